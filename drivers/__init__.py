@@ -1,0 +1,1 @@
+"""How to talk to gauges, encoders and controllers, real or simulated."""

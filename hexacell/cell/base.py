@@ -1,0 +1,28 @@
+"""What all sections of the cell file share."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from pydantic import BaseModel, ConfigDict, Field
+
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+Finite = Annotated[float, Field(allow_inf_nan=False)]
+Point = tuple[Finite, Finite, Finite]
+SixNumbers = tuple[Finite, Finite, Finite, Finite, Finite, Finite]
+SixPoints = tuple[Point, Point, Point, Point, Point, Point]
+
+
+class Section(BaseModel):
+    """A section of the cell file: frozen, and nothing unknown in it."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+class GeometryValues(Section):
+    """The 42 numbers of a mechanism with one constraint a leg, mm."""
+
+    S: SixPoints = Field(description="spherical joints in the base frame at q = 0, mm, legs 1 to 6")
+    B: SixPoints = Field(description="universal joints in the platform frame (origin: the ball), mm")
+    l: SixNumbers = Field(description="leg lengths, mm")  # noqa: E741 - the paper's symbol

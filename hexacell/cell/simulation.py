@@ -1,0 +1,49 @@
+"""The section that a simulated cell adds: what is hidden, how it moves, what it scatters."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import Field
+
+from hexacell.cell.base import GeometryValues, NotNegative, Positive, Section
+
+
+class SimulatedGauges(Section):
+    """How the simulated dial indicators behave."""
+
+    noise_mm: NotNegative = Field(0.01, description="of one reading, one standard deviation")
+    latency_s: NotNegative = Field(0.02, description="between question and answer")
+    baudrate: int | None = Field(None, ge=300, description="wire speed imitated; default the protocol's")
+    transport: Literal["pty", "socket"] = Field("pty")
+    misalignment_deg: NotNegative = Field(0.0, description="of the triad at each station, 1 sigma")
+
+
+class SimulatedEncoders(Section):
+    """How the simulated CANopen encoders behave."""
+
+    noise_mm: NotNegative = Field(0.01, description="of one sample, one standard deviation")
+    latency_s: NotNegative = Field(0.001, description="between SYNC and the last answer")
+
+
+class SimulatedMotion(Section):
+    """How the simulated robot moves."""
+
+    speed_mm_s: Positive = Field(100.0, description="of the fastest slider")
+    minimum_s: NotNegative = Field(0.3, description="shortest duration of a move")
+    ringing_mm: NotNegative = Field(0.2, description="amplitude of the ball's swing on arrival")
+    ringing_s: Positive = Field(0.15, description="time constant of its decay")
+    repeatability_mm: NotNegative = Field(0.0, description="scatter of each slider's stop, 1 sigma")
+
+
+class SimulationSettings(Section):
+    """The simulated twin of a cell."""
+
+    geometry: GeometryValues = Field(description="the true geometry, hidden from everything else")
+    seed: int = Field(1, ge=0, description="of every random number the cell draws")
+    station_reach_mm: Positive = Field(
+        30.0, description="farther than this from the gauges at rest, they are carried to the ball"
+    )
+    gauges: SimulatedGauges = SimulatedGauges()
+    encoders: SimulatedEncoders = SimulatedEncoders()
+    motion: SimulatedMotion = SimulatedMotion()

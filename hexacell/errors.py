@@ -1,0 +1,124 @@
+"""The one error root, and the exit codes that every face shares."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+from pathlib import Path
+from typing import ClassVar
+
+
+class ExitCode(IntEnum):
+    """What the process tells its caller; stable, see ``docs/interface.md``."""
+
+    DONE = 0
+    OUT_OF_LIMITS = 1
+    USAGE = 2
+    HARDWARE = 3
+    ANSWER_NEEDED = 4
+    BUSY = 5
+    WRITE_BACK_UNDONE = 6
+    INTERRUPTED = 130
+
+
+class HexacellError(Exception):
+    """A problem that a person can act on.
+
+    ``subject`` names the device or file, ``line`` counts from 1 inside that file, ``action`` is
+    the next thing to do. ``str()`` gives one plain sentence made of them.
+    """
+
+    exit_code: ClassVar[ExitCode] = ExitCode.USAGE
+
+    def __init__(
+        self,
+        problem: str,
+        *,
+        subject: str | Path | None = None,
+        line: int | None = None,
+        action: str | None = None,
+    ) -> None:
+        self.problem = problem
+        self.subject = None if subject is None else str(subject)
+        self.line = line
+        self.action = action
+        super().__init__(problem)
+
+    def __str__(self) -> str:
+        where = "" if self.subject is None else self.subject
+        where += "" if self.line is None else f":{self.line}"
+        text = f"{where}: {self.problem}" if where else self.problem
+        return text if self.action is None else f"{text}. {self.action}"
+
+
+class UsageError(HexacellError):
+    """The command asks for something that cannot be done as asked."""
+
+
+class FileError(HexacellError):
+    """A file is absent, unreadable, or does not say what it must."""
+
+
+class ReachError(HexacellError):
+    """A pose that the mechanism cannot take; the message names the leg."""
+
+
+class ConvergenceError(HexacellError):
+    """A numerical solution that was not found; never kept silently."""
+
+    exit_code = ExitCode.OUT_OF_LIMITS
+
+
+class IdentifiabilityError(HexacellError):
+    """The data cannot determine the geometry; the message says what is missing."""
+
+    exit_code = ExitCode.OUT_OF_LIMITS
+
+
+class LimitError(HexacellError):
+    """A result or a measurement lies outside the limits that the cell file states."""
+
+    exit_code = ExitCode.OUT_OF_LIMITS
+
+
+class DeviceError(HexacellError):
+    """A device or the line to it does not do what it must; ``subject`` is the device's name."""
+
+    exit_code = ExitCode.HARDWARE
+
+
+class AnswerNeeded(HexacellError):
+    """A person has to answer or approve, and nobody is there."""
+
+    exit_code = ExitCode.ANSWER_NEEDED
+
+
+class CellBusy(HexacellError):
+    """Another process holds the cell."""
+
+    exit_code = ExitCode.BUSY
+
+
+class WriteBackUndone(HexacellError):
+    """Writing the controller's config failed; the file is as it was."""
+
+    exit_code = ExitCode.WRITE_BACK_UNDONE
+
+
+class SeveralErrors(HexacellError):
+    """Every failure at once, in one indented report; its exit code is that of the gravest."""
+
+    def __init__(self, problem: str, errors: list[HexacellError]) -> None:
+        self.errors = errors
+        super().__init__(problem)
+
+    @property
+    def worst(self) -> ExitCode:
+        """The exit code to leave with: hardware before usage before the rest."""
+        codes = [error.exit_code for error in self.errors]
+        for code in (ExitCode.BUSY, ExitCode.HARDWARE, ExitCode.USAGE):
+            if code in codes:
+                return code
+        return codes[0]
+
+    def __str__(self) -> str:
+        return "\n".join([f"{self.problem}:", *(f"  - {error}" for error in self.errors)])

@@ -1,0 +1,67 @@
+"""Rotation matrices from angles and from rotation vectors, batched.
+
+Convention: a pose's angles a, b, c turn about the fixed axes x, y, z in that order,
+``R = Rz(c) Ry(b) Rx(a)`` (LinuxCNC's ``genhexkins`` and the paper's a, b, g).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Array = NDArray[np.float64]
+
+
+def from_angles(angles: ArrayLike) -> Array:
+    """Rotation matrices (..., 3, 3) of the angles a, b, c (..., 3), rad."""
+    angles = np.asarray(angles, dtype=float)
+    (ca, cb, cc), (sa, sb, sc) = np.moveaxis(np.cos(angles), -1, 0), np.moveaxis(np.sin(angles), -1, 0)
+    rows = [
+        [cc * cb, cc * sb * sa - sc * ca, cc * sb * ca + sc * sa],
+        [sc * cb, sc * sb * sa + cc * ca, sc * sb * ca - cc * sa],
+        [-sb, cb * sa, cb * ca],
+    ]
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+
+
+def to_angles(rotation: ArrayLike) -> Array:
+    """Angles a, b, c (..., 3), rad, with b in [-pi/2, pi/2]; at b = +-pi/2, c is set to 0."""
+    r = np.asarray(rotation, dtype=float)
+    cos_b = np.hypot(r[..., 0, 0], r[..., 1, 0])
+    gimbal = cos_b < 1e-12
+    a = np.where(gimbal, np.arctan2(-r[..., 1, 2], r[..., 1, 1]), np.arctan2(r[..., 2, 1], r[..., 2, 2]))
+    b = np.arctan2(-r[..., 2, 0], cos_b)
+    c = np.where(gimbal, 0.0, np.arctan2(r[..., 1, 0], r[..., 0, 0]))
+    return np.stack([a, b, c], axis=-1)
+
+
+def skew(vector: ArrayLike) -> Array:
+    """Cross-product matrices (..., 3, 3): ``skew(u) @ v = u x v``."""
+    x, y, z = np.moveaxis(np.asarray(vector, dtype=float), -1, 0)
+    zero = np.zeros_like(x)
+    rows = [[zero, -z, y], [z, zero, -x], [-y, x, zero]]
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+
+
+def from_vector(vector: ArrayLike) -> Array:
+    """Rotation matrices (..., 3, 3) of rotation vectors (..., 3), rad (Rodrigues' formula)."""
+    vector = np.asarray(vector, dtype=float)
+    angle = np.linalg.norm(vector, axis=-1)[..., None, None]
+    k = skew(vector)
+    # np.sinc is finite at zero, so no branch is needed for small angles.
+    linear = np.sinc(angle / np.pi)
+    quadratic = 0.5 * np.sinc(angle / (2 * np.pi)) ** 2
+    return np.eye(3) + linear * k + quadratic * (k @ k)
+
+
+def to_vector(rotation: ArrayLike) -> Array:
+    """Rotation vectors (..., 3), rad, with an angle in [0, pi)."""
+    r = np.asarray(rotation, dtype=float)
+    axis = 0.5 * np.stack(
+        [r[..., 2, 1] - r[..., 1, 2], r[..., 0, 2] - r[..., 2, 0], r[..., 1, 0] - r[..., 0, 1]], axis=-1
+    )
+    sine = np.linalg.norm(axis, axis=-1)
+    cosine = 0.5 * (np.trace(r, axis1=-2, axis2=-1) - 1.0)
+    angle = np.arctan2(sine, cosine)
+    scale = np.where(sine > 1e-12, angle / np.where(sine > 1e-12, sine, 1.0), 1.0)
+    return axis * scale[..., None]

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from hexacell import rotations
 from hexacell.rotations import Array
@@ -48,3 +50,41 @@ class Pose:
     def __str__(self) -> str:
         words = zip("XYZABC", self.as_tuple(), strict=True)
         return " ".join(f"{axis}{value:.3f}" for axis, value in words)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Poses:
+    """Many poses as mathematics wants them.
+
+    Attributes:
+        positions: ball centres (n, 3), mm.
+        rotations: rotation matrices (n, 3, 3), platform frame to base frame.
+    """
+
+    positions: Array
+    rotations: Array
+
+    @classmethod
+    def of(cls, poses: Iterable[Pose]) -> Poses:
+        """The arrays of some poses."""
+        numbers = np.array([pose.as_tuple() for pose in poses], dtype=float).reshape(-1, 6)
+        return cls(numbers[:, :3], rotations.from_angles(np.radians(numbers[:, 3:])))
+
+    @classmethod
+    def at(cls, position: ArrayLike, orientations: Array) -> Poses:
+        """One position (3,), mm, in several orientations (n, 3, 3)."""
+        return cls(np.broadcast_to(np.asarray(position, dtype=float), (len(orientations), 3)), orientations)
+
+    def __len__(self) -> int:
+        return len(self.positions)
+
+    def __getitem__(self, rows: slice | NDArray[np.intp] | NDArray[np.bool_] | list[int]) -> Poses:
+        return Poses(self.positions[rows], self.rotations[rows])
+
+    def pose(self, row: int) -> Pose:
+        """One of them, in mm and deg."""
+        return Pose.of(self.positions[row], self.rotations[row])
+
+    def tilts(self) -> Array:
+        """Angles (n,), rad, between the platform's z axis and the base's."""
+        return np.arccos(np.clip(self.rotations[:, 2, 2], -1.0, 1.0))

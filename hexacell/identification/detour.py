@@ -1,0 +1,72 @@
+"""Around the singularities that lie between the drawing and the solution.
+
+On the way from the drawing a record may come next to a singularity although it is far from one at
+both ends. Held in the sum there, it stops the whole iteration. It is therefore set aside, the
+others lead the way, and it is taken back at their solution, where its pose is followed from the
+drawing by continuation. A record that cannot be taken back says nothing and stays out.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hexacell import kinematics
+from hexacell.geometry import Geometry
+from hexacell.identification import levenberg_marquardt
+from hexacell.identification.levenberg_marquardt import Solution, Termination
+from hexacell.identification.problem import Problem
+from hexacell.pose import Poses
+from hexacell.rotations import Array
+
+
+def solve(problem: Problem, precision: Array, *, free: Array, poses: Poses) -> tuple[Problem, Solution]:
+    """As :func:`levenberg_marquardt.solve`; also gives the records that took part in the end."""
+    used = np.ones(problem.records, dtype=bool)
+    taken_back = np.zeros(problem.records, dtype=bool)
+    while True:
+        kept = problem.keeping(used)
+        solution = levenberg_marquardt.solve(kept, precision, free=free, poses=poses)
+        free, poses = solution.free, solution.prediction.poses
+        if solution.termination is Termination.SINGULAR and not solution.singular.all():
+            used[np.flatnonzero(used)[solution.singular]] = False
+            poses = poses[~solution.singular]
+            continue
+        returning, everywhere = _returning(problem, free, ~used & ~taken_back)
+        if not returning.any():
+            return kept, solution
+        poses = _merged(problem.records, used, poses, returning, everywhere)
+        used, taken_back = used | returning, taken_back | returning
+        poses = poses[used]
+
+
+def _returning(
+    problem: Problem, free: Array, aside: NDArray[np.bool_]
+) -> tuple[NDArray[np.bool_], Poses]:
+    """Which of the records set aside stand clear of singularities at a geometry, and their poses."""
+    geometry = Geometry.from_vector(problem.basis @ free)
+    rows = np.flatnonzero(aside)
+    found = kinematics.follow(
+        problem.mechanism,
+        geometry,
+        problem.joints[rows],
+        start=problem.start[rows],
+        start_geometry=problem.prior.centre,
+        start_joints=problem.joints[rows],
+    )
+    by_joints = kinematics.sensitivity(
+        problem.mechanism, geometry, found.poses, problem.joints[rows]
+    ).joints[:, :3]
+    clear = np.linalg.norm(by_joints, axis=(-2, -1)) < levenberg_marquardt.LARGEST_AMPLIFICATION
+    returning = np.zeros(problem.records, dtype=bool)
+    returning[rows] = found.found & clear
+    return returning, found.poses[found.found & clear]
+
+
+def _merged(
+    records: int, used: NDArray[np.bool_], poses: Poses, returning: NDArray[np.bool_], back: Poses
+) -> Poses:
+    positions, rotations = np.zeros((records, 3)), np.zeros((records, 3, 3))
+    positions[used], rotations[used] = poses.positions, poses.rotations
+    positions[returning], rotations[returning] = back.positions, back.rotations
+    return Poses(positions, rotations)

@@ -1,0 +1,82 @@
+"""What a geometry predicts for every record, how that changes, and how far to trust it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hexacell import kinematics
+from hexacell.geometry import Geometry
+from hexacell.identification.problem import Noise, Problem
+from hexacell.pose import Poses
+from hexacell.rotations import Array
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Prediction:
+    """A geometry seen through the records.
+
+    Attributes:
+        free: free parameters (p,), mm.
+        poses: the platform's poses at the measured joint variables.
+        residuals: (n, 3), mm: predicted position less measured deviation, each point's unknown
+            constant still in it.
+        jacobian: (n, 3, p) of the residuals by the free parameters.
+        weights: (n, 3, 3), 1/mm^2: inverse covariance of one record.
+        amplification: (n,) mm of ball a mm of slider: large next to a singularity.
+    """
+
+    free: Array
+    poses: Poses
+    residuals: Array
+    jacobian: Array
+    weights: Array
+    amplification: Array
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Trial:
+    """Poses (n) and residuals (n, 3), mm, of a geometry; ``found`` (n,) says which are on their
+    assembly mode."""
+
+    poses: Poses
+    residuals: Array
+    found: NDArray[np.bool_]
+
+
+def follow_residuals(problem: Problem, free: Array, start: Poses) -> Trial:
+    """The residuals of a geometry near one that the poses ``start`` close."""
+    geometry = Geometry.from_vector(problem.basis @ free)
+    result = kinematics.forward(problem.mechanism, geometry, problem.joints, start)
+    return Trial(result.poses, result.poses.positions - problem.deviations, result.found)
+
+
+def predict(problem: Problem, free: Array, poses: Poses) -> Prediction:
+    """Everything a solver step needs, at poses that close the geometry."""
+    geometry = Geometry.from_vector(problem.basis @ free)
+    sensitivity = kinematics.sensitivity(problem.mechanism, geometry, poses, problem.joints)
+    by_joints = sensitivity.joints[:, :3]
+    return Prediction(
+        free=free,
+        poses=poses,
+        residuals=poses.positions - problem.deviations,
+        jacobian=sensitivity.parameters[:, :3] @ problem.basis,
+        weights=record_weights(by_joints, problem.noise),
+        amplification=np.linalg.norm(by_joints, axis=(-2, -1)),
+    )
+
+
+def record_covariance(position_by_joints: Array, noise: Noise) -> Array:
+    """Covariance (n, 3, 3), mm^2, of records: encoder noise through the machine, and the gauges'.
+
+    Near a singularity the first part is large, and ordinary least squares pays for ignoring it.
+    """
+    through_machine = position_by_joints @ np.swapaxes(position_by_joints, -1, -2)
+    return noise.encoder_mm**2 * through_machine + noise.gauge_mm**2 * np.eye(3)
+
+
+def record_weights(position_by_joints: Array, noise: Noise) -> Array:
+    """Inverse of :func:`record_covariance`."""
+    return np.linalg.inv(record_covariance(position_by_joints, noise))

@@ -1,0 +1,175 @@
+"""What is to be identified from what: the records, the prior and the noise, ready for a solver."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hexacell import kinematics
+from hexacell.errors import IdentifiabilityError
+from hexacell.geometry import PARAMETER_NAMES, Geometry
+from hexacell.measurements import MeasurementSet
+from hexacell.mechanisms.base import Branch, Mechanism
+from hexacell.pose import Poses
+from hexacell.rotations import Array
+
+
+@dataclass(frozen=True, slots=True)
+class Noise:
+    """Standard deviations of one record's numbers, mm."""
+
+    encoder_mm: float
+    gauge_mm: float
+
+
+@dataclass(frozen=True, slots=True)
+class Tolerances:
+    """Half-widths, mm, within which the built robot differs from its drawing.
+
+    ``ball_mm`` is an offset common to all B: where the ball was really mounted.
+    """
+
+    S_mm: float
+    B_mm: float
+    l_mm: float
+    ball_mm: float = 0.0
+
+    def widths(self) -> Array:
+        """The half-width of each of the 42 parameters, the ball's offset left out."""
+        return np.repeat([self.S_mm, self.B_mm, self.l_mm], [18, 18, 6])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Prior:
+    """What is known before measuring: the drawing and how well it was kept.
+
+    Attributes:
+        centre: the drawing, in the mechanism's frame convention.
+        covariance: (p, p) of the free parameters, mm^2.
+    """
+
+    centre: Geometry
+    covariance: Array
+
+    @classmethod
+    def of(cls, mechanism: Mechanism, drawing: Geometry, tolerances: Tolerances) -> Prior:
+        """A Gaussian with the second moments of errors that are uniform within the tolerances."""
+        centre, _ = mechanism.to_convention(drawing)
+        free = mechanism.convention.free_names()
+        rows = [PARAMETER_NAMES.index(name) for name in free]
+        covariance = np.diag(tolerances.widths()[rows] ** 2 / 3.0)
+        for axis in "xyz":
+            common = np.array([name[0] == "B" and name[-1] == axis for name in free], dtype=float)
+            covariance += tolerances.ball_mm**2 / 3.0 * np.outer(common, common)
+        return cls(centre, covariance)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Problem:
+    """Records in the frame convention, sorted by point.
+
+    Attributes:
+        joints: (n, 6), mm, as the encoders gave them.
+        deviations: (n, 3), mm, in the convention's base frame.
+        first_rows: (m,) row at which each point begins.
+        start: poses that close the prior's centre at ``joints``.
+        labels: (n, 2) point and orientation as the user counts them.
+    """
+
+    mechanism: Mechanism
+    prior: Prior
+    noise: Noise
+    joints: Array
+    deviations: Array
+    first_rows: NDArray[np.intp]
+    start: Poses
+    labels: NDArray[np.int_]
+
+    @property
+    def basis(self) -> Array:
+        """(42, p), from free parameters to all of them."""
+        return self.mechanism.convention.basis()
+
+    @property
+    def points(self) -> int:
+        """How many points have records."""
+        return len(self.first_rows)
+
+    @property
+    def records(self) -> int:
+        """How many records there are."""
+        return len(self.joints)
+
+    def group_sums(self, values: Array) -> Array:
+        """Sums over the records of each point: (n, ...) to (m, ...)."""
+        return np.add.reduceat(values, self.first_rows, axis=0)
+
+    def spread(self, values: Array) -> Array:
+        """A value a point (m, ...) repeated for each of its records (n, ...)."""
+        lengths = np.diff(np.append(self.first_rows, self.records))
+        return np.repeat(values, lengths, axis=0)
+
+    def keeping(self, rows: NDArray[np.bool_]) -> Problem:
+        """The same problem with some of its records (n,) only."""
+        kept = np.flatnonzero(rows)
+        return Problem(
+            self.mechanism,
+            self.prior,
+            self.noise,
+            self.joints[kept],
+            self.deviations[kept],
+            _first_rows(self.labels[kept, 0]),
+            self.start[kept],
+            self.labels[kept],
+        )
+
+
+def build_problem(
+    mechanism: Mechanism,
+    measurements: MeasurementSet,
+    *,
+    controller: Geometry,
+    branch: Branch,
+    prior: Prior,
+    noise: Noise,
+) -> Problem:
+    """The problem of some records, whose poses were commanded under ``controller``'s geometry.
+
+    Raises:
+        IdentifiabilityError: a record's pose cannot be followed from the commanding geometry to
+            the drawing; the message names the record.
+    """
+    order = np.argsort(measurements.group, kind="stable")
+    joints, labels = measurements.joints[order], measurements.labels[order]
+    commanding, change = mechanism.to_convention(controller)
+    commanded = change.poses(measurements.poses[order])
+    start = kinematics.follow(
+        mechanism,
+        prior.centre,
+        joints,
+        start=commanded,
+        start_geometry=commanding,
+        start_joints=kinematics.inverse(mechanism, commanding, branch, commanded),
+    )
+    _refuse_lost_records(start.found, labels)
+    deviations = change.deviations(measurements.deviations[order])
+    return Problem(
+        mechanism, prior, noise, joints, deviations, _first_rows(labels[:, 0]), start.poses, labels
+    )
+
+
+def _first_rows(points: NDArray[np.int_]) -> NDArray[np.intp]:
+    return np.flatnonzero(np.diff(points, prepend=points[:1] - 1))
+
+
+def _refuse_lost_records(found: NDArray[np.bool_], labels: NDArray[np.int_]) -> None:
+    if found.all():
+        return
+    point, orientation = labels[np.flatnonzero(~found)[0]]
+    raise IdentifiabilityError(
+        f"{int((~found).sum())} records cannot be followed from the commanded pose to the joint variables "
+        f"without crossing a singularity; the first is point {point}, orientation {orientation}",
+        action="Leave them out, or check that q1 to q6 belong to the commanded poses",
+    )

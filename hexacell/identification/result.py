@@ -1,0 +1,80 @@
+"""What an identification found, how sure it is, and what it could not tell."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from hexacell.geometry import PARAMETER_NAMES, Geometry
+from hexacell.identification.levenberg_marquardt import Termination
+from hexacell.pose import Poses
+from hexacell.rotations import Array
+
+
+@dataclass(frozen=True, slots=True)
+class Outlier:
+    """A record that does not agree with the others, and is left out.
+
+    Attributes:
+        statistic: squared length of its standardised residual; about 3 for a good record.
+    """
+
+    point: int
+    orientation: int
+    statistic: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Identification:
+    """The identified geometry and everything said about it.
+
+    Attributes:
+        geometry: in the mechanism's frame convention, mm.
+        covariance: (42, 42), mm^2, in that convention; zero for what it fixes.
+        free: the free parameters (p,), mm, and ``free_covariance`` (p, p) theirs.
+        prior_sigma: (42,), mm, before measuring.
+        poses: the platform at each record that was used, in the order of the problem.
+        residual_rms_mm: of the centred residuals of the deviations.
+        chi2: weighted sum of squares of those residuals, to be compared with ``dof``.
+    """
+
+    geometry: Geometry
+    covariance: Array
+    free: Array
+    free_covariance: Array
+    prior_sigma: Array
+    poses: Poses
+    records: int
+    points: int
+    residual_rms_mm: float
+    chi2: float
+    dof: int
+    iterations: int
+    termination: Termination
+    outliers: tuple[Outlier, ...]
+    frame: str
+
+    @property
+    def converged(self) -> bool:
+        """Whether the solver ended at a solution."""
+        return self.termination.converged
+
+    @property
+    def sigma(self) -> Array:
+        """Standard deviations (42,), mm, of the parameters; zero for what the convention fixes."""
+        return np.sqrt(np.diag(self.covariance))
+
+    @property
+    def undetermined(self) -> tuple[str, ...]:
+        """Parameters about which the data said next to nothing: posterior against prior."""
+        silent = self.sigma > UNDETERMINED_RATIO * self.prior_sigma
+        return tuple(
+            name
+            for name, prior, said_nothing in zip(PARAMETER_NAMES, self.prior_sigma, silent, strict=True)
+            if prior > 0.0 and said_nothing
+        )
+
+
+UNDETERMINED_RATIO = 0.5
+"""A standard deviation that measuring has not even halved is the drawing's, not the data's."""

@@ -1,0 +1,1 @@
+"""Robot controllers, one protocol a family of files."""

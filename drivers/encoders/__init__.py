@@ -1,0 +1,1 @@
+"""Slider encoders: six CANopen nodes after CiA 406 behind any CAN interface."""

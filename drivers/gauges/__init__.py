@@ -1,0 +1,1 @@
+"""Dial indicators on serial lines, one protocol a file."""

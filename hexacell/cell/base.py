@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field
+from pydantic_core import PydanticCustomError
 
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
@@ -18,6 +19,11 @@ class Section(BaseModel):
     """A section of the cell file: frozen, and nothing unknown in it."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
+
+
+def broken_rule(problem: str, action: str) -> PydanticCustomError:
+    """What a validator raises: the problem in plain words and the next thing to do."""
+    return PydanticCustomError("broken_rule", "{problem}", {"problem": problem, "action": action})
 
 
 class GeometryValues(Section):

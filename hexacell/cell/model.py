@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from typing import Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import Field, ValidationError, field_validator, model_validator
+from pydantic_core import InitErrorDetails
 
-from hexacell.cell.base import GeometryValues, Point, Positive, Section, SixNumbers
+from hexacell.cell.base import GeometryValues, Point, Positive, Section, SixNumbers, broken_rule
 from hexacell.cell.devices import (
     ControllerSettings,
     EncoderSettings,
@@ -48,6 +49,7 @@ class AcceptanceSettings(Section):
     mean_deviation_mm: Positive = Field(0.05, description="at held-out points, after")
     max_deviation_mm: Positive = Field(0.15, description="at held-out points, after")
     largest_change_mm: Positive = Field(15.0, description="of a parameter, applied without a person")
+    drift_mm: Positive = Field(0.1, description="of a point's reference, from its zeroing to its end")
     approval: Literal["ask", "automatic"] = Field(
         "ask", description="automatic: apply within the limits above without asking"
     )
@@ -71,7 +73,7 @@ class CellSettings(Section):
     """A whole cell file."""
 
     version: Literal[1] = Field(1, description="of this file's format")
-    name: str = Field(min_length=1)
+    name: str = Field(min_length=1, description="of the cell, on screens and in reports")
     robot: RobotSettings
     controller: ControllerSettings
     gauges: tuple[GaugeSettings, GaugeSettings, GaugeSettings]
@@ -87,23 +89,34 @@ class CellSettings(Section):
     task: TaskSettings = TaskSettings()
     simulation: SimulationSettings | None = None
 
-    @model_validator(mode="after")
-    def _devices_make_a_triad(self) -> Self:
-        if sorted(gauge.axis for gauge in self.gauges) != ["x", "y", "z"]:
-            raise ValueError("the three gauges must measure x, y and z, one each")
-        if len({gauge.name for gauge in self.gauges}) != 3:
-            raise ValueError("two gauges have the same name")
-        if len(set(self.encoders.nodes)) != 6:
-            raise ValueError("encoders.nodes must name six different node ids")
-        return self
+    @field_validator("gauges")
+    @classmethod
+    def _gauges_make_a_triad(cls, gauges: tuple[GaugeSettings, ...]) -> tuple[GaugeSettings, ...]:
+        if sorted(gauge.axis for gauge in gauges) != ["x", "y", "z"]:
+            raise broken_rule("the three gauges must measure x, y and z, one each", "Correct their axis")
+        if len({gauge.name for gauge in gauges}) != 3:
+            raise broken_rule("two gauges have the same name", "Give each its own")
+        inputs = [(gauge.port, gauge.channel) for gauge in gauges if gauge.port is not None]
+        if len(set(inputs)) != len(inputs):
+            raise broken_rule("two gauges have the same port and channel", "Correct one of them")
+        return gauges
 
     @model_validator(mode="after")
-    def _devices_can_be_reached(self) -> Self:
+    def _real_devices_can_be_reached(self) -> Self:
+        """Each is refused at its own place, so that a reader gets its line."""
         if self.simulation is not None:
             return self
-        missing = [f"gauge {gauge.name}: port" for gauge in self.gauges if gauge.port is None]
-        missing += ["encoders: bus"] if self.encoders.bus is None else []
-        missing += ["controller: port"] if self.controller.port is None else []
-        if missing:
-            raise ValueError("without a [simulation] section these are required: " + ", ".join(missing))
+        ways: list[tuple[tuple[str | int, ...], str, object]] = [
+            *((("gauges", n), "the gauge has no port", gauge.port) for n, gauge in enumerate(self.gauges)),
+            (("encoders",), "the encoders have no bus", self.encoders.bus),
+            (("controller",), "the controller has no port", self.controller.port),
+        ]
+        refusals = [_unreachable(place, problem) for place, problem, way in ways if way is None]
+        if refusals:
+            raise ValidationError.from_exception_data(self.name, refusals)
         return self
+
+
+def _unreachable(place: tuple[str | int, ...], problem: str) -> InitErrorDetails:
+    rule = broken_rule(f"{problem}; only a cell with a [simulation] can do without", "Add it")
+    return InitErrorDetails(type=rule, loc=place, input=None)

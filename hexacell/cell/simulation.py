@@ -12,17 +12,19 @@ from hexacell.cell.base import GeometryValues, NotNegative, Positive, Section
 class SimulatedGauges(Section):
     """How the simulated dial indicators behave."""
 
-    noise_mm: NotNegative = Field(0.01, description="of one reading, one standard deviation")
+    noise_mm: NotNegative = Field(0.01, description="drawn at every stop of the robot, 1 sigma")
+    flicker_mm: NotNegative = Field(0.001, description="drawn at every reading, 1 sigma")
     latency_s: NotNegative = Field(0.02, description="between question and answer")
     baudrate: int | None = Field(None, ge=300, description="wire speed imitated; default the protocol's")
-    transport: Literal["pty", "socket"] = Field("pty")
+    transport: Literal["pty", "socket"] = Field("pty", description="what the gauges' lines are made of")
     misalignment_deg: NotNegative = Field(0.0, description="of the triad at each station, 1 sigma")
 
 
 class SimulatedEncoders(Section):
     """How the simulated CANopen encoders behave."""
 
-    noise_mm: NotNegative = Field(0.01, description="of one sample, one standard deviation")
+    noise_mm: NotNegative = Field(0.01, description="drawn at every stop of the robot, 1 sigma")
+    flicker_mm: NotNegative = Field(0.001, description="drawn at every sample, 1 sigma")
     latency_s: NotNegative = Field(0.001, description="between SYNC and the last answer")
 
 

@@ -1,0 +1,1 @@
+"""The command line: parse, show, ask; no logic of its own."""

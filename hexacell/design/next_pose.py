@@ -43,41 +43,48 @@ class Station:
 
     Attributes:
         reference: where the estimate says the ball was when they were zeroed (3,), mm.
-        reference_jacobian: its derivative by the free parameters (3, p).
-        mean_jacobian: weighted mean (3, p) of those of the point's records.
-        covariance: (3, 3), mm^2, of the point's constant, the parameters being known.
+        orientation: the platform's then (3, 3), under the estimate.
+        jacobian: derivative (3, p) of ``reference`` by the free parameters.
+        covariance: of ``reference`` (3, 3), mm^2, the parameters being known.
     """
 
     reference: Array
-    reference_jacobian: Array
-    mean_jacobian: Array
+    orientation: Array
+    jacobian: Array
     covariance: Array
 
 
-def station(knowledge: Knowledge, poses: Poses, joints: Array) -> Station:
-    """The station of a point's records so far: poses under the estimate; the first row zeroed it."""
+def station(knowledge: Knowledge, poses: Poses, joints: Array, deviations: Array) -> Station:
+    """The station of a point's records so far (n): their poses under the estimate, the first at zero."""
     jacobian, by_joints = _derivatives(knowledge, poses, joints)
     weights = record_weights(by_joints, knowledge.noise)
     covariance = np.linalg.inv(weights.sum(axis=0))
+    reference = covariance @ np.einsum("nij,nj->i", weights, poses.positions - deviations)
     mean = covariance @ np.einsum("nij,njp->ip", weights, jacobian)
-    return Station(poses.positions[0], jacobian[0], mean, covariance)
+    return Station(reference, poses.rotations[0], mean, covariance)
 
 
-def choose(knowledge: Knowledge, at: Station, orientations: Array) -> Choice:
-    """The best of the orientations (n, 3, 3) about the zeroed reference.
+def choose(knowledge: Knowledge, at: Station, turns: Array) -> Choice:
+    """The best of some turns (n, 3, 3) away from the orientation at the zeroed reference.
+
+    Turns start there and not at the untilted platform: with millimetres of error in the joints the
+    platform may stand 20 degrees from where the controller believes it to be.
 
     Raises:
         LimitError: none of them is reachable within the limits and surely inside the travel.
     """
-    candidates = reachable(knowledge, Poses.at(at.reference, orientations))
+    candidates = reachable(knowledge, Poses.at(at.reference, turns @ at.orientation))
     if not len(candidates):
         raise LimitError("no orientation is within reach, joint range, tilt limit and singularity margin")
     jacobian, by_joints = _derivatives(knowledge, candidates.targets, candidates.joints)
+    noise = record_covariance(by_joints, knowledge.noise) + at.covariance
+    change = jacobian - at.jacobian
+    spread = change @ knowledge.covariance @ np.swapaxes(change, -1, -2) + noise
+    sigma = np.sqrt(np.diagonal(spread, axis1=-2, axis2=-1))
     deviation = candidates.targets.positions - at.reference
-    noise = record_covariance(by_joints, knowledge.noise)
-    sigma = _deviation_sigma(knowledge, jacobian - at.reference_jacobian, noise)
     outside = np.abs(deviation) + SAFETY_SIGMAS * sigma > TRAVEL_SHARE * knowledge.limits.gauge_travel_mm
-    gain = _information(knowledge, jacobian - at.mean_jacobian, noise + at.covariance)
+    # Information on the parameters, nat: log det(1 + noise^-1 H C H^T) / 2.
+    gain = 0.5 * (np.linalg.slogdet(spread)[1] - np.linalg.slogdet(noise)[1])
     gain[outside.any(axis=-1)] = -np.inf
     best = int(np.argmax(gain))
     if not np.isfinite(gain[best]):
@@ -92,14 +99,3 @@ def _choice(candidates: Candidates, row: int, deviation: Array, sigma: Array, ga
 def _derivatives(knowledge: Knowledge, poses: Poses, joints: Array) -> tuple[Array, Array]:
     sensitivity = kinematics.sensitivity(knowledge.mechanism, knowledge.estimate, poses, joints)
     return sensitivity.parameters[:, :3] @ knowledge.basis, sensitivity.joints[:, :3]
-
-
-def _deviation_sigma(knowledge: Knowledge, jacobian: Array, noise: Array) -> Array:
-    spread = jacobian @ knowledge.covariance @ np.swapaxes(jacobian, -1, -2) + noise
-    return np.sqrt(np.diagonal(spread, axis1=-2, axis2=-1))
-
-
-def _information(knowledge: Knowledge, jacobian: Array, noise: Array) -> Array:
-    """``log det(I + noise^-1 H C H^T) / 2`` (n,), nat."""
-    signal = jacobian @ knowledge.covariance @ np.swapaxes(jacobian, -1, -2)
-    return 0.5 * (np.linalg.slogdet(signal + noise)[1] - np.linalg.slogdet(noise)[1])

@@ -8,6 +8,7 @@ import numpy as np
 
 from hexacell.geometry import PARAMETER_NAMES, Geometry
 from hexacell.identification.levenberg_marquardt import Termination
+from hexacell.identification.problem import Problem
 from hexacell.pose import Poses
 from hexacell.rotations import Array
 
@@ -34,7 +35,8 @@ class Identification:
         covariance: (42, 42), mm^2, in that convention; zero for what it fixes.
         free: the free parameters (p,), mm, and ``free_covariance`` (p, p) theirs.
         prior_sigma: (42,), mm, before measuring.
-        poses: the platform at each record that was used, in the order of the problem.
+        problem: the records that were used.
+        poses: the platform at each of them, under the identified geometry.
         residual_rms_mm: of the centred residuals of the deviations.
         chi2: weighted sum of squares of those residuals, to be compared with ``dof``.
     """
@@ -44,9 +46,8 @@ class Identification:
     free: Array
     free_covariance: Array
     prior_sigma: Array
+    problem: Problem
     poses: Poses
-    records: int
-    points: int
     residual_rms_mm: float
     chi2: float
     dof: int
@@ -54,6 +55,16 @@ class Identification:
     termination: Termination
     outliers: tuple[Outlier, ...]
     frame: str
+
+    @property
+    def records(self) -> int:
+        """How many records were used."""
+        return self.problem.records
+
+    @property
+    def points(self) -> int:
+        """At how many points."""
+        return self.problem.points
 
     @property
     def converged(self) -> bool:

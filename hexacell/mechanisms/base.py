@@ -85,6 +85,16 @@ class FrameChange:
         """The same differences of positions (n, 3), mm, in the new base frame."""
         return deviations @ self.base.T
 
+    def inverse(self) -> FrameChange:
+        """The way back."""
+        return FrameChange(self.base.T, -self.base @ self.origin, self.platform.T)
+
+    def geometry(self, geometry: Geometry) -> Geometry:
+        """The same machine in the new frames."""
+        return Geometry(
+            (geometry.S - self.origin) @ self.base.T, geometry.B @ self.platform.T, geometry.l
+        )
+
 
 class Mechanism(Protocol):
     """A six-legged parallel mechanism. Everything is batched over n poses; nothing raises."""

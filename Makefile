@@ -1,0 +1,40 @@
+# Everything a newcomer or CI types. Each target sets up .venv by itself; once that is done it takes
+# milliseconds and no network.
+#
+#   make demo | test | test-full | lint | bench | clean
+#   make test ARGS="-k gauges"       more arguments for what is run
+#   make PYTHON=python3.12 test      which Python .venv is made with, the first time
+
+PYTHON = python3
+ARGS =
+RUN = .venv/bin/python -m
+
+# What other software puts on these paths would be found before what is pinned here.
+unexport PYTHONPATH PYTHONHOME
+
+.PHONY: demo test test-full lint bench clean venv
+
+demo: venv
+	.venv/bin/hexacell demo $(ARGS)
+
+test: venv
+	$(RUN) pytest -m "not slow and not benchmark" $(ARGS)
+
+test-full: venv
+	$(RUN) pytest -m "not benchmark" $(ARGS)
+
+bench: venv
+	$(RUN) pytest tests/benchmarks -s --timeout=0 $(ARGS)
+
+lint: venv
+	$(RUN) ruff check
+	$(RUN) ruff format --check
+	$(RUN) mypy
+	.venv/bin/lint-imports --no-logo
+
+venv:
+	@.ci/venv "$(PYTHON)"
+
+clean:
+	rm -rf .venv build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +

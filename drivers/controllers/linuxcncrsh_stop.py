@@ -1,0 +1,75 @@
+"""Stopping a machine whose own connection is busy, and making sure that it stands."""
+
+from __future__ import annotations
+
+import asyncio
+
+from drivers.controllers.linuxcncrsh_address import Address, Patience
+from drivers.controllers.linuxcncrsh_commands import Commands
+from drivers.controllers.linuxcncrsh_connection import Connection
+from drivers.controllers.linuxcncrsh_protocol import apart
+from drivers.trace import Recorder
+from hexacell.errors import DeviceError
+
+_ATTEMPTS = 3
+_ALIKE = 3
+"""Successive positions that must agree before the machine counts as standing."""
+
+
+async def stop_in_place(
+    address: Address, patience: Patience, tolerance_mm: float, recorder: Recorder | None = None
+) -> None:
+    """Abort over a connection of its own until successive positions agree within ``tolerance_mm``.
+
+    Raises:
+        DeviceError: There is no way to it, or it still moves after ``patience.stop``.
+    """
+    try:
+        async with asyncio.timeout(patience.stop):
+            await _try_to_stop(address, patience, tolerance_mm, recorder)
+    except TimeoutError:
+        problem = f"does not stand still {patience.stop:g} s after it was told to stop"
+        raise _unstopped(problem, address) from None
+    except DeviceError as error:
+        raise _unstopped(f"could not be stopped: it {error.problem}", address) from error
+
+
+async def _try_to_stop(
+    address: Address, patience: Patience, tolerance_mm: float, recorder: Recorder | None
+) -> None:
+    """Try again whatever went wrong: commands of two clients that coincide garble each other."""
+    for attempt in range(1, _ATTEMPTS + 1):
+        try:
+            connection = await Connection.open(address, patience, recorder)
+            try:
+                await _abort_until_still(Commands(connection, address.name), patience, tolerance_mm)
+            finally:
+                await connection.close()
+        except DeviceError:
+            if attempt == _ATTEMPTS:
+                raise
+        else:
+            return
+
+
+async def _abort_until_still(commands: Commands, patience: Patience, tolerance_mm: float) -> None:
+    """One abort may come before the motion that it is meant for, or without having control."""
+    while True:
+        # Refused when the machine is off, which is as good, or when another client took control.
+        await commands.connection.ask("set abort")
+        if await _stands(commands, patience.poll, tolerance_mm):
+            return
+        await commands.connection.take_control()
+
+
+async def _stands(commands: Commands, poll_s: float, tolerance_mm: float) -> bool:
+    first = await commands.pose()
+    for _ in range(_ALIKE - 1):
+        await asyncio.sleep(poll_s)
+        if max(apart(first, await commands.pose())) > tolerance_mm:
+            return False
+    return True
+
+
+def _unstopped(problem: str, address: Address) -> DeviceError:
+    return DeviceError(problem, subject=address.name, action="Press the emergency stop")

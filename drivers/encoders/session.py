@@ -1,0 +1,121 @@
+"""An open bank of encoders, seen from the thread that owns its bus."""
+
+from __future__ import annotations
+
+import threading
+from functools import partial
+
+from drivers.encoders.alarms import AlarmPoll
+from drivers.encoders.bus import EncoderBus
+from drivers.encoders.configure import configure
+from drivers.encoders.errors import BusError
+from drivers.encoders.identify import (
+    check_measuring_step,
+    check_serial_number,
+    device_type,
+    find,
+    identify,
+)
+from drivers.encoders.legs import Leg
+from drivers.encoders.node import EncoderNode, NmtCommand
+from drivers.encoders.objects import DeviceType
+from drivers.encoders.rounds import SyncRounds
+from drivers.encoders.watch import NodeWatch, check
+from drivers.ports import DeviceIdentity, EncoderRound
+from drivers.trace import Recorder
+from hexacell.cell.devices import EncoderSettings
+
+NM_TO_MM = 1e-6
+
+
+class EncoderSession:
+    """Opened, compared, configured and started; then read round by round.
+
+    Raises:
+        DeviceError: Anything that keeps the bank from being relied on; the bus is closed again.
+    """
+
+    def __init__(
+        self, settings: EncoderSettings, interrupted: threading.Event, trace: Recorder | None = None
+    ) -> None:
+        self._settings = settings
+        self._bus = EncoderBus(_bus_settings(settings), interrupted, trace)
+        try:
+            self._start()
+        except BaseException:
+            self._bus.close()
+            raise
+
+    @property
+    def identities(self) -> tuple[DeviceIdentity, ...]:
+        """Who answered, legs 1 to 6."""
+        return self._identities
+
+    def read(self) -> EncoderRound:
+        """One complete round; kept only if nothing was wrong after it either.
+
+        Raises:
+            DeviceError: What is wrong.
+        """
+        self._bus.check()
+        counts = self._rounds.take(signed=self._settings.signed)
+        self._alarms.check()
+        self._bus.check()
+        return EncoderRound(counts, positions_mm(counts, self._settings))
+
+    def close(self) -> None:
+        """Let the bus go."""
+        self._bus.close()
+
+    def _start(self) -> None:
+        settings = self._settings
+        legs = tuple(Leg(number, node) for number, node in enumerate(settings.nodes, 1))
+        nodes = tuple(EncoderNode(leg, self._bus, settings.timeout_s) for leg in legs)
+        for node in nodes:
+            node.command(NmtCommand.ENTER_PRE_OPERATIONAL)
+        find(nodes, self._bus, settings.timeout_s)
+        watches = tuple(NodeWatch(leg, self._bus, settings.heartbeat_ms) for leg in legs)
+        kinds = tuple(device_type(node) for node in nodes)
+        self._identities = tuple(map(self._identify, nodes, kinds))
+        channels = tuple(
+            configure(node, kind, settings.heartbeat_ms) for node, kind in zip(nodes, kinds, strict=True)
+        )
+        for watch in watches:
+            watch.expect_heartbeats()
+        self._rounds = SyncRounds(legs, channels, self._bus, settings.timeout_s)
+        self._bus.guard = partial(_check_all, nodes, watches, self._rounds)
+        self._alarms = AlarmPoll(nodes, watches)
+        for node in nodes:
+            node.command(NmtCommand.START)
+        self._rounds.prove(signed=settings.signed)
+
+    def _identify(self, node: EncoderNode, kind: DeviceType) -> DeviceIdentity:
+        check_measuring_step(node, self._settings.measuring_step_nm)
+        identity = identify(node, kind)
+        check_serial_number(node, identity, self._settings)
+        return identity
+
+
+def positions_mm(counts: tuple[int, ...], settings: EncoderSettings) -> tuple[float, ...]:
+    """Joint variables q along the rails, mm: direction x counts x step + offset."""
+    step_mm = settings.measuring_step_nm * NM_TO_MM
+    terms = zip(settings.direction, counts, settings.offset_mm, strict=True)
+    return tuple(direction * count * step_mm + offset for direction, count, offset in terms)
+
+
+def _check_all(nodes: tuple[EncoderNode, ...], watches: tuple[NodeWatch, ...], rounds: SyncRounds) -> None:
+    for node in nodes:
+        node.check_alone()
+    check(watches)
+    rounds.check()
+
+
+def _bus_settings(settings: EncoderSettings) -> dict[str, object]:
+    if settings.bus is None:
+        raise BusError(
+            "is not named in the cell file",
+            subject="encoder bus",
+            action="State `bus` under [encoders], for example "
+            '{ interface = "slcan", channel = "/dev/ttyACM0", bitrate = 500000 }',
+        )
+    return settings.bus

@@ -1,0 +1,140 @@
+"""CDI and Starrett indicators with the serial ASCII command protocol.
+
+Line 9600 8N1. ``R`` asks for the value: sign, eight characters of digits, point and blanks, ``, ``,
+and ``IN`` or ``MM``. ``?pXXX`` asks for parameter XXX (Starrett IQ manual, page 17): p011 mode 0 ABS,
+1 TIR, 2 INCR; p013 unit 1 in, 2 mm; p019 reversed; p021 hold; p040 ratio. The manual does not show the
+answer to it: the bare number and ``pXXX=number`` are both accepted. Older indicators know ``R`` only.
+"""
+
+from __future__ import annotations
+
+import re
+from enum import Enum, IntEnum
+from functools import partial
+from typing import ClassVar
+
+from drivers.gauges.dialect import Dialect, LineSettings
+from drivers.gauges.errors import FrameRejected, GaugeAtEnd, GaugeSilent
+from drivers.gauges.serial_gauge import SerialGauge
+from drivers.gauges.shown import Shown, Unit
+from drivers.gauges.state import GaugeState
+
+ASK = b"R\r"
+VALUE = re.compile(rb"([+-])(?=.{8}, )( *\d+\.\d+ *), (IN|MM)\r")
+PARAMETER = re.compile(rb"(?:[pP](\d{3}) ?= ?)?(\d{1,3})\r")
+UNITS = {b"IN": Unit.INCH, b"MM": Unit.MM}
+UNIT_NUMBERS = {1: Unit.INCH, 2: Unit.MM}
+MODES = {0: "ABS", 1: "TIR", 2: "INCR"}
+
+
+class Refusal(Enum):
+    """What the instrument says instead of an answer."""
+
+    NOT_FOUND = b"NOT FOUND\r"
+    NO_ACCESS = b"NO ACCESS\r"
+    OUT_OF_BOUNDS = b"OUT OF BOUNDS\r"
+    NON_NUMERIC = b"NON NUMERIC\r"
+
+
+class Parameter(IntEnum):
+    """The configuration parameters that can falsify readings."""
+
+    MODE = 11
+    UNIT = 13
+    REVERSED = 19
+    HOLD = 21
+    RATIO = 40
+
+
+def parse_value(frame: bytes) -> Shown | Refusal:
+    """What an answer to ``R`` says.
+
+    Raises:
+        FrameRejected: The frame is neither a value nor a refusal, to the last byte.
+    """
+    if match := VALUE.fullmatch(frame):
+        return Shown.of(match[1], match[2], frame, UNITS[match[3]])
+    try:
+        return Refusal(frame)
+    except ValueError:
+        raise FrameRejected(frame) from None
+
+
+def parse_parameter(frame: bytes, parameter: Parameter) -> int | None:
+    """The value of ``parameter`` in the answer to its question; None if there is no such one.
+
+    Raises:
+        FrameRejected: The frame is neither, or names another parameter.
+    """
+    if frame in {Refusal.NOT_FOUND.value, Refusal.NO_ACCESS.value}:
+        return None
+    match = PARAMETER.fullmatch(frame)
+    if match is None or int(match[1] or parameter) != parameter:
+        raise FrameRejected(frame)
+    return int(match[2])
+
+
+class CdiGauge(SerialGauge):
+    """A CDI or Starrett dial indicator."""
+
+    dialect: ClassVar[Dialect] = Dialect(
+        "cdi", "CDI or Starrett indicator", LineSettings(9600), "+  2.1380, MM\r\n"
+    )
+    normal_modes: ClassVar[frozenset[str]] = frozenset({"ABS", "INCR"})
+
+    _knows_parameters: bool | None = None
+
+    @property
+    def question(self) -> bytes:
+        """What asks for the value shown."""
+        return ASK
+
+    def _understand(self, frame: bytes) -> Shown:
+        answer = parse_value(frame)
+        if isinstance(answer, Shown):
+            return answer
+        if answer is Refusal.OUT_OF_BOUNDS:
+            raise GaugeAtEnd(
+                "plunger at its end (OUT OF BOUNDS)",
+                subject=self.subject,
+                action="Move the gauge or the ball",
+            )
+        raise FrameRejected(frame)  # our question did not reach it as sent
+
+    async def _inspect(self) -> GaugeState:
+        unit = await self._unit()
+        mode = await self._parameter(Parameter.MODE)
+        return GaugeState(
+            unit=unit,
+            mode=None if mode is None else MODES.get(mode, str(mode)),
+            reversed=_flag(await self._parameter(Parameter.REVERSED)),
+            hold=_flag(await self._parameter(Parameter.HOLD)),
+            scaling=_flag(await self._parameter(Parameter.RATIO)),
+        )
+
+    async def _unit(self) -> Unit | None:
+        try:
+            return (await self._shown()).unit
+        except GaugeAtEnd:
+            number = await self._parameter(Parameter.UNIT)
+            return None if number is None else UNIT_NUMBERS.get(number)
+
+    async def _parameter(self, parameter: Parameter) -> int | None:
+        """Its value; None if the instrument has none, or has never answered for any."""
+        if self._knows_parameters is False:
+            return None
+        try:
+            value = await self._query(
+                b"?p%03d\r" % parameter, partial(parse_parameter, parameter=parameter)
+            )
+        except GaugeSilent:
+            if self._knows_parameters:
+                raise
+            self._knows_parameters = False
+            return None
+        self._knows_parameters = True
+        return value
+
+
+def _flag(number: int | None) -> bool | None:
+    return None if number is None else number != 0

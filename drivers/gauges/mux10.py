@@ -1,0 +1,134 @@
+"""Mitutoyo MUX-10 frames: one of up to several indicators behind a multiplexer.
+
+Line 9600 8N1. The channel's number asks: ``0``, channel, ``A``, sign, eight of digits and point. An
+error is three digits beginning with 9: the last is 1 if no gauge answered, 8 if the multiplexer is
+busy. The second is 1 in the sources seen; the channel is accepted too. Nothing says the unit: five
+decimals are inches. Hold, direction and preset cannot be asked for.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import re
+from dataclasses import dataclass
+from typing import ClassVar
+
+from drivers.gauges.dialect import Dialect, LineSettings
+from drivers.gauges.errors import FrameRejected, GaugeAtEnd, GaugeSilent, WrongAnswer
+from drivers.gauges.serial_gauge import SerialGauge
+from drivers.gauges.shown import Shown
+from drivers.gauges.state import GaugeState
+from hexacell.errors import DeviceError
+
+VALUE = re.compile(rb"0(\d{1,2})A([+-])(?=.{8}\r)(\d+\.\d+)\r")
+ERROR = re.compile(rb"9(\d)(\d)\r")
+ABOUT = re.compile(rb"([ -~]{4,60})\r")
+NO_GAUGE = 1
+BUSY = 8
+BUSY_PAUSE_S = 0.05
+BUSY_TRIES = 20
+
+
+class MultiplexerBusy(Exception):
+    """Error 918: ask again in a moment."""
+
+
+@dataclass(frozen=True, slots=True)
+class MultiplexerError:
+    """An error frame: its last digit."""
+
+    code: int
+
+
+def parse_value(frame: bytes, channel: int) -> Shown | MultiplexerError:
+    """What an answer to the question for ``channel`` says.
+
+    Raises:
+        FrameRejected: The frame is neither a value of this channel nor an error, to the last byte.
+    """
+    value = VALUE.fullmatch(frame)
+    if value and int(value[1]) == channel:
+        return Shown.of(value[2], value[3], frame)
+    error = ERROR.fullmatch(frame)
+    if error and int(error[1]) in {1, channel}:
+        return MultiplexerError(int(error[2]))
+    raise FrameRejected(frame)
+
+
+def parse_about(frame: bytes) -> str:
+    """The multiplexer's description of itself, which is free text.
+
+    Raises:
+        FrameRejected: It is no text of a likely length, or a value.
+    """
+    match = ABOUT.fullmatch(frame)
+    if match is None or VALUE.fullmatch(frame):
+        raise FrameRejected(frame)
+    return match[1].decode("ascii").strip()
+
+
+class Mux10Gauge(SerialGauge):
+    """A dial indicator on one channel of a Mitutoyo MUX-10 or a multiplexer with its format."""
+
+    dialect: ClassVar[Dialect] = Dialect(
+        "mux10", "Mitutoyo MUX-10 channel", LineSettings(9600), "01A+0000.123\r"
+    )
+
+    @property
+    def channel(self) -> int:
+        """Its input of the multiplexer, from 1."""
+        return self.settings.channel
+
+    @property
+    def question(self) -> bytes:
+        """What asks for the value shown."""
+        return b"%d\r" % self.channel
+
+    async def _shown(self) -> Shown:
+        for _ in range(BUSY_TRIES):
+            try:
+                return await super()._shown()
+            except MultiplexerBusy:
+                await asyncio.sleep(BUSY_PAUSE_S)
+        raise DeviceError(
+            "its multiplexer stays busy (918)",
+            subject=self.subject,
+            action="Disconnect the foot switch and other triggers",
+        )
+
+    def _understand(self, frame: bytes) -> Shown:
+        answer = parse_value(frame, self.channel)
+        if isinstance(answer, Shown):
+            return answer
+        if answer.code == BUSY:
+            raise MultiplexerBusy
+        shown = frame.decode("ascii").strip()
+        if answer.code == NO_GAUGE:
+            raise GaugeSilent(
+                f"does not answer its multiplexer ({shown})",
+                subject=self.subject,
+                action="Switch it on, check its cable, and channel in the cell file",
+            )
+        raise GaugeAtEnd(
+            f"shows an error instead of a value ({shown}), as at an end of its travel",
+            subject=self.subject,
+            action="Move the gauge or the ball",
+        )
+
+    async def _inspect(self) -> GaugeState:
+        shown: Shown | None
+        try:
+            shown = await self._shown()
+        except GaugeAtEnd:
+            shown = None
+        about = self._state.identification if self._state else await self._about()
+        if shown is None:
+            return GaugeState(identification=about)
+        return GaugeState(about, shown.apparent_unit, shown.decimals)
+
+    async def _about(self) -> str | None:
+        """What the multiplexer says of itself, if it does."""
+        try:
+            return await self._query(b"V\r", parse_about)
+        except (GaugeSilent, WrongAnswer):
+            return None

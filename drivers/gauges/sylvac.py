@@ -1,0 +1,149 @@
+"""Sylvac opto-RS duplex: also Kaefer, Teclock and TESA indicators with that interface.
+
+Line 4800 baud 7E2. ``?`` asks for the value: sign or blank, digits, and ``<``, ``=`` or ``>`` while
+tolerances are shown. The unit is not part of it and is asked with ``UNI?``. ``ERR0`` is overspeed or
+the sensor, ``ERR1`` an unknown command, ``ERR2`` wrong parity, ``ERR3`` a plunger out of its range
+(Sylvac opto-RS instructions; the settings' answers from the Z-Cal, Hi-Cal and S-Mike manuals). An
+identification that nobody asked for follows switching on.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from enum import Enum
+from typing import ClassVar
+
+from drivers.gauges.dialect import Dialect, LineSettings
+from drivers.gauges.errors import FrameRejected, GaugeAtEnd, WrongAnswer
+from drivers.gauges.serial_gauge import SerialGauge
+from drivers.gauges.shown import Shown, Unit
+from drivers.gauges.state import GaugeState
+from hexacell.errors import DeviceError
+
+ASK = b"?\r"
+VALUE = re.compile(rb"([+\- ])(\d{1,5}\.\d{1,6})[<=>]?\r")
+POWER_UP = re.compile(rb"(?<![A-Z])[A-Z]{2}\d{2,}[\w.]*\r")  # maker, instrument, options
+
+
+class Fault(Enum):
+    """An error that the instrument reports instead of an answer."""
+
+    SENSOR = b"ERR0\r"
+    COMMAND = b"ERR1\r"
+    PARITY = b"ERR2\r"
+    RANGE = b"ERR3\r"
+
+
+FAULTS = frozenset(fault.value for fault in Fault)
+
+
+@dataclass(frozen=True, slots=True)
+class Query:
+    """A setting: what asks for it, and its answer with the setting as the only group."""
+
+    command: bytes
+    answer: re.Pattern[bytes]
+
+    def parse(self, frame: bytes) -> str | None:
+        """The setting in ``frame``; None if the instrument does not know the command.
+
+        Raises:
+            FrameRejected: The frame is no answer to this query.
+        """
+        if frame == Fault.COMMAND.value:
+            return None
+        match = self.answer.fullmatch(frame)
+        if match is None or frame in FAULTS:
+            raise FrameRejected(frame)
+        return match[1].decode("ascii").strip()
+
+
+UNIT = Query(b"UNI?\r", re.compile(rb"(?:UNI ?)?(MM|IN)\r"))
+IDENTIFICATION = Query(b"ID?\r", re.compile(rb"([A-Z][ -~]{1,31})\r"))
+MODE = Query(b"MOD?\r", re.compile(rb"(?:MOD ?)?([A-Z]{3}\d?)\r"))
+HOLD = Query(b"STO?\r", re.compile(rb"(?:STO ?)?([01])\r"))
+DIRECTION = Query(b"CHA?\r", re.compile(rb"(?:CHA ?)?([+-])\r"))
+PRESET = Query(b"PRE?\r", re.compile(rb"(?:PRE ?)?([+\- ]?\d{1,5}\.\d{1,6})\r"))
+BATTERY = Query(b"BAT?\r", re.compile(rb"(?:BAT ?)?([01])\r"))
+
+
+def parse_value(frame: bytes) -> Shown | Fault:
+    """What an answer to ``?`` says.
+
+    Raises:
+        FrameRejected: The frame is neither a value nor an error, to the last byte.
+    """
+    if match := VALUE.fullmatch(frame):
+        return Shown.of(match[1], match[2], frame)
+    try:
+        return Fault(frame)
+    except ValueError:
+        raise FrameRejected(frame) from None
+
+
+class SylvacGauge(SerialGauge):
+    """A dial indicator that speaks Sylvac's opto-RS duplex protocol."""
+
+    # duplex cables are fed by DTR high and RTS low
+    dialect: ClassVar[Dialect] = Dialect(
+        "sylvac", "Sylvac opto-RS indicator", LineSettings(4800, 7, "E", 2, rts=False), "+12.345\r"
+    )
+    normal_modes: ClassVar[frozenset[str]] = frozenset({"NOR", "REF", "REF1", "REF2"})
+
+    @property
+    def question(self) -> bytes:
+        """What asks for the value shown."""
+        return ASK
+
+    def _understand(self, frame: bytes) -> Shown:
+        match parse_value(frame):
+            case Shown() as shown:
+                return shown
+            case Fault.RANGE:
+                raise GaugeAtEnd(
+                    "plunger at its end (ERR3)", subject=self.subject, action="Move the gauge or the ball"
+                )
+            case Fault.SENSOR:
+                raise self._voided("moved too fast or its sensor fails (ERR0)")
+            case _:  # our question did not reach it as sent
+                raise FrameRejected(frame)
+
+    async def _inspect(self) -> GaugeState:
+        unit = await self._query(UNIT.command, UNIT.parse)
+        if unit is None:
+            raise DeviceError(
+                "does not tell its unit", subject=self.subject, action="Use an indicator that knows UNI?"
+            )
+        direction = await self._query(DIRECTION.command, DIRECTION.parse)
+        return GaugeState(
+            unit=Unit.MM if unit == "MM" else Unit.INCH,
+            identification=await self._query(IDENTIFICATION.command, IDENTIFICATION.parse),
+            mode=await self._query(MODE.command, MODE.parse),
+            hold=_flag(await self._query(HOLD.command, HOLD.parse), "1"),
+            reversed=_flag(direction, "-"),
+            preset=await self._query(PRESET.command, PRESET.parse),
+            battery_low=_flag(await self._query(BATTERY.command, BATTERY.parse), "0"),
+        )
+
+    async def _ask(self, request: bytes) -> bytes:
+        frame = await super()._ask(request)
+        unasked = self._live_link().take_strays()
+        unasked += frame if request != IDENTIFICATION.command else b""
+        if power_up := POWER_UP.search(unasked):
+            self._distrust()
+            raise self._voided(f"was switched on again ({power_up[0]!r})")
+        return frame
+
+    def _nonsense(self, received: bytes) -> DeviceError:
+        if received == Fault.PARITY.value:
+            return WrongAnswer(
+                "hears our questions with wrong parity (ERR2)",
+                subject=self.subject,
+                action=f"Check parity settings: {self.dialect.protocol} uses {self.dialect.line}",
+            )
+        return super()._nonsense(received)
+
+
+def _flag(setting: str | None, when: str) -> bool | None:
+    return None if setting is None else setting == when

@@ -1,0 +1,58 @@
+"""What can be wrong with a port, in words that say what to do next."""
+
+from __future__ import annotations
+
+import errno
+
+from hexacell.errors import DeviceError, FileError
+
+_CAUSES = {
+    errno.ENOENT: ("is absent", "Plug it in or correct port in the cell file"),
+    errno.ENODEV: ("is absent", "Plug it in or correct port in the cell file"),
+    errno.ENXIO: ("is absent", "Plug it in or correct port in the cell file"),
+    errno.EACCES: ("may not be opened by this user", "Let the user into the group that owns it"),
+    errno.EPERM: ("may not be opened by this user", "Let the user into the group that owns it"),
+    errno.EBUSY: ("is in use", "Close the other program that has it open"),
+    errno.EAGAIN: ("is in use", "Close the other program that has it open"),
+}
+
+
+def cannot_open(subject: str, url: str, error: BaseException) -> DeviceError:
+    """Opening the port failed with ``error``, an ``OSError`` or a ``termios.error``."""
+    problem, action = _CAUSES.get(
+        getattr(error, "errno", None) or 0,
+        (f"cannot be opened: {error}", "Check the device and port in the cell file"),
+    )
+    return DeviceError(f"port {url} {problem}", subject=subject, action=action)
+
+
+def settings_refused(subject: str, url: str, error: BaseException) -> FileError:
+    """The URL or one of the settings means nothing to pyserial."""
+    return FileError(
+        f"port {url} or its serial settings are refused: {error}",
+        subject=subject,
+        action="Correct port or serial in the cell file",
+    )
+
+
+def lost(subject: str, url: str, reason: str) -> DeviceError:
+    """The port was there and is no longer."""
+    return DeviceError(
+        f"port {url} was lost ({reason})",
+        subject=subject,
+        action="Plug it in and open the device again; its zero is void",
+    )
+
+
+def closed(subject: str, url: str) -> DeviceError:
+    """The port is being closed, by ourselves."""
+    return DeviceError(f"port {url} is closed", subject=subject)
+
+
+def keeps_sending(subject: str, url: str) -> DeviceError:
+    """The device never falls silent, so no answer can be told from the rest."""
+    return DeviceError(
+        f"the device on {url} keeps sending unasked",
+        subject=subject,
+        action="Switch its continuous output off, or correct port and protocol in the cell file",
+    )

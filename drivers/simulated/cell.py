@@ -1,0 +1,124 @@
+"""A whole simulated cell: gauges, encoders and controller that answer on the wire."""
+
+from __future__ import annotations
+
+from contextlib import ExitStack
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+from drivers.simulated.controller.server import SimulatedController
+from drivers.simulated.encoders import SimulatedEncoderBank
+from drivers.simulated.gauges.cell import GaugeRack
+from drivers.simulated.machine import SimulatedMachine
+from drivers.simulated.slcan import serve_slcan
+from drivers.simulated.world import World
+from hexacell import kinematics
+from hexacell.cell.devices import GaugeSettings
+from hexacell.cell.model import CellSettings
+from hexacell.cell.simulation import SimulationSettings
+from hexacell.clock import CellClock
+from hexacell.controller_config.format import ConfigFormat
+from hexacell.mechanisms.base import Mechanism
+from hexacell.pose import Pose, Poses
+
+
+class SimulatedCell:
+    """The cell that a cell file's ``[simulation]`` describes; serves until it is closed.
+
+    ``other_processes``: whether the encoders must be reachable from outside this process.
+
+    Raises:
+        FileError: the controller's config cannot be read.
+        ReachError: the first point of the cell cannot be reached.
+    """
+
+    def __init__(
+        self,
+        settings: CellSettings,
+        simulation: SimulationSettings,
+        mechanism: Mechanism,
+        config_format: ConfigFormat,
+        config: Path,
+        *,
+        other_processes: bool,
+    ) -> None:
+        clock = CellClock(settings.timing.clock_factor)
+        home = Pose(*settings.identification.points[0])
+        self.world = _world(mechanism, simulation, clock, config_format, config, home)
+        self.machine = SimulatedMachine(mechanism, config_format, config, self.world, clock, home)
+        with ExitStack() as served:
+            self.gauges = served.enter_context(_rack(settings, simulation, self.world, clock))
+            self.encoders = served.enter_context(_bank(settings, simulation, self.world, clock))
+            bus: dict[str, Any] = self.encoders.bus_settings
+            if other_processes:
+                adapter = served.enter_context(serve_slcan(self.encoders.channel, "pty"))
+                bus = adapter.bus_settings
+            self.controller = served.enter_context(SimulatedController(self.machine))
+            self._served = served.pop_all()
+        self.settings = settings.model_copy(
+            update={
+                "gauges": self.gauges.gauges,
+                "encoders": settings.encoders.model_copy(update={"bus": bus}),
+                "controller": settings.controller.model_copy(
+                    update={"host": "127.0.0.1", "port": self.controller.port}
+                ),
+                "simulation": None,
+            }
+        )
+
+    def close(self) -> None:
+        """Stop serving; twice is harmless."""
+        self._served.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+
+def _world(
+    mechanism: Mechanism,
+    simulation: SimulationSettings,
+    clock: CellClock,
+    config_format: ConfigFormat,
+    config: Path,
+    home: Pose,
+) -> World:
+    commanding = config_format.read(config)
+    start = Poses.of([home])
+    joints = kinematics.inverse(mechanism, commanding.geometry, commanding.branch, start)[0]
+    return World(
+        mechanism,
+        simulation,
+        clock,
+        start=start,
+        start_geometry=commanding.geometry,
+        start_joints=joints,
+    )
+
+
+def _rack(settings: CellSettings, simulation: SimulationSettings, world: World, clock: CellClock) -> GaugeRack:
+    plungers = {gauge.name: _Plunger(world, gauge) for gauge in settings.gauges}
+    return GaugeRack(settings.gauges, plungers, simulation.gauges, clock, seed=simulation.seed)
+
+
+def _bank(
+    settings: CellSettings, simulation: SimulationSettings, world: World, clock: CellClock
+) -> SimulatedEncoderBank:
+    latency = simulation.encoders.latency_s
+    return SimulatedEncoderBank(settings.encoders, world.sliders, clock, latency_s=latency)
+
+
+class _Plunger:
+    """What one gauge's plunger does, in the instrument's own direction."""
+
+    def __init__(self, world: World, gauge: GaugeSettings) -> None:
+        self._world = world
+        self._gauge = gauge
+
+    def __call__(self) -> float:
+        return self._gauge.sign * self._world.displacement(self._gauge.axis)

@@ -1,0 +1,6 @@
+"""Six CANopen encoders that answer on the wire, each sampled at the same SYNC."""
+
+from drivers.simulated.encoders.bank import SimulatedEncoderBank
+from drivers.simulated.encoders.maker import EVENTS_AND_SYNC, EVENTS_ONLY, TWO_MAGNETS, Maker
+
+__all__ = ["EVENTS_AND_SYNC", "EVENTS_ONLY", "TWO_MAGNETS", "Maker", "SimulatedEncoderBank"]

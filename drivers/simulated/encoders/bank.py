@@ -1,0 +1,131 @@
+"""The simulated bank: positions in, sampled once per SYNC, counts out on the wire."""
+
+from __future__ import annotations
+
+import uuid
+from collections.abc import Callable, Sequence
+from types import TracebackType
+from typing import Any, Self
+
+from drivers.simulated.encoders.encoder import DeviceData, SimulatedEncoder
+from drivers.simulated.encoders.faults import EncoderFaults
+from drivers.simulated.encoders.line import SimulatedLine
+from drivers.simulated.encoders.maker import EVENTS_AND_SYNC, Maker
+from hexacell.cell.devices import EncoderSettings
+from hexacell.clock import CellClock
+
+Positions = Callable[[], Sequence[float]]
+
+_SYNC = 0x080
+_ALL_BITS = 1 << 32
+FIRST_SERIAL_NUMBER = 1001
+
+
+class SimulatedEncoderBank:
+    """Six encoders on a virtual CAN bus of their own; use it as a context, or start and close it.
+
+    ``positions`` gives the six joint variables now, mm, with their noise; it is called at the
+    start, and then once for every SYNC on the bank's thread. Answers to a SYNC are spread over
+    ``latency_s`` of the cell's time. Serial numbers are the cell file's, or 1001 and up.
+    ``faults`` makes things go wrong.
+    """
+
+    def __init__(
+        self,
+        settings: EncoderSettings,
+        positions: Positions,
+        clock: CellClock,
+        latency_s: float = 0.0,
+        makers: Sequence[Maker] = (EVENTS_AND_SYNC,) * 6,
+    ) -> None:
+        self.channel = f"hexacell-encoders-{uuid.uuid4().hex}"
+        self.line = SimulatedLine(self.channel)
+        self.unplugged: set[int] = set()
+        self.faults = EncoderFaults(self)
+        self._settings = settings
+        self._positions = positions
+        self._clock = clock
+        self._latency_s = latency_s
+        self._makers = tuple(makers)
+        serial_numbers = settings.serial_numbers or range(FIRST_SERIAL_NUMBER, FIRST_SERIAL_NUMBER + 6)
+        self._encoders = tuple(
+            self._make(leg, serial_number) for leg, serial_number in enumerate(serial_numbers, 1)
+        )
+        self._twins: list[tuple[int, SimulatedEncoder]] = []
+
+    @property
+    def bus_settings(self) -> dict[str, Any]:
+        """What ``can.Bus`` needs to reach the bank from this process."""
+        return {"interface": "virtual", "channel": self.channel}
+
+    def start(self) -> None:
+        """Switch the encoders on."""
+        with self.line.lock:
+            self._sample()
+            self.line.subscribe(_SYNC, self._on_sync)
+            for leg, encoder in enumerate(self._encoders, 1):
+                if leg not in self.unplugged:
+                    encoder.plug_in()
+        self.line.start()
+
+    def close(self) -> None:
+        """Switch them off and let the channel go; closing twice is harmless."""
+        self.line.close()
+
+    def __enter__(self) -> Self:
+        self.start()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def encoder(self, leg: int) -> SimulatedEncoder:
+        """The encoder of a leg, from 1."""
+        return self._encoders[leg - 1]
+
+    def add_twin(self, leg: int) -> None:
+        """Plug in a second device under a leg's node id."""
+        twin = self._make(leg, self.encoder(leg).data.serial_number + 1000)
+        self._twins.append((leg, twin))
+        twin.plug_in()
+
+    def _make(self, leg: int, serial_number: int) -> SimulatedEncoder:
+        settings = self._settings
+        data = DeviceData(
+            settings.nodes[leg - 1], serial_number, round(settings.measuring_step_nm), settings.signed
+        )
+        return SimulatedEncoder(self.line, self._makers[leg - 1], data, self._clock.on_the_wall)
+
+    def _on_sync(self, _can_id: int, _data: bytearray, _timestamp: float) -> None:
+        self._sample()
+        devices = [*self._encoders, *(twin for _, twin in self._twins)]
+        for place, encoder in enumerate(devices, 1):
+            delay_s = self._latency_s * place / len(devices) + encoder.delay_s
+            for cob_id, data in encoder.on_sync():
+                self._send_later(encoder, cob_id, data, delay_s)
+
+    def _send_later(self, encoder: SimulatedEncoder, cob_id: int, data: bytes, delay_s: float) -> None:
+        if delay_s:
+            self.line.call_later(self._clock.on_the_wall(delay_s), lambda: encoder.send(cob_id, data))
+        else:
+            encoder.send(cob_id, data)
+
+    def _sample(self) -> None:
+        positions = self._positions()
+        for leg, (encoder, position) in enumerate(zip(self._encoders, positions, strict=True), 1):
+            encoder.counts = self._counts(leg, position)
+        for leg, twin in self._twins:
+            twin.counts = self.encoder(leg).counts
+
+    def _counts(self, leg: int, position_mm: float) -> int:
+        """What a device shows there; beyond 32 bits it rolls over."""
+        settings = self._settings
+        step_mm = settings.measuring_step_nm * 1e-6
+        from_zero = (position_mm - settings.offset_mm[leg - 1]) * settings.direction[leg - 1]
+        counts = round(from_zero / step_mm) % _ALL_BITS
+        return counts - _ALL_BITS if settings.signed and counts >= _ALL_BITS // 2 else counts

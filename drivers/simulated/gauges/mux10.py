@@ -1,0 +1,45 @@
+"""A simulated multiplexer with MUX-10 frames, and the indicators on its channels."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from drivers.simulated.gauges.device import Device
+from drivers.simulated.gauges.indicator import Indicator
+
+NO_GAUGE = b"911\r"
+GAUGE_ERROR = b"912\r"
+BUSY = b"918\r"
+ABOUT = b"MUX-10F SIMULATED\r"
+
+
+def format_value(channel: int, value: float, *, inch: bool) -> bytes:
+    """A data frame: eight characters of digits and point, the sign apart."""
+    sign = b"-" if value < 0 else b"+"
+    return b"0%dA%s%08.*f\r" % (channel, sign, 5 if inch else 3, abs(value))
+
+
+class Mux10Device(Device):
+    """Answers a channel's number with its indicator's value. ``busy`` is how often it is, first."""
+
+    def __init__(self, indicators: Mapping[int, Indicator]) -> None:
+        super().__init__(indicators)
+        self.busy = 0
+
+    def answer(self, command: bytes) -> bytes:
+        """A data frame or an error; nothing if the command is no channel number and not ``V``."""
+        if command == b"V":
+            return ABOUT
+        if not command.isdigit():
+            return b""
+        if self.busy:
+            self.busy -= 1
+            return BUSY
+        return self._value(int(command))
+
+    def _value(self, channel: int) -> bytes:
+        indicator = self.indicators.get(channel)
+        if indicator is None or not indicator.powered:
+            return NO_GAUGE
+        shown = indicator.shown()
+        return GAUGE_ERROR if shown is None else format_value(channel, shown, inch=indicator.inch)

@@ -1,0 +1,124 @@
+"""The simulated robot as its controller drives it: with the geometry of the config, not the truth."""
+
+from __future__ import annotations
+
+import threading
+from pathlib import Path
+
+import numpy as np
+
+from drivers.simulated.controller.machine import KinematicsFailure
+from drivers.simulated.world import World
+from hexacell import kinematics, rotations
+from hexacell.clock import CellClock
+from hexacell.controller_config.format import ConfigFormat, ControllerGeometry
+from hexacell.mechanisms.base import Mechanism
+from hexacell.pose import Pose, Poses
+from hexacell.rotations import Array
+
+STEPS = 24
+"""Straight lines are cut into so many pieces, which is where joints are computed."""
+
+
+class SimulatedMachine:
+    """Sliders under a controller that reads its geometry whenever it is switched on."""
+
+    def __init__(
+        self,
+        mechanism: Mechanism,
+        config_format: ConfigFormat,
+        config: Path,
+        world: World,
+        clock: CellClock,
+        home: Pose,
+    ) -> None:
+        self._mechanism = mechanism
+        self._format = config_format
+        self._config = config
+        self._world = world
+        self._clock = clock
+        self._geometry = config_format.read(config)
+        self._way = Poses.of([home, home])
+        self._lock = threading.Lock()
+        self._fraction = 1.0
+        self._halt = threading.Event()
+
+    def move(self, pose: Pose) -> None:
+        """Go straight to a pose, turning evenly; returns at the end or when stopped.
+
+        Raises:
+            KinematicsFailure: a leg cannot reach some place on the way.
+        """
+        way = _straight(Poses.of([self.pose()]), Poses.of([pose]))
+        joints = self._joints(way)
+        if np.isnan(joints).any():
+            raise KinematicsFailure("Linear move on line 0 fails kinematicsInverse")
+        with self._lock:
+            self._halt.clear()
+            self._way, self._fraction = way, 1.0
+            motion = self._world.travel(joints)
+        self._clock.wait(motion.duration_s, self._halt)
+
+    def stop(self) -> None:
+        """Stop in place."""
+        with self._lock:
+            if not self._halt.is_set():
+                self._fraction = self._world.stop()
+            self._halt.set()
+
+    def pose(self) -> Pose:
+        """Where the platform is by the controller's geometry."""
+        with self._lock:
+            return _between(self._way, self._fraction).pose(0)
+
+    def joints(self) -> tuple[float, ...]:
+        """The sliders (6,), mm, as the controller commands them."""
+        return tuple(float(value) for value in self._joints(Poses.of([self.pose()]))[0])
+
+    def switch_on(self) -> None:
+        """Read the geometry again; the sliders stay, and so the believed pose changes."""
+        with self._lock:
+            here = _between(self._way, self._fraction)
+            joints = self._joints(here)
+            new = self._format.read(self._config)
+            found = kinematics.follow(
+                self._mechanism,
+                new.geometry,
+                joints,
+                start=here,
+                start_geometry=self._geometry.geometry,
+                start_joints=joints,
+            )
+            self._geometry = new
+            self._way, self._fraction = Poses.of([found.poses.pose(0)] * 2), 1.0
+
+    def switch_off(self) -> None:
+        """Sliders hold by their brakes."""
+
+    def home(self) -> None:
+        """The encoders are absolute: nothing to look for."""
+
+    def _joints(self, poses: Poses) -> Array:
+        geometry: ControllerGeometry = self._geometry
+        return self._mechanism.inverse(geometry.geometry, geometry.branch, poses)
+
+
+def _straight(start: Poses, end: Poses) -> Poses:
+    """STEPS + 1 poses on the straight line, turning about one axis."""
+    share = np.linspace(0.0, 1.0, STEPS + 1)[:, None]
+    turn = rotations.to_vector(end.rotations[0] @ start.rotations[0].T)
+    return Poses(
+        (1.0 - share) * start.positions + share * end.positions,
+        rotations.from_vector(share * turn) @ start.rotations[0],
+    )
+
+
+def _between(way: Poses, fraction: float) -> Poses:
+    place = fraction * (len(way) - 1)
+    row = min(int(place), len(way) - 2)
+    if place - row >= 1.0:
+        return way[[row + 1]]
+    turn = rotations.to_vector(way.rotations[row + 1] @ way.rotations[row].T)
+    share = place - row
+    position = (1.0 - share) * way.positions[row] + share * way.positions[row + 1]
+    return Poses(position[None], (rotations.from_vector(share * turn) @ way.rotations[row])[None])

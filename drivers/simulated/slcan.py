@@ -1,0 +1,172 @@
+"""A CAN adapter that speaks slcan, the ASCII protocol of LAWICEL and CANable class devices.
+
+It puts a ``virtual`` CAN bus of this process within reach of others. Commands end with CR and are
+answered with CR, or BEL for an error; frames are ``t`` (11-bit id), ``T`` (29-bit), and ``r`` and
+``R`` for remote requests: id in hexadecimal, number of bytes, bytes.
+"""
+
+from __future__ import annotations
+
+import re
+import threading
+from collections.abc import Callable
+from types import TracebackType
+from typing import Any, Literal, Self
+
+import can
+
+from drivers.simulated.encoders.serial_line import PtyLine, SerialLine, SocketLine
+
+SLICE_S = 0.05
+BITRATE = 500_000
+LONGEST_COMMAND = 32
+
+_OK = b"\r"
+_ERROR = b"\a"
+_FRAME = re.compile(r"(?:(?P<standard>[tr])([0-9A-Fa-f]{3})|(?P<extended>[TR])([0-9A-Fa-f]{8}))([0-8])(.*)")
+_SET_UP = re.compile(r"S[0-9]|s[0-9A-Fa-f]{4}|Y[0-9]?|Z[01]|")
+_INFORMATION = {"V": "V1013", "v": "v1013", "N": "NHX01", "F": "F00"}
+
+
+def encode(message: can.Message) -> bytes:
+    """A frame as slcan writes it, with its CR."""
+    kind = "r" if message.is_remote_frame else "t"
+    if message.is_extended_id:
+        head = f"{kind.upper()}{message.arbitration_id:08X}"
+    else:
+        head = f"{kind}{message.arbitration_id:03X}"
+    data = "" if message.is_remote_frame else bytes(message.data).hex().upper()
+    return f"{head}{message.dlc:d}{data}\r".encode()
+
+
+def decode(command: str) -> can.Message | None:
+    """The frame in a command (without CR), or none if it is no proper one."""
+    match = _FRAME.fullmatch(command)
+    if match is None:
+        return None
+    kind = match["standard"] or match["extended"]
+    identifier = int(match[2] or match[4], 16)
+    length, rest = int(match[5]), match[6]
+    is_remote = kind in "rR"
+    if identifier >= (1 << (29 if match["extended"] else 11)):
+        return None
+    if not re.fullmatch(f"[0-9A-Fa-f]{{{0 if is_remote else 2 * length}}}", rest):
+        return None
+    return can.Message(
+        arbitration_id=identifier,
+        is_extended_id=match["extended"] is not None,
+        is_remote_frame=is_remote,
+        dlc=length,
+        data=None if is_remote else bytes.fromhex(rest),
+    )
+
+
+class SlcanAdapter:
+    """The adapter's answers; it carries frames only while its channel ``is_open``."""
+
+    def __init__(self, transmit: Callable[[can.Message], None]) -> None:
+        self.is_open = False
+        self._may_transmit = False
+        self._transmit = transmit
+
+    def answer(self, command: str) -> bytes:
+        """Do what one command (without CR) says and return the answer."""
+        if command in ("O", "L"):
+            return self._open(may_transmit=command == "O")
+        if command == "C":
+            self.is_open = False
+            return _OK
+        if command in _INFORMATION:
+            return _INFORMATION[command].encode() + _OK
+        if _SET_UP.fullmatch(command):
+            return _ERROR if self.is_open and command else _OK
+        return self._send(command)
+
+    def _open(self, *, may_transmit: bool) -> bytes:
+        self.is_open = True
+        self._may_transmit = may_transmit
+        return _OK
+
+    def _send(self, command: str) -> bytes:
+        message = decode(command)
+        if message is None or not (self.is_open and self._may_transmit):
+            return _ERROR
+        self._transmit(message)
+        return (b"Z" if message.is_extended_id else b"z") + _OK
+
+
+class SlcanServer:
+    """An adapter between a virtual CAN channel and a serial line, on two threads of its own."""
+
+    def __init__(self, channel: str, line: SerialLine) -> None:
+        self._url = line.url
+        self._line = line
+        self._bus = can.Bus(channel, interface="virtual")
+        self._adapter = SlcanAdapter(self._bus.send)
+        self._writing = threading.Lock()
+        self._closing = threading.Event()
+        self._threads = [
+            threading.Thread(target=target, name=f"slcan {self._url}", daemon=True)
+            for target in (self._carry_commands, self._carry_frames)
+        ]
+        for thread in self._threads:
+            thread.start()
+
+    @property
+    def bus_settings(self) -> dict[str, Any]:
+        """What ``can.Bus`` needs to reach the bus from any process of this machine."""
+        return {
+            "interface": "slcan",
+            "channel": self._url,
+            "bitrate": BITRATE,
+            "sleep_after_open": 0,
+            "timeout": SLICE_S,
+        }
+
+    def close(self) -> None:
+        """Unplug the adapter; closing twice is harmless."""
+        if self._closing.is_set():
+            return
+        self._closing.set()
+        for thread in self._threads:
+            thread.join()
+        self._line.close()
+        self._bus.shutdown()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def _carry_commands(self) -> None:
+        pending = b""
+        while not self._closing.is_set():
+            data = self._line.read(SLICE_S)
+            if data is None:
+                self._adapter.is_open, pending = False, b""
+                continue
+            *commands, pending = (pending + data).split(b"\r")
+            pending = pending[-LONGEST_COMMAND:]
+            for command in commands:
+                self._write(self._adapter.answer(command.decode("ascii", "replace")))
+
+    def _carry_frames(self) -> None:
+        while not self._closing.is_set():
+            message = self._bus.recv(SLICE_S)
+            if message is not None and self._adapter.is_open:
+                self._write(encode(message))
+
+    def _write(self, data: bytes) -> None:
+        with self._writing:
+            self._line.write(data)
+
+
+def serve_slcan(channel: str, transport: Literal["pty", "socket"]) -> SlcanServer:
+    """Put the virtual CAN ``channel`` behind an slcan adapter on a pty or a loopback socket."""
+    return SlcanServer(channel, PtyLine() if transport == "pty" else SocketLine())

@@ -1,0 +1,148 @@
+"""The hidden truth of a simulated cell: where sliders and ball really are, and who sees what.
+
+Sliders follow the motion they are given; the ball follows the true geometry, continued from where
+it was, so that the platform stays on its assembly mode. Gauges and encoders look through noise.
+"""
+
+from __future__ import annotations
+
+import threading
+
+import numpy as np
+
+from drivers.simulated.motion import Motion
+from hexacell import kinematics, rotations
+from hexacell.cell.simulation import SimulationSettings
+from hexacell.clock import CellClock
+from hexacell.geometry import Geometry
+from hexacell.mechanisms.base import Mechanism
+from hexacell.pose import Poses
+from hexacell.rotations import Array
+
+AXES = "xyz"
+SWING_HZ = 8.0
+PLACING_MM = 0.4
+"""How near to the middle of their travel the gauges are put, one standard deviation."""
+
+
+class World:
+    """The truth of one cell; safe to ask from several threads."""
+
+    def __init__(
+        self,
+        mechanism: Mechanism,
+        settings: SimulationSettings,
+        clock: CellClock,
+        *,
+        start: Poses,
+        start_geometry: Geometry,
+        start_joints: Array,
+    ) -> None:
+        values = settings.geometry
+        self._truth = Geometry(values.S, values.B, values.l)
+        self._mechanism = mechanism
+        self._settings = settings
+        self._clock = clock
+        self._random = np.random.default_rng(settings.seed)
+        self._lock = threading.RLock()
+        self._motion = Motion.rest(start_joints)
+        self._joints = start_joints
+        self._passed = 0
+        first = kinematics.follow(
+            mechanism,
+            self._truth,
+            start_joints[None],
+            start=start,
+            start_geometry=start_geometry,
+            start_joints=start_joints[None],
+        )
+        self._pose = first.poses
+        self._station = self._placed(self._pose.positions[0])
+        self._triad = self._turned()
+        self._disturb()
+
+    def travel(self, path: Array) -> Motion:
+        """Send the sliders along a path (k, 6), mm, that begins where they stand; returns at once."""
+        motion = self._settings.motion
+        with self._lock:
+            longest = float(np.abs(np.diff(path, axis=0)).sum(axis=0).max())
+            scatter = motion.repeatability_mm * self._random.standard_normal(6)
+            really = path + np.linspace(0.0, 1.0, len(path))[:, None] * scatter
+            really[0] = self._motion.joints(self._catch_up())
+            duration = max(motion.minimum_s, longest / motion.speed_mm_s)
+            self._motion, self._passed = Motion(really, self._clock.now(), duration), 0
+            self._disturb()
+            return self._motion
+
+    def stop(self) -> float:
+        """Stop the sliders where they are; says how much of the way was done, 0 to 1."""
+        with self._lock:
+            now = self._clock.now()
+            moving = self._motion
+            if now < moving.ends_s:
+                self._motion = Motion(moving.path, moving.begins_s, moving.duration_s, now)
+            return moving.fraction(now)
+
+    def sliders(self) -> Array:
+        """What the encoders see (6,), mm."""
+        with self._lock:
+            flicker = self._settings.encoders.flicker_mm * self._random.standard_normal(6)
+            return self._motion.joints(self._clock.now()) + self._encoder_noise + flicker
+
+    def displacement(self, axis: str) -> float:
+        """What a gauge sees: the ball's way along its axis from the middle of its travel, mm."""
+        with self._lock:
+            ball = self._ball()
+            seen = self._triad @ (ball - self._station) + self._gauge_noise
+            flicker = self._settings.gauges.flicker_mm * self._random.standard_normal()
+            return float(seen[AXES.index(axis)] + flicker)
+
+    def _ball(self) -> Array:
+        now = self._catch_up()
+        ball = self._pose.positions[0]
+        if now >= self._motion.ends_s:
+            ball = ball + self._swinging(now - self._motion.ends_s)
+            if np.linalg.norm(ball - self._station) > self._settings.station_reach_mm:
+                self._station, self._triad = self._placed(ball), self._turned()
+        return ball
+
+    def _disturb(self) -> None:
+        self._swing = self._random.standard_normal(3)
+        self._gauge_noise = self._settings.gauges.noise_mm * self._random.standard_normal(3)
+        self._encoder_noise = self._settings.encoders.noise_mm * self._random.standard_normal(6)
+
+    def _catch_up(self) -> float:
+        """Bring the platform along the way the sliders have gone since it was last looked at."""
+        now = self._clock.now()
+        place = self._motion.place(now)
+        while self._passed + 1 <= place:
+            self._passed += 1
+            self._follow(self._motion.path[self._passed])
+        self._follow(self._motion.joints(now))
+        return now
+
+    def _follow(self, joints: Array) -> None:
+        if np.array_equal(joints, self._joints):
+            return
+        found = kinematics.follow(
+            self._mechanism,
+            self._truth,
+            joints[None],
+            start=self._pose,
+            start_geometry=self._truth,
+            start_joints=self._joints[None],
+        )
+        # A real platform that is driven into a singularity goes somewhere too: keep what was found.
+        self._pose, self._joints = found.poses, joints
+
+    def _swinging(self, since_s: float) -> Array:
+        motion = self._settings.motion
+        decay = np.exp(-since_s / motion.ringing_s) * np.cos(2.0 * np.pi * SWING_HZ * since_s)
+        return motion.ringing_mm * decay * self._swing / np.linalg.norm(self._swing)
+
+    def _placed(self, ball: Array) -> Array:
+        return ball + PLACING_MM * self._random.standard_normal(3)
+
+    def _turned(self) -> Array:
+        tilt = np.radians(self._settings.gauges.misalignment_deg)
+        return rotations.from_vector(tilt * self._random.standard_normal(3))

@@ -1,0 +1,75 @@
+"""The wire trace: every byte that went over a line, both ways, with its time."""
+
+from __future__ import annotations
+
+import threading
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import StrEnum
+
+CAPACITY_BYTES = 4 << 20
+
+
+class Direction(StrEnum):
+    """Which way bytes went, seen from here."""
+
+    SENT = ">"
+    RECEIVED = "<"
+
+
+@dataclass(frozen=True, slots=True)
+class TraceEntry:
+    """Bytes that were seen together: seconds since the epoch, the line's URL, the way they went."""
+
+    time_s: float
+    line: str
+    direction: Direction
+    data: bytes
+
+    def __str__(self) -> str:
+        """One line of text: time, line, direction, the bytes in hexadecimal and as characters."""
+        return (
+            f"{self.time_s:.6f} {self.line} {self.direction} {self.data.hex(' ')}  {_readable(self.data)}"
+        )
+
+
+Recorder = Callable[[TraceEntry], None]
+
+
+class WireTrace:
+    """A recorder that keeps the latest entries, at most ``capacity`` bytes of traffic.
+
+    Several links may record into it from their threads at once.
+    """
+
+    def __init__(self, capacity: int = CAPACITY_BYTES) -> None:
+        self.forgotten = 0
+        self._capacity = capacity
+        self._size = 0
+        self._entries: deque[TraceEntry] = deque()
+        self._lock = threading.Lock()
+
+    def __call__(self, entry: TraceEntry) -> None:
+        """Keep ``entry``; the oldest ones make room for it and are counted in ``forgotten``."""
+        with self._lock:
+            self._entries.append(entry)
+            self._size += len(entry.data)
+            while self._size > self._capacity:
+                self._size -= len(self._entries.popleft().data)
+                self.forgotten += 1
+
+    def entries(self) -> tuple[TraceEntry, ...]:
+        """What is kept, oldest first."""
+        with self._lock:
+            return tuple(self._entries)
+
+    def text(self) -> str:
+        """The trace as a file's text, one entry a line; the first line says what was forgotten."""
+        entries = self.entries()
+        head = [f"# {self.forgotten} earlier entries were forgotten"] if self.forgotten else []
+        return "".join(f"{line}\n" for line in (*head, *entries))
+
+
+def _readable(data: bytes) -> str:
+    return "".join(chr(byte) if 0x20 <= byte < 0x7F else "." for byte in data)

@@ -1,0 +1,79 @@
+"""What must hold before a new geometry may enter a controller."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from hexacell.geometry import PARAMETER_NAMES, Geometry
+from hexacell.identification.problem import Tolerances
+from hexacell.identification.result import Identification
+from hexacell.rotations import Array
+
+CERTAIN_SIGMAS = 3.0
+
+
+@dataclass(frozen=True, slots=True)
+class Gate:
+    """One condition, and the sentence that says how it stands.
+
+    ``needs_person``: where it is not met, a person may still decide to go on.
+    """
+
+    name: str
+    passed: bool
+    sentence: str
+    needs_person: bool = False
+
+
+def gates(
+    identified: Identification, drawing: Geometry, tolerances: Tolerances, *, largest_change_mm: float, before: Geometry
+) -> tuple[Gate, ...]:
+    """All conditions on an identification; ``before`` is the controller's geometry in its frame."""
+    return (
+        _converged(identified),
+        _determined(identified),
+        _within_tolerance(identified, drawing, tolerances),
+        _small_enough(identified.geometry, before, largest_change_mm),
+    )
+
+
+def _converged(identified: Identification) -> Gate:
+    return Gate("converged", identified.converged, f"The solver ended because {identified.termination.value}.")
+
+
+def _determined(identified: Identification) -> Gate:
+    names = identified.undetermined
+    sentence = f"Not determined by these data: {', '.join(names)}." if names else "The data determine every parameter."
+    return Gate("determined", not names, sentence, needs_person=True)
+
+
+def _within_tolerance(identified: Identification, drawing: Geometry, tolerances: Tolerances) -> Gate:
+    """A good residual is no proof: rods 13 mm too short have explained data perfectly before."""
+    change = identified.geometry.vector() - drawing.vector()
+    outside = np.abs(_without_ball(change, tolerances)) - CERTAIN_SIGMAS * identified.sigma > tolerances.widths()
+    names = [
+        f"{name} ({value:+.2f} mm)"
+        for name, value, is_outside in zip(PARAMETER_NAMES, change, outside, strict=True)
+        if is_outside
+    ]
+    sentence = f"Beyond the drawing's tolerance: {', '.join(names)}." if names else "Every parameter is within the drawing's tolerance."
+    return Gate("within tolerance", not names, sentence)
+
+
+def _without_ball(change: Array, tolerances: Tolerances) -> Array:
+    """The change less the ball's own offset, as far as that is allowed."""
+    B = change[18:36].reshape(6, 3)
+    offset = np.clip(np.median(B, axis=0), -tolerances.ball_mm, tolerances.ball_mm)
+    return np.concatenate([change[:18], (B - offset).ravel(), change[36:]])
+
+
+def _small_enough(after: Geometry, before: Geometry, largest_change_mm: float) -> Gate:
+    change = after.largest_difference(before)
+    return Gate(
+        "small change",
+        change <= largest_change_mm,
+        f"The largest change is {change:.2f} mm (limit without a person {largest_change_mm:g} mm).",
+        needs_person=True,
+    )

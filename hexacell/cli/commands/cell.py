@@ -1,0 +1,29 @@
+"""``hexacell cell validate|schema|show``."""
+
+from __future__ import annotations
+
+import argparse
+import json
+
+from hexacell.cell.file import describe, load_cell, schema
+from hexacell.cli.console import Console
+from hexacell.errors import ExitCode
+from hexacell.robot import robot_of
+
+
+def main(options: argparse.Namespace) -> ExitCode:
+    """Check, explain or show a cell file."""
+    console = Console(options.json)
+    if options.action == "schema":
+        print(json.dumps(schema(), indent=None if options.json else 2))
+        return ExitCode.DONE
+    cell = load_cell(options.cell)
+    if options.action == "show":
+        console.document(cell.settings.model_dump(mode="json"))
+        if not options.json:
+            console.say(describe(cell).rstrip("\n"))
+        return ExitCode.DONE
+    robot_of(cell)
+    console.document({"valid": True, "name": cell.settings.name})
+    console.say(f"{options.cell}: in order, and so is its controller config {cell.config_path}")
+    return ExitCode.DONE

@@ -1,0 +1,1 @@
+"""Where mathematics, procedures and drivers come together for the faces."""

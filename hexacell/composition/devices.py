@@ -1,0 +1,92 @@
+"""Where the parts come together: the only place that knows which devices are real."""
+
+from __future__ import annotations
+
+from collections.abc import AsyncIterator, Iterator
+from contextlib import asynccontextmanager, contextmanager
+from dataclasses import dataclass, replace
+
+from drivers.link import SerialLinks
+from drivers.ports import DeviceIdentity
+from drivers.trace import WireTrace
+from hexacell.cell.file import Cell
+from hexacell.cell.model import CellSettings
+from hexacell.clock import CellClock
+from hexacell.mechanisms.base import Mechanism
+from hexacell.plugins import Group, load
+from hexacell.robot import config_format
+from procedures.devices import Devices, MountedGauge
+
+
+@contextmanager
+def served(cell: Cell, *, other_processes: bool = False) -> Iterator[CellSettings]:
+    """The cell's settings with an address for every device; a simulated cell answers meanwhile.
+
+    Raises:
+        HexacellError: the simulation cannot begin.
+    """
+    settings = cell.settings
+    if settings.simulation is None:
+        yield settings
+        return
+    # Imported here: a cell of real devices needs nothing of the simulation.
+    from drivers.simulated.cell import SimulatedCell  # noqa: PLC0415
+
+    mechanism: Mechanism = load(Group.MECHANISMS, settings.robot.mechanism)()
+    with SimulatedCell(
+        settings,
+        settings.simulation,
+        mechanism,
+        config_format(settings),
+        cell.config_path,
+        other_processes=other_processes,
+    ) as simulated:
+        yield simulated.settings
+
+
+@dataclass(frozen=True)
+class Connected:
+    """A cell's devices, open, and what goes over their wires."""
+
+    devices: Devices
+    identities: tuple[DeviceIdentity, ...]
+    clock: CellClock
+    trace: WireTrace
+
+
+def devices_of(settings: CellSettings, links: SerialLinks, trace: WireTrace) -> Devices:
+    """The drivers that the settings name, not yet connected.
+
+    Raises:
+        UsageError: a protocol that no driver speaks.
+    """
+    gauges = tuple(
+        MountedGauge(load(Group.GAUGES, gauge.protocol)(gauge, links), "xyz".index(gauge.axis), gauge.sign)
+        for gauge in settings.gauges
+    )
+    encoders = load(Group.ENCODERS, settings.encoders.protocol)(settings.encoders, trace=trace)
+    controller = load(Group.CONTROLLERS, settings.controller.protocol)(settings.controller, trace=trace)
+    return Devices(gauges, encoders, controller)
+
+
+@asynccontextmanager
+async def connected(settings: CellSettings) -> AsyncIterator[Connected]:
+    """The cell's devices, connected; they are let go at the end, whatever happens.
+
+    Raises:
+        HexacellError: one or more devices do not answer as they must.
+    """
+    trace = WireTrace()
+    links = SerialLinks(trace=trace)
+    devices = devices_of(settings, links, trace)
+    try:
+        identities = await devices.open()
+        yield Connected(devices, identities, CellClock(settings.timing.clock_factor), trace)
+    finally:
+        await devices.close()
+        await links.close()
+
+
+def with_settings(cell: Cell, settings: CellSettings) -> Cell:
+    """The cell under the settings that :func:`served` gave."""
+    return replace(cell, settings=settings)

@@ -1,0 +1,55 @@
+"""What a commit leaves in the run folder, so that it can be undone at any later time."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from hexacell import files
+from hexacell.controller_config.document import Document
+from hexacell.controller_config.proposal import Proposal
+from hexacell.errors import FileError
+
+BEFORE = "config-before"
+AFTER = "config-after"
+RECEIPT = "write-back.json"
+STRANGER = "config-found"
+
+
+class Receipt(Document):
+    """What a commit did, and where the way back is.
+
+    ``backup_folder`` is where the receipt was found; a run folder may be moved.
+    """
+
+    path: Path
+    format: str
+    sha256_before: str
+    sha256_after: str
+    backup_folder: Path
+
+    @classmethod
+    def of(cls, folder: Path) -> Receipt:
+        """The receipt kept in a run folder; raises ``FileError``."""
+        return cls.load(folder / RECEIPT).model_copy(update={"backup_folder": folder.absolute()})
+
+    @classmethod
+    def for_proposal(cls, proposal: Proposal, backup_folder: Path) -> Receipt:
+        """The receipt that a commit of ``proposal`` leaves in ``backup_folder``."""
+        return cls(
+            path=proposal.path,
+            format=proposal.format,
+            sha256_before=proposal.sha256_before,
+            sha256_after=proposal.sha256_after,
+            backup_folder=backup_folder.absolute(),
+        )
+
+    def backup(self) -> bytes:
+        """The config as it was before; raises ``FileError`` if the backup is gone or damaged."""
+        data = files.read_bytes(self.backup_folder / BEFORE)
+        if files.sha256(data) != self.sha256_before:
+            raise FileError(
+                "the backup is damaged",
+                subject=self.backup_folder / BEFORE,
+                action="Restore it from elsewhere",
+            )
+        return data

@@ -1,0 +1,81 @@
+"""Poses that judge the result: commanded as a user would, apart from each other, inside the travel."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hexacell import kinematics, rotations
+from hexacell.design.candidates import within_limits
+from hexacell.design.knowledge import Knowledge
+from hexacell.design.next_pose import SAFETY_SIGMAS, TRAVEL_SHARE
+from hexacell.errors import LimitError
+from hexacell.pose import Poses
+from hexacell.rotations import Array
+
+
+def choose_held_out(knowledge: Knowledge, point: Array, count: int, orientations: Array) -> Poses:
+    """``count`` poses at a point (3,), mm, the first of them untilted.
+
+    The controller is sent there with its own geometry, uncorrected; the ball must surely stay
+    within the travel all the same, and the corrected robot must be able to go there too. Of the
+    orientations (n, 3, 3) that do, those farthest apart are taken.
+
+    Raises:
+        LimitError: too few of them do.
+    """
+    poses = Poses.at(point, np.concatenate([np.eye(3)[None], orientations]))
+    joints = knowledge.mechanism.inverse(knowledge.controller, knowledge.branch, poses)
+    usable = np.flatnonzero(within_limits(knowledge.limits, poses, joints) & _after(knowledge, poses))
+    if not len(usable) or usable[0] != 0:
+        raise LimitError(f"the untilted platform cannot stand at {poses.pose(0)} within the limits")
+    kept = usable[_inside_travel(knowledge, poses[usable], joints[usable])]
+    if len(kept) < count:
+        raise LimitError(f"only {len(kept)} orientations at {poses.pose(0)} keep the ball inside the travel")
+    return poses[kept[_farthest_apart(poses.rotations[kept], count)]]
+
+
+def _after(knowledge: Knowledge, poses: Poses) -> NDArray[np.bool_]:
+    """Which poses the estimated geometry can take within the limits."""
+    joints = knowledge.mechanism.inverse(knowledge.estimate, knowledge.branch, poses)
+    fits = within_limits(knowledge.limits, poses, joints)
+    rows = np.flatnonzero(fits)
+    margin = kinematics.singularity_margin(
+        knowledge.mechanism, knowledge.estimate, poses[rows], joints[rows]
+    )
+    fits[rows] &= margin >= knowledge.limits.singularity_margin
+    return fits
+
+
+def _inside_travel(knowledge: Knowledge, poses: Poses, joints: Array) -> NDArray[np.bool_]:
+    """Which poses the uncorrected robot surely takes inside the travel of gauges zeroed at the first."""
+    really = kinematics.follow(
+        knowledge.mechanism,
+        knowledge.estimate,
+        joints,
+        start=poses,
+        start_geometry=knowledge.controller,
+        start_joints=joints,
+    )
+    sensitivity = kinematics.sensitivity(knowledge.mechanism, knowledge.estimate, really.poses, joints)
+    jacobian = sensitivity.parameters[:, :3] @ knowledge.basis
+    change = jacobian - jacobian[0]
+    spread = change @ knowledge.covariance @ np.swapaxes(change, -1, -2)
+    sigma = np.sqrt(np.diagonal(spread, axis1=-2, axis2=-1) + 2.0 * knowledge.noise.gauge_mm**2)
+    deviation = really.poses.positions - really.poses.positions[0]
+    limit = TRAVEL_SHARE * knowledge.limits.gauge_travel_mm
+    inside = (np.abs(deviation) + SAFETY_SIGMAS * sigma <= limit).all(axis=-1)
+    inside &= really.found
+    inside[0] = really.found[0]
+    return inside
+
+
+def _farthest_apart(orientations: Array, count: int) -> list[int]:
+    """Rows of orientations, beginning with the first, each next one farthest from those taken."""
+    taken = [0]
+    nearest = np.full(len(orientations), np.inf)
+    while len(taken) < count:
+        turn = orientations @ orientations[taken[-1]].T
+        nearest = np.minimum(nearest, np.linalg.norm(rotations.to_vector(turn), axis=-1))
+        taken.append(int(np.argmax(nearest)))
+    return taken

@@ -1,0 +1,65 @@
+"""The devices of one cell, together."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Awaitable, Sequence
+from dataclasses import dataclass
+from typing import TypeVar
+
+from drivers.ports import Controller, DeviceIdentity, EncoderBank, Gauge
+from hexacell.errors import HexacellError, SeveralErrors
+
+Result = TypeVar("Result")
+
+
+@dataclass(frozen=True, slots=True)
+class MountedGauge:
+    """A gauge and how it stands: which base axis its plunger moves along, and which way it counts."""
+
+    gauge: Gauge
+    axis: int
+    sign: int
+
+
+@dataclass(frozen=True, slots=True)
+class Devices:
+    """Three gauges, the encoders and the controller."""
+
+    gauges: tuple[MountedGauge, ...]
+    encoders: EncoderBank
+    controller: Controller
+
+    async def open(self) -> tuple[DeviceIdentity, ...]:
+        """Connect to all of them at once; nothing moves.
+
+        Raises:
+            SeveralErrors: one or more do not answer as they must; all are named.
+        """
+        calls: list[Awaitable[tuple[DeviceIdentity, ...]]] = [_alone(m.gauge.open()) for m in self.gauges]
+        calls += [self.encoders.open(), _alone(self.controller.open())]
+        found = await gathered("devices do not answer as they must", calls)
+        return tuple(identity for identities in found for identity in identities)
+
+    async def close(self) -> None:
+        """Let all of them go, whatever happens to one."""
+        ports = [*(mounted.gauge for mounted in self.gauges), self.encoders, self.controller]
+        await asyncio.gather(*(port.close() for port in ports), return_exceptions=True)
+
+
+async def _alone(identity: Awaitable[DeviceIdentity]) -> tuple[DeviceIdentity, ...]:
+    return (await identity,)
+
+
+async def gathered(problem: str, calls: Sequence[Awaitable[Result]]) -> list[Result]:
+    """Wait for all of the calls; one failure is raised as it is, several in one report."""
+    results = await asyncio.gather(*calls, return_exceptions=True)
+    errors = [result for result in results if isinstance(result, HexacellError)]
+    others = [result for result in results if isinstance(result, BaseException)]
+    if others and len(others) > len(errors):
+        raise next(error for error in others if not isinstance(error, HexacellError))
+    if len(errors) == 1:
+        raise errors[0]
+    if errors:
+        raise SeveralErrors(problem, errors)
+    return [result for result in results if not isinstance(result, BaseException)]

@@ -1,0 +1,53 @@
+"""Everything that must hold before motion, checked at once; nothing moves."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from hexacell.clock import CellClock
+from hexacell.errors import AnswerNeeded, HexacellError, SeveralErrors
+from hexacell.pose import Pose
+from procedures.calibration import Calibration
+from procedures.devices import Devices
+from procedures.settling import glance
+
+
+def plan_failures(calibration: Calibration, *, unattended: bool) -> Iterator[HexacellError]:
+    """What is wrong with the plan itself, before any device is asked."""
+    for name, pose in _references(calibration):
+        try:
+            calibration.robot.require_reach(name, pose)
+        except HexacellError as error:
+            yield error if error.subject else type(error)(error.problem, subject=name, action=error.action)
+    if unattended and calibration.settings.stations.placement == "by-hand":
+        yield AnswerNeeded(
+            "unattended running is not possible: the gauges are put at each point by hand",
+            action='Give every point fixed gauges and say placement = "fixed" in [stations]',
+        )
+
+
+async def device_failures(devices: Devices, clock: CellClock) -> list[HexacellError]:
+    """What is wrong with opened devices: one reading of each must come."""
+    try:
+        await glance(devices, clock)
+    except SeveralErrors as several:
+        return several.errors
+    except HexacellError as error:
+        return [error]
+    return []
+
+
+def raise_all(failures: list[HexacellError]) -> None:
+    """Raise one failure as it is, several in one report, none not at all."""
+    if len(failures) == 1:
+        raise failures[0]
+    if failures:
+        raise SeveralErrors(f"{len(failures)} things stand in the way", failures)
+
+
+def _references(calibration: Calibration) -> Iterator[tuple[str, Pose]]:
+    settings = calibration.settings
+    for number, point in enumerate(settings.identification.points, start=1):
+        yield f"identification point {number}", Pose(*point)
+    for number, point in enumerate(settings.verification.points, start=1):
+        yield f"verification point {number}", Pose(*point)

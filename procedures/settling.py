@@ -1,0 +1,98 @@
+"""Settled means seen: readings are taken until a whole window of them agrees."""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass
+
+import numpy as np
+
+from drivers.ports import EncoderRound, GaugeReading
+from hexacell.cell.devices import TimingSettings
+from hexacell.clock import CellClock
+from hexacell.errors import DeviceError
+from hexacell.rotations import Array
+from procedures.devices import Devices, gathered
+
+
+@dataclass(frozen=True, slots=True)
+class Glance:
+    """All devices read once, one after the other's question: gauges and encoders at ``at_s``."""
+
+    at_s: float
+    gauges: tuple[GaugeReading, ...]
+    encoders: EncoderRound
+
+    def gauge_values(self) -> Array:
+        """What the gauges show (3,), mm."""
+        return np.array([reading.value_mm for reading in self.gauges])
+
+    def joints(self) -> Array:
+        """Slider positions (6,), mm."""
+        return np.array(self.encoders.positions_mm)
+
+
+@dataclass(frozen=True, slots=True)
+class Settled:
+    """A window of readings that agree."""
+
+    window: tuple[Glance, ...]
+
+    def gauge_means(self) -> Array:
+        """Means (3,), mm, of what the gauges showed."""
+        return np.mean([glance.gauge_values() for glance in self.window], axis=0)
+
+    def joint_means(self) -> Array:
+        """Means (6,), mm, of the slider positions."""
+        return np.mean([glance.joints() for glance in self.window], axis=0)
+
+    def gauge_spread(self) -> Array:
+        """Ranges (3,), mm, of what the gauges showed."""
+        return np.ptp([glance.gauge_values() for glance in self.window], axis=0)
+
+    def joint_spread(self) -> Array:
+        """Ranges (6,), mm, of the slider positions."""
+        return np.ptp([glance.joints() for glance in self.window], axis=0)
+
+
+async def glance(devices: Devices, clock: CellClock) -> Glance:
+    """Read everything once."""
+    readings = await gathered("gauges cannot be read", [mounted.gauge.read() for mounted in devices.gauges])
+    return Glance(clock.now(), tuple(readings), await devices.encoders.read())
+
+
+async def settle(devices: Devices, timing: TimingSettings, clock: CellClock) -> Settled:
+    """Read until the last window of readings agrees, and give that window.
+
+    Raises:
+        DeviceError: it never did within the time allowed; the message names what kept moving.
+    """
+    window: deque[Glance] = deque()
+    begun = clock.now()
+    while True:
+        window.append(await glance(devices, clock))
+        while len(window) > timing.readings and window[-1].at_s - window[1].at_s >= timing.window_s:
+            window.popleft()
+        settled = Settled(tuple(window))
+        long_enough = window[-1].at_s - window[0].at_s >= timing.window_s
+        if len(window) >= timing.readings and long_enough and not _moving(devices, timing, settled):
+            return settled
+        if clock.now() - begun > timing.give_up_s:
+            raise _never_settled(devices, timing, settled)
+        await clock.sleep(timing.interval_s)
+
+
+def _moving(devices: Devices, timing: TimingSettings, settled: Settled) -> list[str]:
+    """Names of what moved within the window, with how much."""
+    gauges = zip(devices.gauges, settled.gauge_spread(), strict=True)
+    moving = [f"gauge {m.gauge.name} by {spread:.3f} mm" for m, spread in gauges if spread > timing.spread_gauge_mm]
+    legs = enumerate(settled.joint_spread(), start=1)
+    return moving + [f"slider {leg} by {spread:.3f} mm" for leg, spread in legs if spread > timing.spread_encoder_mm]
+
+
+def _never_settled(devices: Devices, timing: TimingSettings, settled: Settled) -> DeviceError:
+    moving = ", ".join(_moving(devices, timing, settled)) or "readings came too slowly"
+    return DeviceError(
+        f"the readings did not settle within {timing.give_up_s:g} s: {moving}",
+        action="Look for vibration or a slipping gauge; the limits are in [timing] of the cell file",
+    )

@@ -1,0 +1,124 @@
+"""The cells in ``configs`` load, and say what the paper's tables say."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hexacell import kinematics
+from hexacell.cell.base import GeometryValues
+from hexacell.cell.file import Cell, describe, dump, load_cell
+from hexacell.controller_config.native_toml import NativeToml
+from hexacell.geometry import Geometry
+from hexacell.mechanisms.hexaglide import Hexaglide
+from hexacell.pose import Pose, Poses
+
+CONFIGS = Path(__file__).parents[2] / "configs"
+NAMES = ["simulated-hexaglide", "paper-experiment"]
+BRANCH = (-1, -1, -1, 1, 1, 1)
+
+# Table 3 of Abtahi et al. 2010: the ball's positions P1 to P6.
+P1, P2, P3 = (0, 0, 550), (0, -200, 550), (100, -100, 500)
+P4, P5, P6 = (100, 0, 600), (-100, 100, 500), (-100, -50, 450)
+
+
+@pytest.fixture(params=NAMES)
+def cell(request: pytest.FixtureRequest) -> Cell:
+    return load_cell(CONFIGS / f"{request.param}.toml")
+
+
+def geometry(values: GeometryValues) -> Geometry:
+    return Geometry(values.S, values.B, values.l)
+
+
+def test_controller_starts_from_the_drawing(cell):
+    config = NativeToml().read(cell.config_path)
+    assert config.geometry.largest_difference(geometry(cell.settings.robot.nominal)) == 0
+    assert config.branch == BRANCH
+
+
+def test_truth_is_within_the_tolerances(cell):
+    settings = cell.settings
+    assert settings.simulation is not None
+    nominal, actual = settings.robot.nominal, settings.simulation.geometry
+    tolerances = settings.tolerances
+    assert np.abs(np.subtract(actual.S, nominal.S)).max() <= tolerances.S_mm
+    assert np.abs(np.subtract(actual.B, nominal.B)).max() <= tolerances.B_mm + tolerances.ball_mm
+    assert np.abs(np.subtract(actual.l, nominal.l)).max() <= tolerances.l_mm
+
+
+def test_geometries_obey_the_paper_frame(cell):
+    """S2 = 0, S3z = 0, B2z = B3z = B5z, B2y = B5y: the drawing and the truth can be compared."""
+    assert cell.settings.simulation is not None
+    for values in (cell.settings.robot.nominal, cell.settings.simulation.geometry):
+        assert values.S[1] == (0, 0, 0)
+        assert values.S[2][2] == 0
+        assert values.B[1][2] == values.B[2][2] == values.B[4][2]
+        assert values.B[1][1] == values.B[4][1]
+
+
+def test_points_and_task_poses_can_be_reached(cell):
+    """Untilted at every point, and at the task's poses, by the drawing and by the built machine."""
+    settings = cell.settings
+    assert settings.simulation is not None
+    points = (*settings.identification.points, *settings.verification.points)
+    poses = Poses.of([*(Pose(*point) for point in points), *(Pose(*pose) for pose in settings.task.poses)])
+    for values in (settings.robot.nominal, settings.simulation.geometry):
+        joints = kinematics.inverse(Hexaglide(), geometry(values), BRANCH, poses)
+        margins = kinematics.singularity_margin(Hexaglide(), geometry(values), poses, joints)
+        assert joints.min() > settings.limits.joint_min_mm
+        assert joints.max() < settings.limits.joint_max_mm
+        assert margins.min() > settings.limits.singularity_margin
+
+
+def test_they_survive_being_written_again(cell, tmp_path):
+    for text in (dump(cell.settings), describe(cell)):
+        (tmp_path / "cell.toml").write_text(text)
+        assert load_cell(tmp_path / "cell.toml").settings == cell.settings
+
+
+def test_owners_configs_hold_more_than_the_geometry():
+    for name in NAMES:
+        text = (CONFIGS / f"{name}.controller.toml").read_text()
+        assert set(tomllib.loads(text)) > {"geometry", "machine", "axes"}
+        inside = text[text.index("S = [") : text.index("B = [")]
+        assert inside.count("# leg") == 6
+
+
+def test_simulated_hexaglide_is_table_1():
+    settings = load_cell(CONFIGS / "simulated-hexaglide.toml").settings
+    assert settings.simulation is not None
+    assert settings.robot.nominal.l == (590, 580, 615, 615, 580, 590)
+    assert settings.robot.nominal.B[5] == (90, -67, -125)
+    actual = settings.simulation.geometry
+    assert actual.S[0] == (0.861, -160.815, 1.501)
+    assert actual.B[5] == (86.346, -67.912, -130.613)
+    assert actual.l == (583.941, 578.279, 610.563, 614.068, 585.272, 593.461)
+    assert settings.identification.points == (P1, P2, P3, P4, P5)
+    assert settings.identification.orientations == 11
+    assert settings.verification.points == (P6, (100, 100, 550))
+    assert settings.limits.gauge_travel_mm == 5
+    assert {settings.tolerances.S_mm, settings.tolerances.B_mm, settings.tolerances.l_mm} == {7}
+    assert {settings.noise.encoder_mm, settings.noise.gauge_mm} == {0.01}
+    assert [(gauge.axis, gauge.protocol) for gauge in settings.gauges] == [
+        ("x", "sylvac"),
+        ("y", "mux10"),
+        ("z", "cdi"),
+    ]
+    assert settings.stations.placement == "fixed"
+    assert settings.acceptance.approval == "automatic"
+
+
+def test_paper_experiment_is_tables_3_and_4():
+    settings = load_cell(CONFIGS / "paper-experiment.toml").settings
+    assert settings.simulation is not None
+    assert settings.simulation.geometry.S[3] == (1.08, 155.85, -0.26)
+    assert settings.simulation.geometry.B[0] == (-90.04, -67.09, -151.27)
+    assert settings.simulation.geometry.l == (590.58, 579.58, 615.75, 619.33, 578.71, 592.50)
+    assert settings.identification.points == (P1, P2, P3)
+    assert settings.verification.points == (P4, P5, P6)
+    assert (settings.identification.orientations, settings.verification.orientations) == (20, 20)
+    assert settings.tolerances.ball_mm == 40

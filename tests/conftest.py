@@ -1,0 +1,72 @@
+"""What holds for every test: nothing is left behind, and hypothesis repeats itself in CI."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import os
+import threading
+import time
+from collections.abc import AsyncIterator, Iterator
+from pathlib import Path
+
+import pytest
+from hypothesis import settings
+
+GRACE_S = 0.5  # for what is on its way out when a test returns
+BENCHMARKS = Path(__file__).parent / "benchmarks"
+
+settings.register_profile(
+    "hexacell",
+    deadline=None,  # a shared machine is slow now and then
+    max_examples=50,
+    derandomize="CI" in os.environ,
+    print_blob=True,
+)
+settings.load_profile("hexacell")
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Whatever lies in tests/benchmarks is a benchmark."""
+    for item in items:
+        if BENCHMARKS in item.path.parents:
+            item.add_marker(pytest.mark.benchmark)
+
+
+@pytest.fixture(autouse=True)
+def nothing_left_open() -> Iterator[None]:
+    """Fail a test that leaves a thread, a file, a socket or a terminal behind."""
+    before = _threads() | _descriptors()
+    yield
+    give_up = time.monotonic() + GRACE_S
+    while left := (_threads() | _descriptors()) - before:
+        if time.monotonic() > give_up:
+            pytest.fail(f"left behind: {', '.join(sorted(left))}", pytrace=False)
+        time.sleep(0.01)
+
+
+@pytest.fixture(autouse=True)
+async def no_task_left_running(nothing_left_open: None) -> AsyncIterator[None]:
+    """Fail a test whose tasks outlive it and its fixtures; the event loop would cancel them unseen."""
+    yield
+    give_up = time.monotonic() + GRACE_S
+    while left := [task for task in asyncio.all_tasks() if task is not asyncio.current_task()]:
+        if time.monotonic() > give_up:
+            pytest.fail(f"left behind: {', '.join(map(str, left))}", pytrace=False)
+        await asyncio.sleep(0.01)
+
+
+def _threads() -> set[str]:
+    return {
+        f"{'daemon ' if thread.daemon else ''}thread {thread.name} ({thread.ident})"
+        for thread in threading.enumerate()
+    }
+
+
+def _descriptors() -> set[str]:
+    """Every open file descriptor and what it refers to; none where there is no /proc."""
+    found = set()
+    for descriptor in Path("/proc/self/fd").glob("*"):
+        with contextlib.suppress(FileNotFoundError):  # the one that lists the folder
+            found.add(f"descriptor {descriptor.name} -> {descriptor.readlink()}")
+    return found

@@ -1,0 +1,153 @@
+"""A server that follows a script, and drivers that talk to it."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator, Awaitable, Callable
+from contextlib import suppress
+from enum import Enum, auto
+
+import pytest
+
+from drivers.controllers.linuxcncrsh import LinuxcncrshController
+from drivers.controllers.linuxcncrsh_address import Patience
+from drivers.trace import WireTrace
+from hexacell.cell.devices import ControllerSettings
+
+QUICK = Patience(
+    connect=2.0,
+    answer=0.15,
+    remark=0.03,
+    poll=0.002,
+    arrival=0.02,
+    stop=0.6,
+    switch=0.02,
+    reload=5.0,
+    comeback=1.0,
+)
+
+
+class Then(Enum):
+    """What a script can do beside sending bytes."""
+
+    SAY_NOTHING = auto()
+    HANG_UP = auto()
+
+
+Step = bytes | asyncio.Event | Then
+Exchange = tuple[str, Step] | tuple[str, Step, Step] | tuple[str, Step, Step, Step]
+
+GREETING: list[Exchange] = [
+    ("hello EMC hexacell 1.0", b"HELLO ACK EMCNETSVR 1.1\r\n"),
+    ("set echo off", b"set echo off\r\n"),
+    ("set verbose on", b"SET VERBOSE ACK\n\r"),
+    ("set enable EMCTOO", b"SET ENABLE ACK\n\r"),
+]
+OPENING: list[Exchange] = [
+    *GREETING,
+    ("set set_wait done", b"SET SET_WAIT ACK\n\r"),
+    ("get inifile", b"INIFILE /home/operator/machine.ini\r\n"),
+]
+AT_REST = b"ABS_ACT_POS 0.000000 0.000000 0.000000 0.000000 -0.000000 0.000000\r\n"
+STOPPING: list[Exchange] = [
+    *GREETING,
+    ("set abort", b"SET ABORT ACK\n\r"),
+    *[("get abs_act_pos", AT_REST)] * 3,
+]
+
+
+class ScriptedServer:
+    """Plays one conversation to each connection in turn, and remembers what did not follow it."""
+
+    def __init__(self, *conversations: list[Exchange]) -> None:
+        self.deviations: list[str] = []
+        self.port = 0
+        self._conversing: set[asyncio.Task[None]] = set()
+        self._left = [list(conversation) for conversation in conversations]
+        self._waiting = iter(self._left)
+        self._server: asyncio.Server | None = None
+
+    async def start(self) -> None:
+        self._server = await asyncio.start_server(self._converse, "127.0.0.1", self.port)
+        self.port = self._server.sockets[0].getsockname()[1]
+
+    async def close(self) -> None:
+        assert self._server is not None
+        self._server.close()
+        for task in self._conversing:
+            task.cancel()
+        await asyncio.gather(*self._conversing)
+        await self._server.wait_closed()
+
+    def assert_followed(self) -> None:
+        assert self.deviations == []
+        assert [conversation for conversation in self._left if conversation] == []
+
+    async def _converse(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        task = asyncio.current_task()
+        assert task is not None
+        self._conversing.add(task)
+        conversation = next(self._waiting, None)
+        if conversation is None:
+            self.deviations.append("one connection more than the script has")
+        with suppress(asyncio.CancelledError, OSError):
+            while conversation is not None and (line := (await reader.readline()).decode()):
+                if not await self._answer(line.removesuffix("\r\n"), conversation, writer):
+                    break
+        writer.transport.abort()
+
+    async def _answer(
+        self, line: str, conversation: list[Exchange], writer: asyncio.StreamWriter
+    ) -> bool:
+        expected, *steps = conversation.pop(0) if conversation else ("nothing",)
+        if line != expected:
+            self.deviations.append(f"{line!r} came where {expected!r} was expected")
+            return False
+        for step in steps:
+            if step is Then.HANG_UP:
+                return False
+            if isinstance(step, asyncio.Event):
+                await step.wait()
+            elif isinstance(step, bytes):
+                writer.write(step)
+        return True
+
+
+Scripted = Callable[..., Awaitable[ScriptedServer]]
+
+
+@pytest.fixture
+async def scripted() -> AsyncIterator[Scripted]:
+    """Starts servers that play conversations; a test fails unless each was played to its end."""
+    servers = []
+
+    async def start(*conversations: list[Exchange]) -> ScriptedServer:
+        servers.append(ScriptedServer(*conversations))
+        await servers[-1].start()
+        return servers[-1]
+
+    yield start
+    for server in servers:
+        await server.close()
+    for server in servers:
+        server.assert_followed()
+
+
+@pytest.fixture
+async def drive() -> AsyncIterator[Callable[..., LinuxcncrshController]]:
+    """Makes drivers for a server and closes them; keywords are controller settings."""
+    drivers = []
+
+    def make(
+        server: ScriptedServer, trace: WireTrace | None = None, **settings: object
+    ) -> LinuxcncrshController:
+        values = {"config": "machine.ini", "port": server.port, "move_timeout_s": 0.2, **settings}
+        made = LinuxcncrshController(
+            ControllerSettings.model_validate(values), trace=trace, patience=QUICK
+        )
+        drivers.append(made)
+        return made
+
+    yield make
+    for driver in drivers:
+        await driver.close()

@@ -1,0 +1,175 @@
+"""Encoders written frame by frame, without canopen, so that a dialogue can be exactly wrong."""
+
+from __future__ import annotations
+
+import threading
+import uuid
+from collections.abc import AsyncIterator, Callable, Iterator
+from dataclasses import dataclass, field
+from typing import Any
+
+import can
+import pytest
+
+from drivers.encoders.cia406 import Cia406Bank
+from hexacell.cell.devices import EncoderSettings
+
+SYNC, NMT, EMERGENCY, SDO_ANSWER, SDO_REQUEST, HEARTBEAT = 0x80, 0x00, 0x80, 0x580, 0x600, 0x700
+NOT_THERE = 0x0602_0000
+Object = tuple[int, int]
+
+
+@dataclass
+class RawNode:
+    """A node as a table of its objects; hooks replace what it answers."""
+
+    node: int
+    objects: dict[Object, bytes]
+    counts: int = 0
+    answers_sdo: int = 1
+    answers_sync: Callable[[int], list[bytes]] | None = None
+    refuses: dict[Object, int] = field(default_factory=dict)
+    forgets: set[Object] = field(default_factory=set)
+    state: int = 0x7F
+
+    @property
+    def tpdo(self) -> int:
+        """The COB-ID of the TPDO in use."""
+        return int.from_bytes(self.objects[0x1801, 1], "little") & 0x7FF
+
+    def answer_sdo(self, request: bytes) -> bytes:
+        """One expedited transfer."""
+        key = (int.from_bytes(request[1:3], "little"), request[3])
+        if request[0] >> 5 == 2:
+            return self._upload(request, key)
+        if key in self.refuses:
+            return _abort(request, self.refuses[key])
+        if key not in self.objects:
+            return _abort(request, NOT_THERE)
+        size = 4 - (request[0] >> 2 & 3)
+        if key not in self.forgets:
+            self.objects[key] = bytes(request[4 : 4 + size])
+        return b"\x60" + request[1:4] + bytes(4)
+
+    def positions(self, sync: int) -> list[bytes]:
+        """What it sends at a SYNC."""
+        if self.answers_sync is not None:
+            return self.answers_sync(sync)
+        return [self.counts.to_bytes(4, "little", signed=True)]
+
+    def _upload(self, request: bytes, key: Object) -> bytes:
+        if key not in self.objects:
+            return _abort(request, NOT_THERE)
+        data = self.objects[key]
+        return bytes([0x43 | (4 - len(data)) << 2]) + request[1:4] + data.ljust(4, b"\0")
+
+
+def _abort(request: bytes, code: int) -> bytes:
+    return b"\x80" + request[1:4] + code.to_bytes(4, "little")
+
+
+def plain_objects(node: int) -> dict[Object, bytes]:
+    """An absolute linear encoder of 1 um that has TPDO2 with SYNC, and hardly more."""
+
+    def unsigned(value: int, size: int = 4) -> bytes:
+        return value.to_bytes(size, "little")
+
+    return {
+        (0x1000, 0): unsigned(0x0008_0196),
+        (0x1017, 0): unsigned(0, 2),
+        (0x1018, 1): unsigned(0x99),
+        (0x1018, 4): unsigned(500 + node),
+        (0x6005, 1): unsigned(1000),
+        (0x1800, 1): unsigned(0x180 + node),
+        (0x1800, 2): unsigned(254, 1),
+        (0x1A00, 0): unsigned(0, 1),
+        (0x1801, 1): unsigned(0x280 + node),
+        (0x1801, 2): unsigned(1, 1),
+        (0x1A01, 0): unsigned(1, 1),
+        (0x1A01, 1): unsigned(0x6004_0020),
+    }
+
+
+class RawBus:
+    """Six raw nodes on a virtual bus; ``heard`` is what the driver sent."""
+
+    def __init__(self) -> None:
+        self.channel = f"raw-{uuid.uuid4().hex}"
+        self.nodes = {node: RawNode(node, plain_objects(node), counts=1000 * node) for node in range(1, 7)}
+        self.heard: list[tuple[int, bytes]] = []
+        self.syncs = 0
+        self.synced = threading.Event()
+        self._bus = can.Bus(self.channel, interface="virtual")
+        self._stop = threading.Event()
+        self._thread = threading.Thread(target=self._run)
+        self._thread.start()
+
+    def send(self, can_id: int, data: bytes = b"", **kind: Any) -> None:
+        """Put any frame on the bus."""
+        self._bus.send(can.Message(arbitration_id=can_id, data=data, **{"is_extended_id": False} | kind))
+
+    def requests_to(self, node: int) -> list[str]:
+        """SDO requests and NMT commands that a node got, in hexadecimal."""
+        return [
+            data.hex()
+            for can_id, data in self.heard
+            if can_id == SDO_REQUEST + node or (can_id == NMT and data[1] == node)
+        ]
+
+    def close(self) -> None:
+        self._stop.set()
+        self._thread.join()
+        self._bus.shutdown()
+
+    def _run(self) -> None:
+        while not self._stop.is_set():
+            message = self._bus.recv(0.01)
+            if message is not None:
+                self.heard.append((message.arbitration_id, bytes(message.data)))
+                self._react(message.arbitration_id, bytes(message.data))
+
+    def _react(self, can_id: int, data: bytes) -> None:
+        if can_id == SYNC:
+            self._sync()
+        elif can_id == NMT and data[1] in self.nodes:
+            self.nodes[data[1]].state = {1: 0x05, 0x80: 0x7F}[data[0]]
+        elif can_id - SDO_REQUEST in self.nodes:
+            node = self.nodes[can_id - SDO_REQUEST]
+            if data[0] != 0x80:
+                for _ in range(node.answers_sdo):
+                    self.send(SDO_ANSWER + node.node, node.answer_sdo(data))
+
+    def _sync(self) -> None:
+        self.syncs += 1
+        for node in self.nodes.values():
+            for data in node.positions(self.syncs) if node.state == 0x05 else ():
+                self.send(node.tpdo, data)
+        self.synced.set()
+
+
+@pytest.fixture
+def raw() -> Iterator[RawBus]:
+    bus = RawBus()
+    yield bus
+    bus.close()
+
+
+@pytest.fixture
+def settings(raw: RawBus) -> EncoderSettings:
+    """Raw nodes send no heartbeat unless a test does."""
+    return EncoderSettings(bus={"interface": "virtual", "channel": raw.channel}, heartbeat_ms=0)
+
+
+@pytest.fixture
+async def bank(settings: EncoderSettings) -> AsyncIterator[Cia406Bank]:
+    bank = Cia406Bank(settings)
+    yield bank
+    await bank.close()
+
+
+@pytest.fixture
+async def impatient(settings: EncoderSettings) -> AsyncIterator[Cia406Bank]:
+    """A bank for tests in which somebody stays silent."""
+    bank = Cia406Bank(settings.model_copy(update={"timeout_s": 0.1}))
+    yield bank
+    await bank.close()

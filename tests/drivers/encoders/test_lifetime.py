@@ -1,0 +1,170 @@
+"""Opening, closing, cancelling: nothing is left behind and nothing gets out of step."""
+
+from __future__ import annotations
+
+import asyncio
+import threading
+import time
+
+import can
+import pytest
+
+from drivers.encoders.cia406 import Cia406Bank
+from drivers.encoders.errors import BusError, MissingNodeError
+from hexacell.errors import DeviceError
+
+
+async def test_reading_what_is_not_open_is_an_error(bank):
+    with pytest.raises(DeviceError, match="not open"):
+        await bank.read()
+
+
+async def test_closing_twice_or_without_opening_is_harmless(bank):
+    await bank.close()
+    await bank.open()
+    await bank.close()
+    await bank.close()
+    with pytest.raises(DeviceError, match="not open"):
+        await bank.read()
+
+
+async def test_no_thread_outlives_close(raw, bank):
+    before = set(threading.enumerate())
+    await bank.open()
+    assert len(set(threading.enumerate()) - before) == 2
+    await bank.close()
+    assert set(threading.enumerate()) == before
+
+
+async def test_no_thread_outlives_a_failed_open(raw, impatient):
+    before = set(threading.enumerate())
+    del raw.nodes[1]
+    with pytest.raises(MissingNodeError):
+        await impatient.open()
+    assert set(threading.enumerate()) == before
+
+
+async def test_opening_again_configures_again(raw, bank):
+    await bank.open()
+    raw.heard.clear()
+    await bank.open()
+    assert (0, b"\x01\x06") in raw.heard
+    assert (await bank.read()).counts[5] == 6000
+
+
+async def test_a_cancelled_read_returns_soon_and_the_next_one_is_right(raw, settings):
+    bank = Cia406Bank(settings.model_copy(update={"timeout_s": 1.0}))
+    await bank.open()
+    release = threading.Event()
+
+    def hold(_sync):
+        release.wait(2)
+        return [b"\x01\0\0\0"]
+
+    raw.nodes[1].answers_sync = hold
+    reading = asyncio.ensure_future(bank.read())
+    await asyncio.sleep(0.05)
+    begin = time.monotonic()
+    reading.cancel()
+    with pytest.raises(asyncio.CancelledError):
+        await reading
+    assert time.monotonic() - begin < 0.2
+    raw.nodes[1].answers_sync = lambda sync: [b"\x02\0\0\0"]
+    release.set()
+    assert (await bank.read()).counts == (2, 2000, 3000, 4000, 5000, 6000)
+    await bank.close()
+
+
+async def test_cancelling_at_any_moment_never_leaves_the_link_out_of_step(raw, bank):
+    await bank.open()
+    for node in raw.nodes.values():
+        node.answers_sync = lambda sync: [sync.to_bytes(4, "little")]
+    for step in range(60):
+        reading = asyncio.ensure_future(bank.read())
+        await asyncio.sleep(step * 0.00005)
+        reading.cancel()
+        await asyncio.gather(reading, return_exceptions=True)
+    found = await bank.read()
+    assert found.counts == (raw.syncs,) * 6
+
+
+async def test_a_cancelled_open_leaves_nothing(raw, bank):
+    before = set(threading.enumerate())
+    answer = raw.nodes[1].answer_sdo
+    asked = threading.Event()
+
+    def answer_slowly(request):
+        asked.set()
+        time.sleep(0.05)
+        return answer(request)
+
+    raw.nodes[1].answer_sdo = answer_slowly
+    opening = asyncio.ensure_future(bank.open())
+    await asyncio.to_thread(asked.wait)
+    opening.cancel()
+    with pytest.raises(asyncio.CancelledError):
+        await opening
+    left = {thread for thread in set(threading.enumerate()) - before if "asyncio" not in thread.name}
+    assert not left
+    with pytest.raises(DeviceError, match="not open"):
+        await bank.read()
+    raw.nodes[1].answer_sdo = answer
+    await bank.open()
+
+
+async def test_closing_ends_reads_in_progress(raw, settings):
+    bank = Cia406Bank(settings.model_copy(update={"timeout_s": 5.0}))
+    await bank.open()
+    raw.nodes[1].answers_sync = lambda _: []
+    readings = [asyncio.ensure_future(bank.read()) for _ in range(3)]
+    await asyncio.sleep(0.05)
+    begin = time.monotonic()
+    await bank.close()
+    results = await asyncio.gather(*readings, return_exceptions=True)
+    assert time.monotonic() - begin < 0.5
+    assert all(isinstance(result, DeviceError) for result in results)
+
+
+async def test_reads_from_many_tasks_take_turns(raw, bank):
+    await bank.open()
+    for node in raw.nodes.values():
+        node.answers_sync = lambda sync: [sync.to_bytes(4, "little")]
+    rounds = await asyncio.gather(*(bank.read() for _ in range(20)))
+    assert all(len(set(found.counts)) == 1 for found in rounds)
+    assert len({found.counts for found in rounds}) == 20
+
+
+async def test_a_slow_device_does_not_hold_up_the_event_loop(raw, impatient):
+    await impatient.open()
+    raw.nodes[1].answers_sync = lambda _: []
+    reading = asyncio.ensure_future(impatient.read())
+    longest = 0.0
+    while not reading.done():
+        begin = time.monotonic()
+        await asyncio.sleep(0.001)
+        longest = max(longest, time.monotonic() - begin)
+    assert reading.exception() is not None
+    assert longest < 0.2
+
+
+@pytest.mark.parametrize("where", ["recv", "send"])
+async def test_a_bus_that_dies_is_an_error_with_its_cause(raw, bank, monkeypatch, where):
+    await bank.open()
+
+    def fail(*_args, **_kwargs):
+        raise can.CanOperationError("adapter gone")
+
+    network = bank._session._bus.network
+    monkeypatch.setattr(network.bus, where, fail)
+    await asyncio.sleep(0.1)
+    for _ in range(2):
+        with pytest.raises(BusError, match=r"encoder bus virtual raw-.*adapter gone.*the set .* is void"):
+            await bank.read()
+
+
+async def test_a_bus_may_die_of_anything(raw, bank, monkeypatch):
+    await bank.open()
+    monkeypatch.setattr(bank._session._bus.network.bus, "recv", lambda _timeout: 1 / 0)
+    await asyncio.sleep(0.1)
+    with pytest.raises(BusError, match="division by zero"):
+        await bank.read()

@@ -1,0 +1,277 @@
+"""What happens before the first position: finding, comparing and configuring six nodes."""
+
+from __future__ import annotations
+
+import can
+import pytest
+
+from drivers.encoders.cia406 import Cia406Bank
+from drivers.encoders.errors import (
+    BusError,
+    ConfigurationError,
+    DuplicatedNodeError,
+    InvalidSampleError,
+    MissingNodeError,
+    SilentNodeError,
+    WrongDeviceError,
+)
+from hexacell.cell.devices import EncoderSettings
+
+DIALOGUE_WITH_NODE_4 = """
+    8004                enter PRE-OPERATIONAL
+    4000100000000000    device type: anybody there?
+    4000100000000000    device type
+    4005600100000000    measuring step
+    4018100100000000    vendor
+    4018100200000000    product (not there)
+    4018100300000000    revision (not there)
+    4018100400000000    serial number
+    4000180100000000    TPDO1: COB-ID
+    40001a0000000000           mapped entries: none
+    4000180200000000           transmission type
+    4001180100000000    TPDO2: COB-ID
+    40011a0000000000           mapped entries: one
+    4001180200000000           transmission type
+    40011a0100000000           position
+    4002180100000000    TPDO3 (not there)
+    4003180100000000    TPDO4 (not there)
+    2300180184010080    TPDO1 off
+    2301180184020080    TPDO2 off
+    2f01180201000000    TPDO2 with every SYNC
+    4001180500000000          event timer (not there)
+    2301180184020000          on
+    4001180200000000          kept?
+    4001180100000000          on?
+    2b171000fa000000    heartbeat every 250 ms
+    4001100000000000    error register (not there)
+    4003650000000000    alarms (not there)
+    0104                start
+"""
+
+
+async def test_the_dialogue_with_a_node_frame_by_frame(raw, settings):
+    bank = Cia406Bank(settings.model_copy(update={"heartbeat_ms": 250}))
+    await bank.open()
+    await bank.close()
+    assert raw.requests_to(4) == [line.split()[0] for line in DIALOGUE_WITH_NODE_4.strip().splitlines()]
+
+
+async def test_all_nodes_are_configured_before_any_is_started(raw, bank):
+    await bank.open()
+    commands = [data.hex() for can_id, data in raw.heard if can_id == 0]
+    assert commands == [f"80{node:02x}" for node in range(1, 7)] + [f"01{node:02x}" for node in range(1, 7)]
+    first_start = raw.heard.index((0, b"\x01\x01"))
+    assert not any(data[0] >> 5 == 1 for can_id, data in raw.heard[first_start:] if can_id >> 7 == 0xC)
+
+
+async def test_it_says_who_answered(bank):
+    identities = await bank.open()
+    assert [identity.serial_number for identity in identities] == [str(500 + leg) for leg in range(1, 7)]
+    assert identities[2].name == "encoder of leg 3 (node 3)"
+    assert identities[2].protocol == "cia406"
+    assert "absolute linear encoder, vendor 0x00000099" in identities[2].description
+
+
+async def test_missing_nodes_are_all_named(raw, impatient):
+    del raw.nodes[2], raw.nodes[5]
+    with pytest.raises(
+        MissingNodeError, match=r"encoders of leg 2 \(node 2\), leg 5 \(node 5\): nobody"
+    ) as caught:
+        await impatient.open()
+    assert [leg.node for leg in caught.value.legs] == [2, 5]
+
+
+async def test_a_node_that_no_leg_has_is_pointed_out(raw, impatient):
+    raw.nodes[127] = raw.nodes.pop(3)
+    raw.nodes[127].node = 127
+    with pytest.raises(
+        MissingNodeError, match=r"leg 3 \(node 3\).*node 127 is on the bus but belongs to no leg"
+    ):
+        await impatient.open()
+
+
+async def test_nodes_need_not_be_numbered_like_legs(raw, settings):
+    bank = Cia406Bank(settings.model_copy(update={"nodes": (6, 5, 4, 3, 2, 1)}))
+    identities = await bank.open()
+    counts = (await bank.read()).counts
+    await bank.close()
+    assert identities[0].name == "encoder of leg 1 (node 6)"
+    assert counts == (6000, 5000, 4000, 3000, 2000, 1000)
+
+
+async def test_two_answers_to_one_request_are_two_devices(raw, bank):
+    raw.nodes[4].answers_sdo = 2
+    with pytest.raises(DuplicatedNodeError, match=r"leg 4 \(node 4\).*two devices share node id 4"):
+        await bank.open()
+
+
+async def test_two_positions_for_the_first_sync_are_two_devices(raw, bank):
+    raw.nodes[4].answers_sync = lambda _: [bytes(4), bytes(4)]
+    with pytest.raises(DuplicatedNodeError, match=r"leg 4 \(node 4\)"):
+        await bank.open()
+
+
+@pytest.mark.parametrize(
+    ("value", "words"),
+    [
+        (0x0002_0196, "an encoder, but of class 2"),
+        (0x0002_0192, "profile 402"),
+        (0, "profile 0"),
+    ],
+)
+async def test_another_kind_of_device_is_refused_and_named(raw, bank, value, words):
+    raw.nodes[6].objects[0x1000, 0] = value.to_bytes(4, "little")
+    with pytest.raises(WrongDeviceError, match=rf"leg 6.*0x{value:08X}.*{words}"):
+        await bank.open()
+
+
+async def test_another_measuring_step_is_refused(raw, bank):
+    raw.nodes[1].objects[0x6005, 1] = (5000).to_bytes(4, "little")
+    with pytest.raises(WrongDeviceError, match=r"leg 1.*steps of 5000 nm, the cell file says 1000 nm"):
+        await bank.open()
+
+
+@pytest.mark.parametrize(("step", "fits"), [(1000, True), (100, False)])
+async def test_the_step_may_be_kept_in_6501(raw, bank, step, fits):
+    for node in raw.nodes.values():
+        del node.objects[0x6005, 1]
+        node.objects[0x6501, 0] = step.to_bytes(4, "little")
+    if fits:
+        await bank.open()
+    else:
+        with pytest.raises(WrongDeviceError, match="100 nm"):
+            await bank.open()
+
+
+async def test_a_device_that_does_not_tell_its_step_is_refused(raw, bank):
+    del raw.nodes[3].objects[0x6005, 1]
+    with pytest.raises(WrongDeviceError, match=r"leg 3.*has no object 6501h:0"):
+        await bank.open()
+
+
+async def test_serial_numbers_are_compared_when_stated(raw, settings):
+    stated = tuple(500 + leg for leg in range(1, 7))
+    bank = Cia406Bank(settings.model_copy(update={"serial_numbers": stated}))
+    await bank.open()
+    raw.nodes[2].objects[0x1018, 4] = (77).to_bytes(4, "little")
+    with pytest.raises(WrongDeviceError, match=r"leg 2.*serial number 77, the cell file says 502"):
+        await bank.open()
+
+
+async def test_a_serial_number_stated_but_not_there_is_refused(raw, settings):
+    del raw.nodes[2].objects[0x1018, 4]
+    bank = Cia406Bank(settings.model_copy(update={"serial_numbers": (501, 502, 503, 504, 505, 506)}))
+    with pytest.raises(WrongDeviceError, match=r"leg 2.*\(none\)"):
+        await bank.open()
+
+
+async def test_position_is_mapped_where_no_tpdo_has_it(raw, bank):
+    for node in raw.nodes.values():
+        node.objects[0x1A01, 0] = b"\0"
+        node.objects[0x1A01, 1] = bytes(4)
+        node.objects[0x1801, 2] = b"\xff"
+        node.objects[0x1A00, 1] = bytes(4)
+        node.objects[0x1800, 5] = b"\x01\0"
+        node.objects[0x1801, 1] = (0x180 + node.node).to_bytes(4, "little")  # where the raw node sends
+    await bank.open()
+    assert (await bank.read()).counts == (1000, 2000, 3000, 4000, 5000, 6000)
+    assert raw.nodes[1].objects[0x1A00, 1] == bytes.fromhex("20000460")
+    assert raw.nodes[1].objects[0x1A00, 0] == b"\x01"
+    assert raw.nodes[1].objects[0x1800, 2] == b"\x01"
+    assert raw.nodes[1].objects[0x1800, 5] == b"\0\0"
+    assert raw.nodes[1].objects[0x1800, 1] == bytes.fromhex("81010000")
+
+
+async def test_a_write_refused_names_object_and_leg(raw, bank):
+    raw.nodes[5].refuses[0x1801, 2] = 0x0601_0002
+    with pytest.raises(ConfigurationError, match=r"leg 5.*object 1801h:2 be set to 0x1.*read only"):
+        await bank.open()
+
+
+@pytest.mark.parametrize("entry", [(0x1801, 2), (0x1801, 1)])
+async def test_a_device_that_only_pretends_to_be_configured_is_refused(raw, bank, entry):
+    raw.nodes[5].objects[0x1801, 2] = b"\xfe"
+    raw.nodes[5].objects[0x1801, 1] = bytes.fromhex("85020080")
+    raw.nodes[5].forgets.add(entry)
+    with pytest.raises(ConfigurationError, match=r"leg 5.*acknowledges"):
+        await bank.open()
+
+
+async def test_a_device_without_tpdos_is_refused(raw, bank):
+    for key in [key for key in raw.nodes[5].objects if 0x1800 <= key[0] < 0x1C00]:
+        del raw.nodes[5].objects[key]
+    with pytest.raises(ConfigurationError, match=r"leg 5.*no transmit PDO"):
+        await bank.open()
+
+
+async def test_a_position_between_bytes_is_refused(raw, bank):
+    raw.nodes[5].objects[0x1A01, 0] = b"\x02"
+    raw.nodes[5].objects[0x1A01, 1] = bytes.fromhex("04003060")
+    raw.nodes[5].objects[0x1A01, 2] = bytes.fromhex("20000460")
+    with pytest.raises(ConfigurationError, match=r"leg 5.*4 bits"):
+        await bank.open()
+
+
+@pytest.mark.parametrize("register", [0x01, 0x21])
+async def test_an_error_from_before_is_not_overlooked(raw, bank, register):
+    raw.nodes[2].objects[0x1001, 0] = bytes([register])
+    with pytest.raises(InvalidSampleError, match=r"leg 2.*1001h:0"):
+        await bank.open()
+
+
+async def test_a_past_communication_error_does_not_matter(raw, bank):
+    raw.nodes[2].objects[0x1001, 0] = b"\x10"
+    await bank.open()
+
+
+async def test_a_node_that_dies_while_being_configured_is_named(raw, impatient):
+    node, answer = raw.nodes[3], raw.nodes[3].answer_sdo
+
+    def answer_until_tpdo1_is_read(request):
+        node.answers_sdo = 0 if request[1:3] == b"\x00\x18" else 1
+        return answer(request)
+
+    node.answer_sdo = answer_until_tpdo1_is_read
+    with pytest.raises(SilentNodeError, match=r"leg 3 .*1A00h:0"):
+        await impatient.open()
+
+
+async def test_nonsense_in_answer_to_a_request_is_an_error_with_a_name(raw, bank):
+    raw.nodes[3].answer_sdo = lambda request: b"\x43\x00\x10\x07" + bytes(4)
+    with pytest.raises(SilentNodeError, match="leg 3"):
+        await bank.open()
+
+
+@pytest.mark.parametrize(
+    ("bus", "words"),
+    [
+        (
+            {"interface": "slcan", "channel": "/dev/no-such-tty", "sleep_after_open": 0},
+            "encoder bus slcan /dev/no-such-tty: cannot be opened.*Plug the CAN adapter in",
+        ),
+        ({"interface": "no-such-interface", "channel": "x"}, "no-such-interface"),
+        ({"interface": "slcan", "channel": "socket://127.0.0.1:1", "sleep_after_open": 0}, "refused"),
+        ({"interface": "slcan", "channel": ""}, "serial port"),
+        (None, "not named in the cell file.*encoders"),
+    ],
+)
+async def test_a_bus_that_cannot_be_opened_says_what_to_do(bus, words):
+    with pytest.raises(BusError, match=words) as caught:
+        await Cia406Bank(EncoderSettings(bus=bus)).open()
+    assert caught.value.action
+
+
+async def test_bus_settings_go_through_unchanged(raw, settings, monkeypatch):
+    seen = {}
+    real = can.Bus
+
+    def spy(*args, **kwargs):
+        seen.update(kwargs)
+        return real(*args, **kwargs)
+
+    monkeypatch.setattr(can, "Bus", spy)
+    stated = {**settings.bus, "preserve_timestamps": True}
+    bank = Cia406Bank(settings.model_copy(update={"bus": stated}))
+    await bank.open()
+    await bank.close()
+    assert seen == stated

@@ -1,0 +1,192 @@
+"""Positions: one SYNC, six answers, all of one instant or none."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections.abc import Callable
+
+import pytest
+
+from drivers.encoders.cia406 import Cia406Bank
+from drivers.encoders.errors import BusError, DuplicatedNodeError, SilentNodeError, WrongDeviceError
+from drivers.encoders.rounds import TRIES
+from drivers.trace import Direction, TraceEntry
+
+
+def counts(value: int) -> bytes:
+    return value.to_bytes(4, "little", signed=True)
+
+
+async def test_a_round_is_one_sync_and_no_sdo_request(raw, bank):
+    await bank.open()
+    raw.heard.clear()
+    assert (await bank.read()).counts == (1000, 2000, 3000, 4000, 5000, 6000)
+    assert raw.heard == [(0x80, b"")]
+
+
+async def test_positions_are_never_asked_for_by_sdo(raw, bank):
+    await bank.open()
+    for _ in range(20):
+        await bank.read()
+    asked = {data[1:3] for can_id, data in raw.heard if can_id >> 7 == 0xC}
+    assert not asked & {b"\x04\x60", b"\x20\x60"}
+
+
+async def test_counts_become_millimetres_by_direction_step_and_offset(raw, settings):
+    for leg, value in enumerate((0, 1, -1, 2**31 - 1, -(2**31), 400), 1):
+        raw.nodes[leg].counts = value
+        raw.nodes[leg].objects[0x6005, 1] = (250).to_bytes(4, "little")
+    bank = Cia406Bank(
+        settings.model_copy(
+            update={
+                "measuring_step_nm": 250.0,
+                "direction": (1, -1, 1, -1, 1, -1),
+                "offset_mm": (7.5, 0.0, -1.0, 0.0, 0.0, 100.0),
+            }
+        )
+    )
+    await bank.open()
+    found = await bank.read()
+    await bank.close()
+    assert found.counts == (0, 1, -1, 2**31 - 1, -(2**31), 400)
+    expected = (7.5, -0.00025, -1.00025, -536870.91175, -536870.912, 99.9)
+    assert found.positions_mm == pytest.approx(expected, abs=1e-9)
+
+
+async def test_unsigned_positions_do_not_turn_negative(raw, settings):
+    raw.nodes[1].counts = -1
+    bank = Cia406Bank(settings.model_copy(update={"signed": False}))
+    await bank.open()
+    assert (await bank.read()).counts[0] == 2**32 - 1
+    await bank.close()
+
+
+async def test_an_incomplete_round_is_discarded_and_tried_again(raw, impatient):
+    await impatient.open()
+    for node in raw.nodes.values():
+        node.answers_sync = lambda sync, node=node: (
+            [] if (sync, node.node) == (2, 3) else [counts(100 * sync + node.node)]
+        )
+    assert (await impatient.read()).counts == (301, 302, 303, 304, 305, 306)
+    assert (await impatient.read()).counts == (401, 402, 403, 404, 405, 406)
+
+
+async def test_a_silent_leg_is_named_after_bounded_tries(raw, impatient):
+    await impatient.open()
+    raw.nodes[5].answers_sync = lambda _: []
+    begin, before = time.monotonic(), raw.syncs
+    with pytest.raises(
+        SilentNodeError, match=r"encoder of leg 5 \(node 5\): no answer to SYNC.*its supply"
+    ):
+        await impatient.read()
+    assert raw.syncs - before == TRIES
+    assert time.monotonic() - begin < 2.0
+
+
+async def test_silence_of_all_points_at_the_bus(raw, impatient):
+    await impatient.open()
+    for node in raw.nodes.values():
+        node.answers_sync = lambda _: []
+    with pytest.raises(SilentNodeError, match=r"leg 1 .*leg 6 .*CAN adapter, supply and termination"):
+        await impatient.read()
+
+
+async def test_after_silence_the_bank_reads_on(raw, impatient):
+    await impatient.open()
+    raw.nodes[5].answers_sync = lambda _: []
+    with pytest.raises(SilentNodeError):
+        await impatient.read()
+    raw.nodes[5].answers_sync = None
+    assert (await impatient.read()).counts[4] == 5000
+
+
+async def test_an_answer_just_late_is_waited_for_before_the_next_sync(raw, settings):
+    bank = Cia406Bank(settings.model_copy(update={"timeout_s": 0.2}))
+    await bank.open()
+    raw.nodes[2].answers_sync = lambda _: []
+    reading = asyncio.ensure_future(bank.read())
+    await _until(lambda: raw.syncs == 2)
+    await asyncio.sleep(0.3)  # past the time-out, within the second one
+    raw.nodes[2].answers_sync = lambda _: [counts(77)]
+    raw.send(raw.nodes[2].tpdo, counts(66))
+    assert (await reading).counts[1] == 77
+    await bank.close()
+    assert raw.syncs == 3
+
+
+async def test_one_position_too_many_is_another_device(raw, bank):
+    await bank.open()
+    await bank.read()
+    raw.send(raw.nodes[4].tpdo, counts(4))
+    await asyncio.sleep(0.05)
+    with pytest.raises(
+        DuplicatedNodeError, match=r"leg 4 \(node 4\).*more positions than there were SYNCs"
+    ):
+        await bank.read()
+
+
+async def test_somebody_elses_sync_is_an_error(raw, bank):
+    await bank.open()
+    raw.send(0x80)
+    await asyncio.sleep(0.05)
+    with pytest.raises(BusError, match="somebody else sends SYNC"):
+        await bank.read()
+
+
+@pytest.mark.parametrize("size", [0, 3])
+async def test_a_frame_too_short_is_no_position(raw, bank, size):
+    await bank.open()
+    raw.nodes[6].answers_sync = lambda _: [bytes(size)]
+    with pytest.raises(WrongDeviceError, match=f"leg 6.*sent {size} bytes where its position needs 4"):
+        await bank.read()
+
+
+async def test_position_is_taken_from_where_it_is_mapped(raw, bank):
+    objects = raw.nodes[1].objects
+    objects[0x1A01, 0] = b"\x02"
+    objects[0x1A01, 1] = bytes.fromhex("10013060")  # 16 bits of speed first
+    objects[0x1A01, 2] = bytes.fromhex("20000460")
+    raw.nodes[1].answers_sync = lambda _: [b"\xff\xff" + counts(-5)]
+    await bank.open()
+    assert (await bank.read()).counts[0] == -5
+
+
+async def test_frames_that_are_no_canopen_do_not_matter(raw, bank):
+    await bank.open()
+    cob_id = raw.nodes[1].tpdo
+    raw.send(cob_id, counts(9), is_extended_id=True)
+    raw.send(cob_id, is_remote_frame=True)
+    raw.send(cob_id, counts(9), is_error_frame=True)
+    raw.send(0x123, b"anything")
+    raw.send(0x7E4, b"\0" * 8)
+    await asyncio.sleep(0.05)
+    assert (await bank.read()).counts[0] == 1000
+
+
+async def test_our_own_echo_is_not_somebody_elses_sync(raw, settings):
+    echoing = {**settings.bus, "receive_own_messages": True}
+    bank = Cia406Bank(settings.model_copy(update={"bus": echoing}))
+    await bank.open()
+    await bank.read()
+    await bank.read()
+    await bank.close()
+
+
+async def test_every_frame_can_be_traced(raw, settings):
+    entries: list[TraceEntry] = []
+    bank = Cia406Bank(settings, trace=entries.append)
+    await bank.open()
+    entries.clear()
+    await bank.read()
+    await bank.close()
+    seen = [(entry.direction, entry.data) for entry in entries]
+    assert seen[0] == (Direction.SENT, b"080#")
+    assert (Direction.RECEIVED, b"286#70170000") in seen
+    assert len(seen) == 7
+    assert all(entry.line.startswith("encoder bus virtual") for entry in entries)
+
+
+async def _until(condition: Callable[[], bool]) -> None:
+    while not condition():  # noqa: ASYNC110 - the raw bus is a thread
+        await asyncio.sleep(0.005)

@@ -1,0 +1,236 @@
+"""CDI and Starrett indicators: the unit in every answer, and parameters."""
+
+import re
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from drivers.gauges.cdi import CdiGauge, Parameter, Refusal, parse_parameter, parse_value
+from drivers.gauges.errors import (
+    FrameRejected,
+    GaugeAtEnd,
+    GaugeSilent,
+    WrongAnswer,
+    WrongMode,
+    WrongUnit,
+    ZeroVoid,
+)
+from drivers.gauges.shown import Shown
+from drivers.ports import DeviceIdentity, GaugeReading
+from drivers.simulated.gauges.cdi import format_value
+
+VALUE = b"+  2.1380, MM\r\n"
+PARAMETERS = {b"?p011\r": b"0\r\n", b"?p019\r": b"0\r\n", b"?p021\r": b"0\r\n", b"?p040\r": b"0\r\n"}
+
+
+def opening(value=VALUE, **answers):
+    parameters = [(ask, answers.get(ask[1:5].decode(), answer)) for ask, answer in PARAMETERS.items()]
+    return [(b"R\r", value), *parameters]
+
+
+@pytest.fixture
+async def gauge(links, settings):
+    gauge = CdiGauge(settings("cdi"), links)
+    yield gauge
+    await gauge.close()
+
+
+@pytest.fixture
+async def opened(dialogue, gauge):
+    dialogue.expect(*opening())
+    await gauge.open()
+    return gauge
+
+
+# Frames
+
+
+@pytest.mark.parametrize(
+    ("frame", "value", "unit"),
+    [
+        (b"+  2.1380, MM\r", 2.138, "mm"),
+        (b"- 12.3450, MM\r", -12.345, "mm"),
+        (b"+00002.13, MM\r", 2.13, "mm"),
+        (b"+2.13    , MM\r", 2.13, "mm"),
+        (b"+ 0.08417, IN\r", 0.08417, "inch"),
+    ],
+)
+def test_a_value_is_read_with_its_unit(frame, value, unit):
+    shown = parse_value(frame)
+    assert (shown.value, shown.apparent_unit) == (value, unit)
+
+
+@pytest.mark.parametrize("refusal", Refusal)
+def test_a_refusal_is_read(refusal):
+    assert parse_value(refusal.value) is refusal
+
+
+@pytest.mark.parametrize(
+    "frame",
+    [
+        b"   2.1380, MM\r",
+        b"+ 2.1380, MM\r",
+        b"+   2.1380, MM\r",
+        b"+ 2 .1380, MM\r",
+        b"+  2.13 0, MM\r",
+        b"+  2.1380; MM\r",
+        b"+  2.1380, mm\r",
+        b"+  2.1380, M\r",
+        b"+  2.1380,MM\r",
+        b"+  21380 , MM\r",
+        b"+  2.1380, MM",
+        b"+  2.\xb1380, MM\r",
+        b"SUCCESS\r",
+        b"",
+    ],
+)
+def test_anything_else_is_rejected(frame):
+    with pytest.raises(FrameRejected):
+        parse_value(frame)
+
+
+@given(st.floats(-99, 99), st.booleans())
+def test_what_the_simulated_device_writes_is_read(value, inch):
+    shown = parse_value(format_value(value, inch=inch).removesuffix(b"\n"))
+    assert isinstance(shown, Shown)
+    assert shown.value == pytest.approx(value, abs=0.51e-5 if inch else 0.51e-4)
+    assert shown.unit == ("inch" if inch else "mm")
+
+
+@given(
+    st.binary(max_size=16)
+    | st.from_regex(rb"[+\- ][0-9. ]{7,9}, ?(IN|MM|NM|MN)\r", fullmatch=True)
+    | st.from_regex(rb"[+-] *[0-9]{1,3}\.[0-9 ]{1,4}, MM\r", fullmatch=True)
+)
+def test_noise_is_a_value_only_if_it_is_one_to_the_last_byte(noise):
+    try:
+        shown = parse_value(noise)
+    except FrameRejected:
+        return
+    if isinstance(shown, Shown):
+        assert re.fullmatch(rb"[+-] *[0-9]+\.[0-9]+ *, (IN|MM)\r", noise)
+        assert len(noise) == 14
+        assert abs(shown.value) == float(noise[1:9])
+
+
+@pytest.mark.parametrize("frame", [b"1\r", b"p021=1\r", b"P021 = 1\r", b"p021=001\r"])
+def test_a_parameter_is_read_bare_or_named(frame):
+    assert parse_parameter(frame, Parameter.HOLD) == 1
+
+
+@pytest.mark.parametrize("frame", [b"NOT FOUND\r", b"NO ACCESS\r"])
+def test_a_parameter_may_be_unknown(frame):
+    assert parse_parameter(frame, Parameter.HOLD) is None
+
+
+@pytest.mark.parametrize(
+    "frame", [b"p019=1\r", b"SUCCESS\r", b"1.5\r", b"\r", b"1\xb2\r", b"OUT OF BOUNDS\r"]
+)
+def test_anything_else_is_no_such_parameter(frame):
+    with pytest.raises(FrameRejected):
+        parse_parameter(frame, Parameter.HOLD)
+
+
+# Dialogues
+
+
+async def test_it_opens_and_reads(dialogue, gauge):
+    dialogue.expect(*opening(), (b"R\r", VALUE), (b"R\r", VALUE))
+    assert await gauge.open() == DeviceIdentity("y", "cdi", "CDI or Starrett indicator")
+    assert await gauge.read() == GaugeReading(2.138, "+  2.1380, MM")
+
+
+async def test_commands_that_are_echoed_are_no_answers(dialogue, gauge):
+    dialogue.expect(*((ask, ask + b"\n", answer) for ask, answer in opening()))
+    dialogue.expect(*[(b"R\r", b"R\r" + VALUE)] * 2)
+    await gauge.open()
+    assert (await gauge.read()).value_mm == 2.138
+
+
+async def test_line_ends_of_a_carriage_return_alone_will_do(dialogue, gauge):
+    dialogue.expect(*((ask, answer.replace(b"\n", b"")) for ask, answer in opening()))
+    await gauge.open()
+
+
+async def test_an_older_indicator_without_parameters_will_do(dialogue, gauge):
+    dialogue.expect((b"R\r", VALUE), (b"?p011\r",), (b"R\r", VALUE))
+    await gauge.open()
+    await gauge.check()
+
+
+async def test_an_indicator_that_has_answered_for_parameters_must_go_on_doing_so(dialogue, opened):
+    dialogue.expect((b"R\r", VALUE), (b"?p011\r",))
+    with pytest.raises(GaugeSilent):
+        await opened.check()
+
+
+async def test_unknown_parameters_are_left_out(dialogue, gauge):
+    unknown = {name: b"NOT FOUND\r\n" for name in ("p011", "p019", "p021", "p040")}
+    dialogue.expect(*opening(**unknown), *opening(**unknown))
+    await gauge.open()
+    await gauge.check()
+
+
+async def test_an_inch_gauge_is_refused(dialogue, gauge):
+    dialogue.expect(*opening(b"+ 0.08417, IN\r\n"))
+    with pytest.raises(WrongUnit, match="gauge y: answers in inch"):
+        await gauge.open()
+
+
+@pytest.mark.parametrize("value", [b"+ 0.08417, IN\r\n", b"+  0.0842, IN\r\n"])
+async def test_inch_pressed_during_a_set_is_found_in_a_reading(dialogue, opened, value):
+    dialogue.expect((b"R\r", value))
+    with pytest.raises(WrongUnit):
+        await opened.read()
+
+
+async def test_the_unit_is_asked_for_with_the_plunger_at_its_end(dialogue, gauge):
+    at_end = opening(b"OUT OF BOUNDS\r\n")
+    dialogue.expect(at_end[0], (b"?p013\r", b"1\r\n"), *at_end[1:])
+    with pytest.raises(WrongUnit):
+        await gauge.open()
+    dialogue.expect(at_end[0], (b"?p013\r", b"2\r\n"), *at_end[1:])
+    await gauge.open()
+
+
+@pytest.mark.parametrize(
+    ("answers", "words"),
+    [
+        ({"p021": b"1\r\n"}, "is on hold"),
+        ({"p011": b"1\r\n"}, "is in mode TIR"),
+        ({"p011": b"7\r\n"}, "is in mode 7"),
+        ({"p040": b"1\r\n"}, "multiplies"),
+    ],
+)
+async def test_what_falsifies_readings_is_refused(dialogue, gauge, answers, words):
+    dialogue.expect(*opening(**answers))
+    with pytest.raises(WrongMode, match=words):
+        await gauge.open()
+
+
+@pytest.mark.parametrize(
+    ("answers", "words"),
+    [({"p019": b"1\r\n"}, "reversed False -> True"), ({"p011": b"2\r\n"}, "mode ABS -> INCR")],
+)
+async def test_what_changed_during_a_set_voids_its_zero(dialogue, opened, answers, words):
+    dialogue.expect(*opening(**answers))
+    with pytest.raises(ZeroVoid, match=words):
+        await opened.check()
+
+
+async def test_a_plunger_at_its_end_is_an_error_of_its_own(dialogue, opened):
+    dialogue.expect((b"R\r", b"OUT OF BOUNDS\r\n"))
+    with pytest.raises(GaugeAtEnd, match="plunger at its end"):
+        await opened.read()
+
+
+async def test_a_question_that_was_not_understood_is_asked_again(dialogue, opened):
+    dialogue.expect((b"R\r", b"NOT FOUND\r\n"), (b"R\r", VALUE), (b"R\r", VALUE))
+    assert (await opened.read()).value_mm == 2.138
+
+
+async def test_another_protocol_is_quoted_beside_what_was_expected(dialogue, gauge):
+    dialogue.expect(*[(b"R\r", b"ERR1\r")] * 3)
+    with pytest.raises(WrongAnswer, match=r"b'ERR1\\r' where protocol cdi has answers like '\+  2\.1380"):
+        await gauge.open()

@@ -1,0 +1,264 @@
+"""MUX-10 frames: several gauges behind one line."""
+
+import asyncio
+import re
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from drivers.gauges import mux10
+from drivers.gauges.errors import (
+    FrameRejected,
+    GaugeAtEnd,
+    GaugeSilent,
+    WrongAnswer,
+    WrongUnit,
+    ZeroVoid,
+)
+from drivers.gauges.mux10 import Mux10Gauge, MultiplexerError, parse_about, parse_value
+from drivers.gauges.shown import Shown
+from drivers.ports import DeviceIdentity, GaugeReading
+from drivers.simulated.gauges.mux10 import format_value
+from hexacell.errors import DeviceError, FileError
+
+VALUE = b"02A+0000.123\r"
+OPENING = ((b"2\r", VALUE), (b"V\r", b"MUX-10F 1.0\r"))
+
+
+@pytest.fixture
+async def gauge(links, settings):
+    gauge = Mux10Gauge(settings("mux10", channel=2), links)
+    yield gauge
+    await gauge.close()
+
+
+@pytest.fixture
+async def opened(dialogue, gauge):
+    dialogue.expect(*OPENING)
+    await gauge.open()
+    return gauge
+
+
+@pytest.fixture
+def no_pause(monkeypatch):
+    monkeypatch.setattr(mux10, "BUSY_PAUSE_S", 0.0)
+
+
+# Frames
+
+
+@pytest.mark.parametrize(
+    ("frame", "value", "decimals"),
+    [
+        (b"02A+0000.123\r", 0.123, 3),
+        (b"02A-0012.340\r", -12.34, 3),
+        (b"02A-001.2340\r", -1.234, 4),
+        (b"02A+00.00484\r", 0.00484, 5),
+    ],
+)
+def test_a_value_is_read(frame, value, decimals):
+    assert parse_value(frame, 2) == Shown(value, decimals, None, frame.decode().strip())
+
+
+@pytest.mark.parametrize(("frame", "code"), [(b"911\r", 1), (b"918\r", 8), (b"912\r", 2), (b"921\r", 1)])
+def test_an_error_is_read(frame, code):
+    assert parse_value(frame, 2) == MultiplexerError(code)
+
+
+@pytest.mark.parametrize(
+    "frame",
+    [
+        b"01A+0000.123\r",  # another channel
+        b"931\r",
+        b"02A 0000.123\r",
+        b"02A+000.123\r",
+        b"02A+00000.123\r",
+        b"02A+00000123\r",
+        b"02A+00.0.123\r",
+        b"02B+0000.123\r",
+        b"12A+0000.123\r",
+        b"02A+0000.123",
+        b"02A+0000.1\xb23\r",
+        b"91\r",
+        b"",
+    ],
+)
+def test_anything_else_is_rejected(frame):
+    with pytest.raises(FrameRejected):
+        parse_value(frame, 2)
+
+
+@given(st.integers(1, 99), st.floats(-99, 99), st.booleans())
+def test_what_the_simulated_device_writes_is_read(channel, value, inch):
+    shown = parse_value(format_value(channel, value, inch=inch), channel)
+    assert isinstance(shown, Shown)
+    assert shown.value == pytest.approx(value, abs=0.51e-5 if inch else 0.51e-3)
+    assert (shown.apparent_unit == "inch") is inch
+
+
+@given(st.binary(max_size=15) | st.from_regex(rb"0[0-9]A[+\- ][0-9. ]{6,9}\r", fullmatch=True))
+def test_noise_is_a_value_only_if_it_is_one_to_the_last_byte(noise):
+    try:
+        shown = parse_value(noise, 2)
+    except FrameRejected:
+        return
+    if isinstance(shown, Shown):
+        assert re.fullmatch(rb"02A[+-][0-9]+\.[0-9]+\r", noise)
+        assert len(noise) == 13
+        assert shown.value == float(noise[3:])
+
+
+@given(st.floats(-99, 99), st.integers(0, 9), st.integers(0, 9))
+def test_no_part_of_a_value_is_a_value(value, front, back):
+    frame = format_value(2, value, inch=False)
+    part = frame[front : len(frame) - back]
+    if part != frame:
+        with pytest.raises(FrameRejected):
+            parse_value(part, 2)
+
+
+@pytest.mark.parametrize("frame", [b"911\r", b"01A+0000.123\r", b"\x80MUX\r", b"\r"])
+def test_an_error_or_a_value_is_no_description(frame):
+    with pytest.raises(FrameRejected):
+        parse_about(frame)
+
+
+# Dialogues
+
+
+async def test_it_opens_and_reads(dialogue, gauge):
+    dialogue.expect(*OPENING, (b"2\r", VALUE), (b"2\r", b"02A+0000.124\r"))
+    assert await gauge.open() == DeviceIdentity("y", "mux10", "MUX-10F 1.0")
+    assert await gauge.read() == GaugeReading(0.124, "02A+0000.124")
+    assert dialogue.settings["baudrate"] == 9600
+    assert (dialogue.settings["bytesize"], dialogue.settings["parity"]) == (8, "N")
+
+
+async def test_a_multiplexer_that_says_nothing_of_itself_will_do(dialogue, gauge):
+    dialogue.expect((b"2\r", VALUE), (b"V\r",), (b"2\r", VALUE))
+    assert (await gauge.open()).description == "Mitutoyo MUX-10 channel"
+    await gauge.check()
+
+
+async def test_a_busy_multiplexer_is_asked_again(dialogue, opened, no_pause):
+    dialogue.expect(
+        (b"2\r", b"918\r"), (b"2\r", b"918\r"), (b"2\r", VALUE), (b"2\r", b"918\r"), (b"2\r", VALUE)
+    )
+    assert (await opened.read()).value_mm == 0.123
+
+
+async def test_it_waits_before_it_asks_a_busy_multiplexer_again(dialogue, opened, monkeypatch):
+    pauses = []
+
+    async def sleep(seconds):
+        pauses.append(seconds)
+
+    monkeypatch.setattr(asyncio, "sleep", sleep)
+    dialogue.expect((b"2\r", b"918\r"), (b"2\r", VALUE), (b"2\r", VALUE))
+    await opened.read()
+    assert pauses == [0.05]
+
+
+async def test_a_multiplexer_that_stays_busy_is_told(dialogue, opened, no_pause):
+    dialogue.expect(*[(b"2\r", b"918\r")] * mux10.BUSY_TRIES)
+    with pytest.raises(DeviceError, match=r"gauge y: its multiplexer stays busy \(918\)"):
+        await opened.read()
+
+
+async def test_a_channel_without_a_gauge_is_silent(dialogue, gauge):
+    dialogue.expect((b"2\r", b"911\r"))
+    with pytest.raises(GaugeSilent, match=r"does not answer its multiplexer \(911\).*channel"):
+        await gauge.open()
+
+
+async def test_any_other_error_is_a_plunger_at_its_end(dialogue, opened):
+    dialogue.expect((b"2\r", b"912\r"))
+    with pytest.raises(GaugeAtEnd, match="912"):
+        await opened.read()
+
+
+async def test_a_plunger_at_its_end_does_not_hinder_opening(dialogue, gauge):
+    dialogue.expect((b"2\r", b"912\r"), OPENING[1], (b"2\r", VALUE), (b"2\r", VALUE), (b"2\r", VALUE))
+    await gauge.open()
+    assert (await gauge.read()).value_mm == 0.123
+    await gauge.check()
+
+
+async def test_the_data_button_of_another_channel_is_not_mistaken(dialogue, opened):
+    dialogue.expect((b"2\r", b"01A+0009.999\r" + VALUE), (b"2\r", VALUE), (b"2\r", VALUE))
+    dialogue.unasked(b"01A+0008.888\r")
+    assert (await opened.read()).value_mm == 0.123
+
+
+async def test_five_decimals_are_inches(dialogue, gauge):
+    dialogue.expect((b"2\r", b"02A+00.00484\r"), OPENING[1])
+    with pytest.raises(WrongUnit, match="gauge y: answers in inch"):
+        await gauge.open()
+
+
+@pytest.mark.parametrize("call", ["read", "check"])
+async def test_inch_pressed_during_a_set_is_found(dialogue, opened, call):
+    dialogue.expect((b"2\r", b"02A+00.00484\r"))
+    with pytest.raises(WrongUnit):
+        await getattr(opened, call)()
+
+
+async def test_another_resolution_voids_the_zero(dialogue, opened):
+    dialogue.expect((b"2\r", b"02A+000.1234\r"))
+    with pytest.raises(ZeroVoid, match="decimals 3 -> 4"):
+        await opened.check()
+
+
+async def test_another_protocol_is_quoted_beside_what_was_expected(dialogue, gauge):
+    dialogue.expect(*[(b"2\r", b"ERR1\r")] * 3)
+    with pytest.raises(WrongAnswer, match=r"b'ERR1\\r' where protocol mux10 has answers like '01A"):
+        await gauge.open()
+
+
+async def test_gauges_on_one_multiplexer_share_its_line(dialogue, links, settings):
+    gauges = [Mux10Gauge(settings("mux10", f"g{each}", channel=each), links) for each in (1, 2, 3)]
+    for channel, gauge in enumerate(gauges, start=1):
+        question, value = b"%d\r" % channel, b"0%dA+0001.000\r" % channel
+        dialogue.expect((question, value), OPENING[1], (question, value), (question, value))
+        await gauge.open()
+        await gauge.read()
+    await gauges[0].close()
+    assert dialogue.is_open
+    dialogue.expect(*[(b"2\r", b"02A+0001.000\r")] * 2)
+    await gauges[1].read()
+    await gauges[1].close()
+    await gauges[2].close()
+    assert not dialogue.is_open
+
+
+async def test_a_line_lost_and_opened_again_voids_the_zero_of_every_gauge_on_it(dialogue, links, settings):
+    one, two = (Mux10Gauge(settings("mux10", f"g{each}", channel=each), links) for each in (1, 2))
+    first, second = (b"1\r", b"01A+0001.000\r"), (b"2\r", b"02A+0001.000\r")
+    dialogue.expect(first, OPENING[1], second, OPENING[1])
+    await one.open()
+    await two.open()
+    dialogue.broken = OSError(5, "Input/output error")
+    with pytest.raises(DeviceError, match="gauges g1, g2: port wire was lost"):
+        await one.read()
+    dialogue.broken = None
+    dialogue.expect(first, OPENING[1])
+    await one.open()
+    with pytest.raises(ZeroVoid, match="gauge g2: lost its port in between"):
+        await two.read()
+    dialogue.expect(second, OPENING[1], second, second)
+    await two.open()
+    assert (await two.read()).value_mm == 1.0
+    await one.close()
+    await two.close()
+
+
+async def test_two_gauges_cannot_have_one_channel(dialogue, opened, links, settings):
+    with pytest.raises(FileError, match=r"gauge z: port wire, channel 2, already belongs to gauge y"):
+        await Mux10Gauge(settings("mux10", "z", channel=2), links).open()
+
+
+async def test_two_speeds_on_one_line_are_refused(dialogue, opened, links, settings):
+    other = Mux10Gauge(settings("mux10", "z", channel=1, serial={"baudrate": 2400}), links)
+    with pytest.raises(FileError, match="gauge z: port wire is shared with gauge y under other serial"):
+        await other.open()

@@ -1,0 +1,120 @@
+"""A simulated bank with positions that show which sample they belong to, and ways to reach it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from typing import Any
+
+import can
+import pytest
+
+from drivers.encoders.cia406 import Cia406Bank
+from drivers.simulated.encoders import SimulatedEncoderBank
+from drivers.simulated.slcan import serve_slcan
+from hexacell.cell.devices import EncoderSettings
+from hexacell.clock import CellClock
+
+
+class Samples:
+    """Positions that are one count further at every sample, the same for all legs."""
+
+    def __init__(self) -> None:
+        self.taken = 0
+
+    def __call__(self) -> list[float]:
+        self.taken += 1
+        return [self.taken * 0.001] * 6
+
+
+MakeBank = Callable[..., SimulatedEncoderBank]
+
+
+@pytest.fixture
+def samples() -> Samples:
+    return Samples()
+
+
+@pytest.fixture
+def settings() -> EncoderSettings:
+    return EncoderSettings()
+
+
+@pytest.fixture
+def make_bank(settings: EncoderSettings, samples: Samples) -> Iterator[MakeBank]:
+    """Start a simulated bank; ends with the test."""
+    with ExitStack() as stack:
+
+        def make(**options: Any) -> SimulatedEncoderBank:
+            chosen = {"settings": settings, "positions": samples, "clock": CellClock()} | options
+            return stack.enter_context(SimulatedEncoderBank(**chosen))
+
+        yield make
+
+
+@pytest.fixture(params=["virtual", "pty", "socket"])
+def reach(request: pytest.FixtureRequest) -> Iterator[Callable[[SimulatedEncoderBank], dict[str, Any]]]:
+    """Settings for ``can.Bus`` to reach a bank inside this process, by a pty, or by a socket."""
+    with ExitStack() as stack:
+
+        def reach(bank: SimulatedEncoderBank) -> dict[str, Any]:
+            if request.param == "virtual":
+                return bank.bus_settings
+            return stack.enter_context(serve_slcan(bank.channel, request.param)).bus_settings
+
+        yield reach
+
+
+@pytest.fixture
+async def driver(settings):
+    """Make drivers for a bus; they are closed with the test."""
+    drivers: list[Cia406Bank] = []
+
+    def make(bus: dict[str, Any], **changes: Any) -> Cia406Bank:
+        drivers.append(Cia406Bank(settings.model_copy(update={"bus": bus, **changes})))
+        return drivers[-1]
+
+    yield make
+    for each in drivers:
+        await each.close()
+
+
+class Listener:
+    """A bare connection to a simulated bus."""
+
+    def __init__(self, bus: can.BusABC) -> None:
+        self.bus = bus
+
+    def send(self, can_id: int, *data: int) -> None:
+        self.bus.send(can.Message(arbitration_id=can_id, data=bytes(data), is_extended_id=False))
+
+    def heard(self, seconds: float = 0.1) -> list[tuple[int, str]]:
+        """Everything until nothing has come for so long: (id, data in hexadecimal)."""
+        frames = []
+        while (message := self.bus.recv(seconds)) is not None:
+            frames.append((message.arbitration_id, bytes(message.data).hex()))
+        return frames
+
+    def heard_within(self, seconds: float) -> list[tuple[int, str]]:
+        """Everything that comes in so many seconds."""
+        import time
+
+        deadline, frames = time.monotonic() + seconds, []
+        while (left := deadline - time.monotonic()) > 0:
+            if (message := self.bus.recv(left)) is not None:
+                frames.append((message.arbitration_id, bytes(message.data).hex()))
+        return frames
+
+    def sdo(self, node: int, request: str) -> str:
+        self.send(0x600 + node, *bytes.fromhex(request).ljust(8, b"\0"))
+        return next(data for can_id, data in self.heard() if can_id == 0x580 + node)
+
+
+@pytest.fixture
+def listen() -> Iterator[Callable[[SimulatedEncoderBank], Listener]]:
+    with ExitStack() as stack:
+
+        def make(bank: SimulatedEncoderBank) -> Listener:
+            return Listener(stack.enter_context(can.Bus(**bank.bus_settings)))
+
+        yield make

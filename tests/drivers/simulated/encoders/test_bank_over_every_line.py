@@ -1,0 +1,265 @@
+"""The real driver against the simulated bank: inside one process, over a pty, over a socket."""
+
+from __future__ import annotations
+
+import asyncio
+import threading
+
+import pytest
+
+from drivers.encoders.errors import (
+    BusError,
+    DuplicatedNodeError,
+    InvalidSampleError,
+    MissingNodeError,
+    RestartedNodeError,
+    SilentNodeError,
+)
+from drivers.simulated.encoders import EVENTS_AND_SYNC, EVENTS_ONLY, TWO_MAGNETS
+from drivers.simulated.slcan import serve_slcan
+from hexacell.clock import CellClock
+from hexacell.errors import DeviceError
+
+SETTLE_S = 0.05
+
+
+async def test_rounds_are_complete_and_of_one_instant(make_bank, reach, driver, samples):
+    simulated = make_bank()
+    bank = driver(reach(simulated))
+    await bank.open()
+    before = samples.taken
+    rounds = [(await bank.read()).counts for _ in range(400)]
+    assert rounds == [(count,) * 6 for count in range(before + 1, before + 401)]
+
+
+async def test_thousands_of_rounds(make_bank, driver, samples):
+    simulated = make_bank()
+    bank = driver(simulated.bus_settings)
+    await bank.open()
+    for _ in range(2500):
+        assert (await bank.read()).counts == (samples.taken,) * 6
+
+
+@pytest.mark.parametrize("maker", [EVENTS_AND_SYNC, EVENTS_ONLY, TWO_MAGNETS])
+async def test_every_make_is_brought_to_one_sample_per_sync(make_bank, reach, driver, listen, maker):
+    simulated = make_bank(makers=(maker,) * 6)
+    bank = driver(reach(simulated))
+    identities = await bank.open()
+    assert [identity.serial_number for identity in identities] == [str(1001 + leg) for leg in range(6)]
+    ear = listen(simulated)
+    positions = [await bank.read() for _ in range(3)]
+    assert all(len(set(each.counts)) == 1 for each in positions)
+    tpdos = [can_id for can_id, _ in ear.heard(0.05) if 0x180 <= can_id < 0x580]
+    assert len(tpdos) == 18
+
+
+async def test_makes_may_be_mixed(make_bank, driver, samples):
+    simulated = make_bank(makers=(EVENTS_AND_SYNC, EVENTS_ONLY, TWO_MAGNETS) * 2)
+    bank = driver(simulated.bus_settings)
+    await bank.open()
+    assert (await bank.read()).counts == (samples.taken,) * 6
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"nodes": (11, 25, 3, 127, 64, 1)},
+        {"direction": (1, -1, 1, -1, 1, -1), "offset_mm": (500.0, -500.0, 0.0, 1.5, -2.25, 1000.0)},
+        {"measuring_step_nm": 5000.0},
+        {"signed": False, "offset_mm": (-1000.0,) * 6},
+        {"serial_numbers": (9, 8, 7, 6, 5, 4)},
+    ],
+)
+async def test_positions_come_back_within_half_a_step(make_bank, driver, settings, changes):
+    positions = (-430.12345, 12.0, 0.0004, 399.9996, -0.0015, 733.7)
+    changed = settings.model_copy(update=changes)
+    simulated = make_bank(settings=changed, positions=lambda: positions)
+    bank = driver(simulated.bus_settings, **changes)
+    await bank.open()
+    found = (await bank.read()).positions_mm
+    assert found == pytest.approx(positions, abs=changed.measuring_step_nm * 0.5e-6 + 1e-9)
+
+
+async def test_two_cells_in_one_process_do_not_hear_each_other(make_bank, driver):
+    banks = [driver(make_bank(positions=lambda mm=mm: [mm] * 6).bus_settings) for mm in (1.0, 2.0)]
+    await asyncio.gather(*(bank.open() for bank in banks))
+    rounds = await asyncio.gather(*(bank.read() for bank in banks for _ in range(10)))
+    assert [found.positions_mm[0] for found in rounds] == pytest.approx([1.0] * 10 + [2.0] * 10)
+
+
+async def test_latency_is_in_the_cells_time(make_bank, driver):
+    simulated = make_bank(clock=CellClock(100.0), latency_s=2.0)
+    bank = driver(simulated.bus_settings)
+    await bank.open()
+    begin = asyncio.get_running_loop().time()
+    await bank.read()
+    assert 0.02 <= asyncio.get_running_loop().time() - begin < 0.2
+
+
+async def test_a_missing_node(make_bank, reach, driver):
+    simulated = make_bank()
+    simulated.faults.unplug(4)
+    with pytest.raises(MissingNodeError, match=r"encoder of leg 4 \(node 4\): nobody answers"):
+        await driver(reach(simulated), timeout_s=0.1).open()
+
+
+async def test_a_duplicated_node(make_bank, reach, driver):
+    simulated = make_bank()
+    simulated.faults.duplicate(4)
+    with pytest.raises(DuplicatedNodeError, match=r"leg 4 \(node 4\)"):
+        await driver(reach(simulated)).open()
+
+
+async def test_a_node_duplicated_in_the_middle_of_a_run(make_bank, driver):
+    simulated = make_bank()
+    bank = driver(simulated.bus_settings)
+    await bank.open()
+    simulated.faults.duplicate(2)
+    await asyncio.sleep(SETTLE_S)
+    with pytest.raises(RestartedNodeError, match="leg 2"):
+        await bank.read()
+    with pytest.raises(DuplicatedNodeError, match="leg 2"):
+        await bank.open()
+
+
+async def test_a_node_that_falls_silent(make_bank, reach, driver):
+    simulated = make_bank()
+    bank = driver(reach(simulated), timeout_s=0.1)
+    await bank.open()
+    simulated.faults.silence(6)
+    with pytest.raises(SilentNodeError, match=r"leg 6"):
+        await bank.read()
+    simulated.faults.silence(6, silent=False)
+    assert len(set((await bank.read()).counts)) == 1
+
+
+async def test_an_emergency_and_its_end(make_bank, reach, driver):
+    simulated = make_bank()
+    bank = driver(reach(simulated))
+    await bank.open()
+    simulated.faults.emergency(3)
+    await asyncio.sleep(SETTLE_S)
+    with pytest.raises(InvalidSampleError, match=r"leg 3.*no magnet"):
+        await bank.read()
+    simulated.faults.clear_emergency(3)
+    await asyncio.sleep(SETTLE_S)
+    await bank.read()
+
+
+async def test_an_error_or_alarm_from_before_keeps_the_bank_shut(make_bank, driver):
+    simulated = make_bank()
+    bank = driver(simulated.bus_settings)
+    simulated.faults.alarm(5)
+    with pytest.raises(InvalidSampleError, match=r"leg 5.*6503h"):
+        await bank.open()
+    simulated.faults.alarm(5, 0)
+    simulated.faults.emergency(1)
+    with pytest.raises(InvalidSampleError, match=r"leg 1.*1001h"):
+        await bank.open()
+    simulated.faults.clear_emergency(1)
+    await bank.open()
+
+
+async def test_a_reboot_in_the_middle_of_a_run(make_bank, reach, driver):
+    simulated = make_bank()
+    bank = driver(reach(simulated))
+    await bank.open()
+    simulated.faults.reboot(1)
+    await asyncio.sleep(SETTLE_S)
+    with pytest.raises(RestartedNodeError, match=r"leg 1.*set is void"):
+        await bank.read()
+    await bank.open()
+    await bank.read()
+
+
+async def test_the_loss_of_a_heartbeat(make_bank, reach, driver):
+    simulated = make_bank()
+    bank = driver(reach(simulated), heartbeat_ms=30)
+    await bank.open()
+    await asyncio.sleep(0.35)
+    await bank.read()
+    simulated.faults.stop_heartbeat(2)
+    await asyncio.sleep(0.45)
+    with pytest.raises(SilentNodeError, match=r"leg 2.*heartbeat"):
+        await bank.read()
+
+
+async def test_a_node_unplugged_and_plugged_in_again(make_bank, driver):
+    simulated = make_bank()
+    bank = driver(simulated.bus_settings, timeout_s=0.1)
+    await bank.open()
+    simulated.faults.unplug(2)
+    with pytest.raises(SilentNodeError, match="leg 2"):
+        await bank.read()
+    simulated.faults.plug_in(2)
+    await asyncio.sleep(SETTLE_S)
+    with pytest.raises(RestartedNodeError, match="leg 2"):
+        await bank.read()
+    await bank.open()
+    await bank.read()
+
+
+@pytest.mark.parametrize("timeouts", [0.5, 1.4, 2.5, 3.5, 4.5])
+async def test_stale_answers_never_mix_instants(make_bank, driver, timeouts):
+    """Leg 3 answers every SYNC that much later, with what it saw at that SYNC."""
+    simulated = make_bank()
+    bank = driver(simulated.bus_settings, timeout_s=0.1)
+    await bank.open()
+    simulated.faults.delay(3, timeouts * 0.1)
+    for _ in range(3):
+        try:
+            found = await bank.read()
+        except DeviceError as error:
+            assert "leg 3" in str(error)
+        else:
+            assert len(set(found.counts)) == 1
+
+
+async def test_a_bus_whose_nodes_all_die(make_bank, reach, driver):
+    simulated = make_bank()
+    bank = driver(reach(simulated), timeout_s=0.1)
+    await bank.open()
+    simulated.faults.kill_bus()
+    with pytest.raises(SilentNodeError, match=r"leg 1 .*leg 6 .*CAN adapter"):
+        await bank.read()
+
+
+@pytest.mark.parametrize("transport", ["pty", "socket"])
+@pytest.mark.parametrize("reading", [True, False])
+async def test_an_adapter_that_is_pulled_out(make_bank, driver, transport, reading):
+    simulated = make_bank()
+    adapter = serve_slcan(simulated.channel, transport)
+    bank = driver(adapter.bus_settings, timeout_s=2.0)
+    await bank.open()
+    if reading:
+        simulated.faults.silence(1)
+        waiting = asyncio.ensure_future(bank.read())
+        await asyncio.sleep(SETTLE_S)
+        adapter.close()
+    else:
+        adapter.close()
+        await asyncio.sleep(SETTLE_S)
+        waiting = asyncio.ensure_future(bank.read())
+    with pytest.raises(BusError, match=r"encoder bus slcan .*CAN adapter"):
+        await asyncio.wait_for(waiting, 1.0)
+
+
+async def test_closing_and_opening_over_the_same_adapter(make_bank, driver, reach):
+    simulated = make_bank()
+    bus = reach(simulated)
+    for _ in range(3):
+        bank = driver(bus)
+        await bank.open()
+        assert len(set((await bank.read()).counts)) == 1
+        await bank.close()
+
+
+async def test_no_thread_is_left(settings, samples, reach):
+    before = set(threading.enumerate())
+    from drivers.simulated.encoders import SimulatedEncoderBank
+
+    bank = SimulatedEncoderBank(settings, samples, CellClock())
+    bank.start()
+    bank.close()
+    bank.close()
+    assert set(threading.enumerate()) == before

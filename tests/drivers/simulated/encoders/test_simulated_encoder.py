@@ -1,0 +1,163 @@
+"""What a simulated encoder does on the wire, seen without the driver."""
+
+from __future__ import annotations
+
+import pytest
+
+from drivers.simulated.encoders import EVENTS_AND_SYNC, EVENTS_ONLY, TWO_MAGNETS, SimulatedEncoderBank
+from hexacell.clock import CellClock
+
+START, STOP, PRE_OPERATIONAL, RESET, RESET_COMMUNICATION = 1, 2, 0x80, 0x81, 0x82
+SYNC, NMT, ALL = 0x80, 0, 0
+
+
+def test_every_node_announces_itself(settings, samples):
+    import can
+
+    bank = SimulatedEncoderBank(settings, samples, CellClock())
+    with can.Bus(**bank.bus_settings) as ear, bank:
+        boots = {(m.arbitration_id, bytes(m.data)) for _ in range(6) if (m := ear.recv(1)) is not None}
+    assert boots == {(0x700 + node, b"\0") for node in range(1, 7)}
+
+
+def test_nothing_is_sent_unasked_before_start(make_bank, listen):
+    ear = listen(make_bank(makers=(EVENTS_ONLY,) * 6))
+    assert ear.heard() == []
+    ear.send(SYNC)
+    assert ear.heard() == []
+
+
+@pytest.mark.parametrize("command", [STOP, PRE_OPERATIONAL, RESET, RESET_COMMUNICATION])
+def test_positions_are_sent_only_while_operational(make_bank, listen, command):
+    ear = listen(make_bank())
+    ear.send(NMT, START, 3)
+    ear.send(SYNC)
+    assert [can_id for can_id, _ in ear.heard(0.008)] == [0x283]
+    ear.send(NMT, command, 3)
+    ear.heard(0.03)
+    ear.send(SYNC)
+    assert ear.heard() == []
+
+
+def test_event_timers_run_while_operational(make_bank, listen):
+    ear = listen(make_bank())
+    ear.send(NMT, START, 2)
+    frames = ear.heard_within(0.3)
+    assert {can_id for can_id, _ in frames} == {0x182}
+    assert 10 <= len(frames) <= 31
+    ear.send(NMT, STOP, 2)
+    ear.heard_within(0.03)
+    assert ear.heard() == []
+
+
+def test_event_timers_run_in_the_cells_time(make_bank, listen):
+    ear = listen(make_bank(clock=CellClock(0.1)))
+    ear.send(NMT, START, 2)
+    assert 1 <= len(ear.heard_within(0.35)) <= 4
+
+
+def test_a_reset_brings_back_the_makers_defaults(make_bank, listen):
+    ear = listen(make_bank())
+    assert ear.sdo(1, "2b17100032") == "6017100000000000"
+    beats = ear.heard_within(0.3)
+    assert {frame for frame in beats} == {(0x701, "7f")}
+    assert 3 <= len(beats) <= 7
+    ear.send(NMT, RESET, 1)
+    assert (0x701, "00") in ear.heard_within(0.1)
+    assert ear.heard() == []
+    assert ear.sdo(1, "40171000") == "4b17100000000000"
+
+
+def test_a_heartbeat_tells_the_state(make_bank, listen):
+    ear = listen(make_bank())
+    ear.sdo(1, "2b1710000a")
+    ear.send(NMT, START, 1)
+    ear.heard_within(0.05)
+    assert (0x701, "05") in ear.heard_within(0.1)
+
+
+@pytest.mark.parametrize(
+    ("maker", "object_", "value"),
+    [
+        (EVENTS_AND_SYNC, "40001000", "4300100096010800"),
+        (TWO_MAGNETS, "40001000", "4300100096010a00"),
+        (EVENTS_AND_SYNC, "40056001", "43056001e8030000"),
+        (EVENTS_ONLY, "40056001", "8005600100000206"),
+        (EVENTS_ONLY, "40016500", "43016500e8030000"),
+        (EVENTS_AND_SYNC, "40181004", "43181004e9030000"),
+        (EVENTS_AND_SYNC, "40001801", "4300180181010000"),
+        (EVENTS_ONLY, "40011801", "4301180181020080"),
+        (TWO_MAGNETS, "40206000", "4f20600002000000"),
+        (TWO_MAGNETS, "40011a02", "43011a0220012060"),
+    ],
+)
+def test_the_dictionary_answers(make_bank, listen, maker, object_, value):
+    assert listen(make_bank(makers=(maker,) * 6)).sdo(1, object_) == value
+
+
+@pytest.mark.parametrize(
+    ("before", "request_", "code"),
+    [
+        ([], "2300180182010000", 0x06090030),  # another COB-ID while the PDO is on
+        ([], "2f001a0000", 0x08000022),  # mapping while the PDO is on
+        (["2300180181010080"], "23001a0120000460", 0x08000022),  # an entry while the mapping is valid
+        ([], "2300100000000000", 0x06010002),  # the device type
+    ],
+)
+def test_pdos_are_changed_by_the_rules_or_not_at_all(make_bank, listen, before, request_, code):
+    ear = listen(make_bank())
+    for each in before:
+        assert ear.sdo(1, each).startswith("60")
+    answer = ear.sdo(1, request_)
+    assert answer[:2] == "80"
+    assert int.from_bytes(bytes.fromhex(answer[8:]), "little") == code
+
+
+def test_pdos_are_not_changed_while_operational(make_bank, listen):
+    ear = listen(make_bank())
+    ear.send(NMT, START, 1)
+    assert ear.sdo(1, "2300180181010080").endswith("22000008")
+
+
+def test_a_fixed_mapping_stays(make_bank, listen):
+    ear = listen(make_bank(makers=(TWO_MAGNETS,) * 6))
+    ear.sdo(1, "2301180181020080")
+    assert ear.sdo(1, "2f011a0000").endswith("02000106")
+
+
+def test_one_sample_serves_all_nodes(make_bank, listen, samples):
+    ear = listen(make_bank())
+    for node in range(1, 7):
+        ear.send(NMT, START, node)
+    ear.send(SYNC)
+    positions = {can_id: data[:8] for can_id, data in ear.heard(0.008) if 0x280 < can_id < 0x300}
+    expected = samples.taken.to_bytes(4, "little").hex()
+    assert positions == {0x280 + node: expected for node in range(1, 7)}
+
+
+def test_reading_the_position_by_sdo_gives_the_last_sample(make_bank, listen, samples):
+    ear = listen(make_bank())
+    assert samples.taken == 1
+    assert ear.sdo(1, "40046000") == "4304600001000000"
+    ear.send(SYNC)
+    assert ear.sdo(1, "40046000") == "4304600002000000"
+
+
+def test_an_emergency_is_a_frame_and_a_register(make_bank, listen):
+    simulated = make_bank()
+    ear = listen(simulated)
+    simulated.faults.emergency(2, 0xFF00)
+    assert ear.heard(0.05) == [(0x82, "00ff210000000000")]
+    assert ear.sdo(2, "40011000") == "4f01100021000000"
+    simulated.faults.clear_emergency(2)
+    assert ear.heard(0.05) == [(0x82, "0000000000000000")]
+    assert ear.sdo(2, "40011000") == "4f01100000000000"
+
+
+def test_faults_before_the_start(settings, samples, listen):
+    bank = SimulatedEncoderBank(settings, samples, CellClock())
+    bank.faults.unplug(2)
+    with bank:
+        ear = listen(bank)
+        ear.send(0x602, 0x40, 0, 0x10, 0, 0, 0, 0, 0)
+        assert ear.heard() == []

@@ -1,0 +1,196 @@
+"""The slcan adapter: its ASCII protocol, and python-can's own slcan against it."""
+
+from __future__ import annotations
+
+import os
+import uuid
+
+import can
+import pytest
+from can.interfaces.slcan import slcanBus
+from hypothesis import given
+from hypothesis import strategies as st
+
+from drivers.simulated.slcan import SlcanAdapter, decode, encode, serve_slcan
+
+
+@st.composite
+def messages(draw) -> can.Message:
+    extended, remote = draw(st.booleans()), draw(st.booleans())
+    size = draw(st.integers(0, 8))
+    return can.Message(
+        arbitration_id=draw(st.integers(0, (1 << (29 if extended else 11)) - 1)),
+        is_extended_id=extended,
+        is_remote_frame=remote,
+        dlc=size,
+        data=None if remote else draw(st.binary(min_size=size, max_size=size)),
+    )
+
+
+@given(messages())
+def test_decode_undoes_encode(message):
+    text = encode(message)
+    assert text.endswith(b"\r")
+    found = decode(text[:-1].decode())
+    assert found is not None
+    assert found.equals(message, timestamp_delta=None, check_channel=False)
+
+
+@pytest.mark.parametrize(
+    ("message", "text"),
+    [
+        (can.Message(arbitration_id=0x80, is_extended_id=False), b"t0800\r"),
+        (can.Message(arbitration_id=0x181, data=b"\x0a\xff", is_extended_id=False), b"t18120AFF\r"),
+        (can.Message(arbitration_id=0x1ABCDEF0, data=b"\x01"), b"T1ABCDEF0101\r"),
+        (can.Message(arbitration_id=0x701, dlc=1, is_remote_frame=True, is_extended_id=False), b"r7011\r"),
+        (can.Message(arbitration_id=0x701, dlc=8, is_remote_frame=True), b"R000007018\r"),
+    ],
+)
+def test_frames_are_written_as_the_protocol_says(message, text):
+    assert encode(message) == text
+
+
+@given(st.text(alphabet="tTrR0123456789abcdefABCDEFxyz \n", max_size=30))
+def test_whatever_is_no_frame_is_refused(text):
+    found = decode(text)
+    assert found is None or encode(found).decode()[:-1].upper() == text.upper()
+
+
+@pytest.mark.parametrize(
+    "text", ["t800", "t8000", "t1819", "t18120A", "t18120AFF0", "T200000000", "r18120AFF"]
+)
+def test_faulty_frames_are_refused(text):
+    assert decode(text) is None
+
+
+@pytest.fixture
+def adapter():
+    sent: list[can.Message] = []
+    adapter = SlcanAdapter(sent.append)
+    return adapter, sent
+
+
+def test_frames_pass_only_while_the_channel_is_open(adapter):
+    device, sent = adapter
+    assert device.answer("t0800") == b"\a"
+    assert device.answer("O") == b"\r"
+    assert device.answer("t0800") == b"z\r"
+    assert device.answer("T000000800") == b"Z\r"
+    assert device.answer("C") == b"\r"
+    assert device.answer("t0800") == b"\a"
+    assert [message.arbitration_id for message in sent] == [0x80, 0x80]
+
+
+def test_listening_only_sends_nothing(adapter):
+    device, sent = adapter
+    assert device.answer("L") == b"\r"
+    assert device.is_open
+    assert device.answer("t0800") == b"\a"
+    assert sent == []
+
+
+@pytest.mark.parametrize(
+    ("command", "answer"),
+    [
+        ("S6", b"\r"),
+        ("s031C", b"\r"),
+        ("", b"\r"),
+        ("Z0", b"\r"),
+        ("V", b"V1013\r"),
+        ("N", b"NHX01\r"),
+        ("F", b"F00\r"),
+        ("S", b"\a"),
+        ("S66", b"\a"),
+        ("nonsense", b"\a"),
+        ("\ufffd", b"\a"),
+    ],
+)
+def test_commands_and_their_answers(adapter, command, answer):
+    assert adapter[0].answer(command) == answer
+
+
+def test_the_bit_rate_is_not_changed_while_open(adapter):
+    adapter[0].answer("O")
+    assert adapter[0].answer("S6") == b"\a"
+
+
+@given(st.lists(st.text(max_size=20), max_size=20))
+def test_no_command_breaks_the_adapter(commands):
+    device = SlcanAdapter(lambda _message: None)
+    assert all(device.answer(command)[-1:] in (b"\r", b"\a") for command in commands)
+
+
+@pytest.fixture(params=["pty", "socket"])
+def pair(request):
+    """A virtual bus, and the same through an adapter."""
+    channel = f"slcan-{uuid.uuid4().hex}"
+    with (
+        can.Bus(channel, interface="virtual") as near,
+        serve_slcan(channel, request.param) as server,
+        can.Bus(**server.bus_settings) as far,
+    ):
+        yield near, far, server
+
+
+def test_every_kind_of_frame_passes_both_ways(pair):
+    near, far, _ = pair
+    frames = [
+        can.Message(arbitration_id=0x80, is_extended_id=False),
+        can.Message(arbitration_id=0x7FF, data=bytes(range(8)), is_extended_id=False),
+        can.Message(arbitration_id=0x1FFFFFFF, data=b"\xff" * 8),
+        can.Message(arbitration_id=0x123, dlc=4, is_remote_frame=True, is_extended_id=False),
+        can.Message(arbitration_id=0x123, dlc=0, is_remote_frame=True),
+    ]
+    for source, sink in ((near, far), (far, near)):
+        for frame in frames:
+            source.send(frame)
+        for frame in frames:
+            found = sink.recv(1.0)
+            assert found is not None
+            assert found.equals(frame, timestamp_delta=None, check_channel=False, check_direction=False)
+
+
+def test_no_frame_is_lost_in_a_burst(pair):
+    near, far, _ = pair
+    for number in range(2000):
+        near.send(can.Message(arbitration_id=0x181, data=number.to_bytes(8, "big"), is_extended_id=False))
+        if number % 50 == 49:
+            for expected in range(number - 49, number + 1):
+                found = far.recv(1.0)
+                assert found is not None
+                assert int.from_bytes(found.data, "big") == expected
+
+
+def test_the_adapter_tells_its_version(pair):
+    _, far, _ = pair
+    assert isinstance(far, slcanBus)
+    assert far.get_version(1.0) == (10, 13)
+    assert far.get_serial_number(1.0) == "HX01"
+
+
+def test_a_client_that_does_not_read_holds_up_nobody(pair):
+    near, far, server = pair
+    for number in range(3000):  # far more than a line buffers
+        near.send(can.Message(arbitration_id=0x181, data=number.to_bytes(8, "big"), is_extended_id=False))
+    far.send(can.Message(arbitration_id=0x080, is_extended_id=False))
+    found = near.recv(1.0)
+    assert found is not None
+    assert found.arbitration_id == 0x080
+
+
+def test_garbage_on_the_line_is_survived():
+    channel = f"slcan-{uuid.uuid4().hex}"
+    with can.Bus(channel, interface="virtual") as near, serve_slcan(channel, "pty") as server:
+        line = os.open(server.bus_settings["channel"], os.O_RDWR | os.O_NOCTTY)
+        os.write(line, bytes(range(256)) * 4)
+        os.write(line, b"\rO\rt0800\r")
+        found = near.recv(1.0)
+        os.close(line)
+    assert found is not None
+    assert found.arbitration_id == 0x80
+
+
+def test_closing_twice_is_harmless():
+    server = serve_slcan(f"slcan-{uuid.uuid4().hex}", "socket")
+    server.close()
+    server.close()

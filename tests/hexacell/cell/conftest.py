@@ -1,0 +1,59 @@
+"""A cell file to spoil, and how to load what became of it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from hexacell.cell.file import Cell, load_cell
+
+CONFIGS = Path(__file__).parents[3] / "configs"
+
+
+@pytest.fixture(scope="session")
+def cell_text() -> str:
+    """The text of a cell file without mistakes."""
+    return (CONFIGS / "simulated-hexaglide.toml").read_text(encoding="utf-8")
+
+
+@pytest.fixture(scope="session")
+def cell_path(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Where a test may write a cell file; one for all, since hypothesis needs it to outlive a test."""
+    return tmp_path_factory.mktemp("cell") / "cell.toml"
+
+
+@pytest.fixture(scope="session")
+def load_text(cell_path: Path) -> Callable[[str], Cell]:
+    """Load a cell file with this text."""
+
+    def load(text: str) -> Cell:
+        cell_path.write_bytes(text.encode())
+        return load_cell(cell_path)
+
+    return load
+
+
+@pytest.fixture(scope="session")
+def load_changed(cell_text: str, load_text: Callable[[str], Cell]) -> Callable[..., Cell]:
+    """Load the good cell file with some of its text, at its first occurrence, replaced."""
+
+    def load(*changes: tuple[str, str]) -> Cell:
+        text = cell_text
+        for old, new in changes:
+            assert old in text
+            text = text.replace(old, new, 1)
+        return load_text(text)
+
+    return load
+
+
+@pytest.fixture(scope="session")
+def line_with(cell_text: str) -> Callable[[str], int]:
+    """The number of the first line of the good cell file with this text in it."""
+
+    def find(part: str) -> int:
+        return next(n for n, line in enumerate(cell_text.splitlines(), start=1) if part in line)
+
+    return find

@@ -1,0 +1,330 @@
+"""Reading a cell file: what it gives, and every way in which it can be wrong."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from hexacell.cell.file import Origin, load_cell
+from hexacell.errors import ExitCode, FileError, HexacellError, SeveralErrors
+
+
+def test_what_a_cell_file_gives(load_text, cell_text, cell_path):
+    cell = load_text(cell_text)
+    assert cell.path == cell_path
+    assert cell.text == cell_text
+    assert cell.settings.name == "simulated Hexaglide"
+    assert cell.settings.limits.tilt_deg == 45.0
+
+
+def test_config_is_beside_the_cell_file(load_changed, cell_path):
+    cell = load_changed(("simulated-hexaglide.controller.toml", "sub/robot.toml"))
+    assert cell.config_path == cell_path.parent / "sub" / "robot.toml"
+
+
+def test_config_may_be_an_absolute_path(load_changed):
+    cell = load_changed(("simulated-hexaglide.controller.toml", "/etc/robot.toml"))
+    assert cell.config_path == Path("/etc/robot.toml")
+
+
+def test_provenance_tells_line_or_default(load_text, cell_text, line_with):
+    origins = load_text(cell_text).provenance
+    assert origins["limits.tilt_deg"] == Origin(line_with("tilt_deg"))
+    assert origins["robot.nominal.S"] == Origin(line_with("S = ["))
+    assert origins["gauges[3].protocol"] == Origin(line_with('"cdi"'))
+    assert str(origins["gauges[3].protocol"]) == f"line {line_with('cdi')}"
+    assert str(origins["timing.window_s"]) == "default"
+    assert str(origins["gauges[3].port"]) == "default"
+
+
+def test_provenance_has_every_setting(load_text, cell_text):
+    cell = load_text(cell_text)
+    for key in cell.provenance:
+        value: object = cell.settings
+        for name, _, number in re.findall(r"(\w+)(\[(\d+)\])?", key):
+            value = getattr(value, name)
+            value = value[int(number) - 1] if number else value  # type: ignore[index]
+    assert len(cell.provenance) > 80
+
+
+def test_windows_line_ends_and_byte_order_mark(load_text, cell_text, line_with):
+    cell = load_text("\ufeff" + cell_text.replace("\n", "\r\n"))
+    assert cell.settings == load_text(cell_text).settings
+    assert cell.provenance["limits.tilt_deg"] == Origin(line_with("tilt_deg"))
+
+
+def test_absent_file_is_named(tmp_path):
+    with pytest.raises(FileError, match="not exist") as refused:
+        load_cell(tmp_path / "cell.toml")
+    assert refused.value.subject == str(tmp_path / "cell.toml")
+
+
+def test_folder_is_refused(tmp_path):
+    with pytest.raises(FileError) as refused:
+        load_cell(tmp_path)
+    assert refused.value.subject == str(tmp_path)
+
+
+def test_unreadable_file_is_refused(cell_text, tmp_path):
+    (tmp_path / "file").write_text(cell_text)
+    with pytest.raises(FileError, match="cannot be read"):
+        load_cell(tmp_path / "file" / "cell.toml")
+
+
+@pytest.mark.parametrize("encoding", ["latin-1", "utf-16"])
+def test_other_encodings_are_refused(cell_text, tmp_path, encoding):
+    path = tmp_path / "cell.toml"
+    path.write_bytes(cell_text.replace("Hexaglide", "Hexaglide Süd").encode(encoding))
+    with pytest.raises(FileError, match="UTF-8") as refused:
+        load_cell(path)
+    assert refused.value.line == 1
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "problem"),
+    [
+        ("[limits]", "[limits", "']'"),
+        ("tilt_deg = 45.0", "tilt_deg = ", "Invalid value"),
+        ("tilt_deg = 45.0", "tilt_deg 45.0", "'='"),
+        ("tilt_deg = 45.0", "tilt_deg = 45.0\ntilt_deg = 45.0", "stands twice"),
+        ("[limits]", "[noise]", "stands twice"),
+    ],
+)
+def test_toml_mistakes_have_a_line(load_changed, line_with, old, new, problem):
+    with pytest.raises(FileError, match=f"not valid TOML.*{problem}") as refused:
+        load_changed((old, new))
+    assert refused.value.line == line_with(old) + new.count("\n")
+
+
+@pytest.mark.parametrize("text", ["a = [1,\n2,\n", "a = {", "a ="])
+def test_unfinished_toml_points_to_its_end(load_text, text):
+    with pytest.raises(FileError, match="not valid TOML") as refused:
+        load_text(text)
+    assert refused.value.line == len(text.splitlines())
+
+
+@pytest.mark.parametrize("depth", [300, 100_000])
+def test_endless_brackets_are_refused(load_changed, depth):
+    with pytest.raises(FileError, match="nested too deeply"):
+        load_changed(('protocol = "cdi"', f'protocol = "cdi"\nserial = {{a = {"[" * depth}{"]" * depth}}}'))
+
+
+@pytest.mark.parametrize("number", ["9" * 5000, "0x" + "f" * 5000])
+def test_endless_integer_is_refused(load_changed, number):
+    with pytest.raises(FileError, match="too many digits"):
+        load_changed(("45.0", number))
+
+
+def test_long_values_are_quoted_in_part(load_changed):
+    with pytest.raises(FileError, match=r'is the text "a{40}\.\.\.", but'):
+        load_changed(("45.0", f'"{"a" * 1000}"'))
+
+
+# What stands in the good file, what replaces it, and what must be said about it, in its line.
+MISTAKES = [
+    (
+        "tilt_deg = 45.0",
+        "tilt_degs = 45.0",
+        r"unknown key 'tilt_degs' in \[limits\]. Did you mean 'tilt_deg'\?",
+    ),
+    ("tilt_deg = 45.0", "Tilt_Deg = 45.0", r"Did you mean 'tilt_deg'\?"),
+    ("tilt_deg = 45.0", "clock_factor = 1", r"unknown key 'clock_factor' .*It belongs in \[timing\]"),
+    ("tilt_deg = 45.0", "baudrate = 1", r"It belongs in \[simulation.gauges\]"),
+    ("tilt_deg = 45.0", "qqq = 1", r"unknown key 'qqq'.*Known here: gauge_travel_mm, tilt_deg"),
+    ('axis = "z"', 'axsi = "z"\naxis = "z"', r"'axsi' in \[\[gauges\]\] number 3. Did you mean 'axis'\?"),
+    ("[limits]", "[limit]", r"unknown section 'limit' at the top of the file. Did you mean 'limits'\?"),
+    ("tilt_deg = 45.0", 'tilt_deg = "45"', r"is the text \"45\", but must be a number. Remove the quotes"),
+    ("tilt_deg = 45.0", 'tilt_deg = "wide"', r"is the text \"wide\", but must be a number. Correct it"),
+    ("tilt_deg = 45.0", "tilt_deg = true", "is true, but must be a number"),
+    ("tilt_deg = 45.0", "tilt_deg = [45.0]", "is a list of 1 item, but must be a number"),
+    ("tilt_deg = 45.0", "tilt_deg = {}", "is a section, but must be a number"),
+    ("tilt_deg = 45.0", "tilt_deg = 2020-02-02", "is a date or a time, but must be a number"),
+    ("tilt_deg = 45.0", "tilt_deg = 80.1", "is 80.1, but must be 80 or less"),
+    ("tilt_deg = 45.0", "tilt_deg = 0", "is 0, but must be more than 0"),
+    ("tilt_deg = 45.0", "tilt_deg = nan", "is nan, but must be a finite number"),
+    ("tilt_deg = 45.0", "tilt_deg = -inf", "is -inf, but must be a finite number"),
+    ("tilt_deg = 45.0", f"tilt_deg = 1{'0' * 400}", "but must be a finite number"),
+    ("joint_min_mm = -800.0", "joint_min_mm = 800.0", "joint_min_mm must be below joint_max_mm"),
+    ("version = 1", "version = 2", "'version' at the top of the file is 2, but must be 1"),
+    ('name = "simulated Hexaglide"', 'name = ""', "but must be text that is not empty"),
+    ('name = "simulated Hexaglide"', "name = 2020-02-02", "is a date or a time, but must be"),
+    (
+        'axis = "z"',
+        'axis = "u"',
+        r"'axis' in \[\[gauges\]\] number 3 is the text \"u\", but must be 'x', 'y' or 'z'",
+    ),
+    ("orientations = 11", "orientations = 11.0", "is 11.0, but must be a whole number"),
+    ("orientations = 11", "orientations = 1", "is 1, but must be 2 or more"),
+    (
+        "nodes = [1, 2, ",
+        "nodes = [1, 200, ",
+        r"'nodes' in \[encoders\], number 2 is 200, but must be 127 or less",
+    ),
+    ("nodes = [1, 2, ", "nodes = [2, 2, ", "two encoders have the same node id"),
+    ("nodes = [1, 2, ", "nodes = [1, ", "is a list of 5 items, but must be a list of 6 items"),
+    ("nodes = [1, 2, ", "nodes = [1, 7, 2, ", "is a list of 7 items, but must be a list of 6 items"),
+    (
+        "  [0.0, 155.0, 0.0],",
+        "  [0.0, 155.0],",
+        r"'S' in \[robot.nominal\], row 3 is a list of 2 items, but must be",
+    ),
+    (
+        "  [0.0, 155.0, 0.0],",
+        "  [0.0, 1, 2, 3],",
+        "row 3 is a list of 4 items, but must be a list of 3 items",
+    ),
+    (
+        "  [0.0, 155.0, 0.0],",
+        '  [0.0, "a", 0],',
+        r"row 3, number 2 is the text \"a\", but must be a number",
+    ),
+    ("  [0.0, 155.0, 0.0],", "  [0.0, inf, 0],", "row 3, number 2 is inf, but must be a finite number"),
+    ('protocol = "cdi"', 'protocol = "cdi"\nserial = 3', "is 3, but must be a table"),
+]
+
+
+@pytest.mark.parametrize(("old", "new", "message"), MISTAKES)
+def test_every_mistake_is_named_with_its_line(load_changed, line_with, old, new, message):
+    with pytest.raises(FileError, match=message) as refused:
+        load_changed((old, new))
+    mistake = refused.value
+    first_line_of_section = line_with("[limits]") if "joint_min_mm must" in message else line_with(old)
+    added = new.count("\n") if message.endswith("a table") else 0
+    assert mistake.line == first_line_of_section + added
+    assert mistake.action
+    assert mistake.exit_code is ExitCode.USAGE
+
+
+@pytest.mark.parametrize("value", ["nan", "[1.0, inf]", "{a = -inf}", "2020-02-02", "07:30:00"])
+def test_what_is_passed_on_is_finite_and_plain_too(load_changed, value):
+    with pytest.raises(FileError, match=r"must be a (finite )?number"):
+        load_changed(('protocol = "cdi"', f'protocol = "cdi"\nserial.extra = {value}'))
+
+
+@pytest.mark.parametrize(
+    ("removed", "message", "at"),
+    [
+        (
+            'config = "simulated-hexaglide.controller.toml"',
+            "'config' in [controller] is missing",
+            "[controller]",
+        ),
+        ('axis = "z"', "'axis' in [[gauges]] number 3 is missing", "CDI"),
+    ],
+)
+def test_missing_key_names_its_section(load_changed, line_with, removed, message, at):
+    with pytest.raises(FileError, match=re.escape(message)) as refused:
+        load_changed((removed, ""))
+    header = line_with("[controller]") if at == "[controller]" else line_with('"gauge z"') - 1
+    assert refused.value.line == header
+
+
+def test_empty_file_misses_every_section_at_once(load_text):
+    with pytest.raises(SeveralErrors) as refused:
+        load_text("")
+    assert "the section [identification] is missing. Add it, with points" in str(refused.value)
+    assert "the section [[gauges]] is missing. Add it, with name, axis, protocol" in str(refused.value)
+    assert len(refused.value.errors) == 7
+
+
+def test_two_gauges_are_too_few(load_text, cell_text):
+    start, end = cell_text.index('[[gauges]]\nname = "gauge z"'), cell_text.index("[encoders]")
+    with pytest.raises(FileError, match="list of 2 items, but must be 3 sections"):
+        load_text(cell_text[:start] + cell_text[end:])
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ([('axis = "z"', 'axis = "x"')], "x, y and z, one each"),
+        ([('"gauge z"', '"gauge x"')], "same name"),
+        (
+            [
+                ('"sylvac"', '"mux10"\nport = "/dev/a"'),
+                ('protocol = "mux10"   ', 'protocol = "mux10"\nport = "/dev/a"'),
+            ],
+            "same port and channel",
+        ),
+    ],
+)
+def test_gauges_that_make_no_triad(load_changed, line_with, changes, message):
+    with pytest.raises(FileError, match=message) as refused:
+        load_changed(*changes)
+    assert refused.value.line == line_with("[[gauges]]")
+
+
+def test_real_cell_needs_a_way_to_every_device(load_text, cell_text, line_with):
+    with pytest.raises(SeveralErrors) as refused:
+        load_text(cell_text[: cell_text.index("[simulation]")])
+    found = [(error.line, error.problem.split(";")[0]) for error in _file_errors(refused.value)]
+    first_gauge = line_with("[[gauges]]")
+    assert found[:2] == [
+        (line_with("[controller]"), "the controller has no port"),
+        (first_gauge, "the gauge has no port"),
+    ]
+    assert found[-1] == (line_with("[encoders]"), "the encoders have no bus")
+    assert len(found) == 5
+
+
+def test_several_mistakes_come_together_in_the_order_of_the_file(load_changed, cell_path):
+    with pytest.raises(SeveralErrors) as refused:
+        load_changed(
+            ("seed = 1", "sead = 1"), ("tilt_deg = 45.0", "tilt_deg = nan"), ("S_mm = 7.0", "S_mm = -7")
+        )
+    lines = [error.line for error in _file_errors(refused.value)]
+    assert len(lines) == 3
+    assert lines == sorted(lines, key=lambda line: line or 0)
+    assert str(refused.value).startswith(f"{cell_path} has 3 mistakes:\n  - {cell_path}:")
+    assert refused.value.worst is ExitCode.USAGE
+
+
+def _file_errors(several: SeveralErrors) -> list[FileError]:
+    assert all(isinstance(error, FileError) for error in several.errors)
+    return [error for error in several.errors if isinstance(error, FileError)]
+
+
+@st.composite
+def _edits(draw: st.DrawFn) -> list[tuple[float, int, bytes]]:
+    pieces = st.sampled_from(
+        [b"[", b"]", b"{", b"}", b'"', b"'", b"=", b",", b".", b"\n", b"#", b"\\", b"nan"]
+    )
+    piece = st.one_of(
+        pieces, st.binary(max_size=3), st.sampled_from([b"-1", b"true", b"[[a]]\n", b'"""', b"1e999"])
+    )
+    edit = st.tuples(st.floats(0, 1), st.integers(0, 40), piece)
+    return draw(st.lists(edit, min_size=1, max_size=4))
+
+
+@given(edits=_edits())
+def test_spoilt_files_give_plain_errors_only(cell_text, cell_path, edits):
+    raw = cell_text.encode()
+    for where, length, piece in edits:
+        start = int(where * len(raw))
+        raw = raw[:start] + piece + raw[start + length :]
+    cell_path.write_bytes(raw)
+    try:
+        load_cell(cell_path)
+    except HexacellError as error:
+        assert str(error).startswith(str(cell_path))  # noqa: PT017 - loading may also succeed
+
+
+@given(data=st.data())
+def test_values_of_any_kind_in_any_place_give_plain_errors_only(cell_text, load_text, data):
+    lines = cell_text.splitlines()
+    keys = [number for number, line in enumerate(lines) if re.match(r"\w+ = [^\[]*$", line)]
+    number = data.draw(st.sampled_from(keys))
+    value = data.draw(
+        st.sampled_from(
+            ['""', "'x'", "0", "-1", "1e400", "true", "[]", "{}", "[[]]", "{a=[1]}", "1979-05-27", "nan"]
+        )
+    )
+    lines[number] = lines[number].split("=")[0] + "= " + value
+    try:
+        load_text("\n".join(lines))
+    except HexacellError as error:
+        mistakes = error.errors if isinstance(error, SeveralErrors) else [error]
+        assert all(isinstance(mistake, FileError) and mistake.line for mistake in mistakes)

@@ -1,0 +1,146 @@
+"""Settings written as a cell file read back as the same settings."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from hexacell.cell import base, devices, model, simulation
+from hexacell.cell.file import describe, dump, schema
+
+finite = st.floats(allow_nan=False, allow_infinity=False)
+positive = st.floats(min_value=0, exclude_min=True, allow_infinity=False)
+texts = st.text(st.characters(codec="utf-8", exclude_characters="\0"), min_size=1, max_size=12)
+points = st.tuples(finite, finite, finite)
+six = st.tuples(*[finite] * 6)
+signs = st.sampled_from([1, -1])
+scalars = st.one_of(st.booleans(), st.integers(), finite, texts)
+anything = st.recursive(
+    scalars, lambda inner: st.lists(inner, max_size=3) | st.dictionaries(texts, inner, max_size=3)
+)
+tables = st.dictionaries(texts, anything, max_size=3)
+geometries = st.builds(base.GeometryValues, S=st.tuples(*[points] * 6), B=st.tuples(*[points] * 6), l=six)
+
+
+def _gauges(axes: tuple[str, ...]) -> st.SearchStrategy[tuple[Any, ...]]:
+    return st.tuples(
+        *(
+            st.builds(
+                devices.GaugeSettings,
+                name=st.just(f"gauge {axis}"),
+                axis=st.just(axis),
+                sign=signs,
+                protocol=texts,
+                port=st.just(f"/dev/{axis}") if place else st.none() | st.just("loop://"),
+                serial=tables,
+                channel=st.integers(1, 99),
+                timeout_s=positive,
+            )
+            for place, axis in enumerate(axes)
+        )
+    )
+
+
+cells = st.builds(
+    model.CellSettings,
+    name=texts,
+    robot=st.builds(model.RobotSettings, mechanism=texts, nominal=geometries),
+    controller=st.builds(
+        devices.ControllerSettings,
+        config=texts,
+        port=st.none() | st.integers(1, 65535),
+        reload_command=st.lists(texts, max_size=3).map(tuple),
+    ),
+    gauges=st.permutations("xyz").flatmap(lambda axes: _gauges(tuple(axes))),
+    encoders=st.builds(
+        devices.EncoderSettings,
+        bus=st.none() | tables,
+        nodes=st.permutations(range(1, 128)).map(lambda ids: tuple(ids[:6])),
+        signed=st.booleans(),
+        direction=st.tuples(*[signs] * 6),
+        offset_mm=six,
+        serial_numbers=st.none() | st.tuples(*[st.integers(0, 2**32 - 1)] * 6),
+    ),
+    limits=st.builds(devices.LimitSettings, tilt_deg=st.floats(1e-300, 80)),
+    identification=st.builds(
+        model.IdentificationSettings,
+        points=st.lists(points, min_size=2, max_size=4).map(tuple),
+        orientations=st.integers(2, 10**30),
+    ),
+    verification=st.builds(
+        model.VerificationSettings, points=st.lists(points, min_size=1, max_size=2).map(tuple)
+    ),
+    task=st.builds(model.TaskSettings, poses=st.lists(six, max_size=2).map(tuple)),
+    simulation=st.builds(
+        simulation.SimulationSettings,
+        geometry=geometries,
+        gauges=st.builds(simulation.SimulatedGauges, baudrate=st.none() | st.integers(300, 10**6)),
+    ),
+)
+
+
+@given(settings=cells)
+def test_dumped_settings_load_as_the_same(load_text, settings):
+    assert load_text(dump(settings)).settings == settings
+
+
+@given(settings=cells)
+def test_description_is_a_cell_file_of_the_same(load_text, settings):
+    cell = load_text(dump(settings))
+    assert load_text(describe(cell)).settings == settings
+
+
+def test_dump_writes_every_number_in_full(load_changed):
+    settings = load_changed(("tilt_deg = 45.0", "tilt_deg = 44.300000000000004")).settings
+    assert "tilt_deg = 44.300000000000004\n" in dump(settings)
+
+
+def test_dump_leaves_out_what_is_not_set(load_text, cell_text):
+    settings = load_text(cell_text).settings
+    assert "\nport" not in dump(settings)
+
+
+def test_dump_of_a_real_cell_needs_no_simulation(load_text, cell_text):
+    real = load_text(
+        cell_text[: cell_text.index("[simulation]")]
+        .replace('axis = "', 'port = "socket://127.0.0.1:1"\naxis = "', 1)
+        .replace('axis = "y"', 'axis = "y"\nport = "/dev/ttyUSB1"')
+        .replace(
+            'axis = "z"', 'axis = "z"\nport = "/dev/ttyUSB2"\nserial = {baudrate = 4800, parity = "E"}'
+        )
+        .replace(
+            "nodes =", 'bus = {interface = "slcan", channel = "/dev/ttyACM0", bitrate = 500000}\nnodes ='
+        )
+        .replace("config_format", "port = 5007\nconfig_format")
+    ).settings
+    text = dump(real)
+    assert "simulation" not in text
+    assert 'bus = {interface = "slcan", channel = "/dev/ttyACM0", bitrate = 500000}' in text
+    assert load_text(text).settings == real
+
+
+def test_description_says_where_every_value_comes_from(load_text, cell_text, line_with):
+    text = describe(load_text(cell_text))
+    assert f"tilt_deg = 45.0  # line {line_with('tilt_deg')}\n" in text
+    assert "window_s = 0.6  # default\n" in text
+    assert "# port is not set\n" in text
+    values = [line for line in text.splitlines() if "=" in line and not line.startswith("#")]
+    assert all("  # " in line or line.endswith("[") for line in values)
+
+
+def test_schema_names_every_section_and_describes_every_key():
+    document = schema()
+    assert set(document["properties"]) == set(model.CellSettings.model_fields)
+    undescribed = [
+        (name, key)
+        for name, section in document["$defs"].items()
+        for key, field in section["properties"].items()
+        if "description" not in field and "$ref" not in str(field)
+    ]
+    assert undescribed == []
+
+
+def test_schema_refuses_unknown_keys():
+    assert all(section["additionalProperties"] is False for section in schema()["$defs"].values())

@@ -1,0 +1,179 @@
+"""The suite's own safety net: a test that leaves something behind fails, one that cleans up does not."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from textwrap import dedent
+
+import pytest
+
+HERE = Path(__file__).parent
+
+LEAKS = {
+    "ERROR *::test_thread - *left behind: thread worker (*)": """
+        def test_thread():
+            threading.Thread(target=time.sleep, args=(1,), name="worker").start()
+    """,
+    "ERROR *::test_daemon_thread - *left behind: daemon thread helper (*)": """
+        def test_daemon_thread():
+            threading.Thread(target=time.sleep, args=(9,), name="helper", daemon=True).start()
+    """,
+    "ERROR *::test_file - *left behind: descriptor * -> /dev/null": """
+        def test_file():
+            os.open("/dev/null", os.O_RDONLY)
+    """,
+    "ERROR *::test_terminal - *left behind: descriptor * -> /dev/ptmx, descriptor * -> /dev/pts/*": """
+        def test_terminal():
+            pty.openpty()
+    """,
+    "ERROR *::test_socket - *left behind: descriptor * -> socket:*": """
+        def test_socket():
+            KEPT.append(socket.socket())
+    """,
+    "ERROR *::test_server - *left behind: descriptor * -> socket:*": """
+        async def test_server():
+            KEPT.append(await asyncio.start_server(print, "127.0.0.1", 0))
+    """,
+    "ERROR *::test_task - *left behind: <Task pending name='listener' *": """
+        async def test_task():
+            KEPT.append(asyncio.create_task(asyncio.sleep(9), name="listener"))
+    """,
+    "ERROR *::test_task_of_a_fixture - *left behind: <Task pending name='pump' *": """
+        @pytest.fixture
+        async def link():
+            yield KEPT.append(asyncio.create_task(asyncio.sleep(9), name="pump"))
+
+        def test_task_of_a_fixture(link):
+            pass
+    """,
+    "FAILED *::test_forgotten_socket - *Exception ignored in: <socket.socket*": """
+        def test_forgotten_socket():
+            socket.socket()
+    """,
+    "FAILED *::test_exception_in_a_thread - *Exception in thread counter*": """
+        def test_exception_in_a_thread():
+            thread = threading.Thread(target=lambda: 1 / 0, name="counter")
+            thread.start()
+            thread.join()
+    """,
+    "FAILED *::test_warning - DeprecationWarning: old": """
+        def test_warning():
+            warnings.warn("old", DeprecationWarning)
+    """,
+    "FAILED *::test_coroutine_never_awaited - *Exception ignored in: <coroutine object sleep*": """
+        def test_coroutine_never_awaited():
+            asyncio.sleep(0)
+    """,
+}
+
+CLEAN = """
+    def test_thread_on_its_way_out():
+        threading.Thread(target=time.sleep, args=(0.05,)).start()
+
+    async def test_cancelled_task():
+        asyncio.create_task(asyncio.sleep(9)).cancel()
+
+    async def test_work_in_a_thread():
+        await asyncio.to_thread(time.sleep, 0)
+
+    async def test_child_process():
+        await (await asyncio.create_subprocess_exec("true")).wait()
+
+    async def test_server_closed():
+        server = await asyncio.start_server(print, "127.0.0.1", 0)
+        server.close()
+        await server.wait_closed()
+
+    def test_loop_of_its_own():
+        asyncio.run(asyncio.sleep(0))
+
+    @pytest.fixture(scope="module")
+    def shared_line():
+        with socket.socket() as line:
+            yield line
+
+    def test_what_belongs_to_the_module(shared_line, capfd, tmp_path):
+        pass
+
+    @pytest.fixture
+    async def link():
+        task = asyncio.create_task(asyncio.sleep(9))
+        yield
+        task.cancel()
+
+    async def test_task_that_its_fixture_ends(link):
+        pass
+
+    @given(st.integers())
+    async def test_generated(number):
+        await asyncio.sleep(0)
+"""
+
+HEADER = """
+    import asyncio, os, pty, socket, threading, time, warnings
+    import pytest
+    from hypothesis import given, settings, strategies as st
+
+    KEPT = []
+"""
+
+
+@pytest.fixture
+def suite(pytester: pytest.Pytester, monkeypatch: pytest.MonkeyPatch) -> pytest.Pytester:
+    """A project with this one's settings and conftest, and a shorter grace."""
+    conftest = (HERE / "conftest.py").read_text() + "\nGRACE_S = 0.2\n"
+    tests = pytester.mkdir("tests")
+    (tests / "conftest.py").write_text(conftest)
+    (pytester.path / "pyproject.toml").write_text((HERE.parent / "pyproject.toml").read_text())
+    monkeypatch.setenv("COLUMNS", "500")
+    return pytester
+
+
+def run(suite: pytest.Pytester, *sources: str, options: str = "") -> pytest.RunResult:
+    """Run tests of these sources in a process of its own, so that what they leave dies with it."""
+    text = "\n".join(dedent(source) for source in (HEADER, *sources))
+    (suite.path / "tests" / "test_inner.py").write_text(text)
+    return suite.runpytest_subprocess("tests", *options.split())
+
+
+def test_whatever_is_left_behind_fails_its_test_and_no_other(suite: pytest.Pytester) -> None:
+    innocent = [f"def test_innocent_{number}(): pass" for number in range(len(LEAKS))]
+    sources = [source for pair in zip(LEAKS.values(), innocent, strict=True) for source in pair]
+    result = run(suite, *sources)
+    result.stdout.fnmatch_lines_random(list(LEAKS))
+    errors = sum(line.startswith("ERROR") for line in LEAKS)
+    failed = len(LEAKS) - errors
+    result.assert_outcomes(passed=len(LEAKS) + errors, errors=errors, failed=failed)
+
+
+def test_what_cleans_up_passes(suite: pytest.Pytester) -> None:
+    run(suite, CLEAN).assert_outcomes(passed=CLEAN.count("def test_"))
+
+
+@pytest.mark.parametrize(("environment", "repeatable"), [({"CI": "true"}, True), ({}, False)])
+def test_hypothesis_repeats_itself_in_ci(
+    suite: pytest.Pytester, monkeypatch: pytest.MonkeyPatch, environment: dict[str, str], repeatable: bool
+) -> None:
+    monkeypatch.delenv("CI", raising=False)
+    for name, value in environment.items():
+        monkeypatch.setenv(name, value)
+    body = f"""
+        def test_profile():
+            assert settings.default.derandomize is {repeatable}
+            assert settings.default.deadline is None
+    """
+    run(suite, body).assert_outcomes(passed=1)
+
+
+def test_a_test_that_hangs_is_ended(suite: pytest.Pytester, pytestconfig: pytest.Config) -> None:
+    assert 0 < float(pytestconfig.getini("timeout")) <= 60
+    result = run(suite, "def test_hangs(): time.sleep(9)", options="--timeout=0.2")
+    result.stdout.fnmatch_lines(["FAILED *::test_hangs - *Timeout*"])
+
+
+def test_the_folder_of_benchmarks_marks_them(suite: pytest.Pytester) -> None:
+    suite.mkdir("tests/benchmarks")
+    (suite.path / "tests/benchmarks/test_speed.py").write_text("def test_speed(): pass")
+    result = run(suite, "def test_sense(): pass", options="-m benchmark -v")
+    result.assert_outcomes(passed=1, deselected=1)
+    result.stdout.fnmatch_lines(["*::test_speed PASSED*"])

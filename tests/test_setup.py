@@ -1,0 +1,218 @@
+"""Setting up with make, against a Python that only notes what it is asked to do."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import pytest
+
+CHECKOUT = Path(__file__).parent.parent
+
+FAKE_PYTHON = """\
+#!/bin/sh
+lacks() { case " $LACKING " in *" $1 "*) true ;; *) false ;; esac; }
+echo "$0 $*" >>"$NOTES"
+case "$*" in
+    "-V") echo "Python 3.9.2" ;;
+    *version_info*) ! lacks version ;;
+    "-m venv"*)
+        mkdir -p .venv/bin && cp "$0" .venv/bin/python
+        case "$*" in *--without-pip*) ;; *) ! lacks ensurepip ;; esac ;;
+    "-c import pip") ! lacks ensurepip ;;
+    "-m pip --version") ! lacks pip ;;
+    *install*editable*) ! lacks network ;;
+esac
+"""
+
+
+@dataclass
+class Newcomer:
+    """Somebody at a checkout, with a Python that may lack a thing or two."""
+
+    checkout: Path
+    python: Path
+    lacking: str = ""
+    environment: dict[str, str] = field(default_factory=lambda: {"PATH": os.environ["PATH"]})
+    printed: list[str] = field(default_factory=list)
+
+    def make(self, *arguments: str) -> int:
+        """Run make; what it says on stderr goes to ``printed``, make's own last line excepted."""
+        notes = self.python.with_name("notes")
+        environment = {**self.environment, "NOTES": str(notes), "LACKING": self.lacking}
+        command = ["make", f"PYTHON={self.python}", *arguments]
+        done = subprocess.run(
+            command, cwd=self.checkout, env=environment, capture_output=True, text=True, check=False
+        )
+        self.printed = [line for line in done.stderr.splitlines() if not line.startswith("make: ***")]
+        return done.returncode
+
+    def calls(self) -> list[str]:
+        """What Python was asked since the last time, the base one's calls marked with ``base:``."""
+        notes = self.python.with_name("notes")
+        lines = notes.read_text().splitlines() if notes.exists() else []
+        notes.unlink(missing_ok=True)
+        return [line.replace(str(self.python), "base:").removeprefix(".venv/bin/python ") for line in lines]
+
+    def installations(self) -> list[str]:
+        """The calls that make a venv or install."""
+        return [call for call in self.calls() if "-m venv" in call or " install " in call]
+
+
+FROM_SCRATCH = [
+    "base: -m venv .venv",
+    "-m pip install --quiet --constraint constraints.txt hatchling",
+    "-m pip install --quiet --constraint constraints.txt --no-build-isolation --editable .[dev]",
+]
+IN_PLACE = FROM_SCRATCH[1:]
+
+
+@pytest.fixture
+def newcomer(tmp_path: Path) -> Newcomer:
+    """A fresh clone in a folder whose name has a space."""
+    checkout = tmp_path / "a checkout"
+    shutil.copytree(CHECKOUT / ".ci", checkout / ".ci")
+    for name in ("Makefile", "pyproject.toml", "constraints.txt"):
+        shutil.copy(CHECKOUT / name, checkout)
+    python = tmp_path / "python3"
+    python.write_text(FAKE_PYTHON)
+    python.chmod(0o755)
+    return Newcomer(checkout, python)
+
+
+@pytest.fixture
+def settled(newcomer: Newcomer) -> Newcomer:
+    """The same, installed."""
+    assert newcomer.make("venv") == 0
+    assert newcomer.installations() == FROM_SCRATCH
+    return newcomer
+
+
+@pytest.mark.parametrize("target", ["test", "test-full", "lint", "bench", "demo"])
+def test_every_target_installs_first(newcomer: Newcomer, target: str) -> None:
+    newcomer.make(target)
+    assert newcomer.installations() == FROM_SCRATCH
+    assert newcomer.printed[0] == "hexacell: setting up .venv, once; this takes a minute"
+
+
+def test_once_installed_only_the_work_is_done(settled: Newcomer) -> None:
+    assert settled.make("test") == 0
+    assert settled.calls() == ["-c ", "-m pytest -m not slow and not benchmark"]
+    assert settled.printed == []
+
+
+def test_once_installed_the_python_that_did_it_may_go(settled: Newcomer) -> None:
+    settled.python.unlink()
+    assert settled.make("test") == 0
+
+
+def test_demo_is_the_installed_program(settled: Newcomer) -> None:
+    program = settled.checkout / ".venv/bin/hexacell"
+    program.write_text('#!/bin/sh\necho "$@" >&2\n')
+    program.chmod(0o755)
+    assert settled.make("demo", "ARGS=--seed 3") == 0
+    assert settled.printed == ["demo --seed 3"]
+
+
+@pytest.mark.parametrize("name", ["pyproject.toml", "constraints.txt"])
+def test_other_pins_are_installed_in_place(settled: Newcomer, name: str) -> None:
+    with (settled.checkout / name).open("a") as pins:
+        pins.write("# changed\n")
+    assert settled.make("venv") == 0
+    assert settled.installations() == IN_PLACE
+    assert settled.make("venv") == 0
+    assert settled.installations() == []
+
+
+def test_touching_the_pins_is_no_change(settled: Newcomer) -> None:
+    (settled.checkout / "pyproject.toml").touch()
+    settled.make("venv")
+    assert settled.installations() == []
+
+
+def test_an_interrupted_installation_starts_anew(newcomer: Newcomer) -> None:
+    newcomer.lacking = "network"
+    assert newcomer.make("venv") == 2
+    assert newcomer.printed[-1] == "hexacell: installing stopped, see above; once mended, run make again"
+    (newcomer.checkout / ".venv/half-written").touch()
+    newcomer.calls()
+    newcomer.lacking = ""
+    assert newcomer.make("venv") == 0
+    assert newcomer.installations() == FROM_SCRATCH
+    assert not (newcomer.checkout / ".venv/half-written").exists()
+
+
+def test_a_stranger_venv_is_made_anew(newcomer: Newcomer) -> None:
+    (newcomer.checkout / ".venv/lib").mkdir(parents=True)
+    assert newcomer.make("venv") == 0
+    assert newcomer.installations() == FROM_SCRATCH
+
+
+def test_a_copied_checkout_does_not_use_the_original(settled: Newcomer) -> None:
+    settled.checkout = shutil.copytree(settled.checkout, settled.checkout.with_name("another"))
+    assert settled.make("venv") == 0
+    assert settled.installations() == FROM_SCRATCH
+
+
+def test_a_venv_whose_python_is_gone_is_made_anew(settled: Newcomer) -> None:
+    (settled.checkout / ".venv/bin/python").unlink()
+    assert settled.make("venv") == 0
+    assert settled.installations() == FROM_SCRATCH
+
+
+def test_without_ensurepip_the_outer_pip_installs(newcomer: Newcomer) -> None:
+    newcomer.lacking = "ensurepip"
+    assert newcomer.make("venv") == 0
+    assert newcomer.installations() == [
+        "base: -m venv .venv",
+        "base: -m venv --clear --without-pip .venv",
+        *(call.replace("-m pip", "base: -m pip --python .venv/bin/python") for call in IN_PLACE),
+    ]
+
+
+@pytest.mark.parametrize(
+    ("lacking", "line"),
+    [
+        ("version", "Python 3.11 or newer is needed, '{}' is Python 3.9.2: name a newer one: "),
+        ("ensurepip pip", "'{}' can neither make a venv with pip nor has pip itself: install python3-"),
+    ],
+)
+def test_what_cannot_be_helped_gets_one_line(newcomer: Newcomer, lacking: str, line: str) -> None:
+    newcomer.lacking = lacking
+    assert newcomer.make("test") == 2
+    [said] = [said for said in newcomer.printed if "setting up" not in said]
+    assert said.startswith("hexacell: " + line.format(newcomer.python))
+    assert not any(" install " in call for call in newcomer.calls())
+
+
+def test_no_python_at_all_gets_one_line(newcomer: Newcomer) -> None:
+    newcomer.python.unlink()
+    assert newcomer.make("test") == 2
+    [said] = newcomer.printed
+    assert said.startswith(f"hexacell: Python 3.11 or newer is needed and there is no '{newcomer.python}'")
+
+
+def test_foreign_paths_do_not_reach_python(settled: Newcomer) -> None:
+    python = settled.checkout / ".venv/bin/python"
+    python.write_text('#!/bin/sh\necho "[$PYTHONPATH]" >&2\n')
+    settled.environment["PYTHONPATH"] = "/opt/ros"
+    assert settled.make("test") == 0
+    assert set(settled.printed) == {"[]"}
+
+
+def test_ci_lints_and_tests_even_if_lint_fails(settled: Newcomer) -> None:
+    python = settled.checkout / ".venv/bin/python"
+    python.write_text('#!/bin/sh\necho "$CI $*"\n[ "$2" != ruff ]\n')
+    command = ["bash", "-c", ".ci/run 2>&1"]
+    done = subprocess.run(
+        command, cwd=settled.checkout, env=settled.environment, capture_output=True, text=True, check=False
+    )
+    assert done.returncode != 0
+    assert "true -m ruff check" in done.stdout
+    assert done.stdout.splitlines()[-2:] == [
+        "true -m pytest -m not slow and not benchmark",
+        "make lint failed, see above",
+    ]

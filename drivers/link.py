@@ -56,7 +56,7 @@ class SerialLink:
         return self._wire.session
 
     async def open(self) -> int:
-        """Open the port unless it is open; the number of its session.
+        """Open the port unless it is open and alive; the number of its session.
 
         Raises:
             DeviceError: The port is absent, in use, or refused.

@@ -69,12 +69,14 @@ class Wire:
         self._early = b""
 
     def open(self) -> int:
-        """Open the port unless it is open; the number of its session, counted from 1.
+        """Open the port unless it is open and alive; the number of its session, counted from 1.
 
         Raises:
             DeviceError: The port is absent, in use, or refused.
             FileError: pyserial does not know the URL or a setting.
         """
+        if self._port is not None and not self._is_alive(self._port):
+            self.close()
         if self._port is None:
             self._port = self._opened()
             self.session += 1
@@ -104,6 +106,15 @@ class Wire:
         if self._port is not None:
             _close(self._port)
             self._port = None
+
+    def _is_alive(self, port: serial.Serial) -> bool:
+        """Whether it is still there: a port may have been unplugged while nobody used it."""
+        try:
+            if port.in_waiting:  # also what a connection says that the far side has ended
+                self._put_aside(self._read(port))
+        except (OSError, termios.error):
+            return False
+        return True
 
     def _opened(self) -> serial.Serial:
         tries = 0

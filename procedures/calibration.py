@@ -178,7 +178,11 @@ class Calibration:
             raise LimitError("the records of this point say nothing about where the ball is")
         at = station(knowledge, estimate.poses[rows], records.joints[rows], records.deviations[rows])
         turns = candidates.orientations(CANDIDATES, knowledge.limits.tilt, self._seed(key, measured))
-        return choose(knowledge, at, turns)
+        return choose(knowledge, at, turns, self._present(measured))
+
+    def _present(self, measured: SetState) -> Poses:
+        """The pose that the robot holds, in the convention's frames."""
+        return self.robot.change.poses(Poses.of([Pose(*measured.samples[-1].pose)]))
 
     def _seed(self, key: SetKey, measured: SetState) -> int:
         """Other candidates for every record and every attempt, and the same when done again."""

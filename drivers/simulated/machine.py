@@ -12,6 +12,7 @@ from drivers.simulated.world import World
 from hexacell import kinematics, rotations
 from hexacell.clock import CellClock
 from hexacell.controller_config.format import ConfigFormat, ControllerGeometry
+from hexacell.design.path import straight
 from hexacell.mechanisms.base import Mechanism
 from hexacell.pose import Pose, Poses
 from hexacell.rotations import Array
@@ -44,12 +45,12 @@ class SimulatedMachine:
         self._halt = threading.Event()
 
     def move(self, pose: Pose) -> None:
-        """Go straight to a pose, turning evenly; returns at the end or when stopped.
+        """Go straight to a pose; returns at the end or when stopped.
 
         Raises:
             KinematicsFailure: a leg cannot reach some place on the way.
         """
-        way = _straight(Poses.of([self.pose()]), Poses.of([pose]))
+        way = straight(Poses.of([self.pose()]), Poses.of([pose]), STEPS)
         joints = self._joints(way)
         if np.isnan(joints).any():
             raise KinematicsFailure("Linear move on line 0 fails kinematicsInverse")
@@ -101,16 +102,6 @@ class SimulatedMachine:
     def _joints(self, poses: Poses) -> Array:
         geometry: ControllerGeometry = self._geometry
         return self._mechanism.inverse(geometry.geometry, geometry.branch, poses)
-
-
-def _straight(start: Poses, end: Poses) -> Poses:
-    """STEPS + 1 poses on the straight line, turning about one axis."""
-    share = np.linspace(0.0, 1.0, STEPS + 1)[:, None]
-    turn = rotations.to_vector(end.rotations[0] @ start.rotations[0].T)
-    return Poses(
-        (1.0 - share) * start.positions + share * end.positions,
-        rotations.from_vector(share * turn) @ start.rotations[0],
-    )
 
 
 def _between(way: Poses, fraction: float) -> Poses:

@@ -124,16 +124,12 @@ class World:
     def _follow(self, joints: Array) -> None:
         if np.array_equal(joints, self._joints):
             return
-        found = kinematics.follow(
-            self._mechanism,
-            self._truth,
-            joints[None],
-            start=self._pose,
-            start_geometry=self._truth,
-            start_joints=self._joints[None],
-        )
-        # A real platform that is driven into a singularity goes somewhere too: keep what was found.
-        self._pose, self._joints = found.poses, joints
+        found = kinematics.forward(self._mechanism, self._truth, joints[None], self._pose)
+        self._joints = joints
+        if found.found[0]:
+            self._pose = found.poses
+        # Else: a platform driven into a singularity. Where a real one would go nobody knows; this
+        # one waits until the sliders are somewhere that it can follow from where it is.
 
     def _swinging(self, since_s: float) -> Array:
         motion = self._settings.motion

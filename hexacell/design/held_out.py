@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from hexacell import kinematics, rotations
 from hexacell.design.candidates import within_limits
 from hexacell.design.knowledge import Knowledge
+from hexacell.design.path import is_clear
 from hexacell.design.next_pose import SAFETY_SIGMAS, TRAVEL_SHARE
 from hexacell.errors import LimitError
 from hexacell.pose import Poses
@@ -29,10 +30,11 @@ def choose_held_out(knowledge: Knowledge, point: Array, count: int, orientations
     usable = np.flatnonzero(within_limits(knowledge.limits, poses, joints) & _after(knowledge, poses))
     if not len(usable) or usable[0] != 0:
         raise LimitError(f"the untilted platform cannot stand at {poses.pose(0)} within the limits")
-    kept = usable[_inside_travel(knowledge, poses[usable], joints[usable])]
-    if len(kept) < count:
-        raise LimitError(f"only {len(kept)} orientations at {poses.pose(0)} keep the ball inside the travel")
-    return poses[kept[_farthest_apart(poses.rotations[kept], count)]]
+    kept = poses[usable[_inside_travel(knowledge, poses[usable], joints[usable])]]
+    taken = _farthest_apart(knowledge, kept, count)
+    if len(taken) < count:
+        raise LimitError(f"only {len(taken)} orientations at {poses.pose(0)} keep the ball inside the travel")
+    return kept[taken]
 
 
 def _after(knowledge: Knowledge, poses: Poses) -> NDArray[np.bool_]:
@@ -70,12 +72,28 @@ def _inside_travel(knowledge: Knowledge, poses: Poses, joints: Array) -> NDArray
     return inside
 
 
-def _farthest_apart(orientations: Array, count: int) -> list[int]:
-    """Rows of orientations, beginning with the first, each next one farthest from those taken."""
+def _farthest_apart(knowledge: Knowledge, poses: Poses, count: int) -> list[int]:
+    """Rows of poses from the first on, each next one farthest from those taken, a clear way ahead.
+
+    A way must be clear there and back to the first, where the set ends.
+    """
     taken = [0]
-    nearest = np.full(len(orientations), np.inf)
+    apart = np.full(len(poses), np.inf)
     while len(taken) < count:
-        turn = orientations @ orientations[taken[-1]].T
-        nearest = np.minimum(nearest, np.linalg.norm(rotations.to_vector(turn), axis=-1))
-        taken.append(int(np.argmax(nearest)))
+        turn = poses.rotations @ poses.rotations[taken[-1]].T
+        apart = np.minimum(apart, np.linalg.norm(rotations.to_vector(turn), axis=-1))
+        best = int(np.argmax(apart))
+        while apart[best] > 0.0 and not _ways_clear(knowledge, poses, (taken[-1], best, 0)):
+            apart[best] = 0.0
+            best = int(np.argmax(apart))
+        if apart[best] <= 0.0:
+            break
+        taken.append(best)
     return taken
+
+
+def _ways_clear(knowledge: Knowledge, poses: Poses, rows: tuple[int, ...]) -> bool:
+    return all(
+        is_clear(knowledge, poses[[start]], poses[[end]])
+        for start, end in zip(rows, rows[1:], strict=False)
+    )

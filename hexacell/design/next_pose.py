@@ -9,6 +9,7 @@ import numpy as np
 from hexacell import kinematics
 from hexacell.design.candidates import Candidates, reachable
 from hexacell.design.knowledge import Knowledge
+from hexacell.design.path import is_clear
 from hexacell.errors import LimitError
 from hexacell.identification.model import record_covariance, record_weights
 from hexacell.pose import Pose, Poses
@@ -17,6 +18,9 @@ from hexacell.rotations import Array
 SAFETY_SIGMAS = 3.0
 TRAVEL_SHARE = 0.9
 """Of the travel, for the predicted deviation and three sigma: the rest is for second-order terms."""
+
+
+PATHS_TRIED = 64
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -64,11 +68,12 @@ def station(knowledge: Knowledge, poses: Poses, joints: Array, deviations: Array
     return Station(reference, poses.rotations[0], mean, covariance)
 
 
-def choose(knowledge: Knowledge, at: Station, turns: Array) -> Choice:
+def choose(knowledge: Knowledge, at: Station, turns: Array, present: Poses | None = None) -> Choice:
     """The best of some turns (n, 3, 3) away from the orientation at the zeroed reference.
 
     Turns start there and not at the untilted platform: with millimetres of error in the joints the
-    platform may stand 20 degrees from where the controller believes it to be.
+    platform may stand 20 degrees from where the controller believes it to be. From the ``present``
+    pose, as last commanded, a straight line must lead there.
 
     Raises:
         LimitError: none of them is reachable within the limits and surely inside the travel.
@@ -86,10 +91,13 @@ def choose(knowledge: Knowledge, at: Station, turns: Array) -> Choice:
     # Information on the parameters, nat: log det(1 + noise^-1 H C H^T) / 2.
     gain = 0.5 * (np.linalg.slogdet(spread)[1] - np.linalg.slogdet(noise)[1])
     gain[outside.any(axis=-1)] = -np.inf
-    best = int(np.argmax(gain))
-    if not np.isfinite(gain[best]):
-        raise LimitError("no orientation surely keeps the ball inside the gauges' travel")
-    return _choice(candidates, best, deviation[best], sigma[best], float(gain[best]))
+    for best in np.argsort(-gain)[:PATHS_TRIED]:
+        if not np.isfinite(gain[best]):
+            break
+        command = candidates.commands[[int(best)]]
+        if present is None or is_clear(knowledge, present, command, at.reference):
+            return _choice(candidates, int(best), deviation[best], sigma[best], float(gain[best]))
+    raise LimitError("no orientation surely keeps the ball inside the gauges' travel")
 
 
 def _choice(candidates: Candidates, row: int, deviation: Array, sigma: Array, gain: float) -> Choice:

@@ -403,9 +403,27 @@ async def test_a_port_that_breaks_is_lost_until_it_is_opened_again(fake, broken)
 
 
 async def test_opening_an_open_port_is_no_new_session(fake):
-    fake(FakePort())
+    port = fake(FakePort())
     link = await opened()
+    port.due = [(0.0, b"SY276.1\r")]
     assert await link.open() == 1
+    assert link.take_strays() == b"SY276.1\r"
+    await link.close()
+
+
+async def test_opening_finds_out_that_an_open_port_has_died_unnoticed(fake):
+    port = fake(FakePort())
+    link = await opened()
+    port.broken = OSError(errno.EIO, "Input/output error")
+    monitor = port.close
+
+    def replug():
+        monitor()
+        port.broken = None
+
+    port.close = replug
+    assert await link.open() == 2
+    assert await link.exchange(b"?\r", b"\r", LONG_S) == b"+1.234\r"
     await link.close()
 
 

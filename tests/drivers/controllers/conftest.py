@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator, Awaitable, Callable
+from collections.abc import AsyncIterator
 from contextlib import suppress
 from enum import Enum, auto
 
@@ -57,10 +57,15 @@ STOPPING: list[Exchange] = [
 
 
 class ScriptedServer:
-    """Plays one conversation to each connection in turn, and remembers what did not follow it."""
+    """Plays one conversation to each connection in turn, and remembers what did not follow it.
+
+    ``afterwards`` answers what is asked again and again once a conversation has been played; the
+    last of several answers is repeated.
+    """
 
     def __init__(self, *conversations: list[Exchange]) -> None:
         self.deviations: list[str] = []
+        self.afterwards: dict[str, bytes | list[bytes]] = {}
         self.port = 0
         self._conversing: set[asyncio.Task[None]] = set()
         self._left = [list(conversation) for conversation in conversations]
@@ -99,6 +104,9 @@ class ScriptedServer:
     async def _answer(
         self, line: str, conversation: list[Exchange], writer: asyncio.StreamWriter
     ) -> bool:
+        if not conversation and line in self.afterwards:
+            writer.write(self._afterwards(line))
+            return True
         expected, *steps = conversation.pop(0) if conversation else ("nothing",)
         if line != expected:
             self.deviations.append(f"{line!r} came where {expected!r} was expected")
@@ -112,42 +120,68 @@ class ScriptedServer:
                 writer.write(step)
         return True
 
-
-Scripted = Callable[..., Awaitable[ScriptedServer]]
-
-
-@pytest.fixture
-async def scripted() -> AsyncIterator[Scripted]:
-    """Starts servers that play conversations; a test fails unless each was played to its end."""
-    servers = []
-
-    async def start(*conversations: list[Exchange]) -> ScriptedServer:
-        servers.append(ScriptedServer(*conversations))
-        await servers[-1].start()
-        return servers[-1]
-
-    yield start
-    for server in servers:
-        await server.close()
-    for server in servers:
-        server.assert_followed()
+    def _afterwards(self, line: str) -> bytes:
+        answer = self.afterwards[line]
+        if isinstance(answer, bytes):
+            return answer
+        return answer.pop(0) if len(answer) > 1 else answer[0]
 
 
-@pytest.fixture
-async def drive() -> AsyncIterator[Callable[..., LinuxcncrshController]]:
-    """Makes drivers for a server and closes them; keywords are controller settings."""
-    drivers = []
+class Play:
+    """Scripts, and drivers that talk to servers which follow them."""
 
-    def make(
-        server: ScriptedServer, trace: WireTrace | None = None, **settings: object
+    GREETING = GREETING
+    OPENING = OPENING
+    STOPPING = STOPPING
+    AT_REST = AT_REST
+    SILENCE = Then.SAY_NOTHING
+    HANG_UP = Then.HANG_UP
+
+    def __init__(self) -> None:
+        self.servers: list[ScriptedServer] = []
+        self._drivers: list[LinuxcncrshController] = []
+
+    async def driver(
+        self, *conversations: list[Exchange], trace: WireTrace | None = None, **settings: object
     ) -> LinuxcncrshController:
-        values = {"config": "machine.ini", "port": server.port, "move_timeout_s": 0.2, **settings}
+        """A driver for a server that plays ``conversations``, one to each connection."""
+        server = ScriptedServer(*conversations)
+        self.servers.append(server)
+        await server.start()
+        return self.driver_at(server.port, trace=trace, **settings)
+
+    async def opened(
+        self, conversation: list[Exchange], *others: list[Exchange], **settings: object
+    ) -> LinuxcncrshController:
+        """The same, connected: ``conversation`` goes on after the opening."""
+        driver = await self.driver([*OPENING, *conversation], *others, **settings)
+        await driver.open()
+        return driver
+
+    def driver_at(
+        self, port: int, trace: WireTrace | None = None, **settings: object
+    ) -> LinuxcncrshController:
+        """A driver for whatever is at ``port``; keywords are controller settings."""
+        values = {"config": "machine.ini", "port": port, "move_timeout_s": 0.2, **settings}
         made = LinuxcncrshController(
             ControllerSettings.model_validate(values), trace=trace, patience=QUICK
         )
-        drivers.append(made)
+        self._drivers.append(made)
         return made
 
-    yield make
-    for driver in drivers:
-        await driver.close()
+    async def end(self) -> None:
+        """Close everything; fail unless every conversation was played to its end."""
+        for driver in self._drivers:
+            await driver.close()
+        for server in self.servers:
+            await server.close()
+        for server in self.servers:
+            server.assert_followed()
+
+
+@pytest.fixture
+async def play() -> AsyncIterator[Play]:
+    """Servers that follow scripts; a test fails unless each script was played to its end."""
+    playing = Play()
+    yield playing
+    await playing.end()

@@ -20,6 +20,8 @@ class Dialogue:
         self.expected = []
         self.pending = b""
         self.broken = None
+        self.settings = {}
+        self.dtr = self.rts = True
 
     def expect(self, *pairs):
         """Add questions with their answers, several bytes strings a question if need be."""

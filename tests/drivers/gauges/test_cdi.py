@@ -58,6 +58,7 @@ async def opened(dialogue, gauge):
 )
 def test_a_value_is_read_with_its_unit(frame, value, unit):
     shown = parse_value(frame)
+    assert isinstance(shown, Shown)
     assert (shown.value, shown.apparent_unit) == (value, unit)
 
 
@@ -166,7 +167,7 @@ async def test_an_indicator_that_has_answered_for_parameters_must_go_on_doing_so
 
 
 async def test_unknown_parameters_are_left_out(dialogue, gauge):
-    unknown = {name: b"NOT FOUND\r\n" for name in ("p011", "p019", "p021", "p040")}
+    unknown = dict.fromkeys(("p011", "p019", "p021", "p040"), b"NOT FOUND\r\n")
     dialogue.expect(*opening(**unknown), *opening(**unknown))
     await gauge.open()
     await gauge.check()

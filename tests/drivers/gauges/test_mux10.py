@@ -16,7 +16,7 @@ from drivers.gauges.errors import (
     WrongUnit,
     ZeroVoid,
 )
-from drivers.gauges.mux10 import Mux10Gauge, MultiplexerError, parse_about, parse_value
+from drivers.gauges.mux10 import MultiplexerError, Mux10Gauge, parse_about, parse_value
 from drivers.gauges.shown import Shown
 from drivers.ports import DeviceIdentity, GaugeReading
 from drivers.simulated.gauges.mux10 import format_value

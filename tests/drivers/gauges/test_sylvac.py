@@ -107,6 +107,7 @@ def test_anything_else_is_rejected(frame):
 @given(st.floats(-999, 999), st.booleans())
 def test_what_the_simulated_device_writes_is_read(value, inch):
     shown = parse_value(format_value(value, inch=inch))
+    assert isinstance(shown, Shown)
     assert shown.value == pytest.approx(value, abs=0.51e-5 if inch else 0.51e-3)
     assert (shown.apparent_unit == "inch") is inch
 

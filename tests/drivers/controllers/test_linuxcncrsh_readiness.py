@@ -1,0 +1,246 @@
+"""Preparing: every step is verified, because an acknowledgement is not a proof."""
+
+from __future__ import annotations
+
+import pytest
+
+from drivers.controllers.errors import CommandRefused
+from hexacell.errors import DeviceError
+
+NO_ERROR = ("get error", b"ERROR OK\r\n")
+TAKING_CONTROL = [
+    ("set enable EMCTOO", b"SET ENABLE ACK\n\r"),
+    ("get error", b"ERROR left over from somebody else\r\n"),
+    NO_ERROR,
+    ("set set_wait done", b"SET SET_WAIT ACK\n\r"),
+]
+FROM_ESTOP = [
+    ("get estop", b"ESTOP ON\r\n"),
+    ("set estop off", b"SET ESTOP ACK\n\r"),
+    ("get estop", b"ESTOP OFF\r\n"),
+]
+NO_ESTOP = [("get estop", b"ESTOP OFF\r\n")]
+SWITCHING_ON = [("set machine on", b"SET MACHINE ACK\n\r"), ("get machine", b"MACHINE ON\r\n")]
+HOMED = [("get joint_homed", b"JOINT_HOMED YES YES YES YES YES YES\r\n")]
+NOT_HOMED = [("get joint_homed", b"JOINT_HOMED YES YES NO YES YES YES\r\n")]
+IN_JOINT_MODE = [
+    ("set mode manual", b"SET MODE ACK\n\r"),
+    ("get teleop_enable", b"TELEOP_ENABLE NO\r\n"),
+    NO_ERROR,
+]
+HOMING = [("set home -1", b"SET HOME ACK\n\r"), *NOT_HOMED, *HOMED]
+MDI = [("set mode mdi", b"SET MODE ACK\n\r"), ("get mode", b"MODE MDI\r\n")]
+UNITS = ("get user_linear_units", b"USER_LINEAR_UNITS MM\r\n")
+CODES = ("get program_codes", b"PROGRAM_CODES G80 G17 G40 G21 G90 G94 G54 G49 G92.2 F0 S0\r\n")
+OFFSETS = ("get pos_offset", b"POS_OFFSET 0.000000 0.000000 -0.000000 0.000000 0.000000 0.000000\r\n")
+UNTIL_HOMED = [*TAKING_CONTROL, *NO_ESTOP, *SWITCHING_ON]
+UNTIL_MDI = [*UNTIL_HOMED, *HOMED, *MDI]
+
+
+async def test_from_emergency_stop_and_unhomed(play):
+    driver = await play.opened(
+        [
+            *TAKING_CONTROL,
+            *FROM_ESTOP,
+            *SWITCHING_ON,
+            *NOT_HOMED,
+            *IN_JOINT_MODE,
+            *HOMING,
+            *MDI,
+            UNITS,
+            CODES,
+            OFFSETS,
+        ]
+    )
+    await driver.prepare()
+
+
+async def test_what_is_already_so_is_left_as_it_is(play):
+    driver = await play.opened([*UNTIL_MDI, UNITS, CODES, OFFSETS])
+    await driver.prepare()
+
+
+async def test_homing_leaves_teleoperation_first(play):
+    driver = await play.opened(
+        [
+            *UNTIL_HOMED,
+            *NOT_HOMED,
+            ("set mode manual", b"SET MODE ACK\n\r"),
+            ("get teleop_enable", b"TELEOP_ENABLE YES\r\n"),
+            ("set teleop_enable off", b"SET TELEOP_ENABLE ACK\n\r"),
+            NO_ERROR,
+            *HOMING,
+            *MDI,
+            UNITS,
+            CODES,
+            OFFSETS,
+        ]
+    )
+    await driver.prepare()
+
+
+async def test_states_may_take_a_moment(play):
+    driver = await play.opened(
+        [
+            *TAKING_CONTROL,
+            ("get estop", b"ESTOP ON\r\n"),
+            ("set estop off", b"SET ESTOP ACK\n\r"),
+            *FROM_ESTOP[:1],
+            *NO_ESTOP,
+            SWITCHING_ON[0],
+            ("get machine", b"MACHINE OFF\r\n"),
+            SWITCHING_ON[1],
+            *HOMED,
+            MDI[0],
+            ("get mode", b"MODE MANUAL\r\n"),
+            MDI[1],
+            UNITS,
+            CODES,
+            OFFSETS,
+        ]
+    )
+    await driver.prepare()
+
+
+async def test_a_server_that_does_not_know_the_finer_questions(play):
+    unknown = [
+        ("get user_linear_units", b"GET USER_LINEAR_UNITS NAK\r\n\r\n"),
+        ("get program_codes", b"GET PROGRAM_CODES NAK\r\n\r\n"),
+        ("get pos_offset", b"GET NAK\r\n"),
+    ]
+    driver = await play.opened([*UNTIL_MDI, *(ask for question in unknown for ask in (question,) * 2)])
+    await driver.prepare()
+
+
+@pytest.mark.parametrize(
+    ("conversation", "states", "problem"),
+    [
+        (
+            [*TAKING_CONTROL, ("get estop", b"ESTOP ON\r\n"), ("set estop off", b"SET ESTOP ACK\n\r")],
+            {"get estop": b"ESTOP ON\r\n", "get error": b"ERROR OK\r\n"},
+            "stays in emergency stop: it is in emergency stop. Release",
+        ),
+        (
+            [*TAKING_CONTROL, *NO_ESTOP, ("set machine on", b"SET MACHINE ACK\n\r")],
+            {
+                "get machine": b"MACHINE OFF\r\n",
+                "get estop": b"ESTOP OFF\r\n",
+                "get error": b"ERROR OK\r\n",
+            },
+            "does not switch on: it is switched off",
+        ),
+        (
+            [*UNTIL_HOMED, *HOMED, ("set mode mdi", b"SET MODE ACK\n\r")],
+            {
+                "get mode": b"MODE MANUAL\r\n",
+                "get estop": b"ESTOP OFF\r\n",
+                "get machine": b"MACHINE ON\r\n",
+                "get error": b"ERROR OK\r\n",
+            },
+            "does not enter MDI mode: it is on, and gives no reason",
+        ),
+        (
+            [*UNTIL_HOMED, *NOT_HOMED, *IN_JOINT_MODE, ("set home -1", b"SET HOME ACK\n\r")],
+            {
+                "get joint_homed": b"JOINT_HOMED NO NO NO NO NO NO\r\n",
+                "get error": [b"ERROR home switch of joint 2 not found\r\n", b"ERROR OK\r\n"],
+            },
+            r"is not homed after 0\.2 s: home switch of joint 2 not found",
+        ),
+    ],
+)
+async def test_an_acknowledged_order_without_effect(play, conversation, states, problem):
+    driver = await play.opened(conversation)
+    play.servers[0].afterwards = states
+    with pytest.raises(DeviceError, match=problem) as caught:
+        await driver.prepare()
+    assert caught.value.subject == f"controller 127.0.0.1:{play.servers[0].port}"
+
+
+@pytest.mark.parametrize(
+    ("conversation", "problem"),
+    [
+        (
+            [("get user_linear_units", b"USER_LINEAR_UNITS INCH\r\n")],
+            r"counts in inch. Set \[TRAJ\] LINEAR_UNITS = mm",
+        ),
+        (
+            [UNITS, ("get program_codes", b"PROGRAM_CODES G0 G17 G20 G90 G54 G49\r\n")],
+            r"takes coordinates in inches \(G20\). G21 is needed",
+        ),
+        (
+            [UNITS, ("get program_codes", b"PROGRAM_CODES G0 G17 G21 G91 G54 G49\r\n")],
+            r"takes coordinates as relative \(G91\). G90",
+        ),
+        (
+            [UNITS, ("get program_codes", b"PROGRAM_CODES G0 G17 G21 G90 G54 G43\r\n")],
+            r"adds a tool length \(G43\). G49",
+        ),
+        (
+            [UNITS, CODES, ("get pos_offset", b"POS_OFFSET 0.0 -5.0 0.0 0.0 0.0 0.0\r\n")],
+            r"adds an offset of 0\.0 -5\.0 .*Clear it",
+        ),
+    ],
+)
+async def test_what_would_falsify_coordinates_is_refused(play, conversation, problem):
+    driver = await play.opened([*UNTIL_MDI, *conversation])
+    with pytest.raises(DeviceError, match=problem):
+        await driver.prepare()
+
+
+async def test_a_refusal_is_told_in_the_controllers_words(play):
+    driver = await play.opened(
+        [
+            *TAKING_CONTROL,
+            *NO_ESTOP,
+            ("set machine on", b"SET MACHINE NAK\n\r"),
+            ("get enable", b"ENABLE ON\r\n"),
+            *[("get error", f"ERROR drive {n} is cold\r\n".encode()) for n in (1, 2, 3, 4, 5, 5)],
+            NO_ERROR,
+        ]
+    )
+    with pytest.raises(CommandRefused) as caught:
+        await driver.prepare()
+    assert caught.value.problem == (
+        "refuses 'set machine on': drive 1 is cold; drive 2 is cold; drive 3 is cold; drive 4 is cold; and 1 more"
+    )
+
+
+async def test_the_explanations_of_2_10_come_with_the_refusal(play):
+    driver = await play.opened(
+        [
+            *TAKING_CONTROL,
+            *NO_ESTOP,
+            ("set machine on", b"error: Waiting for 'SET MACHINE ON' failed\r\nSET MACHINE NAK\r\n"),
+            ("get enable", b"ENABLE ON\r\n"),
+            NO_ERROR,
+        ]
+    )
+    with pytest.raises(CommandRefused, match="refuses 'set machine on': Waiting for 'SET MACHINE ON' failed"):
+        await driver.prepare()
+
+
+async def test_a_refusal_of_2_10_without_a_nak(play):
+    driver = await play.opened(
+        [
+            *TAKING_CONTROL,
+            *UNTIL_MDI[4:-2],
+            ("set mode mdi", b"error: Cannot issue SET MODE command while SET MDI command is still active\r\n"),
+            ("get enable", b"ENABLE ON\r\n"),
+            NO_ERROR,
+        ]
+    )
+    with pytest.raises(CommandRefused, match="while SET MDI command is still active"):
+        await driver.prepare()
+
+
+async def test_positions_that_are_none(play):
+    driver = await play.opened([("get abs_act_pos", b"ABS_ACT_POS 1.0 nan 0.0 0.0 0.0 0.0\r\n")])
+    with pytest.raises(DeviceError, match=r"controller .*it reports '1\.0 nan"):
+        await driver.pose()
+
+
+async def test_too_few_joints(play):
+    driver = await play.opened([("get joint_pos", b"JOINT_POS 1.0 2.0 3.0\r\n")])
+    with pytest.raises(DeviceError, match="where six positions belong"):
+        await driver.joint_positions()

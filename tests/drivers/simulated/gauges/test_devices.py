@@ -1,0 +1,218 @@
+"""Simulated instruments answer byte for byte as their manuals say."""
+
+import pytest
+
+from drivers.simulated.gauges.cdi import CdiDevice
+from drivers.simulated.gauges.indicator import Indicator
+from drivers.simulated.gauges.mux10 import Mux10Device
+from drivers.simulated.gauges.sylvac import SylvacDevice
+
+
+class Ball:
+    """Something that pushes a plunger."""
+
+    def __init__(self, position):
+        self.position = position
+
+    def __call__(self):
+        return self.position
+
+
+@pytest.fixture
+def ball():
+    return Ball(2.138)
+
+
+@pytest.fixture
+def indicator(ball):
+    return Indicator(ball, travel_mm=12.5)
+
+
+@pytest.fixture
+def sylvac(indicator):
+    return SylvacDevice({1: indicator})
+
+
+@pytest.fixture
+def mux10(indicator):
+    return Mux10Device({2: indicator})
+
+
+@pytest.fixture
+def cdi(indicator):
+    return CdiDevice({1: indicator})
+
+
+# The instrument
+
+
+@pytest.mark.parametrize("position", [6.25, -6.25, 0.0])
+def test_within_its_travel_it_shows_a_value(indicator, ball, position):
+    ball.position = position
+    assert indicator.shown() == position
+
+
+@pytest.mark.parametrize("position", [6.26, -6.26, 1000.0])
+def test_outside_its_travel_it_does_not(indicator, ball, position):
+    ball.position = position
+    assert indicator.shown() is None
+
+
+def test_hold_freezes_the_display_even_outside_the_travel(indicator, ball):
+    indicator.hold()
+    ball.position = 99.0
+    assert indicator.shown() == 2.138
+    indicator.release()
+    assert indicator.shown() is None
+
+
+def test_inch_reversal_and_preset_combine(indicator, ball):
+    indicator.reversed = True
+    assert indicator.shown() == -2.138
+    indicator.preset_mm = 25.4
+    indicator.recall_preset()
+    indicator.inch = True
+    assert indicator.shown() == pytest.approx(1.0)
+    ball.position += 2.54
+    assert indicator.shown() == pytest.approx(0.9)
+
+
+def test_switching_on_again_loses_zero_and_hold(indicator, ball):
+    indicator.hold()
+    indicator.switch_off()
+    indicator.switch_on()
+    assert indicator.shown() == 0.0
+    ball.position += 1.0
+    assert indicator.shown() == pytest.approx(1.0)
+
+
+# Sylvac
+
+
+@pytest.mark.parametrize(
+    ("position", "answer"), [(2.138, b"+2.138\r"), (-0.0004, b"-0.000\r"), (99.0, b"ERR3\r")]
+)
+def test_sylvac_answers_with_its_value(sylvac, ball, position, answer):
+    ball.position = position
+    assert sylvac.answer(b"?") == answer
+
+
+@pytest.mark.parametrize(
+    ("question", "answer"),
+    [
+        (b"UNI?", b"MM\r"),
+        (b"uni ?", b"MM\r"),
+        (b"ID?", b"SY276\r"),
+        (b"MOD?", b"NOR\r"),
+        (b"STO?", b"STO0\r"),
+        (b"CHA?", b"CHA+\r"),
+        (b"PRE?", b"PRE +0.000\r"),
+        (b"BAT?", b"BAT1\r"),
+        (b"XYZ?", b"ERR1\r"),
+        (b"XYZ", b"ERR1\r"),
+        (b"PRE x", b"ERR1\r"),
+        (b"\xff", b"ERR1\r"),
+    ],
+)
+def test_sylvac_answers_questions(sylvac, question, answer):
+    assert sylvac.answer(question) == answer
+
+
+@pytest.mark.parametrize(
+    ("command", "question", "answer"),
+    [
+        (b"IN", b"?", b"+0.08417\r"),
+        (b"IN", b"UNI?", b"IN\r"),
+        (b"CHA-", b"?", b"-2.138\r"),
+        (b"CHA-", b"CHA?", b"CHA-\r"),
+        (b"STO1", b"STO?", b"STO1\r"),
+        (b"PRE +1.5", b"PRE?", b"PRE +1.500\r"),
+        (b"PRE", b"?", b"+0.000\r"),
+        (b"OFF", b"?", b""),
+    ],
+)
+def test_sylvac_obeys_commands(sylvac, command, question, answer):
+    assert sylvac.answer(command) == b""
+    assert sylvac.answer(question) == answer
+
+
+def test_sylvac_introduces_itself_when_it_is_switched_on(sylvac):
+    assert sylvac.power_up() == b"SY276.1\r"
+
+
+# MUX-10
+
+
+@pytest.mark.parametrize(
+    ("command", "answer"),
+    [
+        (b"2", b"02A+0002.138\r"),
+        (b"1", b"911\r"),
+        (b"V", b"MUX-10F SIMULATED\r"),
+        (b"?", b""),
+        (b"", b""),
+    ],
+)
+def test_mux10_answers(mux10, command, answer):
+    assert mux10.answer(command) == answer
+
+
+def test_mux10_reports_errors_units_and_absent_gauges(mux10, ball, indicator):
+    indicator.inch = True
+    assert mux10.answer(b"2") == b"02A+00.08417\r"
+    ball.position = -99.0
+    assert mux10.answer(b"2") == b"912\r"
+    indicator.switch_off()
+    assert mux10.answer(b"2") == b"911\r"
+
+
+def test_mux10_is_busy_as_often_as_told(mux10):
+    mux10.busy = 2
+    assert [mux10.answer(b"2") for _ in range(3)] == [b"918\r", b"918\r", b"02A+0002.138\r"]
+
+
+# CDI
+
+
+def test_cdi_answers_with_value_and_unit(cdi, ball, indicator):
+    assert cdi.answer(b"R") == b"+  2.1380, MM\r\n"
+    ball.position = -2.138
+    assert cdi.answer(b"R") == b"-  2.1380, MM\r\n"
+    indicator.inch = True
+    assert cdi.answer(b"R") == b"- 0.08417, IN\r\n"
+    ball.position = 99.0
+    assert cdi.answer(b"R") == b"OUT OF BOUNDS\r\n"
+
+
+@pytest.mark.parametrize(
+    ("command", "answer"),
+    [
+        (b"?p011", b"0\r\n"),
+        (b"?P013", b"2\r\n"),
+        (b"?p999", b"NOT FOUND\r\n"),
+        (b"X", b"NOT FOUND\r\n"),
+        (b"p013=3", b"OUT OF BOUNDS\r\n"),
+        (b"p013=x", b"NON NUMERIC\r\n"),
+        (b"p013", b"NON NUMERIC\r\n"),
+    ],
+)
+def test_cdi_answers_for_parameters(cdi, command, answer):
+    assert cdi.answer(command) == answer
+
+
+@pytest.mark.parametrize(
+    ("command", "question", "answer"),
+    [
+        (b"p013=1", b"R", b"+ 0.08417, IN\r\n"),
+        (b"p019=1", b"R", b"-  2.1380, MM\r\n"),
+        (b"p011=2", b"?p011", b"2\r\n"),
+        (b"p021=1", b"?p021", b"1\r\n"),
+        (b"p021=0", b"?p021", b"0\r\n"),
+        (b"p040=1", b"?p040", b"1\r\n"),
+        (b"H", b"?p021", b"1\r\n"),
+        (b"C", b"R", b"+  0.0000, MM\r\n"),
+    ],
+)
+def test_cdi_obeys_commands(cdi, command, question, answer):
+    assert cdi.answer(command) == b"SUCCESS\r\n"
+    assert cdi.answer(question) == answer

@@ -35,6 +35,7 @@ class TraceEntry:
 
 
 Recorder = Callable[[TraceEntry], None]
+"""Takes entries in a line's thread; it must neither block nor raise."""
 
 
 class WireTrace:

@@ -28,7 +28,12 @@ class Gate:
 
 
 def gates(
-    identified: Identification, drawing: Geometry, tolerances: Tolerances, *, largest_change_mm: float, before: Geometry
+    identified: Identification,
+    drawing: Geometry,
+    tolerances: Tolerances,
+    *,
+    largest_change_mm: float,
+    before: Geometry,
 ) -> tuple[Gate, ...]:
     """All conditions on an identification; ``before`` is the controller's geometry in its frame."""
     return (
@@ -40,25 +45,37 @@ def gates(
 
 
 def _converged(identified: Identification) -> Gate:
-    return Gate("converged", identified.converged, f"The solver ended because {identified.termination.value}.")
+    return Gate(
+        "converged", identified.converged, f"The solver ended because {identified.termination.value}."
+    )
 
 
 def _determined(identified: Identification) -> Gate:
     names = identified.undetermined
-    sentence = f"Not determined by these data: {', '.join(names)}." if names else "The data determine every parameter."
+    sentence = (
+        f"Not determined by these data: {', '.join(names)}."
+        if names
+        else "The data determine every parameter."
+    )
     return Gate("determined", not names, sentence, needs_person=True)
 
 
 def _within_tolerance(identified: Identification, drawing: Geometry, tolerances: Tolerances) -> Gate:
     """A good residual is no proof: rods 13 mm too short have explained data perfectly before."""
     change = identified.geometry.vector() - drawing.vector()
-    outside = np.abs(_without_ball(change, tolerances)) - CERTAIN_SIGMAS * identified.sigma > tolerances.widths()
+    outside = (
+        np.abs(_without_ball(change, tolerances)) - CERTAIN_SIGMAS * identified.sigma > tolerances.widths()
+    )
     names = [
         f"{name} ({value:+.2f} mm)"
         for name, value, is_outside in zip(PARAMETER_NAMES, change, outside, strict=True)
         if is_outside
     ]
-    sentence = f"Beyond the drawing's tolerance: {', '.join(names)}." if names else "Every parameter is within the drawing's tolerance."
+    sentence = (
+        f"Beyond the drawing's tolerance: {', '.join(names)}."
+        if names
+        else "Every parameter is within the drawing's tolerance."
+    )
     return Gate("within tolerance", not names, sentence)
 
 

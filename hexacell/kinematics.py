@@ -10,13 +10,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hexacell import rotations
 from hexacell.errors import ReachError
 from hexacell.geometry import Geometry, from_per_leg
 from hexacell.mechanisms.base import Branch, Mechanism
 from hexacell.pose import Poses
-from hexacell.rotations import Array
+from hexacell.rotations import Array, Mask
 
 CONVERGED_MM = 1e-9
 """Constraints below this count as rounding: legs are a metre, doubles carry 16 digits."""
@@ -37,7 +38,7 @@ class Forward:
     """
 
     poses: Poses
-    found: np.ndarray[tuple[int, ...], np.dtype[np.bool_]]
+    found: Mask
 
 
 def inverse(mechanism: Mechanism, geometry: Geometry, branch: Branch, poses: Poses) -> Array:
@@ -127,7 +128,8 @@ def singularity_margin(mechanism: Mechanism, geometry: Geometry, poses: Poses, j
     """
     scaled = pose_jacobian(mechanism, geometry, poses, joints).copy()
     scaled[..., 3:] /= np.mean(np.linalg.norm(geometry.B, axis=-1))
-    return np.linalg.svd(scaled, compute_uv=False)[..., -1]
+    smallest: Array = np.linalg.svd(scaled, compute_uv=False)[..., -1]
+    return smallest
 
 
 def _staged(
@@ -149,9 +151,7 @@ def _staged(
     return Forward(poses, found)
 
 
-def _newton(
-    mechanism: Mechanism, geometry: Geometry, joints: Array, start: Poses
-) -> tuple[Poses, np.ndarray[tuple[int, ...], np.dtype[np.bool_]]]:
+def _newton(mechanism: Mechanism, geometry: Geometry, joints: Array, start: Poses) -> tuple[Poses, Mask]:
     """Newton's method on the pose, each step bounded; a row that has converged stays put."""
     poses = start
     polished = False
@@ -173,20 +173,19 @@ def _step(jacobian: Array, error: Array) -> Array:
         step = -(np.linalg.pinv(jacobian) @ error[..., None])[..., 0]
     travel = np.linalg.norm(step[..., :3], axis=-1) / LONGEST_STEP_MM
     turn = np.linalg.norm(step[..., 3:], axis=-1) / LARGEST_TURN
-    return step / np.maximum(1.0, np.maximum(travel, turn))[..., None]
+    shortened: Array = step / np.maximum(1.0, np.maximum(travel, turn))[..., None]
+    return shortened
 
 
 def _moved(poses: Poses, step: Array) -> Poses:
-    return Poses(
-        poses.positions + step[..., :3], rotations.from_vector(step[..., 3:]) @ poses.rotations
-    )
+    return Poses(poses.positions + step[..., :3], rotations.from_vector(step[..., 3:]) @ poses.rotations)
 
 
 def _signs(mechanism: Mechanism, geometry: Geometry, joints: Array, poses: Poses) -> Array:
-    return np.sign(np.linalg.det(pose_jacobian(mechanism, geometry, poses, joints)))
+    return np.sign(np.asarray(np.linalg.det(pose_jacobian(mechanism, geometry, poses, joints))))
 
 
-def _replace(poses: Poses, rows: np.ndarray[tuple[int, ...], np.dtype[np.intp]], new: Poses) -> Poses:
+def _replace(poses: Poses, rows: NDArray[np.intp], new: Poses) -> Poses:
     positions, orientation = poses.positions.copy(), poses.rotations.copy()
     positions[rows], orientation[rows] = new.positions, new.rotations
     return Poses(positions, orientation)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from hexacell import rotations
-from hexacell.rotations import Array
+from hexacell.rotations import Array, Mask
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,7 +78,7 @@ class Poses:
     def __len__(self) -> int:
         return len(self.positions)
 
-    def __getitem__(self, rows: slice | NDArray[np.intp] | NDArray[np.bool_] | list[int]) -> Poses:
+    def __getitem__(self, rows: slice | NDArray[np.intp] | Mask | list[int]) -> Poses:
         return Poses(self.positions[rows], self.rotations[rows])
 
     def pose(self, row: int) -> Pose:

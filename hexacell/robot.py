@@ -9,17 +9,16 @@ import numpy as np
 from hexacell import kinematics
 from hexacell.cell.file import Cell
 from hexacell.cell.model import CellSettings
-from hexacell.controller_config.format import ConfigFormat, ControllerGeometry
+from hexacell.controller_config.format import Branch, ConfigFormat, ControllerGeometry
 from hexacell.design.knowledge import Knowledge, Limits
 from hexacell.errors import ReachError
 from hexacell.geometry import Geometry
 from hexacell.identification.problem import Noise, Prior, Problem, Tolerances, build_problem
 from hexacell.identification.result import Identification
 from hexacell.measurements import MeasurementSet
-from hexacell.mechanisms.base import Branch, FrameChange, Mechanism
+from hexacell.mechanisms.base import FrameChange, Mechanism
 from hexacell.plugins import Group, load
 from hexacell.pose import Pose, Poses
-from hexacell.rotations import Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,9 +62,7 @@ class Robot:
         if identified is not None:
             free, covariance = identified.free, identified.free_covariance
         commanding, _ = self.mechanism.to_convention(self.controller)
-        return Knowledge(
-            self.mechanism, commanding, self.branch, free, covariance, self.noise, self.limits
-        )
+        return Knowledge(self.mechanism, commanding, self.branch, free, covariance, self.noise, self.limits)
 
     def for_controller(self, geometry: Geometry) -> Geometry:
         """A geometry of the convention in the frames of the controller's config."""
@@ -96,10 +93,6 @@ class Robot:
                 f"the singularity margin is {margin:.3f}, below {self.limits.singularity_margin:g}",
                 subject=name,
             )
-
-    def joints_of(self, pose: Pose) -> Array:
-        """Joint variables (6,), mm, that the controller computes for a pose."""
-        return kinematics.inverse(self.mechanism, self.controller, self.branch, Poses.of([pose]))[0]
 
 
 def config_format(settings: CellSettings) -> ConfigFormat:

@@ -6,10 +6,15 @@ Convention: a pose's angles a, b, c turn about the fixed axes x, y, z in that or
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-Array = NDArray[np.float64]
+Array = NDArray[np.floating[Any]]
+"""Real numbers; shapes are told in the docstrings."""
+
+Mask = NDArray[np.bool_]
 
 
 def from_angles(angles: ArrayLike) -> Array:
@@ -51,7 +56,8 @@ def from_vector(vector: ArrayLike) -> Array:
     # np.sinc is finite at zero, so no branch is needed for small angles.
     linear = np.sinc(angle / np.pi)
     quadratic = 0.5 * np.sinc(angle / (2 * np.pi)) ** 2
-    return np.eye(3) + linear * k + quadratic * (k @ k)
+    rotation: Array = np.eye(3) + linear * k + quadratic * (k @ k)
+    return rotation
 
 
 def to_vector(rotation: ArrayLike) -> Array:

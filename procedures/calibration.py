@@ -26,7 +26,18 @@ from hexacell.robot import Robot
 from hexacell.rotations import Array
 from hexacell.verification import Verdict
 from procedures.state import RunState, SetState
-from procedures.steps import CloseSet, Compute, Expectation, Move, Phase, Place, Sample, SetKey, SixNumbers, Step
+from procedures.steps import (
+    CloseSet,
+    Compute,
+    Expectation,
+    Move,
+    Phase,
+    Place,
+    Sample,
+    SetKey,
+    SixNumbers,
+    Step,
+)
 
 CANDIDATES = 512
 HELD_OUT_CANDIDATES = 2048

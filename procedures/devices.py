@@ -43,7 +43,11 @@ class Devices:
 
     async def close(self) -> None:
         """Let all of them go, whatever happens to one."""
-        ports = [*(mounted.gauge for mounted in self.gauges), self.encoders, self.controller]
+        ports: list[Gauge | EncoderBank | Controller] = [
+            *(mounted.gauge for mounted in self.gauges),
+            self.encoders,
+            self.controller,
+        ]
         await asyncio.gather(*(port.close() for port in ports), return_exceptions=True)
 
 

@@ -12,6 +12,7 @@ from procedures import events
 from procedures.journal import Journal
 from procedures.performing import Performer
 from procedures.state import RunState, apply, fold
+from procedures.steps import Step
 
 Listener = Callable[[events.Event, RunState], None]
 
@@ -59,7 +60,7 @@ class Engine:
         for listener in self._listeners:
             listener(event, self.state)
 
-    async def _next(self) -> events.Step | None:
+    async def _next(self) -> Step | None:
         return await asyncio.to_thread(self._performer.calibration.next_step, self.state)
 
     async def _stop(self, error: BaseException) -> None:

@@ -11,6 +11,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field
 
 from hexacell.cell.base import GeometryValues
+from hexacell.controller_config.format import Branch
 from hexacell.verification import Verdict
 from procedures.steps import Frozen, SetKey, SixNumbers, Step, ThreeNumbers
 
@@ -35,7 +36,7 @@ class RunStarted(Frozen):
     config: str
     config_sha256: str
     controller: GeometryValues
-    branch: tuple[int, int, int, int, int, int]
+    branch: Branch
     devices: tuple[Identity, ...]
 
 

@@ -183,7 +183,9 @@ class Performer:
             verdict = judge(
                 before, before, mean_mm=acceptance.mean_deviation_mm, largest_mm=acceptance.max_deviation_mm
             )
-            return events.Judged(verdict=verdict, line=_check_line(before, acceptance.mean_deviation_mm, verdict))
+            return events.Judged(
+                verdict=verdict, line=_check_line(before, acceptance.mean_deviation_mm, verdict)
+            )
         after = Spread.of(state.held_out(Phase.AFTER))
         verdict = judge(
             before, after, mean_mm=acceptance.mean_deviation_mm, largest_mm=acceptance.max_deviation_mm

@@ -40,19 +40,19 @@ class Settled:
 
     def gauge_means(self) -> Array:
         """Means (3,), mm, of what the gauges showed."""
-        return np.mean([glance.gauge_values() for glance in self.window], axis=0)
+        return np.asarray(np.mean([glance.gauge_values() for glance in self.window], axis=0))
 
     def joint_means(self) -> Array:
         """Means (6,), mm, of the slider positions."""
-        return np.mean([glance.joints() for glance in self.window], axis=0)
+        return np.asarray(np.mean([glance.joints() for glance in self.window], axis=0))
 
     def gauge_spread(self) -> Array:
         """Ranges (3,), mm, of what the gauges showed."""
-        return np.ptp([glance.gauge_values() for glance in self.window], axis=0)
+        return np.asarray(np.ptp([glance.gauge_values() for glance in self.window], axis=0))
 
     def joint_spread(self) -> Array:
         """Ranges (6,), mm, of the slider positions."""
-        return np.ptp([glance.joints() for glance in self.window], axis=0)
+        return np.asarray(np.ptp([glance.joints() for glance in self.window], axis=0))
 
 
 async def glance(devices: Devices, clock: CellClock) -> Glance:
@@ -85,9 +85,15 @@ async def settle(devices: Devices, timing: TimingSettings, clock: CellClock) -> 
 def _moving(devices: Devices, timing: TimingSettings, settled: Settled) -> list[str]:
     """Names of what moved within the window, with how much."""
     gauges = zip(devices.gauges, settled.gauge_spread(), strict=True)
-    moving = [f"gauge {m.gauge.name} by {spread:.3f} mm" for m, spread in gauges if spread > timing.spread_gauge_mm]
+    moving = [
+        f"gauge {m.gauge.name} by {spread:.3f} mm"
+        for m, spread in gauges
+        if spread > timing.spread_gauge_mm
+    ]
     legs = enumerate(settled.joint_spread(), start=1)
-    return moving + [f"slider {leg} by {spread:.3f} mm" for leg, spread in legs if spread > timing.spread_encoder_mm]
+    return moving + [
+        f"slider {leg} by {spread:.3f} mm" for leg, spread in legs if spread > timing.spread_encoder_mm
+    ]
 
 
 def _never_settled(devices: Devices, timing: TimingSettings, settled: Settled) -> DeviceError:

@@ -15,9 +15,11 @@ import canopen
 from drivers.encoders.errors import BusError
 from drivers.trace import Direction, Recorder, TraceEntry
 
-SLICE_S = 0.05
+SLICE_S = 0.03
 """Longest uninterrupted wait."""
 
+SEND_S = 0.2
+"""Longest wait for an interface to take a frame."""
 PATIENCE_S = 1.0
 """Longest wait for the receiving thread, should an interface ignore the time it is given."""
 
@@ -124,7 +126,7 @@ class EncoderBus:
     def _send(self, message: can.Message) -> None:
         self._record(Direction.SENT, message)
         try:
-            self._bus.send(message, timeout=SLICE_S)
+            self._bus.send(message, timeout=SEND_S)
         except Exception as error:
             raise self._error("does not take a frame", error) from error
 
@@ -175,10 +177,11 @@ def _name_of(settings: Mapping[str, Any]) -> str:
 
 
 def _shut_down(bus: can.BusABC) -> None:
-    with suppress(Exception):
-        bus.shutdown()
-    # python-can's slcan says goodbye before it closes the port, so a dead line would leak the port.
+    # On a dead line, python-can's slcan stops before it closes its port, and pyserial's socket://
+    # before it closes its socket.
     port = getattr(bus, "serialPortOrig", None)
-    if port is not None:
-        with suppress(Exception):
-            port.close()
+    connection = getattr(port, "_socket", None)
+    for part in (bus.shutdown, getattr(port, "close", None), getattr(connection, "close", None)):
+        if part is not None:
+            with suppress(Exception):
+                part()

@@ -17,7 +17,7 @@ from hexacell.cell.devices import GaugeSettings
 from hexacell.errors import DeviceError, FileError
 
 AGREEMENT_MM = 0.05  # readings in a row closer than this agree: noise, no flipped digit
-READINGS = 6
+READINGS = 12  # enough for a ball that still swings to come to rest
 TRIES = 3
 
 Parsed = TypeVar("Parsed")

@@ -1,0 +1,1 @@
+"""A cell that answers on the wire, byte for byte, with nothing attached."""

@@ -101,7 +101,9 @@ def _world(
     )
 
 
-def _rack(settings: CellSettings, simulation: SimulationSettings, world: World, clock: CellClock) -> GaugeRack:
+def _rack(
+    settings: CellSettings, simulation: SimulationSettings, world: World, clock: CellClock
+) -> GaugeRack:
     plungers = {gauge.name: _Plunger(world, gauge) for gauge in settings.gauges}
     return GaugeRack(settings.gauges, plungers, simulation.gauges, clock, seed=simulation.seed)
 
@@ -110,7 +112,9 @@ def _bank(
     settings: CellSettings, simulation: SimulationSettings, world: World, clock: CellClock
 ) -> SimulatedEncoderBank:
     latency = simulation.encoders.latency_s
-    return SimulatedEncoderBank(settings.encoders, world.sliders, clock, latency_s=latency)
+    return SimulatedEncoderBank(
+        settings.encoders, lambda: world.sliders().tolist(), clock, latency_s=latency
+    )
 
 
 class _Plunger:

@@ -50,4 +50,5 @@ class Motion:
         place = self.place(now_s)
         below = min(int(place), len(self.path) - 2)
         share = place - below
-        return (1.0 - share) * self.path[below] + share * self.path[below + 1]
+        joints: Array = (1.0 - share) * self.path[below] + share * self.path[below + 1]
+        return joints

@@ -17,7 +17,8 @@ import can
 
 from drivers.simulated.encoders.serial_line import PtyLine, SerialLine, SocketLine
 
-SLICE_S = 0.05
+SLICE_S = 0.02
+CLIENT_TIMEOUT_S = 0.05
 BITRATE = 500_000
 LONGEST_COMMAND = 32
 
@@ -120,7 +121,7 @@ class SlcanServer:
             "channel": self._url,
             "bitrate": BITRATE,
             "sleep_after_open": 0,
-            "timeout": SLICE_S,
+            "timeout": CLIENT_TIMEOUT_S,
         }
 
     def close(self) -> None:

@@ -99,7 +99,7 @@ class World:
 
     def _ball(self) -> Array:
         now = self._catch_up()
-        ball = self._pose.positions[0]
+        ball: Array = self._pose.positions[0]
         if now >= self._motion.ends_s:
             ball = ball + self._swinging(now - self._motion.ends_s)
             if np.linalg.norm(ball - self._station) > self._settings.station_reach_mm:
@@ -134,7 +134,8 @@ class World:
     def _swinging(self, since_s: float) -> Array:
         motion = self._settings.motion
         decay = np.exp(-since_s / motion.ringing_s) * np.cos(2.0 * np.pi * SWING_HZ * since_s)
-        return motion.ringing_mm * decay * self._swing / np.linalg.norm(self._swing)
+        direction: Array = self._swing / np.linalg.norm(self._swing)
+        return motion.ringing_mm * decay * direction
 
     def _placed(self, ball: Array) -> Array:
         return ball + PLACING_MM * self._random.standard_normal(3)

@@ -112,7 +112,9 @@ def _fit(commands: Any) -> None:  # noqa: ANN401
 def _cell(commands: Any) -> None:  # noqa: ANN401
     parser = _command(commands, "cell", "check, explain or show a cell file")
     actions = parser.add_subparsers(title="actions", metavar="ACTION", required=True, dest="action")
-    validate = actions.add_parser("validate", help="say whether it is in order; every mistake with its line")
+    validate = actions.add_parser(
+        "validate", help="say whether it is in order; every mistake with its line"
+    )
     _add_cell(validate)
     _add_json(validate)
     schema = actions.add_parser("schema", help="print its JSON Schema")

@@ -81,9 +81,7 @@ async def _run(
 ) -> events.Ended:
     if not order.resume:
         order.folder.create(cell)
-    performer = Performer(
-        cell, calibration, cell_now.devices, cell_now.clock, order.operator, order.folder
-    )
+    performer = Performer(cell, calibration, cell_now.devices, cell_now.clock, order.operator, order.folder)
     try:
         with Journal(order.folder.journal) as journal:
             engine = Engine(performer, journal, listeners)
@@ -121,7 +119,11 @@ def _beginning(cell: Cell, calibration: Calibration, cell_now: Connected) -> eve
         config=str(cell.config_path),
         config_sha256=fingerprint(cell.config_path),
         controller=GeometryValues.model_validate(
-            {"S": robot.controller.S.tolist(), "B": robot.controller.B.tolist(), "l": robot.controller.l.tolist()}
+            {
+                "S": robot.controller.S.tolist(),
+                "B": robot.controller.B.tolist(),
+                "l": robot.controller.l.tolist(),
+            }
         ),
         branch=robot.branch,
         devices=_identities(cell_now),
@@ -154,16 +156,18 @@ def _started(order: Order) -> events.RunStarted:
         raise UsageError(f"the run {order.folder.path} is over: {state.ended.line}")
     if state.started.cell_text != order.cell.text:
         raise UsageError(
-            f"{order.cell.path} has changed since the run began", action="Undo the change, or begin a new run"
+            f"{order.cell.path} has changed since the run began",
+            action="Undo the change, or begin a new run",
         )
     if state.started.mode != order.mode.value:
-        raise UsageError(f"the run was begun in the mode {state.started.mode}", action="Resume it in that mode")
+        raise UsageError(
+            f"the run was begun in the mode {state.started.mode}", action="Resume it in that mode"
+        )
     return state.started
 
 
 def _robot_of_run(cell: Cell, started: events.RunStarted) -> Robot:
     """The robot with the geometry that commanded the run's measurements, whatever is written by now."""
     values = started.controller
-    branch = robot_of(cell).branch
-    geometry = ControllerGeometry(Geometry(values.S, values.B, values.l), branch)
+    geometry = ControllerGeometry(Geometry(values.S, values.B, values.l), started.branch)
     return make_robot(cell.settings, geometry)

@@ -11,7 +11,7 @@ from scipy.stats import qmc
 from hexacell import kinematics, rotations
 from hexacell.design.knowledge import Knowledge, Limits
 from hexacell.pose import Poses
-from hexacell.rotations import Array
+from hexacell.rotations import Array, Mask
 
 NEAR_MM = 60.0
 NEAR_TURN = 0.35
@@ -35,7 +35,7 @@ class Candidates:
     def __len__(self) -> int:
         return len(self.joints)
 
-    def __getitem__(self, rows: NDArray[np.bool_] | NDArray[np.intp]) -> Candidates:
+    def __getitem__(self, rows: Mask | NDArray[np.intp]) -> Candidates:
         return Candidates(self.targets[rows], self.joints[rows], self.commands[rows])
 
 
@@ -77,20 +77,18 @@ def reachable(knowledge: Knowledge, targets: Poses) -> Candidates:
     return Candidates(targets, joints, commands.poses)[held]
 
 
-def within_limits(limits: Limits, poses: Poses, joints: Array) -> NDArray[np.bool_]:
+def within_limits(limits: Limits, poses: Poses, joints: Array) -> Mask:
     """Which poses keep to the tilt and joint limits; an unreachable one (NaN) does not."""
     in_range = (joints >= limits.joint_min_mm) & (joints <= limits.joint_max_mm)
     return in_range.all(axis=-1) & (poses.tilts() <= limits.tilt)
 
 
-def _clear(knowledge: Knowledge, poses: Poses, joints: Array) -> NDArray[np.bool_]:
+def _clear(knowledge: Knowledge, poses: Poses, joints: Array) -> Mask:
     margin = kinematics.singularity_margin(knowledge.mechanism, knowledge.estimate, poses, joints)
     return margin >= knowledge.limits.singularity_margin
 
 
-def _held_by_controller(
-    knowledge: Knowledge, commands: Poses, targets: Poses, joints: Array
-) -> NDArray[np.bool_]:
+def _held_by_controller(knowledge: Knowledge, commands: Poses, targets: Poses, joints: Array) -> Mask:
     back = knowledge.mechanism.inverse(knowledge.controller, knowledge.branch, commands)
     agrees = np.abs(np.nan_to_num(back, nan=np.inf) - joints).max(axis=-1, initial=0.0) < 1e-6
     moved = np.linalg.norm(commands.positions - targets.positions, axis=-1)
@@ -99,4 +97,5 @@ def _held_by_controller(
     )
     margin = kinematics.singularity_margin(knowledge.mechanism, knowledge.controller, commands, joints)
     clear = margin >= knowledge.limits.singularity_margin
-    return agrees & (moved < NEAR_MM) & (turned < NEAR_TURN) & clear
+    held: Mask = agrees & (moved < NEAR_MM) & (turned < NEAR_TURN) & clear
+    return held

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hexacell import kinematics, rotations
 from hexacell.design.candidates import within_limits
 from hexacell.design.knowledge import Knowledge
-from hexacell.design.path import is_clear
 from hexacell.design.next_pose import SAFETY_SIGMAS, TRAVEL_SHARE
+from hexacell.design.path import is_clear
 from hexacell.errors import LimitError
 from hexacell.pose import Poses
-from hexacell.rotations import Array
+from hexacell.rotations import Array, Mask
 
 
 def choose_held_out(knowledge: Knowledge, point: Array, count: int, orientations: Array) -> Poses:
@@ -33,11 +32,13 @@ def choose_held_out(knowledge: Knowledge, point: Array, count: int, orientations
     kept = poses[usable[_inside_travel(knowledge, poses[usable], joints[usable])]]
     taken = _farthest_apart(knowledge, kept, count)
     if len(taken) < count:
-        raise LimitError(f"only {len(taken)} orientations at {poses.pose(0)} keep the ball inside the travel")
+        raise LimitError(
+            f"only {len(taken)} orientations at {poses.pose(0)} keep the ball inside the travel"
+        )
     return kept[taken]
 
 
-def _after(knowledge: Knowledge, poses: Poses) -> NDArray[np.bool_]:
+def _after(knowledge: Knowledge, poses: Poses) -> Mask:
     """Which poses the estimated geometry can take within the limits."""
     joints = knowledge.mechanism.inverse(knowledge.estimate, knowledge.branch, poses)
     fits = within_limits(knowledge.limits, poses, joints)
@@ -49,7 +50,7 @@ def _after(knowledge: Knowledge, poses: Poses) -> NDArray[np.bool_]:
     return fits
 
 
-def _inside_travel(knowledge: Knowledge, poses: Poses, joints: Array) -> NDArray[np.bool_]:
+def _inside_travel(knowledge: Knowledge, poses: Poses, joints: Array) -> Mask:
     """Which poses the uncorrected robot surely takes inside the travel of gauges zeroed at the first."""
     really = kinematics.follow(
         knowledge.mechanism,
@@ -66,7 +67,7 @@ def _inside_travel(knowledge: Knowledge, poses: Poses, joints: Array) -> NDArray
     sigma = np.sqrt(np.diagonal(spread, axis1=-2, axis2=-1) + 2.0 * knowledge.noise.gauge_mm**2)
     deviation = really.poses.positions - really.poses.positions[0]
     limit = TRAVEL_SHARE * knowledge.limits.gauge_travel_mm
-    inside = (np.abs(deviation) + SAFETY_SIGMAS * sigma <= limit).all(axis=-1)
+    inside: Mask = (np.abs(deviation) + SAFETY_SIGMAS * sigma <= limit).all(axis=-1)
     inside &= really.found
     inside[0] = really.found[0]
     return inside

@@ -9,7 +9,6 @@ drawing by continuation. A record that cannot be taken back says nothing and sta
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hexacell import kinematics
 from hexacell.geometry import Geometry
@@ -17,7 +16,7 @@ from hexacell.identification import levenberg_marquardt
 from hexacell.identification.levenberg_marquardt import Solution, Termination
 from hexacell.identification.problem import Problem
 from hexacell.pose import Poses
-from hexacell.rotations import Array
+from hexacell.rotations import Array, Mask
 
 
 def solve(problem: Problem, precision: Array, *, free: Array, poses: Poses) -> tuple[Problem, Solution]:
@@ -40,9 +39,7 @@ def solve(problem: Problem, precision: Array, *, free: Array, poses: Poses) -> t
         poses = poses[used]
 
 
-def _returning(
-    problem: Problem, free: Array, aside: NDArray[np.bool_]
-) -> tuple[NDArray[np.bool_], Poses]:
+def _returning(problem: Problem, free: Array, aside: Mask) -> tuple[Mask, Poses]:
     """Which of the records set aside stand clear of singularities at a geometry, and their poses."""
     geometry = Geometry.from_vector(problem.basis @ free)
     rows = np.flatnonzero(aside)
@@ -63,9 +60,7 @@ def _returning(
     return returning, found.poses[found.found & clear]
 
 
-def _merged(
-    records: int, used: NDArray[np.bool_], poses: Poses, returning: NDArray[np.bool_], back: Poses
-) -> Poses:
+def _merged(records: int, used: Mask, poses: Poses, returning: Mask, back: Poses) -> Poses:
     positions, rotations = np.zeros((records, 3)), np.zeros((records, 3, 3))
     positions[used], rotations[used] = poses.positions, poses.rotations
     positions[returning], rotations[returning] = back.positions, back.rotations

@@ -13,12 +13,11 @@ from dataclasses import dataclass
 from enum import Enum
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hexacell.identification import centring, model
 from hexacell.identification.problem import Problem
 from hexacell.pose import Poses
-from hexacell.rotations import Array
+from hexacell.rotations import Array, Mask
 
 INITIAL_DAMPING = 1e-4
 SMALLEST_DAMPING = 1e-12
@@ -61,7 +60,7 @@ class Solution:
     chi2: float
     iterations: int
     termination: Termination
-    singular: NDArray[np.bool_]
+    singular: Mask
 
     @property
     def free(self) -> Array:
@@ -128,7 +127,7 @@ class _Search:
         self.growth, self.refusals = 2.0, 0
         self.singular = self.now.amplification > LARGEST_AMPLIFICATION
 
-    def _refuse(self, found: NDArray[np.bool_]) -> Termination | None:
+    def _refuse(self, found: Mask) -> Termination | None:
         self.refusals += 1
         if self.refusals >= REFUSALS_BEFORE_SINGULAR:
             self.singular = ~found

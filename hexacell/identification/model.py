@@ -5,13 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hexacell import kinematics
 from hexacell.geometry import Geometry
 from hexacell.identification.problem import Noise, Problem
 from hexacell.pose import Poses
-from hexacell.rotations import Array
+from hexacell.rotations import Array, Mask
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -39,11 +38,12 @@ class Prediction:
 @dataclass(frozen=True, slots=True, eq=False)
 class Trial:
     """Poses (n) and residuals (n, 3), mm, of a geometry; ``found`` (n,) says which are on their
-    assembly mode."""
+    assembly mode.
+    """
 
     poses: Poses
     residuals: Array
-    found: NDArray[np.bool_]
+    found: Mask
 
 
 def follow_residuals(problem: Problem, free: Array, start: Poses) -> Trial:

@@ -31,7 +31,7 @@ def statistics(problem: Problem, prediction: Prediction, covariance: Array) -> A
     values, axes = np.linalg.eigh(left)
     along = np.einsum("nij,ni->nj", axes, residuals)
     judged = values > 1e-3 * np.linalg.eigvalsh(own)[:, :1]
-    return np.sum(np.where(judged, along**2 / np.where(judged, values, 1.0), 0.0), axis=-1)
+    return np.asarray(np.sum(np.where(judged, along**2 / np.where(judged, values, 1.0), 0.0), axis=-1))
 
 
 def threshold(values: Array) -> float:

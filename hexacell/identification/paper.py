@@ -66,9 +66,19 @@ def least_squares_without_jacobian(problem: Problem) -> Geometry:
         ConvergenceError: scipy reports no convergence, or the end is outside the assembly mode.
     """
     centre = problem.mechanism.convention.free_part(problem.prior.centre)
+
+    def error(free: Array) -> Array:
+        return _error_from(problem, free, problem.start)
+
     found = least_squares(
-        lambda free: _error_from(problem, free, problem.start), centre, method="trf",
-        x_scale=1.0, ftol=1e-15, xtol=1e-15, gtol=1e-15, max_nfev=100,
+        error,
+        centre,
+        method="trf",
+        x_scale=1.0,
+        ftol=1e-15,
+        xtol=1e-15,
+        gtol=1e-15,
+        max_nfev=100,
     )
     if not found.success or not model.follow_residuals(problem, found.x, problem.start).found.all():
         raise ConvergenceError(f"the least-squares solver ended without a solution: {found.message}")

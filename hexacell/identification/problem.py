@@ -7,13 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from hexacell import kinematics
-from hexacell.errors import IdentifiabilityError
 from hexacell.geometry import PARAMETER_NAMES, Geometry
+from hexacell.identification.start import start_poses
 from hexacell.measurements import MeasurementSet
 from hexacell.mechanisms.base import Branch, Mechanism
 from hexacell.pose import Poses
-from hexacell.rotations import Array
+from hexacell.rotations import Array, Mask
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,7 +110,7 @@ class Problem:
         lengths = np.diff(np.append(self.first_rows, self.records))
         return np.repeat(values, lengths, axis=0)
 
-    def keeping(self, rows: NDArray[np.bool_]) -> Problem:
+    def keeping(self, rows: Mask) -> Problem:
         """The same problem with some of its records (n,) only."""
         kept = np.flatnonzero(rows)
         return Problem(
@@ -137,6 +136,8 @@ def build_problem(
 ) -> Problem:
     """The problem of some records, whose poses were commanded under ``controller``'s geometry.
 
+    Records from before the last calibration may have been commanded under the drawing instead.
+
     Raises:
         IdentifiabilityError: a record's pose cannot be followed from the commanding geometry to
             the drawing; the message names the record.
@@ -144,32 +145,18 @@ def build_problem(
     order = np.argsort(measurements.group, kind="stable")
     joints, labels = measurements.joints[order], measurements.labels[order]
     commanding, change = mechanism.to_convention(controller)
-    commanded = change.poses(measurements.poses[order])
-    start = kinematics.follow(
+    start = start_poses(
         mechanism,
         prior.centre,
         joints,
-        start=commanded,
-        start_geometry=commanding,
-        start_joints=kinematics.inverse(mechanism, commanding, branch, commanded),
+        commanded=change.poses(measurements.poses[order]),
+        under=(commanding, prior.centre),
+        branch=branch,
+        labels=labels,
     )
-    _refuse_lost_records(start.found, labels)
     deviations = change.deviations(measurements.deviations[order])
-    return Problem(
-        mechanism, prior, noise, joints, deviations, _first_rows(labels[:, 0]), start.poses, labels
-    )
+    return Problem(mechanism, prior, noise, joints, deviations, _first_rows(labels[:, 0]), start, labels)
 
 
 def _first_rows(points: NDArray[np.int_]) -> NDArray[np.intp]:
     return np.flatnonzero(np.diff(points, prepend=points[:1] - 1))
-
-
-def _refuse_lost_records(found: NDArray[np.bool_], labels: NDArray[np.int_]) -> None:
-    if found.all():
-        return
-    point, orientation = labels[np.flatnonzero(~found)[0]]
-    raise IdentifiabilityError(
-        f"{int((~found).sum())} records cannot be followed from the commanded pose to the joint variables "
-        f"without crossing a singularity; the first is point {point}, orientation {orientation}",
-        action="Leave them out, or check that q1 to q6 belong to the commanded poses",
-    )

@@ -1,0 +1,1 @@
+"""What a robot is: six constraints, one a leg, and their derivatives."""

@@ -91,9 +91,7 @@ class FrameChange:
 
     def geometry(self, geometry: Geometry) -> Geometry:
         """The same machine in the new frames."""
-        return Geometry(
-            (geometry.S - self.origin) @ self.base.T, geometry.B @ self.platform.T, geometry.l
-        )
+        return Geometry((geometry.S - self.origin) @ self.base.T, geometry.B @ self.platform.T, geometry.l)
 
 
 class Mechanism(Protocol):

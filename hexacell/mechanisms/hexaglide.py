@@ -30,7 +30,8 @@ class Hexaglide:
     def constraints(self, geometry: Geometry, poses: Poses, joints: Array) -> Array:
         """See :class:`~hexacell.mechanisms.base.Mechanism`."""
         _, v = _leg_vectors(geometry, poses, joints)
-        return (np.sum(v * v, axis=-1) - geometry.l**2) / (2.0 * geometry.l)
+        error: Array = (np.sum(v * v, axis=-1) - geometry.l**2) / (2.0 * geometry.l)
+        return error
 
     def linearise(self, geometry: Geometry, poses: Poses, joints: Array) -> Linearisation:
         """See :class:`~hexacell.mechanisms.base.Mechanism`."""

@@ -39,7 +39,7 @@ class Wait(Enum):
     DONE = "DONE"
 
 
-class ConnectionCut(Exception):  # noqa: N818 - an event, not an error of this program
+class ConnectionCut(Exception):
     """The connection over which something was ordered is to be cut."""
 
 

@@ -7,7 +7,7 @@ from typing import Protocol
 from hexacell.pose import Pose
 
 
-class KinematicsFailure(Exception):  # noqa: N818 - LinuxCNC's own word
+class KinematicsFailure(Exception):
     """The geometry that the controller has cannot take the machine there."""
 
 

@@ -21,5 +21,7 @@ def main(options: argparse.Namespace) -> ExitCode:
     for identity in found:
         serial = f", serial number {identity.serial_number}" if identity.serial_number else ""
         console.say(f"ok  {identity.name}: {identity.description} ({identity.protocol}{serial})")
-    console.say(f"ok  {cell.settings.name}: all points can be reached, all devices answer; nothing was moved")
+    console.say(
+        f"ok  {cell.settings.name}: all points can be reached, all devices answer; nothing was moved"
+    )
     return ExitCode.DONE

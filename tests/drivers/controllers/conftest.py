@@ -76,9 +76,14 @@ class ScriptedServer:
         self._server = await asyncio.start_server(self._converse, "127.0.0.1", self.port)
         self.port = self._server.sockets[0].getsockname()[1]
 
-    async def close(self) -> None:
+    def stop_listening(self) -> None:
+        """Connections go on, and no new one is taken."""
         assert self._server is not None
         self._server.close()
+
+    async def close(self) -> None:
+        assert self._server is not None
+        self.stop_listening()
         for task in self._conversing:
             task.cancel()
         await asyncio.gather(*self._conversing)
@@ -101,9 +106,7 @@ class ScriptedServer:
                     break
         writer.transport.abort()
 
-    async def _answer(
-        self, line: str, conversation: list[Exchange], writer: asyncio.StreamWriter
-    ) -> bool:
+    async def _answer(self, line: str, conversation: list[Exchange], writer: asyncio.StreamWriter) -> bool:
         if not conversation and line in self.afterwards:
             writer.write(self._afterwards(line))
             return True
@@ -163,9 +166,7 @@ class Play:
     ) -> LinuxcncrshController:
         """A driver for whatever is at ``port``; keywords are controller settings."""
         values = {"config": "machine.ini", "port": port, "move_timeout_s": 0.2, **settings}
-        made = LinuxcncrshController(
-            ControllerSettings.model_validate(values), trace=trace, patience=QUICK
-        )
+        made = LinuxcncrshController(ControllerSettings.model_validate(values), trace=trace, patience=QUICK)
         self._drivers.append(made)
         return made
 

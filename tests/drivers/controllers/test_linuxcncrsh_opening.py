@@ -113,7 +113,9 @@ async def test_nothing_listens():
         taken.bind(("127.0.0.1", 0))
         port = taken.getsockname()[1]
         driver = LinuxcncrshController(ControllerSettings(config="x", port=port))
-        with pytest.raises(ConnectionLost, match=f"127.0.0.1:{port}: cannot be reached: Connection refused"):
+        with pytest.raises(
+            ConnectionLost, match=f"127.0.0.1:{port}: cannot be reached: Connection refused"
+        ):
             await driver.open()
 
 
@@ -205,5 +207,7 @@ async def test_passwords_stay_out_of_the_trace(play):
     )
     await driver.open()
     sent = b"".join(entry.data for entry in trace.entries() if entry.direction == ">")
-    assert sent.startswith(b"hello *** hexacell 1.0\r\nset echo off\r\nset verbose on\r\nset enable ***\r\n")
+    assert sent.startswith(
+        b"hello *** hexacell 1.0\r\nset echo off\r\nset verbose on\r\nset enable ***\r\n"
+    )
     assert "machine.ini" in trace.text()

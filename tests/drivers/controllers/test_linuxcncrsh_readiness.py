@@ -216,7 +216,9 @@ async def test_the_explanations_of_2_10_come_with_the_refusal(play):
             NO_ERROR,
         ]
     )
-    with pytest.raises(CommandRefused, match="refuses 'set machine on': Waiting for 'SET MACHINE ON' failed"):
+    with pytest.raises(
+        CommandRefused, match="refuses 'set machine on': Waiting for 'SET MACHINE ON' failed"
+    ):
         await driver.prepare()
 
 
@@ -225,7 +227,10 @@ async def test_a_refusal_of_2_10_without_a_nak(play):
         [
             *TAKING_CONTROL,
             *UNTIL_MDI[4:-2],
-            ("set mode mdi", b"error: Cannot issue SET MODE command while SET MDI command is still active\r\n"),
+            (
+                "set mode mdi",
+                b"error: Cannot issue SET MODE command while SET MDI command is still active\r\n",
+            ),
             ("get enable", b"ENABLE ON\r\n"),
             NO_ERROR,
         ]

@@ -16,6 +16,7 @@ from drivers.gauges.errors import (
     WrongUnit,
     ZeroVoid,
 )
+from drivers.gauges.serial_gauge import READINGS
 from drivers.gauges.shown import Shown
 from drivers.gauges.sylvac import BATTERY, IDENTIFICATION, PRESET, Fault, SylvacGauge, parse_value
 from drivers.ports import DeviceIdentity, Gauge, GaugeReading
@@ -212,7 +213,7 @@ async def test_a_flipped_digit_does_not_get_through(dialogue, opened):
 
 
 async def test_readings_that_never_agree_are_an_error_of_their_own(dialogue, opened):
-    dialogue.expect(*((b"?\r", b"+%d.000\r" % number) for number in range(6)))
+    dialogue.expect(*((b"?\r", b"+%d.000\r" % number) for number in range(READINGS)))
     with pytest.raises(GaugeUnsteady, match=r"\+0\.000, \+1\.000"):
         await opened.read()
 

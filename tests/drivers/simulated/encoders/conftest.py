@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from typing import Any
@@ -46,7 +47,11 @@ def make_bank(settings: EncoderSettings, samples: Samples) -> Iterator[MakeBank]
     with ExitStack() as stack:
 
         def make(**options: Any) -> SimulatedEncoderBank:
-            chosen = {"settings": settings, "positions": samples, "clock": CellClock()} | options
+            chosen: dict[str, Any] = {
+                "settings": settings,
+                "positions": samples,
+                "clock": CellClock(),
+            } | options
             return stack.enter_context(SimulatedEncoderBank(**chosen))
 
         yield make
@@ -89,25 +94,24 @@ class Listener:
         self.bus.send(can.Message(arbitration_id=can_id, data=bytes(data), is_extended_id=False))
 
     def heard(self, seconds: float = 0.1) -> list[tuple[int, str]]:
-        """Everything until nothing has come for so long: (id, data in hexadecimal)."""
-        frames = []
-        while (message := self.bus.recv(seconds)) is not None:
-            frames.append((message.arbitration_id, bytes(message.data).hex()))
-        return frames
-
-    def heard_within(self, seconds: float) -> list[tuple[int, str]]:
-        """Everything that comes in so many seconds."""
-        import time
-
+        """Everything that comes in so many seconds: (id, data in hexadecimal)."""
         deadline, frames = time.monotonic() + seconds, []
         while (left := deadline - time.monotonic()) > 0:
             if (message := self.bus.recv(left)) is not None:
                 frames.append((message.arbitration_id, bytes(message.data).hex()))
         return frames
 
+    def wait_for(self, can_id: int) -> str:
+        """The data of the next frame with an id, whatever else comes."""
+        while message := self.bus.recv(2.0):
+            if message.arbitration_id == can_id:
+                return bytes(message.data).hex()
+        raise AssertionError(f"no frame {can_id:03X}h")
+
     def sdo(self, node: int, request: str) -> str:
+        """The answer to an SDO request."""
         self.send(0x600 + node, *bytes.fromhex(request).ljust(8, b"\0"))
-        return next(data for can_id, data in self.heard() if can_id == 0x580 + node)
+        return self.wait_for(0x580 + node)
 
 
 @pytest.fixture

@@ -15,6 +15,7 @@ from drivers.encoders.errors import (
     RestartedNodeError,
     SilentNodeError,
 )
+from drivers.ports import EncoderRound
 from drivers.simulated.encoders import EVENTS_AND_SYNC, EVENTS_ONLY, TWO_MAGNETS
 from drivers.simulated.slcan import serve_slcan
 from hexacell.clock import CellClock
@@ -24,7 +25,7 @@ SETTLE_S = 0.05
 
 
 async def test_rounds_are_complete_and_of_one_instant(make_bank, reach, driver, samples):
-    simulated = make_bank()
+    simulated = make_bank(makers=(EVENTS_AND_SYNC, EVENTS_ONLY, TWO_MAGNETS) * 2)
     bank = driver(reach(simulated))
     await bank.open()
     before = samples.taken
@@ -41,9 +42,9 @@ async def test_thousands_of_rounds(make_bank, driver, samples):
 
 
 @pytest.mark.parametrize("maker", [EVENTS_AND_SYNC, EVENTS_ONLY, TWO_MAGNETS])
-async def test_every_make_is_brought_to_one_sample_per_sync(make_bank, reach, driver, listen, maker):
+async def test_every_make_is_brought_to_one_sample_per_sync(make_bank, driver, listen, maker):
     simulated = make_bank(makers=(maker,) * 6)
-    bank = driver(reach(simulated))
+    bank = driver(simulated.bus_settings)
     identities = await bank.open()
     assert [identity.serial_number for identity in identities] == [str(1001 + leg) for leg in range(6)]
     ear = listen(simulated)
@@ -51,13 +52,6 @@ async def test_every_make_is_brought_to_one_sample_per_sync(make_bank, reach, dr
     assert all(len(set(each.counts)) == 1 for each in positions)
     tpdos = [can_id for can_id, _ in ear.heard(0.05) if 0x180 <= can_id < 0x580]
     assert len(tpdos) == 18
-
-
-async def test_makes_may_be_mixed(make_bank, driver, samples):
-    simulated = make_bank(makers=(EVENTS_AND_SYNC, EVENTS_ONLY, TWO_MAGNETS) * 2)
-    bank = driver(simulated.bus_settings)
-    await bank.open()
-    assert (await bank.read()).counts == (samples.taken,) * 6
 
 
 @pytest.mark.parametrize(
@@ -176,10 +170,10 @@ async def test_the_loss_of_a_heartbeat(make_bank, reach, driver):
     simulated = make_bank()
     bank = driver(reach(simulated), heartbeat_ms=30)
     await bank.open()
-    await asyncio.sleep(0.35)
+    await asyncio.sleep(0.3)  # longer than it would wait for a heartbeat
     await bank.read()
     simulated.faults.stop_heartbeat(2)
-    await asyncio.sleep(0.45)
+    await asyncio.sleep(0.35)
     with pytest.raises(SilentNodeError, match=r"leg 2.*heartbeat"):
         await bank.read()
 
@@ -207,12 +201,12 @@ async def test_stale_answers_never_mix_instants(make_bank, driver, timeouts):
     await bank.open()
     simulated.faults.delay(3, timeouts * 0.1)
     for _ in range(3):
-        try:
-            found = await bank.read()
-        except DeviceError as error:
-            assert "leg 3" in str(error)
+        outcome = (await asyncio.gather(bank.read(), return_exceptions=True))[0]
+        if isinstance(outcome, DeviceError):
+            assert "leg 3" in str(outcome)
         else:
-            assert len(set(found.counts)) == 1
+            assert isinstance(outcome, EncoderRound)
+            assert len(set(outcome.counts)) == 1
 
 
 async def test_a_bus_whose_nodes_all_die(make_bank, reach, driver):

@@ -1,0 +1,136 @@
+"""Reading the config again: off, command, on, and no slider moves."""
+
+from __future__ import annotations
+
+import sys
+
+import pytest
+
+from drivers.controllers.errors import ConnectionLost
+from hexacell.errors import DeviceError
+
+BEFORE = ("get joint_pos", b"JOINT_POS -461.827519 1.0 2.0 3.0 4.0 5.0\r\n")
+AFTER = ("get joint_pos", b"JOINT_POS -461.827512 1.0 2.0 3.0 4.0 5.0\r\n")
+OFF = [("set machine off", b"SET MACHINE ACK\n\r"), ("get machine", b"MACHINE OFF\r\n")]
+ON = [("set machine on", b"SET MACHINE ACK\n\r"), ("get machine", b"MACHINE ON\r\n")]
+HOMED = ("get joint_homed", b"JOINT_HOMED YES YES YES YES YES YES\r\n")
+NOT_HOMED = ("get joint_homed", b"JOINT_HOMED NO NO NO NO NO NO\r\n")
+HOMING = [
+    NOT_HOMED,
+    ("set mode manual", b"SET MODE ACK\n\r"),
+    ("get teleop_enable", b"TELEOP_ENABLE NO\r\n"),
+    ("get error", b"ERROR OK\r\n"),
+    ("set home -1", b"SET HOME ACK\n\r"),
+    NOT_HOMED,
+    HOMED,
+]
+MDI = [("set mode mdi", b"SET MODE ACK\n\r"), ("get mode", b"MODE MDI\r\n")]
+
+
+def python(program: str) -> tuple[str, ...]:
+    return (sys.executable, "-c", program)
+
+
+async def test_without_a_command_the_machine_goes_off_and_on(play):
+    driver = await play.opened([BEFORE, *OFF, *ON, HOMED, AFTER, *MDI])
+    await driver.reload()
+
+
+async def test_the_command_runs_while_the_machine_is_off(play, tmp_path):
+    ran = tmp_path / "ran"
+    driver = await play.opened(
+        [BEFORE, *OFF, *ON, HOMED, AFTER, *MDI],
+        reload_command=python(f"open({str(ran)!r}, 'w').close()"),
+    )
+    await driver.reload()
+    assert ran.exists()
+
+
+async def test_a_machine_that_does_not_go_off_is_not_reloaded(play, tmp_path):
+    ran = tmp_path / "ran"
+    driver = await play.opened([BEFORE, OFF[0]], reload_command=python(f"open({str(ran)!r}, 'w').close()"))
+    play.servers[0].afterwards = {
+        "get machine": b"MACHINE ON\r\n",
+        "get error": b"ERROR OK\r\n",
+        "get estop": b"ESTOP OFF\r\n",
+    }
+    with pytest.raises(DeviceError, match="does not switch off"):
+        await driver.reload()
+    assert not ran.exists()
+
+
+@pytest.mark.parametrize(
+    ("program", "problem"),
+    [
+        (
+            "import sys; sys.exit('S1x: no such pin')",
+            r"failed with status 1: S1x: no such pin\. Correct contr",
+        ),
+        ("raise SystemExit(3)", r"failed with status 3\. Correct controller\.reload_command"),
+    ],
+)
+async def test_a_command_that_fails_leaves_the_machine_off(play, program, problem):
+    driver = await play.opened([BEFORE, *OFF], reload_command=python(program))
+    with pytest.raises(DeviceError, match=problem) as caught:
+        await driver.reload()
+    assert "the machine is off" in str(caught.value)
+
+
+async def test_a_joint_that_moved_is_an_error(play):
+    moved = ("get joint_pos", b"JOINT_POS -461.827512 1.0 2.0 9.8 4.0 5.0\r\n")
+    driver = await play.opened([BEFORE, *OFF, *ON, HOMED, moved])
+    with pytest.raises(DeviceError, match=r"moved joint 4 by 6\.800 mm while it read its config again"):
+        await driver.reload()
+
+
+async def test_lost_references_are_found_again_and_joints_are_then_where_they_are(play):
+    driver = await play.opened([BEFORE, *OFF, *ON, *HOMING, *MDI])
+    await driver.reload()
+
+
+async def test_an_emergency_stop_meanwhile_is_not_reset(play):
+    driver = await play.opened([BEFORE, *OFF, ON[0]])
+    play.servers[0].afterwards = {
+        "get machine": b"MACHINE OFF\r\n",
+        "get error": b"ERROR OK\r\n",
+        "get estop": b"ESTOP ON\r\n",
+    }
+    with pytest.raises(DeviceError, match="does not switch on: it is in emergency stop"):
+        await driver.reload()
+
+
+async def test_a_command_that_starts_the_controller_anew(play):
+    driver = await play.opened(
+        [BEFORE, OFF[0], (*OFF[1], play.HANG_UP)],
+        [
+            *play.OPENING[:-1],
+            ("get estop", b"ESTOP ON\r\n"),
+            ("set estop off", b"SET ESTOP ACK\n\r"),
+            ("get estop", b"ESTOP OFF\r\n"),
+            *ON,
+            *HOMING,
+            *MDI,
+        ],
+        reload_command=python("import time; time.sleep(0.05)"),
+    )
+    await driver.reload()
+
+
+async def test_a_controller_that_needs_a_moment_to_come_back(play):
+    driver = await play.opened(
+        [BEFORE, OFF[0], (*OFF[1], play.HANG_UP)],
+        [("hello EMC hexacell 1.0", play.HANG_UP)],
+        [*play.OPENING[:-1], ("get estop", b"ESTOP OFF\r\n"), *ON, HOMED, AFTER, *MDI],
+        reload_command=python("import time; time.sleep(0.05)"),
+    )
+    await driver.reload()
+
+
+async def test_a_controller_that_does_not_come_back(play):
+    driver = await play.opened(
+        [BEFORE, OFF[0], (*OFF[1], play.HANG_UP)],
+        reload_command=python("import time; time.sleep(0.05)"),
+    )
+    play.servers[0].stop_listening()
+    with pytest.raises(ConnectionLost, match="cannot be reached: Connection refused"):
+        await driver.reload()

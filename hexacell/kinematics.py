@@ -182,7 +182,8 @@ def _moved(poses: Poses, step: Array) -> Poses:
 
 
 def _signs(mechanism: Mechanism, geometry: Geometry, joints: Array, poses: Poses) -> Array:
-    return np.sign(np.asarray(np.linalg.det(pose_jacobian(mechanism, geometry, poses, joints))))
+    signs: Array = np.sign(np.linalg.det(pose_jacobian(mechanism, geometry, poses, joints)))
+    return signs
 
 
 def _replace(poses: Poses, rows: NDArray[np.intp], new: Poses) -> Poses:

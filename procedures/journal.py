@@ -7,6 +7,7 @@ dropped; anything wrong before it is damage and refused. One process writes at a
 
 from __future__ import annotations
 
+import errno
 import fcntl
 import json
 import os
@@ -73,8 +74,7 @@ class Journal:
         line = _line(len(self._events) + 1, event)
         end = os.fstat(self._descriptor).st_size
         try:
-            if os.write(self._descriptor, line) != len(line):
-                raise OSError(28, "the disk is full")
+            _write_whole(self._descriptor, line)
             os.fsync(self._descriptor)
         except OSError as error:
             os.ftruncate(self._descriptor, end)
@@ -98,6 +98,11 @@ class Journal:
             fcntl.flock(self._descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
             raise CellBusy("another process writes this journal", subject=self.path) from None
+
+
+def _write_whole(descriptor: int, data: bytes) -> None:
+    if os.write(descriptor, data) != len(data):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
 
 def _line(number: int, event: Event) -> bytes:

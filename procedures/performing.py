@@ -94,7 +94,7 @@ class Performer:
         limit = self.cell.settings.acceptance.drift_mm
         if np.abs(drift).max() > limit:
             raise LimitError(
-                f"{step.at}: back at the reference the gauges show {_words(drift)} mm, more than {limit:g} mm",
+                f"{step.at}: back at the reference the gauges show {_words(drift)}, more than {limit:g} mm",
                 action="A gauge slipped or the machine does not repeat; resume measures this point again",
             )
         return events.SetClosed(at=step.at, drift_mm=_three(drift))

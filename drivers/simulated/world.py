@@ -134,8 +134,8 @@ class World:
     def _swinging(self, since_s: float) -> Array:
         motion = self._settings.motion
         decay = np.exp(-since_s / motion.ringing_s) * np.cos(2.0 * np.pi * SWING_HZ * since_s)
-        direction: Array = self._swing / np.linalg.norm(self._swing)
-        return motion.ringing_mm * decay * direction
+        swinging: Array = motion.ringing_mm * decay * self._swing / np.linalg.norm(self._swing)
+        return swinging
 
     def _placed(self, ball: Array) -> Array:
         return ball + PLACING_MM * self._random.standard_normal(3)

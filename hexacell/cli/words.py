@@ -9,8 +9,8 @@ from hexacell.identification.result import Identification
 def identification_words(found: Identification, drawing: Geometry) -> str:
     """The parameters beside the drawing, and how well the records agree with them."""
     lines = [
-        f"{len(found.free)} parameters from {found.records} records at {found.points} points: "
-        f"{found.termination.value} ({found.iterations} iterations).",
+        f"{len(found.free)} parameters from {found.records} records at {found.points} points.",
+        f"The solver ended because {found.termination.value} ({found.iterations} iterations).",
         f"Residual {found.residual_rms_mm:.4f} mm rms; chi-square {found.chi2:.1f}, expected {found.dof}.",
         "",
         f"{'':4}{'drawing':>10}{'identified':>12}{'change':>9}{'sigma':>8}  mm",

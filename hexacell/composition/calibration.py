@@ -47,11 +47,14 @@ async def preflight(cell: Cell, mode: Mode, *, unattended: bool) -> tuple[events
         HexacellError: every failure, in one report.
     """
     calibration = Calibration(cell.settings, robot_of(cell), mode)
-    with config_lock(cell.config_path), _plan_checked(calibration, unattended=unattended) as failures:
-        with served(cell) as settings:
-            async with connected(settings) as cell_now:
-                failures += await device_failures(cell_now.devices, cell_now.clock)
-                return _identities(cell_now)
+    with (
+        config_lock(cell.config_path),
+        _plan_checked(calibration, unattended=unattended) as failures,
+        served(cell) as settings,
+    ):
+        async with connected(settings) as cell_now:
+            failures.extend(await device_failures(cell_now.devices, cell_now.clock))
+            return _identities(cell_now)
 
 
 async def calibrate(order: Order, listeners: Sequence[Listener] = ()) -> events.Ended:
@@ -67,7 +70,7 @@ async def calibrate(order: Order, listeners: Sequence[Listener] = ()) -> events.
         calibration = Calibration(cell.settings, robot, order.mode)
         with _plan_checked(calibration, unattended=order.unattended) as failures, served(cell) as settings:
             async with connected(settings) as cell_now:
-                failures += await device_failures(cell_now.devices, cell_now.clock)
+                failures.extend(await device_failures(cell_now.devices, cell_now.clock))
                 raise_all(failures)
                 return await _run(order, with_settings(cell, settings), calibration, cell_now, listeners)
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 
 from hexacell import kinematics, rotations
@@ -94,7 +96,4 @@ def _farthest_apart(knowledge: Knowledge, poses: Poses, count: int) -> list[int]
 
 
 def _ways_clear(knowledge: Knowledge, poses: Poses, rows: tuple[int, ...]) -> bool:
-    return all(
-        is_clear(knowledge, poses[[start]], poses[[end]])
-        for start, end in zip(rows, rows[1:], strict=False)
-    )
+    return all(is_clear(knowledge, poses[[start]], poses[[end]]) for start, end in pairwise(rows))

@@ -37,8 +37,12 @@ class Prediction:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Trial:
-    """Poses (n) and residuals (n, 3), mm, of a geometry; ``found`` (n,) says which are on their
-    assembly mode.
+    """The residuals of a geometry to be tried.
+
+    Attributes:
+        poses: n poses that close it.
+        residuals: (n, 3), mm, as in :class:`Prediction`.
+        found: (n,) bool: which poses were found on their assembly mode.
     """
 
     poses: Poses

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import StrEnum
+from functools import cached_property
 
 import numpy as np
 
@@ -175,8 +176,13 @@ class Calibration:
             expected=self._expectation(choice),
         )
 
+    @cached_property
+    def _poses_to_check(self) -> tuple[tuple[SixNumbers, ...], ...]:
+        """Held-out poses of a run that identifies nothing: what the drawing alone makes safe."""
+        return self.held_out_poses(None)
+
     def _held_out_move(self, state: RunState, key: SetKey, measured: SetState) -> Move:
-        poses = state.identified.held_out if state.identified else self.held_out_poses(None)
+        poses = state.identified.held_out if state.identified else self._poses_to_check
         orientation = len(measured.samples) + 1
         return Move(at=key, orientation=orientation, pose=poses[key.point - 1][orientation - 1])
 

@@ -17,12 +17,10 @@ MATHEMATICS = ("rotations", "geometry", "kinematics", "mechanisms", "identificat
 
 FORBIDDEN = [
     ("hexacell.errors", "hexacell.cli"),
-    ("hexacell.errors", "hexacell.tui"),
     ("hexacell.errors", "hexacell.composition"),
     ("hexacell.errors", "procedures"),
     ("hexacell.errors", "drivers"),
     ("hexacell.a_module_nobody_listed", "drivers.ports"),
-    ("hexacell.tui", "hexacell.cli"),
     ("hexacell.cli", "drivers.simulated"),
     ("drivers.ports", "procedures"),
     ("drivers.ports", "hexacell.composition"),

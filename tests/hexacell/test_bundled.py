@@ -22,7 +22,7 @@ def installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 def test_the_promised_configs_are_there() -> None:
     found = {path.name for path in bundled.bundled_configs()}
-    assert {"simulated-hexaglide.toml", "paper-experiment.toml", "linuxcnc-hexaglide"} <= found
+    assert {"simulated-hexaglide.toml", "paper-experiment.toml"} <= found
 
 
 def test_a_wheel_has_its_own(installed: Path) -> None:

@@ -19,8 +19,8 @@ from hexacell.mechanisms.base import Branch, Mechanism
 from hexacell.pose import Poses
 from hexacell.rotations import Array, Mask
 
-CONVERGED_MM = 1e-9
-"""Constraints below this count as rounding: legs are a metre, doubles carry 16 digits."""
+CONVERGED_MM = 1e-10
+"""Constraints below this count as closed: legs are a metre, and doubles carry 16 digits."""
 
 NEWTON_STEPS = 12
 LONGEST_STEP_MM = 60.0
@@ -54,11 +54,22 @@ def inverse(mechanism: Mechanism, geometry: Geometry, branch: Branch, poses: Pos
     return joints
 
 
-def forward(mechanism: Mechanism, geometry: Geometry, joints: Array, start: Poses) -> Forward:
-    """Poses of n joint vectors (n, 6), mm, by damped Newton steps from nearby poses."""
-    poses, closed = _newton(mechanism, geometry, joints, start)
-    same_mode = _signs(mechanism, geometry, joints, start) == _signs(mechanism, geometry, joints, poses)
-    return Forward(poses, closed & same_mode)
+def forward(
+    mechanism: Mechanism, geometry: Geometry, joints: Array, start: Poses, *, mode: Array | None = None
+) -> Forward:
+    """Poses of n joint vectors (n, 6), mm, by damped Newton steps from nearby poses.
+
+    ``mode`` (n,) is the sign of the Jacobian's determinant to be kept; by default that at ``start``.
+    """
+    if mode is None:
+        mode = assembly_mode(mechanism.closure(geometry, start, joints)[1])
+    return _newton(mechanism, geometry, joints, start, mode)
+
+
+def assembly_mode(pose_jacobian: Array) -> Array:
+    """The sign (n,) of the determinant of pose Jacobians (n, 6, 6): it changes at a singularity."""
+    signs: Array = np.sign(np.linalg.det(pose_jacobian))
+    return signs
 
 
 def follow(
@@ -103,10 +114,12 @@ class Sensitivity:
     Attributes:
         joints: (n, 6, 6).
         parameters: (n, 6, 42).
+        mode: (n,), see :func:`assembly_mode`.
     """
 
     joints: Array
     parameters: Array
+    mode: Array
 
 
 def sensitivity(mechanism: Mechanism, geometry: Geometry, poses: Poses, joints: Array) -> Sensitivity:
@@ -117,6 +130,7 @@ def sensitivity(mechanism: Mechanism, geometry: Geometry, poses: Poses, joints: 
     return Sensitivity(
         joints=inverse_jacobian * linear.joints[..., None, :],
         parameters=from_per_leg(by_leg),
+        mode=assembly_mode(linear.pose),
     )
 
 
@@ -132,6 +146,11 @@ def singularity_margin(mechanism: Mechanism, geometry: Geometry, poses: Poses, j
     return smallest
 
 
+def moved(poses: Poses, step: Array) -> Poses:
+    """Poses after steps (n, 6): positions, mm, then rotation vectors in the base frame, rad."""
+    return Poses(poses.positions + step[..., :3], rotations.from_vector(step[..., 3:]) @ poses.rotations)
+
+
 def _staged(
     mechanism: Mechanism,
     geometries: tuple[Geometry, Geometry],
@@ -141,29 +160,27 @@ def _staged(
 ) -> Forward:
     poses = start
     found = np.ones(len(start), dtype=bool)
-    sign = _signs(mechanism, geometries[0], joints[0], start)
+    mode = assembly_mode(mechanism.closure(geometries[0], start, joints[0])[1])
     for stage in range(1, stages + 1):
         fraction = stage / stages
         geometry = geometries[0].toward(geometries[1], fraction)
         now = (1.0 - fraction) * joints[0] + fraction * joints[1]
-        poses, closed = _newton(mechanism, geometry, now, poses)
-        found &= closed & (_signs(mechanism, geometry, now, poses) == sign)
+        result = _newton(mechanism, geometry, now, poses, mode)
+        poses, found = result.poses, found & result.found
     return Forward(poses, found)
 
 
-def _newton(mechanism: Mechanism, geometry: Geometry, joints: Array, start: Poses) -> tuple[Poses, Mask]:
-    """Newton's method on the pose, each step bounded; a row that has converged stays put."""
+def _newton(mechanism: Mechanism, geometry: Geometry, joints: Array, start: Poses, mode: Array) -> Forward:
+    """Newton's method on the pose, each step bounded."""
     poses = start
-    polished = False
+    error, jacobian = mechanism.closure(geometry, poses, joints)
     for _ in range(NEWTON_STEPS):
-        error = mechanism.constraints(geometry, poses, joints)
-        if polished or not np.isfinite(error).all():
+        if not np.isfinite(error).all() or np.abs(error).max(initial=0.0) < CONVERGED_MM:
             break
-        # One more step after convergence costs little and takes the error to rounding.
-        polished = bool((np.abs(error).max(axis=-1, initial=0.0) < CONVERGED_MM * 1e3).all())
-        poses = _moved(poses, _step(mechanism.linearise(geometry, poses, joints).pose, error))
-    error = mechanism.constraints(geometry, poses, joints)
-    return poses, np.abs(error).max(axis=-1, initial=0.0) < CONVERGED_MM
+        poses = moved(poses, _step(jacobian, error))
+        error, jacobian = mechanism.closure(geometry, poses, joints)
+    closed = np.abs(error).max(axis=-1, initial=0.0) < CONVERGED_MM
+    return Forward(poses, closed & (assembly_mode(jacobian) == mode))
 
 
 def _step(jacobian: Array, error: Array) -> Array:
@@ -175,15 +192,6 @@ def _step(jacobian: Array, error: Array) -> Array:
     turn = np.linalg.norm(step[..., 3:], axis=-1) / LARGEST_TURN
     shortened: Array = step / np.maximum(1.0, np.maximum(travel, turn))[..., None]
     return shortened
-
-
-def _moved(poses: Poses, step: Array) -> Poses:
-    return Poses(poses.positions + step[..., :3], rotations.from_vector(step[..., 3:]) @ poses.rotations)
-
-
-def _signs(mechanism: Mechanism, geometry: Geometry, joints: Array, poses: Poses) -> Array:
-    signs: Array = np.sign(np.linalg.det(pose_jacobian(mechanism, geometry, poses, joints)))
-    return signs
 
 
 def _replace(poses: Poses, rows: NDArray[np.intp], new: Poses) -> Poses:

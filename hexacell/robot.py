@@ -121,7 +121,12 @@ def make_robot(settings: CellSettings, controller: ControllerGeometry) -> Robot:
         controller=controller.geometry,
         branch=controller.branch,
         tolerances=Tolerances(**settings.tolerances.model_dump()),
-        noise=Noise(**settings.noise.model_dump()),
+        noise=Noise(
+            settings.noise.encoder_mm,
+            settings.noise.gauge_mm,
+            float(np.radians(settings.stations.alignment_deg)),
+            settings.noise.gauge_scale,
+        ),
         limits=Limits(
             limits.gauge_travel_mm,
             float(np.radians(limits.tilt_deg)),

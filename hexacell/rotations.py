@@ -42,10 +42,13 @@ def to_angles(rotation: ArrayLike) -> Array:
 
 def skew(vector: ArrayLike) -> Array:
     """Cross-product matrices (..., 3, 3): ``skew(u) @ v = u x v``."""
-    x, y, z = np.moveaxis(np.asarray(vector, dtype=float), -1, 0)
-    zero = np.zeros_like(x)
-    rows = [[zero, -z, y], [z, zero, -x], [-y, x, zero]]
-    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+    u = np.asarray(vector, dtype=float)
+    matrix = np.zeros((*u.shape, 3))
+    for axis in range(3):
+        j, k = (axis + 1) % 3, (axis + 2) % 3
+        matrix[..., k, j] = u[..., axis]
+        matrix[..., j, k] = -u[..., axis]
+    return matrix
 
 
 def from_vector(vector: ArrayLike) -> Array:

@@ -94,6 +94,9 @@ class NoiseSettings(Section):
     """What one record's numbers scatter by, one standard deviation."""
 
     encoder_mm: Positive = Field(0.01, description="of a slider's position")
+    gauge_scale: NotNegative = Field(
+        0.001, description="relative error of each gauge's scale, one standard deviation"
+    )
     gauge_mm: Positive = Field(0.01, description="of a gauge's reading")
 
 

@@ -7,7 +7,7 @@ from typing import Literal, Self
 from pydantic import Field, ValidationError, field_validator, model_validator
 from pydantic_core import InitErrorDetails
 
-from hexacell.cell.base import GeometryValues, Point, Positive, Section, SixNumbers, broken_rule
+from hexacell.cell.base import GeometryValues, NotNegative, Point, Positive, Section, SixNumbers, broken_rule
 from hexacell.cell.devices import (
     ControllerSettings,
     EncoderSettings,
@@ -58,6 +58,9 @@ class AcceptanceSettings(Section):
 class StationSettings(Section):
     """How the gauges get to each point."""
 
+    alignment_deg: NotNegative = Field(
+        0.3, description="how far the gauges' axes may be turned against the base's, deg, 1 sigma"
+    )
     placement: Literal["by-hand", "fixed"] = Field(
         "by-hand", description="fixed: gauges are in place at every point without a person"
     )

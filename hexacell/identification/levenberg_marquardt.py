@@ -95,6 +95,7 @@ class _Search:
         self.precision = precision
         self.centre = problem.mechanism.convention.free_part(problem.prior.centre)
         self.now = start
+        self.centring = centring.Centring(problem, start.weights)
         self.damping = INITIAL_DAMPING
         self.growth = 2.0
         self.refusals = 0
@@ -102,7 +103,7 @@ class _Search:
 
     def linear(self) -> centring.CentredSystem:
         """The linear problem at the iterate."""
-        return centring.system(self.problem, self.now.weights, self.now.residuals, self.now.jacobian)
+        return self.centring.system(self.now.residuals, self.now.jacobian)
 
     def advance(self) -> Termination | None:
         """Try one step; says so when the search has ended."""
@@ -111,7 +112,7 @@ class _Search:
         step = _Step.of(self.linear(), self.precision, self.now.free - self.centre, self.damping)
         if np.abs(step.free).max() < STEP_MM and self.damping <= INITIAL_DAMPING:
             return Termination.STEP
-        trial = model.follow_residuals(self.problem, self.now.free + step.free, self.now.poses)
+        trial = model.try_step(self.problem, self.now, step.free)
         if not trial.found.all():
             return self._refuse(trial.found)
         gain = self._gain(trial.residuals, step)
@@ -122,6 +123,7 @@ class _Search:
 
     def _accept(self, step: _Step, poses: Poses, gain: _Gain) -> None:
         self.now = model.predict(self.problem, self.now.free + step.free, poses)
+        self.centring = centring.Centring(self.problem, self.now.weights)
         self.damping *= max(1.0 / 3.0, 1.0 - (2.0 * gain.ratio - 1.0) ** 3)
         self.damping = max(self.damping, SMALLEST_DAMPING)
         self.growth, self.refusals = 2.0, 0
@@ -141,9 +143,8 @@ class _Search:
     def _gain(self, trial_residuals: Array, step: _Step) -> _Gain:
         before = self.now.free - self.centre
         after = before + step.free
-        weights = self.now.weights
-        old = centring.cost(self.problem, weights, self.now.residuals) + before @ self.precision @ before
-        new = centring.cost(self.problem, weights, trial_residuals) + after @ self.precision @ after
+        old = self.centring.cost(self.now.residuals) + before @ self.precision @ before
+        new = self.centring.cost(trial_residuals) + after @ self.precision @ after
         return _Gain(float(old - new), step.predicted_gain, float(old))
 
 

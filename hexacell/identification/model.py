@@ -22,17 +22,24 @@ class Prediction:
         poses: the platform's poses at the measured joint variables.
         residuals: (n, 3), mm: predicted position less measured deviation, each point's unknown
             constant still in it.
-        jacobian: (n, 3, p) of the residuals by the free parameters.
         weights: (n, 3, 3), 1/mm^2: inverse covariance of one record.
+        pose_jacobian: (n, 6, p) of position, mm, and rotation vector, rad, by the free parameters.
+        mode: (n,) the assembly mode, see :func:`hexacell.kinematics.assembly_mode`.
         amplification: (n,) mm of ball a mm of slider: large next to a singularity.
     """
 
     free: Array
     poses: Poses
     residuals: Array
-    jacobian: Array
     weights: Array
+    pose_jacobian: Array
+    mode: Array
     amplification: Array
+
+    @property
+    def jacobian(self) -> Array:
+        """(n, 3, p) of the residuals by the free parameters."""
+        return self.pose_jacobian[:, :3]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -50,10 +57,16 @@ class Trial:
     found: Mask
 
 
-def follow_residuals(problem: Problem, free: Array, start: Poses) -> Trial:
-    """The residuals of a geometry near one that the poses ``start`` close."""
-    geometry = Geometry.from_vector(problem.basis @ free)
-    result = kinematics.forward(problem.mechanism, geometry, problem.joints, start)
+def try_step(problem: Problem, now: Prediction, step: Array) -> Trial:
+    """The residuals after a step (p,), mm, of the free parameters.
+
+    Poses start where the linearisation puts them; where that is too far, at the present ones.
+    """
+    geometry = Geometry.from_vector(problem.basis @ (now.free + step))
+    for start in (kinematics.moved(now.poses, now.pose_jacobian @ step), now.poses):
+        result = kinematics.forward(problem.mechanism, geometry, problem.joints, start, mode=now.mode)
+        if result.found.all():
+            break
     return Trial(result.poses, result.poses.positions - problem.deviations, result.found)
 
 
@@ -66,8 +79,9 @@ def predict(problem: Problem, free: Array, poses: Poses) -> Prediction:
         free=free,
         poses=poses,
         residuals=poses.positions - problem.deviations,
-        jacobian=sensitivity.parameters[:, :3] @ problem.basis,
         weights=record_weights(by_joints, problem.noise),
+        pose_jacobian=sensitivity.parameters @ problem.basis,
+        mode=sensitivity.mode,
         amplification=np.linalg.norm(by_joints, axis=(-2, -1)),
     )
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.special import chdtri
 
-from hexacell.identification import centring
+from hexacell.identification.centring import Centring
 from hexacell.identification.model import Prediction
 from hexacell.identification.problem import Problem
 from hexacell.rotations import Array
@@ -22,11 +22,10 @@ MEDIAN_OF_CHI2_3 = 2.366
 
 def statistics(problem: Problem, prediction: Prediction, covariance: Array) -> Array:
     """The statistic (n,) of each record, the free parameters having covariance (p, p), mm^2."""
-    residuals = centring.centred(problem, prediction.weights, prediction.residuals)
-    jacobian = centring.centred(problem, prediction.weights, prediction.jacobian)
+    centring = Centring(problem, prediction.weights)
+    residuals, jacobian = centring.centred(prediction.residuals), centring.centred(prediction.jacobian)
     own = np.linalg.inv(prediction.weights)
-    constant = problem.spread(np.linalg.inv(problem.group_sums(prediction.weights)))
-    left = own - constant - jacobian @ covariance @ np.swapaxes(jacobian, -1, -2)
+    left = own - centring.absorbed() - jacobian @ covariance @ np.swapaxes(jacobian, -1, -2)
     # A record that alone determines something has no residual there to be judged by.
     values, axes = np.linalg.eigh(left)
     along = np.einsum("nij,ni->nj", axes, residuals)

@@ -48,14 +48,15 @@ def gauss_newton(problem: Problem, *, steps: int = 30, tolerance_mm: float = 1e-
         prediction = model.predict(problem, free, poses)
         error = error_vector(problem, prediction.residuals)
         jacobian = prediction.jacobian[rows[:, 0]] - prediction.jacobian[rows[:, 1]]
-        step = -np.linalg.lstsq(jacobian.reshape(len(error), -1), error)[0]
+        step: Array = -np.linalg.lstsq(jacobian.reshape(len(error), -1), error)[0]
         free = free + step
-        trial = model.follow_residuals(problem, free, poses)
-        if not trial.found.all():
+        geometry = Geometry.from_vector(problem.basis @ free)
+        reached = kinematics.forward(problem.mechanism, geometry, problem.joints, poses)
+        if not reached.found.all():
             raise ConvergenceError("Gauss-Newton left the assembly mode of a record")
-        poses = trial.poses
+        poses = reached.poses
         if np.abs(step).max() < tolerance_mm:
-            return Geometry.from_vector(problem.basis @ free)
+            return geometry
     raise ConvergenceError(f"Gauss-Newton did not settle in {steps} steps")
 
 
@@ -80,9 +81,11 @@ def least_squares_without_jacobian(problem: Problem) -> Geometry:
         gtol=1e-15,
         max_nfev=100,
     )
-    if not found.success or not model.follow_residuals(problem, found.x, problem.start).found.all():
+    geometry = Geometry.from_vector(problem.basis @ found.x)
+    reached = kinematics.forward(problem.mechanism, geometry, problem.joints, problem.start)
+    if not found.success or not reached.found.all():
         raise ConvergenceError(f"the least-squares solver ended without a solution: {found.message}")
-    return Geometry.from_vector(problem.basis @ found.x)
+    return geometry
 
 
 def _error_from(problem: Problem, free: Array, start: Poses) -> Array:

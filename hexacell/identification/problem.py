@@ -17,10 +17,16 @@ from hexacell.rotations import Array, Mask
 
 @dataclass(frozen=True, slots=True)
 class Noise:
-    """Standard deviations of one record's numbers, mm."""
+    """Standard deviations of one record's numbers, mm, and of how the gauges stand.
+
+    ``alignment`` is the prior of each station's small rotation against the base, rad a component;
+    ``gauge_scale`` that of each gauge's relative scale error. Zero says there is none.
+    """
 
     encoder_mm: float
     gauge_mm: float
+    alignment: float = 0.0
+    gauge_scale: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 from typing import Protocol
 
 import numpy as np
@@ -42,6 +43,7 @@ class FrameConvention:
     zero: tuple[str, ...]
     equal: tuple[tuple[str, ...], ...]
 
+    @cache  # noqa: B019 - a convention lives as long as its mechanism's class
     def basis(self) -> Array:
         """The (42, p) matrix from free parameters to all of them; its entries are 0 and 1."""
         leader = {name: group[0] for group in self.equal for name in group}
@@ -50,6 +52,7 @@ class FrameConvention:
         for row, name in enumerate(PARAMETER_NAMES):
             if name not in self.zero:
                 matrix[row, free.index(leader.get(name, name))] = 1.0
+        matrix.setflags(write=False)
         return matrix
 
     def free_names(self) -> tuple[str, ...]:
@@ -104,8 +107,12 @@ class Mechanism(Protocol):
         """How much too long each leg would have to be (n, 6), mm; zero where the machine closes."""
         ...
 
+    def closure(self, geometry: Geometry, poses: Poses, joints: Array) -> tuple[Array, Array]:
+        """:meth:`constraints` (n, 6) and their derivatives by the pose (n, 6, 6), for Newton's method."""
+        ...
+
     def linearise(self, geometry: Geometry, poses: Poses, joints: Array) -> Linearisation:
-        """Derivatives of :meth:`constraints`."""
+        """All derivatives of :meth:`constraints`."""
         ...
 
     def inverse(self, geometry: Geometry, branch: Branch, poses: Poses) -> Array:

@@ -29,9 +29,12 @@ class Hexaglide:
 
     def constraints(self, geometry: Geometry, poses: Poses, joints: Array) -> Array:
         """See :class:`~hexacell.mechanisms.base.Mechanism`."""
-        _, v = _leg_vectors(geometry, poses, joints)
-        error: Array = (np.sum(v * v, axis=-1) - geometry.l**2) / (2.0 * geometry.l)
-        return error
+        return _leg_errors(geometry, _leg_vectors(geometry, poses, joints)[1])
+
+    def closure(self, geometry: Geometry, poses: Poses, joints: Array) -> tuple[Array, Array]:
+        """See :class:`~hexacell.mechanisms.base.Mechanism`."""
+        b, v = _leg_vectors(geometry, poses, joints)
+        return _leg_errors(geometry, v), _by_pose(b, v / geometry.l[:, None])
 
     def linearise(self, geometry: Geometry, poses: Poses, joints: Array) -> Linearisation:
         """See :class:`~hexacell.mechanisms.base.Mechanism`."""
@@ -39,7 +42,7 @@ class Hexaglide:
         n = v / geometry.l[:, None]
         by_length = -0.5 * (np.sum(n * n, axis=-1, keepdims=True) + 1.0)
         return Linearisation(
-            pose=-np.concatenate([n, np.cross(b, n)], axis=-1),
+            pose=_by_pose(b, n),
             joints=n[..., 0],
             parameters=np.concatenate([n, -n @ poses.rotations, by_length], axis=-1),
         )
@@ -77,6 +80,22 @@ def _leg_vectors(geometry: Geometry, poses: Poses, joints: Array) -> tuple[Array
     v = geometry.S - poses.positions[:, None, :] - b
     v[..., 0] += joints
     return b, v
+
+
+def _leg_errors(geometry: Geometry, v: Array) -> Array:
+    error: Array = (np.einsum("nij,nij->ni", v, v) - geometry.l**2) / (2.0 * geometry.l)
+    return error
+
+
+def _by_pose(b: Array, n: Array) -> Array:
+    """Minus n, and minus b x n, side by side (n, 6, 6)."""
+    jacobian = np.empty((*n.shape[:-1], 6))
+    jacobian[..., :3] = -n
+    # Written out: np.cross costs as much as the rest of a Newton step.
+    for axis in range(3):
+        j, k = (axis + 1) % 3, (axis + 2) % 3
+        jacobian[..., 3 + axis] = b[..., k] * n[..., j] - b[..., j] * n[..., k]
+    return jacobian
 
 
 def _roll_that_levels(vector: Array) -> Array:

@@ -102,7 +102,7 @@ class EncoderBus:
             return can.Bus(**settings)
         except Exception as error:  # the many interfaces of python-can raise whatever they like
             raise BusError(
-                f"cannot be opened: {error}",
+                f"cannot be opened: {_in_words(error)}",
                 subject=self.name,
                 action="Plug the CAN adapter in, or correct `bus` under [encoders] in the cell file",
             ) from error
@@ -137,7 +137,7 @@ class EncoderBus:
 
     def _error(self, what: str, cause: Exception) -> BusError:
         return BusError(
-            f"{what}: {cause}",
+            f"{what}: {_in_words(cause)}",
             subject=self.name,
             action="Check the CAN adapter, its cable, supply and termination, then open the encoders "
             "again; the set that was being measured is void",
@@ -174,6 +174,12 @@ def _concerns_canopen(message: can.Message) -> bool:
 def _name_of(settings: Mapping[str, Any]) -> str:
     words = (settings.get("interface"), settings.get("channel"))
     return " ".join(["encoder bus", *(str(word) for word in words if word is not None)])
+
+
+def _in_words(error: Exception) -> str:
+    """The message, and what is behind it: python-can wraps the errors of what it is built on."""
+    behind = "" if error.__cause__ is None else str(error.__cause__)
+    return str(error) if behind in str(error) else f"{error} ({behind})"
 
 
 def _shut_down(bus: can.BusABC) -> None:

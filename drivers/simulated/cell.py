@@ -30,7 +30,7 @@ class SimulatedCell:
 
     Raises:
         FileError: the controller's config cannot be read.
-        ReachError: the first point of the cell cannot be reached.
+        ReachError: the first point of the cell cannot be reached, by its config or by its truth.
     """
 
     def __init__(
@@ -54,7 +54,7 @@ class SimulatedCell:
             if other_processes:
                 adapter = served.enter_context(serve_slcan(self.encoders.channel, "pty"))
                 bus = adapter.bus_settings
-            self.controller = served.enter_context(SimulatedController(self.machine))
+            self.controller = served.enter_context(_controller(settings, self.machine, config))
             self._served = served.pop_all()
         self.settings = settings.model_copy(
             update={
@@ -114,6 +114,16 @@ def _bank(
     latency = simulation.encoders.latency_s
     return SimulatedEncoderBank(
         settings.encoders, lambda: world.sliders().tolist(), clock, latency_s=latency
+    )
+
+
+def _controller(settings: CellSettings, machine: SimulatedMachine, config: Path) -> SimulatedController:
+    controller = settings.controller
+    return SimulatedController(
+        machine,
+        connect_password=controller.connect_password,
+        enable_password=controller.enable_password,
+        config=config.name,
     )
 
 

@@ -13,6 +13,7 @@ from hexacell import kinematics, rotations
 from hexacell.clock import CellClock
 from hexacell.controller_config.format import ConfigFormat, ControllerGeometry
 from hexacell.design.path import straight
+from hexacell.errors import FileError
 from hexacell.mechanisms.base import Mechanism
 from hexacell.pose import Pose, Poses
 from hexacell.rotations import Array
@@ -41,7 +42,7 @@ class SimulatedMachine:
         self._geometry = config_format.read(config)
         self._way = Poses.of([home, home])
         self._lock = threading.Lock()
-        self._fraction = 1.0
+        self._stops = 0
         self._halt = threading.Event()
 
     def move(self, pose: Pose) -> None:
@@ -50,36 +51,43 @@ class SimulatedMachine:
         Raises:
             KinematicsFailure: a leg cannot reach some place on the way.
         """
+        stops = self._stops
         way = straight(Poses.of([self.pose()]), Poses.of([pose]), STEPS)
         joints = self._joints(way)
         if np.isnan(joints).any():
             raise KinematicsFailure("Linear move on line 0 fails kinematicsInverse")
         with self._lock:
+            if self._stops != stops:
+                return
             self._halt.clear()
-            self._way, self._fraction = way, 1.0
+            self._way = way
             motion = self._world.travel(joints)
         self._clock.wait(motion.duration_s, self._halt)
 
     def stop(self) -> None:
         """Stop in place."""
         with self._lock:
-            if not self._halt.is_set():
-                self._fraction = self._world.stop()
+            self._stops += 1
+            self._world.stop()
             self._halt.set()
 
     def pose(self) -> Pose:
         """Where the platform is by the controller's geometry."""
         with self._lock:
-            return _between(self._way, self._fraction).pose(0)
+            return self._here().pose(0)
 
     def joints(self) -> tuple[float, ...]:
         """The sliders (6,), mm, as the controller commands them."""
         return tuple(float(value) for value in self._joints(Poses.of([self.pose()]))[0])
 
     def switch_on(self) -> None:
-        """Read the geometry again; the sliders stay, and so the believed pose changes."""
+        """Read the geometry again; the sliders stay, and so the believed pose changes.
+
+        Raises:
+            FileError: the config cannot be read, or no pose of its geometry belongs to the sliders.
+        """
         with self._lock:
-            here = _between(self._way, self._fraction)
+            here = self._here()
             joints = self._joints(here)
             new = self._format.read(self._config)
             found = kinematics.follow(
@@ -90,14 +98,19 @@ class SimulatedMachine:
                 start_geometry=self._geometry.geometry,
                 start_joints=joints,
             )
+            if not found.found[0]:
+                raise FileError("with this geometry the sliders cannot stand so", subject=self._config)
             self._geometry = new
-            self._way, self._fraction = Poses.of([found.poses.pose(0)] * 2), 1.0
+            self._way = found.poses[[0, 0]]
 
     def switch_off(self) -> None:
         """Sliders hold by their brakes."""
 
     def home(self) -> None:
         """The encoders are absolute: nothing to look for."""
+
+    def _here(self) -> Poses:
+        return _between(self._way, self._world.progress())
 
     def _joints(self, poses: Poses) -> Array:
         geometry: ControllerGeometry = self._geometry

@@ -7,6 +7,7 @@ it was, so that the platform stays on its assembly mode. Gauges and encoders loo
 from __future__ import annotations
 
 import threading
+from dataclasses import replace
 
 import numpy as np
 
@@ -14,6 +15,7 @@ from drivers.simulated.motion import Motion
 from hexacell import kinematics, rotations
 from hexacell.cell.simulation import SimulationSettings
 from hexacell.clock import CellClock
+from hexacell.errors import ReachError
 from hexacell.geometry import Geometry
 from hexacell.mechanisms.base import Mechanism
 from hexacell.pose import Poses
@@ -26,7 +28,11 @@ PLACING_MM = 0.4
 
 
 class World:
-    """The truth of one cell; safe to ask from several threads."""
+    """The truth of one cell; safe to ask from several threads.
+
+    Raises:
+        ReachError: the true geometry cannot stand where it should begin.
+    """
 
     def __init__(
         self,
@@ -56,6 +62,11 @@ class World:
             start_geometry=start_geometry,
             start_joints=start_joints[None],
         )
+        if not first.found[0]:
+            raise ReachError(
+                f"the simulated machine cannot stand at {start.pose(0)}",
+                action="Correct [simulation.geometry], or begin at another point",
+            )
         self._pose = first.poses
         self._station = self._placed(self._pose.positions[0])
         self._triad = self._turned()
@@ -74,14 +85,17 @@ class World:
             self._disturb()
             return self._motion
 
-    def stop(self) -> float:
-        """Stop the sliders where they are; says how much of the way was done, 0 to 1."""
+    def stop(self) -> None:
+        """Stop the sliders where they are."""
         with self._lock:
             now = self._clock.now()
-            moving = self._motion
-            if now < moving.ends_s:
-                self._motion = Motion(moving.path, moving.begins_s, moving.duration_s, now)
-            return moving.fraction(now)
+            if now < self._motion.ends_s:
+                self._motion = replace(self._motion, stopped_s=now)
+
+    def progress(self) -> float:
+        """How much of the last way is done, 0 to 1."""
+        with self._lock:
+            return self._motion.fraction(self._clock.now())
 
     def sliders(self) -> Array:
         """What the encoders see (6,), mm."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import heapq
 import itertools
+import logging
 import threading
 import time
 from collections.abc import Callable
@@ -11,6 +12,8 @@ from dataclasses import dataclass, field
 
 import can
 import canopen
+
+_log = logging.getLogger(__name__)
 
 SLICE_S = 0.02
 """Longest wait for a frame; a timer set by another thread may be so late."""
@@ -85,6 +88,13 @@ class SimulatedLine(canopen.Network):
         return PeriodicFrame(self, can_id, data, period)
 
     def _run(self) -> None:
+        try:
+            self._serve()
+        except Exception:  # the positions behind the encoders may fail: as loud as a broken cable
+            _log.exception("the simulated encoders have died")
+            self._stopping.set()
+
+    def _serve(self) -> None:
         while not self._stopping.is_set():
             message = self._receive(self._until_next_timer())
             with self.lock:

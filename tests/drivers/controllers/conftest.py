@@ -14,17 +14,9 @@ from drivers.controllers.linuxcncrsh_address import Patience
 from drivers.trace import WireTrace
 from hexacell.cell.devices import ControllerSettings
 
-QUICK = Patience(
-    connect=2.0,
-    answer=0.15,
-    remark=0.03,
-    poll=0.002,
-    arrival=0.02,
-    stop=0.6,
-    switch=0.02,
-    reload=5.0,
-    comeback=1.0,
-)
+PATIENT = Patience(remark=0.05, poll=0.002)
+IMPATIENT = Patience(answer=0.4, remark=0.05, poll=0.002, arrival=0.02, stop=0.6, switch=0.02, comeback=0.2)
+"""For tests in which something does not happen."""
 
 
 class Then(Enum):
@@ -67,6 +59,7 @@ class ScriptedServer:
         self.deviations: list[str] = []
         self.afterwards: dict[str, bytes | list[bytes]] = {}
         self.port = 0
+        self.connections = 0
         self._conversing: set[asyncio.Task[None]] = set()
         self._left = [list(conversation) for conversation in conversations]
         self._waiting = iter(self._left)
@@ -97,6 +90,7 @@ class ScriptedServer:
         task = asyncio.current_task()
         assert task is not None
         self._conversing.add(task)
+        self.connections += 1
         conversation = next(self._waiting, None)
         if conversation is None:
             self.deviations.append("one connection more than the script has")
@@ -139,8 +133,10 @@ class Play:
     AT_REST = AT_REST
     SILENCE = Then.SAY_NOTHING
     HANG_UP = Then.HANG_UP
+    IMPATIENT = IMPATIENT
 
     def __init__(self) -> None:
+        self.patience = PATIENT
         self.servers: list[ScriptedServer] = []
         self._drivers: list[LinuxcncrshController] = []
 
@@ -165,10 +161,9 @@ class Play:
         self, port: int, trace: WireTrace | None = None, **settings: object
     ) -> LinuxcncrshController:
         """A driver for whatever is at ``port``; keywords are controller settings."""
-        values = {"config": "machine.ini", "port": port, "move_timeout_s": 0.2, **settings}
-        made = LinuxcncrshController(ControllerSettings.model_validate(values), trace=trace, patience=QUICK)
-        self._drivers.append(made)
-        return made
+        values = ControllerSettings.model_validate({"config": "machine.ini", "port": port, **settings})
+        self._drivers.append(LinuxcncrshController(values, trace=trace, patience=self.patience))
+        return self._drivers[-1]
 
     async def end(self) -> None:
         """Close everything; fail unless every conversation was played to its end."""

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import asyncio
+
 import pytest
 
-from drivers.controllers.errors import CommandRefused
+from drivers.controllers.errors import CommandRefused, MotionInterrupted
 from hexacell.errors import DeviceError
 
 NO_ERROR = ("get error", b"ERROR OK\r\n")
@@ -150,7 +152,8 @@ async def test_a_server_that_does_not_know_the_finer_questions(play):
     ],
 )
 async def test_an_acknowledged_order_without_effect(play, conversation, states, problem):
-    driver = await play.opened(conversation)
+    play.patience = play.IMPATIENT
+    driver = await play.opened(conversation, move_timeout_s=0.2)
     play.servers[0].afterwards = states
     with pytest.raises(DeviceError, match=problem) as caught:
         await driver.prepare()
@@ -201,9 +204,8 @@ async def test_a_refusal_is_told_in_the_controllers_words(play):
     )
     with pytest.raises(CommandRefused) as caught:
         await driver.prepare()
-    assert caught.value.problem == (
-        "refuses 'set machine on': drive 1 is cold; drive 2 is cold; drive 3 is cold; drive 4 is cold; and 1 more"
-    )
+    four = "drive 1 is cold; drive 2 is cold; drive 3 is cold; drive 4 is cold"
+    assert caught.value.problem == f"refuses 'set machine on': {four}; and 1 more"
 
 
 async def test_the_explanations_of_2_10_come_with_the_refusal(play):
@@ -237,6 +239,26 @@ async def test_a_refusal_of_2_10_without_a_nak(play):
     )
     with pytest.raises(CommandRefused, match="while SET MDI command is still active"):
         await driver.prepare()
+
+
+async def test_a_stop_while_preparing_keeps_it_from_homing(play):
+    stopped = asyncio.Event()
+    driver = await play.opened(
+        [
+            *UNTIL_HOMED,
+            *NOT_HOMED,
+            IN_JOINT_MODE[0],
+            ("get teleop_enable", stopped, b"TELEOP_ENABLE NO\r\n"),
+            NO_ERROR,
+        ],
+        play.STOPPING,
+    )
+    preparing = asyncio.create_task(driver.prepare())
+    await asyncio.sleep(0.05)
+    await driver.stop()
+    stopped.set()
+    with pytest.raises(MotionInterrupted, match="was stopped before it was ready"):
+        await preparing
 
 
 async def test_positions_that_are_none(play):

@@ -47,6 +47,7 @@ async def test_the_command_runs_while_the_machine_is_off(play, tmp_path):
 
 
 async def test_a_machine_that_does_not_go_off_is_not_reloaded(play, tmp_path):
+    play.patience = play.IMPATIENT
     ran = tmp_path / "ran"
     driver = await play.opened([BEFORE, OFF[0]], reload_command=python(f"open({str(ran)!r}, 'w').close()"))
     play.servers[0].afterwards = {
@@ -89,6 +90,7 @@ async def test_lost_references_are_found_again_and_joints_are_then_where_they_ar
 
 
 async def test_an_emergency_stop_meanwhile_is_not_reset(play):
+    play.patience = play.IMPATIENT
     driver = await play.opened([BEFORE, *OFF, ON[0]])
     play.servers[0].afterwards = {
         "get machine": b"MACHINE OFF\r\n",
@@ -127,6 +129,7 @@ async def test_a_controller_that_needs_a_moment_to_come_back(play):
 
 
 async def test_a_controller_that_does_not_come_back(play):
+    play.patience = play.IMPATIENT
     driver = await play.opened(
         [BEFORE, OFF[0], (*OFF[1], play.HANG_UP)],
         reload_command=python("import time; time.sleep(0.05)"),

@@ -34,7 +34,7 @@ async def test_one_that_takes_too_long_is_killed(tmp_path):
 
 async def test_a_cancelled_one_is_killed(tmp_path):
     running = asyncio.create_task(reload_command.run(_saying_who(tmp_path), "controller", 60.0))
-    while not (tmp_path / "pid").exists():
+    while not (tmp_path / "pid").exists():  # noqa: ASYNC110 - another process writes it
         await asyncio.sleep(0.01)
     running.cancel()
     with pytest.raises(asyncio.CancelledError):

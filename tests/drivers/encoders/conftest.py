@@ -170,6 +170,17 @@ async def bank(settings: EncoderSettings) -> AsyncIterator[Cia406Bank]:
 @pytest.fixture
 async def impatient(settings: EncoderSettings) -> AsyncIterator[Cia406Bank]:
     """A bank for tests in which somebody stays silent."""
-    bank = Cia406Bank(settings.model_copy(update={"timeout_s": 0.1}))
+    bank = Cia406Bank(settings.model_copy(update={"timeout_s": 0.2}))
     yield bank
     await bank.close()
+
+
+@pytest.fixture
+def hurry() -> Callable[..., None]:
+    """Shorten an open bank's wait for rounds, for tests in which somebody stays silent."""
+
+    def shorten(bank: Cia406Bank, timeout_s: float = 0.04) -> None:
+        assert bank._session is not None
+        bank._session._rounds._timeout_s = timeout_s
+
+    return shorten

@@ -134,10 +134,11 @@ async def test_reads_from_many_tasks_take_turns(raw, bank):
     assert len({found.counts for found in rounds}) == 20
 
 
-async def test_a_slow_device_does_not_hold_up_the_event_loop(raw, impatient):
-    await impatient.open()
+async def test_a_slow_device_does_not_hold_up_the_event_loop(raw, bank, hurry):
+    await bank.open()
+    hurry(bank)
     raw.nodes[1].answers_sync = lambda _: []
-    reading = asyncio.ensure_future(impatient.read())
+    reading = asyncio.ensure_future(bank.read())
     longest = 0.0
     while not reading.done():
         begin = time.monotonic()

@@ -62,43 +62,47 @@ async def test_unsigned_positions_do_not_turn_negative(raw, settings):
     await bank.close()
 
 
-async def test_an_incomplete_round_is_discarded_and_tried_again(raw, impatient):
-    await impatient.open()
+async def test_an_incomplete_round_is_discarded_and_tried_again(raw, bank, hurry):
+    await bank.open()
+    hurry(bank)
     for node in raw.nodes.values():
         node.answers_sync = lambda sync, node=node: (
             [] if (sync, node.node) == (2, 3) else [counts(100 * sync + node.node)]
         )
-    assert (await impatient.read()).counts == (301, 302, 303, 304, 305, 306)
-    assert (await impatient.read()).counts == (401, 402, 403, 404, 405, 406)
+    assert (await bank.read()).counts == (301, 302, 303, 304, 305, 306)
+    assert (await bank.read()).counts == (401, 402, 403, 404, 405, 406)
 
 
-async def test_a_silent_leg_is_named_after_bounded_tries(raw, impatient):
-    await impatient.open()
+async def test_a_silent_leg_is_named_after_bounded_tries(raw, bank, hurry):
+    await bank.open()
+    hurry(bank)
     raw.nodes[5].answers_sync = lambda _: []
     begin, before = time.monotonic(), raw.syncs
     with pytest.raises(
         SilentNodeError, match=r"encoder of leg 5 \(node 5\): no answer to SYNC.*its supply"
     ):
-        await impatient.read()
+        await bank.read()
     assert raw.syncs - before == TRIES
     assert time.monotonic() - begin < 2.0
 
 
-async def test_silence_of_all_points_at_the_bus(raw, impatient):
-    await impatient.open()
+async def test_silence_of_all_points_at_the_bus(raw, bank, hurry):
+    await bank.open()
+    hurry(bank)
     for node in raw.nodes.values():
         node.answers_sync = lambda _: []
     with pytest.raises(SilentNodeError, match=r"leg 1 .*leg 6 .*CAN adapter, supply and termination"):
-        await impatient.read()
+        await bank.read()
 
 
-async def test_after_silence_the_bank_reads_on(raw, impatient):
-    await impatient.open()
+async def test_after_silence_the_bank_reads_on(raw, bank, hurry):
+    await bank.open()
+    hurry(bank)
     raw.nodes[5].answers_sync = lambda _: []
     with pytest.raises(SilentNodeError):
-        await impatient.read()
+        await bank.read()
     raw.nodes[5].answers_sync = None
-    assert (await impatient.read()).counts[4] == 5000
+    assert (await bank.read()).counts[4] == 5000
 
 
 async def test_an_answer_just_late_is_waited_for_before_the_next_sync(raw, settings):

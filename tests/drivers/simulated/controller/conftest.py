@@ -18,9 +18,7 @@ from hexacell.cell.devices import ControllerSettings
 from hexacell.errors import FileError
 from hexacell.pose import Pose
 
-QUICK = Patience(
-    connect=2.0, answer=0.5, remark=0.1, poll=0.005, arrival=0.05, stop=1.0, switch=0.05, comeback=1.0
-)
+QUICK = Patience(poll=0.005, arrival=0.05, switch=0.05)
 
 
 class FakeMachine:
@@ -30,6 +28,7 @@ class FakeMachine:
         self.duration_s = 0.01
         self.config: float | None = 0.0
         self.jump_mm = 0.0
+        self.deaf_to = 0
         self.events: list[str] = []
         self._geometry = 0.0
         self._joints = (0.0,) * 6
@@ -50,7 +49,10 @@ class FakeMachine:
                 self._joints = tuple(a + share * (b - a) for a, b in zip(start, target, strict=True))
 
     def stop(self) -> None:
-        self._stop.set()
+        if self.deaf_to > 0:
+            self.deaf_to -= 1
+        else:
+            self._stop.set()
 
     def wait_until(self, condition: Callable[[FakeMachine], bool]) -> None:
         give_up = time.monotonic() + 5.0
@@ -168,8 +170,8 @@ def client(simulated: SimulatedController) -> Iterator[Callable[[], RawClient]]:
 def driver(simulated: SimulatedController) -> Callable[..., LinuxcncrshController]:
     """Makes drivers for ``simulated``; keywords are controller settings."""
 
-    def make(**settings: object) -> LinuxcncrshController:
-        values = {"config": "machine.ini", "port": simulated.port, "move_timeout_s": 5.0, **settings}
-        return LinuxcncrshController(ControllerSettings.model_validate(values), patience=QUICK)
+    def make(patience: Patience = QUICK, **settings: object) -> LinuxcncrshController:
+        values = {"config": "machine.ini", "port": simulated.port, **settings}
+        return LinuxcncrshController(ControllerSettings.model_validate(values), patience=patience)
 
     return make

@@ -187,6 +187,22 @@ def test_a_move_is_acknowledged_on_receipt_unless_told_otherwise(client, machine
     assert machine.pose().x < 99.0
 
 
+def test_an_abort_drops_the_moves_that_wait(client, machine):
+    me = client()
+    me.make_ready()
+    me.say("set set_wait received", b"SET SET_WAIT ACK\n\r")
+    machine.duration_s = 30.0
+    me.say("set mdi G0 X100", b"SET MDI ACK\n\r")
+    me.say("set mdi G0 X200", b"SET MDI ACK\n\r")
+    machine.wait_for("move")
+    me.say("set abort", b"SET ABORT ACK\n\r")
+    machine.duration_s = 0.01
+    me.say("set set_wait done", b"SET SET_WAIT ACK\n\r")
+    me.say("set mdi G0 X300", b"SET MDI ACK\n\r")
+    assert machine.events.count("move") == 2
+    assert machine.pose().x == 300.0
+
+
 def test_a_machine_goes_on_when_the_client_goes(client, machine):
     first, second = client(), client()
     first.make_ready()
@@ -290,6 +306,7 @@ def test_closing_ends_a_move_and_may_be_repeated(client, simulated, machine):
     machine.duration_s = 30.0
     me.send("set mdi G0 X100")
     machine.wait_for("move")
+    machine.deaf_to = 2
     simulated.close()
     simulated.close()
     assert machine.pose().x < 99.0

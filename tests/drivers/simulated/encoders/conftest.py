@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
+from types import SimpleNamespace
 from typing import Any
 
 import can
@@ -15,6 +16,13 @@ from drivers.simulated.encoders import SimulatedEncoderBank
 from drivers.simulated.slcan import serve_slcan
 from hexacell.cell.devices import EncoderSettings
 from hexacell.clock import CellClock
+
+
+@pytest.fixture(autouse=True)
+def no_nap_after_closing_a_socket(monkeypatch: pytest.MonkeyPatch) -> None:
+    """pyserial's ``socket://`` sleeps 0.3 s after closing, for the sake of slow servers."""
+    awake = SimpleNamespace(sleep=lambda _seconds: None)
+    monkeypatch.setattr("serial.urlhandler.protocol_socket.time", awake)
 
 
 class Samples:
@@ -93,7 +101,7 @@ class Listener:
     def send(self, can_id: int, *data: int) -> None:
         self.bus.send(can.Message(arbitration_id=can_id, data=bytes(data), is_extended_id=False))
 
-    def heard(self, seconds: float = 0.1) -> list[tuple[int, str]]:
+    def heard(self, seconds: float = 0.06) -> list[tuple[int, str]]:
         """Everything that comes in so many seconds: (id, data in hexadecimal)."""
         deadline, frames = time.monotonic() + seconds, []
         while (left := deadline - time.monotonic()) > 0:
@@ -122,3 +130,14 @@ def listen() -> Iterator[Callable[[SimulatedEncoderBank], Listener]]:
             return Listener(stack.enter_context(can.Bus(**bank.bus_settings)))
 
         yield make
+
+
+@pytest.fixture
+def hurry() -> Callable[..., None]:
+    """Shorten an open bank's wait for rounds, for tests in which somebody stays silent."""
+
+    def shorten(bank: Cia406Bank, timeout_s: float = 0.04) -> None:
+        assert bank._session is not None
+        bank._session._rounds._timeout_s = timeout_s
+
+    return shorten

@@ -60,17 +60,3 @@ class Geometry:
         """The geometry ``fraction`` of the way to ``other``; 0 is this one, 1 the other."""
         return Geometry.from_vector((1.0 - fraction) * self.vector() + fraction * other.vector())
 
-
-def per_leg(vector: Array) -> Array:
-    """A vector over the parameters (..., 42) as (..., 6, 7): S, B and l of each leg."""
-    s = vector[..., :18].reshape(*vector.shape[:-1], LEGS, 3)
-    b = vector[..., 18:36].reshape(*vector.shape[:-1], LEGS, 3)
-    return np.concatenate([s, b, vector[..., 36:, None]], axis=-1)
-
-
-def from_per_leg(legs: Array) -> Array:
-    """The inverse of :func:`per_leg`: (..., 6, 7) to (..., 42)."""
-    lead = legs.shape[:-2]
-    return np.concatenate(
-        [legs[..., 0:3].reshape(*lead, 18), legs[..., 3:6].reshape(*lead, 18), legs[..., 6]], axis=-1
-    )

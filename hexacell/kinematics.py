@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from hexacell import rotations
 from hexacell.errors import ReachError
-from hexacell.geometry import Geometry, from_per_leg
+from hexacell.geometry import Geometry
 from hexacell.mechanisms.base import Branch, Mechanism
 from hexacell.pose import Poses
 from hexacell.rotations import Array, Mask
@@ -126,10 +126,11 @@ def sensitivity(mechanism: Mechanism, geometry: Geometry, poses: Poses, joints: 
     """Implicit derivatives ``-J_pose^-1 J`` at n poses that close the mechanism."""
     linear = mechanism.linearise(geometry, poses, joints)
     inverse_jacobian = -np.linalg.inv(linear.pose)
-    by_leg = inverse_jacobian[..., :, :, None] * linear.parameters[..., None, :, :]
+    by_leg = inverse_jacobian[..., None], linear.parameters[..., None, :, :]
+    columns = [by_leg[0] * by_leg[1][..., part] for part in (slice(3), slice(3, 6), slice(6, 7))]
     return Sensitivity(
         joints=inverse_jacobian * linear.joints[..., None, :],
-        parameters=from_per_leg(by_leg),
+        parameters=np.concatenate([part.reshape(len(poses), 6, 6 * part.shape[-1]) for part in columns], axis=-1),
         mode=assembly_mode(linear.pose),
     )
 

@@ -33,10 +33,13 @@ def to_angles(rotation: ArrayLike) -> Array:
     """Angles a, b, c (..., 3), rad, with b in [-pi/2, pi/2]; at b = +-pi/2, c is set to 0."""
     r = np.asarray(rotation, dtype=float)
     cos_b = np.hypot(r[..., 0, 0], r[..., 1, 0])
-    gimbal = cos_b < 1e-12
-    a = np.where(gimbal, np.arctan2(-r[..., 1, 2], r[..., 1, 1]), np.arctan2(r[..., 2, 1], r[..., 2, 2]))
     b = np.arctan2(-r[..., 2, 0], cos_b)
-    c = np.where(gimbal, 0.0, np.arctan2(r[..., 1, 0], r[..., 0, 0]))
+    c = np.where(cos_b < 1e-12, 0.0, np.arctan2(r[..., 1, 0], r[..., 0, 0]))
+    # Read with c undone, so that near b = +-pi/2 the error of an ill-determined c does not add up.
+    sine, cosine = np.sin(c), np.cos(c)
+    a = np.arctan2(
+        sine * r[..., 0, 2] - cosine * r[..., 1, 2], cosine * r[..., 1, 1] - sine * r[..., 0, 1]
+    )
     return np.stack([a, b, c], axis=-1)
 
 

@@ -13,25 +13,30 @@ import numpy as np
 from hexacell import kinematics
 from hexacell.geometry import Geometry
 from hexacell.identification import levenberg_marquardt
-from hexacell.identification.levenberg_marquardt import Solution, Termination
+from hexacell.identification.levenberg_marquardt import FAR_AWAY, Manner, Solution, Termination
 from hexacell.identification.problem import Problem
 from hexacell.pose import Poses
 from hexacell.rotations import Array, Mask
 
 
-def solve(problem: Problem, precision: Array, *, free: Array, poses: Poses) -> tuple[Problem, Solution]:
+def solve(
+    problem: Problem, precision: Array, *, free: Array, poses: Poses, manner: Manner = FAR_AWAY
+) -> tuple[Problem, Solution]:
     """As :func:`levenberg_marquardt.solve`; also gives the records that took part in the end."""
     used = np.ones(problem.records, dtype=bool)
     taken_back = np.zeros(problem.records, dtype=bool)
     while True:
         kept = problem.keeping(used)
-        solution = levenberg_marquardt.solve(kept, precision, free=free, poses=poses)
+        solution = levenberg_marquardt.solve(kept, precision, free=free, poses=poses, manner=manner)
         free, poses = solution.free, solution.prediction.poses
         if solution.termination is Termination.SINGULAR and not solution.singular.all():
             used[np.flatnonzero(used)[solution.singular]] = False
             poses = poses[~solution.singular]
             continue
-        returning, everywhere = _returning(problem, free, ~used & ~taken_back)
+        aside = ~used & ~taken_back
+        if not aside.any():
+            return kept, solution
+        returning, everywhere = _returning(problem, free, aside)
         if not returning.any():
             return kept, solution
         poses = _merged(problem.records, used, poses, returning, everywhere)

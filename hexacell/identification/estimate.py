@@ -12,7 +12,7 @@ import numpy as np
 from hexacell.errors import IdentifiabilityError
 from hexacell.geometry import Geometry
 from hexacell.identification import centring, detour, outliers
-from hexacell.identification.levenberg_marquardt import Solution, solve
+from hexacell.identification.levenberg_marquardt import NEARBY, Solution, solve
 from hexacell.identification.problem import Problem
 from hexacell.identification.result import Identification, Outlier
 from hexacell.pose import Poses
@@ -81,7 +81,7 @@ def _solve_with_release(problem: Problem) -> tuple[Problem, Solution, Array]:
     centre = problem.mechanism.convention.free_part(problem.prior.centre)
     kept, cautious = detour.solve(problem, precision, free=centre, poses=problem.start)
     held = _precision_where_silent(cautious.information, problem.prior.covariance)
-    solution = solve(kept, held, free=cautious.free, poses=cautious.prediction.poses)
+    solution = solve(kept, held, free=cautious.free, poses=cautious.prediction.poses, manner=NEARBY)
     return kept, solution, np.linalg.inv(solution.information + held)
 
 

@@ -19,10 +19,11 @@ from hexacell.identification.problem import Problem
 from hexacell.pose import Poses
 from hexacell.rotations import Array, Mask
 
-INITIAL_DAMPING = 1e-4
+CAUTIOUS_DAMPING = 1e-4
+NEARLY_NO_DAMPING = 1e-9
 SMALLEST_DAMPING = 1e-12
 LARGEST_DAMPING = 1e12
-STEP_MM = 1e-9
+FINAL_STEP_MM = 1e-9
 ITERATIONS = 200
 REFUSALS_BEFORE_SINGULAR = 6
 LARGEST_AMPLIFICATION = 100.0
@@ -68,7 +69,24 @@ class Solution:
         return self.prediction.free
 
 
-def solve(problem: Problem, precision: Array, *, free: Array, poses: Poses) -> Solution:
+@dataclass(frozen=True, slots=True)
+class Manner:
+    """How to search: the damping to begin with, and the step, mm, that counts as none."""
+
+    damping: float
+    step_mm: float
+
+
+FAR_AWAY = Manner(CAUTIOUS_DAMPING, 1e-3)
+"""From the drawing, millimetres away, to the neighbourhood of the solution."""
+
+NEARBY = Manner(NEARLY_NO_DAMPING, FINAL_STEP_MM)
+"""From the neighbourhood to the solution itself: Gauss-Newton steps unless one fails."""
+
+
+def solve(
+    problem: Problem, precision: Array, *, free: Array, poses: Poses, manner: Manner = FAR_AWAY
+) -> Solution:
     """Minimise from the free parameters (p,), mm, and poses that close that geometry.
 
     Args:
@@ -76,8 +94,9 @@ def solve(problem: Problem, precision: Array, *, free: Array, poses: Poses) -> S
         precision: (p, p) of the prior, 1/mm^2; zero for none.
         free: where to start.
         poses: the platform at each record under ``free``.
+        manner: of the search.
     """
-    search = _Search(problem, precision, model.predict(problem, free, poses))
+    search = _Search(problem, precision, manner, model.predict(problem, free, poses))
     iterations = 0
     ended: Termination | None = None
     while ended is None:
@@ -90,13 +109,14 @@ def solve(problem: Problem, precision: Array, *, free: Array, poses: Poses) -> S
 class _Search:
     """The iterate, its damping, and one step at a time."""
 
-    def __init__(self, problem: Problem, precision: Array, start: model.Prediction) -> None:
+    def __init__(self, problem: Problem, precision: Array, manner: Manner, start: model.Prediction) -> None:
         self.problem = problem
         self.precision = precision
         self.centre = problem.mechanism.convention.free_part(problem.prior.centre)
         self.now = start
         self.centring = centring.Centring(problem, start.weights)
-        self.damping = INITIAL_DAMPING
+        self.manner = manner
+        self.damping = manner.damping
         self.growth = 2.0
         self.refusals = 0
         self.singular = start.amplification > LARGEST_AMPLIFICATION
@@ -110,7 +130,7 @@ class _Search:
         if self.singular.any():
             return Termination.SINGULAR
         step = _Step.of(self.linear(), self.precision, self.now.free - self.centre, self.damping)
-        if np.abs(step.free).max() < STEP_MM and self.damping <= INITIAL_DAMPING:
+        if np.abs(step.free).max() < self.manner.step_mm and self.damping <= self.manner.damping:
             return Termination.STEP
         trial = model.try_step(self.problem, self.now, step.free)
         if not trial.found.all():
@@ -124,7 +144,7 @@ class _Search:
     def _accept(self, step: _Step, poses: Poses, gain: _Gain) -> None:
         self.now = model.predict(self.problem, self.now.free + step.free, poses)
         self.centring = centring.Centring(self.problem, self.now.weights)
-        self.damping *= max(1.0 / 3.0, 1.0 - (2.0 * gain.ratio - 1.0) ** 3)
+        self.damping *= max(0.1, 1.0 - (2.0 * gain.ratio - 1.0) ** 3)
         self.damping = max(self.damping, SMALLEST_DAMPING)
         self.growth, self.refusals = 2.0, 0
         self.singular = self.now.amplification > LARGEST_AMPLIFICATION

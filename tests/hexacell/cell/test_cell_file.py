@@ -17,7 +17,7 @@ def test_what_a_cell_file_gives(load_text, cell_text, cell_path):
     cell = load_text(cell_text)
     assert cell.path == cell_path
     assert cell.text == cell_text
-    assert cell.settings.name == "simulated Hexaglide"
+    assert cell.settings.name == "simulated-hexaglide"
     assert cell.settings.limits.tilt_deg == 45.0
 
 
@@ -150,8 +150,8 @@ MISTAKES = [
     ("tilt_deg = 45.0", f"tilt_deg = 1{'0' * 400}", "but must be a finite number"),
     ("joint_min_mm = -800.0", "joint_min_mm = 800.0", "joint_min_mm must be below joint_max_mm"),
     ("version = 1", "version = 2", "'version' at the top of the file is 2, but must be 1"),
-    ('name = "simulated Hexaglide"', 'name = ""', "but must be text that is not empty"),
-    ('name = "simulated Hexaglide"', "name = 2020-02-02", "is a date or a time, but must be"),
+    ('name = "simulated-hexaglide"', 'name = ""', "but must be text that is not empty"),
+    ('name = "simulated-hexaglide"', "name = 2020-02-02", "is a date or a time, but must be"),
     (
         'axis = "z"',
         'axis = "u"',
@@ -219,7 +219,7 @@ def test_what_is_passed_on_is_finite_and_plain_too(load_changed, value):
 def test_missing_key_names_its_section(load_changed, line_with, removed, message, at):
     with pytest.raises(FileError, match=re.escape(message)) as refused:
         load_changed((removed, ""))
-    header = line_with("[controller]") if at == "[controller]" else line_with('"gauge z"') - 1
+    header = line_with("[controller]") if at == "[controller]" else line_with('"z"') - 1
     assert refused.value.line == header
 
 
@@ -232,7 +232,7 @@ def test_empty_file_misses_every_section_at_once(load_text):
 
 
 def test_two_gauges_are_too_few(load_text, cell_text):
-    start, end = cell_text.index('[[gauges]]\nname = "gauge z"'), cell_text.index("[encoders]")
+    start, end = cell_text.index('[[gauges]]\nname = "z"'), cell_text.index("[encoders]")
     with pytest.raises(FileError, match="list of 2 items, but must be 3 sections"):
         load_text(cell_text[:start] + cell_text[end:])
 
@@ -241,7 +241,7 @@ def test_two_gauges_are_too_few(load_text, cell_text):
     ("changes", "message"),
     [
         ([('axis = "z"', 'axis = "x"')], "x, y and z, one each"),
-        ([('"gauge z"', '"gauge x"')], "same name"),
+        ([('"z"', '"x"')], "same name"),
         (
             [
                 ('"sylvac"', '"mux10"\nport = "/dev/a"'),

@@ -1,0 +1,69 @@
+"""The model linearised where an identification ended: what the checks of it start from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from hexacell import kinematics
+from hexacell.identification.centring import CentredSystem, Centring
+from hexacell.identification.model import record_weights
+from hexacell.identification.problem import Problem
+from hexacell.identification.result import Identification
+from hexacell.rotations import Array
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Linearised:
+    """The records to first order in the parameters and in the noise.
+
+    Attributes:
+        problem: the records that were used.
+        covariance: of the free parameters (p, p), mm^2.
+        from_centre: the free parameters less the prior's centre (p,), mm.
+        residuals: (n, 3), mm, each point's unknown constant still in them.
+        jacobian: (n, 3, p) of the residuals by the free parameters.
+        by_joints: (n, 3, 6) of the ball's position by the joint variables.
+    """
+
+    problem: Problem
+    covariance: Array
+    from_centre: Array
+    residuals: Array
+    jacobian: Array
+    by_joints: Array
+
+    @classmethod
+    def at(cls, found: Identification) -> Linearised:
+        """The model at the solution of an identification."""
+        problem = found.problem
+        sensitivity = kinematics.sensitivity(problem.mechanism, found.geometry, found.poses, problem.joints)
+        return cls(
+            problem=problem,
+            covariance=found.free_covariance,
+            from_centre=found.free - problem.mechanism.convention.free_part(problem.prior.centre),
+            residuals=found.poses.positions - problem.deviations,
+            jacobian=sensitivity.parameters[:, :3] @ problem.basis,
+            by_joints=sensitivity.joints[:, :3],
+        )
+
+    def weights(self, variances: Array | None = None) -> Array:
+        """Inverse covariance (n, 3, 3) of each record, 1/mm^2.
+
+        ``variances`` (2,), mm^2, of encoders and gauges, instead of the stated ones.
+        """
+        noise = self.problem.noise
+        if variances is not None:
+            encoder, gauge = np.sqrt(variances)
+            noise = replace(noise, encoder_mm=float(encoder), gauge_mm=float(gauge))
+        return record_weights(self.by_joints, noise)
+
+    def system(self, centring: Centring) -> CentredSystem:
+        """The linear problem under some weights."""
+        return centring.system(self.residuals, self.jacobian)
+
+    def held(self) -> Array:
+        """Precision (p, p), 1/mm^2, of the prior as far as it took part."""
+        information = self.system(Centring(self.problem, self.weights())).information()
+        return np.linalg.inv(self.covariance) - information

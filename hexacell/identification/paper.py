@@ -17,7 +17,8 @@ from hexacell.errors import ConvergenceError
 from hexacell.geometry import Geometry
 from hexacell.identification import model
 from hexacell.identification.problem import Problem
-from hexacell.pose import Poses
+from hexacell.identification.result import Identification
+from hexacell.kinematics import Forward
 from hexacell.rotations import Array
 
 
@@ -35,15 +36,25 @@ def error_vector(problem: Problem, residuals: Array) -> Array:
     return (residuals[rows[:, 0]] - residuals[rows[:, 1]]).ravel()
 
 
-def gauss_newton(problem: Problem, *, steps: int = 30, tolerance_mm: float = 1e-9) -> Geometry:
-    """Eq. 13: ``d <- d - (A^T A)^-1 A^T E``, from the drawing.
+def gauss_newton(
+    problem: Problem,
+    *,
+    start: Identification | None = None,
+    steps: int = 30,
+    tolerance_mm: float = 1e-9,
+) -> Geometry:
+    """Eq. 13: ``d <- d - (A^T A)^-1 A^T E``, from the drawing, or from a result for these records.
 
     Raises:
         ConvergenceError: it left the assembly mode or did not settle; the paper's method needs a
             good initial estimate.
     """
+    if start is None:
+        problem = problem.keeping(problem.startable)
     free = problem.mechanism.convention.free_part(problem.prior.centre)
     poses, rows = problem.start, pairs(problem)
+    if start is not None:
+        free, poses = start.free, start.poses
     for _ in range(steps):
         prediction = model.predict(problem, free, poses)
         error = error_vector(problem, prediction.residuals)
@@ -68,8 +79,11 @@ def least_squares_without_jacobian(problem: Problem) -> Geometry:
     """
     centre = problem.mechanism.convention.free_part(problem.prior.centre)
 
+    def reached(free: Array) -> Forward:
+        return problem.commands.followed(Geometry.from_vector(problem.basis @ free), problem.joints)
+
     def error(free: Array) -> Array:
-        return _error_from(problem, free, problem.start)
+        return error_vector(problem, reached(free).poses.positions - problem.deviations)
 
     found = least_squares(
         error,
@@ -81,14 +95,6 @@ def least_squares_without_jacobian(problem: Problem) -> Geometry:
         gtol=1e-15,
         max_nfev=100,
     )
-    geometry = Geometry.from_vector(problem.basis @ found.x)
-    reached = kinematics.forward(problem.mechanism, geometry, problem.joints, problem.start)
-    if not found.success or not reached.found.all():
+    if not found.success or not reached(found.x).found.all():
         raise ConvergenceError(f"the least-squares solver ended without a solution: {found.message}")
-    return geometry
-
-
-def _error_from(problem: Problem, free: Array, start: Poses) -> Array:
-    geometry = Geometry.from_vector(problem.basis @ free)
-    poses = kinematics.forward(problem.mechanism, geometry, problem.joints, start).poses
-    return error_vector(problem, poses.positions - problem.deviations)
+    return Geometry.from_vector(problem.basis @ found.x)

@@ -1,0 +1,49 @@
+"""What all benchmarks share: the cell of Table 1, and a line for each figure."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hexacell.bundled import bundled_config
+from hexacell.cell.file import load_cell
+from hexacell.geometry import Geometry
+from hexacell.robot import Robot, robot_of
+from hexacell.rotations import Array
+
+Say = Callable[[str, str, str], None]
+
+
+@dataclass(frozen=True)
+class TableOne:
+    """The robot of Table 1, its hidden geometry, and P1 to P5 of Table 3 (Abtahi et al. 2010)."""
+
+    robot: Robot
+    truth: Geometry
+    points: Array
+
+
+@pytest.fixture(scope="session")
+def table_one() -> TableOne:
+    cell = load_cell(Path(bundled_config("simulated-hexaglide")))
+    assert cell.settings.simulation is not None
+    values = cell.settings.simulation.geometry
+    return TableOne(
+        robot_of(cell),
+        Geometry(values.S, values.B, values.l),
+        np.array(cell.settings.identification.points),
+    )
+
+
+@pytest.fixture(scope="session")
+def say() -> Say:
+    """Prints a figure beside what it must reach."""
+
+    def line(figure: str, measured: str, target: str) -> None:
+        print(f"\n  {figure:<58} {measured:>22}   ({target})", end="")
+
+    return line

@@ -1,0 +1,84 @@
+"""The same estimate by a compiled peer: CasADi with its automatic derivatives, solved by IPOPT.
+
+The peer gets the problem in the form that suits it best: poses and each point's constant are
+unknowns beside the 35 parameters, the legs are constraints, derivatives of first and second order
+are exact and sparse, and our final weights are given to it. Building its expressions is not timed.
+"""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+import pytest
+
+from hexacell.identification import model
+from hexacell.identification.estimate import identify
+from hexacell.identification.problem import Problem
+from hexacell.study import campaigns
+
+casadi = pytest.importorskip("casadi", reason="the peer is not installed: make bench installs it")
+
+
+def peer(problem: Problem, weights: np.ndarray):
+    """A CasADi solver of the weighted problem, and where it starts."""
+    parameters = casadi.SX.sym("parameters", 35)
+    vector = casadi.DM(problem.basis) @ parameters
+    S, B = (casadi.reshape(vector[part], 3, 6) for part in (slice(0, 18), slice(18, 36)))
+    constants = [casadi.SX.sym(f"c{point}", 3) for point in range(problem.points)]
+    unknowns, start = [parameters], [problem.mechanism.convention.free_part(problem.prior.centre)]
+    legs, residuals = [], []
+    points = np.cumsum(np.isin(np.arange(problem.records), problem.first_rows)) - 1
+    factors = np.swapaxes(np.linalg.cholesky(weights), 1, 2)
+    for row in range(problem.records):
+        position, turn = casadi.SX.sym(f"P{row}", 3), casadi.SX.sym(f"w{row}", 3)
+        rotation = _rotation(turn) @ casadi.DM(problem.start.rotations[row])
+        for leg in range(6):
+            v = S[:, leg] - position - rotation @ B[:, leg]
+            v[0] += problem.joints[row, leg]
+            length = vector[36 + leg]
+            legs.append((casadi.sumsqr(v) - length**2) / (2 * length))
+        deviation = casadi.DM(problem.deviations[row])
+        residuals.append(casadi.DM(factors[row]) @ (position - deviation - constants[points[row]]))
+        unknowns += [position, turn]
+        start += [problem.start.positions[row], np.zeros(3)]
+    start += [problem.start.positions[row] for row in problem.first_rows]
+    program = {
+        "x": casadi.vertcat(*unknowns, *constants),
+        "f": casadi.sumsqr(casadi.vertcat(*residuals)) / 2,
+        "g": casadi.vertcat(*legs),
+    }
+    options = {"ipopt.print_level": 0, "ipopt.sb": "yes", "print_time": 0, "ipopt.tol": 1e-8}
+    return casadi.nlpsol("peer", "ipopt", program, options), np.concatenate(start)
+
+
+def _rotation(turn):
+    square = casadi.sumsqr(turn) + 1e-30
+    angle = casadi.sqrt(square)
+    k = casadi.skew(turn)
+    return casadi.SX.eye(3) + casadi.sin(angle) / angle * k + (1 - casadi.cos(angle)) / square * (k @ k)
+
+
+def test_no_slower_than_the_compiled_peer(table_one, say) -> None:
+    random = np.random.default_rng(20)
+    campaign = campaigns.unlimited_travel(
+        table_one.robot, table_one.truth, table_one.points, 20, np.radians(20), random
+    )
+    problem = table_one.robot.problem(campaign.measured(0.01, random))
+    found = identify(problem)
+    weights = model.predict(found.problem, found.free, found.poses).weights
+    solver, start = peer(problem, weights)
+    theirs, ours = [], []
+    for _ in range(5):
+        begun = time.process_time()
+        solution = solver(x0=start, lbg=0, ubg=0)
+        theirs.append(time.process_time() - begun)
+        begun = time.process_time()
+        identify(problem)
+        ours.append(time.process_time() - begun)
+    apart = np.abs(np.asarray(solution["x"]).ravel()[:35] - found.free).max()
+    ratio = min(theirs) / min(ours)
+    say("CasADi and IPOPT, compiled, exact derivatives, 5x20", f"{ratio:.1f} times as long", "at least 1")
+    say("  its solution differs from ours by", f"{apart:.1e} mm", "the same minimum")
+    assert apart < 1e-4
+    assert ratio >= 1.0

@@ -1,0 +1,122 @@
+"""How long an identification takes: as ratios within one run, and as exponents.
+
+Times are of the processor, not of the wall, so that other work on the machine counts little.
+"""
+
+from __future__ import annotations
+
+import time
+import tracemalloc
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from scipy.optimize import least_squares, root
+
+from hexacell import rotations
+from hexacell.geometry import Geometry
+from hexacell.identification.estimate import identify, track
+from hexacell.identification.paper import error_vector, least_squares_without_jacobian
+from hexacell.identification.problem import Problem
+from hexacell.measurements import MeasurementSet, Record
+from hexacell.study import campaigns
+
+SIZES = (1_000, 3_000, 10_000, 30_000, 100_000)
+
+
+def processor_seconds(work: Callable[[], object], repeats: int) -> float:
+    """The quickest of some runs: what disturbs only ever adds."""
+    taken = []
+    for _ in range(repeats):
+        begun = time.process_time()
+        work()
+        taken.append(time.process_time() - begun)
+    return min(taken)
+
+
+@pytest.fixture(scope="module")
+def records_5x20(table_one) -> Problem:
+    random = np.random.default_rng(20)
+    campaign = campaigns.unlimited_travel(
+        table_one.robot, table_one.truth, table_one.points, 20, np.radians(20), random
+    )
+    return table_one.robot.problem(campaign.measured(0.01, random))
+
+
+def test_against_the_pairwise_finite_difference_solve(records_5x20: Problem, say) -> None:
+    ours = processor_seconds(lambda: identify(records_5x20), 5)
+    batched = processor_seconds(lambda: least_squares_without_jacobian(records_5x20), 1)
+    literal = processor_seconds(lambda: as_the_paper_says(records_5x20), 1)
+    say("5x20 records, identified in", f"{1e3 * ours:.1f} ms", "one core, outliers sought too")
+    say("  pairwise least squares by finite differences", f"{literal / ours:.0f} times as long", "200")
+    say(
+        "  the same with our batched forward kinematics",
+        f"{batched / ours:.0f} times as long",
+        "200: missed",
+    )
+    assert literal >= 200 * ours
+
+
+def as_the_paper_says(problem: Problem) -> np.ndarray:
+    """Eq. 4 to 8 and lsqnonlin, written down: each record's pose solved for, each pair subtracted."""
+    poses = [
+        np.concatenate([problem.start.positions[row], rotations.to_angles(problem.start.rotations[row])])
+        for row in range(problem.records)
+    ]
+
+    def position(row: int, geometry: Geometry) -> np.ndarray:
+        def legs(pose: np.ndarray) -> np.ndarray:
+            v = geometry.S - pose[:3] - geometry.B @ rotations.from_angles(pose[3:]).T
+            v[:, 0] += problem.joints[row]
+            return np.sum(v * v, axis=1) - geometry.l**2
+
+        return root(legs, poses[row]).x[:3]
+
+    def errors(free: np.ndarray) -> np.ndarray:
+        geometry = Geometry.from_vector(problem.basis @ free)
+        found = np.array([position(row, geometry) for row in range(problem.records)])
+        return error_vector(problem, found - problem.deviations)
+
+    centre = problem.mechanism.convention.free_part(problem.prior.centre)
+    return least_squares(errors, centre).x
+
+
+@pytest.fixture(scope="module")
+def growth(table_one) -> dict[int, tuple[float, float]]:
+    """Seconds and bytes by the number of records."""
+    return {size: _measure(table_one, size) for size in SIZES}
+
+
+def _measure(table_one, size: int) -> tuple[float, float]:
+    problem = table_one.robot.problem(_many_records(table_one, size))
+    seconds = processor_seconds(lambda: track(problem), 2)
+    tracemalloc.start()
+    track(problem)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    return seconds, float(peak)
+
+
+def _many_records(table_one, size: int) -> MeasurementSet:
+    """A campaign of 20 poses at each point, visited again and again with new noise."""
+    random = np.random.default_rng(size)
+    campaign = campaigns.unlimited_travel(
+        table_one.robot, table_one.truth, table_one.points, 20, np.radians(20), random
+    )
+    records: list[Record] = []
+    for visit in range(size // len(campaign.joints)):
+        records += [
+            Record(r.point, r.orientation + 20 * visit, r.pose, r.joints, r.deviation)
+            for r in campaign.measured(0.01, random).records
+        ]
+    return MeasurementSet(tuple(records))
+
+
+@pytest.mark.parametrize(("what", "place"), [("time", 0), ("memory", 1)])
+def test_cost_is_linear_in_the_records(growth, say, what: str, place: int) -> None:
+    sizes = np.log(list(growth))
+    exponent = float(np.polyfit(sizes, np.log([cost[place] for cost in growth.values()]), 1)[0])
+    largest = growth[SIZES[-1]][place]
+    unit = f"{largest:.1f} s" if place == 0 else f"{largest / 2**20:.0f} MiB"
+    say(f"100,000 records: {what} {unit}; exponent", f"{exponent:.2f}", "at most 1.05")
+    assert exponent <= 1.05

@@ -1,0 +1,126 @@
+"""Is the estimator as good as the data allow, and does it know how good it is?
+
+1,000 data sets of the Table 1 robot, 5 points x 11 orientations within +-30 deg, 0.01 mm noise on
+joint variables and deviations: errors against the Cramer-Rao bound, which is computed here from
+central differences and not from the estimator's derivatives.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+from hexacell import kinematics
+from hexacell.geometry import Geometry
+from hexacell.identification.estimate import identify
+from hexacell.rotations import Array
+from hexacell.study import campaigns
+
+SETS = 1000
+NOISE_MM = 0.01
+STEP_MM = 1e-4
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """Errors (sets, 35), whether 95 % intervals cover (sets, 35), and the bound (35,)."""
+
+    errors: Array
+    covered: Array
+    bound: Array
+    removed: int
+    records: int
+
+
+@pytest.fixture(scope="module")
+def outcome(table_one) -> Outcome:
+    robot, truth = table_one.robot, table_one.truth
+    random = np.random.default_rng(1)
+    campaign = campaigns.unlimited_travel(robot, truth, table_one.points, 11, np.radians(30), random)
+    free = robot.mechanism.convention.free_part(truth)
+    errors, covered, removed = [], [], 0
+    for _ in range(SETS):
+        found = identify(robot.problem(campaign.measured(NOISE_MM, random)))
+        error = found.free - free
+        errors.append(error)
+        covered.append(np.abs(error) <= 1.959964 * np.sqrt(np.diag(found.free_covariance)))
+        removed += len(found.outliers)
+    bound = cramer_rao_bound(robot, truth, campaign)
+    return Outcome(np.array(errors), np.array(covered), bound, removed, SETS * len(campaign.joints))
+
+
+def cramer_rao_bound(robot, truth: Geometry, campaign: campaigns.Campaign) -> Array:
+    """Smallest standard deviations (35,) of an unbiased estimator, mm."""
+    positions = _position_of(robot, truth, campaign)
+    by_joints = _by_joints(lambda joints: positions(truth, joints), campaign.joints)
+    basis = robot.mechanism.convention.basis()
+    vector = truth.vector()
+    columns = []
+    for column in basis.T:
+        ahead, behind = (
+            positions(Geometry.from_vector(vector + sign * STEP_MM * column), campaign.joints)
+            for sign in (1, -1)
+        )
+        columns.append((ahead - behind) / (2 * STEP_MM))
+    by_free = np.stack(columns, axis=-1)
+    covariance = NOISE_MM**2 * (by_joints @ np.swapaxes(by_joints, 1, 2) + np.eye(3))
+    information = np.zeros((35, 35))
+    for point in np.unique(campaign.labels[:, 0]):
+        rows = np.flatnonzero(campaign.labels[:, 0] == point)
+        weights = np.linalg.inv(covariance[rows])
+        # The point's unknown constant is a parameter like the others, eliminated by Schur's complement.
+        cross = np.einsum("nij,njp->ip", weights, by_free[rows])
+        information += np.einsum("nip,nij,njr->pr", by_free[rows], weights, by_free[rows])
+        information -= cross.T @ np.linalg.solve(weights.sum(axis=0), cross)
+    return np.sqrt(np.diag(np.linalg.inv(information)))
+
+
+def _position_of(robot, truth, campaign):
+    really = kinematics.follow(
+        robot.mechanism,
+        truth,
+        campaign.joints,
+        start=campaign.commands,
+        start_geometry=robot.controller,
+        start_joints=campaign.joints,
+    ).poses
+
+    def positions(geometry: Geometry, joints: Array) -> Array:
+        return kinematics.forward(robot.mechanism, geometry, joints, really).poses.positions
+
+    return positions
+
+
+def _by_joints(positions, joints: Array) -> Array:
+    columns = []
+    for leg in range(6):
+        step = np.zeros(6)
+        step[leg] = STEP_MM
+        columns.append((positions(joints + step) - positions(joints - step)) / (2 * STEP_MM))
+    return np.stack(columns, axis=-1)
+
+
+def test_errors_are_at_the_cramer_rao_bound(outcome: Outcome, say) -> None:
+    ratio = np.sqrt(np.mean(outcome.errors**2, axis=0)) / outcome.bound
+    say("rms error / Cramer-Rao bound, median of 35", f"{np.median(ratio):.3f}", "0.98 to 1.03")
+    say("  smallest and largest", f"{ratio.min():.3f} .. {ratio.max():.3f}", "0.92 to 1.08")
+    assert 0.98 <= np.median(ratio) <= 1.03
+    assert ratio.min() >= 0.92
+    assert ratio.max() <= 1.08
+
+
+def test_intervals_cover_what_they_promise(outcome: Outcome, say) -> None:
+    each = 100 * outcome.covered.mean(axis=0)
+    say("95 % intervals cover, pooled", f"{each.mean():.2f} %", "94 to 96 %")
+    say("  each parameter", f"{each.min():.1f} .. {each.max():.1f} %", "92.5 to 97.5 %")
+    assert 94.0 <= each.mean() <= 96.0
+    assert each.min() >= 92.5
+    assert each.max() <= 97.5
+
+
+def test_clean_records_are_kept(outcome: Outcome, say) -> None:
+    share = 100 * outcome.removed / outcome.records
+    say("clean records taken for gross errors", f"{share:.4f} %", "below 0.1 %")
+    assert share < 0.1

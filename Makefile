@@ -23,7 +23,8 @@ test: venv
 test-full: venv
 	$(RUN) pytest -m "not benchmark" $(ARGS)
 
-bench: venv
+bench:
+	@.ci/venv "$(PYTHON)" bench
 	$(RUN) pytest tests/benchmarks -s --timeout=0 $(ARGS)
 
 lint: venv

@@ -91,7 +91,15 @@ def settled(newcomer: Newcomer) -> Newcomer:
     return newcomer
 
 
-@pytest.mark.parametrize("target", ["test", "test-full", "lint", "bench", "demo"])
+def test_benchmarks_add_what_they_compare_with_once(settled: Newcomer) -> None:
+    settled.make("bench")
+    peers = "-m pip install --quiet --constraint constraints.txt --no-build-isolation --editable .[bench]"
+    assert settled.installations() == [peers]
+    settled.make("bench")
+    assert settled.installations() == []
+
+
+@pytest.mark.parametrize("target", ["test", "test-full", "lint", "demo"])
 def test_every_target_installs_first(newcomer: Newcomer, target: str) -> None:
     newcomer.make(target)
     assert newcomer.installations() == FROM_SCRATCH

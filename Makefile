@@ -12,6 +12,9 @@ RUN = .venv/bin/python -m
 # What other software puts on these paths would be found before what is pinned here.
 unexport PYTHONPATH PYTHONHOME
 
+# Our matrices are small: threads of the linear algebra only get into each other's way.
+export OPENBLAS_NUM_THREADS = 1
+
 .PHONY: demo test test-full lint bench clean venv
 
 demo: venv

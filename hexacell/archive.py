@@ -44,12 +44,25 @@ class RunFolder:
         """What went over the wires."""
         return self.path / "wire"
 
+    def new_wire(self) -> Path:
+        """The same for a run that goes on: what went over the wires before stays."""
+        path, part = self.wire, 1
+        while path.exists():
+            part += 1
+            path = self.wire.with_name(f"{self.wire.name}-{part}")
+        return path
+
     def create(self, cell: Cell) -> None:
         """Make the folder and keep the cell file's text in it.
 
         Raises:
+            UsageError: it holds a run already.
             FileError: it cannot be made.
         """
+        if self.journal.exists():
+            raise UsageError(
+                "this folder holds a run already", subject=self.path, action="Resume it, or name another"
+            )
         make_folder(self.path)
         write_atomically(self.path / "cell.toml", cell.text.encode())
 

@@ -7,6 +7,9 @@ from pathlib import Path
 from hexacell.cell.names import nearest
 from hexacell.errors import UsageError
 
+CONTROLLER = ".controller.toml"
+"""How the name of a controller's config ends; what precedes it is the name of its cell."""
+
 _IN_THE_WHEEL = Path(__file__).parent / "_configs"
 _IN_A_CHECKOUT = Path(__file__).parent.parent / "configs"
 
@@ -20,17 +23,19 @@ def bundled_configs() -> tuple[Path, ...]:
 
 
 def bundled_config(name: str) -> Path:
-    """The file or folder called ``name`` with or without its suffix: ``simulated-hexaglide``.
+    """The cell called ``name``, with or without its suffix: ``simulated-hexaglide``.
+
+    It is a cell file, or a folder with one and what belongs to it.
 
     Raises:
         UsageError: no such config comes with the package; the message names the nearest.
     """
-    known = {path.stem: path for path in bundled_configs()}
+    known = {path.stem: path for path in bundled_configs() if not path.name.endswith(CONTROLLER)}
     found = known.get(name) or known.get(name.removesuffix(".toml"))
     if found is None:
         likely = nearest(name, known)
         action = f"Did you mean '{likely}'?" if likely else f"There are: {', '.join(known)}"
-        raise UsageError(f"no config called '{name}' comes with hexacell", action=action)
+        raise UsageError(f"no cell called '{name}' comes with hexacell", action=action)
     return found
 
 

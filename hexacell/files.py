@@ -23,6 +23,7 @@ _WORDS: dict[int, tuple[str, str]] = {
     errno.ENOENT: ("it does not exist", "Check the path"),
     errno.ENOTDIR: ("a part of the path is not a folder", "Check the path"),
     errno.EISDIR: ("it is a folder", "Name a file"),
+    errno.EEXIST: ("something else has that name", "Choose another name"),
     errno.ELOOP: ("its symbolic links go round in a circle", "Repair the link"),
     errno.EACCES: ("permission denied", "Run as a user who may, or change the permissions"),
     errno.EPERM: ("permission denied", "Run as a user who may, or change the permissions"),

@@ -49,7 +49,7 @@ class Pose:
 
     def __str__(self) -> str:
         words = zip("XYZABC", self.as_tuple(), strict=True)
-        return " ".join(f"{axis}{value:.3f}" for axis, value in words)
+        return " ".join(f"{axis}{value:z.3f}" for axis, value in words)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 import asyncio
-import signal
-from contextlib import suppress
+import shlex
 from typing import Any
 
 from hexacell.cli.console import Console
 from hexacell.cli.progress import RunProgress
 from hexacell.composition.calibration import Order, calibrate
-from hexacell.errors import ExitCode
+from hexacell.errors import ExitCode, HexacellError
 from procedures import events
-from procedures.calibration import expected_records
+from procedures.calibration import Mode, expected_records
 
 
 def carry_out(order: Order, console: Console) -> events.Ended:
-    """Run to the end with a progress bar; SIGTERM stops cleanly as Ctrl-C does.
+    """Run to the end with a progress bar.
 
     Raises:
         HexacellError: it could not begin, or a step could not be done.
@@ -25,29 +24,31 @@ def carry_out(order: Order, console: Console) -> events.Ended:
     factor = order.cell.settings.timing.clock_factor
     if factor != 1.0:
         console.say(f"The cell's clock runs {factor:g} times as fast as the one on the wall.")
-    with RunProgress(console, expected_records(order.cell.settings, order.mode)) as progress:
-        try:
-            return asyncio.run(_until_stopped(order, progress))
-        except asyncio.CancelledError:
-            raise KeyboardInterrupt from None
+    progress = RunProgress(console, expected_records(order.cell.settings, order.mode))
+    try:
+        with progress:
+            return asyncio.run(calibrate(order, [progress]))
+    except (HexacellError, KeyboardInterrupt):
+        if progress.has_begun:
+            console.say(f"Stopped; what was measured is kept. To go on:\n  {resume_command(order)}")
+        raise
 
 
-async def _until_stopped(order: Order, progress: RunProgress) -> events.Ended:
-    task = asyncio.current_task()
-    loop = asyncio.get_running_loop()
-    if task is not None:
-        with suppress(NotImplementedError, ValueError, RuntimeError):
-            loop.add_signal_handler(signal.SIGTERM, task.cancel)
-    return await calibrate(order, [progress])
+def resume_command(order: Order) -> str:
+    """What to type to go on with a run, by somebody at a terminal."""
+    mode = ["--mode", "check"] if order.mode is Mode.CHECK else []
+    words = ["hexacell", "run", str(order.cell.path), "--resume", str(order.folder.path), *mode]
+    return shlex.join(words)
 
 
 def run_document(order: Order, ended: events.Ended) -> dict[str, Any]:
     """What ``run --json`` and ``demo --json`` print."""
+    measurements = order.folder.measurements
     return {
         "exit_code": ended.exit_code,
         "line": ended.line,
         "run": str(order.folder.path),
-        "measurements": str(order.folder.measurements),
+        "measurements": str(measurements) if measurements.is_file() else None,
         "config": str(order.cell.config_path),
     }
 
@@ -55,6 +56,6 @@ def run_document(order: Order, ended: events.Ended) -> dict[str, Any]:
 def finish(order: Order, ended: events.Ended, console: Console) -> ExitCode:
     """Say how it ended and where everything is."""
     console.document(run_document(order, ended))
-    console.say(f"everything about this run is in {order.folder.path}")
+    console.say(f"Everything about this run is in {order.folder.path}")
     console.say(ended.line)
     return ExitCode(ended.exit_code)

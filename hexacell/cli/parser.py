@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 from hexacell import __version__
+from hexacell.errors import UsageError
 
 EXIT_CODES = """exit codes:
   0 done, within limits            4 an answer or approval is needed
@@ -16,16 +17,37 @@ EXIT_CODES = """exit codes:
   3 hardware or link"""
 
 
-def make_parser() -> argparse.ArgumentParser:
-    """The parser of all commands; ``options.module`` names the command's module."""
-    parser = argparse.ArgumentParser(
+class Parser(argparse.ArgumentParser):
+    """A parser that raises instead of leaving, so that every mistake is told in the same way.
+
+    Options are never abbreviated: an abbreviation that works today may mean two options tomorrow.
+    """
+
+    def __init__(self, **settings: Any) -> None:  # noqa: ANN401 - argparse's own settings
+        super().__init__(allow_abbrev=False, **settings)
+
+    def error(self, message: str) -> NoReturn:
+        """Raise ``UsageError`` with the words that argparse found."""
+        raise UsageError(message, action=f"Try `{self.prog} --help`")
+
+
+def make_parser() -> Parser:
+    """The parser of all commands; ``options.module`` names the command's module.
+
+    What it is given to parse makes it raise ``UsageError``.
+    """
+    parser = Parser(
         prog="hexacell",
+        usage="hexacell [-h] [--version] COMMAND ...",
         description="Make a 6-DOF parallel robot accurate with three dial gauges and a ball.",
         epilog=EXIT_CODES,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("--version", action="version", version=f"hexacell {__version__}")
-    commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
+    # argparse aligns what stands below by this name, so it must not be much shorter than those.
+    commands = parser.add_subparsers(
+        title="commands", prog="hexacell", metavar="COMMAND ...", required=True
+    )
     _demo(commands)
     _run(commands)
     _preflight(commands)
@@ -35,19 +57,22 @@ def make_parser() -> argparse.ArgumentParser:
     return parser
 
 
-def _command(commands: Any, name: str, words: str) -> argparse.ArgumentParser:  # noqa: ANN401 - argparse's own type is private
-    parser: argparse.ArgumentParser = commands.add_parser(
-        name, help=words, description=words[0].upper() + words[1:] + "."
-    )
+def _add(commands: Any, name: str, words: str) -> Parser:  # noqa: ANN401 - argparse's own type is private
+    parser: Parser = commands.add_parser(name, help=words, description=words[0].upper() + words[1:] + ".")
+    return parser
+
+
+def _command(commands: Any, name: str, words: str) -> Parser:  # noqa: ANN401
+    parser = _add(commands, name, words)
     parser.set_defaults(module=name)
     return parser
 
 
-def _add_cell(parser: argparse.ArgumentParser) -> None:
+def _add_cell(parser: Parser) -> None:
     parser.add_argument("cell", type=Path, metavar="CELL", help="the cell file (TOML)")
 
 
-def _add_json(parser: argparse.ArgumentParser) -> None:
+def _add_json(parser: Parser) -> None:
     parser.add_argument(
         "--json", action="store_true", help="one JSON document on stdout; words go to stderr"
     )
@@ -65,6 +90,7 @@ def _demo(commands: Any) -> None:  # noqa: ANN401
         "--folder",
         type=Path,
         default=Path("hexacell-demo"),
+        metavar="FOLDER",
         help="where to work; a former demo there is replaced (default: %(default)s)",
     )
     _add_json(parser)
@@ -105,20 +131,20 @@ def _simulate(commands: Any) -> None:  # noqa: ANN401
 def _fit(commands: Any) -> None:  # noqa: ANN401
     parser = _command(commands, "fit", "identify the geometry from a measurement file")
     _add_cell(parser)
-    parser.add_argument("--measurements", type=Path, required=True, metavar="FILE", help="CSV")
+    parser.add_argument(
+        "--measurements", type=Path, required=True, metavar="FILE", help="the records (CSV)"
+    )
     _add_json(parser)
 
 
 def _cell(commands: Any) -> None:  # noqa: ANN401
     parser = _command(commands, "cell", "check, explain or show a cell file")
     actions = parser.add_subparsers(title="actions", metavar="ACTION", required=True, dest="action")
-    validate = actions.add_parser(
-        "validate", help="say whether it is in order; every mistake with its line"
-    )
+    validate = _add(actions, "validate", "say whether it is in order; every mistake with its line")
     _add_cell(validate)
     _add_json(validate)
-    schema = actions.add_parser("schema", help="print its JSON Schema")
+    schema = _add(actions, "schema", "print the JSON Schema of cell files, for editors and other programs")
     _add_json(schema)
-    show = actions.add_parser("show", help="print it with defaults filled in, and where each value is from")
+    show = _add(actions, "show", "print it with defaults filled in, and where each value is from")
     _add_cell(show)
     _add_json(show)

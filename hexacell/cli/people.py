@@ -4,47 +4,72 @@ from __future__ import annotations
 
 import asyncio
 import sys
+import termios
 from collections.abc import Sequence
+from typing import TextIO
 
 from hexacell.cli.console import Console
+from hexacell.errors import AnswerNeeded
 from hexacell.pose import Pose
 from procedures.events import Gate
-from procedures.operators import Nobody
+
+
+def somebody_is_there() -> bool:
+    """Whether stdin is a terminal, at which somebody can answer."""
+    return sys.stdin is not None and sys.stdin.isatty()
 
 
 class AtTerminal:
-    """Asks on the terminal; where stdin is none, nobody is there."""
+    """Asks on the terminal that stdin is."""
 
     def __init__(self, console: Console) -> None:
         self._console = console
-        self._nobody = Nobody()
 
     async def place_gauges(self, point: int, pose: Pose) -> None:
         """Ask for the gauges to be put around the ball.
 
         Raises:
-            AnswerNeeded: there is no terminal to ask on.
+            AnswerNeeded: the terminal's input has ended.
         """
-        if not sys.stdin.isatty():
-            await self._nobody.place_gauges(point, pose)
-        self._console.say(f"\nPoint {point}: the robot stands at {pose}.")
-        self._console.say("Put the three gauges around the ball, plungers in the middle of their travel.")
-        await self._answer("Press Enter when they stand. ")
+        await self._answer(
+            f"\nPoint {point}: the robot stands at {pose}.\n"
+            "Put the three gauges around the ball, plungers in the middle of their travel.\n"
+            "Press Enter when they stand. "
+        )
 
     async def approve(self, gates: Sequence[Gate], change: str) -> str | None:
         """Show the change and ask whether it may be written.
 
         Raises:
-            AnswerNeeded: there is no terminal to ask on.
+            AnswerNeeded: the terminal's input has ended.
         """
-        if not sys.stdin.isatty():
-            return await self._nobody.approve(gates, change)
-        self._console.say("\n" + change)
-        for gate in gates:
-            self._console.say(f"{'ok ' if gate.passed else 'NO '} {gate.sentence}")
-        answer = await self._answer("Write this into the controller's config? Type yes: ")
+        conditions = "".join(f"{'ok' if gate.passed else 'NO'}  {gate.sentence}\n" for gate in gates)
+        question = "Write this into the controller's config? Type yes: "
+        answer = await self._answer(f"\n{change}\n{conditions}{question}")
         return "a person at the terminal" if answer.strip().lower() == "yes" else None
 
     async def _answer(self, question: str) -> str:
-        print(question, end="", file=sys.stderr, flush=True)
-        return await asyncio.to_thread(sys.stdin.readline)
+        # An Enter too many, pressed before, must not answer what was not asked yet.
+        termios.tcflush(sys.stdin, termios.TCIFLUSH)
+        self._console.ask(question)
+        try:
+            line = await _line(sys.stdin)
+        except asyncio.CancelledError:
+            self._console.ask("\n")
+            raise
+        if not line:
+            self._console.ask("\n")
+            raise AnswerNeeded("the question was left without an answer", action="Run it at a terminal")
+        return line
+
+
+async def _line(terminal: TextIO) -> str:
+    """The next line; waited for without a thread, which Ctrl-C would have to wait for."""
+    loop = asyncio.get_running_loop()
+    typed = asyncio.Event()
+    loop.add_reader(terminal, typed.set)
+    try:
+        await typed.wait()
+    finally:
+        loop.remove_reader(terminal)
+    return terminal.readline()

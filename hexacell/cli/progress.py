@@ -1,4 +1,4 @@
-"""What a run is doing, as it happens: a bar on a terminal, a line a point anywhere else."""
+"""What a run is doing, as it happens: a bar on a terminal, a line a point anywhere."""
 
 from __future__ import annotations
 
@@ -8,66 +8,57 @@ from typing import Self
 
 import numpy as np
 from rich.console import Console as RichConsole
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from hexacell.cli.console import Console
 from procedures import events
 from procedures.state import RunState
-from procedures.steps import Compute, Move, Phase, SetKey
+from procedures.steps import Compute, Move, Phase, Place, SetKey
 
 COMPUTING = {
     "identify": "identifying the geometry",
     "propose": "preparing the new config",
-    "commit": "writing the controller's config and reloading it",
+    "commit": "writing the config and having it read",
     "judge": "judging the held-out points",
     "roll back": "putting the old config back",
 }
 PHASES = {
-    Phase.IDENTIFY: "point",
-    Phase.BEFORE: "held-out point, before:",
-    Phase.AFTER: "held-out point, after:",
+    Phase.IDENTIFY: "point {}",
+    Phase.BEFORE: "held-out point {}, before",
+    Phase.AFTER: "held-out point {}, after",
 }
 
 
 class RunProgress:
-    """A listener of the engine that shows records as they land."""
+    """A listener of the engine that shows records as they land.
+
+    ``has_begun`` tells whether the run exists on the disk, and so can be resumed.
+    """
 
     def __init__(self, console: Console, expected_records: int) -> None:
+        self.has_begun = False
         self._console = console
-        self._bar = Progress(
-            TextColumn("{task.description:<46}"),
-            BarColumn(),
-            MofNCompleteColumn(),
-            TimeElapsedColumn(),
-            console=RichConsole(file=sys.stderr),
-            transient=True,
-            disable=not sys.stderr.isatty(),
-        )
+        self._bar = _bar()
         self._task = self._bar.add_task("connecting", total=expected_records)
 
     def __call__(self, event: events.Event, state: RunState) -> None:
         """Show one event."""
-        match event:
-            case events.StepBegun(step=Move() as step):
-                self._bar.update(self._task, description=f"{name(step.at)}, orientation {step.orientation}")
-            case events.StepBegun(step=Compute() as step):
-                self._bar.update(self._task, description=COMPUTING[step.kind])
-            case events.Sampled() | events.Refused():
-                self._bar.advance(self._task)
-                self._warn(event)
-            case events.SetClosed():
-                self._bar.advance(self._task)
-                self._console.say(set_line(event, state))
-            case events.Committed():
-                self._console.say(f"written to the controller, approved by {event.approved_by}")
-            case events.RolledBack():
-                self._console.say("the old geometry is back in the controller")
-            case _:
-                pass
+        if not self.has_begun:
+            # Not as progress: what a former attempt measured says nothing about the speed of this one.
+            self._bar.reset(self._task, completed=settled(state))
+            self.has_begun = True
+        self._make_room(event)
+        self._bar.update(self._task, completed=settled(state), description=doing(event))
+        if told := words(event, state):
+            self._console.say(told)
 
-    def _warn(self, event: events.Sampled | events.Refused) -> None:
-        if isinstance(event, events.Refused):
-            self._console.say(f"{name(event.at)}, orientation {event.orientation} left out: {event.reason}")
+    def _make_room(self, event: events.Event) -> None:
+        """Take the bar away as long as a person may be asked something."""
+        match event:
+            case events.StepBegun(step=Place() | Compute(kind="commit")) | events.Interrupted():
+                self._bar.stop()
+            case _:
+                self._bar.start()
 
     def __enter__(self) -> Self:
         self._bar.start()
@@ -79,17 +70,66 @@ class RunProgress:
         self._bar.stop()
 
 
+def _bar() -> Progress:
+    terminal = sys.stderr is not None and sys.stderr.isatty()
+    return Progress(
+        TextColumn("{task.description:<40}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeRemainingColumn(),
+        TextColumn("left"),
+        console=RichConsole(file=sys.stderr),
+        transient=True,
+        disable=not terminal,
+        # Words on the same terminal go above the bar; those for a file or a pipe go there.
+        redirect_stdout=sys.stdout is not None and sys.stdout.isatty(),
+    )
+
+
+def settled(state: RunState) -> int:
+    """How many records and closings of sets a run has."""
+    return sum(len(measured.samples) + measured.closed for measured in state.sets.values())
+
+
+def doing(event: events.Event) -> str | None:
+    """What is being done from now on, in a few words; nothing where that does not change."""
+    match event:
+        case events.StepBegun(step=Move() as step):
+            return f"{name(step.at)}, orientation {step.orientation}"
+        case events.StepBegun(step=Compute() as step):
+            return COMPUTING[step.kind]
+        case _:
+            return None
+
+
+def words(event: events.Event, state: RunState) -> str | None:
+    """What there is to say about an event, if anything."""
+    match event:
+        case events.SetClosed():
+            return set_line(event, state)
+        case events.SetVoided():
+            return f"{name(event.at)} is measured again: {event.reason}"
+        case events.Refused():
+            return f"{name(event.at)}, orientation {event.orientation} left out: {event.reason}"
+        case events.Committed():
+            return f"written to the controller, approved by {event.approved_by}"
+        case events.RolledBack():
+            return "the old geometry is back in the controller"
+        case _:
+            return None
+
+
 def name(key: SetKey) -> str:
     """A set in words."""
-    return f"{PHASES[key.phase]} {key.point}"
+    return PHASES[key.phase].format(key.point)
 
 
 def set_line(closed: events.SetClosed, state: RunState) -> str:
-    """One line about a set that is done."""
+    """One line about a set that is done, which fits a terminal of 80 columns."""
     samples = state.set(closed.at).samples
     largest = max(float(np.abs(sample.deviation_mm).max()) for sample in samples)
     drift = float(np.abs(closed.drift_mm).max())
     return (
-        f"{name(closed.at):26} {len(samples):3} records, largest deviation {largest:6.3f} mm, "
-        f"reference came back within {drift:.3f} mm"
+        f"{name(closed.at):24} {len(samples):2} records, "
+        f"largest deviation {largest:.3f} mm, drift {drift:.3f} mm"
     )

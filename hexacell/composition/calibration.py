@@ -13,13 +13,14 @@ from hexacell.cell.file import Cell
 from hexacell.composition.devices import Connected, connected, served, with_settings
 from hexacell.controller_config.format import ControllerGeometry
 from hexacell.controller_config.proposal import fingerprint
-from hexacell.errors import FileError, HexacellError, SeveralErrors, UsageError
+from hexacell.errors import FileError, HexacellError, UsageError
 from hexacell.files import write_atomically
 from hexacell.geometry import Geometry
 from hexacell.lock import config_lock
 from hexacell.robot import Robot, make_robot, robot_of
 from procedures import events
 from procedures.calibration import Calibration, Mode
+from procedures.devices import each
 from procedures.engine import Engine, Listener
 from procedures.journal import Journal, read_journal
 from procedures.operators import Operator
@@ -53,7 +54,7 @@ async def preflight(cell: Cell, mode: Mode, *, unattended: bool) -> tuple[events
         served(cell) as settings,
     ):
         async with connected(settings) as cell_now:
-            failures.extend(await device_failures(cell_now.devices, cell_now.clock))
+            failures.extend(await device_failures(cell_now.devices))
             return _identities(cell_now)
 
 
@@ -70,7 +71,7 @@ async def calibrate(order: Order, listeners: Sequence[Listener] = ()) -> events.
         calibration = Calibration(cell.settings, robot, order.mode)
         with _plan_checked(calibration, unattended=order.unattended) as failures, served(cell) as settings:
             async with connected(settings) as cell_now:
-                failures.extend(await device_failures(cell_now.devices, cell_now.clock))
+                failures.extend(await device_failures(cell_now.devices))
                 raise_all(failures)
                 return await _run(order, with_settings(cell, settings), calibration, cell_now, listeners)
 
@@ -93,7 +94,7 @@ async def _run(
             engine.void_open_sets()
             return await engine.run()
     finally:
-        write_atomically(order.folder.wire, cell_now.trace.text().encode())
+        write_atomically(order.folder.new_wire(), cell_now.trace.text().encode())
 
 
 @contextmanager
@@ -105,10 +106,10 @@ def _plan_checked(calibration: Calibration, *, unattended: bool) -> Iterator[lis
         raise_all(failures)
     try:
         yield failures
-    except SeveralErrors as several:
-        raise_all([*failures, *(error for error in several.errors if error not in failures)])
     except HexacellError as error:
-        raise_all([*failures, *([] if error in failures else [error])])
+        if not failures:
+            raise
+        raise_all([*failures, *(one for one in each(error) if one not in failures)])
     raise_all(failures)
 
 

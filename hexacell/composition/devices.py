@@ -12,10 +12,13 @@ from drivers.trace import WireTrace
 from hexacell.cell.file import Cell
 from hexacell.cell.model import CellSettings
 from hexacell.clock import CellClock
+from hexacell.errors import HexacellError
 from hexacell.mechanisms.base import Mechanism
 from hexacell.plugins import Group, load
 from hexacell.robot import config_format
 from procedures.devices import Devices, MountedGauge
+from procedures.preflight import raise_all
+from procedures.uninterrupted import uninterrupted
 
 
 @contextmanager
@@ -23,9 +26,10 @@ def served(cell: Cell, *, other_processes: bool = False) -> Iterator[CellSetting
     """The cell's settings with an address for every device; a simulated cell answers meanwhile.
 
     Raises:
-        HexacellError: the simulation cannot begin.
+        HexacellError: a device speaks what no driver does, or the simulation cannot begin.
     """
     settings = cell.settings
+    require_drivers(settings)
     if settings.simulation is None:
         yield settings
         return
@@ -42,6 +46,26 @@ def served(cell: Cell, *, other_processes: bool = False) -> Iterator[CellSetting
         other_processes=other_processes,
     ) as simulated:
         yield simulated.settings
+
+
+def require_drivers(settings: CellSettings) -> None:
+    """Make sure that every device's protocol is known.
+
+    Raises:
+        UsageError: one is not; the message has the nearest that is.
+        SeveralErrors: more than one.
+    """
+    protocols = {(Group.GAUGES, gauge.protocol) for gauge in settings.gauges} | {
+        (Group.ENCODERS, settings.encoders.protocol),
+        (Group.CONTROLLERS, settings.controller.protocol),
+    }
+    failures: list[HexacellError] = []
+    for group, protocol in sorted(protocols):
+        try:
+            load(group, protocol)
+        except HexacellError as error:
+            failures.append(error)
+    raise_all(failures)
 
 
 @dataclass(frozen=True)
@@ -83,8 +107,12 @@ async def connected(settings: CellSettings) -> AsyncIterator[Connected]:
         identities = await devices.open()
         yield Connected(devices, identities, CellClock(settings.timing.clock_factor), trace)
     finally:
-        await devices.close()
-        await links.close()
+        await uninterrupted(_let_go(devices, links))
+
+
+async def _let_go(devices: Devices, links: SerialLinks) -> None:
+    await devices.close()
+    await links.close()
 
 
 def with_settings(cell: Cell, settings: CellSettings) -> Cell:

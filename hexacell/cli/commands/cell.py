@@ -7,6 +7,7 @@ import json
 
 from hexacell.cell.file import describe, load_cell, schema
 from hexacell.cli.console import Console
+from hexacell.composition.devices import require_drivers
 from hexacell.errors import ExitCode
 from hexacell.robot import robot_of
 
@@ -15,7 +16,9 @@ def main(options: argparse.Namespace) -> ExitCode:
     """Check, explain or show a cell file."""
     console = Console(options.json)
     if options.action == "schema":
-        print(json.dumps(schema(), indent=None if options.json else 2))
+        console.document(schema())
+        if not options.json:
+            console.say(json.dumps(schema(), indent=2))
         return ExitCode.DONE
     cell = load_cell(options.cell)
     if options.action == "show":
@@ -24,6 +27,7 @@ def main(options: argparse.Namespace) -> ExitCode:
             console.say(describe(cell).rstrip("\n"))
         return ExitCode.DONE
     robot_of(cell)
+    require_drivers(cell.settings)
     console.document({"valid": True, "name": cell.settings.name})
     console.say(f"{options.cell}: in order, and so is its controller config {cell.config_path}")
     return ExitCode.DONE

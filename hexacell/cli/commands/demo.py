@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import argparse
 import shutil
+from contextlib import ExitStack
 from pathlib import Path
 
 from hexacell.archive import RunFolder
-from hexacell.bundled import bundled_config
+from hexacell.bundled import CONTROLLER, bundled_config
 from hexacell.cell.file import load_cell
 from hexacell.cli.calibrating import carry_out, finish
 from hexacell.cli.console import Console
 from hexacell.composition.calibration import Order
-from hexacell.errors import ExitCode, FileError
-from hexacell.files import make_folder, write_atomically
+from hexacell.errors import ExitCode, FileError, UsageError
+from hexacell.files import make_folder, plain_error, write_atomically
+from hexacell.lock import config_lock, lock_path
 from procedures.calibration import Mode
 from procedures.operators import Nobody
 
@@ -23,14 +25,26 @@ MARK = ".hexacell-demo"
 def main(options: argparse.Namespace) -> ExitCode:
     """Copy a cell into a folder of its own and calibrate it there."""
     console = Console(options.json)
-    cell = load_cell(_prepare(options.folder, bundled_config(options.config)))
+    cell = load_cell(_prepare(options.folder, _simulated(bundled_config(options.config))))
     console.say(
-        "A simulated Hexaglide: gauges on serial lines, encoders on CAN, a controller on TCP.\n"
-        f"It is driven with the geometry in {cell.config_path}, which is wrong by millimetres."
+        "A simulated Hexaglide: gauges on serial lines, encoders on CAN, TCP controller.\n"
+        "The geometry that its controller works with is wrong by millimetres:\n"
+        f"  {cell.config_path}"
     )
     order = Order(cell, RunFolder(options.folder / "run"), Mode.OPTIMISE, Nobody(), unattended=True)
     ended = carry_out(order, console)
     return finish(order, ended, console)
+
+
+def _simulated(cell_file: Path) -> Path:
+    """The same, once it is certain that the cell needs no devices.
+
+    Raises:
+        UsageError: it does.
+    """
+    if load_cell(cell_file).settings.simulation is None:
+        raise UsageError("there is no [simulation] in it: this is a real cell", subject=cell_file)
+    return cell_file
 
 
 def _prepare(folder: Path, cell_file: Path) -> Path:
@@ -38,6 +52,7 @@ def _prepare(folder: Path, cell_file: Path) -> Path:
 
     Raises:
         FileError: the folder holds something that no demo put there.
+        CellBusy: a demo is running in it.
     """
     if folder.is_dir() and any(folder.iterdir()):
         if not (folder / MARK).is_file():
@@ -46,9 +61,23 @@ def _prepare(folder: Path, cell_file: Path) -> Path:
                 subject=folder,
                 action="Choose another with --folder",
             )
-        shutil.rmtree(folder)
+        _clear(folder)
     make_folder(folder)
     write_atomically(folder / MARK, b"made by hexacell demo, which replaces this folder\n")
     for source in cell_file.parent.glob(f"{cell_file.stem}*.toml"):
         write_atomically(folder / source.name, source.read_bytes())
     return folder / cell_file.name
+
+
+def _clear(folder: Path) -> None:
+    """Remove what a former demo left but its mark, so that a clearing that fails can be repeated."""
+    configs = list(folder.glob(f"*{CONTROLLER}"))
+    kept = {folder / MARK, *(folder / lock_path(config).name for config in configs)}
+    with ExitStack() as held:
+        for config in configs:
+            held.enter_context(config_lock(config))
+        try:
+            for item in set(folder.iterdir()) - kept:
+                shutil.rmtree(item) if item.is_dir() and not item.is_symlink() else item.unlink()
+        except OSError as error:
+            raise plain_error("the former demo cannot be removed", folder, error) from error

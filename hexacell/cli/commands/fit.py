@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import argparse
 
+from hexacell.assessment import assess
 from hexacell.cell.file import load_cell
 from hexacell.cli.console import Console
-from hexacell.cli.words import identification_words
+from hexacell.cli.words.identification import identification_words
 from hexacell.errors import ExitCode
 from hexacell.identification.estimate import identify
 from hexacell.measurement_file import read_measurements
 from hexacell.robot import robot_of
-from hexacell.summary import identification_document
+from hexacell.summary import assessment_document, identification_document
 
 
 def main(options: argparse.Namespace) -> ExitCode:
@@ -19,8 +20,10 @@ def main(options: argparse.Namespace) -> ExitCode:
     console = Console(options.json)
     cell = load_cell(options.cell)
     robot = robot_of(cell)
-    found = identify(robot.problem(read_measurements(options.measurements)))
-    console.document(identification_document(found))
+    measurements = read_measurements(options.measurements)
+    found = identify(robot.problem(measurements))
+    assessed = assess(cell.settings, robot, measurements, found)
+    console.document(identification_document(found) | assessment_document(found, assessed))
     if not options.json:
-        console.say(identification_words(found, robot.drawing))
+        console.say(identification_words(found, robot.drawing, assessed))
     return ExitCode.DONE if found.converged else ExitCode.OUT_OF_LIMITS

@@ -7,6 +7,7 @@ import asyncio
 
 from hexacell.cell.file import load_cell
 from hexacell.cli.console import Console
+from hexacell.cli.words import device_words, wrapped
 from hexacell.composition.calibration import preflight
 from hexacell.errors import ExitCode
 from procedures.calibration import Mode
@@ -19,9 +20,6 @@ def main(options: argparse.Namespace) -> ExitCode:
     found = asyncio.run(preflight(cell, Mode.OPTIMISE, unattended=options.unattended))
     console.document({"ready": True, "devices": [identity.model_dump() for identity in found]})
     for identity in found:
-        serial = f", serial number {identity.serial_number}" if identity.serial_number else ""
-        console.say(f"ok  {identity.name}: {identity.description} ({identity.protocol}{serial})")
-    console.say(
-        f"ok  {cell.settings.name}: all points can be reached, all devices answer; nothing was moved"
-    )
+        console.say(wrapped(f"ok  {device_words(identity)}", indent=6))
+    console.say("ok  all points can be reached, all devices answer; nothing was moved")
     return ExitCode.DONE

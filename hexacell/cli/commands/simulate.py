@@ -17,7 +17,7 @@ def main(options: argparse.Namespace) -> ExitCode:
     """Serve until interrupted; stdout gets the cell file that reaches it."""
     cell = load_cell(options.cell)
     if cell.settings.simulation is None:
-        raise UsageError(f"{cell.path} has no [simulation] section: it is a real cell")
+        raise UsageError("there is no [simulation] in it: this is a real cell", subject=cell.path)
     stop = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: stop.set())

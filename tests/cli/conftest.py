@@ -1,0 +1,309 @@
+"""The command line as it is used: typed in a folder, in a process of its own."""
+
+from __future__ import annotations
+
+import json
+import os
+import secrets
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from hexacell.cli.app import main
+from procedures import events
+from procedures.journal import Journal, read_journal
+
+CONFIGS = Path(__file__).parents[2] / "configs"
+CELL = "simulated-hexaglide.toml"
+CONTROLLER = "simulated-hexaglide.controller.toml"
+PATIENCE_S = 40.0
+
+# Fewer records and wide limits, on a cell that lives fast: the whole job in a few seconds.
+QUICK = (
+    ("clock_factor = 50.0", "clock_factor = 200.0\ngive_up_s = 2000.0"),
+    ("orientations = 11", "orientations = 5"),
+    ("orientations = 6", "orientations = 2"),
+    ("mean_deviation_mm = 0.05", "mean_deviation_mm = 0.5"),
+    ("max_deviation_mm = 0.15", "max_deviation_mm = 1.5"),
+)
+
+Edits = tuple[tuple[str, str], ...]
+
+
+def changed(text: str, edits: Edits) -> str:
+    """``text`` with each edit made, at the one place where it can be."""
+    for old, new in edits:
+        assert text.count(old) == 1, old
+        text = text.replace(old, new)
+    return text
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How a command ended."""
+
+    code: int
+    out: str
+    err: str
+
+    @property
+    def document(self) -> Any:
+        """The one JSON document that is all of stdout."""
+        assert self.out.endswith("\n")
+        return json.loads(self.out)
+
+
+@dataclass
+class CellFolder:
+    """A folder with a cell in it, its controller's config, and nothing else."""
+
+    path: Path
+
+    @property
+    def cell(self) -> Path:
+        return self.path / CELL
+
+    @property
+    def controller(self) -> Path:
+        return self.path / CONTROLLER
+
+    def edit(self, *edits: tuple[str, str]) -> None:
+        self.cell.write_text(changed(self.cell.read_text(), edits))
+
+    def snapshot(self) -> dict[str, bytes | None]:
+        """Everything in it, but for the lock, which holds nothing that counts."""
+        return {
+            str(path.relative_to(self.path)): path.read_bytes() if path.is_file() else None
+            for path in self.path.rglob("*")
+            if not path.name.endswith(".hexacell-lock")
+        }
+
+    def runs(self) -> list[Path]:
+        return sorted((self.path / "runs" / "simulated-hexaglide").glob("*"))
+
+    def rewound(self, run: Path, before: str) -> Path:
+        """A run of this cell that stands where ``run`` stood before a step."""
+        history = read_journal(run / "journal.jsonl")
+        steps = [event.step.key if isinstance(event, events.StepBegun) else "" for event in history]
+        started = history[0].model_copy(update={"cell_text": self.cell.read_text()})
+        journal = self.path / "runs" / "simulated-hexaglide" / "rewound" / "journal.jsonl"
+        journal.parent.mkdir(parents=True)
+        with Journal(journal) as new:
+            new.append(started)
+        lines = (run / "journal.jsonl").read_bytes().splitlines(keepends=True)
+        with journal.open("ab") as stream:
+            stream.writelines(lines[1 : steps.index(before)])
+        return journal.parent
+
+
+def copy_cell(folder: Path) -> CellFolder:
+    for name in (CELL, CONTROLLER):
+        (folder / name).write_bytes((CONFIGS / name).read_bytes())
+    return CellFolder(folder)
+
+
+@pytest.fixture
+def cell_folder(tmp_path: Path) -> CellFolder:
+    """The cell of the demo, as it comes."""
+    folder = tmp_path / "cell"
+    folder.mkdir()
+    return copy_cell(folder)
+
+
+@pytest.fixture
+def quick_cell(cell_folder: CellFolder) -> CellFolder:
+    """The same, calibrated in a few seconds."""
+    cell_folder.edit(*QUICK)
+    return cell_folder
+
+
+def command(*arguments: object) -> list[str]:
+    return [sys.executable, "-m", "hexacell", *map(str, arguments)]
+
+
+def surroundings(temporary: Path) -> dict[str, str]:
+    """An environment with a folder of its own for temporary files, and help of the usual width."""
+    temporary.mkdir()
+    return {**os.environ, "COLUMNS": "80", "TMPDIR": str(temporary)}
+
+
+def run_command(folder: Path, *arguments: object) -> Outcome:
+    """Type a command in ``folder``, with nobody at the terminal, and wait until it ends."""
+    temporary = folder / f"temporary-{secrets.token_hex(4)}"
+    ended = subprocess.run(
+        command(*arguments),
+        cwd=folder,
+        env=surroundings(temporary),
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert "Traceback" not in ended.stderr, ended.stderr
+    temporary.rmdir()  # which fails where something was left in it
+    return Outcome(ended.returncode, ended.stdout, ended.stderr)
+
+
+Typed = Callable[..., Outcome]
+
+
+@pytest.fixture
+def typed(tmp_path: Path) -> Typed:
+    """Types a command in a process of its own, in the test's folder."""
+    return lambda *arguments: run_command(tmp_path, *arguments)
+
+
+@pytest.fixture
+def typed_here(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> Typed:
+    """The same within this process, where starting would cost more than the command."""
+    monkeypatch.chdir(tmp_path)
+
+    def run(*arguments: object) -> Outcome:
+        code = main([str(argument) for argument in arguments])
+        return Outcome(code, *capsys.readouterr())
+
+    return run
+
+
+@dataclass
+class Process:
+    """A command that is under way; what it prints goes to files."""
+
+    popen: subprocess.Popen[str]
+    out_path: Path
+    err_path: Path
+    temporary: Path
+
+    @property
+    def out(self) -> str:
+        return self.out_path.read_text()
+
+    @property
+    def err(self) -> str:
+        return self.err_path.read_text()
+
+    def wait_for(self, words: str, where: Callable[[], str]) -> None:
+        """Wait until it has printed some words."""
+        self.wait_until(lambda: words in where(), words)
+
+    def wait_until(self, condition: Callable[[], bool], what: str) -> None:
+        give_up = time.monotonic() + PATIENCE_S
+        while not condition():
+            if self.popen.poll() is not None or time.monotonic() > give_up:
+                pytest.fail(f"waiting for {what!r}: {self.popen.poll()}\n{self.out}\n{self.err}")
+            time.sleep(0.02)
+
+    def ended(self) -> Outcome:
+        """How it ends by itself, having left no temporary files."""
+        code = self.popen.wait(PATIENCE_S)
+        assert "Traceback" not in self.err, self.err
+        assert list(self.temporary.iterdir()) == []
+        return Outcome(code, self.out, self.err)
+
+    def stopped(self, number: signal.Signals) -> tuple[Outcome, float]:
+        """How it ends on a signal, and after how many seconds."""
+        begun = time.monotonic()
+        self.popen.send_signal(number)
+        return self.ended(), time.monotonic() - begun
+
+
+Start = Callable[..., Process]
+
+
+@pytest.fixture
+def start(tmp_path: Path) -> Iterator[Start]:
+    """Types a command and lets it go on; whatever still runs after the test is ended."""
+    with started_in(tmp_path) as starting:
+        yield starting
+
+
+@pytest.fixture(scope="session")
+def processes() -> Callable[[Path], AbstractContextManager[Start]]:
+    """The same for a folder and as long as one wants; a fresh cell is put into the folder."""
+
+    def with_cell(folder: Path) -> AbstractContextManager[Start]:
+        copy_cell(folder)
+        return started_in(folder)
+
+    return with_cell
+
+
+@contextmanager
+def started_in(folder: Path) -> Iterator[Start]:
+    with_folder = Processes(folder)
+    try:
+        yield with_folder.start
+    finally:
+        with_folder.end()
+
+
+class Processes:
+    """Commands that are under way in one folder."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+        self._processes: list[Process] = []
+
+    def start(self, *arguments: object, through: str | None = None, **streams: int) -> Process:
+        """Start a command, ``through`` a shell's script if there is one."""
+        out, err, temporary = (
+            self._folder / f"{name}-{len(self._processes)}" for name in ("out", "err", "temporary")
+        )
+        with out.open("w") as to_out, err.open("w") as to_err:
+            popen = subprocess.Popen(
+                [*(["sh", "-c", through, "sh"] if through else []), *command(*arguments)],
+                cwd=self._folder,
+                env=surroundings(temporary),
+                stdin=streams.get("stdin", subprocess.DEVNULL),
+                stdout=streams.get("stdout", to_out),
+                stderr=streams.get("stderr", to_err),
+                text=True,
+            )
+        process = Process(popen, out, err, temporary)
+        self._processes.append(process)
+        return process
+
+    def end(self) -> None:
+        for process in self._processes:
+            process.popen.kill()
+            process.popen.wait()
+
+
+@dataclass(frozen=True)
+class Demo:
+    """The demo after it ran, and how it ended."""
+
+    outcome: Outcome
+    folder: Path
+
+    @property
+    def run(self) -> Path:
+        return self.folder / "run"
+
+    @property
+    def cell(self) -> Path:
+        return self.folder / CELL
+
+    @property
+    def controller(self) -> Path:
+        return self.folder / CONTROLLER
+
+    def events(self) -> tuple[events.Event, ...]:
+        return read_journal(self.run / "journal.jsonl")
+
+
+@pytest.fixture(scope="session")
+def demo(tmp_path_factory: pytest.TempPathFactory) -> Demo:
+    """``hexacell demo --json``, once for all tests; do not change what is in its folder."""
+    folder = tmp_path_factory.mktemp("demo")
+    return Demo(run_command(folder, "demo", "--json"), folder / "hexacell-demo")

@@ -1,0 +1,217 @@
+"""``hexacell cell``, and what every command says about files it cannot work with."""
+
+from __future__ import annotations
+
+import json
+import os
+import tomllib
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import pytest
+
+from hexacell.cell.model import CellSettings
+
+CONTROLLER = "simulated-hexaglide.controller.toml"
+
+
+def test_validate_a_good_cell(typed, cell_folder):
+    before = cell_folder.snapshot()
+    outcome = typed("cell", "validate", cell_folder.cell)
+    assert (outcome.code, outcome.err) == (0, "")
+    assert str(cell_folder.cell) in outcome.out
+    assert str(cell_folder.controller) in outcome.out
+    assert cell_folder.snapshot() == before
+
+
+def test_validate_with_json(typed, cell_folder):
+    outcome = typed("cell", "validate", cell_folder.cell, "--json")
+    assert outcome.code == 0
+    assert outcome.document == {"valid": True, "name": "simulated-hexaglide"}
+    assert "in order" in outcome.err
+
+
+def test_schema_describes_the_cells_that_come_with_it(typed_here):
+    pretty, compact = typed_here("cell", "schema"), typed_here("cell", "schema", "--json")
+    assert (pretty.code, pretty.err) == (compact.code, compact.err) == (0, "")
+    assert compact.out.count("\n") == 1
+    assert json.loads(pretty.out) == compact.document
+    assert set(compact.document["properties"]) == set(CellSettings.model_fields)
+    assert set(compact.document["required"]) < set(compact.document["properties"])
+
+
+def test_show_is_a_cell_file_with_defaults_and_where_all_is_from(typed_here, cell_folder):
+    outcome = typed_here("cell", "show", cell_folder.cell)
+    assert (outcome.code, outcome.err) == (0, "")
+    assert "move_timeout_s = 60.0  # default\n" in outcome.out
+    number, name = next(
+        (number, line.partition("#")[0].strip())
+        for number, line in enumerate(cell_folder.cell.read_text().splitlines(), 1)
+        if line.startswith("gauge_travel_mm")
+    )
+    assert f"{name}  # line {number}\n" in outcome.out
+    shown = tomllib.loads(outcome.out)
+    assert CellSettings.model_validate_json(json.dumps(shown)) == CellSettings.model_validate_json(
+        json.dumps(tomllib.loads(cell_folder.cell.read_text()))
+    )
+
+
+def test_show_with_json_has_the_same_settings(typed_here, cell_folder):
+    outcome = typed_here("cell", "show", cell_folder.cell, "--json")
+    assert (outcome.code, outcome.err) == (0, "")
+    document = outcome.document
+    assert document["controller"]["move_timeout_s"] == 60.0
+    assert document["limits"]["gauge_travel_mm"] == 5.0
+    assert CellSettings.model_validate_json(json.dumps(document)).name == "simulated-hexaglide"
+
+
+def line_of(text: str, words: str) -> int:
+    return text[: text.index(words)].count("\n") + 1
+
+
+CELL_MISTAKES = {
+    "unknown key": (("tilt_deg = 45.0", "tild_deg = 45.0"), "tild_deg", "Did you mean 'tilt_deg'?"),
+    "unknown section": (("[limits]", "[limit]"), "[limit]", "Did you mean 'limits'?"),
+    "text for a number": (
+        ("tilt_deg = 45.0", 'tilt_deg = "45"'),
+        "tilt_deg",
+        "'tilt_deg' in [limits] is the text \"45\", but must be a number. Remove the quotes",
+    ),
+    "number for a list": (
+        ("nodes = [1, 2, 3, 4, 5, 6]", "nodes = 6"),
+        "nodes",
+        "must be a list of 6 items",
+    ),
+    "too large": (("tilt_deg = 45.0", "tilt_deg = 90.0"), "tilt_deg", "must be 80 or less"),
+    "infinity": (("joint_max_mm = 800.0", "joint_max_mm = inf"), "joint_max_mm", "must be a finite number"),
+    "no TOML": (("tilt_deg = 45.0", "tilt_deg = = 45.0"), "tilt_deg", "is not valid TOML"),
+    "key twice": (("tilt_deg = 45.0", "tilt_deg = 45.0\ntilt_deg = 4.0"), "tilt_deg = 4.0", "stands twice"),
+}
+
+
+@pytest.mark.parametrize("mistake", CELL_MISTAKES)
+@pytest.mark.parametrize("command", [["cell", "validate"], ["run"]], ids=" ".join)
+def test_a_mistake_in_the_cell_file_is_named_with_its_line(typed_here, cell_folder, mistake, command):
+    edit, place, words = CELL_MISTAKES[mistake]
+    cell_folder.edit(edit)
+    before = cell_folder.snapshot()
+    outcome = typed_here(*command, cell_folder.cell, "--json")
+    assert outcome.code == outcome.document["exit_code"] == 2
+    line = line_of(cell_folder.cell.read_text(), place)
+    assert f"{cell_folder.cell}:{line}: " in outcome.err
+    assert words in outcome.err
+    assert cell_folder.snapshot() == before
+
+
+def test_missing_sections_are_all_named_at_once(typed_here, cell_folder):
+    text = cell_folder.cell.read_text()
+    begun, ended = text.index("[identification]"), text.index("[acceptance]")
+    cell_folder.cell.write_text(text[:begun] + text[ended:])
+    outcome = typed_here("cell", "validate", cell_folder.cell)
+    assert outcome.code == 2
+    assert outcome.err.count("\n") == 3
+    assert "has 2 mistakes" in outcome.err
+    for name in ("identification", "verification"):
+        assert f"the section [{name}] is missing. Add it, with points" in outcome.err
+
+
+CONFIG_MISTAKES = {
+    "four numbers": (("[0.0, -155.0, 0.0],  # leg 1", "[0.0, -155.0, 0.0, 1.0],  # leg 1"), "row 1 of S"),
+    "five lengths": (("  590.0,  # leg 6\n", ""), "l is "),
+    "no geometry": (("\n[geometry]", "\n[geometries]"), "there is no [geometry]"),
+    "a leg of no length": (("  590.0,  # leg 1", "  0.0,  # leg 1"), "leg 1 is 0.0 mm long"),
+    "no TOML": (("\n[geometry]", "\n[geometry"), "Correct this line"),
+}
+
+
+@pytest.mark.parametrize("mistake", CONFIG_MISTAKES)
+@pytest.mark.parametrize("command", ["validate", "run"])
+def test_a_mistake_in_the_controllers_config_is_named(typed_here, cell_folder, mistake, command):
+    (old, new), words = CONFIG_MISTAKES[mistake]
+    text = cell_folder.controller.read_text()
+    assert text.count(old) == 1
+    cell_folder.controller.write_text(text.replace(old, new))
+    before = cell_folder.snapshot()
+    outcome = typed_here(*(["cell", "validate"] if command == "validate" else ["run"]), cell_folder.cell)
+    assert outcome.code == 2
+    assert outcome.err.startswith(f"hexacell: {cell_folder.controller}:")
+    assert words in outcome.err
+    assert cell_folder.snapshot() == before
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        ["cell", "validate"],
+        ["cell", "show"],
+        ["run"],
+        ["preflight"],
+        ["simulate"],
+        ["fit", "--measurements", "x"],
+    ],
+    ids=" ".join,
+)
+def test_a_cell_file_that_is_not_there(typed_here, tmp_path, command):
+    outcome = typed_here(*command, "absent.toml")
+    assert (outcome.code, outcome.out) == (2, "")
+    assert outcome.err == "hexacell: absent.toml: cannot be read: it does not exist. Check the path\n"
+    assert list(tmp_path.iterdir()) == []
+
+
+ON_THE_ROBOT = [["cell", "validate"], ["run"], ["preflight"], ["simulate"]]
+
+
+@pytest.mark.parametrize("command", ON_THE_ROBOT, ids=" ".join)
+def test_a_config_that_is_not_there(typed_here, cell_folder, command):
+    cell_folder.controller.unlink()
+    before = cell_folder.snapshot()
+    outcome = typed_here(*command, cell_folder.cell)
+    assert outcome.code == 2
+    assert f"{cell_folder.controller}: cannot be read: it does not exist" in outcome.err
+    assert cell_folder.snapshot() == before
+
+
+def test_a_config_that_is_a_folder(typed, cell_folder):
+    cell_folder.controller.unlink()
+    cell_folder.controller.mkdir()
+    outcome = typed("run", cell_folder.cell)
+    assert outcome.code == 2
+    assert f"{cell_folder.controller}: this is not a file" in outcome.err
+    assert cell_folder.runs() == []
+
+
+@contextmanager
+def an_ordinary_user() -> Iterator[None]:
+    """Root may read everything, so do without being root for a moment."""
+    is_root = os.geteuid() == 0
+    if is_root:
+        os.seteuid(65534)
+    try:
+        yield
+    finally:
+        if is_root:
+            os.seteuid(0)
+
+
+def test_a_config_that_may_not_be_read(typed_here, cell_folder, tmp_path):
+    validate = ("cell", "validate", cell_folder.cell.relative_to(tmp_path))
+    assert typed_here(*validate).code == 0  # what only root may import is imported
+    for folder in (tmp_path, cell_folder.path):
+        folder.chmod(0o755)
+    cell_folder.controller.chmod(0)
+    with an_ordinary_user():
+        outcome = typed_here(*validate)
+    assert outcome.code == 2
+    assert f"{CONTROLLER}: cannot be read: permission denied" in outcome.err
+
+
+def test_a_real_cell_cannot_be_simulated(typed_here, cell_folder):
+    text = cell_folder.cell.read_text()
+    text = text[: text.index("[simulation]")]
+    for protocol, port in (("sylvac", "/dev/a"), ("mux10", "/dev/b"), ("cdi", "/dev/c")):
+        text = text.replace(f'protocol = "{protocol}"', f'protocol = "{protocol}"\nport = "{port}"')
+    text = text.replace("[encoders]", '[encoders]\nbus = { interface = "virtual" }')
+    cell_folder.cell.write_text(text.replace("[controller]", "[controller]\nport = 1"))
+    outcome = typed_here("simulate", cell_folder.cell)
+    assert (outcome.code, outcome.out) == (2, "")
+    assert f"{cell_folder.cell}: there is no [simulation] in it" in outcome.err

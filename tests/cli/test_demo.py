@@ -1,0 +1,260 @@
+"""The demo, judged by what it leaves behind rather than by what it says."""
+
+from __future__ import annotations
+
+import itertools
+import json
+import os
+import re
+import tomllib
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hexacell.lock import config_lock
+from procedures import events
+
+# An independent reading of TOML, good enough for a config: what is text, remark, number, or neither.
+TOKEN = re.compile(
+    r"""(?P<remark>\#[^\n]*)
+      | (?P<text>"(?:[^"\\]|\\.)*"|'[^']*')
+      | (?P<number>(?<![\w.])[+-]?\d+(?:\.\d+)?(?![\w.:-]))
+      | (?P<rest>[\s\S])""",
+    re.VERBOSE,
+)
+SECTION = re.compile(r"^\[+([\w.-]+)\]+", re.MULTILINE)
+
+
+def tokens(text: str) -> Iterator[tuple[str, str, int]]:
+    for match in TOKEN.finditer(text):
+        assert match.lastgroup is not None
+        yield match.lastgroup, match[0], match.start()
+
+
+def section_at(text: str, place: int) -> str:
+    return str(SECTION.findall(text, 0, place)[-1])
+
+
+def key_at(text: str, place: int) -> str:
+    return str(re.findall(r"^(\w+) *=", text[:place], flags=re.MULTILINE)[-1])
+
+
+def remarks(text: str) -> list[str]:
+    return [token for kind, token, _ in tokens(text) if kind == "remark"]
+
+
+def distances(demo, phase: str) -> list[float]:
+    """How far the ball strayed at held-out poses, mm, from the raw readings in the journal."""
+    zeros: dict[int, np.ndarray] = {}
+    found = []
+    for event in demo.events():
+        if isinstance(event, events.Sampled) and event.at.phase == phase:
+            shown = np.array(event.reading.gauges_mm)
+            zero = zeros.setdefault(event.at.point, shown)
+            if event.orientation > 1:
+                found.append(float(np.linalg.norm(shown - zero)))
+    return found
+
+
+def test_it_ends_well_with_one_document_and_words_beside_it(demo):
+    outcome = demo.outcome
+    assert outcome.code == 0, outcome.err
+    document = outcome.document
+    assert document["exit_code"] == 0
+    assert outcome.out.count("\n") == 1
+    assert outcome.err.splitlines()[-1] == document["line"]
+    for name in ("run", "measurements", "config"):
+        assert (demo.folder.parent / document[name]).exists()
+
+
+def test_it_says_how_much_better_the_robot_became(demo):
+    line = demo.outcome.document["line"]
+    match = re.fullmatch(
+        r"35 parameters, 55 records at 5 points; mean deviation at held-out points "
+        r"(\d+\.\d+) -> (\d+\.\d+) mm \(limit 0\.05\): pass",
+        line,
+    )
+    assert match, line
+    before, after = (float(number) for number in match.groups())
+    assert before == pytest.approx(np.mean(distances(demo, "before-V")), abs=0.005)
+    assert after == pytest.approx(np.mean(distances(demo, "after-V")), abs=0.0005)
+
+
+def test_the_mean_deviation_falls_by_more_than_99_percent(demo):
+    before, after = distances(demo, "before-V"), distances(demo, "after-V")
+    assert len(before) == len(after) == 2 * 5
+    assert np.mean(after) < 0.01 * np.mean(before)
+
+
+def test_it_says_that_its_clock_is_fast(demo):
+    assert "The cell's clock runs 50 times as fast as the one on the wall." in demo.outcome.err
+
+
+def test_what_it_says_on_the_way_fits_a_terminal(demo):
+    *words, _result = demo.outcome.err.splitlines()
+    assert max(map(len, words)) <= 80
+    sets = [line for line in words if " records, " in line]
+    assert [line[:24].strip() for line in sets] == [
+        *(f"point {number}" for number in range(1, 6)),
+        *(f"held-out point {number}, {when}" for when in ("before", "after") for number in (1, 2)),
+    ]
+
+
+def test_the_ball_never_leaves_the_gauges_travel(demo):
+    history = demo.events()
+    assert not [event for event in history if isinstance(event, events.Refused)]
+    samples = [event for event in history if isinstance(event, events.Sampled)]
+    assert len(samples) == 5 * 11 + 2 * 2 * 6
+    zeros = {event.at: np.array(event.reading.gauges_mm) for event in samples if event.orientation == 1}
+    for event in samples:
+        shown = event.reading.gauges_mm - zeros[event.at]
+        assert np.abs(shown).max() < 5.0
+        assert event.deviation_mm == pytest.approx(tuple(shown), abs=1e-12)
+
+
+def test_only_number_tokens_of_the_geometry_are_new_in_the_config(demo):
+    before, after = ((demo.run / f"config-{when}").read_text() for when in ("before", "after"))
+    pairs = list(itertools.zip_longest(tokens(before), tokens(after)))
+    different = [(old, new) for old, new in pairs if old[:2] != new[:2]]
+    assert len(different) > 30
+    for (old_kind, _, place), (new_kind, _, _) in different:
+        assert old_kind == new_kind == "number"
+        assert section_at(before, place) == "geometry"
+        assert key_at(before, place) in {"S", "B", "l"}
+    assert remarks(before) == remarks(after)
+    assert len(remarks(before)) > 20
+
+
+def test_the_rest_of_the_config_means_what_it_meant(demo):
+    before, after = (
+        tomllib.loads((demo.run / f"config-{when}").read_text()) for when in ("before", "after")
+    )
+    for config in (before, after):
+        for name in ("S", "B", "l"):
+            del config["geometry"][name]
+    assert before == after
+    assert set(before) > {"geometry", "machine"}
+
+
+def test_the_controller_holds_what_was_identified_and_nothing_else_was_touched(demo):
+    assert demo.controller.read_bytes() == (demo.run / "config-after").read_bytes()
+    config = tomllib.loads(demo.controller.read_text())["geometry"]
+    result = json.loads((demo.run / "result.json").read_text())["geometry"]
+    for name in ("S", "B", "l"):
+        np.testing.assert_allclose(config[name], result[name], rtol=0, atol=1e-6)
+    assert demo.cell.read_bytes() == (demo.run / "cell.toml").read_bytes()
+
+
+def test_what_it_found_is_how_the_robot_was_really_built(demo):
+    truth = tomllib.loads(demo.cell.read_text())["simulation"]["geometry"]
+    nominal = tomllib.loads(demo.cell.read_text())["robot"]["nominal"]
+    result = json.loads((demo.run / "result.json").read_text())["geometry"]
+    for name in ("S", "B", "l"):
+        assert np.abs(np.subtract(result[name], truth[name])).max() < 1.2
+        assert np.abs(np.subtract(nominal[name], truth[name])).max() > 5.0
+
+
+def test_its_run_folder_has_all_that_is_promised(demo):
+    promised = {
+        "journal.jsonl",
+        "cell.toml",
+        "measurements.csv",
+        "result.json",
+        "proposal.json",
+        "config-before",
+        "config-after",
+        "write-back.json",
+        "wire",
+    }
+    assert {path.name for path in demo.run.iterdir()} >= promised
+
+
+@pytest.fixture
+def former(tmp_path: Path) -> Path:
+    """What a former demo left, with something in it that a new one would lose."""
+    folder = tmp_path / "hexacell-demo"
+    (folder / "run").mkdir(parents=True)
+    (folder / ".hexacell-demo").touch()
+    (folder / "simulated-hexaglide.controller.toml").touch()
+    (folder / "run" / "journal.jsonl").write_text("precious")
+    return folder
+
+
+def contents(folder: Path) -> dict[Path, bytes | None]:
+    return {
+        path: path.read_bytes() if path.is_file() else None
+        for path in folder.rglob("*")
+        if not path.name.endswith(".hexacell-lock")
+    }
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("nope", "no cell called 'nope' comes with hexacell. There are: "),
+        ("simulated-hexaglid", "Did you mean 'simulated-hexaglide'?"),
+        ("simulated-hexaglide.controller", "Did you mean 'simulated-hexaglide'?"),
+    ],
+)
+def test_an_unknown_cell_costs_nobody_a_former_demo(typed_here, former, name, words):
+    before = contents(former)
+    outcome = typed_here("demo", "--config", name)
+    assert outcome.code == 2
+    assert words in outcome.err
+    assert contents(former) == before
+
+
+def test_the_cells_on_offer_are_cells(typed_here):
+    outcome = typed_here("demo", "--config", "12")
+    assert "There are: paper-experiment, simulated-hexaglide" in outcome.err.replace(
+        "linuxcnc-hexaglide, ", ""
+    )
+
+
+def test_a_folder_of_somebody_elses_is_left_alone(typed_here, tmp_path):
+    theirs = tmp_path / "theirs"
+    theirs.mkdir()
+    (theirs / "thesis.txt").write_text("years")
+    outcome = typed_here("demo", "--folder", "theirs", "--json")
+    assert outcome.code == 2
+    assert outcome.document["exit_code"] == 2
+    assert "theirs: this folder is not empty" in outcome.err
+    assert contents(theirs) == {theirs / "thesis.txt": b"years"}
+
+
+@pytest.mark.parametrize(
+    ("folder", "words"),
+    [("file", "something else has that name"), ("file/inside", "a part of the path is not a folder")],
+)
+def test_a_file_where_the_folder_should_be(typed_here, tmp_path, folder, words):
+    (tmp_path / "file").write_text("mine")
+    outcome = typed_here("demo", "--folder", folder)
+    assert outcome.code == 2
+    assert outcome.err.startswith(f"hexacell: {folder}: the folder cannot be made: {words}")
+    assert contents(tmp_path) == {tmp_path / "file": b"mine"}
+
+
+def test_a_demo_that_is_running_is_not_swept_away(typed_here, former):
+    before = contents(former)
+    with config_lock(former / "simulated-hexaglide.controller.toml"):
+        outcome = typed_here("demo")
+    assert outcome.code == 5
+    assert f"in use by process {os.getpid()} " in outcome.err
+    assert contents(former) == before
+
+
+def test_a_former_demo_is_replaced(former, start):
+    process = start("demo")
+    process.wait_for("TCP controller", lambda: process.out)
+    assert (former / "simulated-hexaglide.toml").is_file()
+    assert b"precious" not in contents(former).values()
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(180)
+def test_the_papers_experiment_passes_too(typed):
+    outcome = typed("demo", "--config", "paper-experiment", "--json")
+    assert outcome.code == 0, outcome.err
+    assert "60 records at 3 points" in outcome.document["line"]

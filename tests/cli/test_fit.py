@@ -1,0 +1,166 @@
+"""``hexacell fit``: the same answer from a file, and every mistake that a file can have."""
+
+from __future__ import annotations
+
+import json
+import re
+import shutil
+
+import numpy as np
+import pytest
+
+from hexacell.measurement_file import HEADER
+
+SHAPES = {"S": (6, 3), "B": (6, 3), "l": (6,)}
+
+
+@pytest.fixture(scope="session")
+def records(demo) -> list[str]:
+    """The demo's measurement file, line by line."""
+    return str((demo.run / "measurements.csv").read_text()).splitlines()
+
+
+def fit(typed, cell_folder, measurements="m.csv", *arguments):
+    return typed("fit", cell_folder.cell, "--measurements", measurements, *arguments)
+
+
+@pytest.mark.parametrize("config", ["config-before", "config-after"])
+def test_the_demos_records_give_the_demos_geometry(typed_here, demo, cell_folder, config):
+    """Whether the controller holds the old geometry still or the new one already."""
+    shutil.copy(demo.run / config, cell_folder.controller)
+    outcome = fit(typed_here, cell_folder, demo.run / "measurements.csv", "--json")
+    assert outcome.code == 0
+    expected = json.loads((demo.run / "result.json").read_text())["geometry"]
+    for name, shape in SHAPES.items():
+        found = np.array(outcome.document["geometry"][name])
+        assert found.shape == shape
+        assert np.abs(found - expected[name]).max() < 1e-9
+
+
+def test_the_document_is_as_promised(typed, demo):
+    outcome = typed("fit", demo.cell, "--measurements", demo.run / "measurements.csv", "--json")
+    assert (outcome.code, outcome.err) == (0, "")
+    document = outcome.document
+    assert (document["records"], document["points"], document["converged"]) == (55, 5, True)
+    assert document["frame"] == "paper"
+    assert document["undetermined"] == document["outliers"] == []
+    covariance = np.array(document["covariance"])
+    sigma = np.concatenate([np.ravel(document["sigma"][name]) for name in "SBl"])
+    assert covariance.shape == (42, 42)
+    np.testing.assert_allclose(np.sqrt(np.diag(covariance)), sigma, rtol=1e-9)
+    assert np.count_nonzero(sigma == 0.0) == 4
+    assert document["dof"] == 3 * 55 - 3 * 5 - 35
+    assert 0.5 < document["chi2"] / document["dof"] < 1.5
+
+
+def test_words_have_a_line_for_every_free_parameter(typed_here, demo):
+    outcome = typed_here("fit", demo.cell, "--measurements", demo.run / "measurements.csv")
+    assert (outcome.code, outcome.err) == (0, "")
+    assert "35 parameters from 55 records at 5 points" in outcome.out
+    assert max(map(len, outcome.out.splitlines())) <= 80
+    rows = re.findall(r"^([SB][1-6][xyz]|l[1-6]) +(\S+) +(\S+) +(\S+)", outcome.out, flags=re.MULTILINE)
+    assert len({name for name, *_ in rows}) == len(rows) == 42 - 4
+    for _, old, new, change in rows:
+        assert float(new) - float(old) == pytest.approx(float(change), abs=0.0011)
+
+
+def test_few_records_are_no_geometry(typed_here, cell_folder, tmp_path, records):
+    (tmp_path / "m.csv").write_text("\n".join([*records[:3], *records[12:14]]))
+    outcome = fit(typed_here, cell_folder, "m.csv", "--json")
+    assert outcome.code == 1
+    assert outcome.document["exit_code"] == 1
+    assert "Measure" in outcome.err
+
+
+def replaced(line: str, column: str, cell: str) -> str:
+    cells = line.split(",")
+    cells[HEADER.index(column)] = cell
+    return ",".join(cells)
+
+
+def without(line: str, column: str) -> str:
+    cells = line.split(",")
+    del cells[HEADER.index(column)]
+    return ",".join(cells)
+
+
+MISTAKES = {
+    "text": (
+        lambda r: [*r[:4], replaced(r[4], "q3", "abc"), *r[5:]],
+        ':5: q3 is "abc", but must be a finite',
+    ),
+    "NaN": (
+        lambda r: [*r[:4], replaced(r[4], "dx", "nan"), *r[5:]],
+        ':5: dx is "nan", but must be a finite',
+    ),
+    "infinity": (lambda r: [*r[:4], replaced(r[4], "a", "-inf"), *r[5:]], ':5: a is "-inf", but must be'),
+    "empty cell": (lambda r: [*r[:4], replaced(r[4], "z", ""), *r[5:]], ":5: z is empty, but must be"),
+    "point 0": (lambda r: [*r[:4], replaced(r[4], "point", "0"), *r[5:]], ':5: point is "0", but must be'),
+    "half a point": (
+        lambda r: [*r[:4], replaced(r[4], "orientation", "1.5"), *r[5:]],
+        ":5: orientation is",
+    ),
+    "missing columns": (
+        lambda r: [without(without(line, "dy"), "q6") for line in r],
+        ":1: columns are missing: q6, dy",
+    ),
+    "no header": (lambda r: r[1:], ":1: columns are missing: point, orientation"),
+    "duplicate row": (lambda r: [*r, r[7]], ":57: point 1, orientation 7 stands here and in line 8"),
+    "point with one row": (lambda r: r[:13], ":13: point 2 has one row, and at least two are needed"),
+    "header only": (lambda r: r[:1], "m.csv: there are no measurements in it"),
+    "empty": (lambda _: [], "m.csv:1: is empty"),
+    "short row": (
+        lambda r: [*r[:4], r[4].rpartition(",")[0], *r[5:]],
+        ":5: the row has 16 cells, the header 17",
+    ),
+    "decimal comma": (
+        lambda r: [*r[:4], r[4].replace(".", ","), *r[5:]],
+        "the header 17; is the decimal sign a comma?",
+    ),
+    "semicolons": (
+        lambda r: [line.replace(",", ";") for line in r],
+        ":1: columns are separated by semicolons",
+    ),
+    "quote left open": (lambda r: [*r[:4], '"' + r[4], *r[5:]], "is not valid CSV"),
+}
+
+
+@pytest.mark.parametrize("mistake", MISTAKES)
+def test_a_mistake_in_the_file_is_named_with_its_line(typed_here, cell_folder, tmp_path, records, mistake):
+    spoil, words = MISTAKES[mistake]
+    (tmp_path / "m.csv").write_text("".join(line + "\n" for line in spoil(records)))
+    before = cell_folder.snapshot()
+    outcome = fit(typed_here, cell_folder, "m.csv", "--json")
+    assert outcome.code == outcome.document["exit_code"] == 2
+    assert outcome.err.startswith("hexacell: m.csv")
+    assert words in outcome.err
+    assert cell_folder.snapshot() == before
+
+
+def test_a_file_that_is_no_text(typed_here, cell_folder, tmp_path):
+    (tmp_path / "m.csv").write_bytes(b"point,orientation\n1,\xff\n")
+    outcome = fit(typed_here, cell_folder)
+    assert outcome.code == 2
+    assert "m.csv:2: the file is not UTF-8 text" in outcome.err
+
+
+@pytest.mark.parametrize(
+    ("name", "words"), [("absent.csv", "it does not exist"), (".", "this is not a file")]
+)
+def test_a_file_that_cannot_be_read(typed, cell_folder, name, words):
+    outcome = fit(typed, cell_folder, name)
+    assert outcome.code == 2
+    assert f"{name}: " in outcome.err
+    assert words in outcome.err
+
+
+def test_further_columns_another_order_and_windows_line_ends_are_welcome(
+    typed_here, demo, tmp_path, records
+):
+    order = [*reversed(range(len(HEADER)))]
+    rows = [[line.split(",")[place] for place in order] for line in records]
+    text = "\r\n".join(",".join(["remark" if row is rows[0] else '"a, b"', *row]) for row in rows)
+    (tmp_path / "m.csv").write_bytes(b"\xef\xbb\xbf" + text.encode() + b"\r\n\r\n")
+    outcome = typed_here("fit", demo.cell, "--measurements", "m.csv", "--json")
+    assert outcome.code == 0
+    assert outcome.document["geometry"] == json.loads((demo.run / "result.json").read_text())["geometry"]

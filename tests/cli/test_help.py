@@ -1,0 +1,106 @@
+"""What a newcomer types first: nothing, a wrong word, ``--help``."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from hexacell import __version__
+from hexacell.cli.app import main
+from hexacell.cli.parser import make_parser
+
+SLOW_TO_IMPORT = {"numpy", "scipy", "textual", "matplotlib", "pydantic", "rich", "asyncio"}
+COMMANDS = ("demo", "run", "preflight", "simulate", "fit", "cell")
+PAGES = [
+    [],
+    *([command] for command in COMMANDS),
+    *(["cell", action] for action in ("validate", "schema", "show")),
+]
+
+
+def imported(folder: Path, *arguments: str) -> set[str]:
+    ended = subprocess.run(
+        [sys.executable, "-X", "importtime", "-m", "hexacell", *arguments],
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    return {line.rpartition("|")[2].strip().partition(".")[0] for line in ended.stderr.splitlines()}
+
+
+@pytest.mark.parametrize("arguments", [["run", "--help"], [], ["frobnicate"], ["fit", "--help"]])
+def test_nothing_slow_is_imported_to_help(tmp_path, arguments):
+    modules = imported(tmp_path, *arguments)
+    assert "hexacell" in modules
+    assert modules.isdisjoint(SLOW_TO_IMPORT)
+
+
+@pytest.mark.parametrize("page", PAGES, ids=" ".join)
+def test_every_page_fits_a_terminal(page, capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    with pytest.raises(SystemExit) as left:
+        main([*page, "--help"])
+    out, err = capsys.readouterr()
+    assert left.value.code == 0
+    assert err == ""
+    assert out.startswith(f"usage: {' '.join(['hexacell', *page])} ")
+    assert max(map(len, out.splitlines())) <= 80
+
+
+def test_help_names_every_command_in_one_line_each_and_every_exit_code(capsys, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "80")
+    with pytest.raises(SystemExit):
+        main(["--help"])
+    lines = capsys.readouterr().out.splitlines()
+    begun = lines.index("  COMMAND ...") + 1
+    assert [line.split()[0] for line in lines[begun : begun + len(COMMANDS)]] == list(COMMANDS)
+    codes = " ".join(lines[lines.index("exit codes:") :])
+    assert all(f" {code} " in codes for code in (0, 1, 2, 3, 4, 5, 6, 130))
+
+
+def test_no_arguments_are_answered_with_the_help(typed):
+    outcome = typed()
+    assert outcome.code == 2
+    assert outcome.out == ""
+    assert outcome.err == make_parser().format_help()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["frobnicate"], "invalid choice: 'frobnicate' (choose from 'demo', 'run'"),
+        (["run"], "the following arguments are required: CELL. Try `hexacell run --help`"),
+        (["cell"], "the following arguments are required: ACTION. Try `hexacell cell --help`"),
+        (["fit", "cell.toml"], "the following arguments are required: --measurements"),
+        (["run", "cell.toml", "--mode", "improve"], "invalid choice: 'improve'"),
+        (["run", "cell.toml", "--unattend"], "unrecognized arguments: --unattend"),
+        (["simulate", "cell.toml", "--json"], "unrecognized arguments: --json"),
+    ],
+)
+def test_a_slip_is_told_in_one_line(typed_here, arguments, words):
+    outcome = typed_here(*arguments)
+    assert outcome.code == 2
+    assert outcome.err.startswith("hexacell: ")
+    assert outcome.err.count("\n") == 1
+    assert words in outcome.err
+
+
+def test_a_slip_with_json_is_a_document_too(typed):
+    outcome = typed("run", "--json")
+    assert outcome.code == 2
+    assert outcome.document == {
+        "error": "the following arguments are required: CELL. Try `hexacell run --help`",
+        "exit_code": 2,
+    }
+    assert "required: CELL" in outcome.err
+
+
+def test_version(capsys):
+    with pytest.raises(SystemExit) as left:
+        main(["--version"])
+    assert left.value.code == 0
+    assert capsys.readouterr().out == f"hexacell {__version__}\n"

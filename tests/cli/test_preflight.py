@@ -1,0 +1,237 @@
+"""What stands in the way of a calibration is said before anything moves, all of it at once."""
+
+from __future__ import annotations
+
+import os
+import pty
+import re
+import socket
+import tty
+from collections.abc import Iterator
+from typing import Any, Self
+
+import pytest
+
+from drivers.simulated.cell import SimulatedCell
+from drivers.simulated.machine import SimulatedMachine
+
+COMMANDS = ["preflight", "run"]
+
+
+@pytest.fixture
+def never_moves(monkeypatch: pytest.MonkeyPatch) -> None:
+    def move(_machine: SimulatedMachine, pose: object) -> None:
+        pytest.fail(f"the robot was sent to {pose}")
+
+    monkeypatch.setattr(SimulatedMachine, "move", move)
+
+
+@pytest.fixture(scope="module")
+def serving(tmp_path_factory: pytest.TempPathFactory, processes: Any) -> Iterator[str]:
+    """The cell file of a cell that ``simulate`` serves in another process."""
+    folder = tmp_path_factory.mktemp("serving")
+    with processes(folder) as start:
+        process = start("simulate", folder / "simulated-hexaglide.toml", "--output", folder / "served.toml")
+        process.wait_for("serving", lambda: process.err)
+        yield (folder / "served.toml").read_text()
+
+
+@pytest.fixture
+def served(serving: str, cell_folder: Any) -> Any:
+    """A folder whose cell file leads to the served cell, to be spoilt."""
+    cell_folder.cell.write_text(
+        re.sub(r"(?m)^config = .*$", f'config = "{cell_folder.controller.name}"', serving)
+    )
+    return cell_folder
+
+
+def port_of(served: Any, gauge: str) -> str:
+    match = re.search(rf'name = "{gauge}"[^\[]*?port = "([^"]*)"', served.cell.read_text())
+    assert match
+    return match[1]
+
+
+def refused(typed: Any, served: Any, command: str, code: int, *words: str) -> str:
+    """Assert that a command ends with a code and says these words, and leaves the folder as it is."""
+    before = served.snapshot()
+    outcome = typed(command, served.cell, "--json")
+    assert outcome.code == outcome.document["exit_code"] == code, outcome.err
+    for word in words:
+        assert word in outcome.err
+        assert word in outcome.document["error"]
+    assert served.snapshot() == before
+    return str(outcome.err)
+
+
+@pytest.mark.usefixtures("never_moves")
+def test_a_cell_that_is_in_order(typed_here, cell_folder):
+    before = cell_folder.snapshot()
+    outcome = typed_here("preflight", cell_folder.cell)
+    assert (outcome.code, outcome.err) == (0, "")
+    ready = [line for line in outcome.out.splitlines() if line.startswith("ok  ")]
+    assert len(ready) == 3 + 6 + 1 + 1
+    assert "nothing was moved" in ready[-1]
+    assert max(map(len, outcome.out.splitlines())) <= 80
+    assert cell_folder.snapshot() == before
+
+
+def test_the_document_names_every_device(typed, cell_folder):
+    outcome = typed("preflight", cell_folder.cell, "--json")
+    assert outcome.code == 0
+    assert outcome.document["ready"] is True
+    devices = outcome.document["devices"]
+    assert [device["protocol"] for device in devices] == [
+        *("sylvac", "mux10", "cdi"),
+        *["cia406"] * 6,
+        "linuxcncrsh",
+    ]
+    assert [device["name"] for device in devices[:3]] == ["x", "y", "z"]
+    assert "nothing was moved" in outcome.err
+
+
+@pytest.mark.usefixtures("never_moves")
+@pytest.mark.parametrize("command", COMMANDS)
+def test_a_point_out_of_reach_is_named_with_its_leg(typed_here, cell_folder, command):
+    cell_folder.edit(("[100.0, 100.0, 550.0],", "[100.0, 100.0, 1550.0],"))
+    message = refused(typed_here, cell_folder, command, 2, "verification point 2")
+    assert re.search(r"\bleg [1-6]\b", message)
+
+
+@pytest.mark.usefixtures("never_moves")
+@pytest.mark.parametrize("command", COMMANDS)
+def test_a_point_beyond_a_sliders_end_is_named_with_its_leg(typed_here, cell_folder, command):
+    cell_folder.edit(("joint_max_mm = 800.0", "joint_max_mm = 480.0"))
+    message = refused(typed_here, cell_folder, command, 2, "identification point 1", "480")
+    assert re.search(r"\bleg [1-6]\b|\bq[1-6]\b", message)
+
+
+@pytest.mark.usefixtures("never_moves")
+def test_gauges_carried_by_hand_need_a_person(typed_here, cell_folder):
+    cell_folder.edit(('placement = "fixed"', 'placement = "by-hand"'))
+    assert typed_here("preflight", cell_folder.cell).code == 0
+    before = cell_folder.snapshot()
+    for arguments in (["preflight", "--unattended"], ["run", "--unattended"], ["run"]):
+        outcome = typed_here(*arguments, cell_folder.cell, "--json")
+        assert outcome.code == outcome.document["exit_code"] == 4
+        assert 'placement = "fixed"' in outcome.err
+        assert cell_folder.snapshot() == before
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_a_port_that_is_not_there(typed_here, served, command):
+    served.edit((port_of(served, "y"), "/dev/nowhere"))
+    refused(typed_here, served, command, 3, "gauge y: port /dev/nowhere is absent")
+
+
+@pytest.fixture
+def silent_port() -> Iterator[str]:
+    """A serial port at whose other end nobody is."""
+    master, slave = pty.openpty()
+    tty.setraw(slave)
+    yield os.ttyname(slave)
+    os.close(master)
+    os.close(slave)
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_a_gauge_that_is_silent(typed_here, served, silent_port, command):
+    served.edit((port_of(served, "z"), silent_port))
+    message = refused(typed_here, served, command, 3, "gauge z", silent_port)
+    assert "Switch it on" in message or "Switch the device on" in message
+
+
+def test_two_gauges_with_their_cables_swapped(typed_here, served):
+    x, z = port_of(served, "x"), port_of(served, "z")
+    served.edit((x, "#"), (z, x), ("#", z))
+    refused(typed_here, served, "preflight", 3, "gauge x", "gauge z", "port")
+
+
+def test_an_encoder_that_is_missing(typed_here, served):
+    served.edit(("nodes = [1, 2, 3, 4, 5, 6]", "nodes = [1, 2, 3, 4, 5, 9]"))
+    refused(typed_here, served, "preflight", 3, "leg 6", "node 9")
+
+
+def test_a_bus_that_is_not_there(typed_here, served):
+    served.cell.write_text(re.sub('channel = "[^"]*"', 'channel = "/dev/nowhere"', served.cell.read_text()))
+    refused(typed_here, served, "preflight", 3, "/dev/nowhere")
+
+
+@pytest.fixture
+def closed_port() -> int:
+    """A TCP port that nobody listens on."""
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        return int(server.getsockname()[1])
+
+
+def without_controller(served: Any, closed_port: int) -> None:
+    text = served.cell.read_text()
+    served.cell.write_text(re.sub(r"(?m)^port = \d+$", f"port = {closed_port}", text))
+
+
+def test_a_controller_that_is_not_there(typed_here, served, closed_port):
+    without_controller(served, closed_port)
+    refused(typed_here, served, "preflight", 3, f"controller 127.0.0.1:{closed_port}")
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_everything_at_once(typed, served, closed_port, command):
+    served.edit(
+        (port_of(served, "x"), "/dev/nowhere"),
+        ("nodes = [1, 2, 3, 4, 5, 6]", "nodes = [9, 2, 3, 4, 5, 6]"),
+        ("[100.0, 100.0, 550.0],", "[100.0, 100.0, 1550.0],"),
+    )
+    without_controller(served, closed_port)
+    words = ("gauge x", "leg 1", f"controller 127.0.0.1:{closed_port}", "verification point 2")
+    message = refused(typed, served, command, 3, *words)
+    assert message.count("\n  - ") >= len(words)
+
+
+@pytest.mark.usefixtures("never_moves")
+@pytest.mark.parametrize("command", COMMANDS)
+@pytest.mark.parametrize(
+    ("fault", "words"),
+    [
+        ("duplicate", ("leg 3", "node 3")),
+        ("unplug", ("leg 3", "node 3")),
+        ("alarm", ("leg 3",)),
+    ],
+)
+def test_an_encoder_that_is_not_as_it_should_be(
+    typed_here, cell_folder, monkeypatch, command, fault, words
+):
+    class Faulty(SimulatedCell):
+        def __enter__(self) -> Self:
+            getattr(self.encoders.faults, fault)(3)
+            return super().__enter__()
+
+    monkeypatch.setattr("drivers.simulated.cell.SimulatedCell", Faulty)
+    refused(typed_here, cell_folder, command, 3, *words)
+
+
+UNKNOWN = {
+    "gauge": (('protocol = "sylvac"', 'protocol = "sylvak"'), ("gauge protocol 'sylvak'", "'sylvac'?")),
+    "encoders": (
+        ('protocol = "cia406"', 'protocol = "cia408"'),
+        ("encoder protocol 'cia408'", "'cia406'?"),
+    ),
+    "controller": (
+        ('= "linuxcncrsh"', '= "linuxcnc"'),
+        ("controller protocol 'linuxcnc'", "'linuxcncrsh'?"),
+    ),
+    "format": (('config_format = "toml"', 'config_format = "tom"'), ("config format 'tom'", "'toml'?")),
+    "mechanism": (('mechanism = "hexaglide"', 'mechanism = "hexaglid"'), ("'hexaglid'", "'hexaglide'?")),
+}
+
+
+@pytest.mark.parametrize("thing", UNKNOWN)
+@pytest.mark.parametrize(
+    "command", [["preflight"], ["run"], ["simulate"], ["cell", "validate"]], ids=" ".join
+)
+def test_what_no_plugin_offers_gets_the_nearest(typed_here, cell_folder, command, thing):
+    edit, words = UNKNOWN[thing]
+    cell_folder.edit(edit)
+    before = cell_folder.snapshot()
+    outcome = typed_here(*command, cell_folder.cell)
+    assert outcome.code == 2
+    assert all(word in outcome.err for word in ("Did you mean", *words))
+    assert cell_folder.snapshot() == before

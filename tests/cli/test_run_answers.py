@@ -1,0 +1,230 @@
+"""Who lets a new geometry into the controller: limits, a person, or nobody."""
+
+from __future__ import annotations
+
+import os
+import pty
+import re
+import select
+import signal
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+import pytest
+
+from procedures import events
+from procedures.journal import read_journal
+
+FAST = ("clock_factor = 50.0", "clock_factor = 200.0\ngive_up_s = 2000.0")
+ASK = ('approval = "automatic"', 'approval = "ask"')
+BY_HAND = ('placement = "fixed"', 'placement = "by-hand"')
+
+
+@pytest.fixture
+def fast_cell(cell_folder):
+    cell_folder.edit(FAST)
+    return cell_folder
+
+
+@dataclass
+class Terminal:
+    """A terminal of 80 columns, and what was shown on it."""
+
+    master: int
+    slave: int
+    shown: str = ""
+    seen: int = field(default=0)
+
+    def read_until(self, words: str) -> str:
+        """What is shown up to these words, since the last time."""
+        give_up = time.monotonic() + 30.0
+        while (place := self.shown.find(words, self.seen)) < 0:
+            if time.monotonic() > give_up:
+                pytest.fail(f"waiting for {words!r}: {self.shown}")
+            if select.select([self.master], [], [], 0.05)[0]:
+                self.shown += os.read(self.master, 65536).decode()
+        passage = self.shown[self.seen : place + len(words)]
+        self.seen = place + len(words)
+        return passage
+
+    def drain(self) -> str:
+        """All that is shown."""
+        while select.select([self.master], [], [], 0.0)[0]:
+            self.shown += os.read(self.master, 65536).decode()
+        return self.shown
+
+    def type(self, text: str) -> None:
+        os.write(self.master, text.encode())
+
+
+@pytest.fixture
+def terminal() -> Iterator[Terminal]:
+    master, slave = pty.openpty()
+    yield Terminal(master, slave)
+    os.close(master)
+    os.close(slave)
+
+
+def start_at(terminal, start, *arguments):
+    """A command with its input and its stderr at a terminal; stdout goes to a file."""
+    return start(*arguments, stdin=terminal.slave, stderr=terminal.slave)
+
+
+def ended(process, terminal):
+    """How it ends, its terminal being read meanwhile."""
+    give_up = time.monotonic() + 30.0
+    while process.popen.poll() is None and time.monotonic() < give_up:
+        terminal.drain()
+        time.sleep(0.02)
+    assert "Traceback" not in terminal.drain()
+    return process.popen.poll()
+
+
+class TestNobodyIsThere:
+    @pytest.mark.parametrize(
+        "unattended", [[], ["--unattended", "--mode", "optimise"]], ids=["", "unattended"]
+    )
+    def test_approval_waits_with_the_proposal_left(self, typed_here, fast_cell, demo, unattended):
+        fast_cell.edit(ASK)
+        run = fast_cell.rewound(demo.run, before="propose")
+        config = fast_cell.controller.read_bytes()
+        outcome = typed_here("run", fast_cell.cell, "--resume", run, "--json", *unattended)
+        assert outcome.code == outcome.document["exit_code"] == 4
+        assert "the new geometry waits for approval: the cell file says to ask" in outcome.err
+        assert f"--resume {run}" in outcome.err
+        assert (run / "proposal.json").is_file()
+        assert fast_cell.controller.read_bytes() == config
+        assert not (run / "config-after").exists()
+
+    def test_a_change_beyond_its_limit_waits_too(self, typed_here, fast_cell, demo):
+        fast_cell.edit(("largest_change_mm = 15.0", "largest_change_mm = 1.0"))
+        run = fast_cell.rewound(demo.run, before="propose")
+        config = fast_cell.controller.read_bytes()
+        outcome = typed_here("run", fast_cell.cell, "--resume", run)
+        assert outcome.code == 4
+        assert re.search(r"The largest change is \d\.\d\d mm \(limit without a person 1 mm\)", outcome.err)
+        assert fast_cell.controller.read_bytes() == config
+
+    def test_a_result_out_of_limits_is_taken_back_bit_for_bit(self, typed_here, fast_cell, demo):
+        fast_cell.edit(("mean_deviation_mm = 0.05", "mean_deviation_mm = 0.0001"))
+        run = fast_cell.rewound(demo.run, before="propose")
+        config = fast_cell.controller.read_bytes()
+        outcome = typed_here("run", fast_cell.cell, "--resume", run, "--json")
+        assert outcome.code == outcome.document["exit_code"] == 1
+        line = outcome.document["line"]
+        assert line.endswith("(limit 0.0001): out of limits; rolled back, the controller is as it was")
+        assert "the old geometry is back in the controller" in outcome.err
+        assert fast_cell.controller.read_bytes() == config
+        assert (run / "config-after").read_bytes() != config
+
+    def test_a_config_that_somebody_changed_meanwhile_is_left_alone(self, typed_here, fast_cell, demo):
+        run = fast_cell.rewound(demo.run, before="propose")
+        theirs = fast_cell.controller.read_bytes() + b"# tuned by hand\n"
+        fast_cell.controller.write_bytes(theirs)
+        outcome = typed_here("run", fast_cell.cell, "--resume", run)
+        assert outcome.code == 2
+        assert f"{fast_cell.controller}: the config changed since the run began" in outcome.err
+        assert fast_cell.controller.read_bytes() == theirs
+
+    def test_a_controller_that_does_not_take_it_gets_the_old_one_back(
+        self, start, typed_here, fast_cell, demo
+    ):
+        simulation = start("simulate", fast_cell.cell)
+        simulation.wait_for("serving", lambda: simulation.err)
+        fast_cell.cell.write_text(
+            simulation.out.replace(
+                "reload_command = []", 'reload_command = ["sh", "-c", "echo sorry; exit 7"]'
+            )
+        )
+        run = fast_cell.rewound(demo.run, before="propose")
+        config = fast_cell.controller.read_bytes()
+        outcome = typed_here("run", fast_cell.cell, "--resume", run, "--json")
+        assert outcome.code == outcome.document["exit_code"] == 6
+        assert "failed with status 7: sorry" in outcome.err
+        assert "its config is as it was" in outcome.err
+        assert fast_cell.controller.read_bytes() == config
+
+    def test_a_check_touches_nothing(self, typed_here, fast_cell):
+        fast_cell.edit(("orientations = 6", "orientations = 2"))
+        config = fast_cell.controller.read_bytes()
+        outcome = typed_here("run", fast_cell.cell, "--unattended", "--json")
+        assert outcome.code == outcome.document["exit_code"] == 1
+        document = outcome.document
+        assert re.fullmatch(
+            r"2 poses at held-out points; mean deviation \d\.\d{3} mm \(limit 0\.05\): out of limits",
+            document["line"],
+        )
+        assert document["measurements"] is None
+        assert fast_cell.controller.read_bytes() == config
+        [run] = fast_cell.runs()
+        sampled = [e for e in read_journal(run / "journal.jsonl") if isinstance(e, events.Sampled)]
+        assert {event.at.phase.value for event in sampled} == {"before-V"}
+
+    def test_closed_standard_streams_are_nobody(self, start, fast_cell, demo):
+        fast_cell.edit(ASK)
+        run = fast_cell.rewound(demo.run, before="propose")
+        process = start("run", fast_cell.cell, "--resume", run, through='exec "$@" <&- >&- 2>&-')
+        assert process.popen.wait(30) == 4
+        assert (run / "proposal.json").is_file()
+
+
+class TestAPersonAtTheTerminal:
+    @pytest.fixture
+    def waiting(self, fast_cell, demo, start, terminal):
+        """A run that shows its proposal and asks; its terminal; its config before."""
+        fast_cell.edit(ASK)
+        run = fast_cell.rewound(demo.run, before="propose")
+        process = start_at(terminal, start, "run", fast_cell.cell, "--resume", run)
+        question = terminal.read_until("Write this into the controller's config? Type yes: ")
+        return process, question, fast_cell
+
+    def test_sees_the_change_and_says_yes(self, waiting, terminal, demo):
+        process, question, cell = waiting
+        lines = question.replace("\r\n", "\n").splitlines()
+        assert {"--- config-before", "+++ config-after"} <= set(lines)
+        assert len([line for line in lines if line.startswith("ok  ")]) == 4
+        terminal.type("yes\n")
+        assert ended(process, terminal) == 0
+        assert cell.controller.read_bytes() != (demo.run / "config-before").read_bytes()
+        assert "approved by a person at the terminal" in process.out
+        assert process.out.splitlines()[-1].endswith(": pass")
+
+    def test_anything_but_yes_is_no(self, waiting, terminal, demo):
+        process, _, cell = waiting
+        terminal.type("y\n")
+        assert ended(process, terminal) == 1
+        assert "declined; nothing was applied" in terminal.shown
+        assert cell.controller.read_bytes() == (demo.run / "config-before").read_bytes()
+
+    def test_no_answer_is_none(self, waiting, terminal, demo):
+        process, _, cell = waiting
+        terminal.type("\x04")
+        assert ended(process, terminal) == 4
+        assert "left without an answer" in terminal.shown
+        assert cell.controller.read_bytes() == (demo.run / "config-before").read_bytes()
+
+    def test_a_question_keeps_nobody_from_leaving(self, waiting, terminal):
+        process, _, _ = waiting
+        begun = time.monotonic()
+        process.popen.send_signal(signal.SIGINT)
+        assert ended(process, terminal) == 130
+        assert time.monotonic() - begun < 2.0
+        assert "hexacell: interrupted" in terminal.shown
+
+    def test_carries_the_gauges_from_point_to_point(self, quick_cell, start, terminal):
+        quick_cell.edit(BY_HAND)
+        process = start_at(terminal, start, "run", quick_cell.cell, "--mode", "check")
+        terminal.read_until("Press Enter when they stand. ")
+        terminal.type("\n\n")  # an Enter too many must not answer the next question
+        second = terminal.read_until("Press Enter when they stand. ")
+        assert "Point 2: the robot stands at X100.000 Y100.000 Z550.000" in second
+        time.sleep(0.3)
+        [run] = quick_cell.runs()
+        placed = [e for e in read_journal(run / "journal.jsonl") if isinstance(e, events.Placed)]
+        assert len(placed) == 1
+        terminal.type("\n")
+        assert ended(process, terminal) == 1
+        assert "out of limits" in process.out
+        assert "6/6" in terminal.shown  # the bar
+        assert "held-out point 1, before  2 records" in process.out  # not swallowed by the bar's terminal

@@ -1,0 +1,218 @@
+"""A run that is stopped, and goes on later as its last words say."""
+
+from __future__ import annotations
+
+import json
+import os
+import shlex
+import shutil
+import signal
+import subprocess
+import sys
+from collections import Counter
+
+import pytest
+
+from procedures import events
+from procedures.journal import read_journal
+from procedures.steps import Phase
+
+
+@pytest.fixture
+def good_cell(quick_cell, demo):
+    """A quick cell that was calibrated before: checking it passes."""
+    shutil.copy(demo.run / "config-after", quick_cell.controller)
+    return quick_cell
+
+
+def history(run):
+    return read_journal(run / "journal.jsonl")
+
+
+def under_way(process, cell, records: int) -> None:
+    """Wait until so many records are taken."""
+    process.wait_until(lambda: records_in(cell) >= records, f"{records} records")
+
+
+def records_in(cell) -> int:
+    journals = (cell.path / "runs").rglob("journal.jsonl")
+    return sum(journal.read_text().count('"kind":"sampled"') for journal in journals)
+
+
+def to_go_on(words: str) -> list[str]:
+    """The command that the last words of a run give, without ``hexacell``."""
+    lines = words.splitlines()
+    place = lines.index("Stopped; what was measured is kept. To go on:")
+    program, *arguments = shlex.split(lines[place + 1])
+    assert program == "hexacell"
+    return arguments
+
+
+def test_a_check_is_stopped_at_once_and_goes_on_as_it_says(start, typed_here, good_cell):
+    config = good_cell.controller.read_bytes()
+    process = start("run", good_cell.cell, "--unattended")
+    under_way(process, good_cell, 1)
+    outcome, seconds = process.stopped(signal.SIGTERM)
+    assert outcome.code == 130
+    assert seconds < 2.0
+    assert outcome.err == "hexacell: interrupted\n"
+    [run] = good_cell.runs()
+    last = history(run)[-1]
+    assert isinstance(last, events.Interrupted)
+    assert last.exit_code == 130
+    arguments = to_go_on(outcome.out)
+    assert arguments[:4] == ["run", str(good_cell.cell), "--resume", str(run)]
+    resumed = typed_here(*arguments)
+    assert resumed.code == 0, resumed.err
+    assert resumed.out.splitlines()[-1].endswith(": pass")
+    assert good_cell.runs() == [run]
+    assert good_cell.controller.read_bytes() == config
+
+
+def test_a_calibration_is_stopped_and_finished(start, typed, quick_cell):
+    process = start("run", quick_cell.cell)
+    under_way(process, quick_cell, 5 + 3)
+    config = quick_cell.controller.read_bytes()
+    outcome, seconds = process.stopped(signal.SIGINT)
+    assert (outcome.code, seconds < 2.0) == (130, True)
+    assert quick_cell.controller.read_bytes() == config
+    [run] = quick_cell.runs()
+    resumed = typed("run", quick_cell.cell, "--resume", run.name, "--json")
+    assert resumed.code == 0, resumed.err
+    assert "point 2 is measured again: the run was interrupted" in resumed.err
+    assert resumed.document["run"] == str(run)
+    assert "35 parameters, 25 records at 5 points" in resumed.document["line"]
+    assert quick_cell.controller.read_bytes() != config
+    measured = Counter(
+        event.at.point
+        for event in history(run)
+        if isinstance(event, events.Sampled) and event.at.phase is Phase.IDENTIFY
+    )
+    assert measured.pop(2) > 5
+    assert measured == {1: 5, 3: 5, 4: 5, 5: 5}  # what was finished is not measured again
+
+
+def test_a_stop_before_anything_was_measured_leaves_nothing_to_resume(start, good_cell):
+    process = start("run", good_cell.cell)
+    process.wait_for("times as fast", lambda: process.out)
+    outcome, seconds = process.stopped(signal.SIGTERM)
+    assert (outcome.code, seconds < 2.0) == (130, True)
+    assert ("To go on" in outcome.out) == bool(good_cell.runs())
+
+
+def test_a_terminal_that_goes_stops_it_too_and_json_says_so(start, good_cell):
+    process = start("run", good_cell.cell, "--unattended", "--json")
+    under_way(process, good_cell, 1)
+    outcome, seconds = process.stopped(signal.SIGHUP)
+    assert (outcome.code, seconds < 2.0) == (130, True)
+    assert outcome.document == {"error": "interrupted", "exit_code": 130}
+    assert "To go on:" in outcome.err
+
+
+def test_impatience_changes_nothing(start, good_cell):
+    """Ctrl-C again and again while it stops."""
+    process = start("run", good_cell.cell, "--unattended")
+    under_way(process, good_cell, 1)
+    for _ in range(5):
+        process.popen.send_signal(signal.SIGINT)
+    outcome = process.ended()
+    assert outcome.code == 130
+    assert isinstance(history(good_cell.runs()[0])[-1], events.Interrupted)
+
+
+def test_sigterm_stops_what_ignores_ctrl_c(start, good_cell):
+    """So a shell script starts what it puts into the background."""
+    process = start("run", good_cell.cell, "--unattended", through="trap '' INT; exec \"$@\"")
+    under_way(process, good_cell, 1)
+    process.popen.send_signal(signal.SIGINT)
+    outcome, seconds = process.stopped(signal.SIGTERM)
+    assert (outcome.code, seconds < 2.0) == (130, True)
+    assert isinstance(history(good_cell.runs()[0])[-1], events.Interrupted)
+
+
+def test_a_kill_leaves_what_can_be_resumed(start, typed_here, good_cell):
+    process = start("run", good_cell.cell, "--unattended")
+    under_way(process, good_cell, 2)
+    process.popen.kill()
+    process.popen.wait()
+    [run] = good_cell.runs()
+    resumed = typed_here("run", good_cell.cell, "--resume", run, "--unattended")
+    assert resumed.code == 0, resumed.err
+
+
+def test_nobody_listening_is_no_reason_to_stop(start, good_cell):
+    """``hexacell run ... | head -1``: the job is done, and the exit code is the job's."""
+    reader, writer = os.pipe()
+    os.close(reader)
+    process = start("run", good_cell.cell, "--unattended", stdout=writer)
+    os.close(writer)
+    assert process.ended().code == 0
+    assert isinstance(history(good_cell.runs()[0])[-1], events.Ended)
+
+
+@pytest.mark.parametrize("arguments", [["cell", "schema"], ["--help"]], ids=" ".join)
+def test_a_reader_that_leaves_early_gets_no_traceback(arguments, tmp_path):
+    shell = subprocess.run(
+        [
+            "bash",
+            "-c",
+            'set -o pipefail; "$@" | true',
+            "bash",
+            sys.executable,
+            "-m",
+            "hexacell",
+            *arguments,
+        ],
+        capture_output=True,
+        text=True,
+        cwd=tmp_path,
+        check=False,
+    )
+    assert (shell.returncode, shell.stderr) == (0, "")
+
+
+class TestWhatCannotBeResumed:
+    @pytest.fixture
+    def rewound(self, demo, cell_folder):
+        return cell_folder.rewound(demo.run, before="propose")
+
+    def refused(self, typed_here, cell_folder, run, words, *arguments):
+        before = cell_folder.snapshot()
+        outcome = typed_here("run", cell_folder.cell, "--resume", run, "--json", *arguments)
+        assert outcome.code == outcome.document["exit_code"] == 2
+        assert words in outcome.err
+        assert cell_folder.snapshot() == before
+
+    def test_a_run_that_does_not_exist(self, typed_here, cell_folder):
+        words = f"there is no run 'lost'. The cell's runs are in {cell_folder.path / 'runs'}"
+        self.refused(typed_here, cell_folder, "lost", words)
+
+    def test_a_run_that_is_over(self, typed_here, demo):
+        outcome = typed_here("run", demo.cell, "--resume", demo.run)
+        assert outcome.code == 2
+        assert f"the run {demo.run} is over: 35 parameters" in outcome.err
+
+    def test_a_run_of_another_cell_file(self, typed_here, cell_folder, rewound):
+        cell_folder.cell.write_text(cell_folder.cell.read_text() + "\n")
+        self.refused(typed_here, cell_folder, rewound, "has changed since the run began")
+
+    def test_a_run_in_another_mode(self, typed_here, cell_folder, rewound):
+        words = "the run was begun in the mode optimise"
+        self.refused(typed_here, cell_folder, rewound, words, "--mode", "check")
+
+    def test_a_damaged_journal(self, typed_here, cell_folder, rewound):
+        lines = (rewound / "journal.jsonl").read_text().splitlines(keepends=True)
+        lines[7] = lines[7].replace("0", "1", 1)
+        (rewound / "journal.jsonl").write_text("".join(lines))
+        words = f"{rewound / 'journal.jsonl'}:8: this line of the journal is damaged"
+        self.refused(typed_here, cell_folder, rewound, words)
+
+    def test_an_empty_journal(self, typed_here, cell_folder, rewound):
+        (rewound / "journal.jsonl").write_text("")
+        self.refused(typed_here, cell_folder, rewound, "the journal is empty")
+
+
+def test_the_words_of_a_run_and_its_journal_agree(demo):
+    ended = history(demo.run)[-1]
+    assert isinstance(ended, events.Ended)
+    assert json.loads(demo.outcome.out)["line"] == ended.line

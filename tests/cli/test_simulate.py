@@ -1,0 +1,127 @@
+"""A simulated cell in one process, and the program that calibrates it in another."""
+
+from __future__ import annotations
+
+import re
+import signal
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+
+def serving(start, folder):
+    """A cell that is being served, and the cell file that it printed."""
+    process = start("simulate", folder.cell)
+    process.wait_for("serving", lambda: process.err)
+    return process, process.out
+
+
+@pytest.fixture
+def served(start, quick_cell):
+    """The folder of a quick cell that another process serves; ``served.toml`` leads to it."""
+    process, text = serving(start, quick_cell)
+    (quick_cell.path / "served.toml").write_text(text)
+    return process, quick_cell.path / "served.toml"
+
+
+def test_it_prints_a_complete_cell_file_before_it_says_that_it_serves(start, typed_here, cell_folder):
+    process, text = serving(start, cell_folder)
+    settings = tomllib.loads(text)
+    assert "simulation" not in settings
+    assert all(gauge["port"] for gauge in settings["gauges"])
+    assert settings["encoders"]["bus"]["interface"] == "slcan"
+    assert settings["controller"]["host"] == "127.0.0.1"
+    assert Path(settings["controller"]["config"]) == cell_folder.controller
+    printed = cell_folder.path / "printed.toml"
+    printed.write_text(text)
+    assert typed_here("cell", "validate", printed).code == 0
+    outcome, _ = process.stopped(signal.SIGINT)
+    assert outcome.out == text
+
+
+def test_the_truth_stays_hidden(start, cell_folder):
+    _, text = serving(start, cell_folder)
+    truth = tomllib.loads(cell_folder.cell.read_text())["simulation"]["geometry"]
+    for length in truth["l"]:
+        assert str(length) not in text
+
+
+def test_run_does_the_whole_job_over_the_wires(served, typed, quick_cell):
+    _, printed = served
+    before = tomllib.loads(quick_cell.controller.read_text())
+    outcome = typed("run", printed, "--json")
+    assert outcome.code == 0, outcome.err
+    line = outcome.document["line"]
+    assert re.fullmatch(
+        r"35 parameters, 25 records at 5 points; mean deviation at held-out points "
+        r"\d\.\d\d -> 0\.\d{3} mm \(limit 0\.5\): pass",
+        line,
+    ), line
+    truth = tomllib.loads(quick_cell.cell.read_text())["simulation"]["geometry"]
+    after = tomllib.loads(quick_cell.controller.read_text())
+    for name in ("S", "B", "l"):
+        assert np.abs(np.subtract(after["geometry"][name], truth[name])).max() < 3.0
+        assert np.abs(np.subtract(before["geometry"][name], truth[name])).max() > 5.0
+    assert quick_cell.controller.read_text() == (quick_cell.runs()[0] / "config-after").read_text()
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_it_ends_cleanly(start, cell_folder, number):
+    process, text = serving(start, cell_folder)
+    before = cell_folder.snapshot()
+    assert list(process.temporary.iterdir())
+    outcome, seconds = process.stopped(number)
+    assert outcome.code == 0
+    assert seconds < 2.0
+    assert outcome.err == "serving; Ctrl-C ends it\n"
+    assert cell_folder.snapshot() == before
+    for port in re.findall(r'(?:port|channel) = "([^"]+)"', text):
+        assert not Path(port).exists()
+
+
+def test_it_has_no_processes_that_could_stay(start, cell_folder):
+    process, _ = serving(start, cell_folder)
+    pid = process.popen.pid
+    assert Path(f"/proc/{pid}/task/{pid}/children").read_text() == ""
+
+
+def test_it_ends_while_a_run_talks_to_it(served, start):
+    """The run then says which device has gone, and that it can be resumed."""
+    simulation, printed = served
+    run = start("run", printed, "--mode", "check")
+    run.wait_until(lambda: "journal" in names_below(printed.parent), "a journal")
+    outcome, seconds = simulation.stopped(signal.SIGTERM)
+    assert (outcome.code, seconds < 2.0) == (0, True)
+    stopped = run.ended()
+    assert stopped.code == 3
+    assert re.search(r"hexacell: (gauge|encoder|controller|gauges) ", stopped.err)
+    assert f"--resume {printed.parent / 'runs'}" in stopped.out
+
+
+def names_below(folder: Path) -> set[str]:
+    return {path.stem for path in folder.rglob("*")}
+
+
+def test_output_goes_to_a_file_where_one_is_named(start, cell_folder):
+    process = start("simulate", cell_folder.cell, "--output", "served.toml")
+    process.wait_for("serving", lambda: process.err)
+    assert process.out == ""
+    written = cell_folder.path.parent / "served.toml"
+    assert Path(tomllib.loads(written.read_text())["controller"]["config"]) == cell_folder.controller
+
+
+def test_two_processes_cannot_move_one_robot(served, start, typed_here):
+    _, printed = served
+    first = start("run", printed)
+    first.wait_until(lambda: "journal" in names_below(printed.parent), "a journal")
+    runs = names_below(printed.parent / "runs")
+    for command in ("run", "preflight"):
+        outcome = typed_here(command, printed, "--json")
+        assert outcome.code == outcome.document["exit_code"] == 5
+        assert f"the cell is in use by process {first.popen.pid} of " in outcome.err
+    assert names_below(printed.parent / "runs") == runs
+    stopped, _ = first.stopped(signal.SIGTERM)
+    assert stopped.code == 130
+    assert typed_here("preflight", printed).code == 0

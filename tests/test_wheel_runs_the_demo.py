@@ -1,0 +1,118 @@
+"""The wheel alone, installed elsewhere, does the whole job: nothing of the checkout is needed."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import sysconfig
+from pathlib import Path
+
+import pytest
+
+CHECKOUT = Path(__file__).resolve().parent.parent
+CELL = "simulated-hexaglide.toml"
+
+# Fewer records and wide limits, on a cell that lives fast.
+QUICK = (
+    ("clock_factor = 50.0", "clock_factor = 200.0\ngive_up_s = 2000.0"),
+    ("orientations = 11", "orientations = 5"),
+    ("orientations = 6", "orientations = 2"),
+    ("mean_deviation_mm = 0.05", "mean_deviation_mm = 0.5"),
+    ("max_deviation_mm = 0.15", "max_deviation_mm = 1.5"),
+)
+
+
+def run(*command: object, folder: Path) -> str:
+    """What a command prints that ends well, in ``folder`` and without what leads to the checkout."""
+    environment = {name: value for name, value in os.environ.items() if not name.startswith("PYTHON")}
+    ended = subprocess.run(
+        [str(word) for word in command],
+        cwd=folder,
+        env=environment,
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert ended.returncode == 0, ended.stdout + ended.stderr
+    return ended.stdout
+
+
+def pip(folder: Path) -> list[str]:
+    """A pip that can install into other environments; .venv need not have one of its own."""
+    for python in (sys.executable, "python3"):
+        found = subprocess.run(
+            [python, "-m", "pip", "--version"], cwd=folder, capture_output=True, check=False
+        )
+        if found.returncode == 0:
+            return [python, "-m", "pip"]
+    pytest.fail("there is no pip")
+
+
+@pytest.fixture(scope="module")
+def elsewhere(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A venv with the wheel in it; what the wheel needs is lent to it by this one."""
+    folder = tmp_path_factory.mktemp("elsewhere")
+    build = ("-m", "build", "--wheel", "--no-isolation", "--outdir", folder)
+    run(sys.executable, *build, CHECKOUT, folder=folder)
+    [wheel] = folder.glob("*.whl")
+    venv = folder / "venv"
+    run(sys.executable, "-m", "venv", "--without-pip", venv, folder=folder)
+    install = ("install", "--quiet", "--no-index", "--no-deps", "--disable-pip-version-check")
+    run(*pip(folder), "--python", venv / "bin" / "python", *install, wheel, folder=folder)
+    # A folder that a .pth file names has its own .pth files ignored: the checkout's among them.
+    lent = {sysconfig.get_path("purelib"), sysconfig.get_path("platlib")}
+    (site_packages(venv) / "lent.pth").write_text("".join(f"{path}\n" for path in sorted(lent)))
+    return venv
+
+
+def site_packages(venv: Path) -> Path:
+    [folder] = venv.glob("lib/python*/site-packages")
+    return folder
+
+
+def test_the_checkout_is_out_of_sight(elsewhere: Path, tmp_path: Path) -> None:
+    script = """
+import json, sys
+import drivers, hexacell, procedures
+from hexacell.bundled import bundled_config
+from hexacell.plugins import Group, names
+files = [module.__file__ for module in (drivers, hexacell, procedures)]
+files.append(str(bundled_config("simulated-hexaglide")))
+plugins = {group.value: names(group) for group in Group}
+print(json.dumps({"path": sys.path, "files": files, "plugins": plugins}))
+"""
+    found = json.loads(run(elsewhere / "bin" / "python", "-c", script, folder=tmp_path))
+    installed = site_packages(elsewhere)
+    assert all(installed in Path(path).parents for path in found["files"])
+    assert CHECKOUT not in {(tmp_path / path).resolve() for path in found["path"]}
+    assert found["plugins"]["hexacell.gauges"] == ["cdi", "mux10", "sylvac"]
+    assert all(found["plugins"].values())
+
+
+def check_demo(venv: Path, folder: Path, records: int) -> None:
+    said = run(venv / "bin" / "hexacell", "demo", folder=folder).splitlines()
+    assert said[-1].startswith(f"35 parameters, {records} records at 5 points; mean deviation at held-out")
+    assert said[-1].endswith(": pass")
+    result = folder / "hexacell-demo" / "run" / "result.json"
+    assert json.loads(result.read_text())["converged"] is True
+
+
+def test_it_does_the_whole_job_quickly(elsewhere: Path, tmp_path: Path) -> None:
+    cell = site_packages(elsewhere) / "hexacell" / "_configs" / CELL
+    as_it_comes = text = cell.read_text()
+    for old, new in QUICK:
+        assert text.count(old) == 1
+        text = text.replace(old, new)
+    cell.write_text(text)
+    try:
+        check_demo(elsewhere, tmp_path, records=25)
+    finally:
+        cell.write_text(as_it_comes)
+
+
+@pytest.mark.slow
+def test_it_does_the_whole_job_as_it_comes(elsewhere: Path, tmp_path: Path) -> None:
+    check_demo(elsewhere, tmp_path, records=55)

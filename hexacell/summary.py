@@ -2,10 +2,20 @@
 
 from __future__ import annotations
 
+from itertools import zip_longest
 from typing import Any
 
+import numpy as np
+
+from hexacell.assessment import Assessment
+from hexacell.design.parting import Parting
+from hexacell.findings import findings
 from hexacell.geometry import Geometry
+from hexacell.identification.accuracy import PoseErrors
+from hexacell.identification.goodness import Goodness
 from hexacell.identification.result import Identification
+from hexacell.identification.variance_components import NoiseLevels
+from hexacell.pose import Pose
 from hexacell.verification import Spread, Verdict
 
 
@@ -34,6 +44,109 @@ def identification_document(found: Identification) -> dict[str, Any]:
         ],
         "frame": found.frame,
     }
+
+
+def assessment_document(found: Identification, assessed: Assessment) -> dict[str, Any]:
+    """What ``hexacell fit --json`` adds: whether the result can be trusted, and how good it is."""
+    return {
+        "findings": list(findings(found, assessed)),
+        "goodness": _goodness(assessed.goodness),
+        "noise": _noise(assessed.noise),
+        "repeatability": _repeatability(assessed),
+        "correlated": _correlated(assessed),
+        "accuracy": _accuracy(assessed),
+    }
+
+
+def _goodness(goodness: Goodness) -> dict[str, Any]:
+    return {
+        "expected_chi2": goodness.expected,
+        "probability": goodness.probability,
+        "noise_ratio": goodness.ratio,
+        "agreement": goodness.agreement.value,
+    }
+
+
+def _noise(noise: NoiseLevels | None) -> dict[str, Any] | None:
+    if noise is None:
+        return None
+    levels = {
+        name: {
+            "stated": level.stated,
+            "estimated": level.estimated,
+            "standard_error": level.standard_error,
+            "at_most": level.at_most,
+            "seen": level.seen,
+        }
+        for name, level in (("encoder_mm", noise.encoder), ("gauge_mm", noise.gauge))
+    }
+    return levels | {"correlation": noise.correlation, "told_apart": noise.told_apart}
+
+
+def _repeatability(assessed: Assessment) -> dict[str, Any] | None:
+    scatter = assessed.repeatability
+    if scatter is None:
+        return None
+    return {
+        "per_axis_mm": list(scatter.per_axis_mm),
+        "distance_mm": scatter.distance_mm,
+        "degrees_of_freedom": scatter.degrees_of_freedom,
+        "poses": scatter.poses,
+        "recalibrating_helps": not assessed.does_not_repeat,
+    }
+
+
+def _correlated(assessed: Assessment) -> list[dict[str, Any]]:
+    parts = zip_longest(assessed.correlated, assessed.partings)
+    return [
+        {
+            "parameters": [pair.first, pair.second],
+            "correlation": pair.correlation,
+            "measure": _parting(part),
+        }
+        for pair, part in parts
+        if pair
+    ]
+
+
+def _parting(part: Parting | None) -> dict[str, Any] | None:
+    if part is None:
+        return None
+    return {
+        "point": part.point,
+        "axis": part.axis,
+        "angle_deg": part.degrees,
+        "pose": _pose(part.command),
+        "correlation": part.correlation,
+    }
+
+
+def _accuracy(assessed: Assessment) -> dict[str, Any] | None:
+    accuracy = assessed.accuracy
+    if accuracy is None:
+        return None
+    return {
+        "task_named": assessed.task_named,
+        "before": _errors(accuracy.before),
+        "after": _errors(accuracy.after),
+        "poses": [_pose(pose) for pose in assessed.task],
+        "reachable": accuracy.reachable.tolist(),
+    }
+
+
+def _errors(errors: PoseErrors) -> dict[str, Any]:
+    return {
+        "position_rms_mm": errors.position_rms_mm,
+        "position_largest_mm": errors.position_largest_mm,
+        "orientation_rms_deg": errors.orientation_rms_deg,
+        "orientation_largest_deg": errors.orientation_largest_deg,
+        "position_mm": errors.distances_mm.tolist(),
+        "orientation_deg": np.degrees(errors.angles).tolist(),
+    }
+
+
+def _pose(pose: Pose) -> dict[str, float]:
+    return dict(zip("xyzabc", pose.as_tuple(), strict=True))
 
 
 def outcome_line(

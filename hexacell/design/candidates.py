@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import qmc
 
 from hexacell import kinematics, rotations
 from hexacell.design.knowledge import Knowledge, Limits
@@ -45,6 +44,8 @@ def orientations(count: int, tilt: float, seed: int) -> Array:
     Amplitudes are spread over all scales, so that there are small ones to choose while little is
     known and large ones later. ``count`` is a power of two, as Sobol' sequences want it.
     """
+    from scipy.stats import qmc  # noqa: PLC0415 - half a second that only this function needs
+
     direction, size, turn = qmc.Sobol(3, seed=seed).random(count).T
     amplitude = tilt * (0.02 + 0.98 * size**2)
     heading = 2.0 * np.pi * direction

@@ -31,7 +31,10 @@ def choose_held_out(knowledge: Knowledge, point: Array, count: int, orientations
     usable = np.flatnonzero(within_limits(knowledge.limits, poses, joints) & _after(knowledge, poses))
     if not len(usable) or usable[0] != 0:
         raise LimitError(f"the untilted platform cannot stand at {poses.pose(0)} within the limits")
-    kept = poses[usable[_inside_travel(knowledge, poses[usable], joints[usable])]]
+    inside = _inside_travel(knowledge, poses[usable], joints[usable])
+    if not inside[0]:
+        raise LimitError(f"where the robot really goes for {poses.pose(0)} cannot be told")
+    kept = poses[usable[inside]]
     taken = _farthest_apart(knowledge, kept, count)
     if len(taken) < count:
         raise LimitError(

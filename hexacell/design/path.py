@@ -6,6 +6,7 @@ import numpy as np
 
 from hexacell import kinematics, rotations
 from hexacell.design.knowledge import Knowledge
+from hexacell.geometry import Geometry
 from hexacell.pose import Poses
 from hexacell.rotations import Array
 
@@ -47,10 +48,19 @@ def is_clear(knowledge: Knowledge, start: Poses, end: Poses, reference: Array | 
     if not really.found.all():
         return False
     for geometry, poses in ((knowledge.controller, way), (knowledge.estimate, really.poses)):
-        margin = kinematics.singularity_margin(knowledge.mechanism, geometry, poses, joints)
-        # The ends were chosen under the limit itself; on the way half of it will do.
-        if margin.min() < 0.5 * limits.singularity_margin:
+        if not _stays_clear_of_singularities(knowledge, geometry, poses, joints):
             return False
     if reference is None:
         return True
     return bool(np.abs(really.poses.positions - reference).max() <= limits.gauge_travel_mm)
+
+
+def _stays_clear_of_singularities(
+    knowledge: Knowledge, geometry: Geometry, way: Poses, joints: Array
+) -> bool:
+    margin = kinematics.singularity_margin(knowledge.mechanism, geometry, way, joints)
+    # Between two of the poses looked at a singularity may lie unseen; beyond it the mode is another.
+    mode = kinematics.assembly_mode(kinematics.pose_jacobian(knowledge.mechanism, geometry, way, joints))
+    # The ends were chosen under the limit itself; on the way half of it will do.
+    far_enough = margin.min() >= 0.5 * knowledge.limits.singularity_margin
+    return bool(far_enough and (mode == mode[0]).all())

@@ -1,12 +1,15 @@
 """Around the singularities that lie between the drawing and the solution.
 
 On the way from the drawing a record may come next to a singularity although it is far from one at
-both ends. Held in the sum there, it stops the whole iteration. It is therefore set aside, the
-others lead the way, and it is taken back at their solution, where its pose is followed from the
-drawing by continuation. A record that cannot be taken back says nothing and stays out.
+both ends; or one may lie between the geometry that commanded it and the drawing, so that it cannot
+even begin there. Held in the sum, such a record stops the whole iteration. It is therefore set
+aside, the others lead the way, and it is taken back at their solution, where its pose is followed
+from the commanded one by continuation. A record that cannot be taken back stays out.
 """
 
 from __future__ import annotations
+
+import itertools
 
 import numpy as np
 
@@ -22,12 +25,18 @@ from hexacell.rotations import Array, Mask
 def solve(
     problem: Problem, precision: Array, *, free: Array, poses: Poses, manner: Manner = FAR_AWAY
 ) -> tuple[Problem, Solution]:
-    """As :func:`levenberg_marquardt.solve`; also gives the records that took part in the end."""
-    used = np.ones(problem.records, dtype=bool)
+    """As :func:`levenberg_marquardt.solve`; also gives the records that took part in the end.
+
+    ``poses`` counts where ``problem.startable`` says so.
+    """
+    used = problem.startable.copy()
+    poses = poses[used]
     taken_back = np.zeros(problem.records, dtype=bool)
-    while True:
+    for search in itertools.count(1):
         kept = problem.keeping(used)
         solution = levenberg_marquardt.solve(kept, precision, free=free, poses=poses, manner=manner)
+        if search == manner.searches:
+            break
         free, poses = solution.free, solution.prediction.poses
         if solution.termination is Termination.SINGULAR and not solution.singular.all():
             used[np.flatnonzero(used)[solution.singular]] = False
@@ -35,27 +44,21 @@ def solve(
             continue
         aside = ~used & ~taken_back
         if not aside.any():
-            return kept, solution
+            break
         returning, everywhere = _returning(problem, free, aside)
         if not returning.any():
-            return kept, solution
+            break
         poses = _merged(problem.records, used, poses, returning, everywhere)
         used, taken_back = used | returning, taken_back | returning
         poses = poses[used]
+    return kept, solution
 
 
 def _returning(problem: Problem, free: Array, aside: Mask) -> tuple[Mask, Poses]:
     """Which of the records set aside stand clear of singularities at a geometry, and their poses."""
     geometry = Geometry.from_vector(problem.basis @ free)
     rows = np.flatnonzero(aside)
-    found = kinematics.follow(
-        problem.mechanism,
-        geometry,
-        problem.joints[rows],
-        start=problem.start[rows],
-        start_geometry=problem.prior.centre,
-        start_joints=problem.joints[rows],
-    )
+    found = problem.commands[rows].followed(geometry, problem.joints[rows])
     by_joints = kinematics.sensitivity(
         problem.mechanism, geometry, found.poses, problem.joints[rows]
     ).joints[:, :3]

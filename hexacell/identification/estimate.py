@@ -1,44 +1,32 @@
-"""The identification: solve, release the prior where the data speak, leave out gross errors.
-
-The tolerance prior keeps the solver on the road from the drawing and holds what the data do not
-determine. In a direction that the data determine much better than the drawing does, it would only
-bias the result toward the drawing; there it is released, and the estimate is the data's alone.
-"""
+"""The identification: what ``fit`` does, and everything else the program asks of the estimator."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from hexacell.errors import IdentifiabilityError
 from hexacell.geometry import Geometry
-from hexacell.identification import centring, detour, outliers
-from hexacell.identification.levenberg_marquardt import NEARBY, Solution, solve
+from hexacell.identification import centring, detour
+from hexacell.identification.cleaning import Cleaned, clean, leave_alone
+from hexacell.identification.levenberg_marquardt import Solution
 from hexacell.identification.problem import Problem
-from hexacell.identification.result import Identification, Outlier
+from hexacell.identification.refusals import refuse_too_little
+from hexacell.identification.result import Identification
 from hexacell.pose import Poses
 from hexacell.rotations import Array
-
-RELEASE_RATIO = 9.0
-"""Data information over prior information from which on the data speak alone (sigma a third)."""
 
 
 def identify(problem: Problem, *, find_outliers: bool = True) -> Identification:
     """The geometry that explains the records, from the drawing on.
 
     Raises:
-        IdentifiabilityError: fewer records or points than the parameters need.
+        IdentifiabilityError: the records cannot determine the parameters, or gauges were misread
+            (:class:`~hexacell.identification.anomaly.FalseReadings`).
     """
     refuse_too_little(problem)
-    kept, solution, covariance = _solve_with_release(problem)
-    left_out: tuple[Outlier, ...] = ()
-    while find_outliers and len(left_out) < outliers.LARGEST_SHARE * problem.records:
-        row, outlier = _worst(kept, solution, covariance)
-        if outlier is None:
-            break
-        left_out = (*left_out, outlier)
-        problem = problem.keeping(np.any(problem.labels != kept.labels[row], axis=1))
-        kept, solution, covariance = _solve_with_release(problem)
-    return _result(kept, solution, covariance, left_out)
+    cleaned = clean(problem) if find_outliers else leave_alone(problem)
+    refuse_too_little(cleaned.fit.problem)
+    found = cleaned.fit
+    return _result(found.problem, found.solution, found.covariance, cleaned)
 
 
 def track(problem: Problem, *, free: Array | None = None, poses: Poses | None = None) -> Identification:
@@ -51,62 +39,14 @@ def track(problem: Problem, *, free: Array | None = None, poses: Poses | None = 
         free, poses = problem.mechanism.convention.free_part(problem.prior.centre), problem.start
     kept, solution = detour.solve(problem, precision, free=free, poses=poses)
     covariance = np.linalg.inv(solution.information + precision)
-    return _result(kept, solution, covariance, ())
-
-
-def refuse_too_little(problem: Problem) -> None:
-    """Raise where the number of records or points alone shows that nothing can be identified.
-
-    Raises:
-        IdentifiabilityError: says what is missing.
-    """
-    parameters = problem.prior.covariance.shape[0]
-    if problem.points < 2:
-        raise IdentifiabilityError(
-            f"records at one point cannot determine the {parameters} parameters, however many they are",
-            action="Measure at two points at least",
-        )
-    equations = 3 * (problem.records - problem.points)
-    if equations < parameters:
-        missing = -(-(parameters - equations) // 3)
-        raise IdentifiabilityError(
-            f"{problem.records} records at {problem.points} points give {equations} equations for "
-            f"{parameters} parameters",
-            action=f"Measure {missing} more records at these points",
-        )
-
-
-def _solve_with_release(problem: Problem) -> tuple[Problem, Solution, Array]:
-    precision = np.linalg.inv(problem.prior.covariance)
-    centre = problem.mechanism.convention.free_part(problem.prior.centre)
-    kept, cautious = detour.solve(problem, precision, free=centre, poses=problem.start)
-    held = _precision_where_silent(cautious.information, problem.prior.covariance)
-    solution = solve(kept, held, free=cautious.free, poses=cautious.prediction.poses, manner=NEARBY)
-    return kept, solution, np.linalg.inv(solution.information + held)
-
-
-def _precision_where_silent(information: Array, prior_covariance: Array) -> Array:
-    """The prior's precision in the directions that the data leave open, zero in the others."""
-    factor = np.linalg.cholesky(prior_covariance)
-    ratios, directions = np.linalg.eigh(factor.T @ information @ factor)
-    silent = directions[:, ratios < RELEASE_RATIO]
-    back = np.linalg.solve(factor.T, silent)
-    return back @ back.T
-
-
-def _worst(problem: Problem, solution: Solution, covariance: Array) -> tuple[int, Outlier | None]:
-    values = outliers.statistics(problem, solution.prediction, covariance)
-    row = int(np.argmax(values))
-    if values[row] <= outliers.threshold(values):
-        return row, None
-    point, orientation = problem.labels[row]
-    return row, Outlier(int(point), int(orientation), float(values[row]))
+    return _result(kept, solution, covariance)
 
 
 def _result(
-    problem: Problem, solution: Solution, covariance: Array, left_out: tuple[Outlier, ...]
+    problem: Problem, solution: Solution, covariance: Array, cleaned: Cleaned | None = None
 ) -> Identification:
     basis = problem.basis
+    covariance = 0.5 * (covariance + covariance.T)  # an inverse is symmetric to rounding only
     residuals = centring.centred(problem, solution.prediction.weights, solution.prediction.residuals)
     return Identification(
         geometry=Geometry.from_vector(basis @ solution.free),
@@ -121,6 +61,7 @@ def _result(
         dof=3 * (problem.records - problem.points) - len(solution.free),
         iterations=solution.iterations,
         termination=solution.termination,
-        outliers=left_out,
+        outliers=cleaned.outliers if cleaned else (),
+        anomalies=cleaned.anomalies if cleaned else (),
         frame=problem.mechanism.convention.name,
     )

@@ -67,6 +67,11 @@ class Goodness:
         return Agreement.AGREES
 
     @property
+    def noise_factor(self) -> float:
+        """What to multiply every standard deviation by: it is surely larger than by the stated noise."""
+        return self.ratio if self.agreement is Agreement.TOO_LARGE else 1.0
+
+    @property
     def sentence(self) -> str:
         """The verdict for people."""
         match self.agreement:

@@ -25,6 +25,7 @@ SMALLEST_DAMPING = 1e-12
 LARGEST_DAMPING = 1e12
 FINAL_STEP_MM = 1e-9
 ITERATIONS = 200
+SEARCHES = 1000
 REFUSALS_BEFORE_SINGULAR = 6
 LARGEST_AMPLIFICATION = 100.0
 """mm of ball a mm of slider: beyond it a record says nothing, and its linearisation little."""
@@ -71,10 +72,19 @@ class Solution:
 
 @dataclass(frozen=True, slots=True)
 class Manner:
-    """How to search: the damping to begin with, and the step, mm, that counts as none."""
+    """How to search, and when to give up.
+
+    Attributes:
+        damping: to begin with.
+        step_mm: that counts as none.
+        iterations: at most, in one search.
+        searches: at most, around singularities (see :mod:`.detour`).
+    """
 
     damping: float
     step_mm: float
+    iterations: int = ITERATIONS
+    searches: int = SEARCHES
 
 
 FAR_AWAY = Manner(CAUTIOUS_DAMPING, 1e-3)
@@ -101,7 +111,7 @@ def solve(
     ended: Termination | None = None
     while ended is None:
         iterations += 1
-        ended = search.advance() if iterations <= ITERATIONS else Termination.ITERATIONS
+        ended = search.advance() if iterations <= manner.iterations else Termination.ITERATIONS
     final = search.linear()
     return Solution(search.now, final.information(), final.cost(), iterations, ended, search.singular)
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from hexacell import kinematics
 from hexacell.identification.centring import CentredSystem, Centring
-from hexacell.identification.model import record_weights
+from hexacell.identification.model import record_covariance, record_weights
 from hexacell.identification.problem import Problem
 from hexacell.identification.result import Identification
 from hexacell.rotations import Array
@@ -48,6 +48,12 @@ class Linearised:
             by_joints=sensitivity.joints[:, :3],
         )
 
+    @property
+    def record_noise_mm(self) -> float:
+        """Root mean square distance by which the stated noise displaces a record."""
+        covariance = record_covariance(self.by_joints, self.problem.noise)
+        return float(np.sqrt(np.mean(np.trace(covariance, axis1=-2, axis2=-1))))
+
     def weights(self, variances: Array | None = None) -> Array:
         """Inverse covariance (n, 3, 3) of each record, 1/mm^2.
 
@@ -64,6 +70,16 @@ class Linearised:
         return centring.system(self.residuals, self.jacobian)
 
     def held(self) -> Array:
-        """Precision (p, p), 1/mm^2, of the prior as far as it took part."""
+        """Precision (p, p), 1/mm^2, of the prior as far as it took part.
+
+        It did so in full in some directions and not at all in the others, in coordinates in which
+        the prior's covariance is the identity: this is told by the difference of the result's
+        precision and the data's information, and freed from its rounding errors.
+        """
         information = self.system(Centring(self.problem, self.weights())).information()
-        return np.linalg.inv(self.covariance) - information
+        factor = np.linalg.cholesky(self.problem.prior.covariance)
+        share, directions = np.linalg.eigh(
+            factor.T @ (np.linalg.inv(self.covariance) - information) @ factor
+        )
+        back = np.linalg.solve(factor.T, directions[:, share > 0.5])
+        return back @ back.T

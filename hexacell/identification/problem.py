@@ -7,8 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from hexacell.errors import IdentifiabilityError
 from hexacell.geometry import PARAMETER_NAMES, Geometry
-from hexacell.identification.start import start_poses
+from hexacell.identification.start import Commands
 from hexacell.measurements import MeasurementSet
 from hexacell.mechanisms.base import Branch, Mechanism
 from hexacell.pose import Poses
@@ -79,8 +80,13 @@ class Problem:
         joints: (n, 6), mm, as the encoders gave them.
         deviations: (n, 3), mm, in the convention's base frame.
         first_rows: (m,) row at which each point begins.
+        commands: what the records were commanded with.
         start: poses that close the prior's centre at ``joints``.
+        startable: (n,) bool, where there is such a pose: a singularity may lie between the
+            geometry that commanded a record and the drawing.
         labels: (n, 2) point and orientation as the user counts them.
+        gauges: (3, 3), columns: along which the gauges x, y and z measure, in the convention's
+            base frame.
     """
 
     mechanism: Mechanism
@@ -89,8 +95,11 @@ class Problem:
     joints: Array
     deviations: Array
     first_rows: NDArray[np.intp]
+    commands: Commands
     start: Poses
+    startable: Mask
     labels: NDArray[np.int_]
+    gauges: Array
 
     @property
     def basis(self) -> Array:
@@ -126,8 +135,11 @@ class Problem:
             self.joints[kept],
             self.deviations[kept],
             _first_rows(self.labels[kept, 0]),
+            self.commands[kept],
             self.start[kept],
+            self.startable[kept],
             self.labels[kept],
+            self.gauges,
         )
 
 
@@ -145,23 +157,42 @@ def build_problem(
     Records from before the last calibration may have been commanded under the drawing instead.
 
     Raises:
-        IdentifiabilityError: a record's pose cannot be followed from the commanding geometry to
-            the drawing; the message names the record.
+        IdentifiabilityError: most records cannot be followed from the geometry that commanded them
+            to the drawing; the message names the first.
     """
     order = np.argsort(measurements.group, kind="stable")
     joints, labels = measurements.joints[order], measurements.labels[order]
     commanding, change = mechanism.to_convention(controller)
-    start = start_poses(
-        mechanism,
-        prior.centre,
-        joints,
-        commanded=change.poses(measurements.poses[order]),
-        under=(commanding, prior.centre),
-        branch=branch,
+    poses = change.poses(measurements.poses[order])
+    commands = Commands.of(mechanism, poses, (commanding, prior.centre), branch, joints)
+    start = commands.followed(prior.centre, joints)
+    _refuse_strangers(start.found, labels)
+    return Problem(
+        mechanism=mechanism,
+        prior=prior,
+        noise=noise,
+        joints=joints,
+        deviations=change.deviations(measurements.deviations[order]),
+        first_rows=_first_rows(labels[:, 0]),
+        commands=commands,
+        start=start.poses,
+        startable=start.found,
         labels=labels,
+        gauges=change.base,
     )
-    deviations = change.deviations(measurements.deviations[order])
-    return Problem(mechanism, prior, noise, joints, deviations, _first_rows(labels[:, 0]), start, labels)
+
+
+def _refuse_strangers(found: Mask, labels: NDArray[np.int_]) -> None:
+    """A few records beyond a singularity are no obstacle; where most are, something else is wrong."""
+    lost = np.flatnonzero(~found)
+    if 2 * len(lost) <= len(found):
+        return
+    point, orientation = labels[lost[0]]
+    raise IdentifiabilityError(
+        f"{len(lost)} of {len(found)} records cannot be followed from the commanded pose to the joint "
+        f"variables without crossing a singularity; the first is point {point}, orientation {orientation}",
+        action="Check that q1 to q6 belong to these poses, and the poses to this controller's config",
+    )
 
 
 def _first_rows(points: NDArray[np.int_]) -> NDArray[np.intp]:

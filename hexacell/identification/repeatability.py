@@ -67,9 +67,7 @@ def repeatability(
     return Repeatability((float(x), float(y), float(z)), freedom, len(groups))
 
 
-def _visits(
-    measurements: MeasurementSet, left_out: Collection[tuple[int, int]]
-) -> Iterable[list[int]]:
+def _visits(measurements: MeasurementSet, left_out: Collection[tuple[int, int]]) -> Iterable[list[int]]:
     """Rows of each pose commanded at each point."""
     visits: defaultdict[tuple[float, ...], list[int]] = defaultdict(list)
     for row, record in enumerate(measurements.records):

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hexacell.geometry import PARAMETER_NAMES, Geometry
+from hexacell.identification.anomaly import Anomaly, Kind
 from hexacell.identification.levenberg_marquardt import Termination
 from hexacell.identification.problem import Problem
 from hexacell.pose import Poses
@@ -18,12 +19,19 @@ class Outlier:
     """A record that does not agree with the others, and is left out.
 
     Attributes:
-        statistic: squared length of its standardised residual; about 3 for a good record.
+        statistic: squared length of its standardised residual; about 3 for a good record, infinite
+            for one that the identified geometry cannot follow at all.
+        kind: what is wrong with it.
+        gauges: of ``xyz``, those that alone are wrong; empty where no single one stands out.
+        off_mm: what the gauges x, y and z show too much; none where that cannot be said.
     """
 
     point: int
     orientation: int
     statistic: float
+    kind: Kind = Kind.GROSS_ERROR
+    gauges: str = ""
+    off_mm: tuple[float, float, float] | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -39,6 +47,7 @@ class Identification:
         poses: the platform at each of them, under the identified geometry.
         residual_rms_mm: of the centred residuals of the deviations.
         chi2: weighted sum of squares of those residuals, to be compared with ``dof``.
+        outliers: the records left out, and ``anomalies`` why, in words.
     """
 
     geometry: Geometry
@@ -55,6 +64,7 @@ class Identification:
     termination: Termination
     outliers: tuple[Outlier, ...]
     frame: str
+    anomalies: tuple[Anomaly, ...] = ()
 
     @property
     def records(self) -> int:

@@ -3,75 +3,69 @@
 A pose belongs to the geometry that commanded it. That is the controller's, unless the records are
 older than its last calibration; then it was, as a rule, the drawing's. Each record is believed to
 come from the geometry whose inverse kinematics is nearest to its encoders, and is followed from
-there to the drawing.
+there to any other geometry.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hexacell import kinematics
-from hexacell.errors import IdentifiabilityError
 from hexacell.geometry import Geometry
+from hexacell.kinematics import Forward
 from hexacell.mechanisms.base import Branch, Mechanism
 from hexacell.pose import Poses
 from hexacell.rotations import Array, Mask
 
 
-def start_poses(
-    mechanism: Mechanism,
-    drawing: Geometry,
-    joints: Array,
-    *,
-    commanded: Poses,
-    under: Sequence[Geometry],
-    branch: Branch,
-    labels: NDArray[np.int_],
-) -> Poses:
-    """Poses that close the drawing at the measured joint variables (n, 6), mm.
+@dataclass(frozen=True, slots=True, eq=False)
+class Commands:
+    """What n records were commanded with.
 
-    Args:
-        mechanism: of all geometries.
-        drawing: the geometry to end at.
-        joints: as the encoders gave them.
-        commanded: as the controller was told.
+    Attributes:
+        poses: as the controller was told.
         under: geometries that may have commanded them.
-        branch: of the inverse kinematics.
-        labels: point and orientation (n, 2), for messages.
-
-    Raises:
-        IdentifiabilityError: a record cannot be followed; the message names it.
+        choice: (n,) which of these did.
+        joints: (n, 6), mm, that it computed; NaN where none of them reaches the pose.
     """
-    computed = np.stack([mechanism.inverse(geometry, branch, commanded) for geometry in under])
-    distance = np.abs(np.nan_to_num(computed - joints, nan=np.inf)).max(axis=-1)
-    nearest = np.argmin(distance, axis=0)
-    positions, rotations = np.array(commanded.positions), np.array(commanded.rotations)
-    found = np.zeros(len(joints), dtype=bool)
-    for choice, geometry in enumerate(under):
-        rows = np.flatnonzero((nearest == choice) & np.isfinite(distance[choice]))
-        result = kinematics.follow(
-            mechanism,
-            drawing,
-            joints[rows],
-            start=commanded[rows],
-            start_geometry=geometry,
-            start_joints=computed[choice, rows],
-        )
-        positions[rows], rotations[rows] = result.poses.positions, result.poses.rotations
-        found[rows] = result.found
-    _refuse_lost_records(found, labels)
-    return Poses(positions, rotations)
 
+    mechanism: Mechanism
+    poses: Poses
+    under: Sequence[Geometry]
+    choice: NDArray[np.intp]
+    joints: Array
 
-def _refuse_lost_records(found: Mask, labels: NDArray[np.int_]) -> None:
-    if found.all():
-        return
-    point, orientation = labels[np.flatnonzero(~found)[0]]
-    raise IdentifiabilityError(
-        f"{int((~found).sum())} records cannot be followed from the commanded pose to the joint variables "
-        f"without crossing a singularity; the first is point {point}, orientation {orientation}",
-        action="Leave them out, or check that q1 to q6 belong to the commanded poses",
-    )
+    @classmethod
+    def of(
+        cls, mechanism: Mechanism, poses: Poses, under: Sequence[Geometry], branch: Branch, measured: Array
+    ) -> Commands:
+        """Poses commanded under one of some geometries, and the measured joint variables (n, 6), mm."""
+        computed = np.stack([mechanism.inverse(geometry, branch, poses) for geometry in under])
+        distance = np.abs(np.nan_to_num(computed - measured, nan=np.inf)).max(axis=-1)
+        choice = np.argmin(distance, axis=0)
+        return cls(mechanism, poses, under, choice, computed[choice, np.arange(len(poses))])
+
+    def __getitem__(self, rows: Mask | NDArray[np.intp]) -> Commands:
+        return Commands(self.mechanism, self.poses[rows], self.under, self.choice[rows], self.joints[rows])
+
+    def followed(self, geometry: Geometry, joints: Array) -> Forward:
+        """Poses that close ``geometry`` at joint variables (n, 6), mm, near the commanded ones."""
+        positions, rotations = np.array(self.poses.positions), np.array(self.poses.rotations)
+        found = np.zeros(len(joints), dtype=bool)
+        for choice, commanding in enumerate(self.under):
+            rows = np.flatnonzero((self.choice == choice) & np.isfinite(self.joints).all(axis=-1))
+            result = kinematics.follow(
+                self.mechanism,
+                geometry,
+                joints[rows],
+                start=self.poses[rows],
+                start_geometry=commanding,
+                start_joints=self.joints[rows],
+            )
+            positions[rows], rotations[rows] = result.poses.positions, result.poses.rotations
+            found[rows] = result.found
+        return Forward(Poses(positions, rotations), found)

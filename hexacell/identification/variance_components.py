@@ -32,7 +32,7 @@ LONGEST_STEP = 1.5
 SETTLED = 1e-5
 SMALLEST_SHARE = 1e-2
 """Of the stated standard deviation: nobody can see a noise smaller than that."""
-LARGEST_RELATIVE_ERROR = 0.5
+LARGEST_RELATIVE_ERROR = 0.4
 CLOSE_CORRELATION = -0.9
 
 

@@ -1,0 +1,108 @@
+"""Everything that is said of an identification beyond its numbers: can it be trusted, how good is it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from hexacell.cell.model import CellSettings
+from hexacell.design.parting import Parting, partings
+from hexacell.design.workspace import workspace_poses
+from hexacell.identification.accuracy import Accuracy, predicted_accuracy
+from hexacell.identification.correlation import CorrelatedPair, strongly_correlated
+from hexacell.identification.goodness import Goodness, goodness
+from hexacell.identification.linearised import Linearised
+from hexacell.identification.repeatability import Repeatability, repeatability
+from hexacell.identification.result import Identification
+from hexacell.identification.variance_components import NoiseLevels, noise_levels
+from hexacell.measurements import MeasurementSet
+from hexacell.pose import Pose, Poses
+from hexacell.robot import Robot
+
+PAIRS_TO_PART = 5
+"""Of the strongest correlations, for which a measurement is looked for."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Assessment:
+    """The checks of a model against its data, and what they promise.
+
+    Attributes:
+        goodness: residuals against the stated noise.
+        noise: noise levels seen in the residuals; none without redundancy.
+        repeatability: none where no pose was visited twice.
+        record_noise_mm: what the stated noise makes a deviation scatter by (root mean square
+            distance), to compare the repeatability with.
+        correlated: pairs of parameters found only together, the strongest first.
+        partings: for the first of these pairs, the record that would part them; commands as the
+            controller takes them.
+        task: poses at which the accuracy is stated, as the controller takes them.
+        task_named: whether the cell file names them; else they span the workspace.
+        accuracy: at these poses; none where the robot can take none of them. Where the residuals
+            are larger than the stated noise, so is the error to be expected afterwards.
+    """
+
+    goodness: Goodness
+    noise: NoiseLevels | None
+    repeatability: Repeatability | None
+    record_noise_mm: float
+    correlated: tuple[CorrelatedPair, ...]
+    partings: tuple[Parting | None, ...]
+    task: tuple[Pose, ...]
+    task_named: bool
+    accuracy: Accuracy | None
+
+    @property
+    def does_not_repeat(self) -> bool:
+        """Whether the machine's scatter exceeds the error that calibrating would remove."""
+        if self.repeatability is None or self.accuracy is None:
+            return False
+        return self.repeatability.dominates(self.accuracy.removable_mm)
+
+
+def assess(
+    settings: CellSettings, robot: Robot, measurements: MeasurementSet, found: Identification
+) -> Assessment:
+    """Check an identification of some measurements, and predict what it is good for."""
+    model = Linearised.at(found)
+    pairs = strongly_correlated(found)
+    left_out = {(outlier.point, outlier.orientation) for outlier in found.outliers}
+    fitting = goodness(model)
+    task, accuracy = _accuracy(settings, robot, found)
+    return Assessment(
+        goodness=fitting,
+        noise=noise_levels(model),
+        repeatability=repeatability(measurements, left_out),
+        record_noise_mm=model.record_noise_mm,
+        correlated=pairs,
+        partings=_partings(robot, found, pairs[:PAIRS_TO_PART]),
+        task=tuple(robot.to_command(task.pose(row)) for row in range(len(task))),
+        task_named=bool(settings.task.poses),
+        accuracy=accuracy and replace(accuracy, after=accuracy.after.times(fitting.noise_factor)),
+    )
+
+
+def _partings(
+    robot: Robot, found: Identification, pairs: Sequence[CorrelatedPair]
+) -> tuple[Parting | None, ...]:
+    return tuple(
+        part and replace(part, command=robot.to_command(part.command))
+        for part in partings(robot.knowledge(found), found, pairs)
+    )
+
+
+def _accuracy(settings: CellSettings, robot: Robot, found: Identification) -> tuple[Poses, Accuracy | None]:
+    """The task poses in the convention's frames, and the accuracy there."""
+    knowledge = robot.knowledge(found)
+    points = Poses.of(Pose(*point) for point in settings.identification.points)
+    workspace = workspace_poses(knowledge, robot.change.poses(points).positions)
+    task = robot.change.poses(Poses.of(Pose(*pose) for pose in settings.task.poses))
+    task = task if len(task) else workspace
+    accuracy = predicted_accuracy(
+        found,
+        knowledge.controller,
+        robot.branch,
+        task=task,
+        workspace=workspace if len(workspace) else task,
+    )
+    return task, accuracy

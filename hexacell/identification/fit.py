@@ -1,0 +1,83 @@
+"""One fit of a problem: from the drawing, the prior released where the data speak.
+
+The tolerance prior keeps the solver on the road from the drawing and holds what the data do not
+determine. In a direction that the data determine much better than the drawing does, it would only
+bias the result toward the drawing; there it is released, and the estimate is the data's alone.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from hexacell.identification import detour
+from hexacell.identification.goodness import Goodness
+from hexacell.identification.levenberg_marquardt import (
+    CAUTIOUS_DAMPING,
+    FAR_AWAY,
+    NEARBY,
+    Manner,
+    Solution,
+    solve,
+)
+from hexacell.identification.problem import Problem
+from hexacell.pose import Poses
+from hexacell.rotations import Array
+
+RELEASE_RATIO = 9.0
+"""Data information over prior information from which on the data speak alone (sigma a third)."""
+
+
+IN_A_HURRY = Manner(CAUTIOUS_DAMPING, 1e-3, iterations=60, searches=12)
+"""Twice what records that agree with each other need; others are not worth more."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Fit:
+    """A solution, and what it was reached with.
+
+    Attributes:
+        problem: the records that took part in the end.
+        held: precision (p, p), 1/mm^2, of the prior as far as it took part.
+        covariance: of the free parameters (p, p), mm^2.
+    """
+
+    problem: Problem
+    solution: Solution
+    held: Array
+    covariance: Array
+
+    @property
+    def goodness(self) -> Goodness:
+        """The residuals against the stated noise."""
+        taken = float(np.sum(self.covariance * self.solution.information))
+        return Goodness(self.solution.chi2, 3.0 * (self.problem.records - self.problem.points) - taken)
+
+
+def fit(problem: Problem, *, manner: Manner = FAR_AWAY) -> Fit:
+    """The geometry that explains the records, from the drawing on."""
+    centre = problem.mechanism.convention.free_part(problem.prior.centre)
+    return _released(problem, centre, problem.start, manner)
+
+
+def refit(problem: Problem, free: Array, poses: Poses) -> Fit:
+    """The same from free parameters (p,), mm, that are nearly right, and poses that close them."""
+    return _released(problem, free, poses, NEARBY)
+
+
+def _released(problem: Problem, free: Array, poses: Poses, manner: Manner) -> Fit:
+    precision = np.linalg.inv(problem.prior.covariance)
+    kept, cautious = detour.solve(problem, precision, free=free, poses=poses, manner=manner)
+    held = _precision_where_silent(cautious.information, problem.prior.covariance)
+    solution = solve(kept, held, free=cautious.free, poses=cautious.prediction.poses, manner=NEARBY)
+    return Fit(kept, solution, held, np.linalg.inv(solution.information + held))
+
+
+def _precision_where_silent(information: Array, prior_covariance: Array) -> Array:
+    """The prior's precision in the directions that the data leave open, zero in the others."""
+    factor = np.linalg.cholesky(prior_covariance)
+    ratios, directions = np.linalg.eigh(factor.T @ information @ factor)
+    silent = directions[:, ratios < RELEASE_RATIO]
+    back = np.linalg.solve(factor.T, silent)
+    return back @ back.T

@@ -1,0 +1,99 @@
+"""One record that took no part in a solution, judged by it: does it agree, and if not, why?"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import chdtri
+
+from hexacell.geometry import Geometry
+from hexacell.identification import model
+from hexacell.identification.anomaly import GAUGES, Kind
+from hexacell.identification.causes import Label, labelled
+from hexacell.identification.expansion import Expansion
+from hexacell.identification.fit import Fit
+from hexacell.identification.levenberg_marquardt import LARGEST_AMPLIFICATION
+from hexacell.identification.misreadings import MISREADINGS
+from hexacell.identification.outliers import RecordTests
+from hexacell.identification.problem import Problem
+from hexacell.pose import Poses
+from hexacell.rotations import Array, Mask
+
+LEAST_MISREAD_MM = 1.0
+"""A gross error smaller than this resembles some misreading or other by chance."""
+
+NOT_SURPRISING = 1e-3
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Judgement:
+    """What a solution says about a record.
+
+    Attributes:
+        agrees: whether it does not differ from what is expected by more than chance allows.
+        kind: if it does not agree, why.
+        gauges: of ``xyz``, those that alone are wrong; empty where no single one is.
+        off: (3,), mm, what the gauges x, y and z show too much; none next to a singularity.
+        statistic: squared standardised length of that; infinite next to a singularity.
+    """
+
+    agrees: bool
+    kind: Kind
+    gauges: str
+    off: Array | None
+    statistic: float
+
+
+BEYOND_JUDGEMENT = Judgement(False, Kind.SINGULAR, "", None, np.inf)
+
+
+def judge(problem: Problem, label: Label, found: Fit, *, found_before: int) -> Judgement:
+    """Judge one record of a problem by a fit that it took no part in."""
+    expansion = _with_record(problem, label, found)
+    if expansion is None:
+        return BEYOND_JUDGEMENT
+    row = int(np.flatnonzero(labelled(expansion.problem, [label]))[0])
+    tests = RecordTests.of(expansion)
+    own, gauges = expansion.weights[row], expansion.problem.gauges
+    information = gauges.T @ own @ expansion.left[row] @ own @ gauges
+    off = -np.linalg.pinv(information, hermitian=True) @ (gauges.T @ expansion.scores[row])
+    shown = expansion.problem.deviations[row] @ gauges
+    kind, wrong = _explanation(off, shown, information / tests.scale)
+    agrees = bool(tests.excess(found_before)[row] <= 1.0)
+    return Judgement(agrees, kind, wrong, off, float(tests.in_any_direction[row]))
+
+
+def poses_at(problem: Problem, found: Fit) -> tuple[Poses, Mask]:
+    """Poses that close a fit's geometry at all records of a problem, and which (n,) were found."""
+    geometry = Geometry.from_vector(problem.basis @ found.solution.free)
+    reached = problem.commands.followed(geometry, problem.joints)
+    return reached.poses, reached.found
+
+
+def _with_record(problem: Problem, label: Label, found: Fit) -> Expansion | None:
+    """The expansion of a fit in its own records and one more; none if that is next to a singularity."""
+    kept = {(point, orientation) for point, orientation in found.problem.labels.tolist()}
+    some = problem.keeping(labelled(problem, kept | {label}))
+    poses, reached = poses_at(some, found)
+    row = int(np.flatnonzero(labelled(some, [label]))[0])
+    if not reached.all():
+        return None
+    prediction = model.predict(some, found.solution.free, poses)
+    if prediction.amplification[row] > LARGEST_AMPLIFICATION:
+        return None
+    return Expansion.around(some, prediction, found.held)
+
+
+def _explanation(off: Array, shown: Array, information: Array) -> tuple[Kind, str]:
+    """The simplest one: a known misreading, else one wrong gauge, else a wrong record."""
+    if np.abs(off).max() > LEAST_MISREAD_MM:
+        rests = [off + misreading.remedy @ shown - shown for misreading in MISREADINGS]
+        squares = [float(rest @ information @ rest) for rest in rests]
+        best = int(np.argmin(squares))
+        if squares[best] < chdtri(3, NOT_SURPRISING):
+            return MISREADINGS[best].kind, MISREADINGS[best].gauges
+    along = (information @ off) ** 2 / np.maximum(np.diag(information), 1e-300)
+    worst = int(np.argmax(along))
+    rest_of_it = float(off @ information @ off - along[worst])
+    return Kind.GROSS_ERROR, GAUGES[worst] if rest_of_it < chdtri(2, NOT_SURPRISING) else ""

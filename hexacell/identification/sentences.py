@@ -1,0 +1,155 @@
+"""Anomalies in words: what is wrong, how that shows, and what to do about it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from hexacell.identification.anomaly import Anomaly, Kind
+from hexacell.identification.causes import Label, Slip
+from hexacell.identification.goodness import Goodness
+from hexacell.identification.misreadings import MM_PER_INCH, Misreading, Suspect
+from hexacell.identification.result import Outlier
+
+SLIPPED_SIGNIFICANTLY = 0.3
+"""Of the largest component of a slip: a gauge that shows less of it is not named."""
+
+
+def of_record(outlier: Outlier) -> Anomaly:
+    """A record that was left out."""
+    where = f"Point {outlier.point}, orientation {outlier.orientation}"
+    sentence, action = _about_record(outlier)
+    return Anomaly(
+        outlier.kind, outlier.point, outlier.orientation, outlier.gauges, f"{where}: {sentence}", action
+    )
+
+
+def of_slip(slip: Slip, labels: Sequence[Label]) -> Anomaly:
+    """A slip, with the records after it that were left out."""
+    gauges, fact = _slip_in_words(slip)
+    last = labels[-1][1]
+    return Anomaly(
+        Kind.SLIPPED_ZERO,
+        slip.point,
+        slip.orientation,
+        gauges,
+        f"{fact}; orientations {slip.orientation} to {last} are left out",
+        f"Check that {_names(gauges)} and the station are clamped, and measure point {slip.point} again",
+    )
+
+
+def of_slip_refused(slip: Slip, equations: int) -> Anomaly:
+    """A slip after which too little is left."""
+    gauges, fact = _slip_in_words(slip)
+    return Anomaly(
+        Kind.SLIPPED_ZERO,
+        slip.point,
+        slip.orientation,
+        gauges,
+        f"{fact}, and the records before it and at the other points give {equations} equations only",
+        f"Check that {_names(gauges)} and the station are clamped, and measure point {slip.point} again",
+    )
+
+
+def of_misreading(suspect: Suspect, before: Goodness, after: Goodness) -> Anomaly:
+    """Misread gauges, refused."""
+    misreading = suspect.misreading
+    where = "at every point" if suspect.point is None else f"at point {suspect.point}"
+    proof = (
+        f"the residuals are {_times(before)} times the stated noise, and {_times(after)} times "
+        f"{_were_it_undone(misreading)}"
+    )
+    return Anomaly(
+        misreading.kind,
+        suspect.point,
+        None,
+        misreading.gauges,
+        f"{_names(misreading.gauges)} {_look(misreading)} {where}: {proof}",
+        _remedy(misreading, where),
+    )
+
+
+def _about_record(outlier: Outlier) -> tuple[str, str]:
+    again = "Measure it again"
+    if outlier.kind is Kind.SINGULAR or outlier.off_mm is None:
+        return (
+            "the platform stands next to a singularity there, and the record is left out",
+            "Choose another orientation",
+        )
+    if outlier.kind is not Kind.GROSS_ERROR:
+        words = {Kind.EXCHANGED: "exchanged", Kind.REVERSED: "reversed", Kind.INCHES: "in inches"}
+        return f"{_names(outlier.gauges)} read {words[outlier.kind]}; the record is left out", again
+    if outlier.gauges:
+        off = outlier.off_mm["xyz".index(outlier.gauges)]
+        return (
+            f"gauge {outlier.gauges} shows {off:+.3f} mm too much for all other records; "
+            "the record is left out",
+            again,
+        )
+    x, y, z = outlier.off_mm
+    return (
+        f"the ball is x {x:+.3f}, y {y:+.3f}, z {z:+.3f} mm from where all other records put it, so that not "
+        "one gauge is wrong but several, or an encoder; the record is left out",
+        again,
+    )
+
+
+def _slip_in_words(slip: Slip) -> tuple[str, str]:
+    size = np.abs(slip.shift)
+    moved = [axis for axis in range(3) if size[axis] >= SLIPPED_SIGNIFICANTLY * size.max()]
+    gauges = "".join("xyz"[axis] for axis in moved)
+    shift = ", ".join(f"{'xyz'[axis]} {slip.shift[axis]:+.3f}" for axis in moved)
+    return gauges, (
+        f"Point {slip.point}: the zero of {_names(gauges)} slipped before orientation {slip.orientation} "
+        f"({shift} mm)"
+    )
+
+
+def _names(gauges: str) -> str:
+    if len(gauges) == 1:
+        return f"gauge {gauges}"
+    return f"gauges {', '.join(gauges[:-1])} and {gauges[-1]}"
+
+
+def _times(goodness: Goodness) -> str:
+    return f"{goodness.ratio:.3g}"
+
+
+def _look(misreading: Misreading) -> str:
+    plural = len(misreading.gauges) > 1
+    match misreading.kind:
+        case Kind.INCHES:
+            return "seem to read in inches" if plural else "seems to read in inches"
+        case Kind.REVERSED:
+            return "look reversed" if plural else "looks reversed"
+        case _:
+            return "look exchanged"
+
+
+def _were_it_undone(misreading: Misreading) -> str:
+    match misreading.kind:
+        case Kind.INCHES:
+            return f"if these readings are multiplied by {MM_PER_INCH}"
+        case Kind.REVERSED:
+            return "with the sign of these readings changed"
+        case _:
+            return "with these readings exchanged"
+
+
+def _remedy(misreading: Misreading, where: str) -> str:
+    columns = " and ".join(f"d{gauge}" for gauge in misreading.gauges)
+    match misreading.kind:
+        case Kind.INCHES:
+            return (
+                f"Switch to millimetres and measure again, or multiply {columns} {where} by {MM_PER_INCH}"
+            )
+        case Kind.REVERSED:
+            return (
+                f"Correct the counting direction and measure again, or change the sign of {columns} {where}"
+            )
+        case _:
+            return (
+                "Check which gauge is on which channel and measure again, or put "
+                f"{columns} {where} in the right order"
+            )

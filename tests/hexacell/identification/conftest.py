@@ -1,0 +1,50 @@
+"""Identifications that several tests look at, computed once."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from hexacell.identification.estimate import identify
+from hexacell.identification.result import Identification
+from hexacell.measurements import MeasurementSet
+
+NOISE_MM = 0.01
+REPETITIONS = range(100, 140)
+
+
+@pytest.fixture(scope="session")
+def repeated(visit: Any, make_problem: Any) -> Sequence[Identification]:
+    """One measurement again and again: the same poses, other noise."""
+    exact = visit(seed=2)
+    return [identify(make_problem(exact.measured(NOISE_MM, seed))) for seed in REPETITIONS]
+
+
+@pytest.fixture(scope="session")
+def spoil() -> Callable[..., MeasurementSet]:
+    """A copy of a measurement set with something added to one record."""
+
+    def spoilt(
+        measurements: MeasurementSet,
+        label: tuple[int, int],
+        *,
+        joints: Sequence[float] = (0, 0, 0, 0, 0, 0),
+        deviation: Sequence[float] = (0, 0, 0),
+    ) -> MeasurementSet:
+        records = [
+            replace(
+                record,
+                joints=tuple(np.add(record.joints, joints).tolist()),
+                deviation=tuple(np.add(record.deviation, deviation).tolist()),
+            )
+            if (record.point, record.orientation) == label
+            else record
+            for record in measurements.records
+        ]
+        return MeasurementSet(tuple(records))
+
+    return spoilt

@@ -63,9 +63,8 @@ def _determined(identified: Identification) -> Gate:
 def _within_tolerance(identified: Identification, drawing: Geometry, tolerances: Tolerances) -> Gate:
     """A good residual is no proof: rods 13 mm too short have explained data perfectly before."""
     change = identified.geometry.vector() - drawing.vector()
-    outside = (
-        np.abs(_without_ball(change, tolerances)) - CERTAIN_SIGMAS * identified.sigma > tolerances.widths()
-    )
+    surely_off = np.abs(_without_ball(change, tolerances)) - CERTAIN_SIGMAS * identified.sigma
+    outside = ~(surely_off <= tolerances.widths())  # what is no number is outside too
     names = [
         f"{name} ({value:+.2f} mm)"
         for name, value, is_outside in zip(PARAMETER_NAMES, change, outside, strict=True)

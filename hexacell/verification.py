@@ -30,9 +30,9 @@ class Spread:
 
     @classmethod
     def of(cls, deviations: ArrayLike) -> Spread | None:
-        """Of deviations (n, 3), mm, references left out; nothing where there are none."""
+        """Of deviations (n, 3), mm, references left out; nothing where there are none, or not all finite."""
         distances: Array = np.linalg.norm(np.reshape(np.asarray(deviations, dtype=float), (-1, 3)), axis=-1)
-        if not len(distances):
+        if not len(distances) or not np.isfinite(distances).all():
             return None
         return cls(float(distances.mean()), float(distances.max()), len(distances))
 

@@ -18,14 +18,17 @@ import numpy as np
 from hexacell.cell.model import CellSettings
 from hexacell.design import candidates
 from hexacell.design.held_out import choose_held_out
-from hexacell.design.next_pose import Choice, choose, station
-from hexacell.errors import LimitError
+from hexacell.design.knowledge import Knowledge
+from hexacell.design.next_pose import Choice, Station, choose, station
+from hexacell.design.path import is_clear
+from hexacell.errors import HexacellError, LimitError
 from hexacell.identification.estimate import identify, track
 from hexacell.identification.result import Identification
 from hexacell.pose import Pose, Poses
 from hexacell.robot import Robot
 from hexacell.rotations import Array
 from hexacell.verification import Verdict
+from procedures.events import Sampled
 from procedures.state import RunState, SetState
 from procedures.steps import (
     CloseSet,
@@ -131,10 +134,10 @@ class Calibration:
 
     def _next_in_set(self, state: RunState, key: SetKey, orientations: int) -> Step:
         measured = state.set(key)
-        if not measured.samples and measured.refusals:
-            raise LimitError(f"{key}: the gauges cannot be zeroed, they are at the end of their travel")
         if measured.refusals and key.phase is Phase.AFTER:
             return Compute(kind="judge")
+        if not measured.samples and measured.refusals:
+            raise LimitError(f"{key}: the gauges cannot be zeroed, they are at the end of their travel")
         if measured.refusals and key.phase is Phase.BEFORE:
             raise LimitError(f"{key}: the ball left the gauges' travel at a held-out pose")
         if len(measured.samples) < orientations and measured.refusals <= REFUSALS:
@@ -155,7 +158,28 @@ class Calibration:
     def _closing(self, state: RunState, key: SetKey) -> Step:
         if state.standing == (key, 1):
             return CloseSet(at=key)
-        return Move(at=key, orientation=1, pose=state.set(key).samples[0].pose)
+        orientation = self._on_the_way_back(state, key)
+        return Move(at=key, orientation=orientation, pose=state.set(key).samples[orientation - 1].pose)
+
+    def _on_the_way_back(self, state: RunState, key: SetKey) -> int:
+        """The set's first orientation, or the earliest that a safe straight line leads to from here.
+
+        The last resort is the one before: the line between the two was safe when it was chosen.
+        """
+        if key.phase is not Phase.IDENTIFY:
+            return 1  # held-out poses were chosen with a safe way back
+        samples = state.set(key).samples
+        at_set, here = state.standing or (key, 0)
+        last = here - 1 if at_set == key and here > 1 else len(samples)
+        try:
+            knowledge, at = self._known(state, key)
+        except HexacellError:
+            return last
+        present = self._present(state, samples)
+        for orientation in range(1, last):
+            if is_clear(knowledge, present, self._held(samples[orientation - 1].pose), at.reference):
+                return orientation
+        return last
 
     def _move(self, state: RunState, key: SetKey) -> Move | None:
         """The move to the set's next orientation; none if there is none worth or safe to visit."""
@@ -166,7 +190,7 @@ class Calibration:
             point = self.settings.identification.points[key.point - 1]
             return Move(at=key, orientation=1, pose=(*point, 0.0, 0.0, 0.0))
         try:
-            choice = self._choice(state, key, measured)
+            choice = self._choice(state, key)
         except LimitError:
             return None
         return Move(
@@ -186,20 +210,35 @@ class Calibration:
         orientation = len(measured.samples) + 1
         return Move(at=key, orientation=orientation, pose=poses[key.point - 1][orientation - 1])
 
-    def _choice(self, state: RunState, key: SetKey, measured: SetState) -> Choice:
+    def _choice(self, state: RunState, key: SetKey) -> Choice:
+        measured = state.set(key)
+        knowledge, at = self._known(state, key)
+        turns = candidates.orientations(CANDIDATES, knowledge.limits.tilt, self._seed(key, measured))
+        return choose(knowledge, at, turns, self._present(state, measured.samples))
+
+    def _known(self, state: RunState, key: SetKey) -> tuple[Knowledge, Station]:
+        """The estimate by now, and where it says the ball was when the set's gauges were zeroed.
+
+        Raises:
+            LimitError: it cannot say so.
+        """
         estimate = track(self.robot.problem(state.measurements()))
         knowledge = self.robot.knowledge(estimate)
         records = estimate.problem
         rows = np.flatnonzero(records.labels[:, 0] == key.point)
         if not len(rows):
             raise LimitError("the records of this point say nothing about where the ball is")
-        at = station(knowledge, estimate.poses[rows], records.joints[rows], records.deviations[rows])
-        turns = candidates.orientations(CANDIDATES, knowledge.limits.tilt, self._seed(key, measured))
-        return choose(knowledge, at, turns, self._present(measured))
+        return knowledge, station(
+            knowledge, estimate.poses[rows], records.joints[rows], records.deviations[rows]
+        )
 
-    def _present(self, measured: SetState) -> Poses:
-        """The pose that the robot holds, in the convention's frames."""
-        return self.robot.change.poses(Poses.of([Pose(*measured.samples[-1].pose)]))
+    def _present(self, state: RunState, samples: tuple[Sampled, ...]) -> Poses:
+        """The pose that the robot holds, that of a refused record included."""
+        return self._held(state.target or samples[-1].pose)
+
+    def _held(self, pose: SixNumbers) -> Poses:
+        """A commanded pose in the convention's frames."""
+        return self.robot.change.poses(Poses.of([Pose(*pose)]))
 
     def _seed(self, key: SetKey, measured: SetState) -> int:
         """Other candidates for every record and every attempt, and the same when done again."""

@@ -55,6 +55,16 @@ async def _alone(identity: Awaitable[DeviceIdentity]) -> tuple[DeviceIdentity, .
     return (await identity,)
 
 
+def consists_of(error: HexacellError, *kinds: type[HexacellError]) -> bool:
+    """Whether an error, or each of several that came at once, is of these kinds."""
+    return all(isinstance(one, kinds) for one in each(error))
+
+
+def each(error: HexacellError) -> list[HexacellError]:
+    """The errors that one report is made of."""
+    return error.errors if isinstance(error, SeveralErrors) else [error]
+
+
 async def gathered(problem: str, calls: Sequence[Awaitable[Result]]) -> list[Result]:
     """Wait for all of the calls; one failure is raised as it is, several in one report."""
     results = await asyncio.gather(*calls, return_exceptions=True)
@@ -65,5 +75,5 @@ async def gathered(problem: str, calls: Sequence[Awaitable[Result]]) -> list[Res
     if len(errors) == 1:
         raise errors[0]
     if errors:
-        raise SeveralErrors(problem, errors)
+        raise SeveralErrors(problem, [one for error in errors for one in each(error)])
     return [result for result in results if not isinstance(result, BaseException)]

@@ -6,15 +6,18 @@ import asyncio
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 
-from hexacell.errors import ExitCode, HexacellError
+from hexacell.errors import ExitCode, HexacellError, SeveralErrors
 from hexacell.verification import Verdict
 from procedures import events
 from procedures.journal import Journal
 from procedures.performing import Performer
 from procedures.state import RunState, apply, fold
 from procedures.steps import Step
+from procedures.uninterrupted import uninterrupted
 
 Listener = Callable[[events.Event, RunState], None]
+
+_KILLED = int(ExitCode.INTERRUPTED)
 
 
 class Engine:
@@ -48,7 +51,12 @@ class Engine:
         return self._end()
 
     def void_open_sets(self) -> None:
-        """Give up sets that an interruption left open: nobody saw whether their gauges kept their zero."""
+        """Give up what an interruption left open: nobody saw whether gauges kept their zero.
+
+        A run that ended without a word, by a kill or a power cut, left the robot nobody knows where.
+        """
+        if self.state.standing is not None:
+            self.tell(events.Interrupted(reason="the program ended without a word", exit_code=_KILLED))
         for key, measured in list(self.state.sets.items()):
             if not measured.closed:
                 self.tell(events.SetVoided(at=key, reason="the run was interrupted in this set"))
@@ -64,12 +72,13 @@ class Engine:
         return await asyncio.to_thread(self._performer.calibration.next_step, self.state)
 
     async def _stop(self, error: BaseException) -> None:
-        with suppress(HexacellError):
-            await asyncio.shield(self._performer.devices.controller.stop())
-        code = error.exit_code if isinstance(error, HexacellError) else ExitCode.INTERRUPTED
         reason = str(error) or type(error).__name__
-        with suppress(HexacellError):
-            self.tell(events.Interrupted(reason=reason, exit_code=int(code)))
+        try:
+            with suppress(HexacellError):
+                await uninterrupted(self._performer.devices.controller.stop())
+        finally:
+            with suppress(HexacellError):
+                self.tell(events.Interrupted(reason=reason, exit_code=int(_exit_code(error))))
 
     def _end(self) -> events.Ended:
         if self.state.ended is not None:
@@ -83,3 +92,9 @@ class Engine:
         ended = events.Ended(exit_code=int(code), line=line)
         self.tell(ended)
         return ended
+
+
+def _exit_code(error: BaseException) -> ExitCode:
+    if isinstance(error, SeveralErrors):
+        return error.worst
+    return error.exit_code if isinstance(error, HexacellError) else ExitCode.INTERRUPTED

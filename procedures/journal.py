@@ -12,6 +12,7 @@ import fcntl
 import json
 import os
 import zlib
+from contextlib import suppress
 from datetime import UTC, datetime
 from pathlib import Path
 from types import TracebackType
@@ -53,7 +54,7 @@ class Journal:
         try:
             self._hold()
             history, whole = _parse(path, files.read_bytes(path))
-            self._events = list(history)
+            self._events, self._whole = list(history), whole
             os.ftruncate(self._descriptor, whole)
             files.sync_folder(path.parent)
         except BaseException:
@@ -72,14 +73,17 @@ class Journal:
             FileError: it could not be written; the journal is as before.
         """
         line = _line(len(self._events) + 1, event)
-        end = os.fstat(self._descriptor).st_size
         try:
+            # Once more, should the last failure have left half a line and been unable to cut it off.
+            os.ftruncate(self._descriptor, self._whole)
             _write_whole(self._descriptor, line)
             os.fsync(self._descriptor)
         except OSError as error:
-            os.ftruncate(self._descriptor, end)
+            with suppress(OSError):
+                os.ftruncate(self._descriptor, self._whole)
             raise files.plain_error("the journal cannot be written", self.path, error) from error
         self._events.append(event)
+        self._whole += len(line)
 
     def close(self) -> None:
         """Let the file and its lock go."""

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import ParamSpec, TypeVar
 
 import numpy as np
 
@@ -23,11 +25,15 @@ from hexacell.summary import identification_document, outcome_line
 from hexacell.verification import Spread, Verdict, judge
 from procedures import events
 from procedures.calibration import Calibration, Mode
-from procedures.devices import Devices
+from procedures.devices import Devices, consists_of, gathered
 from procedures.operators import Operator
 from procedures.settling import Settled, settle
 from procedures.state import RunState
 from procedures.steps import CloseSet, Compute, Move, Phase, Place, Sample, Step
+from procedures.uninterrupted import uninterrupted
+
+Arguments = ParamSpec("Arguments")
+Result = TypeVar("Result")
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,7 +74,9 @@ class Performer:
     async def _sample(self, step: Sample, state: RunState) -> events.Event:
         try:
             reading = await self._read()
-        except GaugeAtEnd as error:
+        except HexacellError as error:
+            if not consists_of(error, GaugeAtEnd):
+                raise
             return events.Refused(at=step.at, orientation=step.orientation, reason=str(error))
         samples = state.set(step.at).samples
         zero = samples[0].reading if samples else reading
@@ -89,8 +97,9 @@ class Performer:
         reading = await self._read()
         zero = state.set(step.at).samples[0].reading
         drift = np.subtract(reading.gauges_mm, zero.gauges_mm)
-        for mounted in self.devices.gauges:
-            await mounted.gauge.check()
+        await gathered(
+            "gauges are not as they were", [mounted.gauge.check() for mounted in self.devices.gauges]
+        )
         limit = self.cell.settings.acceptance.drift_mm
         if np.abs(drift).max() > limit:
             raise LimitError(
@@ -106,13 +115,13 @@ class Performer:
     async def _compute(self, step: Compute, state: RunState) -> events.Event:
         match step.kind:
             case "identify":
-                return await asyncio.to_thread(self._identify, state)
+                return await _in_thread(self._identify, state)
             case "propose":
-                return await asyncio.to_thread(self._propose, state)
+                return await _in_thread(self._propose, state)
             case "commit":
                 return await self._commit(state)
             case "judge":
-                return await asyncio.to_thread(self._judge, state)
+                return await _in_thread(self._judge, state)
             case "roll back":
                 return await self._roll_back()
 
@@ -156,16 +165,26 @@ class Performer:
             raise LimitError("the new geometry is refused: " + " ".join(refused))
         proposal = Proposal.load(self.folder.proposal)
         approved_by = await self._approval(conditions, proposal)
-        receipt = await asyncio.to_thread(commit, proposal, self.folder.path)
+        receipt = await _in_thread(commit, proposal, self.folder.path)
         try:
             await self.devices.controller.reload()
         except HexacellError as error:
-            await asyncio.to_thread(rollback, receipt)
-            raise WriteBackUndone(
-                f"the controller did not take the new geometry ({error}); its config is as it was",
-                subject=receipt.path,
-            ) from error
+            await _in_thread(rollback, receipt)
+            raise await self._undone(receipt, error) from error
         return events.Committed(approved_by=approved_by)
+
+    async def _undone(self, receipt: Receipt, error: HexacellError) -> WriteBackUndone:
+        """What to raise after a reload that failed, with the old config already back."""
+        action = None
+        try:
+            await self.devices.controller.reload()
+        except HexacellError:
+            action = "Start the controller anew before it moves: nobody knows which geometry it has"
+        return WriteBackUndone(
+            f"the controller did not take the new geometry ({error}); its config is as it was",
+            subject=receipt.path,
+            action=action,
+        )
 
     async def _approval(self, conditions: tuple[events.Gate, ...], proposal: Proposal) -> str:
         automatic = self.cell.settings.acceptance.approval == "automatic"
@@ -197,9 +216,16 @@ class Performer:
         return events.Judged(verdict=verdict, line=line)
 
     async def _roll_back(self) -> events.Event:
-        await asyncio.to_thread(rollback, Receipt.of(self.folder.path))
+        await _in_thread(rollback, Receipt.of(self.folder.path))
         await self.devices.controller.reload()
         return events.RolledBack()
+
+
+async def _in_thread(
+    work: Callable[Arguments, Result], *args: Arguments.args, **kwargs: Arguments.kwargs
+) -> Result:
+    """Work that may write files: who cancels it waits for its end, or it would write behind his back."""
+    return await uninterrupted(asyncio.to_thread(work, *args, **kwargs))
 
 
 def _reading(devices: Devices, settled: Settled) -> events.Reading:

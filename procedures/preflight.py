@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Awaitable, Iterator
 
-from hexacell.clock import CellClock
+from drivers.gauges.errors import GaugeAtEnd
+from drivers.ports import EncoderRound, GaugeReading
 from hexacell.errors import AnswerNeeded, HexacellError, SeveralErrors
 from hexacell.pose import Pose
 from procedures.calibration import Calibration
-from procedures.devices import Devices
-from procedures.settling import glance
+from procedures.devices import Devices, each, gathered
 
 
 def plan_failures(calibration: Calibration, *, unattended: bool) -> Iterator[HexacellError]:
@@ -26,14 +26,16 @@ def plan_failures(calibration: Calibration, *, unattended: bool) -> Iterator[Hex
         )
 
 
-async def device_failures(devices: Devices, clock: CellClock) -> list[HexacellError]:
-    """What is wrong with opened devices: one reading of each must come."""
+async def device_failures(devices: Devices) -> list[HexacellError]:
+    """What is wrong with opened devices: each is asked for one reading.
+
+    A plunger at an end of its travel is no failure: the robot is not at the gauges yet.
+    """
+    calls: list[Awaitable[GaugeReading | EncoderRound]] = [m.gauge.read() for m in devices.gauges]
     try:
-        await glance(devices, clock)
-    except SeveralErrors as several:
-        return several.errors
+        await gathered("devices cannot be read", [*calls, devices.encoders.read()])
     except HexacellError as error:
-        return [error]
+        return [one for one in each(error) if not isinstance(one, GaugeAtEnd)]
     return []
 
 

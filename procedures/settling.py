@@ -7,12 +7,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from drivers.gauges.errors import GaugeAtEnd, GaugeUnsteady
 from drivers.ports import EncoderRound, GaugeReading
 from hexacell.cell.devices import TimingSettings
 from hexacell.clock import CellClock
-from hexacell.errors import DeviceError
+from hexacell.errors import DeviceError, HexacellError
 from hexacell.rotations import Array
-from procedures.devices import Devices, gathered
+from procedures.devices import Devices, consists_of, each, gathered
+
+LEAST_WINDOWS = 3
+"""So many windows' worth of readings are taken before giving up, however long they take."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,22 +68,48 @@ async def glance(devices: Devices, clock: CellClock) -> Glance:
 async def settle(devices: Devices, timing: TimingSettings, clock: CellClock) -> Settled:
     """Read until the last window of readings agrees, and give that window.
 
+    A gauge that still swings too much to be read at all counts as one that has not settled yet.
+
     Raises:
         DeviceError: it never did within the time allowed; the message names what kept moving.
     """
     window: deque[Glance] = deque()
-    begun = clock.now()
+    begun, looks = clock.now(), 0
     while True:
-        window.append(await glance(devices, clock))
-        while len(window) > timing.readings and window[-1].at_s - window[1].at_s >= timing.window_s:
-            window.popleft()
-        settled = Settled(tuple(window))
-        long_enough = window[-1].at_s - window[0].at_s >= timing.window_s
-        if len(window) >= timing.readings and long_enough and not _moving(devices, timing, settled):
-            return settled
-        if clock.now() - begun > timing.give_up_s:
-            raise _never_settled(devices, timing, settled)
+        looks += 1
+        moving = await _look(devices, timing, clock, window)
+        if not moving and _is_full(window, timing):
+            return Settled(tuple(window))
+        # Counted too, because a slow device or a machine under load must not run out of time unread.
+        if looks >= LEAST_WINDOWS * timing.readings and clock.now() - begun > timing.give_up_s:
+            raise _never_settled(timing, moving)
         await clock.sleep(timing.interval_s)
+
+
+async def _look(
+    devices: Devices, timing: TimingSettings, clock: CellClock, window: deque[Glance]
+) -> list[str]:
+    """Take one more reading into the window; gives what moved meanwhile, in words."""
+    try:
+        window.append(await glance(devices, clock))
+    except HexacellError as error:
+        if not _still_swings(error):
+            raise
+        window.clear()
+        return [f"{one.subject}: {one.problem}" for one in each(error)]
+    while len(window) > timing.readings and window[-1].at_s - window[1].at_s >= timing.window_s:
+        window.popleft()
+    return _moving(devices, timing, Settled(tuple(window)))
+
+
+def _is_full(window: deque[Glance], timing: TimingSettings) -> bool:
+    return len(window) >= timing.readings and window[-1].at_s - window[0].at_s >= timing.window_s
+
+
+def _still_swings(error: HexacellError) -> bool:
+    """Whether it says no more than that the ball moves; that may touch an end of the travel too."""
+    unsteady = any(isinstance(one, GaugeUnsteady) for one in each(error))
+    return unsteady and consists_of(error, GaugeUnsteady, GaugeAtEnd)
 
 
 def _moving(devices: Devices, timing: TimingSettings, settled: Settled) -> list[str]:
@@ -96,9 +126,9 @@ def _moving(devices: Devices, timing: TimingSettings, settled: Settled) -> list[
     ]
 
 
-def _never_settled(devices: Devices, timing: TimingSettings, settled: Settled) -> DeviceError:
-    moving = ", ".join(_moving(devices, timing, settled)) or "readings came too slowly"
+def _never_settled(timing: TimingSettings, moving: list[str]) -> DeviceError:
+    words = ", ".join(moving) or "the window of readings is longer than that"
     return DeviceError(
-        f"the readings did not settle within {timing.give_up_s:g} s: {moving}",
+        f"the readings did not settle within {timing.give_up_s:g} s: {words}",
         action="Look for vibration or a slipping gauge; the limits are in [timing] of the cell file",
     )

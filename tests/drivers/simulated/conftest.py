@@ -1,0 +1,154 @@
+"""The simulated Hexaglide on a clock that stands until it is moved."""
+
+from __future__ import annotations
+
+import shutil
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from drivers.simulated.machine import SimulatedMachine
+from drivers.simulated.world import World
+from hexacell import kinematics
+from hexacell.bundled import bundled_config
+from hexacell.cell.file import Cell, load_cell
+from hexacell.cell.simulation import SimulationSettings
+from hexacell.clock import CellClock
+from hexacell.controller_config.native_toml import NativeToml
+from hexacell.geometry import Geometry
+from hexacell.mechanisms.hexaglide import Hexaglide
+from hexacell.pose import Pose, Poses
+from hexacell.rotations import Array
+
+HOME = Pose(0.0, 0.0, 550.0)
+STILL: dict[str, Any] = {
+    "gauges.noise_mm": 0.0,
+    "gauges.flicker_mm": 0.0,
+    "encoders.noise_mm": 0.0,
+    "encoders.flicker_mm": 0.0,
+    "motion.ringing_mm": 0.0,
+    "motion.repeatability_mm": 0.0,
+    "station_reach_mm": 30.0,
+}
+"""A simulation without any scatter: what is seen is what is."""
+
+
+class StillClock(CellClock):
+    """Time passes when told to, and for whoever waits on it."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.time_s = 100.0
+        self.on_wait: Callable[[], None] = lambda: None
+
+    def now(self) -> float:
+        return self.time_s
+
+    def wait(self, seconds: float, until: threading.Event | None = None) -> bool:
+        self.on_wait()
+        if until is not None and until.is_set():
+            return True
+        self.time_s += seconds
+        return False
+
+
+@dataclass
+class Twin:
+    """A world and the machine in it, beside what an onlooker may compute for himself."""
+
+    clock: StillClock
+    world: World
+    machine: SimulatedMachine
+    config: Path
+    truth: Geometry
+    commanding: Geometry
+
+    def joints_for(self, pose: Pose) -> Array:
+        """Where the controller's geometry puts the sliders for a pose."""
+        branch = NativeToml().read(self.config).branch
+        joints: Array = kinematics.inverse(Hexaglide(), self.commanding, branch, Poses.of([pose]))[0]
+        return joints
+
+    def ball_at(self, pose: Pose) -> Array:
+        """Where the ball then really is: found by least squares, not by the simulation's own way."""
+        from scipy.optimize import least_squares
+
+        joints = self.joints_for(pose)
+        legs = np.array([1.0, 0.0, 0.0])
+
+        def error(numbers: Array) -> Array:
+            platform = Poses.of([Pose(*(float(number) for number in numbers))])
+            ends = platform.positions[0] + self.truth.B @ platform.rotations[0].T
+            sliders = self.truth.S + joints[:, None] * legs
+            return np.asarray(np.linalg.norm(sliders - ends, axis=1) - self.truth.l, dtype=float)
+
+        found = least_squares(
+            error, pose.as_tuple(), x_scale=(1, 1, 1, 0.1, 0.1, 0.1), xtol=1e-15, ftol=1e-15
+        )
+        assert np.abs(found.fun).max() < 1e-9
+        ball: Array = found.x[:3]
+        return ball
+
+    def seen(self) -> Array:
+        """What the three gauges see, mm."""
+        return np.array([self.world.displacement(axis) for axis in "xyz"])
+
+
+MakeTwin = Callable[..., Twin]
+
+
+@pytest.fixture
+def bundled_cell(tmp_path: Path) -> Cell:
+    source = bundled_config("simulated-hexaglide")
+    for path in source.parent.glob("simulated-hexaglide*.toml"):
+        shutil.copy(path, tmp_path)
+    return load_cell(tmp_path / source.name)
+
+
+@pytest.fixture
+def make_twin(bundled_cell: Cell) -> MakeTwin:
+    def make(home: Pose = HOME, **changes: Any) -> Twin:
+        simulation = bundled_cell.settings.simulation
+        assert simulation is not None
+        changes = STILL | {key.replace("__", "."): value for key, value in changes.items()}
+        simulation = changed(simulation, changes)
+        config = bundled_cell.config_path
+        read = NativeToml().read(config)
+        start = Poses.of([home])
+        joints = kinematics.inverse(Hexaglide(), read.geometry, read.branch, start)[0]
+        clock = StillClock()
+        world = World(
+            Hexaglide(),
+            simulation,
+            clock,
+            start=start,
+            start_geometry=read.geometry,
+            start_joints=joints,
+        )
+        machine = SimulatedMachine(Hexaglide(), NativeToml(), config, world, clock, home)
+        values = simulation.geometry
+        truth = Geometry(values.S, values.B, values.l)
+        return Twin(clock, world, machine, config, truth, read.geometry)
+
+    return make
+
+
+@pytest.fixture
+def twin(make_twin: MakeTwin) -> Twin:
+    return make_twin()
+
+
+def changed(section: SimulationSettings, changes: dict[str, Any]) -> SimulationSettings:
+    values = section.model_dump()
+    for key, value in changes.items():
+        *heads, last = key.split(".")
+        inner = values
+        for head in heads:
+            inner = inner[head]
+        inner[last] = value
+    return SimulationSettings.model_validate(values)

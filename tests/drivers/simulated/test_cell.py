@@ -1,0 +1,227 @@
+"""A whole simulated cell: every device answers on the wire, through the real drivers."""
+
+from __future__ import annotations
+
+import asyncio
+import socket
+import threading
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from typing import Any
+
+import pytest
+
+from drivers.controllers.errors import MotionInterrupted, MoveRefused
+from drivers.controllers.linuxcncrsh import LinuxcncrshController
+from drivers.encoders.cia406 import Cia406Bank
+from drivers.gauges.cdi import CdiGauge
+from drivers.gauges.mux10 import Mux10Gauge
+from drivers.gauges.sylvac import SylvacGauge
+from drivers.link import SerialLinks
+from drivers.simulated.cell import SimulatedCell
+from drivers.simulated.gauges.faults import GaugeFault
+from hexacell.cell.model import CellSettings
+from hexacell.controller_config.native_toml import NativeToml
+from hexacell.errors import FileError, HexacellError, ReachError
+from hexacell.mechanisms.hexaglide import Hexaglide
+from hexacell.pose import Pose
+
+DRIVERS: dict[str, Any] = {"sylvac": SylvacGauge, "mux10": Mux10Gauge, "cdi": CdiGauge}
+
+
+def serve(bundled_cell: Any, settings: CellSettings | None = None, *, other_processes: bool = False) -> Any:
+    settings = settings or quick(bundled_cell.settings)
+    assert settings.simulation is not None
+    return SimulatedCell(
+        settings,
+        settings.simulation,
+        Hexaglide(),
+        NativeToml(),
+        bundled_cell.config_path,
+        other_processes=other_processes,
+    )
+
+
+def quick(settings: CellSettings) -> CellSettings:
+    timing = settings.timing.model_copy(update={"clock_factor": 200.0})
+    return settings.model_copy(update={"timing": timing})
+
+
+def slow(settings: CellSettings) -> CellSettings:
+    """Moves that last 20 s on the wall: time enough to stop one."""
+    assert settings.simulation is not None
+    motion = settings.simulation.motion.model_copy(update={"minimum_s": 4000.0})
+    simulation = settings.simulation.model_copy(update={"motion": motion})
+    return quick(settings).model_copy(update={"simulation": simulation})
+
+
+async def under_way(cell: SimulatedCell) -> None:
+    while cell.world.progress() in {0.0, 1.0}:  # noqa: ASYNC110 - threads move the simulation
+        await asyncio.sleep(0.001)
+
+
+@asynccontextmanager
+async def drivers(settings: CellSettings) -> AsyncIterator[tuple[list[Any], Any, Any]]:
+    links = SerialLinks()
+    gauges = [DRIVERS[gauge.protocol](gauge, links) for gauge in settings.gauges]
+    encoders, controller = Cia406Bank(settings.encoders), LinuxcncrshController(settings.controller)
+    try:
+        await asyncio.gather(*(gauge.open() for gauge in gauges), encoders.open(), controller.open())
+        yield gauges, encoders, controller
+    finally:
+        await asyncio.gather(*(gauge.close() for gauge in gauges), encoders.close(), controller.close())
+        await links.close()
+
+
+async def test_every_device_answers_and_the_robot_moves(bundled_cell) -> None:
+    target = Pose(3.0, -2.0, 548.0, 1.0, 0.0, 0.0)
+    with serve(bundled_cell) as cell:
+        async with drivers(cell.settings) as (gauges, encoders, controller):
+            await controller.prepare()
+            before = (await encoders.read()).positions_mm
+            await controller.move(target)
+            after = (await encoders.read()).positions_mm
+            readings = [(await gauge.read()).value_mm for gauge in gauges]
+            seen = [cell.world.displacement(axis) for axis in "xyz"]
+            assert (await controller.pose()).as_tuple() == pytest.approx(target.as_tuple(), abs=1e-3)
+        assert before != after
+        assert after == pytest.approx(cell.world.sliders().tolist(), abs=0.01)
+        assert readings == pytest.approx(seen, abs=0.05)
+
+
+async def test_out_of_reach_is_said_by_the_driver(bundled_cell) -> None:
+    with serve(bundled_cell) as cell:
+        async with drivers(cell.settings) as (_, encoders, controller):
+            await controller.prepare()
+            before = (await encoders.read()).positions_mm
+            with pytest.raises(MoveRefused, match="kinematicsInverse"):
+                await controller.move(Pose(0.0, 0.0, 2000.0))
+            assert (await encoders.read()).positions_mm == pytest.approx(before, abs=0.01)
+
+
+async def test_a_move_that_is_cancelled_stops_the_robot_in_place(bundled_cell) -> None:
+    with serve(bundled_cell, slow(bundled_cell.settings)) as cell:
+        async with drivers(cell.settings) as (_, _, controller):
+            await controller.prepare()
+            moving = asyncio.create_task(controller.move(Pose(0.0, -100.0, 550.0)))
+            await under_way(cell)
+            moving.cancel()
+            with pytest.raises(asyncio.CancelledError):
+                await moving
+            progress = cell.world.progress()
+            sliders = cell.world.sliders()
+        assert 0.0 < progress < 1.0
+        assert cell.world.progress() == progress
+        assert cell.world.sliders() == pytest.approx(sliders, abs=0.01)
+
+
+async def test_a_stop_while_it_moves_is_said(bundled_cell) -> None:
+    with serve(bundled_cell, slow(bundled_cell.settings)) as cell:
+        async with drivers(cell.settings) as (_, _, controller):
+            await controller.prepare()
+            moving = asyncio.create_task(controller.move(Pose(0.0, -100.0, 550.0)))
+            await under_way(cell)
+            await controller.stop()
+            with pytest.raises(MotionInterrupted, match="told to"):
+                await moving
+
+
+@pytest.mark.parametrize("signs", [(1, 1, 1), (-1, 1, -1)])
+async def test_gauges_count_the_way_they_are_mounted(bundled_cell, signs: tuple[int, ...]) -> None:
+    settings = quick(bundled_cell.settings)
+    gauges = tuple(
+        gauge.model_copy(update={"sign": sign}) for gauge, sign in zip(settings.gauges, signs, strict=True)
+    )
+    with serve(bundled_cell, settings.model_copy(update={"gauges": gauges})) as cell:
+        async with drivers(cell.settings) as (opened, _, _):
+            readings = [(await gauge.read()).value_mm for gauge in opened]
+        expected = [sign * cell.world.displacement(axis) for sign, axis in zip(signs, "xyz", strict=True)]
+    assert readings == pytest.approx(expected, abs=0.05)
+
+
+async def test_reloading_reads_the_config_and_moves_nothing(bundled_cell) -> None:
+    with serve(bundled_cell) as cell:
+        async with drivers(cell.settings) as (_, _, controller):
+            await controller.prepare()
+            sliders, believed = cell.machine.joints(), await controller.pose()
+            config, values = bundled_cell.config_path, bundled_cell.settings.simulation.geometry
+            config.write_text(NativeToml().rewrite(config.read_text(), _geometry(values)))
+            await controller.reload()
+            assert cell.machine.joints() == pytest.approx(sliders, abs=1e-6)
+            assert (await controller.pose()).position != pytest.approx(believed.position, abs=0.5)
+
+
+def _geometry(values: Any) -> Any:
+    from hexacell.geometry import Geometry
+
+    return Geometry(values.S, values.B, values.l)
+
+
+async def test_the_cells_own_passwords_are_asked_for(bundled_cell) -> None:
+    settings = quick(bundled_cell.settings)
+    own = settings.controller.model_copy(update={"connect_password": "sesame", "enable_password": "open"})
+    with serve(bundled_cell, settings.model_copy(update={"controller": own})) as cell:
+        async with drivers(cell.settings) as (_, _, controller):
+            await controller.prepare()
+        wrong = cell.settings.controller.model_copy(update={"connect_password": "EMC"})
+        stranger = LinuxcncrshController(wrong)
+        with pytest.raises(HexacellError, match="password"):
+            await stranger.open()
+        await stranger.close()
+
+
+def test_its_settings_name_every_device_and_no_simulation(bundled_cell) -> None:
+    with serve(bundled_cell) as cell:
+        assert cell.settings.simulation is None
+        assert len({gauge.port for gauge in cell.settings.gauges}) == 3
+        assert cell.settings.encoders.bus == cell.encoders.bus_settings
+        assert cell.settings.controller.port == cell.controller.port
+        CellSettings.model_validate(cell.settings.model_dump(), strict=True)
+
+
+def test_other_processes_reach_the_encoders_too(bundled_cell) -> None:
+    with serve(bundled_cell, other_processes=True) as cell:
+        bus = cell.settings.encoders.bus
+        assert bus != cell.encoders.bus_settings
+        assert bus["interface"] == "slcan"
+
+
+def test_closing_ends_everything_and_twice_is_harmless(bundled_cell) -> None:
+    before = set(threading.enumerate())
+    cell = serve(bundled_cell)
+    assert set(threading.enumerate()) > before
+    cell.close()
+    cell.close()
+    assert set(threading.enumerate()) == before
+    with (
+        pytest.raises(ConnectionRefusedError),
+        socket.create_connection(("127.0.0.1", cell.controller.port), 0.2),
+    ):
+        pass
+
+
+def test_a_first_point_out_of_reach_is_refused_and_nothing_stays_open(bundled_cell) -> None:
+    settings = bundled_cell.settings
+    far = settings.identification.model_copy(update={"points": ((0.0, 0.0, 2000.0), (0.0, 0.0, 550.0))})
+    with pytest.raises(ReachError):
+        serve(bundled_cell, settings.model_copy(update={"identification": far}))
+
+
+def test_a_device_that_cannot_be_simulated_is_refused_and_nothing_stays_open(bundled_cell) -> None:
+    settings = bundled_cell.settings
+    strange = (settings.gauges[0].model_copy(update={"protocol": "telepathy"}), *settings.gauges[1:])
+    with pytest.raises(FileError, match="telepathy"):
+        serve(bundled_cell, settings.model_copy(update={"gauges": strange}))
+
+
+async def test_faults_of_devices_reach_the_drivers(bundled_cell) -> None:
+    settings = quick(bundled_cell.settings)
+    hasty = settings.encoders.model_copy(update={"timeout_s": 0.1})
+    with serve(bundled_cell, settings.model_copy(update={"encoders": hasty})) as cell:
+        async with drivers(cell.settings) as (gauges, encoders, _):
+            cell.gauges.inject("x", GaugeFault.INCH)
+            with pytest.raises(HexacellError, match="gauge x"):
+                await gauges[0].read()
+            cell.encoders.faults.silence(3)
+            with pytest.raises(HexacellError, match="3"):
+                await encoders.read()

@@ -1,0 +1,96 @@
+"""Back to a set's reference: straight where that is safe, else over poses that were visited."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from hexacell import kinematics
+from hexacell.design.path import straight
+from hexacell.errors import IdentifiabilityError
+from hexacell.pose import Pose, Poses
+from procedures import calibration as module
+from procedures import events
+from procedures.calibration import REFUSALS
+from procedures.state import fold
+from procedures.steps import Move, Phase
+
+ORIENTATIONS = 9
+
+
+class Ways:
+    """Stands in for the check of straight lines: only those to some orientations are clear."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch, *clear_to: int) -> None:
+        self.clear_to = clear_to
+        monkeypatch.setattr(module.Calibration, "_known", lambda *_: (None, self))
+        monkeypatch.setattr(module, "is_clear", self._is_clear)
+        self.reference = np.zeros(3)
+
+    def _is_clear(self, _: Any, present: Any, target: Any, reference: Any) -> bool:
+        assert reference is self.reference
+        # A story's poses differ in their angle a: orientation less one, in degrees.
+        return round(target.pose(0).a) + 1 in self.clear_to
+
+
+@pytest.mark.parametrize(
+    ("clear_to", "way"),
+    [((1,), [1]), ((4, 1), [1]), ((4,), [4, 3, 2, 1]), ((), [8, 7, 6, 5, 4, 3, 2, 1]), ((6, 5, 2), [2, 1])],
+)
+def test_the_way_back_is_safe(make_rig, story, monkeypatch, clear_to, way) -> None:
+    Ways(monkeypatch, *clear_to)
+    calibration, happened = make_rig().calibration, story().whole(ORIENTATIONS)[:-2]
+    visited: list[int] = []
+    while isinstance(step := calibration.next_step(fold(happened)), Move):
+        visited.append(step.orientation)
+        happened.append(story().arrived(step.orientation, step.pose))
+    assert visited == way
+    assert step.key == "P1/close"
+
+
+def test_the_way_back_from_a_refused_pose_begins_at_the_last_record(make_rig, story, monkeypatch) -> None:
+    Ways(monkeypatch)
+    refusals = [story().arrived(5), story().refused(5)] * (REFUSALS + 1)
+    step = make_rig().calibration.next_step(fold([*story().whole(4)[:-2], *refusals]))
+    assert step.key == "P1/o04/move"
+
+
+def test_nothing_known_leads_back_one_by_one(make_rig, story, monkeypatch) -> None:
+    def unknown(*_: Any) -> Any:
+        raise IdentifiabilityError("the records cannot be followed")
+
+    monkeypatch.setattr(module.Calibration, "_known", unknown)
+    step = make_rig().calibration.next_step(fold(story().whole(ORIENTATIONS)[:-2]))
+    assert step.key == f"P1/o{ORIENTATIONS - 1:02d}/move"
+
+
+def test_the_ball_stays_inside_the_travel_on_every_way(recording, make_rig) -> None:
+    """Judged by the truth, which the procedure does not know."""
+    rig = make_rig()
+    robot, truth = rig.calibration.robot, rig.world._truth
+    settings = rig.cell.settings
+    here: dict[Any, Poses] = {}
+    reference: dict[Any, Any] = {}
+    farthest = 0.0
+    for event in recording.history:
+        if not isinstance(event, events.Arrived) or event.at.phase is not Phase.IDENTIFY:
+            continue
+        there = Poses.of([Pose(*event.pose)])
+        way = straight(here.get(event.at, there), there)
+        joints = kinematics.inverse(robot.mechanism, robot.controller, robot.branch, way)
+        really = kinematics.follow(
+            robot.mechanism,
+            truth,
+            joints,
+            start=way,
+            start_geometry=robot.controller,
+            start_joints=joints,
+        )
+        assert really.found.all()
+        balls = really.poses.positions
+        farthest = max(farthest, np.abs(balls - reference.setdefault(event.at, balls[0])).max())
+        here[event.at] = there
+    # The estimate that the ways were checked with was a little wrong itself.
+    assert 1.0 < farthest < 1.1 * settings.limits.gauge_travel_mm

@@ -201,7 +201,10 @@ class Wire:
             raise closed(self.subject, self.url)
         self._record(Direction.SENT, request)
         self._asked_at = self._last_traffic = time.monotonic()
-        port.write(request)
+        # pyserial raises it also where all was sent and this thread then got no turn for so long;
+        # whether anybody heard, the answer tells.
+        with suppress(serial.SerialTimeoutException):
+            port.write(request)
 
     def _record(self, direction: Direction, data: bytes) -> None:
         if data and self._recorder is not None:

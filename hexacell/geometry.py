@@ -59,4 +59,3 @@ class Geometry:
     def toward(self, other: Geometry, fraction: float) -> Geometry:
         """The geometry ``fraction`` of the way to ``other``; 0 is this one, 1 the other."""
         return Geometry.from_vector((1.0 - fraction) * self.vector() + fraction * other.vector())
-

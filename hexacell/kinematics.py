@@ -130,7 +130,9 @@ def sensitivity(mechanism: Mechanism, geometry: Geometry, poses: Poses, joints: 
     columns = [by_leg[0] * by_leg[1][..., part] for part in (slice(3), slice(3, 6), slice(6, 7))]
     return Sensitivity(
         joints=inverse_jacobian * linear.joints[..., None, :],
-        parameters=np.concatenate([part.reshape(len(poses), 6, 6 * part.shape[-1]) for part in columns], axis=-1),
+        parameters=np.concatenate(
+            [part.reshape(len(poses), 6, 6 * part.shape[-1]) for part in columns], axis=-1
+        ),
         mode=assembly_mode(linear.pose),
     )
 

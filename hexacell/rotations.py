@@ -37,9 +37,7 @@ def to_angles(rotation: ArrayLike) -> Array:
     c = np.where(cos_b < 1e-12, 0.0, np.arctan2(r[..., 1, 0], r[..., 0, 0]))
     # Read with c undone, so that near b = +-pi/2 the error of an ill-determined c does not add up.
     sine, cosine = np.sin(c), np.cos(c)
-    a = np.arctan2(
-        sine * r[..., 0, 2] - cosine * r[..., 1, 2], cosine * r[..., 1, 1] - sine * r[..., 0, 1]
-    )
+    a = np.arctan2(sine * r[..., 0, 2] - cosine * r[..., 1, 2], cosine * r[..., 1, 1] - sine * r[..., 0, 1])
     return np.stack([a, b, c], axis=-1)
 
 

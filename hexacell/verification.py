@@ -30,7 +30,7 @@ class Spread:
 
     @classmethod
     def of(cls, deviations: ArrayLike) -> Spread | None:
-        """Of deviations (n, 3), mm, references left out; nothing where there are none, or not all finite."""
+        """Of deviations (n, 3), mm, references left out; nothing where one is missing or not finite."""
         distances: Array = np.linalg.norm(np.reshape(np.asarray(deviations, dtype=float), (-1, 3)), axis=-1)
         if not len(distances) or not np.isfinite(distances).all():
             return None

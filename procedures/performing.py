@@ -12,6 +12,7 @@ import numpy as np
 from drivers.gauges.errors import GaugeAtEnd
 from hexacell.acceptance import gates
 from hexacell.archive import RunFolder
+from hexacell.assessment import assess
 from hexacell.cell.file import Cell
 from hexacell.clock import CellClock
 from hexacell.controller_config.proposal import Proposal, propose
@@ -21,7 +22,7 @@ from hexacell.measurement_file import write_measurements
 from hexacell.pose import Pose
 from hexacell.robot import config_format
 from hexacell.rotations import Array
-from hexacell.summary import identification_document, outcome_line
+from hexacell.summary import assessment_document, identification_document, outcome_line
 from hexacell.verification import Spread, Verdict, judge
 from procedures import events
 from procedures.calibration import Calibration, Mode
@@ -128,8 +129,10 @@ class Performer:
     def _identify(self, state: RunState) -> events.Event:
         write_measurements(self.folder.measurements, state.measurements())
         identified = self.calibration.identification(state)
+        robot = self.calibration.robot
+        assessed = assess(self.cell.settings, robot, state.measurements(), identified)
         document = identification_document(identified)
-        self.folder.write_result(document)
+        self.folder.write_result(document | assessment_document(identified, assessed))
         return events.Identified(result=document, held_out=self.calibration.held_out_poses(identified))
 
     def _propose(self, state: RunState) -> events.Event:

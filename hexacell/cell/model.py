@@ -7,7 +7,15 @@ from typing import Literal, Self
 from pydantic import Field, ValidationError, field_validator, model_validator
 from pydantic_core import InitErrorDetails
 
-from hexacell.cell.base import GeometryValues, NotNegative, Point, Positive, Section, SixNumbers, broken_rule
+from hexacell.cell.base import (
+    GeometryValues,
+    NotNegative,
+    Point,
+    Positive,
+    Section,
+    SixNumbers,
+    broken_rule,
+)
 from hexacell.cell.devices import (
     ControllerSettings,
     EncoderSettings,

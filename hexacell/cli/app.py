@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Sequence
 from importlib import import_module
@@ -14,6 +15,8 @@ from hexacell.errors import ExitCode, HexacellError, SeveralErrors
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command; the result is the process's exit code."""
+    # Before numpy is there to read it: our matrices are small, and threads get into each other's way.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     typed = sys.argv[1:] if arguments is None else list(arguments)
     parser = make_parser()
     if not typed:

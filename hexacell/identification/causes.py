@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Hashable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.special import chdtri
@@ -25,6 +25,8 @@ LEAST_GAIN = 25.0
 
 COST_OF_AN_UNKNOWN = 10.0
 """What an explanation must lower the chi-square by for each number that it is free to choose."""
+
+NOBODYS_POINT = -1
 
 Label = tuple[int, int]
 
@@ -76,13 +78,26 @@ class Slip:
         """The problem without the records after the slip."""
         return problem.keeping(~self.rows(problem))
 
+    def parted(self, problem: Problem) -> Problem:
+        """The problem with the records after the slip as a point of their own, its zero unknown too."""
+        after = self.rows(problem)
+        labels = problem.labels.copy()
+        labels[after, 0] = NOBODYS_POINT
+        first_rows = np.union1d(problem.first_rows, np.flatnonzero(after)[:1])
+        return replace(problem, labels=labels, first_rows=first_rows)
+
 
 Cause = GrossErrors | Slip | Suspect
 
 
+def labels_of(problem: Problem) -> list[Label]:
+    """Point and orientation of each record."""
+    return [(point, orientation) for point, orientation in problem.labels.tolist()]
+
+
 def labelled(problem: Problem, labels: Collection[Label]) -> Mask:
     """Which records (n,) of a problem bear one of some labels."""
-    return np.array([tuple(label) in labels for label in problem.labels.tolist()], dtype=bool)
+    return np.array([label in labels for label in labels_of(problem)], dtype=bool)
 
 
 def likeliest(expansion: Expansion, goodness: Goodness, *, found_before: int = 0) -> list[Cause]:

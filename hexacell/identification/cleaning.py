@@ -9,11 +9,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from hexacell.identification import sentences
 from hexacell.identification.anomaly import Anomaly, FalseReadings, Kind
-from hexacell.identification.causes import Cause, GrossErrors, Label, Slip, labelled, likeliest
+from hexacell.identification.causes import (
+    Cause,
+    GrossErrors,
+    Label,
+    Slip,
+    labelled,
+    labels_of,
+    likeliest,
+)
 from hexacell.identification.expansion import Expansion
 from hexacell.identification.fit import IN_A_HURRY, Fit, fit, refit
 from hexacell.identification.judgement import Judgement, judge, poses_at
@@ -21,10 +27,14 @@ from hexacell.identification.misreadings import ALL_IN_INCHES, Suspect
 from hexacell.identification.problem import Problem
 from hexacell.identification.refusals import equations, is_enough
 from hexacell.identification.result import Outlier
-from hexacell.identification.search import explains, led_astray, search
-
-LARGEST_SHARE = 0.1
-"""Of gross errors in all records: beyond it they are not single mistakes."""
+from hexacell.identification.search import (
+    LARGEST_SHARE,
+    Explanation,
+    explains,
+    is_constant,
+    led_astray,
+    search,
+)
 
 CONFIRMED = 0.5
 """Of the gain expected to first order, what a new solution must show of it."""
@@ -67,23 +77,27 @@ class _Cleaning:
 
     def run(self) -> None:
         """Look for causes until none is left that chance does not explain as well."""
-        while len(self.gross) < LARGEST_SHARE * self.whole.records:
-            cause = self._cause()
-            if cause is None:
-                break
-            self._remove(cause)
+        self._remove_all()
         if len(self.gross) > 1 or not explains(self.remaining, self.fit):
             self._refuse_inches()
-        self._readmit()
+        if self._left_out_singly() and self._readmit():
+            self._remove_all()
 
-    def _cause(self) -> Cause | None:
+    def _remove_all(self) -> None:
+        while len(self.gross) < LARGEST_SHARE * self.whole.records:
+            explanation = self._explanation()
+            if not explanation:
+                break
+            self._remove(explanation)
+
+    def _explanation(self) -> Explanation:
         if led_astray(self.remaining, self.fit):
-            cause = search(self.remaining, self.fit)
-            if cause is not None or not self._patiently():
-                return cause
+            found = search(self.remaining, self.fit)
+            if found or not self._patiently():
+                return found
         expansion = Expansion.at_solution(self.fit)
         causes = likeliest(expansion, self.fit.goodness, found_before=len(self.gross))
-        return next(filter(self._confirmed, causes), None)
+        return tuple([*filter(self._confirmed, causes)][:1])
 
     def _patiently(self) -> bool:
         """Whether a solution that was not reached in a hurry is reached with more patience."""
@@ -91,81 +105,78 @@ class _Cleaning:
             self.fit = fit(self.remaining)
         return not led_astray(self.remaining, self.fit)
 
+    def _confirmed(self, cause: Cause) -> bool:
+        """A record can be left out if enough are left; what concerns more needs a second solution."""
+        if isinstance(cause, GrossErrors):
+            return is_enough(cause.undone(self.remaining))
+        if isinstance(cause, Slip):
+            return is_constant(self.remaining, cause)
+        trial = fit(cause.undone(self.remaining), manner=IN_A_HURRY)
+        return trial.goodness.chi2 < self.fit.goodness.chi2 - CONFIRMED * cause.gain
+
     def _refuse_inches(self) -> None:
         """Readings in inches resemble a machine that needs no calibration, with some gross errors."""
         suspect = Suspect(ALL_IN_INCHES, None, 0.0)
         in_mm = suspect.undone(self.whole)
         if explains(in_mm, fit(in_mm, manner=IN_A_HURRY)):
             self.remaining, self.fit = self.whole, fit(self.whole, manner=IN_A_HURRY)
-            self._remove(suspect)
+            self._remove((suspect,))
 
-    def _confirmed(self, cause: Cause) -> bool:
-        """A record can always be left out if enough are left; a misreading needs a second solution."""
-        if isinstance(cause, GrossErrors):
-            return is_enough(cause.undone(self.remaining))
-        if isinstance(cause, Slip):
-            return True
-        trial = fit(cause.undone(self.remaining), manner=IN_A_HURRY)
-        return trial.goodness.chi2 < self.fit.goodness.chi2 - CONFIRMED * cause.gain
+    def _remove(self, explanation: Explanation) -> None:
+        for cause in explanation:
+            self.remaining = cause.undone(self.remaining)
+            if isinstance(cause, Suspect):
+                after = fit(self.remaining, manner=IN_A_HURRY)
+                raise FalseReadings(sentences.of_misreading(cause, self.fit.goodness, after.goodness))
+            if isinstance(cause, GrossErrors):
+                self.gross.update(cause.labels)
+            elif is_enough(self.remaining):
+                self.slips.append(cause)
+            else:
+                raise FalseReadings(sentences.of_slip_refused(cause, equations(self.remaining)))
+        self.fit = fit(self.remaining, manner=IN_A_HURRY)
 
-    def _remove(self, cause: Cause) -> None:
-        remaining = cause.undone(self.remaining)
-        if isinstance(cause, Suspect):
-            raise FalseReadings(
-                sentences.of_misreading(
-                    cause, self.fit.goodness, fit(remaining, manner=IN_A_HURRY).goodness
-                )
-            )
-        if isinstance(cause, Slip):
-            if not is_enough(remaining):
-                raise FalseReadings(sentences.of_slip_refused(cause, equations(remaining)))
-            self.slips.append(cause)
-        else:
-            self.gross.update(cause.labels)
-        self.remaining, self.fit = remaining, fit(remaining, manner=IN_A_HURRY)
-
-    def _readmit(self) -> None:
-        """Take back what was left out too hastily, from the solution on."""
-        if not self._left_out_singly():
-            return
-        agreeing = {label for label, judgement in self._judgements().items() if judgement.agrees}
+    def _readmit(self) -> bool:
+        """Take back what was left out too hastily, from the solution on; whether there was anything."""
+        agreeing = self._agreeing()
         if not agreeing:
-            return
-        kept = {(point, orientation) for point, orientation in self.fit.problem.labels.tolist()}
-        wanted = self.whole.keeping(labelled(self.whole, kept | agreeing))
+            return False
+        wanted = self.whole.keeping(labelled(self.whole, agreeing.union(labels_of(self.fit.problem))))
         poses, reached = poses_at(wanted, self.fit)
-        again = refit(
-            replace(wanted, startable=np.ones(wanted.records, bool)), self.fit.solution.free, poses
-        )
-        if reached.all() and not led_astray(wanted, again) and not self._wrong_again(again):
-            self.gross -= agreeing
-            self.fit = again
+        if not reached.all():
+            return False
+        startable = replace(wanted, startable=reached)
+        again = refit(startable, self.fit.solution.free, poses)
+        if led_astray(wanted, again):
+            return False
+        self.gross -= agreeing
+        self.remaining, self.fit = wanted, again
+        return True
 
-    def _wrong_again(self, again: Fit) -> bool:
-        return bool(likeliest(Expansion.at_solution(again), again.goodness, found_before=len(self.gross)))
+    def _agreeing(self) -> set[Label]:
+        """Records that were left out and agree; the fewer disagree, the more must one do so to stay out."""
+        sure = [judged for judged in self._judgements(0).values() if not judged.agrees]
+        judgements = self._judgements(max(0, len(sure) - 1))
+        return {label for label, judged in judgements.items() if judged.agrees}
 
-    def _left_out_singly(self) -> list[Label]:
-        """Gross errors, and records that the solver lost; those after a slip stay where they are."""
-        slipped = {label for slip in self.slips for label in self._labels_after(slip)}
-        kept = {(point, orientation) for point, orientation in self.fit.problem.labels.tolist()}
-        labels = [(point, orientation) for point, orientation in self.whole.labels.tolist()]
-        return [label for label in labels if label not in kept and label not in slipped]
-
-    def _labels_after(self, slip: Slip) -> list[Label]:
-        return [
-            (point, orientation) for point, orientation in self.whole.labels[slip.rows(self.whole)].tolist()
-        ]
-
-    def _judgements(self) -> dict[Label, Judgement]:
-        found = len(self.gross)
+    def _judgements(self, found_before: int) -> dict[Label, Judgement]:
         return {
-            label: judge(self.whole, label, self.fit, found_before=found)
+            label: judge(self.whole, label, self.fit, found_before=found_before)
             for label in self._left_out_singly()
         }
 
+    def _left_out_singly(self) -> list[Label]:
+        """Gross errors, and records that the solver lost; those after a slip stay where they are."""
+        accounted_for = {label for slip in self.slips for label in self._labels_after(slip)}
+        accounted_for.update(labels_of(self.fit.problem))
+        return [label for label in labels_of(self.whole) if label not in accounted_for]
+
+    def _labels_after(self, slip: Slip) -> list[Label]:
+        return labels_of(self.whole.keeping(slip.rows(self.whole)))
+
     def result(self) -> Cleaned:
         """The records left out, each with its reason."""
-        judgements = self._judgements()
+        judgements = self._judgements(0)
         outliers = [_outlier(label, judgement) for label, judgement in judgements.items()]
         anomalies = [sentences.of_record(outlier) for outlier in outliers]
         for slip in self.slips:

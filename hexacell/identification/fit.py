@@ -28,6 +28,11 @@ from hexacell.rotations import Array
 RELEASE_RATIO = 9.0
 """Data information over prior information from which on the data speak alone (sigma a third)."""
 
+LEAST_REDUNDANCY = 10
+"""Equations beyond the unknowns from which on residuals tell the noise."""
+
+SMALLEST_CHI2 = 1e-6
+
 
 IN_A_HURRY = Manner(CAUTIOUS_DAMPING, 1e-3, iterations=60, searches=12)
 """Twice what records that agree with each other need; others are not worth more."""
@@ -69,9 +74,21 @@ def refit(problem: Problem, free: Array, poses: Poses) -> Fit:
 def _released(problem: Problem, free: Array, poses: Poses, manner: Manner) -> Fit:
     precision = np.linalg.inv(problem.prior.covariance)
     kept, cautious = detour.solve(problem, precision, free=free, poses=poses, manner=manner)
-    held = _precision_where_silent(cautious.information, problem.prior.covariance)
+    information = _quieter_than_stated(kept, cautious) * cautious.information
+    held = _precision_where_silent(information, problem.prior.covariance)
     solution = solve(kept, held, free=cautious.free, poses=cautious.prediction.poses, manner=NEARBY)
     return Fit(kept, solution, held, np.linalg.inv(solution.information + held))
+
+
+def _quieter_than_stated(problem: Problem, solution: Solution) -> float:
+    """How many times the stated information the records hold, their residuals being that small; at least 1.
+
+    Without it, records with hardly any noise would be held by a prior that they outweigh by far.
+    """
+    redundancy = 3 * (problem.records - problem.points) - len(solution.free)
+    if redundancy < LEAST_REDUNDANCY:
+        return 1.0
+    return max(1.0, redundancy / max(solution.chi2, SMALLEST_CHI2))
 
 
 def _precision_where_silent(information: Array, prior_covariance: Array) -> Array:

@@ -10,7 +10,7 @@ from scipy.special import chdtri
 from hexacell.geometry import Geometry
 from hexacell.identification import model
 from hexacell.identification.anomaly import GAUGES, Kind
-from hexacell.identification.causes import Label, labelled
+from hexacell.identification.causes import Label, labelled, labels_of
 from hexacell.identification.expansion import Expansion
 from hexacell.identification.fit import Fit
 from hexacell.identification.levenberg_marquardt import LARGEST_AMPLIFICATION
@@ -73,8 +73,7 @@ def poses_at(problem: Problem, found: Fit) -> tuple[Poses, Mask]:
 
 def _with_record(problem: Problem, label: Label, found: Fit) -> Expansion | None:
     """The expansion of a fit in its own records and one more; none if that is next to a singularity."""
-    kept = {(point, orientation) for point, orientation in found.problem.labels.tolist()}
-    some = problem.keeping(labelled(problem, kept | {label}))
+    some = problem.keeping(labelled(problem, {label, *labels_of(found.problem)}))
     poses, reached = poses_at(some, found)
     row = int(np.flatnonzero(labelled(some, [label]))[0])
     if not reached.all():

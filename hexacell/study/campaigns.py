@@ -12,6 +12,7 @@ import numpy as np
 
 from hexacell import kinematics, rotations
 from hexacell.design.candidates import within_limits
+from hexacell.errors import LimitError
 from hexacell.geometry import Geometry
 from hexacell.measurements import MeasurementSet, Record
 from hexacell.pose import Poses
@@ -63,12 +64,15 @@ def unlimited_travel(
     random: np.random.Generator,
     *,
     margin: float | None = None,
-) -> Campaign | None:
+) -> Campaign:
     """Random angles within ``amplitude``, rad, at points (m, 3), mm, as in the paper's simulation.
 
     Every pose is commanded at the point itself and may end far from it; gauges with any travel are
     supposed. Poses keep the singularity ``margin``, by default the robot's limit; with 0 they only
-    have to be reached without crossing a singularity. Nothing where there are too few.
+    have to be reached without crossing a singularity.
+
+    Raises:
+        LimitError: too few of them can be.
     """
     sets = []
     for point in points:
@@ -79,7 +83,7 @@ def unlimited_travel(
             if chosen.count >= orientations:
                 break
         else:
-            return None
+            raise _too_few(point)
         sets.append(chosen)
     return _campaign(sets, orientations)
 
@@ -91,12 +95,14 @@ def within_travel(
     orientations: int,
     amplitude: float,
     random: np.random.Generator,
-) -> Campaign | None:
+) -> Campaign:
     """Random turns within ``amplitude``, rad, that keep the ball within the gauges' travel.
 
     They are aimed with the true geometry, which a program does not know: this is for studies of
-    what can be identified from records that a machine with gauges can give at all. Nothing where a
-    point or enough poses at it cannot be reached without crossing a singularity.
+    what can be identified from records that a machine with gauges can give at all.
+
+    Raises:
+        LimitError: a point, or enough poses at it, cannot be reached without crossing a singularity.
     """
     sets = []
     travel = 0.7 * robot.limits.gauge_travel_mm
@@ -104,7 +110,7 @@ def within_travel(
         chosen = _Chosen(robot, truth, robot.limits.singularity_margin)
         chosen.offer(Poses.at(point, np.eye(3)[None]), 1)
         if chosen.count < 1:
-            return None
+            raise _too_few(point)
         reference = chosen.really[0]
         for _ in range(ROUNDS):
             turns = rotations.from_angles(random.uniform(-amplitude, amplitude, (BATCH, 3)))
@@ -114,9 +120,13 @@ def within_travel(
             if chosen.count >= orientations:
                 break
         else:
-            return None
+            raise _too_few(point)
         sets.append(chosen)
     return _campaign(sets, orientations)
+
+
+def _too_few(point: Array) -> LimitError:
+    return LimitError(f"too few poses can be reached at {point} without crossing a singularity")
 
 
 class _Chosen:

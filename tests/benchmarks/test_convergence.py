@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from hexacell.errors import LimitError
 from hexacell.identification.estimate import identify
 from hexacell.study import campaigns
 from hexacell.study.robots import random_robot
@@ -18,8 +19,9 @@ def test_every_robot_is_found(table_one, say) -> None:
     for seed in range(ROBOTS):
         random = np.random.default_rng(seed)
         truth = random_robot(robot.mechanism, robot.drawing, 7.0, random)
-        campaign = campaigns.within_travel(robot, truth, table_one.points, 11, np.radians(30), random)
-        if campaign is None:
+        try:
+            campaign = campaigns.within_travel(robot, truth, table_one.points, 11, np.radians(30), random)
+        except LimitError:
             unreachable += 1
             continue
         found = identify(robot.problem(campaign.measured(0.01, random)))

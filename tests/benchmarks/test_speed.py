@@ -40,7 +40,8 @@ def records_5x20(table_one) -> Problem:
     campaign = campaigns.unlimited_travel(
         table_one.robot, table_one.truth, table_one.points, 20, np.radians(20), random
     )
-    return table_one.robot.problem(campaign.measured(0.01, random))
+    problem: Problem = table_one.robot.problem(campaign.measured(0.01, random))
+    return problem
 
 
 def test_against_the_pairwise_finite_difference_solve(records_5x20: Problem, say) -> None:
@@ -78,7 +79,7 @@ def as_the_paper_says(problem: Problem) -> np.ndarray:
         return error_vector(problem, found - problem.deviations)
 
     centre = problem.mechanism.convention.free_part(problem.prior.centre)
-    return least_squares(errors, centre).x
+    return np.asarray(least_squares(errors, centre).x)
 
 
 @pytest.fixture(scope="module")

@@ -121,6 +121,28 @@ async def test_what_came_is_told_when_no_answer_does(fake):
     await link.close()
 
 
+@pytest.mark.parametrize("sent", [True, False])
+async def test_a_write_that_took_too_long_is_judged_by_its_answer(fake, sent):
+    """A busy machine may be late to notice that it has sent; the port is not lost by that."""
+    port = fake(FakePort())
+    real = port.write
+
+    def write(request):
+        if sent:
+            real(request)
+        raise serial.SerialTimeoutException("Write timeout")
+
+    port.write = write
+    link = await opened()
+    if sent:
+        assert await link.exchange(b"?\r", b"\r", LONG_S) == b"+1.234\r"
+    else:
+        with pytest.raises(NoAnswer):
+            await link.exchange(b"?\r", b"\r", SOON_S)
+    assert port.is_open
+    await link.close()
+
+
 async def test_a_late_answer_is_never_the_answer_to_the_next_question(fake):
     answers = iter([[(3 * SOON_S, b"late\r")], [(0.0, b"second\r")], [(0.0, b"third\r")]])
     fake(FakePort(lambda _: next(answers)))

@@ -6,7 +6,7 @@ import inspect
 from typing import Any, get_args
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydantic import TypeAdapter, ValidationError
 
@@ -123,6 +123,7 @@ def test_steps_survive_json(step: Any) -> None:
     assert adapter.validate_json(adapter.dump_json(step)) == step
 
 
+@settings(max_examples=25)  # each forces every event to the disk
 @given(history=st.lists(some_event, max_size=4))
 def test_events_survive_the_journal(history: list[events.Event], tmp_path_factory: Any) -> None:
     path = tmp_path_factory.mktemp("journal") / "journal.jsonl"

@@ -43,8 +43,11 @@ def serve(bundled_cell: Any, settings: CellSettings | None = None, *, other_proc
 
 
 def quick(settings: CellSettings) -> CellSettings:
+    """A cell that lives fast, and whose drivers wait long for a machine under load."""
     timing = settings.timing.model_copy(update={"clock_factor": 200.0})
-    return settings.model_copy(update={"timing": timing})
+    gauges = tuple(gauge.model_copy(update={"timeout_s": 10.0}) for gauge in settings.gauges)
+    encoders = settings.encoders.model_copy(update={"timeout_s": 10.0, "heartbeat_ms": 10_000})
+    return settings.model_copy(update={"timing": timing, "gauges": gauges, "encoders": encoders})
 
 
 def slow(settings: CellSettings) -> CellSettings:
@@ -216,7 +219,7 @@ def test_a_device_that_cannot_be_simulated_is_refused_and_nothing_stays_open(bun
 
 async def test_faults_of_devices_reach_the_drivers(bundled_cell) -> None:
     settings = quick(bundled_cell.settings)
-    hasty = settings.encoders.model_copy(update={"timeout_s": 0.1})
+    hasty = settings.encoders.model_copy(update={"timeout_s": 0.3})
     with serve(bundled_cell, settings.model_copy(update={"encoders": hasty})) as cell:
         async with drivers(cell.settings) as (gauges, encoders, _):
             cell.gauges.inject("x", GaugeFault.INCH)

@@ -38,6 +38,8 @@ SMALL: dict[str, Any] = {
     "acceptance.mean_deviation_mm": 0.2,
     "acceptance.max_deviation_mm": 0.4,
     "timing.clock_factor": 500.0,
+    "encoders.timeout_s": 10.0,
+    "encoders.heartbeat_ms": 10_000,
     "simulation.gauges.noise_mm": 0.001,
     "simulation.gauges.flicker_mm": 0.0002,
     "simulation.encoders.noise_mm": 0.001,
@@ -64,7 +66,8 @@ def maker(folder: Path) -> MakeCell:
         source = bundled_config("simulated-hexaglide")
         cell = load_cell(source)
         changes = SMALL | {key.replace("__", "."): value for key, value in changes.items()}
-        settings: CellSettings = changed(cell.settings, changes)
+        patient = tuple(gauge.model_copy(update={"timeout_s": 10.0}) for gauge in cell.settings.gauges)
+        settings: CellSettings = changed(cell.settings, {"gauges": patient} | changes)
         path = folder / "cell.toml"
         path.write_text(dump(settings))
         if not (folder / settings.controller.config).exists():

@@ -21,7 +21,7 @@ from hexacell.lock import config_lock
 from procedures.calibration import Mode
 
 FAR = (0.0, 0.0, 2000.0)
-HASTY = {"encoders__timeout_s": 0.1}
+HASTY = {"encoders__timeout_s": 0.3}
 
 
 async def check(site, *, unattended: bool = True):

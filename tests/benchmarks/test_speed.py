@@ -69,7 +69,7 @@ def as_the_paper_says(problem: Problem) -> np.ndarray:
         def legs(pose: np.ndarray) -> np.ndarray:
             v = geometry.S - pose[:3] - geometry.B @ rotations.from_angles(pose[3:]).T
             v[:, 0] += problem.joints[row]
-            return np.sum(v * v, axis=1) - geometry.l**2
+            return np.asarray(np.sum(v * v, axis=1) - geometry.l**2)
 
         return root(legs, poses[row]).x[:3]
 
@@ -79,7 +79,8 @@ def as_the_paper_says(problem: Problem) -> np.ndarray:
         return error_vector(problem, found - problem.deviations)
 
     centre = problem.mechanism.convention.free_part(problem.prior.centre)
-    return np.asarray(least_squares(errors, centre).x)
+    solution: np.ndarray = least_squares(errors, centre).x
+    return solution
 
 
 @pytest.fixture(scope="module")

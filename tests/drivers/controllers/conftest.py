@@ -150,10 +150,14 @@ class Play:
         return self.driver_at(server.port, trace=trace, **settings)
 
     async def opened(
-        self, conversation: list[Exchange], *others: list[Exchange], **settings: object
+        self,
+        conversation: list[Exchange],
+        *others: list[Exchange],
+        trace: WireTrace | None = None,
+        **settings: object,
     ) -> LinuxcncrshController:
         """The same, connected: ``conversation`` goes on after the opening."""
-        driver = await self.driver([*OPENING, *conversation], *others, **settings)
+        driver = await self.driver([*OPENING, *conversation], *others, trace=trace, **settings)
         await driver.open()
         return driver
 

@@ -7,6 +7,7 @@
 
 PYTHON = python3
 ARGS =
+TWO_AT_A_TIME = -n 2 --dist loadfile
 RUN = .venv/bin/python -m
 
 # What other software puts on these paths would be found before what is pinned here.
@@ -21,10 +22,10 @@ demo: venv
 	.venv/bin/hexacell demo $(ARGS)
 
 test: venv
-	$(RUN) pytest -m "not slow and not benchmark" $(ARGS)
+	$(RUN) pytest $(TWO_AT_A_TIME) -m "not slow and not benchmark" $(ARGS)
 
 test-full: venv
-	$(RUN) pytest -m "not benchmark" $(ARGS)
+	$(RUN) pytest $(TWO_AT_A_TIME) -m "not benchmark" $(ARGS)
 
 bench:
 	@.ci/venv "$(PYTHON)" bench

@@ -87,7 +87,9 @@ def test_what_a_run_leaves_in_its_folder(recording) -> None:
     assert measured == state.measurements()
     assert len(measured) == 18
     assert state.identified
-    assert json.loads(folder.result.read_text()) == state.identified.result
+    result = json.loads(folder.result.read_text())
+    assert {key: result[key] for key in state.identified.result} == state.identified.result
+    assert result["findings"]
     proposal = Proposal.load(folder.proposal)
     assert proposal.text_before.encode() == recording.config_before
     assert proposal.text_after.encode() == recording.config_after

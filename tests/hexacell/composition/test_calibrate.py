@@ -57,7 +57,9 @@ def test_the_run_folder_says_everything(finished) -> None:
     assert (folder.path / "cell.toml").read_text() == finished.cell.text
     assert read_measurements(folder.measurements) == state.measurements()
     assert state.identified
-    assert json.loads(folder.result.read_text()) == state.identified.result
+    result = json.loads(folder.result.read_text())
+    assert {key: result[key] for key in state.identified.result} == state.identified.result
+    assert result["findings"]
     assert folder.wire.stat().st_size > 1000
 
 

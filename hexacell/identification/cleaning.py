@@ -167,6 +167,8 @@ class _Cleaning:
 
     def _left_out_singly(self) -> list[Label]:
         """Gross errors, and records that the solver lost; those after a slip stay where they are."""
+        if self.fit.problem.records == self.whole.records:
+            return []
         accounted_for = {label for slip in self.slips for label in self._labels_after(slip)}
         accounted_for.update(labels_of(self.fit.problem))
         return [label for label in labels_of(self.whole) if label not in accounted_for]

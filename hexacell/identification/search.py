@@ -49,7 +49,7 @@ def explains(problem: Problem, found: Fit) -> bool:
 
 
 def is_constant(problem: Problem, slip: Slip) -> bool:
-    """Whether the records after a slip agree with all others but for a constant, to be confirmed by a fit."""
+    """Whether the records after a slip agree with all the others but for a constant."""
     parted = slip.parted(problem)
     found = fit(parted, manner=IN_A_HURRY)
     if led_astray(parted, found):

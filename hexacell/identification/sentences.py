@@ -71,27 +71,22 @@ def of_misreading(suspect: Suspect, before: Goodness, after: Goodness) -> Anomal
 
 
 def _about_record(outlier: Outlier) -> tuple[str, str]:
-    again = "Measure it again"
     if outlier.kind is Kind.SINGULAR or outlier.off_mm is None:
-        return (
-            "the platform stands next to a singularity there, and the record is left out",
-            "Choose another orientation",
-        )
+        return "a singularity is too near for this record to be used", "Choose another orientation"
+    return f"{_about_readings(outlier, outlier.off_mm)}; the record is left out", "Measure it again"
+
+
+def _about_readings(outlier: Outlier, off_mm: tuple[float, float, float]) -> str:
     if outlier.kind is not Kind.GROSS_ERROR:
         words = {Kind.EXCHANGED: "exchanged", Kind.REVERSED: "reversed", Kind.INCHES: "in inches"}
-        return f"{_names(outlier.gauges)} read {words[outlier.kind]}; the record is left out", again
+        return f"{_names(outlier.gauges)} read {words[outlier.kind]}"
     if outlier.gauges:
-        off = outlier.off_mm["xyz".index(outlier.gauges)]
-        return (
-            f"gauge {outlier.gauges} shows {off:+.3f} mm too much for all other records; "
-            "the record is left out",
-            again,
-        )
-    x, y, z = outlier.off_mm
+        off = off_mm["xyz".index(outlier.gauges)]
+        return f"gauge {outlier.gauges} shows {off:+.3f} mm more than all other records let expect"
+    x, y, z = off_mm
     return (
-        f"the ball is x {x:+.3f}, y {y:+.3f}, z {z:+.3f} mm from where all other records put it, so that not "
-        "one gauge is wrong but several, or an encoder; the record is left out",
-        again,
+        f"the gauges show x {x:+.3f}, y {y:+.3f}, z {z:+.3f} mm more than all other records let expect, "
+        "so that more than one of them is wrong, or an encoder"
     )
 
 

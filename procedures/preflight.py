@@ -6,9 +6,9 @@ from collections.abc import Awaitable, Iterator
 
 from drivers.gauges.errors import GaugeAtEnd
 from drivers.ports import EncoderRound, GaugeReading
-from hexacell.errors import AnswerNeeded, HexacellError, SeveralErrors
+from hexacell.errors import AnswerNeeded, HexacellError, SeveralErrors, UsageError
 from hexacell.pose import Pose
-from procedures.calibration import Calibration
+from procedures.calibration import Calibration, Mode
 from procedures.devices import Devices, each, gathered
 
 
@@ -19,10 +19,27 @@ def plan_failures(calibration: Calibration, *, unattended: bool) -> Iterator[Hex
             calibration.robot.require_reach(name, pose)
         except HexacellError as error:
             yield error if error.subject else type(error)(error.problem, subject=name, action=error.action)
+    yield from _too_few_records(calibration)
     if unattended and calibration.settings.stations.placement == "by-hand":
         yield AnswerNeeded(
             "unattended running is not possible: the gauges are put at each point by hand",
             action='Give every point fixed gauges and say placement = "fixed" in [stations]',
+        )
+
+
+def _too_few_records(calibration: Calibration) -> Iterator[UsageError]:
+    if calibration.mode is Mode.CHECK:
+        return
+    plan = calibration.settings.identification
+    unknowns = len(calibration.robot.mechanism.convention.free_names())
+    equations = 3 * len(plan.points) * (plan.orientations - 1)
+    if equations < unknowns:
+        needed = 1 - (-unknowns // (3 * len(plan.points)))
+        yield UsageError(
+            f"{len(plan.points)} points with {plan.orientations} orientations give {equations} equations "
+            f"for {unknowns} parameters",
+            subject="[identification]",
+            action=f"Have at least {needed} orientations at each point",
         )
 
 

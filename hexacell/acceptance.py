@@ -4,14 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-
-from hexacell.geometry import PARAMETER_NAMES, Geometry
+from hexacell.geometry import Geometry
 from hexacell.identification.problem import Tolerances
 from hexacell.identification.result import Identification
-from hexacell.rotations import Array
-
-CERTAIN_SIGMAS = 3.0
+from hexacell.identification.tolerance import beyond_tolerance
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,28 +57,14 @@ def _determined(identified: Identification) -> Gate:
 
 
 def _within_tolerance(identified: Identification, drawing: Geometry, tolerances: Tolerances) -> Gate:
-    """A good residual is no proof: rods 13 mm too short have explained data perfectly before."""
-    change = identified.geometry.vector() - drawing.vector()
-    surely_off = np.abs(_without_ball(change, tolerances)) - CERTAIN_SIGMAS * identified.sigma
-    outside = ~(surely_off <= tolerances.widths())  # what is no number is outside too
-    names = [
-        f"{name} ({value:+.2f} mm)"
-        for name, value, is_outside in zip(PARAMETER_NAMES, change, outside, strict=True)
-        if is_outside
-    ]
+    beyond = beyond_tolerance(identified, drawing, tolerances)
+    names = ", ".join(f"{excess.name} ({excess.change_mm:+.2f} mm)" for excess in beyond)
     sentence = (
-        f"Beyond the drawing's tolerance: {', '.join(names)}."
-        if names
+        f"Beyond the drawing's tolerance: {names}."
+        if beyond
         else "Every parameter is within the drawing's tolerance."
     )
-    return Gate("within tolerance", not names, sentence)
-
-
-def _without_ball(change: Array, tolerances: Tolerances) -> Array:
-    """The change less the ball's own offset, as far as that is allowed."""
-    B = change[18:36].reshape(6, 3)
-    offset = np.clip(np.median(B, axis=0), -tolerances.ball_mm, tolerances.ball_mm)
-    return np.concatenate([change[:18], (B - offset).ravel(), change[36:]])
+    return Gate("within tolerance", not beyond, sentence)
 
 
 def _small_enough(after: Geometry, before: Geometry, largest_change_mm: float) -> Gate:

@@ -14,10 +14,14 @@ from hexacell.identification.goodness import Goodness, goodness
 from hexacell.identification.linearised import Linearised
 from hexacell.identification.repeatability import Repeatability, repeatability
 from hexacell.identification.result import Identification
+from hexacell.identification.tolerance import Excess, beyond_tolerance
 from hexacell.identification.variance_components import NoiseLevels, noise_levels
 from hexacell.measurements import MeasurementSet
 from hexacell.pose import Pose, Poses
 from hexacell.robot import Robot
+
+CONTRADICTED_RATIO = 10.0
+"""Residuals over the stated noise from which on no noise explains them, but something false."""
 
 PAIRS_TO_PART = 5
 """Of the strongest correlations, for which a measurement is looked for."""
@@ -40,6 +44,7 @@ class Assessment:
         task_named: whether the cell file names them; else they span the workspace.
         accuracy: at these poses; none where the robot can take none of them. Where the residuals
             are larger than the stated noise, so is the error to be expected afterwards.
+        beyond_tolerance: parameters that the data push out of the drawing's tolerances.
     """
 
     goodness: Goodness
@@ -51,6 +56,13 @@ class Assessment:
     task: tuple[Pose, ...]
     task_named: bool
     accuracy: Accuracy | None
+    beyond_tolerance: tuple[Excess, ...] = ()
+
+    @property
+    def refused(self) -> bool:
+        """Whether the geometry must not be used, however well everything else looks."""
+        contradicted = self.goodness.ratio > CONTRADICTED_RATIO and not self.does_not_repeat
+        return contradicted or bool(self.beyond_tolerance)
 
     @property
     def does_not_repeat(self) -> bool:
@@ -79,6 +91,7 @@ def assess(
         task=tuple(robot.to_command(task.pose(row)) for row in range(len(task))),
         task_named=bool(settings.task.poses),
         accuracy=accuracy and replace(accuracy, after=accuracy.after.times(fitting.noise_factor)),
+        beyond_tolerance=beyond_tolerance(found, robot.drawing, robot.tolerances),
     )
 
 

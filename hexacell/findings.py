@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from hexacell.assessment import Assessment
 from hexacell.identification.goodness import Agreement, Goodness
 from hexacell.identification.naming import in_words
 from hexacell.identification.result import Identification
+from hexacell.identification.tolerance import Excess
+from hexacell.mechanisms.base import FrameConvention
 
 RETURNS_BADLY = 2.0
 """Scatter on returning over that of the stated noise, from which on it is worth a sentence."""
@@ -44,11 +48,35 @@ def pair_sentences(found: Identification, assessed: Assessment) -> tuple[str, ..
 def _verdict(found: Identification, assessed: Assessment) -> str:
     if not found.converged:
         return f"No result: the solver ended because {found.termination.value}."
+    if assessed.beyond_tolerance:
+        return _beyond_tolerance(assessed.beyond_tolerance, found.problem.mechanism.convention)
     if assessed.does_not_repeat:
         return _recalibrating_will_not_help(assessed)
+    if assessed.refused:
+        return _contradicted(assessed.goodness)
     if found.undetermined:
         return f"Incomplete: {_undetermined(found)} not determined by these data."
     return _by_residuals(assessed.goodness)
+
+
+def _beyond_tolerance(beyond: Sequence[Excess], convention: FrameConvention) -> str:
+    names = ", ".join(
+        f"{in_words(excess.name, convention)} is {excess.change_mm:+.2f} mm from the drawing (tolerance "
+        f"{excess.tolerance_mm:g}, sigma {excess.sigma_mm:.2g})"
+        for excess in beyond
+    )
+    return (
+        f"Refused: {names}. A good residual is no proof: measure that on the machine, and correct the "
+        "drawing or its tolerance in the cell file, or look for what else is wrong."
+    )
+
+
+def _contradicted(goodness: Goodness) -> str:
+    return (
+        f"Refused: the residuals are {goodness.ratio:.0f} times the stated noise, and no single mistake "
+        "explains them. Check that the drawing, the controller's config and the branch are this machine's, "
+        "and that the ball and the gauges sit tight."
+    )
 
 
 def _by_residuals(goodness: Goodness) -> str:

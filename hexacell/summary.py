@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from itertools import zip_longest
 from typing import Any
 
@@ -13,7 +14,7 @@ from hexacell.findings import findings
 from hexacell.geometry import Geometry
 from hexacell.identification.accuracy import PoseErrors
 from hexacell.identification.goodness import Goodness
-from hexacell.identification.result import Identification
+from hexacell.identification.result import Identification, Outlier
 from hexacell.identification.variance_components import NoiseLevels
 from hexacell.pose import Pose
 from hexacell.verification import Spread, Verdict
@@ -39,10 +40,18 @@ def identification_document(found: Identification) -> dict[str, Any]:
         "sigma": geometry_values(Geometry.from_vector(found.sigma)),
         "covariance": found.covariance.tolist(),
         "undetermined": list(found.undetermined),
-        "outliers": [
-            {"point": outlier.point, "orientation": outlier.orientation} for outlier in found.outliers
-        ],
+        "outliers": [_outlier(outlier) for outlier in found.outliers],
         "frame": found.frame,
+    }
+
+
+def _outlier(outlier: Outlier) -> dict[str, Any]:
+    return {
+        "point": outlier.point,
+        "orientation": outlier.orientation,
+        "kind": outlier.kind.value,
+        "gauges": list(outlier.gauges),
+        "off_mm": None if outlier.off_mm is None else list(outlier.off_mm),
     }
 
 
@@ -55,6 +64,8 @@ def assessment_document(found: Identification, assessed: Assessment) -> dict[str
         "repeatability": _repeatability(assessed),
         "correlated": _correlated(assessed),
         "accuracy": _accuracy(assessed),
+        "refused": assessed.refused,
+        "beyond_tolerance": [asdict(excess) for excess in assessed.beyond_tolerance],
     }
 
 

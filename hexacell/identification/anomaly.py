@@ -18,6 +18,7 @@ class Kind(StrEnum):
     REVERSED = "reversed gauge"
     INCHES = "inches"
     SLIPPED_ZERO = "slipped zero"
+    FOREIGN_JOINTS = "joint variables of another pose"
     SINGULAR = "next to a singularity"
 
 

@@ -191,4 +191,4 @@ class _Cleaning:
 def _outlier(label: Label, judgement: Judgement) -> Outlier:
     off = judgement.off
     off_mm = None if off is None else (float(off[0]), float(off[1]), float(off[2]))
-    return Outlier(*label, judgement.statistic, judgement.kind, judgement.gauges, off_mm)
+    return Outlier(*label, judgement.statistic, judgement.kind, judgement.gauges, off_mm, judgement.stray)

@@ -9,7 +9,7 @@ from hexacell.identification import centring, detour
 from hexacell.identification.cleaning import Cleaned, clean, leave_alone
 from hexacell.identification.levenberg_marquardt import Solution
 from hexacell.identification.problem import Problem
-from hexacell.identification.refusals import refuse_too_little
+from hexacell.identification.refusals import refuse_one_axis, refuse_too_little
 from hexacell.identification.result import Identification
 from hexacell.pose import Poses
 from hexacell.rotations import Array
@@ -23,6 +23,7 @@ def identify(problem: Problem, *, find_outliers: bool = True) -> Identification:
             (:class:`~hexacell.identification.anomaly.FalseReadings`).
     """
     refuse_too_little(problem)
+    refuse_one_axis(problem)
     cleaned = clean(problem) if find_outliers else leave_alone(problem)
     refuse_too_little(cleaned.fit.problem)
     found = cleaned.fit

@@ -15,13 +15,19 @@ from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
 from hexacell.errors import IdentifiabilityError
-from hexacell.geometry import LEGS, Geometry, from_per_leg, per_leg
+from hexacell.geometry import LEGS, Geometry
 from hexacell.identification.start import Commands
 from hexacell.mechanisms.base import Branch
-from hexacell.rotations import Array
+from hexacell.rotations import Array, Mask
 
 UNSUSPICIOUS_MM = 1.0
 """Machines go where they are sent more exactly than that: nearer q need no closer look."""
+
+FEW = 0.2
+"""Of the records."""
+
+FEWEST_TO_COMPARE = 3
+STRAY_SCATTERS = 10.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -43,54 +49,92 @@ class JointData:
     widths: Array
 
     def refuse_foreign(self) -> None:
-        """Raise where a leg stands where no geometry within the tolerances sends it.
+        """Raise where legs stand where no geometry within the tolerances sends them.
+
+        A few such records are left to the tests for gross errors, which name them.
 
         Raises:
             IdentifiabilityError: names the first record and its worst leg; the columns that look
                 exchanged, if some do.
         """
-        difference = np.abs(self.measured - self.commands.joints)
-        suspicious = np.flatnonzero(np.nanmax(difference, axis=-1, initial=0.0) > UNSUSPICIOUS_MM)
-        excess = difference[suspicious] - self._explicable(suspicious)
-        foreign = np.nanmax(excess, axis=-1, initial=0.0) > 0.0
-        if not foreign.any():
+        # Where no leg reaches the pose, the solver finds no start either, and says so.
+        difference = np.nan_to_num(np.abs(self.measured - self.commands.joints), nan=0.0)
+        if _are_few(_in_any_leg(difference > UNSUSPICIOUS_MM)):
             return
-        first = suspicious[foreign][0]
-        leg = int(np.nanargmax(excess[foreign][0]))
+        explicable = self._explicable()
+        foreign = _in_any_leg(difference > explicable)
+        if _are_few(foreign):
+            return
+        first = int(np.argmax(foreign))
+        leg = int(np.argmax(difference[first] - explicable[first]))
+        point, orientation = self.labels[first]
         raise IdentifiabilityError(
-            f"in {np.count_nonzero(foreign)} of {len(self.measured)} records the joint variables do not belong "
-            f"to the commanded pose; the first is point {self.labels[first, 0]}, orientation "
-            f"{self.labels[first, 1]}, where q{leg + 1} is {difference[first, leg]:.1f} mm off, and the "
-            f"tolerances explain {difference[first, leg] - excess[foreign][0, leg]:.1f} mm",
-            action=self._advice(),
+            f"in {np.count_nonzero(foreign)} of {self.labels.shape[0]} records the joint variables do not "
+            f"belong to the commanded pose; the first is point {point}, orientation {orientation}, where "
+            f"q{leg + 1} is {difference[first, leg]:.1f} mm off, and the tolerances explain "
+            f"{explicable[first, leg]:.1f} mm",
+            action=self._advice(explicable),
         )
 
-    def _explicable(self, rows: NDArray[np.intp]) -> Array:
-        """How far (k, 6), mm, tolerances can take each joint variable; infinite at the end of reach."""
-        at_drawing = self._commanded(rows, np.zeros(7))
-        changes = np.zeros((len(rows), LEGS))
+    def _explicable(self) -> Array:
+        """How far (n, 6), mm, tolerances can take each joint variable; infinite at the end of reach."""
+        at_drawing = self._commanded(np.zeros(7))
+        changes = np.zeros_like(at_drawing)
         for parameter in np.diag(self.widths):
-            ends = [np.abs(self._commanded(rows, sign * parameter) - at_drawing) for sign in (-1.0, 1.0)]
+            ends = [np.abs(self._commanded(sign * parameter) - at_drawing) for sign in (-1.0, 1.0)]
             changes += np.maximum(*ends)
         return np.nan_to_num(changes, nan=np.inf)
 
-    def _commanded(self, rows: NDArray[np.intp], change: Array) -> Array:
-        """Joint variables (k, 6), mm, with every leg changed by (7,), mm."""
-        legs = per_leg(self.drawing.vector()) + change
-        geometry = Geometry.from_vector(from_per_leg(legs))
-        return self.commands.mechanism.inverse(geometry, self.branch, self.commands.poses[rows])
+    def _commanded(self, change: Array) -> Array:
+        """Joint variables (n, 6), mm, with every leg changed by (7,), mm."""
+        drawing = self.drawing
+        geometry = Geometry(drawing.S + change[:3], drawing.B + change[3:6], drawing.l + change[6])
+        return self.commands.mechanism.inverse(geometry, self.branch, self.commands.poses)
 
-    def _advice(self) -> str:
+    def _advice(self, explicable: Array) -> str:
         columns = self._columns()
+        difference = np.nan_to_num(np.abs(self.measured[:, columns] - self.commands.joints), nan=0.0)
+        if not _are_few(_in_any_leg(difference > explicable)):
+            return (
+                "Check that q1 to q6 stand in the row of their pose, in mm, and which config commanded it"
+            )
         moved = [leg for leg in range(LEGS) if columns[leg] != leg]
-        if not moved:
-            return "Check that q1 to q6 and the pose stand in the same row, and which config commanded it"
-        names = ", ".join(f"q{leg + 1}" for leg in moved)
-        right = ", ".join(f"q{columns[leg] + 1}" for leg in moved)
-        return f"The columns {names} look as if they were {right}: check which encoder is on which slider"
+        names, right = (
+            ", ".join(f"q{leg + 1}" for leg in legs) for legs in (moved, [columns[leg] for leg in moved])
+        )
+        return f"The columns {names} look like those of {right}: check which encoder is on which slider"
 
     def _columns(self) -> list[int]:
         """Which column (6,) agrees best with each leg's commands."""
-        distance = np.abs(self.measured[:, None, :] - self.commands.joints[:, :, None])
-        _, columns = linear_sum_assignment(np.nan_to_num(np.nanmedian(distance, axis=0), nan=1e9))
+        reached = np.isfinite(self.commands.joints).all(axis=-1)
+        measured, commanded = self.measured[reached], self.commands.joints[reached]
+        distance = np.median(np.abs(measured[:, None, :] - commanded[:, :, None]), axis=0)
+        _, columns = linear_sum_assignment(distance)
         return [int(column) for column in columns]
+
+
+def _in_any_leg(joints: Mask) -> Mask:
+    records: Mask = np.logical_or.reduce(joints, axis=-1)
+    return records
+
+
+def _are_few(records: Mask) -> bool:
+    return bool(np.count_nonzero(records) <= FEW * len(records))
+
+
+def stray_leg(commands: Commands, measured: Array, row: int, others: Mask) -> tuple[int, float] | None:
+    """The leg (from 1) that in one record stands farthest from where it does in other ones, and mm.
+
+    Compared is how far joint variables (n, 6) are from the commanded ones: that changes little from
+    pose to pose of a point, whatever geometry the controller had.
+    """
+    misfit = measured - commands.joints
+    known = misfit[others & np.isfinite(misfit).all(axis=-1)]
+    if len(known) < FEWEST_TO_COMPARE or not np.isfinite(misfit[row]).all():
+        return None
+    usual = np.median(known, axis=0)
+    scatter = np.median(np.abs(known - usual), axis=0)
+    off = misfit[row] - usual
+    beyond = np.abs(off) - UNSUSPICIOUS_MM - STRAY_SCATTERS * scatter
+    leg = int(np.argmax(beyond))
+    return (leg + 1, float(off[leg])) if beyond[leg] > 0.0 else None

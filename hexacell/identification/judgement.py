@@ -13,6 +13,7 @@ from hexacell.identification.anomaly import GAUGES, Kind
 from hexacell.identification.causes import Label, labelled, labels_of
 from hexacell.identification.expansion import Expansion
 from hexacell.identification.fit import Fit
+from hexacell.identification.joint_data import stray_leg
 from hexacell.identification.levenberg_marquardt import LARGEST_AMPLIFICATION
 from hexacell.identification.misreadings import MISREADINGS
 from hexacell.identification.outliers import RecordTests
@@ -36,6 +37,7 @@ class Judgement:
         gauges: of ``xyz``, those that alone are wrong; empty where no single one is.
         off: (3,), mm, what the gauges x, y and z show too much; none next to a singularity.
         statistic: squared standardised length of that; infinite next to a singularity.
+        stray: the leg (from 1) that does not stand where it was sent, and how far off, mm.
     """
 
     agrees: bool
@@ -43,16 +45,15 @@ class Judgement:
     gauges: str
     off: Array | None
     statistic: float
-
-
-BEYOND_JUDGEMENT = Judgement(False, Kind.SINGULAR, "", None, np.inf)
+    stray: tuple[int, float] | None
 
 
 def judge(problem: Problem, label: Label, found: Fit, *, found_before: int) -> Judgement:
     """Judge one record of a problem by a fit that it took no part in."""
+    stray = _stray(problem, label)
     expansion = _with_record(problem, label, found)
     if expansion is None:
-        return BEYOND_JUDGEMENT
+        return Judgement(False, Kind.FOREIGN_JOINTS if stray else Kind.SINGULAR, "", None, np.inf, stray)
     row = int(np.flatnonzero(labelled(expansion.problem, [label]))[0])
     tests = RecordTests.of(expansion)
     own, gauges = expansion.weights[row], expansion.problem.gauges
@@ -61,7 +62,16 @@ def judge(problem: Problem, label: Label, found: Fit, *, found_before: int) -> J
     shown = expansion.problem.deviations[row] @ gauges
     kind, wrong = _explanation(off, shown, information / tests.scale)
     agrees = bool(tests.excess(found_before)[row] <= 1.0)
-    return Judgement(agrees, kind, wrong, off, float(tests.in_any_direction[row]))
+    if stray and not wrong:
+        kind = Kind.FOREIGN_JOINTS
+    return Judgement(agrees, kind, wrong, off, float(tests.in_any_direction[row]), stray)
+
+
+def _stray(problem: Problem, label: Label) -> tuple[int, float] | None:
+    row = int(np.flatnonzero(labelled(problem, [label]))[0])
+    others = problem.labels[:, 0] == label[0]
+    others[row] = False
+    return stray_leg(problem.commands, problem.joints, row, others)
 
 
 def poses_at(problem: Problem, found: Fit) -> tuple[Poses, Mask]:

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from hexacell.errors import IdentifiabilityError
 from hexacell.geometry import PARAMETER_NAMES, Geometry
+from hexacell.identification.joint_data import JointData
 from hexacell.identification.start import Commands
 from hexacell.measurements import MeasurementSet
 from hexacell.mechanisms.base import Branch, Mechanism
@@ -70,6 +71,13 @@ class Prior:
             common = np.array([name[0] == "B" and name[-1] == axis for name in free], dtype=float)
             covariance += tolerances.ball_mm**2 / 3.0 * np.outer(common, common)
         return cls(centre, covariance)
+
+    def leg_widths(self, mechanism: Mechanism) -> Array:
+        """The largest tolerances (7,), mm, of a leg's S, B and l, the ball's offset included."""
+        kinds = np.array([name[0] for name in mechanism.convention.free_names()])
+        widths = np.sqrt(3.0 * np.diag(self.covariance))
+        largest = [widths[kinds == kind].max(initial=0.0) for kind in "SBl"]
+        return np.repeat(largest, [3, 3, 1])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -157,14 +165,16 @@ def build_problem(
     Records from before the last calibration may have been commanded under the drawing instead.
 
     Raises:
-        IdentifiabilityError: most records cannot be followed from the geometry that commanded them
-            to the drawing; the message names the first.
+        IdentifiabilityError: joint variables do not belong to the commanded poses, or most records
+            cannot be followed from the geometry that commanded them to the drawing; the message
+            names the first.
     """
     order = np.argsort(measurements.group, kind="stable")
     joints, labels = measurements.joints[order], measurements.labels[order]
     commanding, change = mechanism.to_convention(controller)
     poses = change.poses(measurements.poses[order])
     commands = Commands.of(mechanism, poses, (commanding, prior.centre), branch, joints)
+    JointData(commands, joints, labels, branch, prior.centre, prior.leg_widths(mechanism)).refuse_foreign()
     start = commands.followed(prior.centre, joints)
     _refuse_strangers(start.found, labels)
     return Problem(

@@ -24,6 +24,7 @@ class Outlier:
         kind: what is wrong with it.
         gauges: of ``xyz``, those that alone are wrong; empty where no single one stands out.
         off_mm: what the gauges x, y and z show too much; none where that cannot be said.
+        stray: the leg (from 1) that does not stand where it was sent, and how far off, mm.
     """
 
     point: int
@@ -32,6 +33,7 @@ class Outlier:
     kind: Kind = Kind.GROSS_ERROR
     gauges: str = ""
     off_mm: tuple[float, float, float] | None = None
+    stray: tuple[int, float] | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -71,7 +71,13 @@ def of_misreading(suspect: Suspect, before: Goodness, after: Goodness) -> Anomal
 
 
 def _about_record(outlier: Outlier) -> tuple[str, str]:
-    if outlier.kind is Kind.SINGULAR or outlier.off_mm is None:
+    if outlier.kind is Kind.FOREIGN_JOINTS and outlier.stray:
+        leg, off = outlier.stray
+        return (
+            f"q{leg} is {off:+.3f} mm from where the commanded pose puts it, unlike in the point's other "
+            "records; this one is left out"
+        ), "Check whether its q1 to q6 belong to another pose, or measure it again"
+    if outlier.off_mm is None:
         return "a singularity is too near for this record to be used", "Choose another orientation"
     return f"{_about_readings(outlier, outlier.off_mm)}; the record is left out", "Measure it again"
 

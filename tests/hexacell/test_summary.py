@@ -74,7 +74,10 @@ def test_outliers_and_what_is_left_open_are_named(visit, make_problem):
     shifted = (bad.deviation[0] + 1.0, *bad.deviation[1:])
     records[17] = type(bad)(bad.point, bad.orientation, bad.pose, bad.joints, shifted)
     document = identification_document(identify(make_problem(type(measured)(tuple(records)))))
-    assert document["outliers"] == [{"point": 2, "orientation": 7}]
+    (outlier,) = document["outliers"]
+    assert (outlier["point"], outlier["orientation"]) == (2, 7)
+    assert (outlier["kind"], outlier["gauges"]) == ("gross error", ["x"])
+    assert outlier["off_mm"] == pytest.approx([1.0, 0.0, 0.0], abs=0.2)
     assert document["records"] == 54
     assert "S4z" in document["undetermined"]
     assert set(document["undetermined"]) <= set(PARAMETER_NAMES)
@@ -87,7 +90,9 @@ def test_a_record_that_nothing_can_follow_is_no_obstacle_to_json(noisy, make_pro
     apart = tuple(np.add(bad.joints, [-300, -300, -300, 300, 300, 300]).tolist())
     records[20] = type(bad)(bad.point, bad.orientation, bad.pose, apart, bad.deviation)
     document = identification_document(identify(make_problem(type(noisy)(tuple(records)))))
-    assert document["outliers"] == [{"point": bad.point, "orientation": bad.orientation}]
+    (outlier,) = document["outliers"]
+    assert (outlier["point"], outlier["orientation"]) == (bad.point, bad.orientation)
+    assert outlier["off_mm"] is None
     json.dumps(document, allow_nan=False)
 
 

@@ -26,4 +26,5 @@ def main(options: argparse.Namespace) -> ExitCode:
     console.document(identification_document(found) | assessment_document(found, assessed))
     if not options.json:
         console.say(identification_words(found, robot.drawing, assessed))
-    return ExitCode.DONE if found.converged else ExitCode.OUT_OF_LIMITS
+    usable = found.converged and not assessed.refused
+    return ExitCode.DONE if usable else ExitCode.OUT_OF_LIMITS

@@ -16,7 +16,8 @@ from hexacell.measurements import MeasurementSet
 
 KEYS = (
     "converged termination iterations records points residual_rms_mm chi2 dof geometry sigma covariance "
-    "undetermined outliers frame findings goodness noise repeatability correlated accuracy"
+    "undetermined outliers frame findings goodness noise repeatability correlated accuracy refused "
+    "beyond_tolerance"
 )
 
 

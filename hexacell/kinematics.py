@@ -7,6 +7,7 @@ both change into the ones asked for.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -80,16 +81,18 @@ def follow(
     start: Poses,
     start_geometry: Geometry,
     start_joints: Array,
+    tries: Sequence[int] = CONTINUATION_STAGES,
 ) -> Forward:
     """Poses of n joint vectors (n, 6), mm, continued from poses that are known exactly.
 
     ``start`` closes ``start_geometry`` at ``start_joints`` (n, 6). Geometry and joint variables go
-    to the ones asked for together, in 2 stages, then 4, 8 and so on where that was not enough. A
-    stage that ends on the other side of a singularity is a failure, not a solution.
+    to the ones asked for together, in as many stages as the first of ``tries`` says, then, where that
+    was not enough, in as many as the next. A stage that ends on the other side of a singularity is
+    a failure, not a solution.
     """
     poses = start
     found = np.zeros(len(joints), dtype=bool)
-    for stages in CONTINUATION_STAGES:
+    for stages in tries:
         rows = np.flatnonzero(~found)
         if not len(rows):
             break
@@ -162,14 +165,18 @@ def _staged(
     stages: int,
 ) -> Forward:
     poses = start
-    found = np.ones(len(start), dtype=bool)
+    rows = np.arange(len(start))
     mode = assembly_mode(mechanism.closure(geometries[0], start, joints[0])[1])
     for stage in range(1, stages + 1):
         fraction = stage / stages
         geometry = geometries[0].toward(geometries[1], fraction)
-        now = (1.0 - fraction) * joints[0] + fraction * joints[1]
-        result = _newton(mechanism, geometry, now, poses, mode)
-        poses, found = result.poses, found & result.found
+        now = (1.0 - fraction) * joints[0][rows] + fraction * joints[1][rows]
+        result = _newton(mechanism, geometry, now, poses[rows], mode[rows])
+        poses = _replace(poses, rows, result.poses)
+        # Those that failed are not led on: they would cost more than all the others.
+        rows = rows[result.found]
+    found = np.zeros(len(start), dtype=bool)
+    found[rows] = True
     return Forward(poses, found)
 
 

@@ -23,6 +23,7 @@ from hexacell.pose import Pose
 COUNTS = ("point", "orientation")
 NUMBERS = (*"xyzabc", "q1", "q2", "q3", "q4", "q5", "q6", "dx", "dy", "dz")
 HEADER = (*COUNTS, *NUMBERS)
+POSE_HEADER = HEADER[:8]
 LARGEST_COUNT = 1_000_000
 Label = tuple[int, int]
 
@@ -40,18 +41,21 @@ def read_measurements(path: Path, *, allow_partial: bool = False) -> Measurement
     text = read_text(path).removeprefix("\N{BYTE ORDER MARK}")
     if allow_partial and not text.strip():
         return MeasurementSet(())
-    table = _Table(path, text)
-    lines: dict[Label, int] = {}
-    records = []
-    for line, record in table.records():
-        label = (record.point, record.orientation)
-        if label in lines:
-            raise _stands_twice(path, label, lines[label], line)
-        lines[label] = line
-        records.append(record)
+    records = _by_label(path, _Table(path, text, HEADER))
     if not allow_partial:
-        _require_two_rows_a_point(path, lines)
-    return MeasurementSet(tuple(records))
+        _require_two_rows_a_point(path, {label: line for label, (line, _) in records.items()})
+    return MeasurementSet(tuple(record for _, record in records.values()))
+
+
+def read_poses(path: Path) -> list[tuple[int, int, Pose]]:
+    """Read only the poses of such a file: line, point and pose of each row.
+
+    Raises:
+        FileError: as for a measurement file, but columns other than the poses' need not be there.
+    """
+    table = _Table(path, read_text(path).removeprefix("\N{BYTE ORDER MARK}"), POSE_HEADER)
+    records = _by_label(path, table).values()
+    return [(line, record.point, record.pose) for line, record in records]
 
 
 def write_measurements(path: Path, measurements: MeasurementSet) -> None:
@@ -73,22 +77,34 @@ def _row(record: Record) -> list[str]:
     return [str(record.point), str(record.orientation), *(repr(float(number)) for number in numbers)]
 
 
-class _Table:
-    """The rows of one file, and where the columns are that count."""
+def _by_label(path: Path, table: _Table) -> dict[Label, tuple[int, Record]]:
+    """The records of a table, each with its line, in their order."""
+    found: dict[Label, tuple[int, Record]] = {}
+    for line, record in table.records():
+        label = (record.point, record.orientation)
+        if label in found:
+            raise _stands_twice(path, label, found[label][0], line)
+        found[label] = (line, record)
+    return found
 
-    def __init__(self, path: Path, text: str) -> None:
+
+class _Table:
+    """The rows of one file, and where the columns are that count: the first ones of ``HEADER``."""
+
+    def __init__(self, path: Path, text: str, wanted: tuple[str, ...]) -> None:
         self._path = path
         self._rows = _filled_rows(path, text)
         line, self._header = next(self._rows, (1, []))
-        columns = _columns(path, line, self._header)
+        columns = _columns(path, line, self._header, wanted)
         self._cells = itemgetter(*columns)
+        self._absent = ("0",) * (len(HEADER) - len(wanted))
 
     def records(self) -> Iterator[tuple[int, Record]]:
         """Each record with its line."""
         for line, row in self._rows:
             if len(row) != len(self._header):
                 raise self._wrong_width(line, row)
-            cells = self._cells(row)
+            cells = (*self._cells(row), *self._absent)
             record = _record(cells)
             if record is None:
                 raise _bad_cell(self._path, line, cells)
@@ -117,11 +133,11 @@ def _filled_rows(path: Path, text: str) -> Iterator[tuple[int, list[str]]]:
         ) from None
 
 
-def _columns(path: Path, line: int, header: list[str]) -> list[int]:
-    """The place of each column of ``HEADER`` in the file."""
+def _columns(path: Path, line: int, header: list[str], wanted: tuple[str, ...]) -> list[int]:
+    """The place of each column wanted in the file."""
     names = [name.strip() for name in header]
-    missing = [name for name in HEADER if name not in names]
-    twice = [name for name in HEADER if names.count(name) > 1]
+    missing = [name for name in wanted if name not in names]
+    twice = [name for name in wanted if names.count(name) > 1]
     if not names:
         problem = "is empty"
     elif len(names) == 1 and (";" in names[0] or "\t" in names[0]):
@@ -131,8 +147,8 @@ def _columns(path: Path, line: int, header: list[str]) -> list[int]:
     elif twice:
         problem = f"columns stand twice: {', '.join(twice)}"
     else:
-        return [names.index(name) for name in HEADER]
-    raise FileError(problem, subject=path, line=line, action=f"The header must be {','.join(HEADER)}")
+        return [names.index(name) for name in wanted]
+    raise FileError(problem, subject=path, line=line, action=f"The header must be {','.join(wanted)}")
 
 
 def _record(cells: tuple[str, ...]) -> Record | None:

@@ -27,6 +27,10 @@ class Robot:
 
     ``controller`` is as the config states it, in the config's own frames; ``drawing`` and all that
     is computed are in the mechanism's frame convention. ``change`` leads from the first to the second.
+
+    Attributes:
+        lent: geometries, in the frame convention, that the controller was lent while measuring.
+        lending: whether it commands with the last of them now.
     """
 
     mechanism: Mechanism
@@ -37,6 +41,13 @@ class Robot:
     noise: Noise
     limits: Limits
     change: FrameChange
+    lent: tuple[Geometry, ...] = ()
+    lending: bool = False
+
+    @property
+    def commanding(self) -> Geometry:
+        """What the controller commands with now, in the frame convention."""
+        return self.lent[-1] if self.lending else self.mechanism.to_convention(self.controller)[0]
 
     @property
     def prior(self) -> Prior:
@@ -44,7 +55,7 @@ class Robot:
         return Prior.of(self.mechanism, self.drawing, self.tolerances)
 
     def problem(self, measurements: MeasurementSet) -> Problem:
-        """The identification of records that were commanded with the present controller geometry."""
+        """The identification of records that were commanded with the controller's geometries."""
         return build_problem(
             self.mechanism,
             measurements,
@@ -52,6 +63,7 @@ class Robot:
             branch=self.branch,
             prior=self.prior,
             noise=self.noise,
+            lent=self.lent,
         )
 
     def knowledge(self, identified: Identification | None = None) -> Knowledge:
@@ -61,8 +73,9 @@ class Robot:
         covariance = prior.covariance
         if identified is not None:
             free, covariance = identified.free, identified.free_covariance
-        commanding, _ = self.mechanism.to_convention(self.controller)
-        return Knowledge(self.mechanism, commanding, self.branch, free, covariance, self.noise, self.limits)
+        return Knowledge(
+            self.mechanism, self.commanding, self.branch, free, covariance, self.noise, self.limits
+        )
 
     def for_controller(self, geometry: Geometry) -> Geometry:
         """A geometry of the convention in the frames of the controller's config."""

@@ -55,11 +55,12 @@ def skew(vector: ArrayLike) -> Array:
 def from_vector(vector: ArrayLike) -> Array:
     """Rotation matrices (..., 3, 3) of rotation vectors (..., 3), rad (Rodrigues' formula)."""
     vector = np.asarray(vector, dtype=float)
-    angle = np.linalg.norm(vector, axis=-1)[..., None, None]
+    half = 0.5 * np.sqrt(np.einsum("...i,...i->...", vector, vector))[..., None, None]
     k = skew(vector)
-    # np.sinc is finite at zero, so no branch is needed for small angles.
-    linear = np.sinc(angle / np.pi)
-    quadratic = 0.5 * np.sinc(angle / (2 * np.pi)) ** 2
+    # Below this half angle the quotient is 1 to the last bit, and at zero there is none.
+    tiny = half < 1e-9
+    quotient = np.where(tiny, 1.0, np.sin(half) / np.where(tiny, 1.0, half))
+    linear, quadratic = quotient * np.cos(half), 0.5 * quotient**2
     rotation: Array = np.eye(3) + linear * k + quadratic * (k @ k)
     return rotation
 

@@ -1,4 +1,4 @@
-"""Orientations to choose from, and the commands that would bring the robot there."""
+"""Poses to choose from, and the commands that would bring the robot there."""
 
 from __future__ import annotations
 
@@ -12,9 +12,34 @@ from hexacell.design.knowledge import Knowledge, Limits
 from hexacell.pose import Poses
 from hexacell.rotations import Array, Mask
 
-NEAR_MM = 60.0
-NEAR_TURN = 0.35
-"""A command farther than this from the pose aimed at belongs to another assembly mode."""
+TWISTS_A_TILT = 2.0
+"""Turns about the platform's own normal go so many times as far as tilts: nothing limits them but
+the legs, and they tell as much."""
+
+COMMAND_TRIES = (3,)
+"""Stages of the continuation to a command. What takes more is next to a singularity, and left out."""
+
+SMALLEST_SHARE = 0.004
+"""Of the largest amplitude. With the drawing's tolerances alone some robots bear no more."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Standing:
+    """Poses that the estimated robot can take within its limits.
+
+    Attributes:
+        targets: n poses under the estimate.
+        joints: joint variables (n, 6), mm, that take the estimated robot there.
+    """
+
+    targets: Poses
+    joints: Array
+
+    def __len__(self) -> int:
+        return len(self.joints)
+
+    def __getitem__(self, rows: Mask | NDArray[np.intp]) -> Standing:
+        return Standing(self.targets[rows], self.joints[rows])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -39,64 +64,69 @@ class Candidates:
 
 
 def orientations(count: int, tilt: float, seed: int) -> Array:
-    """``count`` rotations (count, 3, 3) that fill tilts up to ``tilt``, rad, and as large turns.
+    """``count`` rotations (count, 3, 3): tilts up to ``tilt``, rad, after turns up to twice as far.
 
-    Amplitudes are spread over all scales, so that there are small ones to choose while little is
-    known and large ones later. ``count`` is a power of two, as Sobol' sequences want it.
+    Half of the amplitudes are spread over all scales, so that there are small ones to choose while
+    little is known; half evenly, because large ones tell most. ``count`` is a power of two, as
+    Sobol' sequences want it.
     """
     from scipy.stats import qmc  # noqa: PLC0415 - half a second that only this function needs
 
-    direction, size, turn = qmc.Sobol(3, seed=seed).random(count).T
-    amplitude = tilt * (0.02 + 0.98 * size**2)
-    heading = 2.0 * np.pi * direction
-    about_z = amplitude * (2.0 * turn - 1.0)
-    tilt_vectors = np.stack([np.cos(heading), np.sin(heading), np.zeros(count)], axis=-1)
-    twist_vectors = np.stack([np.zeros(count), np.zeros(count), about_z], axis=-1)
-    return rotations.from_vector(amplitude[:, None] * tilt_vectors) @ rotations.from_vector(twist_vectors)
+    heading, tilted, about_z, twisted, scale = qmc.Sobol(5, seed=seed).random(count).T
+    angle = tilt * _amplitudes(tilted, scale)
+    twist = TWISTS_A_TILT * tilt * _amplitudes(twisted, scale) * np.where(about_z < 0.5, -1.0, 1.0)
+    heading, none = 2.0 * np.pi * heading, np.zeros(count)
+    tilts = angle[:, None] * np.stack([np.cos(heading), np.sin(heading), none], axis=-1)
+    twists = np.stack([none, none, twist], axis=-1)
+    return rotations.from_vector(tilts) @ rotations.from_vector(twists)
 
 
-def reachable(knowledge: Knowledge, targets: Poses) -> Candidates:
-    """Those of the poses that the estimated robot reaches within its limits, with their commands.
+def _amplitudes(evenly: Array, scale: Array) -> Array:
+    """Shares of the largest amplitude, from values spread evenly over 0 to 1."""
+    return np.where(scale < 0.5, SMALLEST_SHARE ** (1.0 - evenly), evenly)
 
-    Left out are also poses that the controller's own geometry cannot hold, or only next to a
-    singularity or in another assembly mode: there no command leads to these joint variables.
-    """
+
+def standing(knowledge: Knowledge, targets: Poses) -> Standing:
+    """Those of the poses that the estimated robot takes within its limits."""
     joints = knowledge.mechanism.inverse(knowledge.estimate, knowledge.branch, targets)
     rows = np.flatnonzero(within_limits(knowledge.limits, targets, joints))
     targets, joints = targets[rows], joints[rows]
-    clear = _clear(knowledge, targets, joints)
-    targets, joints = targets[clear], joints[clear]
-    commands = kinematics.follow(
+    margin = kinematics.singularity_margin(knowledge.mechanism, knowledge.estimate, targets, joints)
+    return Standing(targets, joints)[margin >= knowledge.limits.singularity_margin]
+
+
+def commanded(knowledge: Knowledge, stands: Standing) -> tuple[Poses, Mask]:
+    """The commands (n) that lead the controller to the joint variables of n poses, and which do.
+
+    None does where the controller's own geometry cannot hold these joint variables, or only next to
+    a singularity or in another assembly mode.
+    """
+    found = kinematics.follow(
         knowledge.mechanism,
         knowledge.controller,
-        joints,
-        start=targets,
+        stands.joints,
+        start=stands.targets,
         start_geometry=knowledge.estimate,
-        start_joints=joints,
+        start_joints=stands.joints,
+        tries=COMMAND_TRIES,
     )
-    held = commands.found & _held_by_controller(knowledge, commands.poses, targets, joints)
-    return Candidates(targets, joints, commands.poses)[held]
+    back = knowledge.mechanism.inverse(knowledge.controller, knowledge.branch, found.poses)
+    agrees = np.abs(np.nan_to_num(back, nan=np.inf) - stands.joints).max(axis=-1, initial=0.0) < 1e-6
+    margin = kinematics.singularity_margin(
+        knowledge.mechanism, knowledge.controller, found.poses, stands.joints
+    )
+    held: Mask = found.found & agrees & (margin >= knowledge.limits.singularity_margin)
+    return found.poses, held
+
+
+def reachable(knowledge: Knowledge, targets: Poses) -> Candidates:
+    """Those of the poses that the estimated robot reaches within its limits, with their commands."""
+    stands = standing(knowledge, targets)
+    commands, held = commanded(knowledge, stands)
+    return Candidates(stands.targets, stands.joints, commands)[held]
 
 
 def within_limits(limits: Limits, poses: Poses, joints: Array) -> Mask:
     """Which poses keep to the tilt and joint limits; an unreachable one (NaN) does not."""
     in_range = (joints >= limits.joint_min_mm) & (joints <= limits.joint_max_mm)
     return in_range.all(axis=-1) & (poses.tilts() <= limits.tilt)
-
-
-def _clear(knowledge: Knowledge, poses: Poses, joints: Array) -> Mask:
-    margin = kinematics.singularity_margin(knowledge.mechanism, knowledge.estimate, poses, joints)
-    return margin >= knowledge.limits.singularity_margin
-
-
-def _held_by_controller(knowledge: Knowledge, commands: Poses, targets: Poses, joints: Array) -> Mask:
-    back = knowledge.mechanism.inverse(knowledge.controller, knowledge.branch, commands)
-    agrees = np.abs(np.nan_to_num(back, nan=np.inf) - joints).max(axis=-1, initial=0.0) < 1e-6
-    moved = np.linalg.norm(commands.positions - targets.positions, axis=-1)
-    turned = np.linalg.norm(
-        rotations.to_vector(commands.rotations @ np.swapaxes(targets.rotations, -1, -2)), axis=-1
-    )
-    margin = kinematics.singularity_margin(knowledge.mechanism, knowledge.controller, commands, joints)
-    clear = margin >= knowledge.limits.singularity_margin
-    held: Mask = agrees & (moved < NEAR_MM) & (turned < NEAR_TURN) & clear
-    return held

@@ -1,4 +1,8 @@
-"""Poses that judge the result: commanded as a user would, apart from each other, inside the travel."""
+"""Poses that judge the result: commanded as a user would, inside the travel, away from all others.
+
+Away from each other, and from the orientations that the geometry was identified with: near those it
+fits in any case.
+"""
 
 from __future__ import annotations
 
@@ -16,12 +20,15 @@ from hexacell.pose import Poses
 from hexacell.rotations import Array, Mask
 
 
-def choose_held_out(knowledge: Knowledge, point: Array, count: int, orientations: Array) -> Poses:
+def choose_held_out(
+    knowledge: Knowledge, point: Array, count: int, orientations: Array, used: Array | None = None
+) -> Poses:
     """``count`` poses at a point (3,), mm, the first of them untilted.
 
     The controller is sent there with its own geometry, uncorrected; the ball must surely stay
     within the travel all the same, and the corrected robot must be able to go there too. Of the
-    orientations (n, 3, 3) that do, those farthest apart are taken.
+    orientations (n, 3, 3) that do, those are taken in which the platform really stands farthest from
+    where it stands in the others and in the ``used`` ones (k, 3, 3), wherever these were.
 
     Raises:
         LimitError: too few of them do.
@@ -31,11 +38,12 @@ def choose_held_out(knowledge: Knowledge, point: Array, count: int, orientations
     usable = np.flatnonzero(within_limits(knowledge.limits, poses, joints) & _after(knowledge, poses))
     if not len(usable) or usable[0] != 0:
         raise LimitError(f"the untilted platform cannot stand at {poses.pose(0)} within the limits")
-    inside = _inside_travel(knowledge, poses[usable], joints[usable])
+    really, inside = _inside_travel(knowledge, poses[usable], joints[usable])
     if not inside[0]:
         raise LimitError(f"where the robot really goes for {poses.pose(0)} cannot be told")
     kept = poses[usable[inside]]
-    taken = _farthest_apart(knowledge, kept, count)
+    stands = really.rotations[inside]
+    taken = _farthest_apart(knowledge, kept, stands, _nearest(stands, used), count)
     if len(taken) < count:
         raise LimitError(
             f"only {len(taken)} orientations at {poses.pose(0)} keep the ball inside the travel"
@@ -55,8 +63,8 @@ def _after(knowledge: Knowledge, poses: Poses) -> Mask:
     return fits
 
 
-def _inside_travel(knowledge: Knowledge, poses: Poses, joints: Array) -> Mask:
-    """Which poses the uncorrected robot surely takes inside the travel of gauges zeroed at the first."""
+def _inside_travel(knowledge: Knowledge, poses: Poses, joints: Array) -> tuple[Poses, Mask]:
+    """Where the uncorrected robot goes; is it surely inside the travel of gauges zeroed at the first."""
     really = kinematics.follow(
         knowledge.mechanism,
         knowledge.estimate,
@@ -75,19 +83,34 @@ def _inside_travel(knowledge: Knowledge, poses: Poses, joints: Array) -> Mask:
     inside: Mask = (np.abs(deviation) + SAFETY_SIGMAS * sigma <= limit).all(axis=-1)
     inside &= really.found
     inside[0] = really.found[0]
-    return inside
+    return really.poses, inside
 
 
-def _farthest_apart(knowledge: Knowledge, poses: Poses, count: int) -> list[int]:
+def _nearest(stands: Array, used: Array | None) -> Array:
+    """How far orientations (n, 3, 3) are from the nearest of those used (n,), rad."""
+    apart = np.full(len(stands), np.inf)
+    for other in () if used is None else used:
+        apart = np.minimum(apart, _angles(stands, other))
+    return apart
+
+
+def _angles(stands: Array, other: Array) -> Array:
+    angles: Array = np.linalg.norm(rotations.to_vector(stands @ other.T), axis=-1)
+    return angles
+
+
+def _farthest_apart(
+    knowledge: Knowledge, poses: Poses, stands: Array, apart: Array, count: int
+) -> list[int]:
     """Rows of poses from the first on, each next one farthest from those taken, a clear way ahead.
 
-    A way must be clear there and back to the first, where the set ends.
+    ``stands`` (n, 3, 3) is how the platform really stands in them, ``apart`` (n,), rad, how far that
+    is from what was taken before. A way must be clear there and back to the first, where the set ends,
+    with the ball inside the travel.
     """
     taken = [0]
-    apart = np.full(len(poses), np.inf)
     while len(taken) < count:
-        turn = poses.rotations @ poses.rotations[taken[-1]].T
-        apart = np.minimum(apart, np.linalg.norm(rotations.to_vector(turn), axis=-1))
+        apart = np.minimum(apart, _angles(stands, stands[taken[-1]]))
         best = int(np.argmax(apart))
         while apart[best] > 0.0 and not _ways_clear(knowledge, poses, (taken[-1], best, 0)):
             apart[best] = 0.0
@@ -99,4 +122,22 @@ def _farthest_apart(knowledge: Knowledge, poses: Poses, count: int) -> list[int]
 
 
 def _ways_clear(knowledge: Knowledge, poses: Poses, rows: tuple[int, ...]) -> bool:
-    return all(is_clear(knowledge, poses[[start]], poses[[end]]) for start, end in pairwise(rows))
+    reference = _zeroed(knowledge, poses[[0]])
+    return all(
+        is_clear(knowledge, poses[[start]], poses[[end]], reference) for start, end in pairwise(rows)
+    )
+
+
+def _zeroed(knowledge: Knowledge, first: Poses) -> Array:
+    """Where the uncorrected robot really takes the ball (3,), mm, for the pose that zeroes the gauges."""
+    joints = knowledge.mechanism.inverse(knowledge.controller, knowledge.branch, first)
+    really = kinematics.follow(
+        knowledge.mechanism,
+        knowledge.estimate,
+        joints,
+        start=first,
+        start_geometry=knowledge.controller,
+        start_joints=joints,
+    )
+    ball: Array = really.poses.positions[0]
+    return ball

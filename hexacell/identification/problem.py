@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -159,10 +160,12 @@ def build_problem(
     branch: Branch,
     prior: Prior,
     noise: Noise,
+    lent: Sequence[Geometry] = (),
 ) -> Problem:
     """The problem of some records, whose poses were commanded under ``controller``'s geometry.
 
-    Records from before the last calibration may have been commanded under the drawing instead.
+    Records from before the last calibration may have been commanded under the drawing instead, and
+    others under geometries, in the frame convention, that the controller was ``lent``.
 
     Raises:
         IdentifiabilityError: joint variables do not belong to the commanded poses, or most records
@@ -173,7 +176,7 @@ def build_problem(
     joints, labels = measurements.joints[order], measurements.labels[order]
     commanding, change = mechanism.to_convention(controller)
     poses = change.poses(measurements.poses[order])
-    commands = Commands.of(mechanism, poses, (commanding, prior.centre), branch, joints)
+    commands = Commands.of(mechanism, poses, (commanding, *lent, prior.centre), branch, joints)
     JointData(commands, joints, labels, branch, prior.centre, prior.leg_widths(mechanism)).refuse_foreign()
     start = commands.followed(prior.centre, joints)
     _refuse_strangers(start.found, labels)

@@ -61,7 +61,7 @@ def test_limits_are_in_millimetres_and_radians(robot):
     assert robot.limits.gauge_travel_mm == 5.0
     assert robot.limits.tilt == pytest.approx(np.pi / 4)
     assert (robot.limits.joint_min_mm, robot.limits.joint_max_mm) == (-800.0, 800.0)
-    assert robot.limits.singularity_margin == 0.05
+    assert robot.limits.singularity_margin == 0.03
 
 
 @given(poses)
@@ -132,7 +132,7 @@ def test_a_pose_within_reach_is_no_error(robot):
     [
         (Pose(0, 0, 899), r"leg 1 cannot reach the pose X0\.000 Y0\.000 Z899\.000"),
         (Pose(390, 0, 550), r"^task 1: q4 would be \d+\.\d mm, outside -800 to 800$"),
-        (Pose(0, 0, 550, 46.0), r"^task 1: the singularity margin is 0\.00\d, below 0\.05$"),
+        (Pose(0, 0, 550, 46.0), r"^task 1: the singularity margin is 0\.00\d, below 0\.03$"),
     ],
 )
 def test_a_pose_out_of_reach_says_why(robot, pose, message):

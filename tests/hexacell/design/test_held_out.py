@@ -51,10 +51,36 @@ def test_the_uncorrected_robot_keeps_the_ball_inside_the_travel(chosen, paper, r
 
 
 def test_they_are_apart_from_each_other(chosen):
+    """As commanded, which is about as they really stand."""
     turns = Rotation.from_matrix(chosen.rotations)
     apart = [(turns[i] * turns[j].inv()).magnitude() for i in range(COUNT) for j in range(i)]
     assert np.degrees(min(apart)) > 2.0
     assert np.degrees(max(apart)) > 10.0
+
+
+def test_they_are_away_from_the_orientations_used(chosen, know, much, point, paper, reach):
+    """Where the platform really stood when the geometry was identified: the truth's orientations."""
+    used = much.poses.rotations
+    away = choose_held_out(know(much), point, COUNT, TURNS, used)
+    np.testing.assert_array_equal(away.rotations[0], np.eye(3))
+
+    def nearest(poses):
+        stands = [reach(paper.actual, paper.nominal, poses.pose(row))[1][3:] for row in range(1, COUNT)]
+        turns = Rotation.from_rotvec(np.array(stands))
+        return min((turn * Rotation.from_matrix(used).inv()).magnitude().min() for turn in turns)
+
+    assert np.degrees(nearest(away)) > 3.0
+    assert nearest(away) > 1.2 * nearest(chosen)
+
+
+def test_an_orientation_used_already_is_the_last_to_be_taken(know, paper, limits):
+    exactly = know(paper.nominal, limits=replace(limits, singularity_margin=0.02))
+    centre = np.array([0.0, 0.0, 550.0])
+    turns = Poses.of([Pose(0, 0, 0, tilt) for tilt in (8.0, 16.0, -12.0)]).rotations
+    without = choose_held_out(exactly, centre, 2, turns)
+    assert without.pose(1).a == pytest.approx(16.0)
+    away = choose_held_out(exactly, centre, 2, turns, used=turns[1:2])
+    assert away.pose(1).a == pytest.approx(-12.0)
 
 
 def test_the_corrected_robot_can_take_them_too(chosen, much, legs):

@@ -1,0 +1,60 @@
+"""A way between two commanded poses in straight lines, each of them checked, round by others if need be."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from hexacell import kinematics
+from hexacell.design.knowledge import Knowledge
+from hexacell.design.path import is_clear
+from hexacell.pose import Poses
+from hexacell.rotations import Array
+
+
+def route(
+    knowledge: Knowledge, start: Poses, goal: Poses, via: Sequence[Poses], reference: Array | None = None
+) -> list[int] | None:
+    """The fewest straight lines from ``start`` to ``goal``: the rows of ``via`` that lie between.
+
+    Every line is clear in the sense of :func:`hexacell.design.path.is_clear`. Nothing where there is
+    no such way; an empty list where the straight line itself is clear.
+    """
+
+    def clear(one: Poses, other: Poses) -> bool:
+        return is_clear(knowledge, one, other, reference)
+
+    return _fewest(start, goal, via, clear)
+
+
+def ball_at(knowledge: Knowledge, command: Poses) -> Array | None:
+    """Where the estimate says the ball is (3,), mm, at a commanded pose; nothing if it cannot say."""
+    joints = knowledge.mechanism.inverse(knowledge.controller, knowledge.branch, command)
+    really = kinematics.follow(
+        knowledge.mechanism,
+        knowledge.estimate,
+        joints,
+        start=command,
+        start_geometry=knowledge.controller,
+        start_joints=joints,
+    )
+    return np.asarray(really.poses.positions[0]) if really.found[0] else None
+
+
+def _fewest(
+    start: Poses, goal: Poses, via: Sequence[Poses], clear: Callable[[Poses, Poses], bool]
+) -> list[int] | None:
+    """Breadth first, the goal tried before anything else."""
+    waiting: deque[list[int]] = deque([[]])
+    unseen = list(range(len(via)))
+    while waiting:
+        way = waiting.popleft()
+        here = via[way[-1]] if way else start
+        if clear(here, goal):
+            return way
+        reached = [row for row in unseen if clear(here, via[row])]
+        unseen = [row for row in unseen if row not in reached]
+        waiting.extend([*way, row] for row in reached)
+    return None

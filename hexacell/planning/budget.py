@@ -1,0 +1,61 @@
+"""What measuring costs, and how much of it may be spent."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from hexacell.cell.model import CellSettings
+
+
+@dataclass(frozen=True, slots=True)
+class Pace:
+    """How long things take: minutes to bring the gauges to a point, seconds to move and settle."""
+
+    station_minutes: float
+    record_seconds: float
+
+    @classmethod
+    def of(cls, settings: CellSettings) -> Pace:
+        """The pace that a cell file states."""
+        by_hand = settings.stations.placement == "by-hand"
+        stated = settings.identification.seconds_per_record
+        usual = settings.timing.move_s + settings.timing.window_s
+        return cls(settings.identification.minutes_per_station if by_hand else 0.0, stated or usual)
+
+    def minutes(self, records: int, stations: int) -> float:
+        """Of some records at some points; at its end each point's reference is read once more."""
+        return stations * self.station_minutes + (records + stations) * self.record_seconds / 60.0
+
+
+@dataclass(frozen=True, slots=True)
+class Budget:
+    """What may be spent; without a limit where a number is none."""
+
+    records: int | None
+    minutes: float | None
+    pace: Pace
+
+    @classmethod
+    def of(cls, settings: CellSettings) -> Budget:
+        """The budget that a cell file states."""
+        plan = settings.identification
+        return cls(plan.budget_records, plan.budget_minutes, Pace.of(settings))
+
+    def left(self, records: int, stations: int) -> float:
+        """How many more records can be paid after some records at some points; infinite if all."""
+        left = math.inf if self.records is None else float(self.records - records)
+        if self.minutes is not None:
+            seconds = 60.0 * (self.minutes - self.pace.minutes(records, stations))
+            left = min(left, math.floor(seconds / self.pace.record_seconds + 1e-9))
+        return max(left, 0.0)
+
+    @property
+    def words(self) -> str:
+        """The limits for people."""
+        limits = []
+        if self.records is not None:
+            limits.append(f"{self.records} records")
+        if self.minutes is not None:
+            limits.append(f"{self.minutes:g} minutes")
+        return " or ".join(limits)

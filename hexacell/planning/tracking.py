@@ -1,0 +1,111 @@
+"""The estimate while measuring: each continues the one before it.
+
+What a record more does to the estimate is small, so that the former one is where the search starts.
+The estimate of n records is defined as the n-th of this chain, from the drawing on. Keeping the last
+link saves its computation and changes nothing: without it the chain is computed again.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from hexacell.design.knowledge import Knowledge
+from hexacell.design.next_pose import Station, station
+from hexacell.errors import LimitError
+from hexacell.identification.estimate import track
+from hexacell.identification.problem import Problem
+from hexacell.identification.result import Identification
+from hexacell.measurements import MeasurementSet, Record
+from hexacell.pose import Poses
+from hexacell.robot import Robot
+
+IMPLAUSIBLE = 3.0
+"""Times the number of residuals: a cost beyond it is looked into, from the drawing on."""
+
+FEW_RESIDUALS = 30.0
+"""Added to their number, since few of them may be large by chance."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Known:
+    """What the records so far say of the robot; ``estimate`` is none before the first."""
+
+    knowledge: Knowledge
+    estimate: Identification | None
+
+    def station(self, point: int) -> Station:
+        """Where a point's gauges were zeroed.
+
+        Raises:
+            LimitError: the records do not say so.
+        """
+        found = self.estimate
+        if found is None or point not in found.problem.labels[:, 0]:
+            raise LimitError("the records of this point say nothing about where the ball is")
+        records = found.problem
+        rows = np.flatnonzero(records.labels[:, 0] == point)
+        return station(self.knowledge, found.poses[rows], records.joints[rows], records.deviations[rows])
+
+
+class Tracker:
+    """Gives the estimate of any records, quickly where they continue the last ones asked for."""
+
+    def __init__(self, robot: Robot) -> None:
+        self._robot = robot
+        self._records: tuple[Record, ...] = ()
+        self._last: Identification | None = None
+
+    def known(self, measurements: MeasurementSet) -> Known:
+        """What some records say, in their order.
+
+        Raises:
+            IdentifiabilityError: they do not belong to this robot.
+        """
+        records = measurements.records
+        if records[: len(self._records)] != self._records:
+            self._records, self._last = (), None
+        for count in range(len(self._records) + 1, len(records) + 1):
+            problem = self._robot.problem(MeasurementSet(records[:count]))
+            self._last = continued(problem, self._last)
+            self._records = records[:count]
+        return Known(self._robot.knowledge(self._last), self._last)
+
+
+def continued(problem: Problem, before: Identification | None) -> Identification:
+    """The estimate from the one of all records but the last; from the drawing if that is astray."""
+    poses = None if before is None else _poses_under(problem, before)
+    if before is None or poses is None:
+        return track(problem)
+    found = track(problem, free=before.free, poses=poses)
+    residuals = 3 * (found.records - found.points)
+    healthy = found.converged and found.records == problem.records
+    if healthy and cost(found) <= IMPLAUSIBLE * residuals + FEW_RESIDUALS:
+        return found
+    anew = track(problem)
+    better = (anew.records, -cost(anew)) > (found.records, -cost(found))
+    return anew if better else found
+
+
+def cost(found: Identification) -> float:
+    """What the estimate minimised: squared residuals and distance from the drawing, by sigma."""
+    prior = found.problem.prior
+    moved = found.free - found.problem.mechanism.convention.free_part(prior.centre)
+    return float(found.chi2 + moved @ np.linalg.solve(prior.covariance, moved))
+
+
+def _poses_under(problem: Problem, before: Identification) -> Poses | None:
+    """Poses that close the former estimate where a search may start; none if one is not found."""
+    rows = {tuple(label): row for row, label in enumerate(before.problem.labels.tolist())}
+    known = [rows.get(tuple(label)) for label in problem.labels.tolist()]
+    new = np.array([row for row, place in enumerate(known) if place is None], dtype=np.intp)
+    followed = problem.commands[new].followed(before.geometry, problem.joints[new])
+    if not followed.found[problem.startable[new]].all():
+        return None
+    old = np.array([row for row, place in enumerate(known) if place is not None], dtype=np.intp)
+    places = np.array([place for place in known if place is not None], dtype=np.intp)
+    positions, rotations = np.empty((problem.records, 3)), np.empty((problem.records, 3, 3))
+    positions[new], rotations[new] = followed.poses.positions, followed.poses.rotations
+    positions[old], rotations[old] = before.poses.positions[places], before.poses.rotations[places]
+    return Poses(positions, rotations)

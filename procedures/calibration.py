@@ -1,52 +1,61 @@
 """What to do next: the whole procedure as a decision on where the run stands.
 
-Points one after the other, each with a reference where the gauges are zeroed and orientations that
-choose themselves from what is known by then; then the geometry is identified and the held-out
-points are visited; the geometry is written back, and the held-out points are visited again.
-Nothing here talks to hardware or disk, so the same decisions serve a run, its resumption and its
-replay.
+The points are measured as the plan has it (:mod:`hexacell.planning.plan`); then the geometry is
+identified and the held-out points are visited; the geometry is written back, and the held-out
+points are visited again. Nothing here talks to hardware or disk, so the same decisions serve a run,
+its resumption and its replay.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, replace
 from enum import StrEnum
 from functools import cached_property
-
-import numpy as np
 
 from hexacell.cell.model import CellSettings
 from hexacell.design import candidates
 from hexacell.design.held_out import choose_held_out
 from hexacell.design.knowledge import Knowledge
-from hexacell.design.next_pose import Choice, Station, choose, station
+from hexacell.design.next_pose import Station
 from hexacell.design.path import is_clear
 from hexacell.errors import HexacellError, LimitError
-from hexacell.identification.estimate import identify, track
+from hexacell.geometry import Geometry
+from hexacell.identification.estimate import identify
 from hexacell.identification.result import Identification
+from hexacell.measurements import MeasurementSet
+from hexacell.planning.listed import PoseList
+from hexacell.planning.plan import Plan
+from hexacell.planning.situation import ClosePoint, Reference, Situation, Visit
 from hexacell.pose import Pose, Poses
 from hexacell.robot import Robot
 from hexacell.rotations import Array
 from hexacell.verification import Verdict
+from procedures import events
 from procedures.events import Sampled
-from procedures.state import RunState, SetState
+from procedures.state import RunState, SetState, record
 from procedures.steps import (
     CloseSet,
     Compute,
     Expectation,
+    Forecast,
+    Locate,
     Move,
     Phase,
     Place,
+    Revisit,
     Sample,
     SetKey,
     SixNumbers,
     Step,
 )
+from procedures.ways import Ways
 
-CANDIDATES = 512
+CANDIDATES = 1024
 HELD_OUT_CANDIDATES = 2048
-REFUSALS = 3
-"""Records of one point that may leave the travel before the point is given up."""
+
+
+class TravelError(LimitError):
+    """The gauges' plungers are at an end of their travel where they must not be."""
 
 
 class Mode(StrEnum):
@@ -56,35 +65,47 @@ class Mode(StrEnum):
     CHECK = "check"
 
 
-def expected_records(settings: CellSettings, mode: Mode) -> int:
-    """How many times a whole run waits for settled readings, closings of sets included."""
-    identification, verification = (
-        len(size.points) * (size.orientations + 1)
-        for size in (settings.identification, settings.verification)
-    )
-    return verification if mode is Mode.CHECK else identification + 2 * verification
+def expected_records(settings: CellSettings, mode: Mode, listed: PoseList | None = None) -> int:
+    """How many times a whole run waits for settled readings at most, closings of sets included."""
+    plan, held_out = settings.identification, settings.verification
+    verification = len(held_out.points) * (held_out.orientations + 1)
+    if mode is Mode.CHECK:
+        return verification
+    records = len(plan.points) * plan.orientations if listed is None else len(listed)
+    return min(records, plan.budget_records or records) + len(plan.points) + 2 * verification
 
 
 @dataclass(frozen=True, eq=False)
 class Calibration:
-    """The procedure of one cell."""
+    """The procedure of one cell; ``listed`` are the poses that it names, where it does."""
 
     settings: CellSettings
     robot: Robot
     mode: Mode
+    listed: PoseList | None = None
+
+    @cached_property
+    def plan(self) -> Plan:
+        """What is measured to identify the geometry."""
+        return Plan(self.settings, self.robot, self.listed, CANDIDATES)
 
     def next_step(self, state: RunState) -> Step | None:
         """The step to do where the run stands; nothing when it is over."""
         if state.ended is not None:
             return None
-        if self.mode is Mode.CHECK:
-            return self._measuring(state, Phase.BEFORE) or (None if state.judged else Compute(kind="judge"))
-        return (
-            self._measuring(state, Phase.IDENTIFY)
-            or (None if state.identified else Compute(kind="identify"))
-            or self._measuring(state, Phase.BEFORE)
-            or self._writing_back(state)
-        )
+        if state.rewriting:
+            return Compute(kind="take back")
+        if state.lent is not None and not self.robot.lent:
+            return self._with_lent(state.lent, lending=state.lending).next_step(state)
+        return self._checking(state) if self.mode is Mode.CHECK else self._optimising(state)
+
+    def _checking(self, state: RunState) -> Step | None:
+        return self._measuring(state, Phase.BEFORE) or (None if state.judged else Compute(kind="judge"))
+
+    def _optimising(self, state: RunState) -> Step | None:
+        if state.identified is None:
+            return self._planned(state) or Compute(kind="take back" if state.lending else "identify")
+        return self._measuring(state, Phase.BEFORE) or self._writing_back(state)
 
     def identification(self, state: RunState) -> Identification:
         """The geometry that the run's records give.
@@ -92,7 +113,34 @@ class Calibration:
         Raises:
             IdentifiabilityError: they cannot give one.
         """
-        return identify(self.robot.problem(state.measurements()))
+        return identify(self.robot_of(state).problem(state.measurements()))
+
+    def robot_of(self, state: RunState) -> Robot:
+        """The robot with all geometries that commanded the run's records."""
+        if state.lent is None:
+            return self.robot
+        return self._with_lent(state.lent, lending=state.lending).robot
+
+    def to_lend(self, state: RunState) -> Geometry:
+        """The estimate by now, or what was lent before an interruption: its poses are to be visited again.
+
+        Raises:
+            HexacellError: the records so far give none.
+        """
+        if state.lent is not None:
+            return geometry_of(state.lent)
+        return self.plan.known(self._situation(state, None)).knowledge.estimate
+
+    def _with_lent(self, lent: events.Lent, *, lending: bool) -> Calibration:
+        if lending not in self._lent:
+            robot = replace(self.robot, lent=(geometry_of(lent),), lending=lending)
+            self._lent[lending] = replace(self, robot=robot)
+        return self._lent[lending]
+
+    @cached_property
+    def _lent(self) -> dict[bool, Calibration]:
+        """This procedure with a lent geometry, which is one for the whole run."""
+        return {}
 
     def held_out_poses(self, identified: Identification | None) -> tuple[tuple[SixNumbers, ...], ...]:
         """Poses at each held-out point, in the controller's frames.
@@ -102,11 +150,12 @@ class Calibration:
         """
         verification = self.settings.verification
         knowledge = self.robot.knowledge(identified)
+        used = None if identified is None else identified.poses.rotations
         turns = candidates.orientations(HELD_OUT_CANDIDATES, knowledge.limits.tilt, verification.seed)
         chosen = []
         for point in verification.points:
             position = self.robot.change.poses(Poses.of([Pose(*point)])).positions[0]
-            poses = choose_held_out(knowledge, position, verification.orientations, turns)
+            poses = choose_held_out(knowledge, position, verification.orientations, turns, used)
             chosen.append(
                 tuple(self.robot.to_command(poses.pose(row)).as_tuple() for row in range(len(poses)))
             )
@@ -116,6 +165,8 @@ class Calibration:
         if state.proposed is None:
             return Compute(kind="propose")
         if state.judged is None:
+            if state.withdrawing:
+                return Compute(kind="roll back")
             if state.committed is None:
                 return Compute(kind="commit")
             return self._measuring(state, Phase.AFTER) or Compute(kind="judge")
@@ -123,32 +174,100 @@ class Calibration:
             return Compute(kind="roll back")
         return None
 
+    def _planned(self, state: RunState) -> Step | None:
+        """The next step of identification; none when nothing more is to be measured."""
+        key = open_set(state)
+        if key is not None and (step := self._in_set(state, key)):
+            return step
+        match self.plan.decide(self._situation(state, key)):
+            case Reference() as opening:
+                return self._opening(state, opening)
+            case Visit() as visit:
+                return self._visiting(state, visit)
+            case ClosePoint(point=point):
+                return self._closing(state, SetKey(phase=Phase.IDENTIFY, point=point))
+            case _:
+                return None
+
+    def _opening(self, state: RunState, opening: Reference) -> Step:
+        """On to a point, by a checked way; before that the controller may be lent a geometry."""
+        if self._lends(state):
+            return Compute(kind="lend")
+        at = SetKey(phase=Phase.IDENTIFY, point=opening.point)
+        move = Move(at=at, orientation=1, pose=opening.pose.as_tuple())
+        return Locate() if state.lost else self.ways.towards(state, move)
+
+    def _visiting(self, state: RunState, visit: Visit) -> Move:
+        """To the pose chosen, or to the first of those that lie on the way."""
+        at = SetKey(phase=Phase.IDENTIFY, point=visit.point)
+        if visit.via:
+            pose = visit.via[0].as_tuple()
+            by_pose = {sample.pose: sample.orientation for sample in state.set(at).samples}
+            return Move(at=at, orientation=by_pose[pose], pose=pose)
+        return Move(
+            at=at,
+            orientation=state.set(at).next_orientation,
+            pose=visit.pose.as_tuple(),
+            expected=_expectation(visit),
+        )
+
+    def _lends(self, state: RunState) -> bool:
+        """Whether the controller is to be lent a geometry now, between two points."""
+        allowed = self.settings.identification.provisional and not state.lending
+        return allowed and any(measured.closed for measured in state.sets.values())
+
+    def _in_set(self, state: RunState, key: SetKey) -> Step | None:
+        """What is to be done in a set that is begun before anything new is planned there."""
+        measured = state.set(key)
+        if state.lost:
+            return Locate()
+        _require_zero(key, measured)
+        if measured.doubtful:
+            return self._returning(state, key)
+        if step := self._standing_move(state, key):
+            return step
+        if not measured.again:
+            return None
+        orientation, pose = measured.again[0]
+        move = Move(at=key, orientation=orientation, pose=pose)
+        return self.ways.towards(state, move, self._reference(state, key))
+
+    def _situation(self, state: RunState, key: SetKey | None) -> Situation:
+        """Where the plan stands. Records are in the order of their sets, which are never reordered."""
+        sets = {at: measured for at, measured in state.sets.items() if at.phase is Phase.IDENTIFY}
+        records = tuple(record(sample) for measured in sets.values() for sample in measured.samples)
+        return Situation(
+            measurements=MeasurementSet(records),
+            point=None if key is None else key.point,
+            done=frozenset(at.point for at, measured in sets.items() if measured.closed),
+            present=None if key is None else self._present(state, state.set(key).samples),
+            refusals=0 if key is None else state.set(key).refusals,
+        )
+
     def _measuring(self, state: RunState, phase: Phase) -> Step | None:
-        """The next step of the first set of a phase that is not closed."""
-        size = self.settings.identification if phase is Phase.IDENTIFY else self.settings.verification
-        for point in range(1, len(size.points) + 1):
+        """The next step of the first set of held-out poses that is not closed."""
+        for point in range(1, len(self.settings.verification.points) + 1):
             key = SetKey(phase=phase, point=point)
             if not state.set(key).closed:
-                return self._next_in_set(state, key, size.orientations)
+                return Locate() if state.lost else self._next_held_out(state, key)
         return None
 
-    def _next_in_set(self, state: RunState, key: SetKey, orientations: int) -> Step:
+    def _next_held_out(self, state: RunState, key: SetKey) -> Step:
         measured = state.set(key)
         if measured.refusals and key.phase is Phase.AFTER:
             return Compute(kind="judge")
-        if not measured.samples and measured.refusals:
-            raise LimitError(f"{key}: the gauges cannot be zeroed, they are at the end of their travel")
-        if measured.refusals and key.phase is Phase.BEFORE:
-            raise LimitError(f"{key}: the ball left the gauges' travel at a held-out pose")
-        if len(measured.samples) < orientations and measured.refusals <= REFUSALS:
-            move = self._standing_move(state, key) or self._move(state, key)
-            if move is not None:
-                return move
+        _require_zero(key, measured)
+        if measured.refusals:
+            raise TravelError(f"{key}: the ball left the gauges' travel at a held-out pose")
+        if measured.doubtful:
+            return self._returning(state, key)
+        if len(measured.samples) < self.settings.verification.orientations:
+            return self._standing_move(state, key) or self._held_out_move(state, key, measured)
         return self._closing(state, key)
 
     def _standing_move(self, state: RunState, key: SetKey) -> Step | None:
         """What to do at the pose the robot was just sent to: place the gauges, or sample."""
-        orientation = len(state.set(key).samples) + 1
+        orientation = state.set(key).next_orientation
         if state.standing != (key, orientation) or state.target is None:
             return None
         if orientation == 1 and not state.set(key).placed:
@@ -158,8 +277,31 @@ class Calibration:
     def _closing(self, state: RunState, key: SetKey) -> Step:
         if state.standing == (key, 1):
             return CloseSet(at=key)
+        if not self.ways.is_in_order(state, key):
+            return self._returning(state, key)
         orientation = self._on_the_way_back(state, key)
-        return Move(at=key, orientation=orientation, pose=state.set(key).samples[orientation - 1].pose)
+        return Move(at=key, orientation=orientation, pose=self._pose(state, key, orientation))
+
+    def _returning(self, state: RunState, key: SetKey) -> Step:
+        """To the set's reference by a checked way, and see there whether the gauges kept their zero."""
+        if state.standing == (key, 1):
+            return Revisit(at=key) if state.set(key).doubtful else CloseSet(at=key)
+        home = Move(at=key, orientation=1, pose=self._pose(state, key, 1))
+        return self.ways.towards(state, home, self._reference(state, key))
+
+    def _pose(self, state: RunState, key: SetKey, orientation: int) -> SixNumbers:
+        pose = state.set(key).pose(orientation)
+        assert pose is not None  # noqa: S101 - asked for orientations that were measured only
+        return pose
+
+    def _reference(self, state: RunState, key: SetKey) -> Array | None:
+        """Where the ball was when the set's gauges were zeroed (3,), mm, if the records can tell."""
+        if key.phase is not Phase.IDENTIFY:
+            return self.ways.ball_at(state, self._pose(state, key, 1))
+        try:
+            return self._known(state, key)[1].reference
+        except HexacellError:
+            return None
 
     def _on_the_way_back(self, state: RunState, key: SetKey) -> int:
         """The set's first orientation, or the earliest that a safe straight line leads to from here.
@@ -170,35 +312,25 @@ class Calibration:
             return 1  # held-out poses were chosen with a safe way back
         samples = state.set(key).samples
         at_set, here = state.standing or (key, 0)
-        last = here - 1 if at_set == key and here > 1 else len(samples)
+        visited = sorted(sample.orientation for sample in samples)
+        before = [number for number in visited if number < here] if at_set == key and here > 1 else visited
         try:
             knowledge, at = self._known(state, key)
         except HexacellError:
-            return last
-        present = self._present(state, samples)
-        for orientation in range(1, last):
-            if is_clear(knowledge, present, self._held(samples[orientation - 1].pose), at.reference):
+            return before[-1]
+        pose = self._present(state, samples)
+        if pose is None:
+            return before[-1]
+        present = self._held(pose.as_tuple())
+        for orientation in before[:-1]:
+            if is_clear(knowledge, present, self._held(self._pose(state, key, orientation)), at.reference):
                 return orientation
-        return last
+        return before[-1]
 
-    def _move(self, state: RunState, key: SetKey) -> Move | None:
-        """The move to the set's next orientation; none if there is none worth or safe to visit."""
-        measured = state.set(key)
-        if key.phase is not Phase.IDENTIFY:
-            return self._held_out_move(state, key, measured)
-        if not measured.samples:
-            point = self.settings.identification.points[key.point - 1]
-            return Move(at=key, orientation=1, pose=(*point, 0.0, 0.0, 0.0))
-        try:
-            choice = self._choice(state, key)
-        except LimitError:
-            return None
-        return Move(
-            at=key,
-            orientation=len(measured.samples) + 1,
-            pose=self.robot.to_command(choice.command).as_tuple(),
-            expected=self._expectation(choice),
-        )
+    @cached_property
+    def ways(self) -> Ways:
+        """How to get from anywhere to a pose."""
+        return Ways(self.robot)
 
     @cached_property
     def _poses_to_check(self) -> tuple[tuple[SixNumbers, ...], ...]:
@@ -207,14 +339,12 @@ class Calibration:
 
     def _held_out_move(self, state: RunState, key: SetKey, measured: SetState) -> Move:
         poses = state.identified.held_out if state.identified else self._poses_to_check
-        orientation = len(measured.samples) + 1
-        return Move(at=key, orientation=orientation, pose=poses[key.point - 1][orientation - 1])
-
-    def _choice(self, state: RunState, key: SetKey) -> Choice:
-        measured = state.set(key)
-        knowledge, at = self._known(state, key)
-        turns = candidates.orientations(CANDIDATES, knowledge.limits.tilt, self._seed(key, measured))
-        return choose(knowledge, at, turns, self._present(state, measured.samples))
+        orientation = measured.next_orientation
+        move = Move(at=key, orientation=orientation, pose=poses[key.point - 1][orientation - 1])
+        if orientation == 1:
+            return self.ways.towards(state, move)
+        in_turn = state.standing == (key, orientation - 1)  # poses were chosen with safe ways between them
+        return move if in_turn else self.ways.towards(state, move, self._reference(state, key))
 
     def _known(self, state: RunState, key: SetKey) -> tuple[Knowledge, Station]:
         """The estimate by now, and where it says the ball was when the set's gauges were zeroed.
@@ -222,39 +352,45 @@ class Calibration:
         Raises:
             LimitError: it cannot say so.
         """
-        estimate = track(self.robot.problem(state.measurements()))
-        knowledge = self.robot.knowledge(estimate)
-        records = estimate.problem
-        rows = np.flatnonzero(records.labels[:, 0] == key.point)
-        if not len(rows):
-            raise LimitError("the records of this point say nothing about where the ball is")
-        return knowledge, station(
-            knowledge, estimate.poses[rows], records.joints[rows], records.deviations[rows]
-        )
+        known = self.plan.known(self._situation(state, key))
+        return known.knowledge, known.station(key.point)
 
-    def _present(self, state: RunState, samples: tuple[Sampled, ...]) -> Poses:
+    def _present(self, state: RunState, samples: tuple[Sampled, ...]) -> Pose | None:
         """The pose that the robot holds, that of a refused record included."""
-        return self._held(state.target or samples[-1].pose)
+        if state.target is not None:
+            return Pose(*state.target)
+        return Pose(*samples[-1].pose) if samples else None
 
     def _held(self, pose: SixNumbers) -> Poses:
         """A commanded pose in the convention's frames."""
         return self.robot.change.poses(Poses.of([Pose(*pose)]))
 
-    def _seed(self, key: SetKey, measured: SetState) -> int:
-        """Other candidates for every record and every attempt, and the same when done again."""
-        attempt = len(measured.samples) + 100 * measured.refusals
-        return self.settings.identification.seed + 1000 * key.point + attempt
 
-    def _expectation(self, choice: Choice) -> Expectation:
-        base = self.robot.change.base.T
-        covariance = base @ np.diag(choice.sigma**2) @ base.T
-        return Expectation(
-            deviation_mm=_three(base @ choice.deviation),
-            sigma_mm=_three(np.sqrt(np.diag(covariance))),
-            gain=choice.gain,
-        )
+def geometry_of(lent: events.Lent) -> Geometry:
+    """What was lent, in the mechanism's frame convention."""
+    return Geometry(lent.geometry.S, lent.geometry.B, lent.geometry.l)
 
 
-def _three(values: Array) -> tuple[float, float, float]:
-    x, y, z = (float(value) for value in values)
-    return x, y, z
+def open_set(state: RunState) -> SetKey | None:
+    """The set that identification is in the middle of."""
+    begun = [key for key, measured in state.sets.items() if not measured.closed]
+    standing = [] if state.standing is None else [state.standing[0]]
+    for key in [*begun, *standing]:
+        if key.phase is Phase.IDENTIFY and not state.set(key).closed:
+            return key
+    return None
+
+
+def _require_zero(key: SetKey, measured: SetState) -> None:
+    if not measured.samples and measured.refusals:
+        raise TravelError(f"{key}: the gauges cannot be zeroed, they are at the end of their travel")
+
+
+def _expectation(visit: Visit) -> Expectation:
+    outlook = visit.outlook
+    return Expectation(
+        deviation_mm=visit.deviation,
+        sigma_mm=visit.sigma,
+        gain=visit.gain,
+        forecast=None if outlook is None else Forecast(**asdict(outlook)),
+    )

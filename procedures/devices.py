@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Awaitable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TypeVar
 
-from drivers.ports import Controller, DeviceIdentity, EncoderBank, Gauge
+from drivers.ports import Controller, DeviceIdentity, EncoderBank, Gauge, StopLine
+from drivers.stop_line import ContactLine
 from hexacell.errors import HexacellError, SeveralErrors
 
 Result = TypeVar("Result")
@@ -24,11 +25,12 @@ class MountedGauge:
 
 @dataclass(frozen=True, slots=True)
 class Devices:
-    """Three gauges, the encoders and the controller."""
+    """Three gauges, the encoders, the controller, and the line by which anybody may stop it."""
 
     gauges: tuple[MountedGauge, ...]
     encoders: EncoderBank
     controller: Controller
+    stop_line: StopLine = field(default_factory=ContactLine)
 
     async def open(self) -> tuple[DeviceIdentity, ...]:
         """Connect to all of them at once; nothing moves.
@@ -37,22 +39,28 @@ class Devices:
             SeveralErrors: one or more do not answer as they must; all are named.
         """
         calls: list[Awaitable[tuple[DeviceIdentity, ...]]] = [_alone(m.gauge.open()) for m in self.gauges]
-        calls += [self.encoders.open(), _alone(self.controller.open())]
+        calls += [self.encoders.open(), _alone(self.controller.open()), _if_any(self.stop_line.open())]
         found = await gathered("devices do not answer as they must", calls)
         return tuple(identity for identities in found for identity in identities)
 
     async def close(self) -> None:
         """Let all of them go, whatever happens to one."""
-        ports: list[Gauge | EncoderBank | Controller] = [
+        ports: list[Gauge | EncoderBank | Controller | StopLine] = [
             *(mounted.gauge for mounted in self.gauges),
             self.encoders,
             self.controller,
+            self.stop_line,
         ]
         await asyncio.gather(*(port.close() for port in ports), return_exceptions=True)
 
 
 async def _alone(identity: Awaitable[DeviceIdentity]) -> tuple[DeviceIdentity, ...]:
     return (await identity,)
+
+
+async def _if_any(identity: Awaitable[DeviceIdentity | None]) -> tuple[DeviceIdentity, ...]:
+    found = await identity
+    return () if found is None else (found,)
 
 
 def consists_of(error: HexacellError, *kinds: type[HexacellError]) -> bool:

@@ -5,96 +5,317 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable, Sequence
 from contextlib import suppress
+from functools import reduce
 
-from hexacell.errors import ExitCode, HexacellError, SeveralErrors
-from hexacell.verification import Verdict
+from hexacell.cell.recovery import Action
+from hexacell.errors import AnswerNeeded, ExitCode, HexacellError, Interruption, SeveralErrors, UsageError
 from procedures import events
+from procedures.attention import Attention, BrokenOff
+from procedures.commands import Command, Inbox, MeasureAgain, Undo
+from procedures.desk import Desk
+from procedures.ending import ending, exit_code
+from procedures.guards.trips import GuardTripped
 from procedures.journal import Journal
+from procedures.mending import mend
+from procedures.operators import Nobody
 from procedures.performing import Performer
+from procedures.recovery import GIVE_UP, Policy, choices, failed
 from procedures.state import RunState, apply, fold
-from procedures.steps import Step
+from procedures.status import Status
+from procedures.steps import Compute, Phase, Step
+from procedures.superseding import superseding
 from procedures.uninterrupted import uninterrupted
 
 Listener = Callable[[events.Event, RunState], None]
 
 _KILLED = int(ExitCode.INTERRUPTED)
+_IN_A_RECORD = (events.Located, events.Arrived, events.Placed)
+"""After these a record is still being taken; a pause after the record waits."""
 
 
 class Engine:
     """One run, from where its journal stands to its end.
 
-    Faces learn everything through listeners, which are called after each event is on the disk.
+    Faces learn what happened through listeners, which are called after each event is on the disk,
+    and what the engine is doing through ``status`` and ``watch``; they tell it what to do through
+    ``command``. Questions are put through ``desk``, which the performer's operator should be.
     """
 
-    def __init__(self, performer: Performer, journal: Journal, listeners: Sequence[Listener] = ()) -> None:
+    def __init__(
+        self,
+        performer: Performer,
+        journal: Journal,
+        listeners: Sequence[Listener] = (),
+        *,
+        inbox: Inbox | None = None,
+        desk: Desk | None = None,
+        policy: Policy = GIVE_UP,
+    ) -> None:
         self._performer = performer
         self._journal = journal
         self._listeners = tuple(listeners)
+        self._inbox = inbox or Inbox()
+        self._desk = desk or Desk(Nobody())
+        self._policy = policy
+        self._attention = Attention(
+            self._inbox, self._desk, supersede=self._supersede, decline=self._declined
+        )
+        self._superseded: list[events.Undone | events.SetVoided] = []
+        self._prepared = False
+        self._last: events.Event | None = None
         self.state = fold(journal.events)
+
+    @property
+    def status(self) -> Status:
+        """What the engine is doing now."""
+        return self._attention.situation.status
+
+    def watch(self, watcher: Callable[[Status], None]) -> None:
+        """Have somebody hear of every new status."""
+        self._attention.watchers.append(watcher)
+
+    def command(self, command: Command) -> None:
+        """Tell the engine something, from any thread; see :mod:`procedures.commands`."""
+        self._inbox.put(command)
 
     async def run(self) -> events.Ended:
         """Do all that is left.
 
-        Whatever stops it, motion stops in place and the journal says so before the error goes on.
+        Whatever stops it, motion stops in place and the journal says so before the error goes on. A
+        geometry that was written and could not be verified is taken back.
 
         Raises:
-            HexacellError: a step could not be done.
+            Interruption: somebody ended it before it was over.
+            HexacellError: a step could not be done, and the policy knew no way on.
         """
+        self._attention.note(begun=True)
         try:
-            await self._performer.devices.controller.prepare()
-            while (step := await self._next()) is not None:
-                self.tell(events.StepBegun(step=step))
-                self.tell(await self._performer.perform(step, self.state))
+            with self._inbox.attended():
+                while await self._went_on():
+                    pass
         except BaseException as error:
             await self._stop(error)
             raise
+        finally:
+            self._attention.note(ended=True)
         return self._end()
 
-    def void_open_sets(self) -> None:
-        """Give up what an interruption left open: nobody saw whether gauges kept their zero.
+    def reopen_sets(self) -> None:
+        """Take up what an interruption left open: what cannot be continued is given up.
 
         A run that ended without a word, by a kill or a power cut, left the robot nobody knows where.
         """
-        if self.state.standing is not None:
+        if self.state.target is not None and not self.state.lost:
             self.tell(events.Interrupted(reason="the program ended without a word", exit_code=_KILLED))
         for key, measured in list(self.state.sets.items()):
-            if not measured.closed:
+            in_vain = not measured.samples or (measured.refusals and key.phase is Phase.BEFORE)
+            if in_vain and not measured.closed:
                 self.tell(events.SetVoided(at=key, reason="the run was interrupted in this set"))
 
     def tell(self, event: events.Event) -> None:
         """Write an event down, then let everybody know."""
         self._journal.append(event)
         self.state = apply(self.state, event)
+        self._last = event
         for listener in self._listeners:
             listener(event, self.state)
+
+    async def _went_on(self) -> bool:
+        """Decide on a step and do it; whether there was one."""
+        await self._heed()
+        step: Step | None = None
+        try:
+            await self._prepare()
+            step = await self._attention.during(self._next())
+            if step is None:
+                return False
+            self.tell(events.StepBegun(step=step))
+            await self._note(await self._attention.during(self._performer.perform(step, self.state)))
+        except BrokenOff:
+            pass
+        except HexacellError as error:
+            await self._recover(error, step)
+        return True
+
+    async def _note(self, event: events.Event) -> None:
+        """Write down what a step caused; a commit that cannot be noted is taken back.
+
+        Raises:
+            HexacellError: it could not be noted.
+            SeveralErrors: nor could the commit be taken back.
+        """
+        try:
+            self.tell(event)
+        except HexacellError as error:
+            if isinstance(event, events.Committed) and self.state.committed is None:
+                await self._undo_commit(error)
+            raise
+
+    async def _undo_commit(self, cause: HexacellError) -> None:
+        step = Compute(kind="roll back")
+        try:
+            await uninterrupted(self._performer.perform(step, self.state))
+        except HexacellError as error:
+            problem = "the controller has the new geometry, which could be neither noted nor taken back"
+            raise SeveralErrors(problem, [cause, error]) from cause
+
+    async def _prepare(self) -> None:
+        if not self._prepared:
+            await self._attention.during(self._performer.prepare())
+            self._prepared = True
 
     async def _next(self) -> Step | None:
         return await asyncio.to_thread(self._performer.calibration.next_step, self.state)
 
+    async def _heed(self) -> None:
+        """Between two steps: do what was asked for meanwhile."""
+        self._attention.catch_up()
+        self._tell_superseded()
+        now = self._attention.situation
+        self._leave_if_told()
+        if now.pausing and (now.at_once or not isinstance(self._last, _IN_A_RECORD)):
+            await self._rest(at_once=now.at_once)
+
+    async def _rest(self, *, at_once: bool) -> None:
+        if at_once:
+            self._prepared = False
+            await uninterrupted(self._performer.devices.controller.stop())
+        self.tell(events.Paused(at_once=at_once))
+        self._attention.note(pausing=False, at_once=False, resting=True)
+        while self._attention.situation.resting:
+            await self._attention.take_one()
+            self._tell_superseded()
+            self._leave_if_told()
+        self.tell(events.Resumed())
+
+    def _leave_if_told(self) -> None:
+        if reason := self._attention.situation.stopping:
+            raise Interruption(reason)
+
+    def _supersede(self, command: Undo | MeasureAgain) -> str | None:
+        """Note what a person sees now, whatever is recorded until it can be obeyed."""
+        try:
+            self._superseded.append(superseding(command, reduce(apply, self._superseded, self.state)))
+        except UsageError as refusal:
+            return str(refusal)
+        return None
+
+    def _tell_superseded(self) -> None:
+        waiting, self._superseded = self._superseded, []
+        for event in waiting:
+            if self.state.set(event.at).samples:
+                self.tell(event)
+
+    def _declined(self, command: Command, reason: str) -> None:
+        self.tell(events.Declined(command=type(command).__name__, reason=reason))
+
+    async def _recover(self, error: HexacellError, step: Step | None) -> None:
+        """Find a way on after a failure; what goes wrong on the way is a failure of its own.
+
+        Raises:
+            HexacellError: the failure, where there is none.
+        """
+        while True:
+            failure = failed(self._policy, error, step, self.state)
+            self._attention.note(fault=str(error))
+            if failure.action is Action.ABORT:
+                raise error
+            if not await self._halt() and failure.action is not Action.ASK:
+                raise error  # a robot that may still move is nothing to try again with
+            if (decided := await self._decided(failure)) is None:
+                raise error
+            self._tell_trip(error)
+            self.tell(decided)
+            self._attention.note(fault=None)
+            try:
+                await self._mend(error, decided)
+            except BrokenOff:
+                return
+            except HexacellError as another:
+                error = another
+            else:
+                return
+
+    async def _decided(self, failure: events.Failed) -> events.Failed | None:
+        """The failure with what follows it, a person asked if need be; nothing where the run ends."""
+        if failure.action is not Action.ASK:
+            return failure
+        try:
+            asking = self._desk.decide(failure.reason, choices(failure))
+            action = await self._attention.during(asking)
+        except AnswerNeeded:
+            return None
+        except BrokenOff:
+            self._leave_if_told()
+            return None
+        return (
+            None if action is Action.ABORT else failure.model_copy(update={"action": action, "asked": True})
+        )
+
+    async def _mend(self, error: HexacellError, failure: events.Failed) -> None:
+        self._prepared = False
+        told = await self._attention.during(mend(self._performer, self._policy, error, failure, self.state))
+        for event in told:
+            self.tell(event)
+
+    def _tell_trip(self, error: BaseException) -> None:
+        if isinstance(error, GuardTripped):
+            self.tell(events.Tripped.of(error.trip))
+
+    async def _halt(self) -> bool:
+        """Stop motion in place; whether it is certain that it has stopped."""
+        self._prepared = False
+        try:
+            await uninterrupted(self._performer.devices.controller.stop())
+        except HexacellError:
+            return False
+        return True
+
     async def _stop(self, error: BaseException) -> None:
         reason = str(error) or type(error).__name__
         try:
+            await self._halt()
             with suppress(HexacellError):
-                await uninterrupted(self._performer.devices.controller.stop())
+                self._tell_trip(error)
+            if isinstance(error, HexacellError) and not isinstance(error, Interruption):
+                await self._withdraw(error)
+            await self._take_back()
         finally:
             with suppress(HexacellError):
-                self.tell(events.Interrupted(reason=reason, exit_code=int(_exit_code(error))))
+                self.tell(events.Interrupted(reason=reason, exit_code=int(exit_code(error))))
+
+    async def _take_back(self) -> None:
+        """Leave no provisional geometry in the controller where the robot stands level.
+
+        Elsewhere the sliders may belong to no pose of the old one; whoever resumes has it taken back.
+        """
+        standing = self.state.standing
+        if (self.state.lending and standing and standing[1] == 1) or self.state.rewriting:
+            step = Compute(kind="take back")
+            with suppress(HexacellError):
+                self._performer.guards.watch.clear()
+                self.tell(events.StepBegun(step=step))
+                self.tell(await uninterrupted(self._performer.perform(step, self.state)))
+
+    async def _withdraw(self, cause: HexacellError) -> None:
+        """Take back a geometry that stands in the controller and can no longer be verified.
+
+        Raises:
+            SeveralErrors: what hindered the verification, and what hinders this.
+        """
+        if not self.state.is_unverified:
+            return
+        step = Compute(kind="roll back")
+        try:
+            self._performer.guards.watch.clear()  # what still holds will trip anew
+            self.tell(events.StepBegun(step=step))
+            self.tell(await uninterrupted(self._performer.perform(step, self.state)))
+        except HexacellError as error:
+            problem = "the new geometry was not verified, and could not be taken back"
+            raise SeveralErrors(problem, [cause, error]) from cause
 
     def _end(self) -> events.Ended:
-        if self.state.ended is not None:
-            return self.state.ended
-        judged = self.state.judged
-        passed = judged is not None and judged.verdict is Verdict.PASS
-        code = ExitCode.DONE if passed else ExitCode.OUT_OF_LIMITS
-        line = judged.line if judged is not None else "nothing was judged"
-        if self.state.rolled_back:
-            line += "; rolled back, the controller is as it was"
-        ended = events.Ended(exit_code=int(code), line=line)
-        self.tell(ended)
+        ended = ending(self.state)
+        if self.state.ended is None:
+            self.tell(ended)
         return ended
-
-
-def _exit_code(error: BaseException) -> ExitCode:
-    if isinstance(error, SeveralErrors):
-        return error.worst
-    return error.exit_code if isinstance(error, HexacellError) else ExitCode.INTERRUPTED

@@ -6,14 +6,24 @@ commanded, and in ``RunStarted`` the geometry that commanded it.
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field
 
 from hexacell.cell.base import GeometryValues
+from hexacell.cell.recovery import Action, FailureKind
 from hexacell.controller_config.format import Branch
 from hexacell.verification import Verdict
+from procedures.guards.trips import Guard, Trip
 from procedures.steps import Frozen, SetKey, SixNumbers, Step, ThreeNumbers
+
+
+def place_of(step: Step | None) -> str:
+    """The set that a step belongs to, or the step's own key."""
+    if step is None:
+        return "deciding"
+    key = getattr(step, "at", None)
+    return step.key if key is None else str(key)
 
 
 class Identity(Frozen):
@@ -38,6 +48,7 @@ class RunStarted(Frozen):
     controller: GeometryValues
     branch: Branch
     devices: tuple[Identity, ...]
+    pose_list: str | None = None
 
 
 class StepBegun(Frozen):
@@ -56,6 +67,13 @@ class Arrived(Frozen):
     pose: SixNumbers
 
 
+class Located(Frozen):
+    """The controller said where the robot stands, after a time in which nobody knew."""
+
+    kind: Literal["located"] = "located"
+    pose: SixNumbers
+
+
 class Placed(Frozen):
     """The gauges stand around the ball."""
 
@@ -63,11 +81,21 @@ class Placed(Frozen):
     at: SetKey
 
 
+class Temperature(Frozen):
+    """What a thermometer said, deg C; without a number, ``problem`` says why there is none."""
+
+    name: str
+    celsius: float | None
+    raw: str = ""
+    problem: str = ""
+
+
 class Reading(Frozen):
     """A settled window of readings.
 
     ``gauges_mm`` and ``spread_mm`` are mean and range along base x, y, z; ``joints_mm`` the mean
     slider positions. ``answers`` and ``counts`` are the raw readings behind them, in the order taken.
+    ``temperatures`` are those of the cell's thermometers just afterwards.
     """
 
     gauges_mm: ThreeNumbers
@@ -75,6 +103,7 @@ class Reading(Frozen):
     joints_mm: SixNumbers
     answers: tuple[tuple[str, ...], ...]
     counts: tuple[tuple[int, ...], ...]
+    temperatures: tuple[Temperature, ...] = ()
 
 
 class Sampled(Frozen):
@@ -89,12 +118,33 @@ class Sampled(Frozen):
 
 
 class Refused(Frozen):
-    """A record was not taken: the ball left the travel. The orientation is chosen anew."""
+    """A record was not taken: the ball left the travel. The orientation is chosen anew.
+
+    There is no ``reading`` where a plunger at its end gave none.
+    """
 
     kind: Literal["refused"] = "refused"
     at: SetKey
     orientation: int
     reason: str
+    reading: Reading | None = None
+
+
+class Undone(Frozen):
+    """A record no longer counts and is taken again at the same pose; it stays here."""
+
+    kind: Literal["undone"] = "undone"
+    at: SetKey
+    orientation: int
+
+
+class Confirmed(Frozen):
+    """Back at the reference after an interruption: ``change_mm`` is small, the set goes on."""
+
+    kind: Literal["confirmed"] = "confirmed"
+    at: SetKey
+    change_mm: ThreeNumbers
+    reading: Reading | None = None
 
 
 class SetClosed(Frozen):
@@ -103,14 +153,37 @@ class SetClosed(Frozen):
     kind: Literal["closed"] = "closed"
     at: SetKey
     drift_mm: ThreeNumbers
+    reading: Reading | None = None
 
 
 class SetVoided(Frozen):
-    """The set is no longer to be trusted and will be measured again; its records stay here."""
+    """The set is no longer to be trusted and will be measured again; its records stay here.
+
+    There is a ``reading`` where its reference was seen again and is no longer the same.
+    """
 
     kind: Literal["voided"] = "voided"
     at: SetKey
     reason: str
+    reading: Reading | None = None
+
+
+class Lent(Frozen):
+    """The controller commands with a provisional geometry while the points are measured.
+
+    ``geometry`` is in the mechanism's frame convention. The config as it was is kept in ``folder``,
+    a part of the run folder.
+    """
+
+    kind: Literal["lent"] = "lent"
+    geometry: GeometryValues
+    folder: str
+
+
+class TakenBack(Frozen):
+    """The controller's config is as it was before a geometry was lent, and has been read."""
+
+    kind: Literal["taken back"] = "taken back"
 
 
 class Identified(Frozen):
@@ -158,6 +231,63 @@ class RolledBack(Frozen):
     kind: Literal["rolled back"] = "rolled back"
 
 
+class Tripped(Frozen):
+    """A guard stopped the robot, or kept it from moving: which, on account of what, and what to do."""
+
+    kind: Literal["tripped"] = "tripped"
+    guard: Guard
+    device: str
+    problem: str
+    action: str
+
+    @classmethod
+    def of(cls, trip: Trip) -> Self:
+        """The event of a trip."""
+        return cls(guard=trip.guard, device=trip.device, problem=trip.problem, action=trip.action)
+
+
+class Paused(Frozen):
+    """The run rests; ``at_once``: motion was stopped in place, in the middle of a step."""
+
+    kind: Literal["paused"] = "paused"
+    at_once: bool = False
+
+
+class Resumed(Frozen):
+    """The run goes on after a pause."""
+
+    kind: Literal["resumed"] = "resumed"
+
+
+class Failed(Frozen):
+    """A step, or deciding on one, failed; motion was stopped.
+
+    ``failure`` is its kind, ``attempt`` counts failures of this kind at this set or step since the
+    run was begun or resumed, and ``action`` is what follows; ``asked`` tells whether a person chose it.
+    """
+
+    kind: Literal["failed"] = "failed"
+    step: Step | None
+    failure: FailureKind
+    attempt: int
+    reason: str
+    action: Action
+    asked: bool = False
+
+    @property
+    def place(self) -> str:
+        """Where attempts are counted: the set, or the step that belongs to none."""
+        return place_of(self.step)
+
+
+class Declined(Frozen):
+    """A command that could not be obeyed, and why."""
+
+    kind: Literal["declined"] = "declined"
+    command: str
+    reason: str
+
+
 class Interrupted(Frozen):
     """The run stopped here: by a person, a fault, or because an answer is missing."""
 
@@ -178,16 +308,26 @@ Event = Annotated[
     RunStarted
     | StepBegun
     | Arrived
+    | Located
     | Placed
     | Sampled
     | Refused
+    | Undone
+    | Confirmed
     | SetClosed
     | SetVoided
+    | Lent
+    | TakenBack
     | Identified
     | Proposed
     | Committed
     | Judged
     | RolledBack
+    | Paused
+    | Resumed
+    | Failed
+    | Declined
+    | Tripped
     | Interrupted
     | Ended,
     Field(discriminator="kind"),

@@ -1,40 +1,51 @@
 """The run on disk: one JSON line an event, appended, checksummed, forced out before going on.
 
-A line is ``{"n": 7, "at": "2026-11-20T10:30:00.000Z", "event": {...}, "crc": "89abcdef"}``; the
-checksum is CRC-32 of the line without it. A torn last line is what a power cut leaves and is
-dropped; anything wrong before it is damage and refused. One process writes at a time.
+Every line is on the disk before the next is begun, so a power cut can tear the last one only: it may
+be cut off, or have zeros where its bytes should be. Such a tail is dropped; nobody was told that it
+had been written. Anything else that is wrong is damage and refused with its line. One process writes
+at a time.
 """
 
 from __future__ import annotations
 
-import errno
 import fcntl
-import json
+import gc
 import os
-import zlib
-from contextlib import suppress
-from datetime import UTC, datetime
+import stat
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from functools import partial
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Self
-
-from pydantic import TypeAdapter, ValidationError
+from typing import BinaryIO, Self
 
 from hexacell import files
 from hexacell.errors import CellBusy, FileError
 from procedures.events import Event
+from procedures.journal_lines import RESTORE, Entry, LineRefused, begins_whole, decode, encode, now
 
 NAME = "journal.jsonl"
-_EVENTS: TypeAdapter[Event] = TypeAdapter(Event)
+LONGEST_LINE = 16 << 20
+"""Bytes; no event comes near it. A file without line ends must not fill the memory."""
 
 
 def read_journal(path: Path) -> tuple[Event, ...]:
     """All events of a journal.
 
     Raises:
-        FileError: absent, or damaged before its last line; the message names the line.
+        FileError: absent, written by a newer program, or damaged before its last line; the message
+            names the line.
     """
-    return _parse(path, files.read_bytes(path))[0]
+    return tuple(entry.event for entry in read_entries(path))
+
+
+def read_entries(path: Path) -> tuple[Entry, ...]:
+    """The same with number and time of each; raises ``FileError``."""
+    try:
+        with open(path, "rb", opener=_open_without_waiting) as stream:
+            return _parse(path, stream)[0]
+    except OSError as error:
+        raise files.plain_error("cannot be read", path, error) from error
 
 
 class Journal:
@@ -48,18 +59,19 @@ class Journal:
     def __init__(self, path: Path) -> None:
         self.path = path
         try:
-            self._descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o666)
+            self._descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_APPEND | os.O_NONBLOCK, 0o666)
         except OSError as error:
-            raise files.plain_error("the journal cannot be opened", path, error) from error
+            raise self._cannot_open(error) from error
         try:
             self._hold()
-            history, whole = _parse(path, files.read_bytes(path))
-            self._events, self._whole = list(history), whole
-            os.ftruncate(self._descriptor, whole)
-            files.sync_folder(path.parent)
+            self._events, self._whole = self._read()
+        except OSError as error:
+            os.close(self._descriptor)
+            raise self._cannot_open(error) from error
         except BaseException:
             os.close(self._descriptor)
             raise
+        self._is_torn = False
 
     @property
     def events(self) -> tuple[Event, ...]:
@@ -72,15 +84,17 @@ class Journal:
         Raises:
             FileError: it could not be written; the journal is as before.
         """
-        line = _line(len(self._events) + 1, event)
+        line = self._line(event)
         try:
-            # Once more, should the last failure have left half a line and been unable to cut it off.
-            os.ftruncate(self._descriptor, self._whole)
+            if self._is_torn:
+                self._cut_off()
+            self._is_torn = True
             _write_whole(self._descriptor, line)
             os.fsync(self._descriptor)
+            self._is_torn = False
         except OSError as error:
             with suppress(OSError):
-                os.ftruncate(self._descriptor, self._whole)
+                self._cut_off()
             raise files.plain_error("the journal cannot be written", self.path, error) from error
         self._events.append(event)
         self._whole += len(line)
@@ -97,58 +111,90 @@ class Journal:
     ) -> None:
         self.close()
 
+    def _line(self, event: Event) -> bytes:
+        try:
+            return encode(Entry(len(self._events) + 1, *now(), event))
+        except ValueError as error:
+            raise FileError(
+                f"the journal cannot be written: {error}",
+                subject=self.path,
+                action="Use file names that are text in UTF-8",
+            ) from error
+
+    def _read(self) -> tuple[list[Event], int]:
+        with open(self._descriptor, "rb", closefd=False) as stream:
+            entries, whole = _parse(self.path, stream)
+        if os.fstat(self._descriptor).st_size > whole:
+            os.ftruncate(self._descriptor, whole)
+        files.sync_folder(self.path.parent)
+        return [entry.event for entry in entries], whole
+
+    def _cut_off(self) -> None:
+        """Remove what a failure left of a line, perhaps now that it can be done."""
+        os.ftruncate(self._descriptor, self._whole)
+        self._is_torn = False
+
     def _hold(self) -> None:
         try:
             fcntl.flock(self._descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
             raise CellBusy("another process writes this journal", subject=self.path) from None
 
+    def _cannot_open(self, error: OSError) -> FileError:
+        return files.plain_error("the journal cannot be opened", self.path, error)
+
+
+def _open_without_waiting(path: str, flags: int) -> int:
+    return os.open(path, flags | os.O_NONBLOCK)  # a pipe would be waited for
+
 
 def _write_whole(descriptor: int, data: bytes) -> None:
-    if os.write(descriptor, data) != len(data):
-        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+    # A disk or a limit that is nearly reached takes a part, and says why only when asked for the rest.
+    while data:
+        data = data[os.write(descriptor, data) :]
 
 
-def _line(number: int, event: Event) -> bytes:
-    at = datetime.now(UTC).isoformat(timespec="milliseconds").replace("+00:00", "Z")
-    record: dict[str, Any] = {"n": number, "at": at, "event": event.model_dump(mode="json")}
-    return _text({**record, "crc": _checksum(record)}) + b"\n"
-
-
-def _text(record: dict[str, Any]) -> bytes:
-    return json.dumps(record, separators=(",", ":"), ensure_ascii=False).encode()
-
-
-def _checksum(record: dict[str, Any]) -> str:
-    return f"{zlib.crc32(_text(record)):08x}"
-
-
-def _parse(path: Path, data: bytes) -> tuple[tuple[Event, ...], int]:
-    """The events, and how many bytes of the file are whole lines."""
-    parsed: list[Event] = []
+def _parse(path: Path, stream: BinaryIO) -> tuple[tuple[Entry, ...], int]:
+    """The entries, and how many bytes of the file are whole lines."""
+    if not stat.S_ISREG(os.fstat(stream.fileno()).st_mode):
+        raise FileError("this is not a file", subject=path, action="Check the path")
+    entries: list[Entry] = []
     whole = 0
-    for line in data.splitlines(keepends=True):
-        event = _event(line, len(parsed) + 1) if line.endswith(b"\n") else None
-        if event is None:
-            if whole + len(line) == len(data):
+    with _collector_at_rest():
+        while line := stream.readline(LONGEST_LINE):
+            due = len(entries) + 1
+            entry = _decoded(path, line, due)
+            if entry is None:
+                if begins_whole(line) or _anything_follows(stream):
+                    raise _damaged(path, due)
                 break
-            raise FileError(
-                "this line of the journal is damaged",
-                subject=path,
-                line=len(parsed) + 1,
-                action="Restore the run folder from a copy; it cannot be continued",
-            )
-        parsed.append(event)
-        whole += len(line)
-    return tuple(parsed), whole
+            entries.append(entry)
+            whole += len(line)
+    return tuple(entries), whole
 
 
-def _event(line: bytes, number: int) -> Event | None:
+def _anything_follows(stream: BinaryIO) -> bool:
+    return any(part.strip(b"\0") for part in iter(partial(stream.read, LONGEST_LINE), b""))
+
+
+def _decoded(path: Path, line: bytes, due: int) -> Entry | None:
     try:
-        record = json.loads(line)
-        checksum = record.pop("crc")
-        if record["n"] != number or checksum != _checksum(record):
-            return None
-        return _EVENTS.validate_python(record["event"])
-    except (ValueError, KeyError, TypeError, AttributeError, ValidationError):
-        return None
+        return decode(line, due)
+    except LineRefused as refusal:
+        raise FileError(refusal.problem, subject=path, line=due, action=refusal.action) from refusal
+
+
+def _damaged(path: Path, line: int) -> FileError:
+    return FileError("this line of the journal is damaged", subject=path, line=line, action=RESTORE)
+
+
+@contextmanager
+def _collector_at_rest() -> Iterator[None]:
+    """Many objects are made and none is garbage; looking for some would take most of the time."""
+    was_enabled = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if was_enabled:
+            gc.enable()

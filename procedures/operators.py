@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Protocol
 
+from hexacell.cell.recovery import Action
 from hexacell.errors import AnswerNeeded
 from hexacell.pose import Pose
 from procedures.events import Gate
@@ -19,6 +20,10 @@ class Operator(Protocol):
 
     async def approve(self, gates: Sequence[Gate], change: str) -> str | None:
         """The name of who lets the change into the controller; nothing where it is declined."""
+        ...
+
+    async def decide(self, problem: str, choices: Sequence[Action]) -> Action:
+        """What follows a failure that ``problem`` tells in plain words; one of the choices."""
         ...
 
 
@@ -47,3 +52,12 @@ class Nobody:
         raise AnswerNeeded(
             "the new geometry waits for approval: " + (" ".join(reasons) or "the cell file says to ask")
         )
+
+    async def decide(self, problem: str, choices: Sequence[Action]) -> Action:
+        """Always refuses.
+
+        Raises:
+            AnswerNeeded: says what is to be decided.
+        """
+        words = ", ".join(choice.value for choice in choices)
+        raise AnswerNeeded(f"{problem} Somebody must choose: {words}")

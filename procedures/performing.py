@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import asyncio
-from collections.abc import Callable
-from dataclasses import dataclass
-from typing import ParamSpec, TypeVar
+from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
@@ -15,11 +13,12 @@ from hexacell.archive import RunFolder
 from hexacell.assessment import assess
 from hexacell.cell.file import Cell
 from hexacell.clock import CellClock
+from hexacell.controller_config.format import ControllerGeometry
 from hexacell.controller_config.proposal import Proposal, propose
 from hexacell.controller_config.write_back import Receipt, commit, rollback
 from hexacell.errors import HexacellError, LimitError, WriteBackUndone
 from hexacell.measurement_file import write_measurements
-from hexacell.pose import Pose
+from hexacell.pose import Pose, Poses
 from hexacell.robot import config_format
 from hexacell.rotations import Array
 from hexacell.summary import assessment_document, identification_document, outcome_line
@@ -27,14 +26,16 @@ from hexacell.verification import Spread, Verdict, judge
 from procedures import events
 from procedures.calibration import Calibration, Mode
 from procedures.devices import Devices, consists_of, gathered
+from procedures.guards.guards import Guards
+from procedures.guards.trips import GuardTripped
+from procedures.lending import Lending
 from procedures.operators import Operator
+from procedures.revisiting import in_words, seen_again
 from procedures.settling import Settled, settle
 from procedures.state import RunState
-from procedures.steps import CloseSet, Compute, Move, Phase, Place, Sample, Step
-from procedures.uninterrupted import uninterrupted
-
-Arguments = ParamSpec("Arguments")
-Result = TypeVar("Result")
+from procedures.steps import CloseSet, Compute, Locate, Move, Phase, Place, Revisit, Sample, Step
+from procedures.temperatures import Thermometers
+from procedures.uninterrupted import in_thread
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,29 +48,68 @@ class Performer:
     clock: CellClock
     operator: Operator
     folder: RunFolder
+    thermometers: Thermometers = field(default_factory=Thermometers)
 
-    async def perform(self, step: Step, state: RunState) -> events.Event:
+    @cached_property
+    def guards(self) -> Guards:
+        """What stops the robot when something is wrong; what they latch lasts as long as this."""
+        return Guards(self.cell.settings, self.devices, self.clock, self.folder.path)
+
+    @cached_property
+    def lending(self) -> Lending:
+        """Lends the controller a geometry, and takes it back."""
+        return Lending(self.cell, self.calibration, self.guards, self.folder)
+
+    async def prepare(self) -> None:
+        """Make the controller ready to move; raises ``HexacellError``."""
+        await self.guards.prepare()
+
+    async def perform(self, step: Step, state: RunState) -> events.Event:  # noqa: PLR0911 - a case a step
         """Do one step.
 
         Raises:
             HexacellError: it could not be done; the message says what to do.
         """
         match step:
+            case Locate():
+                return events.Located(pose=(await self.devices.controller.pose()).as_tuple())
             case Move():
-                await self.devices.controller.move(step.target)
-                return events.Arrived(at=step.at, orientation=step.orientation, pose=step.pose)
+                return await self._move(step, state)
             case Place():
                 return await self._place(step)
             case Sample():
                 return await self._sample(step, state)
+            case Revisit():
+                return await self._revisit(step, state)
             case CloseSet():
                 return await self._close(step, state)
             case Compute():
                 return await self._compute(step, state)
 
+    async def _move(self, step: Move, state: RunState) -> events.Event:
+        try:
+            await self.guards.move(step, state, lambda: self._commanded(step, lending=state.lending))
+        except GuardTripped as tripped:
+            if step.at.phase is not Phase.AFTER or not tripped.trip.is_about_the_ball:
+                raise
+            # The new geometry takes the ball off its plate: that is a verdict, and it is rolled back.
+            self.guards.watch.clear()
+            return events.Refused(at=step.at, orientation=step.orientation, reason=str(tripped))
+        return events.Arrived(at=step.at, orientation=step.orientation, pose=step.pose)
+
+    def _commanded(self, step: Move, *, lending: bool) -> Array:
+        """Where the sliders (6,), mm, belong by the geometry that the controller has now."""
+        robot = self.calibration.robot
+        commanding = ControllerGeometry(robot.controller, robot.branch)
+        if lending or step.at.phase is Phase.AFTER:
+            commanding = config_format(self.cell.settings).read(self.cell.config_path)
+        target = Poses.of([step.target])
+        joints: Array = robot.mechanism.inverse(commanding.geometry, commanding.branch, target)[0]
+        return joints
+
     async def _place(self, step: Place) -> events.Event:
         if self.cell.settings.stations.placement == "by-hand":
-            await self.operator.place_gauges(step.at.point, Pose(*step.pose))
+            await self.guards.stand(lambda: self.operator.place_gauges(step.at.point, Pose(*step.pose)))
         return events.Placed(at=step.at)
 
     async def _sample(self, step: Sample, state: RunState) -> events.Event:
@@ -84,8 +124,8 @@ class Performer:
         deviation = np.subtract(reading.gauges_mm, zero.gauges_mm)
         travel = self.cell.settings.limits.gauge_travel_mm
         if np.abs(deviation).max() > travel:
-            reason = f"the ball is {_words(deviation)} mm from its reference, farther than {travel:g} mm"
-            return events.Refused(at=step.at, orientation=step.orientation, reason=reason)
+            reason = f"the ball is {in_words(deviation)} mm from its reference, farther than {travel:g} mm"
+            return events.Refused(at=step.at, orientation=step.orientation, reason=reason, reading=reading)
         return events.Sampled(
             at=step.at,
             orientation=step.orientation,
@@ -94,42 +134,66 @@ class Performer:
             deviation_mm=_three(deviation),
         )
 
+    async def _revisit(self, step: Revisit, state: RunState) -> events.Event:
+        try:
+            reading = await self._read()
+        except HexacellError as error:
+            if not consists_of(error, GaugeAtEnd):
+                raise
+            return events.SetVoided(at=step.at, reason=str(error))
+        await self._check_gauges()
+        return seen_again(step.at, state.set(step.at).samples[0].reading, reading, self.agreement_mm)
+
+    @property
+    def agreement_mm(self) -> float:
+        """The largest change of a reference with which a set goes on after an interruption."""
+        return self.cell.settings.recovery.agreement_mm
+
+    async def _check_gauges(self) -> None:
+        checks = [mounted.gauge.check() for mounted in self.devices.gauges]
+        await gathered("gauges are not as they were", checks)
+
     async def _close(self, step: CloseSet, state: RunState) -> events.Event:
         reading = await self._read()
         zero = state.set(step.at).samples[0].reading
         drift = np.subtract(reading.gauges_mm, zero.gauges_mm)
-        await gathered(
-            "gauges are not as they were", [mounted.gauge.check() for mounted in self.devices.gauges]
-        )
-        limit = self.cell.settings.acceptance.drift_mm
-        if np.abs(drift).max() > limit:
-            raise LimitError(
-                f"{step.at}: back at the reference the gauges show {_words(drift)}, more than {limit:g} mm",
-                action="A gauge slipped or the machine does not repeat; resume measures this point again",
-            )
-        return events.SetClosed(at=step.at, drift_mm=_three(drift))
+        await self._check_gauges()
+        if drifted := self.guards.drift(str(step.at), _three(drift)):
+            raise drifted
+        return events.SetClosed(at=step.at, drift_mm=_three(drift), reading=reading)
 
     async def _read(self) -> events.Reading:
-        settled = await settle(self.devices, self.cell.settings.timing, self.clock)
-        return _reading(self.devices, settled)
+        timing = self.cell.settings.timing
+        settled = await self.guards.sample(lambda: settle(self.devices, timing, self.clock))
+        return _reading(self.devices, settled, await self.thermometers.read())
 
     async def _compute(self, step: Compute, state: RunState) -> events.Event:
         match step.kind:
             case "identify":
-                return await _in_thread(self._identify, state)
+                return await in_thread(self._identify, state)
             case "propose":
-                return await _in_thread(self._propose, state)
+                return await in_thread(self._propose, state)
+            case "judge":
+                return await in_thread(self._judge, state)
+            case _:
+                return await self._rewritten(step, state)
+
+    async def _rewritten(self, step: Compute, state: RunState) -> events.Event:
+        """The controller's config changed, and the controller has read it."""
+        match step.kind:
+            case "lend":
+                return await self.lending.lend(state)
+            case "take back":
+                return await self.lending.take_back(state)
             case "commit":
                 return await self._commit(state)
-            case "judge":
-                return await _in_thread(self._judge, state)
-            case "roll back":
+            case _:
                 return await self._roll_back()
 
     def _identify(self, state: RunState) -> events.Event:
         write_measurements(self.folder.measurements, state.measurements())
         identified = self.calibration.identification(state)
-        robot = self.calibration.robot
+        robot = self.calibration.robot_of(state)
         assessed = assess(self.cell.settings, robot, state.measurements(), identified)
         document = identification_document(identified)
         self.folder.write_result(document | assessment_document(identified, assessed))
@@ -168,11 +232,11 @@ class Performer:
             raise LimitError("the new geometry is refused: " + " ".join(refused))
         proposal = Proposal.load(self.folder.proposal)
         approved_by = await self._approval(conditions, proposal)
-        receipt = await _in_thread(commit, proposal, self.folder.path)
+        receipt = await in_thread(commit, proposal, self.folder.path)
         try:
-            await self.devices.controller.reload()
+            await self.guards.reload()
         except HexacellError as error:
-            await _in_thread(rollback, receipt)
+            await in_thread(rollback, receipt)
             raise await self._undone(receipt, error) from error
         return events.Committed(approved_by=approved_by)
 
@@ -219,19 +283,14 @@ class Performer:
         return events.Judged(verdict=verdict, line=line)
 
     async def _roll_back(self) -> events.Event:
-        await _in_thread(rollback, Receipt.of(self.folder.path))
-        await self.devices.controller.reload()
+        await in_thread(rollback, Receipt.of(self.folder.path))
+        await self.guards.reload()
         return events.RolledBack()
 
 
-async def _in_thread(
-    work: Callable[Arguments, Result], *args: Arguments.args, **kwargs: Arguments.kwargs
-) -> Result:
-    """Work that may write files: who cancels it waits for its end, or it would write behind his back."""
-    return await uninterrupted(asyncio.to_thread(work, *args, **kwargs))
-
-
-def _reading(devices: Devices, settled: Settled) -> events.Reading:
+def _reading(
+    devices: Devices, settled: Settled, temperatures: tuple[events.Temperature, ...]
+) -> events.Reading:
     means, spreads = settled.gauge_means(), settled.gauge_spread()
     on_axes, spread = np.zeros(3), np.zeros(3)
     for row, mounted in enumerate(devices.gauges):
@@ -244,6 +303,7 @@ def _reading(devices: Devices, settled: Settled) -> events.Reading:
         joints_mm=(q1, q2, q3, q4, q5, q6),
         answers=tuple(tuple(reading.raw for reading in glance.gauges) for glance in settled.window),
         counts=tuple(glance.encoders.counts for glance in settled.window),
+        temperatures=temperatures,
     )
 
 
@@ -259,7 +319,3 @@ def _check_line(found: Spread | None, limit_mm: float, verdict: Verdict) -> str:
 def _three(values: Array) -> tuple[float, float, float]:
     x, y, z = (float(value) for value in values)
     return x, y, z
-
-
-def _words(deviation: Array) -> str:
-    return ", ".join(f"{axis} {value:+.3f}" for axis, value in zip("xyz", deviation, strict=True))

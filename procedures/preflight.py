@@ -3,23 +3,28 @@
 from __future__ import annotations
 
 from collections.abc import Awaitable, Iterator
+from pathlib import Path
 
 from drivers.gauges.errors import GaugeAtEnd
 from drivers.ports import EncoderRound, GaugeReading
-from hexacell.errors import AnswerNeeded, HexacellError, SeveralErrors, UsageError
+from hexacell.errors import AnswerNeeded, HexacellError, SeveralErrors
+from hexacell.planning import feasibility
 from hexacell.pose import Pose
 from procedures.calibration import Calibration, Mode
 from procedures.devices import Devices, each, gathered
+from procedures.guards import rules
+from procedures.guards.space import free_bytes
 
 
 def plan_failures(calibration: Calibration, *, unattended: bool) -> Iterator[HexacellError]:
     """What is wrong with the plan itself, before any device is asked."""
-    for name, pose in _references(calibration):
-        try:
-            calibration.robot.require_reach(name, pose)
-        except HexacellError as error:
-            yield error if error.subject else type(error)(error.problem, subject=name, action=error.action)
-    yield from _too_few_records(calibration)
+    unreachable = [*feasibility.reach_failures(calibration.plan), *_held_out_failures(calibration)]
+    yield from unreachable
+    if calibration.mode is Mode.OPTIMISE:
+        too_few = [*feasibility.too_few_records(calibration.plan)]
+        yield from too_few
+        if not unreachable and not too_few:
+            yield from feasibility.plan_failures(calibration.plan)
     if unattended and calibration.settings.stations.placement == "by-hand":
         yield AnswerNeeded(
             "unattended running is not possible: the gauges are put at each point by hand",
@@ -27,20 +32,9 @@ def plan_failures(calibration: Calibration, *, unattended: bool) -> Iterator[Hex
         )
 
 
-def _too_few_records(calibration: Calibration) -> Iterator[UsageError]:
-    if calibration.mode is Mode.CHECK:
-        return
-    plan = calibration.settings.identification
-    unknowns = len(calibration.robot.mechanism.convention.free_names())
-    equations = 3 * len(plan.points) * (plan.orientations - 1)
-    if equations < unknowns:
-        needed = 1 - (-unknowns // (3 * len(plan.points)))
-        yield UsageError(
-            f"{len(plan.points)} points with {plan.orientations} orientations give {equations} equations "
-            f"for {unknowns} parameters",
-            subject="[identification]",
-            action=f"Have at least {needed} orientations at each point",
-        )
+def _held_out_failures(calibration: Calibration) -> Iterator[HexacellError]:
+    for number, point in enumerate(calibration.settings.verification.points, start=1):
+        yield from feasibility.refusals(calibration.plan, f"verification point {number}", Pose(*point))
 
 
 async def device_failures(devices: Devices) -> list[HexacellError]:
@@ -56,17 +50,19 @@ async def device_failures(devices: Devices) -> list[HexacellError]:
     return []
 
 
+async def start_failures(devices: Devices, folder: Path, free_disk_mb: float) -> list[HexacellError]:
+    """What keeps a run from beginning beside its devices: the stop line, and a disk without room."""
+    pressed = await devices.stop_line.pressed()
+    trips = [
+        None if pressed is None else rules.forbidden(pressed),
+        rules.disk(str(folder), free_bytes(folder), free_disk_mb),
+    ]
+    return [trip.as_error() for trip in trips if trip is not None]
+
+
 def raise_all(failures: list[HexacellError]) -> None:
     """Raise one failure as it is, several in one report, none not at all."""
     if len(failures) == 1:
         raise failures[0]
     if failures:
         raise SeveralErrors(f"{len(failures)} things stand in the way", failures)
-
-
-def _references(calibration: Calibration) -> Iterator[tuple[str, Pose]]:
-    settings = calibration.settings
-    for number, point in enumerate(settings.identification.points, start=1):
-        yield f"identification point {number}", Pose(*point)
-    for number, point in enumerate(settings.verification.points, start=1):
-        yield f"verification point {number}", Pose(*point)

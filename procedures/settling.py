@@ -19,6 +19,10 @@ LEAST_WINDOWS = 3
 """So many windows' worth of readings are taken before giving up, however long they take."""
 
 
+class NeverSettled(DeviceError):
+    """The readings did not come to rest in the time allowed."""
+
+
 @dataclass(frozen=True, slots=True)
 class Glance:
     """All devices read once, one after the other's question: gauges and encoders at ``at_s``."""
@@ -126,9 +130,9 @@ def _moving(devices: Devices, timing: TimingSettings, settled: Settled) -> list[
     ]
 
 
-def _never_settled(timing: TimingSettings, moving: list[str]) -> DeviceError:
+def _never_settled(timing: TimingSettings, moving: list[str]) -> NeverSettled:
     words = ", ".join(moving) or "the window of readings is longer than that"
-    return DeviceError(
+    return NeverSettled(
         f"the readings did not settle within {timing.give_up_s:g} s: {words}",
         action="Look for vibration or a slipping gauge; the limits are in [timing] of the cell file",
     )

@@ -6,25 +6,66 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from functools import reduce
 
+from hexacell.cell.recovery import Action, FailureKind
 from hexacell.measurements import MeasurementSet, Record
 from hexacell.pose import Pose
 from procedures import events
-from procedures.steps import Phase, SetKey, SixNumbers
+from procedures.steps import Compute, Move, Phase, SetKey, SixNumbers
 
 
 @dataclass(frozen=True, slots=True)
 class SetState:
-    """One set as far as it is measured."""
+    """One set as far as it is measured.
+
+    Attributes:
+        samples: those that count, in the order taken; the first is the reference.
+        again: poses whose records were undone and are to be taken again, by orientation.
+        doubtful: nobody watched the gauges for a while; their zero must be seen again.
+    """
 
     samples: tuple[events.Sampled, ...] = ()
     placed: bool = False
     refusals: int = 0
     drift_mm: tuple[float, float, float] | None = None
+    again: tuple[tuple[int, SixNumbers], ...] = ()
+    doubtful: bool = False
 
     @property
     def closed(self) -> bool:
         """Whether its reference was read again at the end."""
         return self.drift_mm is not None
+
+    @property
+    def next_orientation(self) -> int:
+        """The lowest orientation without a record."""
+        taken = {sample.orientation for sample in self.samples}
+        return next(number for number in range(1, len(taken) + 2) if number not in taken)
+
+    def pose(self, orientation: int) -> SixNumbers | None:
+        """Where a record was, or is to be, taken; nothing where that is not decided."""
+        found = [sample.pose for sample in self.samples if sample.orientation == orientation]
+        return found[0] if found else dict(self.again).get(orientation)
+
+    def doubted(self) -> SetState:
+        """The same after a time in which nobody watched; a closed set is done with."""
+        return self if self.closed or not self.samples else replace(self, doubtful=True)
+
+    def with_sample(self, sample: events.Sampled) -> SetState:
+        """One more record."""
+        again = tuple(pair for pair in self.again if pair[0] != sample.orientation)
+        return replace(self, samples=(*self.samples, sample), again=again)
+
+    def refused(self, orientation: int) -> SetState:
+        """One more record that could not be taken; its orientation is chosen anew."""
+        again = tuple(pair for pair in self.again if pair[0] != orientation)
+        return replace(self, refusals=self.refusals + 1, again=again)
+
+    def without(self, orientation: int) -> SetState:
+        """One record less; a set that was closed is open again, and its gauges are not believed."""
+        kept = tuple(sample for sample in self.samples if sample.orientation != orientation)
+        undone = [(s.orientation, s.pose) for s in self.samples if s.orientation == orientation]
+        less = replace(self, samples=kept, again=(*self.again, *undone), drift_mm=None)
+        return less.doubted() if self.closed else less
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,21 +74,39 @@ class RunState:
 
     Attributes:
         sets: by key, voided ones left out.
-        standing: the set and orientation whose pose the robot holds, if it is known, and
-            ``target``, that pose as it was commanded.
+        standing: the set and orientation whose pose the robot holds, if it holds one, and
+            ``target``, the pose that it was last commanded to or found at.
+        astray: it stands at a pose of no set: it was found there, or is on its way.
+        lost: it may stand anywhere by now; the controller must be asked before it moves.
+        failures: how many, by kind and place, since the run was begun or resumed.
+        withdrawing: the old geometry is being put back.
+        lent: the provisional geometry that the controller was lent last, and ``lending``: whether it
+            has it now; ``rewriting``: it is being lent or taken back, and nobody knows how far that got.
     """
 
     started: events.RunStarted | None = None
     sets: dict[SetKey, SetState] = field(default_factory=dict)
     standing: tuple[SetKey, int] | None = None
     target: SixNumbers | None = None
+    astray: bool = False
+    lost: bool = False
     voided: int = 0
     identified: events.Identified | None = None
     proposed: events.Proposed | None = None
     committed: events.Committed | None = None
     judged: events.Judged | None = None
     rolled_back: bool = False
+    withdrawing: bool = False
+    lent: events.Lent | None = None
+    lending: bool = False
+    rewriting: bool = False
+    failures: dict[tuple[str, str], int] = field(default_factory=dict)
     ended: events.Ended | None = None
+
+    @property
+    def is_unverified(self) -> bool:
+        """Whether the controller has a new geometry on which no verdict was given."""
+        return self.committed is not None and self.judged is None
 
     def set(self, key: SetKey) -> SetState:
         """One set; an empty one where nothing was measured yet."""
@@ -60,7 +119,7 @@ class RunState:
 
     def measurements(self) -> MeasurementSet:
         """The records that the geometry is identified from."""
-        return MeasurementSet(tuple(_record(sample) for sample in self.samples(Phase.IDENTIFY)))
+        return MeasurementSet(tuple(record(sample) for sample in self.samples(Phase.IDENTIFY)))
 
     def refusals(self, phase: Phase) -> int:
         """How many records of a phase were refused."""
@@ -80,18 +139,30 @@ def apply(state: RunState, event: events.Event) -> RunState:  # noqa: C901, PLR0
     """The state after one more event."""
     match event:
         case events.RunStarted():
-            return replace(state, started=event)
+            return replace(state, started=event, lost=True)
+        case events.StepBegun(step=Compute(kind="roll back")):
+            return replace(state, withdrawing=True)
+        case events.StepBegun(step=Compute(kind="lend" | "take back")):
+            return replace(state, rewriting=True)
+        case events.Lent():
+            return replace(state, lent=event, lending=True, rewriting=False, standing=None, lost=True)
+        case events.TakenBack():
+            return replace(state, lending=False, rewriting=False, standing=None, lost=True)
+        case events.Located():
+            return replace(state, standing=None, astray=True, target=event.pose, lost=False)
         case events.Arrived():
-            return replace(state, standing=(event.at, event.orientation), target=event.pose)
+            return _doubted(_arrived(state, event), but=event.at)
         case events.Placed():
             return _with_set(state, event.at, replace(state.set(event.at), placed=True))
         case events.Sampled():
-            before = state.set(event.at)
-            return _with_set(state, event.at, replace(before, samples=(*before.samples, event)))
+            return _with_set(state, event.at, state.set(event.at).with_sample(event))
         case events.Refused():
-            before = state.set(event.at)
-            standing_nowhere = replace(state, standing=None)
-            return _with_set(standing_nowhere, event.at, replace(before, refusals=before.refusals + 1))
+            refused = state.set(event.at).refused(event.orientation)
+            return _with_set(replace(state, standing=None), event.at, refused)
+        case events.Undone():
+            return _with_set(state, event.at, state.set(event.at).without(event.orientation))
+        case events.Confirmed():
+            return _with_set(state, event.at, replace(state.set(event.at), doubtful=False))
         case events.SetClosed():
             return _with_set(state, event.at, replace(state.set(event.at), drift_mm=event.drift_mm))
         case events.SetVoided():
@@ -102,24 +173,67 @@ def apply(state: RunState, event: events.Event) -> RunState:  # noqa: C901, PLR0
         case events.Proposed():
             return replace(state, proposed=event)
         case events.Committed():
-            return replace(state, committed=event, standing=None)
+            # The same sliders are another pose under another geometry.
+            return replace(state, committed=event, standing=None, lost=True)
         case events.Judged():
             return replace(state, judged=event)
         case events.RolledBack():
-            return replace(state, rolled_back=True, standing=None)
+            return _rolled_back(replace(state, standing=None, lost=True, withdrawing=False))
+        case events.Paused(at_once=True):
+            return _doubted(_nowhere(state))
+        case events.Failed():
+            return _failed(_nowhere(state), event)
         case events.Interrupted():
-            return replace(state, standing=None)
+            return _doubted(replace(_nowhere(state), failures={}))
         case events.Ended():
             return replace(state, ended=event)
         case _:
             return state
 
 
+def _arrived(state: RunState, event: events.Arrived) -> RunState:
+    on_the_way = event.orientation == 0
+    standing = None if on_the_way else (event.at, event.orientation)
+    return replace(state, standing=standing, astray=on_the_way, target=event.pose, lost=False)
+
+
+def _nowhere(state: RunState) -> RunState:
+    return replace(state, standing=None, lost=True)
+
+
+def _doubted(state: RunState, but: SetKey | None = None) -> RunState:
+    """Sets that are left open lose their trust: gauges are carried away, slip, or are switched off."""
+    return replace(state, sets={k: v if k == but else v.doubted() for k, v in state.sets.items()})
+
+
+def _failed(state: RunState, event: events.Failed) -> RunState:
+    where = (event.failure.value, event.place)
+    counted = replace(state, failures={**state.failures, where: event.attempt})
+    match event.step:
+        # The ball left its plate on the way to a pose that was chosen: another one is to be chosen.
+        case Move(at=at, orientation=orientation) if _is_plate(event) and at.phase is Phase.IDENTIFY:
+            counted = _with_set(counted, at, counted.set(at).refused(orientation))
+    return _doubted(counted) if event.action is Action.MEASURE_AGAIN else counted
+
+
+def _is_plate(event: events.Failed) -> bool:
+    return event.failure is FailureKind.GAUGE_AT_END and event.action is not Action.REDO_SET
+
+
+def _rolled_back(state: RunState) -> RunState:
+    """Without a verdict the proposal waits again: nothing was verified under the geometry that went."""
+    if state.judged is not None:
+        return replace(state, rolled_back=True)
+    kept = {key: value for key, value in state.sets.items() if key.phase is not Phase.AFTER}
+    return replace(state, committed=None, sets=kept)
+
+
 def _with_set(state: RunState, key: SetKey, value: SetState) -> RunState:
     return replace(state, sets={**state.sets, key: value})
 
 
-def _record(sample: events.Sampled) -> Record:
+def record(sample: events.Sampled) -> Record:
+    """A record as the mathematics takes it."""
     return Record(
         sample.at.point,
         sample.orientation,

@@ -16,7 +16,7 @@ ThreeNumbers = tuple[float, float, float]
 class Frozen(BaseModel):
     """A record of the journal."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", ser_json_inf_nan="constants")
 
 
 class Phase(StrEnum):
@@ -37,16 +37,44 @@ class SetKey(Frozen):
         return f"{self.phase.value}{self.point}"
 
 
+class Forecast(Frozen):
+    """The predicted error at the worst task pose, 1 sigma, mm: now, after this record, at the end.
+
+    The end is ``records`` more away, this one included, and that many ``minutes``.
+    """
+
+    now_mm: float
+    next_mm: float
+    end_mm: float
+    records: int
+    minutes: float
+
+
 class Expectation(Frozen):
     """What the gauges should show (mm, base x y z), one sigma, and what is learnt (nat)."""
 
     deviation_mm: ThreeNumbers
     sigma_mm: ThreeNumbers
     gain: float
+    forecast: Forecast | None = None
+
+
+class Locate(Frozen):
+    """Ask the controller where the robot stands: nobody knows, and no way is safe from nowhere."""
+
+    kind: Literal["locate"] = "locate"
+
+    @property
+    def key(self) -> str:
+        """Stable name of the step."""
+        return self.kind
 
 
 class Move(Frozen):
-    """Send the robot to a pose; the first orientation of a set is its reference."""
+    """Send the robot to a pose; the first orientation of a set is its reference.
+
+    Orientation 0 is a pose on the way, at which nothing is measured.
+    """
 
     kind: Literal["move"] = "move"
     at: SetKey
@@ -92,6 +120,18 @@ class Sample(Frozen):
         return f"{self.at}/o{self.orientation:02d}/sample"
 
 
+class Revisit(Frozen):
+    """Back at a set's reference after an interruption: see whether the gauges kept their zero."""
+
+    kind: Literal["revisit"] = "revisit"
+    at: SetKey
+
+    @property
+    def key(self) -> str:
+        """Stable name of the step."""
+        return f"{self.at}/revisit"
+
+
 class CloseSet(Frozen):
     """Back at the set's reference pose: read again; the difference is drift."""
 
@@ -107,7 +147,7 @@ class CloseSet(Frozen):
 class Compute(Frozen):
     """A step that moves nothing."""
 
-    kind: Literal["identify", "propose", "commit", "judge", "roll back"]
+    kind: Literal["lend", "take back", "identify", "propose", "commit", "judge", "roll back"]
 
     @property
     def key(self) -> str:
@@ -115,4 +155,4 @@ class Compute(Frozen):
         return self.kind
 
 
-Step = Annotated[Move | Place | Sample | CloseSet | Compute, Field(discriminator="kind")]
+Step = Annotated[Locate | Move | Place | Sample | Revisit | CloseSet | Compute, Field(discriminator="kind")]

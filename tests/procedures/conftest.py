@@ -10,7 +10,7 @@ import asyncio
 import shutil
 import threading
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
@@ -19,7 +19,7 @@ from typing import Any
 import pytest
 
 from drivers.gauges.errors import GaugeAtEnd
-from drivers.ports import DeviceIdentity, EncoderRound, GaugeReading
+from drivers.ports import ControllerStatus, DeviceIdentity, EncoderRound, GaugeReading
 from drivers.simulated import machine as machine_module
 from drivers.simulated.cell import _world
 from drivers.simulated.machine import SimulatedMachine
@@ -27,6 +27,7 @@ from drivers.simulated.world import World
 from hexacell.archive import RunFolder
 from hexacell.bundled import bundled_config
 from hexacell.cell.file import Cell, dump, load_cell
+from hexacell.cell.recovery import Action
 from hexacell.clock import CellClock
 from hexacell.composition.calibration import _beginning
 from hexacell.controller_config.native_toml import NativeToml
@@ -39,10 +40,12 @@ from hexacell.robot import robot_of
 from procedures import calibration as calibration_module
 from procedures import events
 from procedures.calibration import Calibration, Mode
+from procedures.desk import Desk
 from procedures.devices import Devices, MountedGauge
 from procedures.engine import Engine, Listener
 from procedures.journal import Journal
 from procedures.performing import Performer
+from procedures.recovery import GIVE_UP, Policy
 from procedures.steps import Phase, SetKey, SixNumbers, ThreeNumbers
 
 HALF_TRAVEL_MM = 6.25
@@ -107,6 +110,12 @@ class FakeGauge(Fake):
             raise GaugeAtEnd("is at an end of its travel", subject=f"gauge {self.name}")
         return GaugeReading(value, f"{value:+.3f}")
 
+    async def glance(self) -> GaugeReading:
+        value = self.shown()
+        if abs(value) > HALF_TRAVEL_MM:
+            raise GaugeAtEnd("is at an end of its travel", subject=f"gauge {self.name}")
+        return GaugeReading(value, f"{value:+.3f}")
+
     async def check(self) -> None:
         if self.void:
             raise self.void
@@ -136,6 +145,7 @@ class FakeController(Fake):
         self.machine: SimulatedMachine | None = None
         self.log: list[str] = []
         self.failures: dict[str, BaseException] = {}
+        self.now = ControllerStatus(estop=False, enabled=True)
 
     def _do(self, order: str, target: str = "") -> None:
         self.log.append(f"{order} {target}".strip())
@@ -154,7 +164,11 @@ class FakeController(Fake):
             self.machine.move(pose)
 
     async def pose(self) -> Pose:
-        raise NotImplementedError
+        self._do("pose")
+        return self.machine.pose() if self.machine else Pose(0.0, 0.0, 0.0)
+
+    async def status(self) -> ControllerStatus:
+        return self.now
 
     async def stop(self) -> None:
         self._do("stop")
@@ -172,6 +186,8 @@ class Approver:
         self.name = name
         self.placed: list[int] = []
         self.asked: list[tuple[Sequence[events.Gate], str]] = []
+        self.problems: list[str] = []
+        self.decisions: list[Action] = []
 
     async def place_gauges(self, point: int, pose: Pose) -> None:
         self.placed.append(point)
@@ -179,6 +195,10 @@ class Approver:
     async def approve(self, gates: Sequence[events.Gate], change: str) -> str | None:
         self.asked.append((gates, change))
         return self.name
+
+    async def decide(self, problem: str, choices: Sequence[Action]) -> Action:
+        self.problems.append(problem)
+        return self.decisions.pop(0) if self.decisions else Action.ABORT
 
 
 @dataclass
@@ -203,6 +223,7 @@ class Rig:
     folder: RunFolder
     mode: Mode = Mode.OPTIMISE
     operator: Any = field(default_factory=Approver)
+    engine: Any = None
 
     def __post_init__(self) -> None:
         simulation = self.cell.settings.simulation
@@ -229,14 +250,16 @@ class Rig:
         nobody: Any = SimpleNamespace(identities=())
         return _beginning(self.cell, self.calibration, nobody)
 
-    async def run(self, *listeners: Listener) -> events.Ended:
-        """Begin, or go on where the folder's journal ends."""
+    async def run(self, *listeners: Listener, policy: Policy = GIVE_UP) -> events.Ended:
+        """Begin, or go on where the folder's journal ends; ``engine`` is the one that does."""
         self.folder.path.mkdir(exist_ok=True)
+        desk = Desk(self.performer.operator)
+        performer = replace(self.performer, operator=desk)
         with Journal(self.folder.journal) as journal:
-            engine = Engine(self.performer, journal, listeners)
+            engine = self.engine = Engine(performer, journal, listeners, desk=desk, policy=policy)
             if engine.state.started is None:
                 engine.tell(self.started())
-            engine.void_open_sets()
+            engine.reopen_sets()
             return await engine.run()
 
     def write(self, history: Sequence[events.Event]) -> None:
@@ -379,6 +402,12 @@ class Story:
 
     def closed(self) -> events.Event:
         return events.SetClosed(at=self.key, drift_mm=NOTHING_IS_ZERO)
+
+    def undone(self, orientation: int) -> events.Event:
+        return events.Undone(at=self.key, orientation=orientation)
+
+    def confirmed(self) -> events.Event:
+        return events.Confirmed(at=self.key, change_mm=NOTHING_IS_ZERO)
 
     def voided(self) -> events.Event:
         return events.SetVoided(at=self.key, reason="interrupted")

@@ -9,15 +9,18 @@ from typing import Any
 import numpy as np
 import pytest
 
-from hexacell.design import next_pose
+from hexacell.design.route import route
 from hexacell.errors import LimitError
+from hexacell.planning import choosing
+from hexacell.planning import plan as module
+from hexacell.planning.plan import REFUSALS
+from hexacell.planning.situation import Visit
 from hexacell.pose import Pose
 from hexacell.verification import Verdict
-from procedures import calibration as module
 from procedures import events
-from procedures.calibration import REFUSALS, Mode, expected_records
+from procedures.calibration import Calibration, Mode, expected_records
 from procedures.state import fold
-from procedures.steps import Move, Phase, Place, Sample
+from procedures.steps import Compute, Move, Phase, Place, Sample
 
 POINTS, ORIENTATIONS, HELD_OUT = 2, 9, 3
 HELD_OUT_POSES = tuple(
@@ -31,6 +34,8 @@ PASS, WORSE, OUT, UNKNOWN = (
     events.Judged(verdict=verdict, line="so it is")
     for verdict in (Verdict.PASS, Verdict.WORSE, Verdict.OUT_OF_LIMITS, Verdict.NOT_EVALUATED)
 )
+LOCATED = events.Located(pose=(100.0, -100.0, 500.0, 0.0, 0.0, 0.0))
+WITHDRAWING = events.StepBegun(step=Compute(kind="roll back"))
 INTERRUPTED = events.Interrupted(reason="a power cut", exit_code=130)
 
 
@@ -74,7 +79,20 @@ TABLE: Table = {
     ),
     "first point closed": (lambda s, t: s().whole(ORIENTATIONS), "P2/o01/move"),
     "closed with few records": (lambda s, t: s().whole(1), "P2/o01/move"),
-    "interrupted at a pose": (lambda s, t: [s().arrived(), INTERRUPTED], "P1/o01/move"),
+    "interrupted at a pose": (lambda s, t: [s().arrived(), INTERRUPTED], "locate"),
+    "found after an interruption": (lambda s, t: [s().arrived(), INTERRUPTED, LOCATED], "P1/o01/move"),
+    "interrupted with records": (lambda s, t: [*s().whole(3)[:-2], INTERRUPTED, LOCATED], "P1/o01/move"),
+    "back at the reference to see": (
+        lambda s, t: [*s().whole(3)[:-2], INTERRUPTED, LOCATED, s().arrived()],
+        "P1/revisit",
+    ),
+    "seen to be as before": (
+        lambda s, t: [*s().whole(3)[:-2], INTERRUPTED, LOCATED, s().arrived(), s().confirmed()],
+        "P1/o04/move",
+    ),
+    "the last record undone": (lambda s, t: [*s().whole(3)[:-2], s().undone(3)], "P1/o03/sample"),
+    "an earlier record undone": (lambda s, t: [*s().whole(4)[:-2], s().undone(3)], "P1/o03/move"),
+    "a record of a closed set undone": (lambda s, t: [*t["measured"], s().undone(3)], "P1/o01/move"),
     "a set voided": (lambda s, t: [*s().whole(3)[:-2], s().voided()], "P1/o01/move"),
     "an earlier set voided": (
         lambda s, t: [*t["measured"], s(Phase.IDENTIFY, 1).voided()],
@@ -96,7 +114,16 @@ TABLE: Table = {
     ),
     "held-out points measured": (lambda s, t: t["before"], "propose"),
     "proposed": (lambda s, t: [*t["before"], PROPOSED], "commit"),
-    "committed": (lambda s, t: t["committed"], "after-V1/o01/move"),
+    "committed": (lambda s, t: t["committed"], "locate"),
+    "found after committing": (lambda s, t: [*t["committed"], LOCATED], "after-V1/o01/move"),
+    "taking it back was interrupted": (
+        lambda s, t: [*t["committed"], WITHDRAWING, INTERRUPTED, LOCATED],
+        "roll back",
+    ),
+    "taken back without a verdict": (
+        lambda s, t: [*t["committed"], WITHDRAWING, events.RolledBack()],
+        "commit",
+    ),
     "refused afterwards": (
         lambda s, t: [*t["committed"], *s(Phase.AFTER).whole(1)[:3], s(Phase.AFTER).refused()],
         "judge",
@@ -123,7 +150,8 @@ def test_what_follows(name: str, make_rig, story, told, monkeypatch) -> None:
     choices = Choices(monkeypatch)
     step = rig.calibration.next_step(fold(happened(story, told)))
     assert (step.key if step else None) == key
-    assert choices.made == (1 if key in {"P1/o02/move", "P1/o03/move"} else 0)
+    chosen = {"P1/o02/move", "P1/o03/move", "P1/o04/move"}
+    assert choices.made == (1 if key in chosen and "undone" not in name else 0)
 
 
 CHECKS: Table = {
@@ -156,22 +184,23 @@ class Choices:
     def __init__(self, monkeypatch: pytest.MonkeyPatch, refusal: LimitError | None = None) -> None:
         self.made = 0
         self._refusal = refusal
-        monkeypatch.setattr(module.Calibration, "_choice", self._choose)
-        monkeypatch.setattr(module.Calibration, "_expectation", lambda *_: None)
-        monkeypatch.setattr(module.Calibration, "_on_the_way_back", lambda *_: 1)
+        monkeypatch.setattr(module.Plan, "_visit", self._choose)
+        monkeypatch.setattr(Calibration, "_on_the_way_back", lambda *_: 1)
 
-    def _choose(self, state: Any, key: Any) -> Any:
+    def _choose(self, situation: Any, point: int) -> Visit:
         self.made += 1
         if self._refusal:
             raise self._refusal
-        return Chosen()
-
-
-class Chosen:
-    """The controller's own frames differ from the convention's by rounding only here."""
-
-    def __init__(self) -> None:
-        self.command = Pose(100.0, -100.0, 500.0, 3.0, 2.0, 1.0)
+        return Visit(
+            point=point,
+            orientation=situation.records_at(point) + 1,
+            pose=Pose(100.0, -100.0, 500.0, 3.0, 2.0, 1.0),
+            joints=(0.0,) * 6,
+            deviation=(0.0,) * 3,
+            sigma=(0.1,) * 3,
+            gain=1.0,
+            outlook=None,
+        )
 
 
 def test_references_are_the_cells_points_untilted(make_rig) -> None:
@@ -212,7 +241,7 @@ def test_a_set_without_a_pose_worth_visiting_is_closed(make_rig, story, monkeypa
 def test_held_out_poses_are_those_chosen_when_identified_before_and_after(make_rig, story, told) -> None:
     calibration = make_rig().calibration
     for stage, phase in (("identified", Phase.BEFORE), ("committed", Phase.AFTER)):
-        happened = list(told[stage])
+        happened = [*told[stage], LOCATED]
         for orientation in range(1, HELD_OUT + 1):
             step = calibration.next_step(fold(happened))
             assert step.pose == HELD_OUT_POSES[0][orientation - 1]
@@ -289,14 +318,14 @@ def test_after_a_refusal_another_pose_is_chosen(recording, make_rig) -> None:
 
 
 def test_the_way_after_a_refusal_begins_where_the_robot_is(recording, make_rig, monkeypatch) -> None:
-    """Not at the last record: the refused pose is where the straight line starts that is checked."""
+    """Not at the last record: the refused pose is where the straight lines start that are checked."""
     starts: list[Any] = []
 
-    def spy(knowledge: Any, at: Any, turns: Any, present: Any) -> Any:
-        starts.append(present.pose(0).as_tuple())
-        return next_pose.choose(knowledge, at, turns, present)
+    def spy(knowledge: Any, start: Any, *others: Any) -> Any:
+        starts.append(start.pose(0).as_tuple())
+        return route(knowledge, start, *others)
 
-    monkeypatch.setattr(module, "choose", spy)
+    monkeypatch.setattr(choosing, "route", spy)
     sampled = recording.until(events.Sampled, count=4)
     refused_at = (101.0, -99.0, 502.0, 4.0, -3.0, 2.0)
     key = sampled[-1].at
@@ -338,6 +367,7 @@ def test_the_steps_of_a_whole_run_in_their_order(recording) -> None:
         return [*begin, *rest, f"{name}/o01/move", f"{name}/close"]
 
     assert keys == [
+        "locate",
         *of_set("P1", ORIENTATIONS),
         *of_set("P2", ORIENTATIONS),
         "identify",
@@ -345,6 +375,7 @@ def test_the_steps_of_a_whole_run_in_their_order(recording) -> None:
         *of_set("before-V2", HELD_OUT),
         "propose",
         "commit",
+        "locate",
         *of_set("after-V1", HELD_OUT),
         *of_set("after-V2", HELD_OUT),
         "judge",

@@ -49,6 +49,9 @@ class Script:
         assert isinstance(state, RunState)
         return self.steps[len(self.done)] if len(self.done) < len(self.steps) else None
 
+    async def prepare(self) -> None:
+        await self.devices.controller.prepare()
+
     async def perform(self, step: Any, state: RunState) -> events.Event:
         if self.failure and len(self.done) == 1:
             raise self.failure
@@ -191,7 +194,7 @@ async def test_a_programming_error_stops_motion_too(script, journal, bench) -> N
     with pytest.raises(ZeroDivisionError):
         await Engine(script, journal).run()
     assert bench.controller.log == ["prepare", "stop"]
-    assert isinstance(journal.events[-1], events.Interrupted)
+    assert journal.events[-1] == events.Interrupted(reason="division by zero", exit_code=1)
 
 
 async def test_an_error_while_deciding_stops_motion_too(script, journal, bench) -> None:
@@ -287,22 +290,26 @@ async def test_a_run_that_is_over_is_not_ended_twice(script, journal) -> None:
     assert [event.kind for event in journal.events] == ["ended"]
 
 
-def test_open_sets_are_voided_and_closed_ones_kept(script, journal, story) -> None:
-    done, open_one, held = story(point=1), story(point=2), story(Phase.BEFORE, 1)
+def test_open_sets_that_cannot_go_on_are_voided_and_the_others_doubted(script, journal, story) -> None:
+    done, begun, zeroed, held = story(point=1), story(point=2), story(point=3), story(Phase.BEFORE, 1)
     interrupted = events.Interrupted(reason="a power cut", exit_code=130)
-    for event in [*done.whole(2), *held.whole(2)[:-1], *open_one.whole(2)[:-2], interrupted]:
+    in_vain = [*held.whole(2)[:-1], held.refused()]
+    for event in [*done.whole(2), *in_vain, *zeroed.whole(2)[:-2], *begun.whole(1)[:2], interrupted]:
         journal.append(event)
     engine = Engine(script, journal)
-    engine.void_open_sets()
+    engine.reopen_sets()
     voided = [event.at for event in journal.events if isinstance(event, events.SetVoided)]
     assert sorted(map(str, voided)) == ["P2", "before-V1"]
-    assert list(engine.state.sets) == [done.key]
-    engine.void_open_sets()
+    assert {str(key): value.doubtful for key, value in engine.state.sets.items()} == {
+        "P1": False,
+        "P3": True,
+    }
+    engine.reopen_sets()
     assert engine.state.voided == 2
 
 
 def test_nothing_is_voided_in_a_new_run(script, journal) -> None:
-    Engine(script, journal).void_open_sets()
+    Engine(script, journal).reopen_sets()
     assert journal.events == ()
 
 
@@ -311,6 +318,34 @@ def test_after_a_kill_nobody_knows_where_the_robot_stands(script, journal, story
     journal.append(story().arrived())
     engine = Engine(script, journal)
     assert engine.state.standing is not None
-    engine.void_open_sets()
+    engine.reopen_sets()
     assert engine.state.standing is None
     assert isinstance(journal.events[-1], events.Interrupted)
+
+
+@pytest.mark.parametrize("comes_back", [True, False])
+async def test_a_commit_that_cannot_be_noted_is_taken_back_or_said(
+    recording, replayed, monkeypatch, comes_back: bool
+) -> None:
+    rig = replayed(recording.until(events.Proposed))
+    append = Journal.append
+
+    def full(self: Journal, event: events.Event) -> None:
+        if isinstance(event, events.Committed):
+            if not comes_back:
+                rig.controller.failures["reload"] = DeviceError("is deaf", subject="controller")
+            raise FileError("the disk is full", subject=self.path)
+        append(self, event)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Journal, "append", full)
+        with pytest.raises(HexacellError, match="the disk is full") as failure:
+            await rig.run()
+    assert rig.config == recording.config_before
+    assert rig.controller.log.count("reload") == 2, "the geometry that it read is taken from it"
+    if not comes_back:
+        assert "the controller has the new geometry, which could be neither noted nor taken" in str(
+            failure.value
+        )
+    assert (await rig.run()).exit_code == ExitCode.DONE
+    assert rig.config == recording.config_after

@@ -43,7 +43,7 @@ class Station:
 
 @pytest.fixture
 def station(make_rig) -> Station:
-    return Station(make_rig())
+    return Station(make_rig(guards__following_mm=1e6))  # its sliders show what they are told to
 
 
 @pytest.fixture
@@ -166,7 +166,10 @@ async def test_other_failures_are_no_refusals(
 async def test_coming_back_within_the_limit_closes_the_set(station: Station, zeroed: RunState) -> None:
     station.shown[:] = [-1.0625, 2.0, 3.09375]
     event = await station.do(CloseSet(at=P1), zeroed)
-    assert event == events.SetClosed(at=P1, drift_mm=(-0.0625, 0.0, 0.09375))
+    assert isinstance(event, events.SetClosed)
+    assert event.reading is not None
+    assert event.reading.gauges_mm == (-1.0625, 2.0, 3.09375)
+    assert event.drift_mm == (-0.0625, 0.0, 0.09375)
 
 
 @pytest.mark.parametrize(("axis", "drift"), [(0, 0.11), (1, -0.11), (2, 0.5)])

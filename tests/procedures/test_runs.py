@@ -358,7 +358,7 @@ async def test_with_nobody_there_to_carry_gauges_the_run_ends(make_rig) -> None:
     with pytest.raises(AnswerNeeded):
         await rig.run()
     assert happened(rig, events.Interrupted)[-1].exit_code == ExitCode.ANSWER_NEEDED
-    assert [entry.split()[0] for entry in rig.controller.log] == ["prepare", "move", "stop"]
+    assert [entry.split()[0] for entry in rig.controller.log] == ["prepare", "pose", "move", "stop"]
 
 
 async def test_too_little_to_identify_is_said_and_nothing_is_written(make_rig) -> None:

@@ -140,6 +140,15 @@ def test_after_these_nobody_knows_what_pose_the_robot_holds(event: Any, story) -
     assert fold([story().arrived(2), event]).standing is None
 
 
-def test_rolled_back_is_remembered() -> None:
-    assert fold([events.RolledBack()]).rolled_back
+WORSE = events.Judged(verdict=Verdict.WORSE, line="worse")
+
+
+def test_rolled_back_after_a_verdict_is_remembered() -> None:
+    assert fold([WORSE, events.RolledBack()]).rolled_back
     assert not RunState().rolled_back
+
+
+def test_rolled_back_without_a_verdict_the_proposal_waits_again(story) -> None:
+    after = story(Phase.AFTER)
+    state = fold([events.Committed(approved_by="a tester"), *after.whole(2), events.RolledBack()])
+    assert (state.committed, state.rolled_back, state.sets) == (None, False, {})

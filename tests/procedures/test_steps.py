@@ -11,10 +11,24 @@ from hypothesis import strategies as st
 from pydantic import TypeAdapter, ValidationError
 
 from hexacell.cell.base import GeometryValues
+from hexacell.cell.recovery import Action, FailureKind
 from hexacell.verification import Verdict
 from procedures import events, steps
+from procedures.guards.trips import Guard
 from procedures.journal import Journal, read_journal
-from procedures.steps import CloseSet, Compute, Expectation, Move, Phase, Place, Sample, SetKey, Step
+from procedures.steps import (
+    CloseSet,
+    Compute,
+    Expectation,
+    Locate,
+    Move,
+    Phase,
+    Place,
+    Revisit,
+    Sample,
+    SetKey,
+    Step,
+)
 
 POSE = (1.0, 2.0, 3.0, 4.0, 5.0, 6.0)
 P2 = SetKey(phase=Phase.IDENTIFY, point=2)
@@ -61,8 +75,10 @@ set_key = st.builds(SetKey, phase=st.sampled_from(Phase), point=count)
 expectation = st.builds(Expectation, deviation_mm=three, sigma_mm=three, gain=number)
 some_step: st.SearchStrategy[Any] = st.one_of(
     st.builds(Move, at=set_key, orientation=count, pose=six, expected=st.none() | expectation),
+    st.builds(Locate),
     st.builds(Place, at=set_key, pose=six),
     st.builds(Sample, at=set_key, orientation=count, pose=six),
+    st.builds(Revisit, at=set_key),
     st.builds(CloseSet, at=set_key),
     st.builds(Compute, kind=st.sampled_from(["identify", "propose", "commit", "judge", "roll back"])),
 )
@@ -98,9 +114,12 @@ some_event: st.SearchStrategy[Any] = st.one_of(
     ),
     st.builds(events.StepBegun, step=some_step),
     st.builds(events.Arrived, at=set_key, orientation=count, pose=six),
+    st.builds(events.Located, pose=six),
     st.builds(events.Placed, at=set_key),
     st.builds(events.Sampled, at=set_key, orientation=count, pose=six, reading=reading, deviation_mm=three),
     st.builds(events.Refused, at=set_key, orientation=count, reason=text),
+    st.builds(events.Undone, at=set_key, orientation=count),
+    st.builds(events.Confirmed, at=set_key, change_mm=three),
     st.builds(events.SetClosed, at=set_key, drift_mm=three),
     st.builds(events.SetVoided, at=set_key, reason=text),
     st.builds(
@@ -112,6 +131,19 @@ some_event: st.SearchStrategy[Any] = st.one_of(
     st.builds(events.Committed, approved_by=text),
     st.builds(events.Judged, verdict=st.sampled_from(Verdict), line=text),
     st.builds(events.RolledBack),
+    st.builds(events.Paused, at_once=st.booleans()),
+    st.builds(events.Resumed),
+    st.builds(
+        events.Failed,
+        step=st.none() | some_step,
+        failure=st.sampled_from(FailureKind),
+        attempt=count,
+        reason=text,
+        action=st.sampled_from(Action),
+        asked=st.booleans(),
+    ),
+    st.builds(events.Declined, command=text, reason=text),
+    st.builds(events.Tripped, guard=st.sampled_from(Guard), device=text, problem=text, action=text),
     st.builds(events.Interrupted, reason=text, exit_code=st.integers(0, 255)),
     st.builds(events.Ended, exit_code=st.integers(0, 255), line=text),
 )
@@ -150,6 +182,7 @@ def test_every_kind_of_event_is_in_the_union_and_under_test() -> None:
 
 KINDS = (
     *("started", "begun", "arrived", "placed", "sampled", "refused", "closed", "voided", "identified"),
-    *("proposed", "committed", "judged", "rolled back", "interrupted", "ended"),
+    *("lent", "taken back", "proposed", "committed", "judged", "rolled back", "interrupted", "ended"),
+    *("located", "undone", "confirmed", "paused", "resumed", "failed", "declined", "tripped"),
 )
 """Journals on disk say these words: they must never change."""

@@ -10,10 +10,10 @@ import pytest
 from hexacell import kinematics
 from hexacell.design.path import straight
 from hexacell.errors import IdentifiabilityError
+from hexacell.planning.plan import REFUSALS
 from hexacell.pose import Pose, Poses
 from procedures import calibration as module
 from procedures import events
-from procedures.calibration import REFUSALS
 from procedures.state import fold
 from procedures.steps import Move, Phase
 

@@ -1,0 +1,1 @@
+"""When to stop: what must hold at the start, before each move, and while the robot moves."""

@@ -1,0 +1,109 @@
+"""How to get to a pose from wherever the robot stands: by checked straight lines, or not at all."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from hexacell.design.knowledge import Knowledge
+from hexacell.design.route import ball_at, route
+from hexacell.errors import HexacellError, LimitError
+from hexacell.geometry import Geometry
+from hexacell.identification.estimate import track
+from hexacell.pose import Pose, Poses
+from hexacell.robot import Robot
+from hexacell.rotations import Array
+from procedures.state import RunState
+from procedures.steps import Move, SetKey, SixNumbers
+
+
+class NoSafeWay(LimitError):
+    """No checked straight line leads on from where the robot stands; nothing moved."""
+
+
+@dataclass(frozen=True, eq=False)
+class Ways:
+    """The ways of one robot."""
+
+    robot: Robot
+
+    def is_in_order(self, state: RunState, key: SetKey) -> bool:
+        """Whether the robot came by the set's own moves, each of which was checked when it was chosen."""
+        return not state.astray and (state.standing is None or state.standing[0] == key)
+
+    def towards(self, state: RunState, goal: Move, reference: Array | None = None) -> Move:
+        """``goal`` if the straight line to it is clear, else the first move of a way round.
+
+        With gauges at a ``reference`` (3,), mm, the ball stays inside their travel all the way, unless
+        it is outside already. Ways round lead over untilted poses and over poses the set has visited.
+
+        Raises:
+            NoSafeWay: there is none.
+        """
+        if state.target is None:
+            return goal
+        via = self._between(state, goal)
+        poses = [self._held(pose) for _, pose in via]
+        start, end = self._held(state.target), self._held(goal.pose)
+        knowledge = self._knowledge(state)
+        if reference is not None and not _inside(knowledge, start, reference):
+            reference = None
+        way = route(knowledge, start, end, poses, reference)
+        if way is None:
+            raise _no_way(state.target, goal)
+        if not way:
+            return goal
+        orientation, pose = via[way[0]]
+        return Move(at=goal.at, orientation=orientation, pose=pose)
+
+    def ball_at(self, state: RunState, pose: SixNumbers) -> Array | None:
+        """Where the ball really is (3,), mm, at a commanded pose, by what is known now."""
+        return ball_at(self._knowledge(state), self._held(pose))
+
+    def _between(self, state: RunState, goal: Move) -> list[tuple[int, SixNumbers]]:
+        """Poses that a way round may lead over, with their orientations; 0 where nothing is measured."""
+        samples = state.set(goal.at).samples
+        visited = [(s.orientation, s.pose) for s in samples if s.orientation != goal.orientation]
+        level = [_untilted(pose) for pose in (state.target, goal.pose) if pose is not None]
+        return [*((0, pose) for pose in level), *visited]
+
+    def _held(self, pose: SixNumbers) -> Poses:
+        return self.robot.change.poses(Poses.of([Pose(*pose)]))
+
+    def _knowledge(self, state: RunState) -> Knowledge:
+        """What is known by now; with the identified geometry in the controller, that one commands."""
+        found = state.identified.result.get("geometry") if state.identified else None
+        if found is None:
+            return self._by_records(state)
+        geometry = Geometry(**found)
+        free = self.robot.mechanism.convention.free_part(geometry)
+        known = replace(self.robot.knowledge(), free=np.asarray(free))
+        return replace(known, controller=geometry) if state.committed else known
+
+    def _by_records(self, state: RunState) -> Knowledge:
+        measurements = state.measurements()
+        if not len(measurements):
+            return self.robot.knowledge()
+        try:
+            return self.robot.knowledge(track(self.robot.problem(measurements)))
+        except HexacellError:
+            return self.robot.knowledge()
+
+
+def _inside(knowledge: Knowledge, pose: Poses, reference: Array) -> bool:
+    ball = ball_at(knowledge, pose)
+    return ball is not None and bool(np.abs(ball - reference).max() <= knowledge.limits.gauge_travel_mm)
+
+
+def _untilted(pose: SixNumbers) -> SixNumbers:
+    x, y, z, *_ = pose
+    return (x, y, z, 0.0, 0.0, 0.0)
+
+
+def _no_way(here: SixNumbers, goal: Move) -> NoSafeWay:
+    return NoSafeWay(
+        f"{goal.at}: the robot stands at {Pose(*here)}, and no straight line that keeps to the limits "
+        f"leads from there to {goal.target}; it was not moved",
+        action="Bring it near that pose with its own controller, then go on",
+    )

@@ -1,0 +1,236 @@
+"""Every guard, tripped at every kind of step: the robot stands in time, and the config is as it was.
+
+Here time is the cell's own, so figures are exact; the benchmark has them on the wire and on the wall.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Awaitable, Callable
+from dataclasses import dataclass
+from typing import Any
+
+import pytest
+
+from hexacell.errors import ExitCode, HexacellError
+from procedures import events
+from procedures.guards import watching
+from procedures.guards.trips import Guard, GuardTripped
+from procedures.steps import CloseSet, Compute, Move, Phase, Place, Sample, SetKey
+
+MUST_S = 0.2
+STRIKES_S = 0.3
+"""After so long in a step: a move is then on its way, readings are being taken."""
+
+P1 = SetKey(phase=Phase.IDENTIFY, point=1)
+V1 = SetKey(phase=Phase.AFTER, point=1)
+Step = Callable[[], Awaitable[Any]]
+
+
+def move(at: SetKey, orientation: int) -> Move:
+    x, y, z = (100.0, -100.0, 500.0) if at is P1 else (-100.0, -50.0, 450.0)
+    return Move(at=at, orientation=orientation, pose=(x, y, z, orientation - 1.0, 0.0, 0.0))
+
+
+def sample(at: SetKey, orientation: int) -> Sample:
+    return Sample(at=at, orientation=orientation, pose=move(at, orientation).pose)
+
+
+async def before(scene: Any, *steps: Any, then: Any) -> Step:
+    for step in steps:
+        await scene.do(step)
+    return lambda: scene.do(then)
+
+
+async def prepare(scene: Any) -> Step:
+    prepared: Step = scene.rig.performer.prepare
+    return prepared
+
+
+async def move_to_a_reference(scene: Any) -> Step:
+    return await before(scene, move(P1, 2), then=move(V1, 1))
+
+
+async def place(scene: Any) -> Step:
+    return await before(scene, move(P1, 1), then=Place(at=P1, pose=move(P1, 1).pose))
+
+
+async def sample_of_the_reference(scene: Any) -> Step:
+    return await before(scene, move(P1, 1), then=sample(P1, 1))
+
+
+async def move_in_a_set(scene: Any) -> Step:
+    return await before(scene, move(P1, 1), sample(P1, 1), then=move(P1, 2))
+
+
+async def sample_in_a_set(scene: Any) -> Step:
+    return await before(scene, move(P1, 1), sample(P1, 1), move(P1, 2), then=sample(P1, 2))
+
+
+async def way_back(scene: Any) -> Step:
+    there = (move(P1, 1), sample(P1, 1), move(P1, 2), sample(P1, 2))
+    return await before(scene, *there, then=move(P1, 1))
+
+
+async def close(scene: Any) -> Step:
+    return await before(scene, move(P1, 1), sample(P1, 1), then=CloseSet(at=P1))
+
+
+async def reload(scene: Any) -> Step:
+    return lambda: scene.do(Compute(kind="commit"))
+
+
+async def move_afterwards(scene: Any) -> Step:
+    return await before(scene, move(V1, 1), sample(V1, 1), then=move(V1, 2))
+
+
+async def sample_afterwards(scene: Any) -> Step:
+    return await before(scene, move(V1, 1), sample(V1, 1), move(V1, 2), then=sample(V1, 2))
+
+
+OUTSIDE = (move_to_a_reference,)
+WITHIN = (move_in_a_set, way_back, move_afterwards)
+READING = (sample_of_the_reference, sample_in_a_set, close, sample_afterwards)
+STEPS = (prepare, *OUTSIDE, place, *WITHIN, *READING, reload)
+
+
+@dataclass(frozen=True)
+class Fault:
+    """Something that happens, the guard that trips on it, and at which steps it does."""
+
+    name: str
+    guard: Guard
+    strike: Callable[[Any], Any]
+    steps: tuple[Any, ...]
+
+    def __str__(self) -> str:
+        return self.name
+
+
+STANDING_ON = (*OUTSIDE, *WITHIN, place, *READING)
+MOVING = (prepare, *OUTSIDE, *WITHIN, place, reload)
+LAGS = "joint 3 following error"
+FAULTS = (
+    Fault("stop line", Guard.STOP_LINE, lambda s: setattr(s, "forbidden", "stop exists"), STEPS),
+    Fault("estop", Guard.CONTROLLER, lambda s: s.switch_off(estop=True), STANDING_ON),
+    Fault("switched off", Guard.CONTROLLER, lambda s: s.switch_off(), STANDING_ON),
+    Fault("following error", Guard.FOLLOWING, lambda s: s.switch_off(LAGS), STANDING_ON),
+    Fault("silent controller", Guard.STALE, lambda s: s.silent.add("controller"), STANDING_ON),
+    Fault("gauge at its end", Guard.GAUGE_END, lambda s: s.at_end.add("y"), WITHIN),
+    Fault("ball off its plate", Guard.PLATE, lambda s: s.shift.update(z=5.7), WITHIN),
+    Fault("silent gauge", Guard.STALE, lambda s: s.silent.add("gauge x"), WITHIN),
+    Fault("gauge in inches", Guard.DEVICE, lambda s: s.inch.add("x"), WITHIN),
+    Fault("encoder alarm", Guard.ENCODERS, lambda s: setattr(s, "encoder_alarm", True), MOVING),
+    Fault("silent encoders", Guard.STALE, lambda s: s.silent.add("encoders"), MOVING),
+)
+
+
+@pytest.fixture
+def stage(scene: Any, recording: Any, replayed: Any) -> Callable[..., Any]:
+    """A scene that has come as far as a step needs."""
+
+    def make(step: Any) -> Any:
+        if step is not reload:
+            return scene(stations__placement="by-hand")
+        from procedures.journal import read_journal
+        from procedures.state import fold
+
+        staged = scene(replayed(recording.until(events.Proposed), guards__stale_s=0.12))
+        staged.state = fold(read_journal(staged.rig.folder.journal))
+        return staged
+
+    return make
+
+
+async def struck(scene: Any, fault: Fault, doing: Step) -> tuple[float, Any]:
+    """When it struck, on the cell's clock, and how the step ended."""
+    action = asyncio.ensure_future(doing())
+    while scene.state.proposed and "reload" not in scene.controller.log:  # noqa: ASYNC110 - a thread writes
+        await asyncio.sleep(0)  # the config is being written, for which no time passes here
+    await scene.rig.clock.sleep(STRIKES_S)
+    assert not action.done(), "it must strike in the middle"
+    at_s = scene.now
+    fault.strike(scene)
+    ended: Any = (await asyncio.gather(action, return_exceptions=True))[0]
+    if isinstance(ended, BaseException) and not isinstance(ended, HexacellError):
+        raise ended
+    return at_s, ended
+
+
+def root(error: BaseException) -> GuardTripped:
+    """The trip that an error comes from."""
+    while not isinstance(error, GuardTripped):
+        assert error.__cause__ is not None, error
+        error = error.__cause__
+    return error
+
+
+async def happens(stage: Any, step: Any, fault: Fault) -> None:
+    scene = stage(step)
+    config = scene.rig.config
+    doing = await step(scene)
+    at_s, ended = await struck(scene, fault, doing)
+    goes_on = step is reload and step not in fault.steps
+    assert (scene.rig.config == config) is not goes_on
+    assert scene.rig.world.still_since_s <= at_s + MUST_S or (step in OUTSIDE and step not in fault.steps)
+    if step is move_afterwards and fault.guard in {Guard.GAUGE_END, Guard.PLATE}:
+        assert isinstance(ended, events.Refused), "a verdict on the new geometry"
+        assert scene.rig.performer.guards.watch.latched is None
+    elif step in fault.steps:
+        tripped = root(ended)
+        assert tripped.trip.guard is fault.guard
+        assert tripped.exit_code is ExitCode.HARDWARE
+        assert tripped.action
+        assert scene.rig.performer.guards.watch.latched == tripped.trip
+        assert scene.stops
+        with pytest.raises(GuardTripped):
+            await scene.do(move(P1, 3))
+    elif step not in READING:
+        assert not isinstance(ended, BaseException), "nothing that concerns this step"
+    if step in {*OUTSIDE, *WITHIN} and step in fault.steps:
+        assert scene.rig.world.progress() < 1.0, "stopped on the way"
+
+
+SOME = (
+    [(move_in_a_set, fault) for fault in FAULTS]
+    + [(step, FAULTS[0]) for step in STEPS if step is not move_in_a_set]
+    + [
+        (move_to_a_reference, FAULTS[5]),
+        (move_afterwards, FAULTS[6]),
+        (reload, FAULTS[9]),
+        (close, FAULTS[7]),
+    ]
+)
+THE_REST = [(step, fault) for step in STEPS for fault in FAULTS if (step, fault) not in SOME]
+
+
+def names(cases: list[tuple[Any, Fault]]) -> list[str]:
+    return [f"{fault}-{step.__name__}" for step, fault in cases]
+
+
+@pytest.mark.parametrize(("step", "fault"), SOME, ids=names(SOME))
+async def test_it_stands_in_time(stage: Any, step: Any, fault: Fault) -> None:
+    await happens(stage, step, fault)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("step", "fault"), THE_REST, ids=names(THE_REST))
+async def test_it_stands_in_time_at_all_others(stage: Any, step: Any, fault: Fault) -> None:
+    await happens(stage, step, fault)
+
+
+@pytest.mark.parametrize("step", STEPS, ids=[step.__name__ for step in STEPS])
+async def test_on_a_full_disk_nothing_begins(stage: Any, step: Any, monkeypatch: Any) -> None:
+    scene = stage(step)
+    config = scene.rig.config
+    doing = await step(scene)
+    orders, still_since_s = len(scene.controller.log), scene.rig.world.still_since_s
+    monkeypatch.setattr(watching, "free_bytes", lambda folder: 49_900_000)
+    with pytest.raises(HexacellError) as refusal:
+        await doing()
+    assert root(refusal.value).trip.guard is Guard.DISK
+    assert "only 50 MB are free" in str(root(refusal.value))
+    assert scene.rig.config == config
+    if step is not reload:
+        assert len(scene.controller.log) == orders
+    assert scene.rig.world.still_since_s == still_since_s

@@ -1,0 +1,242 @@
+"""What each guard says to a snapshot: nothing where all is well, a sentence and an action where not."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from drivers.gauges.errors import GaugeAtEnd, GaugeSilent, WrongAnswer, ZeroVoid
+from drivers.ports import ControllerStatus, EncoderRound
+from hexacell.errors import DeviceError, ExitCode, LimitError
+from procedures import events
+from procedures.guards import rules
+from procedures.guards.snapshot import Heard, Limits, PlungerSeen, Snapshot
+from procedures.guards.trips import DriftTripped, Guard, GuardTripped, Trip
+
+LIMITS = Limits(stale_s=0.12, plate_mm=5.5)
+AT_END = GaugeAtEnd("plunger at its end", subject="gauge x", action="Move the gauge or the ball")
+
+
+def gauge(now: float | None = 0.0, first: float | None = 0.0, axis: int = 0, **changes: Any) -> Any:
+    def seen(deviation: float | None) -> PlungerSeen | None:
+        return None if deviation is None else PlungerSeen(axis, deviation)
+
+    return Heard(f"gauge {'xyz'[axis]}", value=seen(now), first=seen(first), **changes)
+
+
+def sliders(now: tuple[float, ...], first: tuple[float, ...] = (0.0,) * 6) -> Any:
+    def taken(positions: tuple[float, ...]) -> EncoderRound:
+        return EncoderRound((0,) * 6, positions)
+
+    return Heard("encoders", value=taken(now), first=taken(first))
+
+
+def status(*complaints: str, estop: bool = False, enabled: bool = True) -> Any:
+    return Heard("controller", value=ControllerStatus(estop, enabled, complaints))
+
+
+WELL = Snapshot(
+    gauges=(gauge(axis=0), gauge(5.5, axis=1), gauge(-5.5, axis=2)),
+    encoders=sliders((100.0,) * 6),
+    controller=status(),
+    stop_line=Heard("stop line", value=""),
+)
+
+
+def tripped(limits: Limits = LIMITS, **changes: Any) -> Trip:
+    from dataclasses import replace
+
+    trip = rules.first_trip(replace(WELL, **changes), limits)
+    assert trip is not None
+    return trip
+
+
+def test_where_all_is_well_nothing_trips() -> None:
+    assert rules.first_trip(WELL, LIMITS) is None
+    assert rules.first_trip(Snapshot(), LIMITS) is None
+
+
+def test_what_was_not_heard_yet_trips_nothing_but_time() -> None:
+    unheard = Snapshot((Heard("gauge x"),), Heard("encoders"), Heard("controller"), Heard("stop line"))
+    assert rules.first_trip(unheard, LIMITS) is None
+    assert tripped(encoders=Heard("encoders", silent_s=0.13)).guard is Guard.STALE
+
+
+def test_the_stop_line_says_how_it_is_pressed() -> None:
+    trip = tripped(stop_line=Heard("stop line", value="/cell/stop exists"))
+    assert trip.guard is Guard.STOP_LINE
+    assert "/cell/stop exists" in trip.problem
+
+
+@pytest.mark.parametrize(
+    ("heard", "guard", "words"),
+    [
+        (status(estop=True, enabled=False), Guard.CONTROLLER, "is in emergency stop"),
+        (status(estop=True, enabled=True), Guard.CONTROLLER, "is in emergency stop"),
+        (status(enabled=False), Guard.CONTROLLER, "was switched off"),
+        (status("drive 2 too hot", enabled=False), Guard.CONTROLLER, "was switched off: drive 2 too hot"),
+        (status("joint 3 following error", enabled=False), Guard.FOLLOWING, "joint 3 following error"),
+        (status("a", "Joint 0 Following Error", enabled=False), Guard.FOLLOWING, "Joint 0 Following Error"),
+    ],
+)
+def test_a_controller_that_may_not_move(heard: Any, guard: Guard, words: str) -> None:
+    trip = tripped(controller=heard)
+    assert (trip.guard, trip.device) == (guard, "controller")
+    assert words in trip.problem
+
+
+def test_complaints_of_a_machine_that_is_on_trip_nothing() -> None:
+    talkative = Snapshot(controller=status("joint 3 following error"))
+    assert rules.first_trip(talkative, LIMITS) is None
+
+
+def test_an_encoder_is_named_with_what_it_says() -> None:
+    error = DeviceError("reports no magnet", subject="leg 3", action="Look at it")
+    trip = tripped(encoders=Heard("encoders", error=error))
+    assert (trip.guard, trip.device, trip.action) == (Guard.ENCODERS, "leg 3", "Look at it")
+
+
+def test_a_plunger_that_comes_to_its_end() -> None:
+    trip = tripped(gauges=(gauge(4.0, error=AT_END),))
+    assert (trip.guard, trip.device) == (Guard.GAUGE_END, "gauge x")
+
+
+def test_a_plunger_that_was_at_its_end_may_leave_it() -> None:
+    assert rules.first_trip(Snapshot((gauge(None, None, error=AT_END),)), LIMITS) is None
+
+
+@given(deviation=st.floats(-20.0, 20.0), first=st.floats(-20.0, 20.0), axis=st.sampled_from([0, 1, 2]))
+def test_a_ball_must_not_go_farther_than_allowed_nor_than_it_was(
+    deviation: float, first: float, axis: int
+) -> None:
+    trip = rules.first_trip(Snapshot((gauge(deviation, first, axis),)), LIMITS)
+    if abs(deviation) > max(5.5, abs(first)):
+        assert trip is not None
+        assert (trip.guard, trip.device) == (Guard.PLATE, f"gauge {'xyz'[axis]}")
+        assert f"{deviation:+.2f} mm from its reference along {'xyz'[axis]}" in trip.problem
+    else:
+        assert trip is None
+
+
+@given(leg=st.integers(0, 5), way=st.floats(-3.0, 3.0))
+def test_where_the_robot_must_stand_no_slider_moves(leg: int, way: float) -> None:
+    now = [10.0] * 6
+    now[leg] += way
+    snapshot = Snapshot(encoders=sliders(tuple(now), (10.0,) * 6))
+    assert rules.first_trip(snapshot, LIMITS) is None, "a robot that moves may"
+    trip = rules.first_trip(snapshot, Limits(0.12, 5.5, rest_mm=1.0))
+    if abs(now[leg] - 10.0) > 1.0:
+        assert trip is not None
+        assert (trip.guard, trip.device) == (Guard.FOLLOWING, f"slider {leg + 1}")
+    else:
+        assert trip is None
+
+
+def test_devices_that_fail_are_all_named() -> None:
+    void = ZeroVoid("was off", subject="gauge x", action="Zero it")
+    silent = GaugeSilent("does not answer", subject="gauge z", action="Switch it on")
+    trip = tripped(gauges=(gauge(error=void), gauge(axis=1), gauge(axis=2, error=silent)))
+    assert trip.guard is Guard.DEVICE
+    assert str(trip.as_error()) == "gauge x: was off; gauge z: does not answer. Zero it. Switch it on"
+
+
+@pytest.mark.parametrize(("garbled", "trips"), [(1, False), (2, False), (3, True), (4, True)])
+def test_a_noisy_line_is_no_broken_device(garbled: int, trips: bool) -> None:
+    nonsense = WrongAnswer("answers b'0'", subject="gauge y", action="Check it")
+    snapshot = Snapshot((gauge(axis=1, error=nonsense, garbled=garbled),))
+    trip = rules.first_trip(snapshot, LIMITS)
+    assert (trip is not None and trip.guard is Guard.DEVICE) is trips
+
+
+@pytest.mark.parametrize("device", ["gauges", "encoders", "controller", "stop_line"])
+def test_any_device_may_be_silent_for_so_long_and_no_longer(device: str) -> None:
+    def snapshot(silent_s: float) -> Snapshot:
+        heard: Any = Heard("it", silent_s)
+        only: dict[str, Any] = {device: (heard,) if device == "gauges" else heard}
+        return Snapshot(**only)
+
+    assert rules.first_trip(snapshot(0.12), LIMITS) is None
+    trip = rules.first_trip(snapshot(0.121), LIMITS)
+    assert trip is not None
+    assert (trip.guard, trip.device) == (Guard.STALE, "it")
+
+
+def test_the_plainest_cause_comes_first() -> None:
+    everything: dict[str, Any] = {
+        "gauges": (gauge(9.0, error=AT_END, silent_s=1.0),),
+        "encoders": Heard("encoders", error=DeviceError("has an alarm"), silent_s=1.0),
+        "controller": status(estop=True, enabled=False),
+        "stop_line": Heard("stop line", value="pressed"),
+    }
+    order = []
+    for key in ("stop_line", "controller", "encoders", "gauges"):
+        order.append(tripped(**everything).guard)
+        everything[key] = getattr(WELL, key)
+    assert order == [Guard.STOP_LINE, Guard.CONTROLLER, Guard.ENCODERS, Guard.GAUGE_END]
+    assert rules.first_trip(Snapshot(**everything), LIMITS) is None
+
+
+def test_sliders_are_where_they_were_sent() -> None:
+    sent = np.arange(6.0)
+    assert rules.following(sent, sent + 1.0, 1.0) is None
+    measured = sent + np.array([0.0, 0.5, 0.0, 0.0, -1.25, 1.0])
+    trip = rules.following(sent, measured, 1.0)
+    assert trip is not None
+    assert (trip.guard, trip.device) == (Guard.FOLLOWING, "slider 5")
+    assert "is -1.250 mm from where the controller was told to send it (limit 1 mm)" in trip.problem
+
+
+@pytest.mark.parametrize(
+    ("shown", "expected_mm", "trips"),
+    [
+        (("+1.234",) * 3, 1.5, True),
+        (("+1.234",) * 3, -1.5, True),
+        (("+1.234",) * 3, 0.5, False),
+        (("+1.234",) * 2, 1.5, False),
+        (("+1.234", "+1.234", "+1.235"), 1.5, False),
+        ((), 1.5, False),
+    ],
+)
+def test_a_gauge_that_does_not_follow_its_ball(
+    shown: tuple[str, ...], expected_mm: float, trips: bool
+) -> None:
+    trip = rules.frozen("gauge y", shown, expected_mm)
+    assert (trip is not None) is trips
+    if trip:
+        assert (
+            f"shows +1.234 unchanged although the ball should have moved {expected_mm:+.2f}" in trip.problem
+        )
+
+
+def test_drift_leaves_with_its_own_code() -> None:
+    assert rules.drift("P2", (0.1, -0.1, 0.0), 0.1) is None
+    trip = rules.drift("P2", (0.0, -0.101, 0.0), 0.1)
+    assert trip is not None
+    error = trip.as_error()
+    assert isinstance(error, DriftTripped)
+    assert isinstance(error, LimitError)
+    assert error.exit_code is ExitCode.OUT_OF_LIMITS
+
+
+@pytest.mark.parametrize(("free", "trips"), [(50_000_000, False), (49_999_999, True), (0, True)])
+def test_the_disk_must_have_room(free: int, trips: bool) -> None:
+    assert (rules.disk("/runs", free, 50.0) is not None) is trips
+
+
+def test_a_robot_that_could_not_be_stopped_comes_first() -> None:
+    trip = Trip(Guard.STALE, "controller", "has not answered", "Check its cable").unstopped("no way to it")
+    error = trip.as_error()
+    assert isinstance(error, GuardTripped)
+    assert error.exit_code is ExitCode.HARDWARE
+    assert str(error).endswith("could not be stopped: no way to it. Press the emergency stop")
+
+
+def test_a_trip_stands_in_the_journal_as_it_is() -> None:
+    trip = Trip(Guard.PLATE, "gauge z", "the ball is off", "Look at it")
+    event = events.Tripped.of(trip)
+    assert events.Tripped.model_validate_json(event.model_dump_json()) == event
+    assert (event.guard, event.device) == (Guard.PLATE, "gauge z")

@@ -1,0 +1,322 @@
+"""Watching over an action: when it begins, when it ends, and what must not trip."""
+
+from __future__ import annotations
+
+import asyncio
+from typing import Any
+
+import numpy as np
+import pytest
+
+from drivers.gauges.errors import GaugeAtEnd, WrongAnswer
+from drivers.ports import GaugeReading
+from hexacell.errors import DeviceError, HexacellError, LimitError
+from procedures import events
+from procedures.guards.lanes import Lane, Line
+from procedures.guards.patrol import Lanes, Patrol
+from procedures.guards.snapshot import Limits
+from procedures.guards.trips import Guard, GuardTripped
+from procedures.journal import read_journal
+from procedures.steps import CloseSet, Expectation, Move, Phase, Sample, SetKey
+
+P1 = SetKey(phase=Phase.IDENTIFY, point=1)
+P2 = SetKey(phase=Phase.IDENTIFY, point=2)
+
+
+def move(orientation: int, at: SetKey = P1, expected: Expectation | None = None) -> Move:
+    x, y, z = (100.0, -100.0, 500.0) if at is P1 else (-100.0, 100.0, 500.0)
+    pose = (x, y, z, orientation - 1.0, 0.0, 0.0)
+    return Move(at=at, orientation=orientation, pose=pose, expected=expected)
+
+
+def sample(orientation: int, at: SetKey = P1) -> Sample:
+    return Sample(at=at, orientation=orientation, pose=move(orientation, at).pose)
+
+
+async def reference(scene: Any) -> Any:
+    for step in (move(1), sample(1)):
+        await scene.do(step)
+    return scene
+
+
+async def test_two_sets_from_beginning_to_end_trip_nothing(scene) -> None:
+    stage = scene()
+    await stage.rig.performer.prepare()
+    for at in (P1, P2):
+        for orientation in (1, 2, 3):
+            await stage.do(move(orientation, at))
+            await stage.do(sample(orientation, at))
+        await stage.do(move(1, at))
+        await stage.do(CloseSet(at=at))
+    assert [len(stage.state.set(at).samples) for at in (P1, P2)] == [3, 3]
+    assert stage.stops == 0
+
+
+async def test_nothing_begins_before_every_device_has_answered(scene) -> None:
+    stage = await reference(scene())
+    begun: list[float] = []
+    real = stage.controller.move
+
+    async def late(pose: Any) -> None:
+        begun.append(stage.now)
+        await real(pose)
+
+    stage.controller.move = late
+    before = stage.now
+    await stage.do(move(2))
+    assert begun[0] - before >= 0.043, "a gauge takes so long to answer"
+
+
+@pytest.mark.parametrize("device", ["gauge y", "encoders", "controller"])
+async def test_a_device_that_is_silent_beforehand_keeps_it_from_moving(scene, device: str) -> None:
+    stage = await reference(scene())
+    moves = stage.controller.log.count
+    before = len(stage.controller.log)
+    stage.silent.add(device)
+    with pytest.raises(GuardTripped, match=device) as tripped:
+        await stage.do(move(2))
+    assert tripped.value.trip.guard is Guard.STALE
+    assert moves("stop") == 0
+    assert len(stage.controller.log) == before
+
+
+async def test_all_devices_that_fail_beforehand_are_named(scene) -> None:
+    stage = await reference(scene())
+    stage.inch |= {"x", "z"}
+    with pytest.raises(GuardTripped, match=r"gauge x: answers in inch; gauge z: answers in inch"):
+        await stage.do(move(2))
+
+
+async def test_what_is_latched_lasts_until_it_is_cleared(scene) -> None:
+    stage = await reference(scene())
+    stage.forbidden = "the button is pressed"
+    with pytest.raises(GuardTripped, match="the button"):
+        await stage.do(move(2))
+    stage.forbidden = None
+    for step in (move(2), sample(1)):
+        with pytest.raises(GuardTripped, match="the button"):
+            await stage.do(step)
+    stage.rig.performer.guards.watch.clear()
+    await stage.do(move(2))
+
+
+async def test_preparing_anew_clears_what_is_latched_but_looks_again(scene) -> None:
+    stage = await reference(scene())
+    stage.forbidden = "the button is pressed"
+    for action in (lambda: stage.do(move(2)), stage.rig.performer.prepare):
+        with pytest.raises(GuardTripped, match="the button"):
+            await action()
+    stage.forbidden = None
+    await stage.rig.performer.prepare()
+    await stage.do(move(2))
+
+
+async def test_a_robot_that_cannot_be_stopped_is_said(scene) -> None:
+    stage = await reference(scene())
+
+    async def deaf() -> None:
+        raise DeviceError("does not answer", subject="controller")
+
+    stage.controller.stop = deaf
+    moving = asyncio.ensure_future(stage.do(move(2)))
+    await stage.rig.clock.sleep(0.3)
+    stage.forbidden = "the button is pressed"
+    with pytest.raises(
+        GuardTripped, match=r"the button .*could not be stopped: .*Press the emergency stop"
+    ):
+        await moving
+
+
+async def test_a_move_that_fails_by_itself_is_explained_by_the_guard_that_knows_why(scene) -> None:
+    stage = await reference(scene())
+
+    async def interrupted(pose: Any) -> None:
+        stage.switch_off("joint 2 following error")
+        raise DeviceError("stopped on the way", subject="controller")
+
+    stage.controller.move = interrupted
+    with pytest.raises(GuardTripped, match="joint 2 following error") as tripped:
+        await stage.do(move(2))
+    assert isinstance(tripped.value.__cause__, DeviceError)
+
+
+async def test_a_move_that_fails_for_reasons_of_its_own_says_so(scene) -> None:
+    stage = await reference(scene())
+    stage.controller.failures["move"] = DeviceError("cannot go there", subject="controller")
+    with pytest.raises(DeviceError, match="cannot go there") as failed:
+        await stage.do(move(2))
+    assert not isinstance(failed.value, GuardTripped)
+    await stage.do(move(2))
+
+
+async def test_a_mistake_in_the_watch_itself_ends_the_move(scene) -> None:
+    stage = await reference(scene())
+
+    async def mistaken() -> Any:
+        raise ZeroDivisionError
+
+    stage.pressed = mistaken
+    with pytest.raises(ZeroDivisionError):
+        await stage.do(move(2))
+
+
+async def test_cancelling_ends_the_action_and_the_watch(scene) -> None:
+    stage = await reference(scene())
+    moving = asyncio.ensure_future(stage.do(move(2)))
+    await stage.rig.clock.sleep(0.3)
+    moving.cancel()
+    with pytest.raises(asyncio.CancelledError):
+        await moving
+    assert stage.rig.performer.guards.watch.latched is None
+
+
+async def test_a_noisy_line_is_borne(scene) -> None:
+    stage = await reference(scene())
+    gauge = stage.rig.gauges[1]
+    real, asked = gauge.glance, [0]
+
+    async def noisy() -> GaugeReading:
+        asked[0] += 1
+        await stage.rig.clock.sleep(0.1 if (asked[0] - 1) % 3 else 0.0)  # the line is left alone
+        if asked[0] % 3:
+            await stage.rig.clock.sleep(0.043)
+            raise WrongAnswer("answers b'?'", subject="gauge y", action="Check it")
+        return await real()  # type: ignore[no-any-return]
+
+    gauge.glance = noisy
+    await stage.do(move(2))
+    assert asked[0] > 3
+
+
+async def test_gauges_are_left_alone_on_the_way_to_another_point(scene) -> None:
+    stage = await reference(scene())
+
+    async def forbidden() -> GaugeReading:
+        raise AssertionError("its zero would be void")
+
+    for gauge in stage.rig.gauges:
+        gauge.glance = forbidden
+    await stage.do(move(1, P2))
+    assert isinstance(await stage.do(sample(1, P2)), events.Sampled)
+
+
+async def test_a_move_that_begins_off_the_plate_may_lead_back_onto_it(scene) -> None:
+    stage = await reference(scene())
+    stage.shift["x"] = 5.9
+    assert isinstance(await stage.do(sample(2)), events.Refused)
+
+    async def creep_back() -> None:
+        while stage.shift["x"] > 0.0:
+            await stage.rig.clock.sleep(0.05)
+            stage.shift["x"] -= 0.5
+
+    creeping = asyncio.ensure_future(creep_back())
+    await stage.do(move(1))
+    await creeping
+
+
+async def test_a_move_that_begins_at_the_end_of_a_plunger_may_lead_away_from_it(scene) -> None:
+    stage = await reference(scene())
+    stage.at_end.add("x")
+    moving = asyncio.ensure_future(stage.do(move(2)))
+    await stage.rig.clock.sleep(0.4)
+    stage.at_end.clear()
+    await moving
+
+
+async def test_sliders_that_are_not_where_they_were_sent(scene) -> None:
+    stage = await reference(scene())
+    stage.slip_mm = -1.5
+    with pytest.raises(GuardTripped, match=r"slider \d: is -1\.\d+ mm from where") as tripped:
+        await stage.do(move(2))
+    assert tripped.value.trip.guard is Guard.FOLLOWING
+    assert stage.stops == 1
+
+
+EXPECTED = Expectation(deviation_mm=(0.0, 0.0, 3.0), sigma_mm=(0.1, 0.1, 0.1), gain=1.0)
+
+
+@pytest.mark.parametrize(("sigma", "trips"), [(0.1, True), (0.5, False)])
+async def test_a_gauge_that_shows_one_value_all_the_way(scene, sigma: float, trips: bool) -> None:
+    stage = await reference(scene())
+    stage.frozen["z"] = stage.rig.gauges[2].shown()
+    step = move(2, expected=EXPECTED.model_copy(update={"sigma_mm": (sigma,) * 3}))
+    if not trips:
+        await stage.do(step)
+        return
+    with pytest.raises(GuardTripped, match=r"gauge z: shows .* unchanged") as tripped:
+        await stage.do(step)
+    assert tripped.value.trip.guard is Guard.STALE
+
+
+async def test_what_trips_stands_in_the_journal(scene) -> None:
+    stage = scene()
+
+    def press(event: events.Event, _: object) -> None:
+        if isinstance(event, events.Arrived):
+            stage.forbidden = "stop exists"
+
+    with pytest.raises(GuardTripped):
+        await stage.rig.run(press)
+    history = read_journal(stage.rig.folder.journal)
+    assert [event.kind for event in history[-2:]] == ["tripped", "interrupted"]
+    assert history[-2].guard is Guard.STOP_LINE  # type: ignore[union-attr]
+    assert history[-1].exit_code == 3  # type: ignore[union-attr]
+
+
+async def test_a_drifted_reference_is_not_latched(scene) -> None:
+    stage = await reference(scene())
+    stage.shift["y"] = 0.2
+    with pytest.raises(LimitError, match=r"P1: back at the reference .*more than 0\.1 mm"):
+        await stage.do(CloseSet(at=P1))
+    assert stage.rig.performer.guards.watch.latched is None
+
+
+async def test_lanes_of_one_line_are_silent_together(scene) -> None:
+    stage = scene()
+    clock, shared = stage.rig.clock, Line()
+    turn = asyncio.Lock()
+
+    async def queued() -> str:
+        async with turn:
+            await clock.sleep(0.05)
+        return "here"
+
+    lanes = tuple(Lane("it", queued, 0.0, shared) for _ in range(5))
+    async with Patrol(Lanes(gauges=lanes), Limits(0.12, 5.5), clock) as patrol:  # type: ignore[arg-type]
+        await clock.sleep(2.0)
+        assert patrol.trip is None, "one answer in 0.25 s each, but one in 0.05 s altogether"
+
+
+async def test_a_process_without_turns_is_deaf_not_its_devices_silent(scene) -> None:
+    stage = scene()
+    clock = stage.rig.clock
+
+    async def slow() -> str:
+        await clock.sleep(0.05)
+        return ""
+
+    lanes = Lanes(stop_line=Lane("stop line", slow, 0.02))
+    async with Patrol(lanes, Limits(0.12, 5.5), clock) as patrol:
+        await clock.sleep(0.2)
+        clock.time_s += 5.0
+        await clock.sleep(0.2)
+        assert patrol.trip is None
+
+
+async def test_errors_of_a_lane_do_not_hide_what_it_said() -> None:
+    answers: list[Any] = [1.0, GaugeAtEnd("end", subject="g"), HexacellError("off", subject="g"), 2.0]
+
+    async def ask() -> float:
+        answer = answers.pop(0)
+        if isinstance(answer, HexacellError):
+            raise answer
+        return float(answer)
+
+    lane = Lane("g", ask, 0.0)
+    seen = []
+    for _ in range(4):
+        lane._heard = await lane._look()
+        seen.append((lane.heard.value, lane.heard.first, str(lane.heard.error or "")))
+    assert seen == [(1.0, 1.0, ""), (1.0, 1.0, "g: end"), (1.0, 1.0, "g: off"), (2.0, 1.0, "")]
+    assert np.isclose(lane.heard.silent_s, 0.0)

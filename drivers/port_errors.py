@@ -17,13 +17,17 @@ _CAUSES = {
 }
 
 
+class LinkLost(DeviceError):
+    """There is no line to a device, or it broke."""
+
+
 def cannot_open(subject: str, url: str, error: BaseException) -> DeviceError:
     """Opening the port failed with ``error``, an ``OSError`` or a ``termios.error``."""
     problem, action = _CAUSES.get(
         getattr(error, "errno", None) or 0,
         (f"cannot be opened: {error}", "Check the device and port in the cell file"),
     )
-    return DeviceError(f"port {url} {problem}", subject=subject, action=action)
+    return LinkLost(f"port {url} {problem}", subject=subject, action=action)
 
 
 def settings_refused(subject: str, url: str, error: BaseException) -> FileError:
@@ -37,7 +41,7 @@ def settings_refused(subject: str, url: str, error: BaseException) -> FileError:
 
 def lost(subject: str, url: str, reason: str) -> DeviceError:
     """The port was there and is no longer."""
-    return DeviceError(
+    return LinkLost(
         f"port {url} was lost ({reason})",
         subject=subject,
         action="Plug it in and open the device again; its zero is void",
@@ -46,7 +50,7 @@ def lost(subject: str, url: str, reason: str) -> DeviceError:
 
 def closed(subject: str, url: str) -> DeviceError:
     """The port is being closed, by ourselves."""
-    return DeviceError(f"port {url} is closed", subject=subject)
+    return LinkLost(f"port {url} is closed", subject=subject)
 
 
 def keeps_sending(subject: str, url: str) -> DeviceError:

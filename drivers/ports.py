@@ -38,6 +38,28 @@ class EncoderRound:
     positions_mm: tuple[float, ...]
 
 
+@dataclass(frozen=True, slots=True)
+class ControllerStatus:
+    """What a controller says of itself: whether it may move, and what it complains about."""
+
+    estop: bool
+    enabled: bool
+    complaints: tuple[str, ...] = ()
+
+    @property
+    def may_move(self) -> bool:
+        """Whether nothing keeps it from moving."""
+        return self.enabled and not self.estop
+
+
+@dataclass(frozen=True, slots=True)
+class TemperatureReading:
+    """A temperature, deg C, and the answer it came in."""
+
+    celsius: float
+    raw: str
+
+
 class Gauge(Protocol):
     """A dial indicator. Its zero is kept in software; the instrument's own zero is not touched."""
 
@@ -52,6 +74,14 @@ class Gauge(Protocol):
 
     async def read(self) -> GaugeReading:
         """The plunger's position now, mm, in the instrument's own zero and direction."""
+        ...
+
+    async def glance(self) -> GaugeReading:
+        """What it shows in this moment, moving or not: asked once, agreed with nothing.
+
+        For watching a motion, never for a record. An answer that is garbled raises
+        :class:`drivers.gauges.errors.WrongAnswer`; the next one may be whole.
+        """
         ...
 
     async def check(self) -> None:
@@ -98,6 +128,10 @@ class Controller(Protocol):
         """The pose the controller believes the platform to have."""
         ...
 
+    async def status(self) -> ControllerStatus:
+        """Whether it is in emergency stop, whether it is on; also while ``move`` waits."""
+        ...
+
     async def stop(self) -> None:
         """Stop motion in place, at once, also while ``move`` waits."""
         ...
@@ -108,4 +142,41 @@ class Controller(Protocol):
 
     async def close(self) -> None:
         """Let the connection go; closing twice is harmless."""
+        ...
+
+
+class StopLine(Protocol):
+    """A contact or a file by which anybody may forbid motion."""
+
+    async def open(self) -> DeviceIdentity | None:
+        """Get ready to look at it; gives the device that it is, if it is one."""
+        ...
+
+    async def pressed(self) -> str | None:
+        """Why nothing may move now, in words, or nothing. Fails safe: a lost line forbids."""
+        ...
+
+    async def close(self) -> None:
+        """Let it go; closing twice is harmless."""
+        ...
+
+
+class Thermometer(Protocol):
+    """Something that knows how warm it is. A run goes on without it."""
+
+    @property
+    def name(self) -> str:
+        """The name the cell file gives it."""
+        ...
+
+    async def open(self) -> DeviceIdentity:
+        """Connect."""
+        ...
+
+    async def read(self) -> TemperatureReading:
+        """The temperature now, or a ``DeviceError`` within the time that the cell file allows."""
+        ...
+
+    async def close(self) -> None:
+        """Let it go; closing twice is harmless."""
         ...

@@ -19,7 +19,7 @@ from drivers.controllers.linuxcncrsh_address import Address, Patience
 from drivers.controllers.linuxcncrsh_commands import Commands
 from drivers.controllers.linuxcncrsh_protocol import apart, rapid_move
 from drivers.controllers.linuxcncrsh_session import Session
-from drivers.ports import DeviceIdentity
+from drivers.ports import ControllerStatus, DeviceIdentity
 from drivers.trace import Recorder
 from hexacell.cell.devices import ControllerSettings
 from hexacell.errors import DeviceError
@@ -111,6 +111,10 @@ class LinuxcncrshController:
         """The six joints as the controller has them, mm."""
         async with self._turn:
             return await (await self._session.in_step()).joints()
+
+    async def status(self) -> ControllerStatus:
+        """Whether it is in emergency stop, whether it is on, and why not; also while ``move`` waits."""
+        return await self._session.status()
 
     async def stop(self) -> None:
         """Stop motion in place at once; returns when the machine stands still.

@@ -11,6 +11,7 @@ from typing import Self
 
 from drivers.controllers.errors import AnswerOverdue, ConnectionLost
 from drivers.controllers.linuxcncrsh_address import Address, Patience
+from drivers.controllers.linuxcncrsh_floor import Floor
 from drivers.controllers.linuxcncrsh_protocol import Answer, LineBuffer, answer_in, encode, explanation_in
 from drivers.trace import Direction, Recorder, TraceEntry
 from hexacell.errors import DeviceError, UsageError
@@ -25,7 +26,8 @@ class Connection:
 
     The caller asks one question at a time. When a wait is cancelled or runs out, the answer is
     still owed: ``catch_up`` collects it before the next question, so that a late answer is never
-    taken for that of another command. While ``may_speak`` is cleared, nothing is asked.
+    taken for that of another command. While ``may_speak`` is cleared, nothing is asked, and
+    connections that share a ``floor`` are never heard at the same moment.
     """
 
     def __init__(
@@ -39,6 +41,7 @@ class Connection:
         self.server = ""
         self.may_speak = asyncio.Event()
         self.may_speak.set()
+        self.floor = Floor()
         self._recorder = recorder
         self._address = address
         self._patience = patience
@@ -49,8 +52,15 @@ class Connection:
         self._owed: str | None = None
 
     @classmethod
-    async def open(cls, address: Address, patience: Patience, recorder: Recorder | None = None) -> Self:
-        """Connect, greet, silence the echo, ask for acknowledgements and take control.
+    async def open(
+        cls,
+        address: Address,
+        patience: Patience,
+        recorder: Recorder | None = None,
+        *,
+        commanding: bool = True,
+    ) -> Self:
+        """Connect, greet, silence the echo, ask for acknowledgements and, if ``commanding``, take control.
 
         Raises:
             ConnectionLost: Nothing listens there, or it says nothing.
@@ -59,7 +69,8 @@ class Connection:
         connection = cls(address, patience, recorder, *await _connect(address, patience))
         try:
             await connection._greet()
-            await connection.take_control()
+            if commanding:
+                await connection.take_control()
         except BaseException:
             await connection.close()
             raise
@@ -74,9 +85,10 @@ class Connection:
         """
         line = self._encoded(command)
         await self.may_speak.wait()
-        self._owed = command
-        await self._write(line)
-        return await self._owed_answer(patience_s or self._patience.answer)
+        async with self.floor.taken():
+            self._owed = command
+            await self._write(line)
+            return await self._owed_answer(patience_s or self._patience.answer)
 
     async def catch_up(self) -> None:
         """Collect an answer that nobody waited for to the end.
@@ -89,13 +101,13 @@ class Connection:
         if self._reader.at_eof():
             raise ConnectionLost("closed the connection", subject=self._address.name)
 
-    async def take_control(self) -> None:
+    async def take_control(self, patience_s: float | None = None) -> None:
         """Become the client that may command; on LinuxCNC 2.9 the one before loses control.
 
         Raises:
             DeviceError: The password is wrong.
         """
-        answer = await self.ask(f"set enable {self._address.enable_password}")
+        answer = await self.ask(f"set enable {self._address.enable_password}", patience_s)
         if not answer.accepted:
             raise DeviceError(
                 "refuses the enable password",

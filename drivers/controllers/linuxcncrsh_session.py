@@ -1,4 +1,4 @@
-"""Keeping one usable connection, and a second one for stopping."""
+"""Keeping one usable connection, and a second one for looking on and for stopping."""
 
 from __future__ import annotations
 
@@ -9,7 +9,10 @@ from drivers.controllers.errors import ConnectionLost
 from drivers.controllers.linuxcncrsh_address import Address, Patience
 from drivers.controllers.linuxcncrsh_commands import Commands
 from drivers.controllers.linuxcncrsh_connection import Connection
+from drivers.controllers.linuxcncrsh_floor import Floor
+from drivers.controllers.linuxcncrsh_lookout import Lookout
 from drivers.controllers.linuxcncrsh_stop import stop_in_place
+from drivers.ports import ControllerStatus
 from drivers.trace import Recorder
 from hexacell.errors import DeviceError
 
@@ -32,6 +35,8 @@ class Session:
         self._stop_turn = asyncio.Lock()
         self._may_speak = asyncio.Event()
         self._may_speak.set()
+        self._floor = Floor()
+        self._lookout = Lookout(address, patience, self._floor, trace)
 
     async def open(self) -> Commands:
         """The first connection; nothing is left behind if there is none."""
@@ -65,6 +70,7 @@ class Session:
     async def in_control(self) -> Commands:
         """The same, after taking control from whoever has it."""
         self._has_control = False
+        self._lookout.forget()
         return await self.in_step()
 
     async def come_back(self) -> Commands:
@@ -82,6 +88,16 @@ class Session:
                     raise
                 await asyncio.sleep(self._patience.poll)
 
+    async def status(self) -> ControllerStatus:
+        """How the machine is, over a connection of its own: the first one may be waiting for a move.
+
+        Raises:
+            DeviceError: The session is not open, or it cannot be asked.
+        """
+        self._expect_open()
+        await self._may_speak.wait()
+        return await self._lookout.status()
+
     async def stop(self, tolerance_mm: float) -> None:
         """Stop motion over a connection of its own; the first one is silent meanwhile.
 
@@ -92,7 +108,8 @@ class Session:
         async with self._stop_turn:
             self._may_speak.clear()
             try:
-                await stop_in_place(self._address, self._patience, tolerance_mm, self._trace)
+                ready = await self._lookout.hand_over()
+                await stop_in_place(self._address, self._patience, tolerance_mm, self._trace, ready)
             finally:
                 self._has_control = False
                 self._may_speak.set()
@@ -100,11 +117,13 @@ class Session:
     async def close(self) -> None:
         """Let the line go; closing twice is harmless."""
         self._is_open = False
+        await self._lookout.close()
         await self._drop()
 
     async def _connected(self) -> Commands:
-        connection = await Connection.open(self._address, self._patience, self._trace)
-        connection.may_speak = self._may_speak
+        async with self._floor.kept():
+            connection = await Connection.open(self._address, self._patience, self._trace)
+        connection.may_speak, connection.floor = self._may_speak, self._floor
         commands = Commands(connection, self._address.name)
         try:
             await readiness.wait_for_completion(commands)

@@ -10,7 +10,7 @@ from drivers.encoders.node import EncoderNode
 from drivers.encoders.objects import ALARMS, ERROR_REGISTER, Entry
 from drivers.encoders.watch import NodeWatch, invalid
 
-PERIOD_S = 0.5
+PERIOD_S = 0.1
 """A device that raises an alarm without an emergency message is found out after so long."""
 
 _COMMUNICATION = 0x10

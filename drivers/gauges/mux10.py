@@ -18,6 +18,7 @@ from drivers.gauges.errors import FrameRejected, GaugeAtEnd, GaugeSilent, WrongA
 from drivers.gauges.serial_gauge import SerialGauge
 from drivers.gauges.shown import Shown
 from drivers.gauges.state import GaugeState
+from drivers.ports import GaugeReading
 from hexacell.errors import DeviceError
 
 VALUE = re.compile(rb"0(\d{1,2})A([+-])(?=.{8}\r)(\d+\.\d+)\r")
@@ -83,6 +84,17 @@ class Mux10Gauge(SerialGauge):
     def question(self) -> bytes:
         """What asks for the value shown."""
         return b"%d\r" % self.channel
+
+    async def glance(self) -> GaugeReading:
+        """As :meth:`SerialGauge.glance`; a multiplexer that is busy has not answered it."""
+        try:
+            return await super().glance()
+        except MultiplexerBusy:
+            raise WrongAnswer(
+                "its multiplexer is busy (918)",
+                subject=self.subject,
+                action="Disconnect the foot switch and other triggers",
+            ) from None
 
     async def _shown(self) -> Shown:
         for _ in range(BUSY_TRIES):

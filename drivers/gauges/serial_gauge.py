@@ -104,6 +104,22 @@ class SerialGauge(ABC):
             action="Wait until it stands still; if it does, check its cable",
         )
 
+    async def glance(self) -> GaugeReading:
+        """The value shown in this moment, mm, moving or not: one question, no second opinion.
+
+        Raises:
+            GaugeAtEnd: The plunger is at an end of its travel.
+            WrongAnswer: The answer is garbled.
+            DeviceError: As :meth:`read`.
+        """
+        self._opened_state()
+        try:
+            shown = self._in_mm(self._understand(await self._ask(self.question)))
+        except FrameRejected as rejection:
+            self._distrust()
+            raise wrong_answer(self.subject, self.dialect, rejection.frame) from rejection
+        return GaugeReading(shown.value, shown.text)
+
     async def check(self) -> None:
         """Ask for the settings again and compare them with those found by ``open``.
 

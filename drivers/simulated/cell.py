@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from contextlib import ExitStack
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from types import TracebackType
 from typing import Any, Self
 
 from drivers.simulated.controller.server import SimulatedController
 from drivers.simulated.encoders import SimulatedEncoderBank
+from drivers.simulated.faults import CellFaults, FaultSchedule
 from drivers.simulated.gauges.cell import GaugeRack
 from drivers.simulated.machine import SimulatedMachine
 from drivers.simulated.slcan import serve_slcan
@@ -26,6 +28,7 @@ from hexacell.pose import Pose, Poses
 class SimulatedCell:
     """The cell that a cell file's ``[simulation]`` describes; serves until it is closed.
 
+    ``faults`` makes things go wrong at once, ``schedule`` at a moment that is to come.
     ``other_processes``: whether the encoders must be reachable from outside this process.
 
     Raises:
@@ -48,6 +51,7 @@ class SimulatedCell:
         self.world = _world(mechanism, simulation, clock, config_format, config, home)
         self.machine = SimulatedMachine(mechanism, config_format, config, self.world, clock, home)
         with ExitStack() as served:
+            stop_file = _stop_file(settings, served)
             self.gauges = served.enter_context(_rack(settings, simulation, self.world, clock))
             self.encoders = served.enter_context(_bank(settings, simulation, self.world, clock))
             bus: dict[str, Any] = self.encoders.bus_settings
@@ -55,6 +59,9 @@ class SimulatedCell:
                 adapter = served.enter_context(serve_slcan(self.encoders.channel, "pty"))
                 bus = adapter.bus_settings
             self.controller = served.enter_context(_controller(settings, self.machine, config))
+            self.faults = CellFaults(self.gauges, self.encoders, self.controller, stop_file)
+            self.schedule = served.enter_context(FaultSchedule(self.faults, clock, simulation.faults))
+            self.world.on_travel = self.schedule.move_begun
             self._served = served.pop_all()
         self.settings = settings.model_copy(
             update={
@@ -63,6 +70,7 @@ class SimulatedCell:
                 "controller": settings.controller.model_copy(
                     update={"host": "127.0.0.1", "port": self.controller.port}
                 ),
+                "guards": settings.guards.model_copy(update={"stop_file": str(stop_file)}),
                 "simulation": None,
             }
         )
@@ -78,6 +86,13 @@ class SimulatedCell:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.close()
+
+
+def _stop_file(settings: CellSettings, served: ExitStack) -> Path:
+    """The cell's own stop file, or one in a folder that lasts as long as the cell is served."""
+    if settings.guards.stop_file is not None:
+        return Path(settings.guards.stop_file)
+    return Path(served.enter_context(TemporaryDirectory(prefix="hexacell-"))) / "stop"
 
 
 def _world(

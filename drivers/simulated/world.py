@@ -7,6 +7,7 @@ it was, so that the platform stays on its assembly mode. Gauges and encoders loo
 from __future__ import annotations
 
 import threading
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -23,12 +24,12 @@ from hexacell.rotations import Array
 
 AXES = "xyz"
 SWING_HZ = 8.0
-PLACING_MM = 0.4
-"""How near to the middle of their travel the gauges are put, one standard deviation."""
 
 
 class World:
     """The truth of one cell; safe to ask from several threads.
+
+    ``on_travel`` is called whenever a move has begun; it must not take long.
 
     Raises:
         ReachError: the true geometry cannot stand where it should begin.
@@ -47,6 +48,7 @@ class World:
         values = settings.geometry
         self._truth = Geometry(values.S, values.B, values.l)
         self._mechanism = mechanism
+        self.on_travel: Callable[[], None] = lambda: None
         self._settings = settings
         self._clock = clock
         self._random = np.random.default_rng(settings.seed)
@@ -83,6 +85,7 @@ class World:
             duration = max(motion.minimum_s, longest / motion.speed_mm_s)
             self._motion, self._passed = Motion(really, self._clock.now(), duration), 0
             self._disturb()
+            self.on_travel()
             return self._motion
 
     def stop(self) -> None:
@@ -91,6 +94,12 @@ class World:
             now = self._clock.now()
             if now < self._motion.ends_s:
                 self._motion = replace(self._motion, stopped_s=now)
+
+    @property
+    def still_since_s(self) -> float:
+        """When the sliders came, or will come, to rest, on the cell's clock."""
+        with self._lock:
+            return self._motion.ends_s
 
     def progress(self) -> float:
         """How much of the last way is done, 0 to 1."""
@@ -152,7 +161,7 @@ class World:
         return swinging
 
     def _placed(self, ball: Array) -> Array:
-        return ball + PLACING_MM * self._random.standard_normal(3)
+        return ball + self._settings.gauges.placing_mm * self._random.standard_normal(3)
 
     def _turned(self) -> Array:
         tilt = np.radians(self._settings.gauges.misalignment_deg)

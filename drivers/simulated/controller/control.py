@@ -21,6 +21,9 @@ from hexacell.pose import Pose
 MID_MOVE_S = 0.02
 """When faults in the middle of a move strike, s after it began."""
 
+LAGGING = 3
+"""The joint whose following errors are simulated, as LinuxCNC counts them: from 0."""
+
 _AGAIN_S = 0.05
 
 
@@ -84,6 +87,12 @@ class Control:
             self.estop = on
         return True
 
+    def lag(self, joint: int = LAGGING) -> None:
+        """A joint's following error exceeds its limit: the drives are switched off, and it says why."""
+        with self._lock:
+            self._errors.append(following_error(joint))
+            self._switch_off()
+
     def set_machine(self, *, on: bool) -> bool:
         """Switch on or off; in emergency stop it is acknowledged and stays off."""
         with self._lock:
@@ -133,7 +142,7 @@ class Control:
         except BlockError as error:
             return self._failed(str(error))
         if self._faults.strikes(Fault.REFUSES_MOVE):
-            return self._failed("joint 3 following error")
+            return self._failed(following_error(LAGGING))
         if target is None or self._faults.strikes(Fault.STAYS_PUT):
             return True
         job = self._start(lambda: self._travel(target))
@@ -153,10 +162,13 @@ class Control:
     def _strike_in_mid_move(self, job: Future[bool]) -> None:
         drops = self._faults.strikes(Fault.DROPS_CONNECTION)
         stops = self._faults.strikes(Fault.EMERGENCY_STOP)
-        if drops or stops:
+        lags = self._faults.strikes(Fault.FOLLOWING_ERROR)
+        if drops or stops or lags:
             wait([job], timeout=MID_MOVE_S)
         if stops:
             self.set_estop(on=True)
+        if lags:
+            self.lag()
         if drops:
             raise ConnectionCut
 
@@ -199,6 +211,11 @@ class Control:
         if self.on:
             self.on = False
             self.machine.switch_off()
+
+
+def following_error(joint: int) -> str:
+    """What LinuxCNC says when it switches the machine off for one."""
+    return f"joint {joint} following error"
 
 
 def _outcome(job: Future[bool]) -> bool:

@@ -22,6 +22,8 @@ class Fault(Enum):
     """In the middle of a move the connection that ordered it is cut; the machine goes on."""
     EMERGENCY_STOP = auto()
     """In the middle of a move somebody presses the emergency stop."""
+    FOLLOWING_ERROR = auto()
+    """In the middle of a move a slider lags behind: the machine is switched off."""
 
 
 class Faults:

@@ -52,6 +52,15 @@ class SimulatedController:
         )
         self._thread.start()
 
+    def unplug(self) -> None:
+        """Cut every connection and take no other; the machine goes on with what it was told."""
+        self._server.unplugged = True
+        self._server.cut_all()
+
+    def plug_in(self) -> None:
+        """Take connections again."""
+        self._server.unplugged = False
+
     def close(self) -> None:
         """Stop the machine, cut all connections and end all threads; closing twice is harmless."""
         self._server.shutdown()
@@ -75,6 +84,7 @@ class _Server(socketserver.ThreadingTCPServer):
         self.control = control
         self.faults = faults
         self.access = access
+        self.unplugged = False
         self._connections: set[socket.socket] = set()
         super().__init__((HOST, port), _Handler)
 
@@ -83,6 +93,10 @@ class _Server(socketserver.ThreadingTCPServer):
         connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         self._connections.add(connection)
         return connection, address
+
+    def verify_request(self, request: object, client_address: object) -> bool:
+        del request, client_address
+        return not self.unplugged
 
     def shutdown_request(self, request: socket.socket | tuple[bytes, socket.socket]) -> None:
         assert isinstance(request, socket.socket)  # noqa: S101 - a TCP server has no datagrams

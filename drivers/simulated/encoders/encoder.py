@@ -137,8 +137,9 @@ class SimulatedEncoder:
 
     def _start_event_timers(self) -> None:
         for number in range(1, len(self._maker.tpdos) + 1):
+            is_on = not self._value(0x1800 + number - 1, 1) & dictionary.TPDO_OFF
             period_ms = self._value(0x1800 + number - 1, 5)
-            if period_ms and self._value(0x1800 + number - 1, 2) not in _SYNCHRONOUS:
+            if is_on and period_ms and self._value(0x1800 + number - 1, 2) not in _SYNCHRONOUS:
                 self._repeat(number, self._on_the_wall(period_ms / 1000))
 
     def _repeat(self, number: int, period_s: float) -> None:

@@ -25,6 +25,9 @@ class GaugeFault(StrEnum):
     BATTERY_LOW = "battery-low"
     AUTO_OFF = "auto-off"
     UNPLUGGED = "unplugged"
+    AT_END = "at-end"
+    PUSHED = "pushed"
+    FROZEN = "frozen"
 
 
 def afflict(indicator: Indicator, fault: GaugeFault, *, on: bool) -> bool:
@@ -36,6 +39,12 @@ def afflict(indicator: Indicator, fault: GaugeFault, *, on: bool) -> bool:
             indicator.reversed = on
         case GaugeFault.BATTERY_LOW:
             indicator.battery_low = on
+        case GaugeFault.AT_END:
+            indicator.at_end = on
+        case GaugeFault.PUSHED:
+            indicator.push(on=on)
+        case GaugeFault.FROZEN:
+            indicator.stick(on=on)
         case GaugeFault.HOLD:
             (indicator.hold if on else indicator.release)()
         case GaugeFault.AUTO_OFF:

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from math import copysign
 
 MM_PER_INCH = 25.4
+PUSH_MM = 6.0
 
 Plunger = Callable[[], float]
 """Where the plunger is now, mm from the middle of its travel, noise included.
@@ -22,10 +24,13 @@ class Indicator:
         self.battery_low = False
         self.preset_mm = 0.0
         self.powered = True
+        self.at_end = False
         self._plunger = plunger
         self._travel_mm = travel_mm
         self._offset_mm = 0.0
         self._held_mm: float | None = None
+        self._stuck_mm: float | None = None
+        self._pushed_mm = 0.0
 
     @property
     def on_hold(self) -> bool:
@@ -47,6 +52,14 @@ class Indicator:
         """Let the display follow the plunger again."""
         self._held_mm = None
 
+    def stick(self, *, on: bool) -> None:
+        """Let the plunger jam where it is, or come free: it goes on answering."""
+        self._stuck_mm = self._plunger() if on else None
+
+    def push(self, *, on: bool) -> None:
+        """Push the plunger away, farther than a ball on its plate would, or let it come back."""
+        self._pushed_mm = -copysign(PUSH_MM, self._plunger()) if on else 0.0
+
     def recall_preset(self) -> None:
         """Show the preset value here; with a preset of 0 this is the zero key."""
         self._offset_mm += self.preset_mm - (self._live_mm() or 0.0)
@@ -63,7 +76,7 @@ class Indicator:
         self._offset_mm = -(self._live_mm() or 0.0)
 
     def _live_mm(self) -> float | None:
-        position = self._plunger()
-        if abs(position) > self._travel_mm / 2:
+        position = self._plunger() + self._pushed_mm if self._stuck_mm is None else self._stuck_mm
+        if self.at_end or abs(position) > self._travel_mm / 2:
             return None
         return (-position if self.reversed else position) + self._offset_mm

@@ -235,3 +235,10 @@ async def test_another_protocol_is_quoted_beside_what_was_expected(dialogue, gau
     dialogue.expect(*[(b"R\r", b"ERR1\r")] * 3)
     with pytest.raises(WrongAnswer, match=r"b'ERR1\\r' where protocol cdi has answers like '\+  2\.1380"):
         await gauge.open()
+
+
+async def test_a_glance_is_one_question(dialogue, opened):
+    dialogue.expect((b"R\r", b"+  2.1380, MM\r\n"), (b"R\r", b"OUT OF BOUNDS\r\n"))
+    assert (await opened.glance()).value_mm == 2.138
+    with pytest.raises(GaugeAtEnd):
+        await opened.glance()

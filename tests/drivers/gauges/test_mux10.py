@@ -262,3 +262,24 @@ async def test_two_speeds_on_one_line_are_refused(dialogue, opened, links, setti
     other = Mux10Gauge(settings("mux10", "z", channel=1, serial={"baudrate": 2400}), links)
     with pytest.raises(FileError, match="gauge z: port wire is shared with gauge y under other serial"):
         await other.open()
+
+
+# Glancing
+
+
+async def test_a_glance_is_one_question(dialogue, opened):
+    dialogue.expect((b"2\r", VALUE))
+    assert await opened.glance() == GaugeReading(0.123, "02A+0000.123")
+
+
+async def test_a_busy_multiplexer_has_not_answered_a_glance(dialogue, opened):
+    dialogue.expect((b"2\r", b"918\r"), (b"2\r", VALUE))
+    with pytest.raises(WrongAnswer, match=r"busy \(918\)"):
+        await opened.glance()
+    assert (await opened.glance()).value_mm == 0.123
+
+
+async def test_a_glance_at_the_end_of_its_travel(dialogue, opened):
+    dialogue.expect((b"2\r", b"912\r"))
+    with pytest.raises(GaugeAtEnd):
+        await opened.glance()

@@ -431,3 +431,40 @@ async def test_a_gauge_without_a_port_is_an_error_of_the_cell_file(links, settin
 async def test_two_gauges_cannot_have_one_port(dialogue, opened, links, settings):
     with pytest.raises(FileError, match="gauge z: port wire already belongs to gauge y"):
         await SylvacGauge(settings("sylvac", name="z"), links).open()
+
+
+# Glancing
+
+
+async def test_a_glance_is_one_question(dialogue, opened):
+    dialogue.expect((b"?\r", b"+1.234\r"))
+    assert await opened.glance() == GaugeReading(1.234, "+1.234")
+
+
+async def test_glances_need_not_agree(dialogue, opened):
+    dialogue.expect((b"?\r", b"+1.234\r"), (b"?\r", b"+4.321\r"))
+    assert [(await opened.glance()).value_mm for _ in range(2)] == [1.234, 4.321]
+
+
+async def test_a_garbled_glance_is_not_repeated(dialogue, opened):
+    dialogue.expect((b"?\r", b"+1.2x4\r"), (b"?\r", b"+1.234\r"))
+    with pytest.raises(WrongAnswer, match="gauge y"):
+        await opened.glance()
+    assert (await opened.glance()).value_mm == 1.234
+
+
+async def test_a_glance_at_the_end_of_its_travel(dialogue, opened):
+    dialogue.expect((b"?\r", b"ERR3\r"))
+    with pytest.raises(GaugeAtEnd):
+        await opened.glance()
+
+
+async def test_a_glance_that_is_not_answered(dialogue, opened):
+    dialogue.expect((b"?\r", b""))
+    with pytest.raises(GaugeSilent):
+        await opened.glance()
+
+
+async def test_nobody_glances_at_a_gauge_that_is_closed(gauge):
+    with pytest.raises(DeviceError, match="is not open"):
+        await gauge.glance()

@@ -20,6 +20,8 @@ from hexacell.pose import Pose
 
 QUICK = Patience(poll=0.005, arrival=0.05, switch=0.05)
 
+PATIENCE_S = 20.0  # a machine under load is no controller that fails
+
 
 class FakeMachine:
     """Joints are the pose's coordinates plus ``geometry``, which is read when it is switched on."""
@@ -90,7 +92,7 @@ class RawClient:
     """Says one line at a time and reads what comes until nothing has come for a moment."""
 
     def __init__(self, port: int) -> None:
-        self._socket = socket.create_connection((HOST, port), timeout=2.0)
+        self._socket = socket.create_connection((HOST, port), timeout=PATIENCE_S)
         self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
 
     def say(self, line: str, answer: bytes) -> None:
@@ -111,7 +113,7 @@ class RawClient:
         self._socket.settimeout(0.03)
         with pytest.raises(TimeoutError):
             self._socket.recv(1)
-        self._socket.settimeout(2.0)
+        self._socket.settimeout(PATIENCE_S)
 
     def expect_end(self) -> None:
         assert self._socket.recv(1) == b""

@@ -1,0 +1,1 @@
+"""Thermometers, one protocol a file."""

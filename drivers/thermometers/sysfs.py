@@ -1,0 +1,102 @@
+"""Whatever the Linux kernel shows as a file with a temperature in millidegrees Celsius.
+
+That is ``temp1_input`` and its like below /sys/class/hwmon (the kernel's
+Documentation/hwmon/sysfs-interface.rst) and ``temperature`` of a DS18B20 and its like below
+/sys/bus/w1/devices (Documentation/w1/slaves/w1_therm.rst). Reading the latter makes the sensor measure,
+which takes up to 750 ms; the file is empty while another measurement is under way.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import os
+from concurrent.futures import Future, ThreadPoolExecutor
+from pathlib import Path
+
+from drivers.ports import DeviceIdentity, TemperatureReading
+from hexacell.cell.thermometers import ThermometerSettings
+from hexacell.errors import DeviceError
+from hexacell.files import plain_error
+
+LONGEST = 64
+PLAUSIBLE_C = (-100.0, 300.0)
+
+
+class SysfsThermometer:
+    """A thermometer behind a file; implements :class:`drivers.ports.Thermometer`.
+
+    The kernel may let a read wait. Each thermometer has a thread for that, and one read at a time.
+    """
+
+    def __init__(self, settings: ThermometerSettings) -> None:
+        self._settings = settings
+        self._thread: ThreadPoolExecutor | None = None
+        self._reading: Future[str] | None = None
+
+    @property
+    def name(self) -> str:
+        """The name the cell file gives it."""
+        return self._settings.name
+
+    async def open(self) -> DeviceIdentity:
+        """Read it once; raises ``DeviceError`` if that gives no temperature."""
+        await self.read()
+        return DeviceIdentity(self._subject, "sysfs", str(self._path))
+
+    async def read(self) -> TemperatureReading:
+        """The temperature now, deg C.
+
+        Raises:
+            DeviceError: the file gives none, or not in time.
+        """
+        if self._reading is not None and not self._reading.done():
+            raise self._error("still does not answer")
+        self._thread = self._thread or ThreadPoolExecutor(1, thread_name_prefix="thermometer")
+        self._reading = self._thread.submit(_content, self._path)
+        try:
+            async with asyncio.timeout(self._settings.timeout_s):
+                raw = await asyncio.shield(asyncio.wrap_future(self._reading))
+        except TimeoutError:
+            raise self._error(f"does not answer within {self._settings.timeout_s:g} s") from None
+        except OSError as error:
+            plain = plain_error("cannot be read", self._path, error)
+            raise self._error(plain.problem) from error
+        return TemperatureReading(self._celsius(raw), raw)
+
+    async def close(self) -> None:
+        """Let the file go; closing twice is harmless."""
+        thread, self._thread = self._thread, None
+        if thread is not None:
+            thread.shutdown(wait=self._reading is None or self._reading.done(), cancel_futures=True)
+
+    @property
+    def _path(self) -> Path:
+        return Path(self._settings.path)
+
+    @property
+    def _subject(self) -> str:
+        return f"thermometer {self.name}"
+
+    def _celsius(self, raw: str) -> float:
+        try:
+            celsius = int(raw) / 1000
+        except ValueError:
+            raise self._error(f"gives no number but {raw!r}") from None
+        low, high = PLAUSIBLE_C
+        if not low <= celsius <= high:
+            raise self._error(f"gives {celsius:g} deg C, which no thermometer here can have")
+        return celsius
+
+    def _error(self, problem: str) -> DeviceError:
+        return DeviceError(
+            problem, subject=self._subject, action=f"Check the sensor behind {self._settings.path}"
+        )
+
+
+def _content(path: Path) -> str:
+    # Without waiting, should somebody name a pipe; files of the kernel do not mind.
+    descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK)
+    try:
+        return os.read(descriptor, LONGEST).decode("ascii", errors="replace").strip()
+    finally:
+        os.close(descriptor)

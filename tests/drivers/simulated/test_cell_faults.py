@@ -1,0 +1,208 @@
+"""What goes wrong with a simulated cell, at once and at a planned moment."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from drivers.gauges.errors import GaugeAtEnd, GaugeSilent
+from drivers.gauges.sylvac import SylvacGauge
+from drivers.link import SerialLinks
+from drivers.simulated.cell import SimulatedCell
+from drivers.simulated.faults import FaultKind, FaultSchedule
+from hexacell.cell.simulation import SimulatedFault
+from hexacell.clock import CellClock
+from hexacell.controller_config.native_toml import NativeToml
+from hexacell.errors import DeviceError, UsageError
+from hexacell.mechanisms.hexaglide import Hexaglide
+
+PATIENCE_S = 5.0
+
+
+@pytest.fixture
+def cell(bundled_cell):
+    settings = bundled_cell.settings
+    gauges = tuple(gauge.model_copy(update={"protocol": "sylvac"}) for gauge in settings.gauges)
+    settings = settings.model_copy(update={"gauges": gauges})
+    with SimulatedCell(
+        settings,
+        settings.simulation,
+        Hexaglide(),
+        NativeToml(),
+        bundled_cell.config_path,
+        other_processes=False,
+    ) as simulated:
+        yield simulated
+
+
+@pytest.fixture
+async def gauge(cell):
+    links = SerialLinks()
+    opened = SylvacGauge(cell.settings.gauges[0].model_copy(update={"timeout_s": 2.0}), links)
+    await opened.open()
+    yield opened
+    await opened.close()
+    await links.close()
+
+
+async def test_a_plunger_at_its_end_comes_back(cell, gauge) -> None:
+    cell.faults.strike(FaultKind.AT_END, "x")
+    with pytest.raises(GaugeAtEnd):
+        await gauge.glance()
+    cell.faults.lift(FaultKind.AT_END, "x")
+    assert abs((await gauge.glance()).value_mm) < 3.0
+
+
+async def test_a_frozen_gauge_answers_the_same_again_and_again(cell, gauge) -> None:
+    cell.faults.strike(FaultKind.FROZEN, "x")
+    assert len({(await gauge.glance()).raw for _ in range(20)}) == 1
+    cell.faults.lift(FaultKind.FROZEN, "x")
+    assert len({(await gauge.glance()).raw for _ in range(50)}) > 1
+
+
+async def test_a_ball_off_its_plate_and_back(cell, gauge) -> None:
+    before = (await gauge.glance()).value_mm
+    cell.faults.strike(FaultKind.OFF_PLATE, "x")
+    assert abs((await gauge.glance()).value_mm - before) == pytest.approx(6.0, abs=0.1)
+    cell.faults.lift(FaultKind.OFF_PLATE, "x")
+    assert (await gauge.glance()).value_mm == pytest.approx(before, abs=0.1)
+
+
+async def test_a_cable_that_is_pulled_and_put_back(cell, gauge) -> None:
+    cell.faults.strike(FaultKind.UNPLUGGED, "x")
+    with pytest.raises(DeviceError, match="lost"):
+        await gauge.glance()
+    cell.faults.lift(FaultKind.UNPLUGGED, "x")
+    await gauge.open()
+    await gauge.glance()
+
+
+async def test_a_silent_gauge(cell, gauge) -> None:
+    cell.faults.strike(FaultKind.SILENT, "x")
+    with pytest.raises(GaugeSilent):
+        await gauge.glance()
+    cell.faults.lift(FaultKind.SILENT, "x")
+
+
+def test_the_stop_line_is_a_file(cell) -> None:
+    stop_file = Path(cell.settings.guards.stop_file)
+    cell.faults.strike(FaultKind.STOP_LINE)
+    assert stop_file.exists()
+    cell.faults.lift(FaultKind.STOP_LINE)
+    assert not stop_file.exists()
+    cell.faults.lift(FaultKind.STOP_LINE)
+
+
+def test_an_emergency_stop_and_a_following_error_switch_the_machine_off(cell) -> None:
+    control = cell.controller.control
+    for kind, estop in ((FaultKind.FOLLOWING_ERROR, False), (FaultKind.EMERGENCY_STOP, True)):
+        control.set_estop(on=False)
+        control.set_machine(on=True)
+        assert control.on
+        cell.faults.strike(kind)
+        assert (control.on, control.estop) == (False, estop)
+    assert control.next_error() == "joint 3 following error"
+
+
+@pytest.mark.parametrize(
+    ("kind", "device"),
+    [
+        (FaultKind.AT_END, "w"),
+        (FaultKind.AT_END, ""),
+        (FaultKind.AT_END, "encoder 1"),
+        (FaultKind.ALARM, "x"),
+        (FaultKind.ALARM, "encoder 7"),
+        (FaultKind.ALARM, "controller"),
+        (FaultKind.STOP_LINE, "x"),
+        (FaultKind.EMERGENCY_STOP, "encoder 2"),
+    ],
+)
+def test_what_cannot_go_wrong_is_refused(cell, kind: FaultKind, device: str) -> None:
+    with pytest.raises(UsageError, match=f"no fault '{kind}' can be simulated of '{device}'"):
+        cell.faults.strike(kind, device)
+
+
+class Log:
+    """Stands in for a cell's faults and writes down what is asked of it."""
+
+    def __init__(self, clock: CellClock) -> None:
+        self.clock = clock
+        self.told: list[tuple[str, str, float]] = []
+
+    def check(self, kind: FaultKind, device: str) -> None:
+        if device == "nobody":
+            raise UsageError("there is no such device")
+
+    def strike(self, kind: FaultKind, device: str = "") -> None:
+        self.told.append(("strike", device, self.clock.now()))
+
+    def lift(self, kind: FaultKind, device: str = "") -> None:
+        self.told.append(("lift", device, self.clock.now()))
+
+    def wait_for(self, count: int) -> list[tuple[str, str]]:
+        give_up = time.monotonic() + PATIENCE_S
+        while len(self.told) < count and time.monotonic() < give_up:
+            time.sleep(0.005)
+        return [(what, device) for what, device, _ in self.told]
+
+
+def fault(device: str, **values: Any) -> SimulatedFault:
+    return SimulatedFault.model_validate({"kind": "silent", "device": device, **values})
+
+
+def test_faults_strike_and_end_in_their_order() -> None:
+    clock = CellClock(100.0)
+    log: Any = Log(clock)
+    planned = [fault("b", after_s=4.0), fault("a", after_s=1.0, lasts_s=5.0)]
+    with FaultSchedule(log, clock, planned) as schedule:
+        assert log.wait_for(3) == [("strike", "a"), ("strike", "b"), ("lift", "a")]
+        assert [struck.fault.device for struck in schedule.struck] == ["a", "b"]
+    for (_, _, at_s), due_s in zip(log.told, (1.0, 4.0, 6.0), strict=True):
+        assert at_s >= due_s
+
+
+def test_a_fault_waits_for_its_move() -> None:
+    clock = CellClock(100.0)
+    log: Any = Log(clock)
+    with FaultSchedule(log, clock, [fault("x", at_move=2)]) as schedule:
+        schedule.move_begun()
+        assert log.told == []
+        schedule.move_begun()
+        assert log.wait_for(1) == [("strike", "x")]
+        schedule.move_begun()
+        schedule.plan(fault("y", at_move=schedule.moves + 1))
+        schedule.move_begun()
+        assert log.wait_for(2) == [("strike", "x"), ("strike", "y")]
+
+
+def test_what_is_planned_is_checked_at_once() -> None:
+    clock = CellClock()
+    log: Any = Log(clock)
+    with pytest.raises(UsageError):
+        FaultSchedule(log, clock, [fault("nobody")])
+
+
+def test_closing_forgets_what_has_not_struck() -> None:
+    clock = CellClock()
+    log: Any = Log(clock)
+    schedule = FaultSchedule(log, clock, [fault("x", after_s=1000.0)])
+    schedule.close()
+    schedule.close()
+    assert log.told == []
+
+
+def test_a_cell_file_that_plans_what_cannot_be_is_refused(bundled_cell) -> None:
+    settings = bundled_cell.settings
+    simulation = settings.simulation.model_copy(update={"faults": (fault("w"),)})
+    with pytest.raises(UsageError, match="simulated of 'w'"):
+        SimulatedCell(
+            settings,
+            simulation,
+            Hexaglide(),
+            NativeToml(),
+            bundled_cell.config_path,
+            other_processes=False,
+        )

@@ -1,0 +1,116 @@
+"""A thermometer behind a file: what the kernel writes there, and what it should not."""
+
+from __future__ import annotations
+
+import os
+import threading
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager
+from pathlib import Path
+
+import pytest
+
+from drivers.ports import DeviceIdentity, TemperatureReading
+from drivers.thermometers import sysfs
+from drivers.thermometers.sysfs import SysfsThermometer
+from hexacell.cell.thermometers import ThermometerSettings
+from hexacell.errors import DeviceError
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    return tmp_path / "temperature"
+
+
+def show(path: Path, text: str) -> None:
+    path.write_text(text, encoding="latin-1")
+
+
+@asynccontextmanager
+async def thermometer(path: Path, timeout_s: float = 2.0) -> AsyncIterator[SysfsThermometer]:
+    made = SysfsThermometer(ThermometerSettings(name="room", path=str(path), timeout_s=timeout_s))
+    try:
+        yield made
+    finally:
+        await made.close()
+        await made.close()
+
+
+@pytest.mark.parametrize(
+    ("text", "celsius"), [("21375\n", 21.375), ("-500\n", -0.5), ("0", 0.0), ("85000\n", 85.0)]
+)
+async def test_millidegrees_are_read(path: Path, text: str, celsius: float) -> None:
+    show(path, text)
+    async with thermometer(path) as room:
+        assert await room.read() == TemperatureReading(celsius, text.strip())
+
+
+async def test_it_says_where_it_is(path: Path) -> None:
+    show(path, "21375\n")
+    async with thermometer(path) as room:
+        assert await room.open() == DeviceIdentity("thermometer room", "sysfs", str(path))
+        assert room.name == "room"
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("", "gives no number but ''"),  # a 1-wire sensor that is still measuring
+        ("NO\n", "gives no number but 'NO'"),
+        ("21.5\n", "gives no number but '21.5'"),
+        ("\xff\xfe", "gives no number"),
+        ("-2147483648\n", "gives -2.14748e[+]06 deg C"),
+        ("9" * 5000, "gives 1e[+]61 deg C|gives no number"),
+    ],
+)
+async def test_what_is_no_temperature_is_refused(path: Path, text: str, words: str) -> None:
+    show(path, text)
+    async with thermometer(path) as room:
+        with pytest.raises(DeviceError, match=f"^thermometer room: {words}") as refusal:
+            await room.read()
+    assert refusal.value.action == f"Check the sensor behind {path}"
+
+
+async def test_what_cannot_be_read_is_said_and_may_come_back(path: Path) -> None:
+    async with thermometer(path) as room:
+        with pytest.raises(DeviceError, match="cannot be read: it does not exist"):
+            await room.open()
+        show(path, "20000")
+        assert (await room.read()).celsius == 20.0
+
+
+async def test_a_folder_is_no_thermometer(tmp_path: Path) -> None:
+    async with thermometer(tmp_path) as room:
+        with pytest.raises(DeviceError, match="cannot be read: it is a folder"):
+            await room.read()
+
+
+async def test_a_pipe_is_not_waited_for(path: Path) -> None:
+    os.mkfifo(path)
+    async with thermometer(path) as room:
+        with pytest.raises(DeviceError, match="gives no number"):
+            await room.read()
+
+
+async def test_a_sensor_that_hangs_is_left_to_itself(path: Path, monkeypatch) -> None:
+    """One read hangs at a time, and what comes of it later is nobody's answer."""
+    answers = threading.Event()
+    content: Callable[[Path], str] = sysfs._content
+
+    def slow(_: Path) -> str:
+        answers.wait(10.0)
+        return "99000"
+
+    monkeypatch.setattr(sysfs, "_content", slow)
+    show(path, "20000")
+    async with thermometer(path, timeout_s=0.02) as room:
+        with pytest.raises(DeviceError, match=r"does not answer within 0\.02 s"):
+            await room.read()
+        with pytest.raises(DeviceError, match="still does not answer"):
+            await room.read()
+        monkeypatch.setattr(sysfs, "_content", content)
+        hanging = room._reading
+        assert hanging is not None
+        answers.set()
+        hanging.result(timeout=10.0)
+        assert (await room.read()).celsius == 20.0

@@ -98,6 +98,12 @@ class CellBusy(HexacellError):
     exit_code = ExitCode.BUSY
 
 
+class Interruption(HexacellError):
+    """Somebody ended the run before it was over; it can be resumed."""
+
+    exit_code = ExitCode.INTERRUPTED
+
+
 class WriteBackUndone(HexacellError):
     """Writing the controller's config failed; the file is as it was."""
 

@@ -2,7 +2,8 @@
 
 A replacement is written to a temporary file in the same folder, forced to the disk, renamed over
 the old file, and the folder is forced to the disk too. POSIX ``rename`` is atomic: whoever opens
-the file sees the old text or the new one, never a mixture.
+the file sees the old text or the new one, never a mixture. A process that dies in between leaves its
+temporary file, ``.hexacell-*.tmp``; who next holds the cell removes it.
 """
 
 from __future__ import annotations
@@ -30,6 +31,7 @@ _WORDS: dict[int, tuple[str, str]] = {
     errno.EROFS: ("the file system is read-only", "Mount it writable, or move the file"),
     errno.ENOSPC: ("the disk is full", "Free some space and try again"),
     errno.EDQUOT: ("the disk quota is used up", "Free some space and try again"),
+    errno.EFBIG: ("it may not become larger", "Raise the limit on the size of files (ulimit -f)"),
     errno.EBUSY: ("the file is a mount point", "Mount its folder instead of the single file"),
     errno.EIO: ("the disk reports an error", "Check the disk"),
 }
@@ -125,8 +127,11 @@ def sync_folder(folder: Path) -> None:
 def make_folder(folder: Path) -> None:
     """Create ``folder`` and the folders above it where absent, for good; raises ``FileError``."""
     try:
+        absent = [parent for parent in (folder, *folder.parents) if not parent.exists()]
         folder.mkdir(parents=True, exist_ok=True)
-        sync_folder(folder.parent)
+        # Each is a name in the one above: were a single one lost, so would be all below it.
+        for made in absent or [folder]:
+            sync_folder(made.parent)
     except OSError as error:
         raise plain_error("the folder cannot be made", folder, error) from error
 
@@ -145,10 +150,27 @@ def _followed(path: Path) -> Path:
         return Path(os.path.realpath(path))
 
 
+def remove_leftovers(path: Path) -> None:
+    """Remove temporary files that processes left when they died in :func:`write_atomically`.
+
+    Those for the file ``path``, or all in it if it is a folder. Only for who alone may write there now:
+    a temporary file that somebody is still writing looks no different.
+    """
+    target = _followed(path)
+    folder, own = (target, "*") if target.is_dir() else (target.parent, f"{_mark(target)}-*")
+    for temporary in folder.glob(f".hexacell-{own}.tmp"):
+        with suppress(OSError):  # untidy, but nobody reads it
+            temporary.unlink()
+
+
+def _mark(target: Path) -> str:
+    """Of a file's temporaries; not its name, which may already have the greatest length allowed."""
+    return sha256(os.fsencode(target.name))[:8]
+
+
 @contextmanager
 def _temporary_beside(target: Path) -> Iterator[Path]:
-    # Not derived from the target's name, which may already have the greatest length allowed.
-    temporary = target.with_name(f".hexacell-{secrets.token_hex(8)}.tmp")
+    temporary = target.with_name(f".hexacell-{_mark(target)}-{secrets.token_hex(8)}.tmp")
     try:
         yield temporary
     finally:

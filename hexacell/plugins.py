@@ -21,6 +21,7 @@ class Group(StrEnum):
     GAUGES = "hexacell.gauges"
     ENCODERS = "hexacell.encoders"
     CONTROLLERS = "hexacell.controllers"
+    THERMOMETERS = "hexacell.thermometers"
     CONFIG_FORMATS = "hexacell.config_formats"
     MECHANISMS = "hexacell.mechanisms"
 
@@ -34,6 +35,7 @@ _NOUNS = {
     Group.GAUGES: "gauge protocol",
     Group.ENCODERS: "encoder protocol",
     Group.CONTROLLERS: "controller protocol",
+    Group.THERMOMETERS: "thermometer protocol",
     Group.CONFIG_FORMATS: "config format",
     Group.MECHANISMS: "mechanism",
 }

@@ -85,6 +85,7 @@ class TimingSettings(Section):
     spread_gauge_mm: Positive = Field(0.06, description="largest range of one gauge in the window")
     spread_encoder_mm: Positive = Field(0.06, description="largest range of one slider in the window")
     give_up_s: Positive = Field(20.0, description="longest wait for settled readings")
+    move_s: Positive = Field(1.5, description="an ordinary move, for estimates of time only")
     clock_factor: Positive = Field(
         1.0, description="simulated cells only: cell seconds per second on the wall"
     )

@@ -25,7 +25,10 @@ from hexacell.cell.devices import (
     TimingSettings,
     ToleranceSettings,
 )
+from hexacell.cell.guards import GuardSettings
+from hexacell.cell.recovery import RecoverySettings
 from hexacell.cell.simulation import SimulationSettings
+from hexacell.cell.thermometers import ThermometerSettings
 
 
 class RobotSettings(Section):
@@ -41,6 +44,39 @@ class IdentificationSettings(Section):
     points: tuple[Point, ...] = Field(min_length=2, description="ball positions, mm, in this order")
     orientations: int = Field(11, ge=2, description="records at each point, its reference included")
     seed: int = Field(1, ge=0, description="of the candidate orientations")
+    criterion: Literal["task", "parameters", "information"] = Field(
+        "information",
+        description="what a pose is chosen for: error at the task poses, of all parameters, or bits",
+    )
+    target_mm: Positive | None = Field(
+        None, description="done once the predicted error at every task pose is below, 1 sigma"
+    )
+    least_gain_mm: NotNegative = Field(
+        0.0, description="done once no record would lower that error by more"
+    )
+    budget_records: int | None = Field(None, ge=2, description="records at most, references included")
+    budget_minutes: Positive | None = Field(None, description="estimated time at most")
+    minutes_per_station: NotNegative = Field(
+        5.0, description="to carry the gauges to a point by hand and place them"
+    )
+    seconds_per_record: Positive | None = Field(
+        None, description="to move and settle; by default from [timing]"
+    )
+    choose_points: bool = Field(
+        False, description="true: visit the points worth most for their time, not all in order"
+    )
+    poses: str | None = Field(
+        None, description="CSV file with the poses to visit (point,orientation,x,y,z,a,b,c)"
+    )
+    provisional: bool = Field(
+        False, description="true: lend the controller a better geometry after the first point"
+    )
+
+    @model_validator(mode="after")
+    def _points_are_chosen_or_listed(self) -> Self:
+        if self.choose_points and self.poses is not None:
+            raise broken_rule("a list of poses leaves no points to choose", "Remove one of the two")
+        return self
 
 
 class VerificationSettings(Section):
@@ -89,14 +125,17 @@ class CellSettings(Section):
     controller: ControllerSettings
     gauges: tuple[GaugeSettings, GaugeSettings, GaugeSettings]
     encoders: EncoderSettings
+    thermometers: tuple[ThermometerSettings, ...] = ()
     stations: StationSettings = StationSettings()
     tolerances: ToleranceSettings = ToleranceSettings()
     noise: NoiseSettings = NoiseSettings()
     limits: LimitSettings = LimitSettings()
     timing: TimingSettings = TimingSettings()
+    guards: GuardSettings = GuardSettings()
     identification: IdentificationSettings
     verification: VerificationSettings
     acceptance: AcceptanceSettings = AcceptanceSettings()
+    recovery: RecoverySettings = RecoverySettings()
     task: TaskSettings = TaskSettings()
     simulation: SimulationSettings | None = None
 
@@ -111,6 +150,15 @@ class CellSettings(Section):
         if len(set(inputs)) != len(inputs):
             raise broken_rule("two gauges have the same port and channel", "Correct one of them")
         return gauges
+
+    @field_validator("thermometers")
+    @classmethod
+    def _thermometers_differ(
+        cls, thermometers: tuple[ThermometerSettings, ...]
+    ) -> tuple[ThermometerSettings, ...]:
+        if len({thermometer.name for thermometer in thermometers}) != len(thermometers):
+            raise broken_rule("two thermometers have the same name", "Give each its own")
+        return thermometers
 
     @model_validator(mode="after")
     def _real_devices_can_be_reached(self) -> Self:

@@ -18,6 +18,9 @@ class SimulatedGauges(Section):
     baudrate: int | None = Field(None, ge=300, description="wire speed imitated; default the protocol's")
     transport: Literal["pty", "socket"] = Field("pty", description="what the gauges' lines are made of")
     misalignment_deg: NotNegative = Field(0.0, description="of the triad at each station, 1 sigma")
+    placing_mm: NotNegative = Field(
+        0.4, description="how far from the middle of their travel they are put, 1 sigma"
+    )
 
 
 class SimulatedEncoders(Section):
@@ -38,6 +41,30 @@ class SimulatedMotion(Section):
     repeatability_mm: NotNegative = Field(0.0, description="scatter of each slider's stop, 1 sigma")
 
 
+class SimulatedFault(Section):
+    """Something that goes wrong at a given moment, and perhaps comes right again."""
+
+    kind: Literal[
+        "emergency stop",
+        "following error",
+        "stop line",
+        "unplugged",
+        "silent",
+        "at its end",
+        "off its plate",
+        "frozen",
+        "alarm",
+    ] = Field(description="what goes wrong")
+    device: str = Field(
+        "", description="a gauge's name, encoder 1 to encoder 6, or controller; empty where there is one"
+    )
+    at_move: int | None = Field(
+        None, ge=1, description="during this move, the first being 1; without it, from the beginning"
+    )
+    after_s: NotNegative = Field(0.0, description="so long after that, in the cell's time")
+    lasts_s: Positive | None = Field(None, description="until it is put right; without it, for ever")
+
+
 class SimulationSettings(Section):
     """The simulated twin of a cell."""
 
@@ -49,3 +76,4 @@ class SimulationSettings(Section):
     gauges: SimulatedGauges = SimulatedGauges()
     encoders: SimulatedEncoders = SimulatedEncoders()
     motion: SimulatedMotion = SimulatedMotion()
+    faults: tuple[SimulatedFault, ...] = Field((), description="what goes wrong, and when")

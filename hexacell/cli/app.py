@@ -33,6 +33,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except HexacellError as error:
         code = error.worst if isinstance(error, SeveralErrors) else error.exit_code
         return _failed(str(error), code, console)
+    except Exception as error:
+        # A mistake of this program: Python shows where, and a reader of JSON is not left without.
+        console.document({"error": repr(error), "exit_code": int(ExitCode.OUT_OF_LIMITS)})
+        raise
 
 
 def _failed(message: str, code: ExitCode, console: Console) -> int:

@@ -2,36 +2,72 @@
 
 from __future__ import annotations
 
-import asyncio
 import shlex
+import sys
 from typing import Any
 
 from hexacell.cli.console import Console
+from hexacell.cli.heeding import Signals
+from hexacell.cli.keys import HELP, Keys
+from hexacell.cli.people import AtTerminal
 from hexacell.cli.progress import RunProgress
 from hexacell.composition.calibration import Order, calibrate
 from hexacell.errors import ExitCode, HexacellError
+from hexacell.planning.listed import pose_list_of
 from procedures import events
 from procedures.calibration import Mode, expected_records
+from procedures.commands import Inbox
+from procedures.journal import read_journal
+from procedures.state import fold
 
 
 def carry_out(order: Order, console: Console) -> events.Ended:
     """Run to the end with a progress bar.
 
+    Ctrl-C, SIGTERM or SIGHUP ends it after the step that is being done, Ctrl-C once more at once.
+
     Raises:
-        HexacellError: it could not begin, or a step could not be done.
-        KeyboardInterrupt: somebody stopped it.
+        HexacellError: it could not begin, could not go on, or somebody stopped it.
     """
     factor = order.cell.settings.timing.clock_factor
     if factor != 1.0:
         console.say(f"The cell's clock runs {factor:g} times as fast as the one on the wall.")
-    progress = RunProgress(console, expected_records(order.cell.settings, order.mode))
+    listed = pose_list_of(order.cell)
+    progress = RunProgress(console, expected_records(order.cell.settings, order.mode, listed))
+    signals = Signals(console)
     try:
         with progress:
-            return asyncio.run(calibrate(order, [progress]))
-    except (HexacellError, KeyboardInterrupt):
-        if progress.has_begun:
-            console.say(f"Stopped; what was measured is kept. To go on:\n  {resume_command(order)}")
+            return signals.run(_with_keys(order, console, progress, signals.inbox))
+    except HexacellError:
+        _say_how_to_go_on(order, console, has_begun=progress.has_begun)
         raise
+
+
+async def _with_keys(order: Order, console: Console, progress: RunProgress, inbox: Inbox) -> events.Ended:
+    """Calibrate; a person who is asked at a terminal may also type there what is to happen."""
+    if not isinstance(order.operator, AtTerminal):
+        return await calibrate(order, [progress], inbox)
+    keys = Keys(console, inbox, sys.stdin)
+    order.operator.before, order.operator.afterwards = progress.make_room, keys.listen
+    console.say(HELP)
+    return await keys.during(calibrate(order, [progress, keys], inbox))
+
+
+def _say_how_to_go_on(order: Order, console: Console, *, has_begun: bool) -> None:
+    if has_begun:
+        console.say(f"Stopped; what was measured is kept. To go on:\n  {resume_command(order)}")
+    if (has_begun or order.resume) and _is_unverified(order):
+        console.complain(
+            "The controller's config holds the new geometry, which is not verified yet: going on "
+            "verifies it, or puts the old one back."
+        )
+
+
+def _is_unverified(order: Order) -> bool:
+    try:
+        return fold(read_journal(order.folder.journal)).is_unverified
+    except HexacellError:
+        return False
 
 
 def resume_command(order: Order) -> str:

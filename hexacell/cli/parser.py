@@ -52,7 +52,9 @@ def make_parser() -> Parser:
     _run(commands)
     _preflight(commands)
     _simulate(commands)
+    _next(commands)
     _fit(commands)
+    _replay(commands)
     _cell(commands)
     return parser
 
@@ -128,11 +130,51 @@ def _simulate(commands: Any) -> None:  # noqa: ANN401
     )
 
 
+def _next(commands: Any) -> None:  # noqa: ANN401
+    parser = _command(commands, "next", "say which pose is worth measuring next")
+    _add_cell(parser)
+    parser.add_argument(
+        "--measurements", type=Path, required=True, metavar="FILE", help="the records so far (CSV)"
+    )
+    parser.add_argument(
+        "--refused",
+        type=_count,
+        default=0,
+        metavar="N",
+        help="how many poses at the present point could not be measured: another is proposed",
+    )
+    _add_json(parser)
+
+
+def _count(text: str) -> int:
+    number = int(text)
+    if number < 0:
+        raise ValueError
+    return number
+
+
 def _fit(commands: Any) -> None:  # noqa: ANN401
     parser = _command(commands, "fit", "identify the geometry from a measurement file")
     _add_cell(parser)
     parser.add_argument(
         "--measurements", type=Path, required=True, metavar="FILE", help="the records (CSV)"
+    )
+    _add_json(parser)
+
+
+def _replay(commands: Any) -> None:  # noqa: ANN401
+    parser = _command(commands, "replay", "decide and compute a recorded run again, and compare")
+    parser.add_argument("run", type=Path, metavar="RUN", help="a run folder, or a journal")
+    parser.add_argument(
+        "--only",
+        choices=("decisions", "results", "identification"),
+        help="do only these again, and take everything else as recorded",
+    )
+    parser.add_argument(
+        "--tolerance",
+        type=float,
+        metavar="T",
+        help="of every number, in its own unit, above 1 relative (default: 1e-9)",
     )
     _add_json(parser)
 

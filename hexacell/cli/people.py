@@ -5,9 +5,10 @@ from __future__ import annotations
 import asyncio
 import sys
 import termios
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import TextIO
 
+from hexacell.cell.recovery import Action
 from hexacell.cli.console import Console
 from hexacell.errors import AnswerNeeded
 from hexacell.pose import Pose
@@ -20,10 +21,12 @@ def somebody_is_there() -> bool:
 
 
 class AtTerminal:
-    """Asks on the terminal that stdin is."""
+    """Asks on the terminal that stdin is; ``before`` and ``afterwards`` are called around a question."""
 
     def __init__(self, console: Console) -> None:
         self._console = console
+        self.before: Callable[[], None] = lambda: None
+        self.afterwards: Callable[[], None] = lambda: None
 
     async def place_gauges(self, point: int, pose: Pose) -> None:
         """Ask for the gauges to be put around the ball.
@@ -48,7 +51,23 @@ class AtTerminal:
         answer = await self._answer(f"\n{change}\n{conditions}{question}")
         return "a person at the terminal" if answer.strip().lower() == "yes" else None
 
+    async def decide(self, problem: str, choices: Sequence[Action]) -> Action:
+        """Tell what failed and ask how to go on, until the answer is one of the choices.
+
+        Raises:
+            AnswerNeeded: the terminal's input has ended.
+        """
+        words = ", ".join(choice.value for choice in choices)
+        question = f"\n{problem}\nHow to go on ({words})? "
+        while True:
+            answer = (await self._answer(question)).strip().lower().replace(" ", "-")
+            found = [choice for choice in choices if answer and choice.value.startswith(answer)]
+            if len(found) == 1:
+                return found[0]
+            question = f"Type one of {words}: "
+
     async def _answer(self, question: str) -> str:
+        self.before()
         # An Enter too many, pressed before, must not answer what was not asked yet.
         termios.tcflush(sys.stdin, termios.TCIFLUSH)
         self._console.ask(question)
@@ -57,6 +76,8 @@ class AtTerminal:
         except asyncio.CancelledError:
             self._console.ask("\n")
             raise
+        finally:
+            self.afterwards()
         if not line:
             self._console.ask("\n")
             raise AnswerNeeded("the question was left without an answer", action="Run it at a terminal")

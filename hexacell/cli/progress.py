@@ -11,16 +11,24 @@ from rich.console import Console as RichConsole
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from hexacell.cli.console import Console
+from hexacell.cli.words.planning import minutes_words
 from procedures import events
 from procedures.state import RunState
-from procedures.steps import Compute, Move, Phase, Place, SetKey
+from procedures.steps import Compute, Forecast, Move, Phase, Place, SetKey
 
 COMPUTING = {
+    "lend": "lending the controller a better geometry",
+    "take back": "taking the lent geometry back",
     "identify": "identifying the geometry",
     "propose": "preparing the new config",
     "commit": "writing the config and having it read",
     "judge": "judging the held-out points",
     "roll back": "putting the old config back",
+}
+REWRITTEN = {
+    "lent": "the controller has a better geometry while the points are measured",
+    "taken back": "the controller has its own geometry again",
+    "rolled back": "the old geometry is back in the controller",
 }
 PHASES = {
     Phase.IDENTIFY: "point {}",
@@ -38,6 +46,7 @@ class RunProgress:
     def __init__(self, console: Console, expected_records: int) -> None:
         self.has_begun = False
         self._console = console
+        self._forecast: Forecast | None = None
         self._bar = _bar()
         self._task = self._bar.add_task("connecting", total=expected_records)
 
@@ -51,11 +60,30 @@ class RunProgress:
         self._bar.update(self._task, completed=settled(state), description=doing(event))
         if told := words(event, state):
             self._console.say(told)
+        if line := self._promised(event):
+            self._console.say(line)
+
+    def _promised(self, event: events.Event) -> str | None:
+        """Where a set of records has brought the predicted error, once the set is done."""
+        match event:
+            case events.StepBegun(step=Move(expected=expected)) if expected is not None:
+                self._forecast = expected.forecast
+            case events.SetClosed(at=SetKey(phase=Phase.IDENTIFY)) if self._forecast is not None:
+                return forecast_line(self._forecast)
+        return None
+
+    def make_room(self) -> None:
+        """Take the bar away until the next event: a person is asked something."""
+        self._bar.stop()
 
     def _make_room(self, event: events.Event) -> None:
         """Take the bar away as long as a person may be asked something."""
         match event:
-            case events.StepBegun(step=Place() | Compute(kind="commit")) | events.Interrupted():
+            case (
+                events.StepBegun(step=Place() | Compute(kind="commit"))
+                | events.Paused()
+                | events.Interrupted()
+            ):
                 self._bar.stop()
             case _:
                 self._bar.start()
@@ -95,11 +123,28 @@ def doing(event: events.Event) -> str | None:
     """What is being done from now on, in a few words; nothing where that does not change."""
     match event:
         case events.StepBegun(step=Move() as step):
-            return f"{name(step.at)}, orientation {step.orientation}"
+            return f"{name(step.at)}, orientation {step.orientation}{_promise(step)}"
         case events.StepBegun(step=Compute() as step):
             return COMPUTING[step.kind]
         case _:
             return None
+
+
+def _promise(step: Move) -> str:
+    """The predicted error now and at the end, where a move has been chosen for it."""
+    forecast = step.expected and step.expected.forecast
+    return f": {forecast.now_mm:.3f} -> {forecast.end_mm:.3f} mm" if forecast else ""
+
+
+def forecast_line(forecast: Forecast) -> str:
+    """What is known after the record that was forecast, and what going on would gain."""
+    line = f"  predicted error at the task {forecast.next_mm:.3f} mm"
+    left = forecast.records - 1
+    if left < 1:
+        return line
+    gain = forecast.next_mm - forecast.end_mm
+    minutes = minutes_words(forecast.minutes * left / forecast.records)
+    return f"{line}; going on gains {gain:.3f} mm in {minutes}"
 
 
 def words(event: events.Event, state: RunState) -> str | None:
@@ -113,8 +158,25 @@ def words(event: events.Event, state: RunState) -> str | None:
             return f"{name(event.at)}, orientation {event.orientation} left out: {event.reason}"
         case events.Committed():
             return f"written to the controller, approved by {event.approved_by}"
-        case events.RolledBack():
-            return "the old geometry is back in the controller"
+        case events.Lent() | events.TakenBack() | events.RolledBack():
+            return REWRITTEN[event.kind]
+        case _:
+            return _interlude(event)
+
+
+def _interlude(event: events.Event) -> str | None:
+    """What there is to say about interruptions and what followed them."""
+    match event:
+        case events.Confirmed():
+            return f"{name(event.at)} goes on: its reference is as it was"
+        case events.Undone():
+            return f"{name(event.at)}, orientation {event.orientation} is measured again"
+        case events.Failed():
+            return f"{event.reason}\n  attempt {event.attempt}: {event.action.value}"
+        case events.Declined():
+            return f"{event.command}: {event.reason}"
+        case events.Paused() | events.Resumed():
+            return event.kind
         case _:
             return None
 

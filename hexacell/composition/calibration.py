@@ -3,29 +3,36 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
+from pathlib import Path
 
 from hexacell import __version__
-from hexacell.archive import RunFolder
+from hexacell.archive import RunFolder, runs_folder
 from hexacell.cell.base import GeometryValues
 from hexacell.cell.file import Cell
 from hexacell.composition.devices import Connected, connected, served, with_settings
 from hexacell.controller_config.format import ControllerGeometry
 from hexacell.controller_config.proposal import fingerprint
 from hexacell.errors import FileError, HexacellError, UsageError
-from hexacell.files import write_atomically
+from hexacell.files import read_text, remove_leftovers, write_atomically
 from hexacell.geometry import Geometry
 from hexacell.lock import config_lock
+from hexacell.planning.listed import pose_list_of
 from hexacell.robot import Robot, make_robot, robot_of
 from procedures import events
 from procedures.calibration import Calibration, Mode
+from procedures.commands import Inbox
+from procedures.desk import Desk
 from procedures.devices import each
 from procedures.engine import Engine, Listener
 from procedures.journal import Journal, read_journal
+from procedures.lending import holds_lent
 from procedures.operators import Operator
 from procedures.performing import Performer
-from procedures.preflight import device_failures, plan_failures, raise_all
+from procedures.preflight import device_failures, plan_failures, raise_all, start_failures
+from procedures.recovery import Policy
+from procedures.reopening import require_known
 from procedures.state import fold
 
 
@@ -47,33 +54,69 @@ async def preflight(cell: Cell, mode: Mode, *, unattended: bool) -> tuple[events
     Raises:
         HexacellError: every failure, in one report.
     """
-    calibration = Calibration(cell.settings, robot_of(cell), mode)
+    calibration = Calibration(cell.settings, robot_of(cell), mode, pose_list_of(cell))
     with (
         config_lock(cell.config_path),
         _plan_checked(calibration, unattended=unattended) as failures,
         served(cell) as settings,
     ):
-        async with connected(settings) as cell_now:
-            failures.extend(await device_failures(cell_now.devices))
+        async with connected(settings, cell.path.parent) as cell_now:
+            failures.extend(await _begin_failures(cell, cell_now, runs_folder(cell)))
             return _identities(cell_now)
 
 
-async def calibrate(order: Order, listeners: Sequence[Listener] = ()) -> events.Ended:
+async def calibrate(
+    order: Order, listeners: Sequence[Listener] = (), inbox: Inbox | None = None
+) -> events.Ended:
     """Measure, identify, verify, propose, write back: as far as the mode and the results go.
 
+    What is put into the ``inbox`` (:mod:`procedures.commands`) is heeded while the engine runs.
+
     Raises:
+        Interruption: a command ended it.
         HexacellError: it could not begin, or a step could not be done.
     """
     cell = order.cell
     with config_lock(cell.config_path):
+        remove_leftovers(cell.config_path)
         started = _started(order) if order.resume else None
-        robot = robot_of(cell) if started is None else _robot_of_run(cell, started)
-        calibration = Calibration(cell.settings, robot, order.mode)
+        if started is None:
+            _require_own_geometry(cell)
+        robot = robot_of(cell) if started is None else robot_of_run(cell, started)
+        calibration = Calibration(cell.settings, robot, order.mode, pose_list_of(cell))
         with _plan_checked(calibration, unattended=order.unattended) as failures, served(cell) as settings:
-            async with connected(settings) as cell_now:
-                failures.extend(await device_failures(cell_now.devices))
+            async with connected(settings, cell.path.parent) as cell_now:
+                failures.extend(await _begin_failures(cell, cell_now, order.folder.path))
                 raise_all(failures)
-                return await _run(order, with_settings(cell, settings), calibration, cell_now, listeners)
+                require_known(cell_now.identities, started.devices if started else ())
+                return await _run(
+                    order, with_settings(cell, settings), calibration, cell_now, listeners, inbox
+                )
+
+
+def _require_own_geometry(cell: Cell) -> None:
+    """Refuse to begin while the controller has what an interrupted run lent it.
+
+    Raises:
+        UsageError: names that run.
+    """
+    folder = runs_folder(cell)
+    for path in sorted(folder.iterdir()) if folder.is_dir() else ():
+        if holds_lent(RunFolder(path), cell.config_path):
+            raise UsageError(
+                f"the run {path} was interrupted and left its provisional geometry here",
+                subject=cell.config_path,
+                action="Resume that run, which takes it back; or copy its lent/config-before over this",
+            )
+
+
+async def _begin_failures(cell: Cell, cell_now: Connected, folder: Path) -> list[HexacellError]:
+    """What the connected devices, the stop line and the disk have against a run kept in ``folder``."""
+    guards = cell.settings.guards
+    return [
+        *await device_failures(cell_now.devices),
+        *await start_failures(cell_now.devices, folder, guards.free_disk_mb),
+    ]
 
 
 async def _run(
@@ -82,19 +125,33 @@ async def _run(
     calibration: Calibration,
     cell_now: Connected,
     listeners: Sequence[Listener],
+    inbox: Inbox | None,
 ) -> events.Ended:
     if not order.resume:
         order.folder.create(cell)
-    performer = Performer(cell, calibration, cell_now.devices, cell_now.clock, order.operator, order.folder)
+    desk = Desk(order.operator)
+    policy = Policy.of(cell.settings.recovery, attended=not order.unattended)
+    performer = Performer(
+        cell,
+        calibration,
+        cell_now.devices,
+        cell_now.clock,
+        desk,
+        order.folder,
+        cell_now.thermometers,
+    )
     try:
         with Journal(order.folder.journal) as journal:
-            engine = Engine(performer, journal, listeners)
+            remove_leftovers(order.folder.path)
+            engine = Engine(performer, journal, listeners, inbox=inbox, desk=desk, policy=policy)
             if engine.state.started is None:
                 engine.tell(_beginning(cell, calibration, cell_now))
-            engine.void_open_sets()
+            engine.reopen_sets()
             return await engine.run()
     finally:
-        write_atomically(order.folder.new_wire(), cell_now.trace.text().encode())
+        # A help in the search for faults: whether it can be kept never decides how a run ends.
+        with suppress(FileError):
+            write_atomically(order.folder.new_wire(), cell_now.trace.text().encode())
 
 
 @contextmanager
@@ -131,6 +188,7 @@ def _beginning(cell: Cell, calibration: Calibration, cell_now: Connected) -> eve
         ),
         branch=robot.branch,
         devices=_identities(cell_now),
+        pose_list=None if calibration.listed is None else read_text(calibration.listed.path),
     )
 
 
@@ -170,7 +228,7 @@ def _started(order: Order) -> events.RunStarted:
     return state.started
 
 
-def _robot_of_run(cell: Cell, started: events.RunStarted) -> Robot:
+def robot_of_run(cell: Cell, started: events.RunStarted) -> Robot:
     """The robot with the geometry that commanded the run's measurements, whatever is written by now."""
     values = started.controller
     geometry = ControllerGeometry(Geometry(values.S, values.B, values.l), started.branch)

@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import AsyncIterator, Iterator
 from contextlib import asynccontextmanager, contextmanager
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 from drivers.link import SerialLinks
 from drivers.ports import DeviceIdentity
+from drivers.stop_line import stop_line
 from drivers.trace import WireTrace
 from hexacell.cell.file import Cell
 from hexacell.cell.model import CellSettings
@@ -18,6 +20,7 @@ from hexacell.plugins import Group, load
 from hexacell.robot import config_format
 from procedures.devices import Devices, MountedGauge
 from procedures.preflight import raise_all
+from procedures.temperatures import Thermometers
 from procedures.uninterrupted import uninterrupted
 
 
@@ -56,6 +59,7 @@ def require_drivers(settings: CellSettings) -> None:
         SeveralErrors: more than one.
     """
     protocols = {(Group.GAUGES, gauge.protocol) for gauge in settings.gauges} | {
+        *((Group.THERMOMETERS, thermometer.protocol) for thermometer in settings.thermometers),
         (Group.ENCODERS, settings.encoders.protocol),
         (Group.CONTROLLERS, settings.controller.protocol),
     }
@@ -76,10 +80,13 @@ class Connected:
     identities: tuple[DeviceIdentity, ...]
     clock: CellClock
     trace: WireTrace
+    thermometers: Thermometers
 
 
-def devices_of(settings: CellSettings, links: SerialLinks, trace: WireTrace) -> Devices:
-    """The drivers that the settings name, not yet connected.
+def devices_of(
+    settings: CellSettings, links: SerialLinks, trace: WireTrace, folder: Path | None = None
+) -> Devices:
+    """The drivers that the settings name, not yet connected; ``folder`` has the cell file.
 
     Raises:
         UsageError: a protocol that no driver speaks.
@@ -90,27 +97,37 @@ def devices_of(settings: CellSettings, links: SerialLinks, trace: WireTrace) -> 
     )
     encoders = load(Group.ENCODERS, settings.encoders.protocol)(settings.encoders, trace=trace)
     controller = load(Group.CONTROLLERS, settings.controller.protocol)(settings.controller, trace=trace)
-    return Devices(gauges, encoders, controller)
+    return Devices(gauges, encoders, controller, stop_line(settings.guards, folder or Path()))
 
 
 @asynccontextmanager
-async def connected(settings: CellSettings) -> AsyncIterator[Connected]:
+async def connected(settings: CellSettings, folder: Path | None = None) -> AsyncIterator[Connected]:
     """The cell's devices, connected; they are let go at the end, whatever happens.
+
+    ``folder`` has the cell file, to which the file of its stop line is relative.
 
     Raises:
         HexacellError: one or more devices do not answer as they must.
     """
     trace = WireTrace()
     links = SerialLinks(trace=trace)
-    devices = devices_of(settings, links, trace)
+    devices = devices_of(settings, links, trace, folder)
+    thermometers = thermometers_of(settings)
     try:
-        identities = await devices.open()
-        yield Connected(devices, identities, CellClock(settings.timing.clock_factor), trace)
+        identities = (*await devices.open(), *await thermometers.open())
+        clock = CellClock(settings.timing.clock_factor)
+        yield Connected(devices, identities, clock, trace, thermometers)
     finally:
-        await uninterrupted(_let_go(devices, links))
+        await uninterrupted(_let_go(devices, links, thermometers))
 
 
-async def _let_go(devices: Devices, links: SerialLinks) -> None:
+def thermometers_of(settings: CellSettings) -> Thermometers:
+    """The thermometers that the settings name, not yet connected; raises ``UsageError``."""
+    return Thermometers([load(Group.THERMOMETERS, one.protocol)(one) for one in settings.thermometers])
+
+
+async def _let_go(devices: Devices, links: SerialLinks, thermometers: Thermometers) -> None:
+    await thermometers.close()
     await devices.close()
     await links.close()
 

@@ -175,6 +175,12 @@ def typed_here(
     return run
 
 
+@pytest.fixture
+def one_robot(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Foretell on a single robot: what it says is under test, not how well."""
+    monkeypatch.setattr("hexacell.planning.forecast.ROBOTS", 1)
+
+
 @dataclass
 class Process:
     """A command that is under way; what it prints goes to files."""

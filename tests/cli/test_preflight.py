@@ -63,7 +63,7 @@ def refused(typed: Any, served: Any, command: str, code: int, *words: str) -> st
     return str(outcome.err)
 
 
-@pytest.mark.usefixtures("never_moves")
+@pytest.mark.usefixtures("never_moves", "one_robot")
 def test_a_cell_that_is_in_order(typed_here, cell_folder):
     before = cell_folder.snapshot()
     outcome = typed_here("preflight", cell_folder.cell)
@@ -75,8 +75,9 @@ def test_a_cell_that_is_in_order(typed_here, cell_folder):
     assert cell_folder.snapshot() == before
 
 
-def test_the_document_names_every_device(typed, cell_folder):
-    outcome = typed("preflight", cell_folder.cell, "--json")
+@pytest.mark.usefixtures("one_robot")
+def test_the_document_names_every_device(typed_here, cell_folder):
+    outcome = typed_here("preflight", cell_folder.cell, "--json")
     assert outcome.code == 0
     assert outcome.document["ready"] is True
     devices = outcome.document["devices"]
@@ -105,7 +106,7 @@ def test_a_point_beyond_a_sliders_end_is_named_with_its_leg(typed_here, cell_fol
     assert re.search(r"\bleg [1-6]\b|\bq[1-6]\b", message)
 
 
-@pytest.mark.usefixtures("never_moves")
+@pytest.mark.usefixtures("never_moves", "one_robot")
 def test_gauges_carried_by_hand_need_a_person(typed_here, cell_folder):
     cell_folder.edit(('placement = "fixed"', 'placement = "by-hand"'))
     assert typed_here("preflight", cell_folder.cell).code == 0

@@ -17,6 +17,8 @@ from procedures import events
 from procedures.journal import read_journal
 from procedures.steps import Phase
 
+STOPPED_S = 2.0
+
 
 @pytest.fixture
 def good_cell(quick_cell, demo):
@@ -54,7 +56,7 @@ def test_a_check_is_stopped_at_once_and_goes_on_as_it_says(start, typed_here, go
     under_way(process, good_cell, 1)
     outcome, seconds = process.stopped(signal.SIGTERM)
     assert outcome.code == 130
-    assert seconds < 2.0
+    assert seconds < STOPPED_S
     assert outcome.err == "hexacell: interrupted\n"
     [run] = good_cell.runs()
     last = history(run)[-1]
@@ -69,17 +71,19 @@ def test_a_check_is_stopped_at_once_and_goes_on_as_it_says(start, typed_here, go
     assert good_cell.controller.read_bytes() == config
 
 
+@pytest.mark.slow
 def test_a_calibration_is_stopped_and_finished(start, typed, quick_cell):
     process = start("run", quick_cell.cell)
     under_way(process, quick_cell, 5 + 3)
     config = quick_cell.controller.read_bytes()
     outcome, seconds = process.stopped(signal.SIGINT)
-    assert (outcome.code, seconds < 2.0) == (130, True)
+    assert (outcome.code, seconds < STOPPED_S) == (130, True)
     assert quick_cell.controller.read_bytes() == config
     [run] = quick_cell.runs()
     resumed = typed("run", quick_cell.cell, "--resume", run.name, "--json")
     assert resumed.code == 0, resumed.err
-    assert "point 2 is measured again: the run was interrupted" in resumed.err
+    # The simulated cell began anew with the process: its gauges stand elsewhere now, and are seen to.
+    assert "point 2 is measured again: back at its reference the gauges show" in resumed.err
     assert resumed.document["run"] == str(run)
     assert "35 parameters, 25 records at 5 points" in resumed.document["line"]
     assert quick_cell.controller.read_bytes() != config
@@ -96,7 +100,7 @@ def test_a_stop_before_anything_was_measured_leaves_nothing_to_resume(start, goo
     process = start("run", good_cell.cell)
     process.wait_for("times as fast", lambda: process.out)
     outcome, seconds = process.stopped(signal.SIGTERM)
-    assert (outcome.code, seconds < 2.0) == (130, True)
+    assert (outcome.code, seconds < STOPPED_S) == (130, True)
     assert ("To go on" in outcome.out) == bool(good_cell.runs())
 
 
@@ -104,7 +108,7 @@ def test_a_terminal_that_goes_stops_it_too_and_json_says_so(start, good_cell):
     process = start("run", good_cell.cell, "--unattended", "--json")
     under_way(process, good_cell, 1)
     outcome, seconds = process.stopped(signal.SIGHUP)
-    assert (outcome.code, seconds < 2.0) == (130, True)
+    assert (outcome.code, seconds < STOPPED_S) == (130, True)
     assert outcome.document == {"error": "interrupted", "exit_code": 130}
     assert "To go on:" in outcome.err
 
@@ -126,7 +130,7 @@ def test_sigterm_stops_what_ignores_ctrl_c(start, good_cell):
     under_way(process, good_cell, 1)
     process.popen.send_signal(signal.SIGINT)
     outcome, seconds = process.stopped(signal.SIGTERM)
-    assert (outcome.code, seconds < 2.0) == (130, True)
+    assert (outcome.code, seconds < STOPPED_S) == (130, True)
     assert isinstance(history(good_cell.runs()[0])[-1], events.Interrupted)
 
 

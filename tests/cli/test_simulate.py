@@ -112,6 +112,7 @@ def test_output_goes_to_a_file_where_one_is_named(start, cell_folder):
     assert Path(tomllib.loads(written.read_text())["controller"]["config"]) == cell_folder.controller
 
 
+@pytest.mark.slow
 def test_two_processes_cannot_move_one_robot(served, start, typed_here):
     _, printed = served
     first = start("run", printed)

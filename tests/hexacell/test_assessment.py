@@ -72,7 +72,7 @@ def test_a_good_result_says_so_first_and_then_what_it_is_worth(good):
     found, assessed = good
     verdict, promise, *more = findings(found, assessed)
     assert verdict.startswith("Good: the records determine every parameter")
-    assert "At 6 task poses the robot now errs by 18.6 mm (rms)" in promise
+    assert "At 6 task poses the robot now errs by 19 mm (rms)" in promise
     assert f"by {assessed.accuracy.after.position_rms_mm:.2g} mm (one sigma)" in promise
     assert more == []
 

@@ -5,8 +5,9 @@ import shutil
 import stat
 import tempfile
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 from hypothesis import given
@@ -335,6 +336,68 @@ def test_folders_are_made_with_those_above(tmp_path: Path) -> None:
     for name in ("file", "file/below"):
         with pytest.raises(FileError, match="the folder cannot be made"):
             files.make_folder(tmp_path / name)
+
+
+def test_every_folder_that_is_made_is_a_name_for_good_in_the_one_above(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    synced: list[Path] = []
+    monkeypatch.setattr(files, "sync_folder", synced.append)
+    files.make_folder(tmp_path / "runs" / "cell" / "run")
+    assert set(synced) == {tmp_path, tmp_path / "runs", tmp_path / "runs" / "cell"}
+
+
+class TestLeftovers:
+    """Temporary files of processes that died in the middle of a write."""
+
+    @pytest.fixture
+    def died(self, monkeypatch: pytest.MonkeyPatch) -> Callable[[Path], None]:
+        class Death(BaseException):
+            pass
+
+        def die(_: object, __: object) -> None:
+            raise Death
+
+        def write(path: Path) -> None:
+            with monkeypatch.context() as patch:
+                patch.setattr(os, "replace", die)
+                patch.setattr(Path, "unlink", lambda *_, **__: None)
+                with pytest.raises(Death):
+                    files.write_atomically(path, b"half a thought")
+
+        return write
+
+    def test_those_of_a_file_are_removed_and_no_others(self, path: Path, died: Any) -> None:
+        other = path.with_name("other.toml")
+        died(path)
+        died(path)
+        died(other)
+        assert len(names(path.parent)) == 4
+        files.remove_leftovers(path)
+        assert len(names(path.parent)) == 2
+        assert path.read_bytes() == b"old"
+        files.remove_leftovers(other)
+        assert names(path.parent) == [path.name]
+
+    def test_a_link_leads_to_those_of_its_file(self, path: Path, tmp_path: Path, died: Any) -> None:
+        link = tmp_path / "elsewhere" / "link.toml"
+        link.parent.mkdir()
+        link.symlink_to(path)
+        died(link)
+        files.remove_leftovers(link)
+        assert names(path.parent) == [path.name, "elsewhere"]
+
+    def test_all_in_a_folder_are_removed(self, path: Path, died: Any) -> None:
+        died(path)
+        died(path.with_name("other.toml"))
+        files.remove_leftovers(path.parent)
+        assert names(path.parent) == [path.name]
+
+    def test_those_that_may_not_be_removed_are_left(self, ordinary_folder: Path, died: Any) -> None:
+        died(ordinary_folder / "file")
+        ordinary_folder.chmod(0o500)
+        files.remove_leftovers(ordinary_folder / "file")
+        assert len(names(ordinary_folder)) == 1
 
 
 def test_checksums_are_those_of_the_standard() -> None:

@@ -44,6 +44,7 @@ def test_every_kind_that_hexacell_itself_announces() -> None:
         Group.GAUGES: ("cdi", "mux10", "sylvac"),
         Group.ENCODERS: ("cia406",),
         Group.CONTROLLERS: ("linuxcncrsh",),
+        Group.THERMOMETERS: ("sysfs",),
         Group.CONFIG_FORMATS: ("toml",),
         Group.MECHANISMS: ("hexaglide",),
     }

@@ -4,22 +4,40 @@ from __future__ import annotations
 
 import argparse
 import asyncio
+from dataclasses import asdict
 
 from hexacell.cell.file import load_cell
 from hexacell.cli.console import Console
 from hexacell.cli.words import device_words, wrapped
+from hexacell.cli.words.planning import foretold_words
 from hexacell.composition.calibration import preflight
 from hexacell.errors import ExitCode
+from hexacell.planning.feasibility import shares_lost
+from hexacell.planning.forecast import foretell
+from hexacell.planning.listed import pose_list_of
+from hexacell.planning.plan import Plan
+from hexacell.robot import robot_of
 from procedures.calibration import Mode
 
 
 def main(options: argparse.Namespace) -> ExitCode:
-    """Check, move nothing, report every failure at once."""
+    """Check, move nothing, report every failure at once; then foretell what the plan will give."""
     console = Console(options.json)
     cell = load_cell(options.cell)
     found = asyncio.run(preflight(cell, Mode.OPTIMISE, unattended=options.unattended))
-    console.document({"ready": True, "devices": [identity.model_dump() for identity in found]})
     for identity in found:
         console.say(wrapped(f"ok  {device_words(identity)}", indent=6))
     console.say("ok  all points can be reached, all devices answer; nothing was moved")
+    console.say("Trying the plan on simulated robots within the tolerances, some seconds ...")
+    plan = Plan(cell.settings, robot_of(cell), pose_list_of(cell))
+    foretold, lost = foretell(plan), shares_lost(plan)
+    console.document(
+        {
+            "ready": True,
+            "devices": [identity.model_dump() for identity in found],
+            "expected": asdict(foretold) | {"lost": {str(point): share for point, share in lost.items()}},
+        }
+    )
+    for line in foretold_words(foretold, lost, target_mm=cell.settings.identification.target_mm):
+        console.say(wrapped(line))
     return ExitCode.DONE

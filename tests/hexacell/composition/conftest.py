@@ -18,6 +18,7 @@ from hexacell.archive import RunFolder
 from hexacell.bundled import bundled_config
 from hexacell.cell.file import Cell, dump, load_cell
 from hexacell.cell.model import CellSettings
+from hexacell.cell.recovery import Action
 from hexacell.composition.calibration import Order, calibrate
 from hexacell.controller_config.native_toml import NativeToml
 from hexacell.mechanisms.hexaglide import Hexaglide
@@ -203,6 +204,9 @@ class Approver:
 
     async def approve(self, gates: Sequence[events.Gate], change: str) -> str | None:
         return "a tester"
+
+    async def decide(self, problem: str, choices: Sequence[Action]) -> Action:
+        return Action.ABORT
 
 
 @pytest.fixture

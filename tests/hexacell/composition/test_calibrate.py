@@ -203,6 +203,7 @@ async def test_cancelled_it_stops_in_place_and_goes_on_later(make_site, finished
     assert ended.exit_code == ExitCode.DONE
     history = read_journal(site.folder.journal)
     assert history[: len(first)] == first
-    assert [str(event.at) for event in site.happened(events.SetVoided)] == ["P2"]
+    assert [str(event.at) for event in site.happened(events.Confirmed)] == ["P2"]
+    assert not site.happened(events.SetVoided), "the gauges stood there all the time"
     assert site.folder.wire.read_bytes() == wire
     assert (site.folder.path / "wire-2").exists()

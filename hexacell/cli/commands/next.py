@@ -1,0 +1,81 @@
+"""``hexacell next``: the pose worth measuring next, for people whose controller we do not drive."""
+
+from __future__ import annotations
+
+import argparse
+from typing import Any
+
+from hexacell.cell.file import load_cell
+from hexacell.cli.console import Console
+from hexacell.cli.words.layout import wrapped
+from hexacell.cli.words.planning import outlook_words, visit_words
+from hexacell.errors import ExitCode
+from hexacell.measurement_file import read_measurements
+from hexacell.planning.by_file import decide, situation_of
+from hexacell.planning.listed import pose_list_of
+from hexacell.planning.plan import Plan
+from hexacell.planning.situation import Finished, Outlook, Reference, Visit
+from hexacell.robot import robot_of
+
+
+def main(options: argparse.Namespace) -> ExitCode:
+    """Decide on the records so far."""
+    console = Console(options.json)
+    cell = load_cell(options.cell)
+    plan = Plan(cell.settings, robot_of(cell), pose_list_of(cell))
+    measurements = read_measurements(options.measurements, allow_partial=True)
+    situation = situation_of(plan, measurements, refusals=options.refused)
+    decision = decide(plan, situation)
+    outlook = decision.outlook if isinstance(decision, Visit) else plan.outlook(situation)
+    console.document(next_document(decision, outlook))
+    if not options.json:
+        console.say(wrapped(visit_words(decision)))
+        console.say(wrapped(outlook_words(outlook)))
+    return ExitCode.DONE
+
+
+def next_document(decision: Reference | Visit | Finished, outlook: Outlook | None) -> dict[str, Any]:
+    """The document of ``docs/interface.md``."""
+    now = None if outlook is None else outlook.now_mm
+    if isinstance(decision, Finished):
+        return {"done": True, "reason": decision.reason, "present_worst_sigma_mm": now}
+    return {
+        "done": False,
+        "point": decision.point,
+        **_step(decision),
+        "pose": dict(zip("xyzabc", decision.pose.as_tuple(), strict=True)),
+        "joint_targets": list(decision.joints),
+        "present_worst_sigma_mm": now,
+        "predicted_worst_sigma_mm": None if outlook is None else outlook.next_mm,
+        "going_on": None if outlook is None else _going_on(outlook),
+    }
+
+
+def _step(decision: Reference | Visit) -> dict[str, Any]:
+    if isinstance(decision, Reference):
+        zero = [0.0, 0.0, 0.0]
+        return {
+            "orientation": 1,
+            "reference": True,
+            "predicted_deviation": zero,
+            "sigma": zero,
+            "gain": 0.0,
+            "via": [],
+        }
+    return {
+        "orientation": decision.orientation,
+        "reference": False,
+        "predicted_deviation": list(decision.deviation),
+        "sigma": list(decision.sigma),
+        "gain": decision.gain,
+        "via": [dict(zip("xyzabc", pose.as_tuple(), strict=True)) for pose in decision.via],
+    }
+
+
+def _going_on(outlook: Outlook) -> dict[str, Any]:
+    return {
+        "records": outlook.records,
+        "minutes": outlook.minutes,
+        "worst_sigma_mm": outlook.end_mm,
+        "gain_mm": outlook.gain_mm,
+    }

@@ -1,0 +1,132 @@
+"""Signals while an engine runs: commands, in the order they came, and nothing cut short."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import signal
+from collections.abc import Iterator
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from hexacell.cli import app
+from hexacell.cli.console import Console
+from hexacell.cli.heeding import ENDS, Signals
+from hexacell.errors import Interruption
+from procedures.commands import Abort, Command, Stop
+from procedures.uninterrupted import uninterrupted
+
+
+@pytest.fixture(autouse=True)
+def handlers_are_put_back() -> Iterator[None]:
+    before = [signal.getsignal(number) for number in ENDS]
+    yield
+    assert [signal.getsignal(number) for number in ENDS] == before
+
+
+@pytest.fixture
+def signals() -> Signals:
+    return Signals(Console())
+
+
+def send(*numbers: signal.Signals) -> None:
+    for number in numbers:
+        os.kill(os.getpid(), number)
+
+
+async def commands_after(signals: Signals, *numbers: signal.Signals) -> list[Command]:
+    """What an engine finds in its inbox."""
+    with signals.inbox.attended():
+        send(*numbers)
+        return [await signals.inbox.next() for _ in numbers]
+
+
+STOP, ABORT = Stop("interrupted"), Abort("interrupted")
+INT, TERM, HUP = ENDS[0], ENDS[1], ENDS[2]
+
+
+@pytest.mark.parametrize(
+    ("numbers", "commands"),
+    [
+        ((INT,), [STOP]),
+        ((TERM,), [STOP]),
+        ((HUP,), [STOP]),
+        ((TERM, INT), [STOP, ABORT]),
+        ((TERM, HUP), [STOP, STOP]),
+    ],
+)
+def test_the_first_stops_and_ctrl_c_once_more_aborts(signals, numbers: Any, commands: Any) -> None:
+    assert signals.run(commands_after(signals, *numbers)) == commands
+
+
+def test_ctrl_c_twice(signals, capsys) -> None:
+    async def twice() -> list[Command]:
+        with signals.inbox.attended():
+            send(INT)
+            first = await signals.inbox.next()
+            send(INT)
+            return [first, await signals.inbox.next()]
+
+    assert signals.run(twice()) == [STOP, ABORT]
+    assert capsys.readouterr().out == "Stopping after this step; Ctrl-C again stops motion at once.\n"
+
+
+def test_before_an_engine_runs_the_work_is_cancelled_and_cleans_up_undisturbed(signals) -> None:
+    let_go: list[str] = []
+
+    async def connecting() -> None:
+        try:
+            send(INT)
+            await asyncio.Event().wait()
+        finally:
+            await uninterrupted(cleaning_up())
+
+    async def cleaning_up() -> None:
+        for _ in range(3):
+            send(INT, TERM)
+            await asyncio.sleep(0.001)
+        let_go.append("devices")
+
+    with pytest.raises(Interruption):
+        signals.run(connecting())
+    assert let_go == ["devices"]
+
+
+def test_when_the_engine_has_ended_a_signal_changes_nothing(signals) -> None:
+    async def over() -> str:
+        with signals.inbox.attended():
+            pass
+        send(INT, TERM)
+        await asyncio.sleep(0.01)
+        return "done"
+
+    assert signals.run(over()) == "done"
+
+
+def test_what_is_ignored_stays_ignored(signals) -> None:
+    former = signal.signal(INT, signal.SIG_IGN)
+
+    async def background_job() -> bool:
+        with signals.inbox.attended():
+            send(INT)
+            await asyncio.sleep(0.01)
+            return list(signals.inbox.take()) == []
+
+    try:
+        assert signals.run(background_job())
+        assert signal.getsignal(INT) is signal.SIG_IGN
+    finally:
+        signal.signal(INT, former)
+
+
+def test_a_mistake_of_the_program_is_a_document_and_a_traceback(monkeypatch, capsys) -> None:
+    def mistake(_: Any) -> Any:
+        raise ZeroDivisionError("division by zero")
+
+    monkeypatch.setattr(app, "import_module", lambda _: SimpleNamespace(main=mistake))
+    with pytest.raises(ZeroDivisionError):
+        app.main(["demo", "--json"])
+    document = capsys.readouterr().out
+    assert document == '{"error": "ZeroDivisionError(\'division by zero\')", "exit_code": 1}\n'

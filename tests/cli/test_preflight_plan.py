@@ -1,0 +1,175 @@
+"""Preflight over the plan: what cannot work is refused with the reason, what can is foretold."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+from drivers.simulated.machine import SimulatedMachine
+
+P5 = "[-100.0, 100.0, 500.0],\n]\norientations = 11"
+
+
+@pytest.fixture(autouse=True)
+def never_moves(monkeypatch: pytest.MonkeyPatch) -> None:
+    def move(_machine: SimulatedMachine, pose: object) -> None:
+        pytest.fail(f"the robot was sent to {pose}")
+
+    monkeypatch.setattr(SimulatedMachine, "move", move)
+
+
+IMPOSSIBLE: dict[str, tuple[tuple[tuple[str, str], ...], tuple[str, ...]]] = {
+    "travel": (
+        (("gauge_travel_mm = 5.0", "gauge_travel_mm = 0.05"),),
+        ("identification point 1: no orientation surely keeps the ball inside", "gauge_travel_mm = 0.05"),
+    ),
+    "noise beyond the travel": (
+        (("gauge_mm = 0.01", "gauge_mm = 2.0"),),
+        ("identification point 1: no orientation", "identification point 5: no orientation"),
+    ),
+    "tolerances": (
+        (("S_mm = 7.0", "S_mm = 150.0"),),
+        ("identification point 1", "cannot stand there"),
+    ),
+    "tilt": (
+        (("tilt_deg = 45.0", "tilt_deg = 0.5"),),
+        ("parameters undetermined", "Allow more tilt"),
+    ),
+    "points on one spot": (
+        ((P5, "[0.0, 1.0, 550.0],\n]\norientations = 2"),),
+        ("5 points with 2 orientations give 15 equations for 35 parameters",),
+    ),
+    "budget": (
+        (("orientations = 11", "orientations = 11\nbudget_records = 12"),),
+        ("the budget of 12 records allows 11 records at 1 points, 30 equations for 35", "Allow 14 records"),
+    ),
+    "a point that most robots cannot reach": (
+        ((P5, "[179.0, -280.0, 322.0],\n]\norientations = 11"),),
+        ("identification point 5: ", "of the robots within the tolerances cannot stand there"),
+    ),
+    "a way across a singularity": (
+        ((P5, "[111.0, 15.0, -266.0],\n]\norientations = 11"),),
+        ("identification points 4 and 5: the straight line between them", "change their order"),
+    ),
+}
+
+
+@pytest.mark.parametrize(
+    ("command", "name"),
+    [*(("preflight", name) for name in IMPOSSIBLE), ("run", "travel"), ("run", "budget")],
+)
+def test_a_cell_that_cannot_be_calibrated_is_refused_with_the_reason(
+    typed_here: Any, cell_folder: Any, command: str, name: str
+) -> None:
+    edits, words = IMPOSSIBLE[name]
+    cell_folder.edit(*edits)
+    before = cell_folder.snapshot()
+    outcome = typed_here(command, cell_folder.cell, "--json")
+    assert outcome.code == outcome.document["exit_code"] == 2, outcome.err
+    for word in words:
+        assert word in outcome.err
+    assert cell_folder.snapshot() == before
+
+
+@pytest.mark.usefixtures("one_robot")
+def test_what_the_plan_will_give_is_said_before_any_motion(typed_here: Any, cell_folder: Any) -> None:
+    before = cell_folder.snapshot()
+    outcome = typed_here("preflight", cell_folder.cell, "--json")
+    assert outcome.code == 0
+    expected = outcome.document["expected"]
+    assert expected["robots"] == 1
+    assert 14 <= expected["records"] <= 55
+    assert expected["points"] == 5
+    assert expected["outside"] <= 1
+    assert 0.02 < expected["worst_sigma_mm"] < 1.0
+    assert 1.0 < expected["minutes"] < 4.0
+    assert all(0.0 <= share < 0.3 for share in expected["lost"].values())
+    said = re.sub(r"\s+", " ", outcome.err)
+    words = r"\d+ records at 5 points will give about 0\.\d{3} mm at the worst of your task poses"
+    assert re.search(rf"{words} \(one sigma\), in about \d minutes\.", said)
+    assert cell_folder.snapshot() == before
+
+
+FIXED = [f"{point},{n}" for point in range(1, 6) for n in range(1, 12)]
+"""Labels of as many poses as the cell has."""
+
+
+def listed(cell_folder: Any, change: Callable[[list[str]], list[str]]) -> str:
+    """A list of small tilts at the cell's points, changed in some way; the name of its file."""
+    points = ["0,0,550", "0,-200,550", "100,-100,500", "100,0,600", "-100,100,500"]
+    rows = []
+    for label in FIXED:
+        point, n = map(int, label.split(","))
+        angle = 0.2 * n * (n - 1)
+        turn = [f"{angle},0,0", f"0,{angle},0", f"0,0,{angle}"][n % 3]
+        rows.append(f"{label},{points[point - 1]},{turn}")
+    name = "list.csv"
+    (cell_folder.path / name).write_text(
+        "point,orientation,x,y,z,a,b,c\n" + "".join(f"{row}\n" for row in change(rows))
+    )
+    cell_folder.edit(("orientations = 11", f'orientations = 11\nposes = "{name}"'))
+    return name
+
+
+LISTS: dict[str, tuple[Callable[[list[str]], list[str]], tuple[str, ...]]] = {
+    "a point too many": (lambda rows: [*rows, "6,1,0,0,550,0,0,0"], ("list.csv:57: there is no point 6",)),
+    "a point without poses": (lambda rows: rows[:44], ("point 5 has no pose",)),
+    "a point with one pose": (lambda rows: rows[:45], ("point 5 has one pose",)),
+    "text": (lambda rows: [rows[0], rows[1].replace(",550,", ",up,"), *rows[2:]], (':3: z is "up"',)),
+    "twice": (lambda rows: [*rows, rows[3]], (":57: point 1, orientation 4 stands here and in line 5",)),
+    "too few": (
+        lambda rows: [row for row in rows if int(row.split(",")[1]) <= 3],
+        ("30 equations for 35 parameters", "at least 4 orientations"),
+    ),
+    "a way across a singularity": (
+        lambda rows: [*rows, "1,12,0,0,550,10,-10,169"],
+        ("point 1, poses 11 and 12 of the list: the straight line between them",),
+    ),
+    "out of reach, too steep and elsewhere, all at once": (
+        lambda rows: [
+            *rows,
+            "1,12,0,0,1550,0,0,0",
+            "2,12,0,-200,550,46,0,0",
+            "3,12,60,-100,500,0,0,0",
+        ],
+        (
+            "point 1, pose 12 of the list: leg ",
+            "point 2, pose 12 of the list: is tilted by 46.0 deg, beyond tilt_deg = 45",
+            "point 3, pose 12 of the list: is 40.0 mm from its reference, where the gauges reach 5",
+        ),
+    ),
+}
+
+
+@pytest.mark.parametrize("name", LISTS)
+def test_a_list_of_poses_goes_through_the_same_preflight(
+    typed_here: Any, cell_folder: Any, name: str
+) -> None:
+    change, words = LISTS[name]
+    listed(cell_folder, change)
+    outcome = typed_here("preflight", cell_folder.cell, "--json")
+    assert outcome.code == outcome.document["exit_code"] == 2
+    for word in words:
+        assert word in outcome.err
+
+
+@pytest.mark.usefixtures("one_robot")
+def test_a_list_of_poses_that_can_be_measured(typed_here: Any, cell_folder: Any) -> None:
+    """Gauges with a long travel can follow it even on a robot that is not calibrated."""
+    listed(cell_folder, lambda rows: rows)
+    cell_folder.edit(("gauge_travel_mm = 5.0", "gauge_travel_mm = 60.0"))
+    outcome = typed_here("preflight", cell_folder.cell, "--json")
+    assert outcome.code == 0, outcome.err
+    assert outcome.document["expected"]["records"] >= 40
+    assert outcome.document["expected"]["outside"] == 0
+
+
+def test_a_list_leaves_no_points_to_choose(typed_here: Any, cell_folder: Any) -> None:
+    listed(cell_folder, lambda rows: rows)
+    cell_folder.edit(("orientations = 11", "orientations = 11\nchoose_points = true"))
+    outcome = typed_here("preflight", cell_folder.cell)
+    assert outcome.code == 2
+    assert "a list of poses leaves no points to choose" in outcome.err

@@ -1,0 +1,85 @@
+"""``hexacell replay``: what it says and how it ends."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from hexacell.verification import Verdict
+from procedures import events
+from procedures.journal import read_entries
+from procedures.journal_lines import encode
+
+
+@pytest.fixture
+def run(typed, quick_cell):
+    """A quick run on the simulated cell, in a process of its own."""
+    outcome = typed("run", quick_cell.cell, "--mode", "optimise", "--unattended")
+    assert outcome.code in {0, 1}, outcome.err
+    [folder] = quick_cell.runs()
+    return folder
+
+
+def test_a_run_is_the_same_again_and_nothing_is_touched(typed, quick_cell, run):
+    before = quick_cell.snapshot()
+    outcome = typed("replay", run, "--json")
+    assert outcome.code == 0, outcome.err
+    found = outcome.document
+    entries = read_entries(run / "journal.jsonl")
+    assert found["same"] is True
+    assert found["differences"] == []
+    assert found["events"] == len(entries)
+    assert found["decisions"] == sum(isinstance(entry.event, events.StepBegun) for entry in entries)
+    assert found["decisions"] + found["results"] + found["taken"] >= found["events"]
+    assert outcome.err.endswith(f" of {len(entries)} events: the same as recorded\n")
+    assert quick_cell.snapshot() == before
+
+
+@pytest.fixture
+def manipulated(demo, tmp_path):
+    """The demo's journal with another verdict and other words, all checksums right."""
+    entries = list(read_entries(demo.run / "journal.jsonl"))
+    for place, entry in enumerate(entries):
+        if isinstance(entry.event, events.Judged):
+            judged = entry.event.model_copy(update={"verdict": Verdict.WORSE, "line": "Not at all."})
+            entries[place] = replace(entry, event=judged)
+            line = entry.number
+    path = tmp_path / "journal.jsonl"
+    path.write_bytes(b"".join(map(encode, entries)))
+    return path, line
+
+
+def test_a_manipulated_journal_is_different_and_the_record_is_named(typed_here, manipulated):
+    path, line = manipulated
+    outcome = typed_here("replay", path, "--only", "results")
+    assert outcome.code == 1
+    first, *others, verdict = outcome.out.splitlines()
+    assert first == f"NO  line {line}, judge: verdict: recorded worse than before, replayed pass"
+    assert others[0].startswith(f"--  line {line}, judge: line: recorded Not at all., replayed ")
+    assert verdict.endswith(f": different, first in line {line} (judge)")
+    assert max(map(len, outcome.out.splitlines())) <= 80
+    found = typed_here("replay", path, "--only", "results", "--json").document
+    assert found["same"] is False
+    assert [one["counts"] for one in found["differences"]][:2] == [True, False]
+
+
+def test_the_identification_alone(typed_here, manipulated):
+    path, _ = manipulated
+    outcome = typed_here("replay", path, "--only", "identification")
+    assert outcome.code == 0
+    assert outcome.out.startswith("0 decisions and 1 results of ")
+
+
+def test_what_cannot_be_read_is_told(typed_here, demo, tmp_path):
+    outcome = typed_here("replay", tmp_path / "nowhere")
+    assert outcome.code == 2
+    assert "nowhere: cannot be read: it does not exist" in outcome.err
+    damaged = (demo.run / "journal.jsonl").read_bytes().replace(b'"begun"', b'"began"', 1)
+    (tmp_path / "journal.jsonl").write_bytes(damaged)
+    outcome = typed_here("replay", tmp_path)
+    assert outcome.code == 2
+    assert "journal.jsonl:2: this line of the journal is damaged" in outcome.err
+    outcome = typed_here("replay", tmp_path, "--tolerance", "nan")
+    assert outcome.code == 2
+    assert "a tolerance of nan is none" in outcome.err

@@ -1,0 +1,65 @@
+"""The [recovery] section: ladders that a cell may state, and those that it may not."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from hexacell.bundled import bundled_config
+from hexacell.cell.file import load_cell
+from hexacell.cell.recovery import (
+    Action,
+    AttendedRecovery,
+    FailureKind,
+    RecoverySettings,
+    UnattendedRecovery,
+)
+from hexacell.errors import FileError
+
+
+@pytest.fixture
+def with_section(tmp_path: Path):
+    source = bundled_config("simulated-hexaglide")
+
+    def make(text: str) -> Path:
+        path = tmp_path / "cell.toml"
+        path.write_text(source.read_text() + "\n" + text)
+        return path
+
+    return make
+
+
+def test_a_cell_states_its_own_ladders(with_section) -> None:
+    path = with_section('[recovery]\nagreement_mm = 0.02\n[recovery.unattended]\ndrift = ["abort"]\n')
+    recovery = load_cell(path).settings.recovery
+    assert recovery.agreement_mm == 0.02
+    assert recovery.unattended.ladder(FailureKind.DRIFT) == (Action.ABORT,)
+    assert recovery.unattended.ladder(FailureKind.ZERO_VOID)[0] is Action.REDO_SET
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ('[recovery.unattended]\ndrift = ["redo-set"]\n', "drift must end with ask or abort"),
+        ('[recovery.unattended]\ndrift = ["ask"]\n', "drift asks, and nobody is there"),
+        ("[recovery.attended]\ndrift = []\n", "drift must end with ask or abort"),
+        ('[recovery.attended]\ndrift = ["pray"]\n', "retry"),
+        ('[recovery.attended]\ndrifft = ["ask"]\n', "drift"),
+    ],
+)
+def test_what_a_cell_may_not_state(with_section, text: str, words: str) -> None:
+    with pytest.raises(FileError, match=words):
+        load_cell(with_section(text))
+
+
+@pytest.mark.parametrize("ladders", [AttendedRecovery(), UnattendedRecovery()])
+def test_there_is_a_ladder_for_every_kind_but_the_final_ones(ladders: AttendedRecovery) -> None:
+    named = set(type(ladders).model_fields)
+    assert named == {kind.value for kind in FailureKind} - {FailureKind.FINAL.value}
+    assert ladders.ladder(FailureKind.FINAL) == (Action.ABORT,)
+
+
+def test_the_limit_of_agreement_is_tighter_than_that_of_drift() -> None:
+    settings = load_cell(bundled_config("simulated-hexaglide")).settings
+    assert RecoverySettings().agreement_mm < settings.acceptance.drift_mm

@@ -1,0 +1,39 @@
+"""``[[thermometers]]``: none, one or several, each with its own name."""
+
+from __future__ import annotations
+
+import pytest
+
+from hexacell.cell.file import describe
+from hexacell.errors import FileError
+
+ROOM = '\n[[thermometers]]\nname = "room"\npath = "/sys/class/hwmon/hwmon0/temp1_input"\n'
+
+
+def test_a_cell_needs_none(load_text, cell_text) -> None:
+    assert load_text(cell_text).settings.thermometers == ()
+
+
+def test_what_one_says(load_text, cell_text) -> None:
+    rails = ROOM.replace("room", "rails") + 'protocol = "laser"\ntimeout_s = 0.5\n'
+    cell = load_text(cell_text + ROOM + rails)
+    room, other = cell.settings.thermometers
+    assert (room.name, room.protocol, room.timeout_s) == ("room", "sysfs", 2.0)
+    assert (other.name, other.protocol, other.timeout_s) == ("rails", "laser", 0.5)
+    assert load_text(describe(cell)).settings == cell.settings
+
+
+@pytest.mark.parametrize(
+    ("section", "words"),
+    [
+        (ROOM + ROOM, "two thermometers have the same name"),
+        (ROOM.replace("path", "file"), "'path'"),
+        (ROOM.replace("room", ""), "text that is not empty"),
+    ],
+)
+def test_mistakes_are_told_with_their_line(load_text, cell_text, section: str, words: str) -> None:
+    with pytest.raises(Exception, match=words) as refusal:
+        load_text(cell_text + section)
+    errors = getattr(refusal.value, "errors", [refusal.value])
+    assert all(isinstance(error, FileError) for error in errors)
+    assert all(error.line > len(cell_text.splitlines()) for error in errors)

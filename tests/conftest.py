@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import json
 import os
 import threading
 import time
@@ -15,6 +16,7 @@ from hypothesis import settings
 
 GRACE_S = 0.5  # for what is on its way out when a test returns
 BENCHMARKS = Path(__file__).parent / "benchmarks"
+FAULTS = "fault-matrix"  # what a test calls the cases that it tried
 
 settings.register_profile(
     "hexacell",
@@ -31,6 +33,19 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     for item in items:
         if BENCHMARKS in item.path.parents:
             item.add_marker(pytest.mark.benchmark)
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+    """Print the fault matrix of the tests in tests/faults that were run, by whichever process."""
+    reports = [
+        report for outcome in ("passed", "failed") for report in terminalreporter.getreports(outcome)
+    ]
+    entries = [value for report in reports for name, value in report.user_properties if name == FAULTS]
+    if entries:
+        from tests.faults.matrix import Case, table
+
+        terminalreporter.section("fault matrix")
+        terminalreporter.write_line(table(Case(*json.loads(str(entry))) for entry in entries))
 
 
 @pytest.fixture(autouse=True)

@@ -1,0 +1,112 @@
+"""What the journal costs: a record on the disk, and opening a long one."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from statistics import median
+
+import pytest
+
+from procedures import events, journal_lines
+from procedures.journal import Journal, read_journal
+from procedures.journal_lines import Entry, encode
+from procedures.state import fold
+from procedures.steps import Phase, SetKey
+
+RECORDS = 10_000
+APPENDED = 400
+WINDOW = 7
+"""Readings in a settled window, as with the times of the demo's cell."""
+
+
+def sampled(number: int, per_set: int) -> events.Sampled:
+    """A record such as a run has, in a set of ``per_set``."""
+    value = number / 7
+    reading = events.Reading(
+        gauges_mm=(0.123, 1.2345, value),
+        spread_mm=(0.001, 0.002, 0.003),
+        joints_mm=(value, 2 * value, 3 * value, 4 * value, 5 * value, 6 * value),
+        answers=(("+1.234\r", "01A+00001.234\r", "1.234\r"),) * WINDOW,
+        counts=((123456, 123457, 123458, -123459, 123460, 123461),) * WINDOW,
+    )
+    place, orientation = divmod(number, per_set)
+    return events.Sampled(
+        at=SetKey(phase=Phase.IDENTIFY, point=place + 1),
+        orientation=orientation + 1,
+        pose=(100.0, -100.0, 500.0, value, -value, 0.125),
+        reading=reading,
+        deviation_mm=(0.1, -0.2, value),
+    )
+
+
+def timed(work: Callable[[], object]) -> float:
+    """Seconds on the wall: waiting for the disk is what counts."""
+    begun = time.perf_counter()
+    work()
+    return time.perf_counter() - begun
+
+
+def test_a_record_against_the_bare_disk(tmp_path: Path, say) -> None:
+    """Taken in turns, so that whatever else keeps the disk busy counts for both."""
+    line = encode(Entry(1, *journal_lines.now(), sampled(1, 20)))
+    descriptor = os.open(tmp_path / "bare", os.O_CREAT | os.O_WRONLY | os.O_APPEND)
+
+    def bare() -> None:
+        os.write(descriptor, line)
+        os.fsync(descriptor)
+
+    ours, disk = [], []
+    with Journal(tmp_path / "journal.jsonl") as journal:
+        for number in range(APPENDED):
+            ours.append(timed(partial(journal.append, sampled(number, 20))))
+            disk.append(timed(bare))
+    os.close(descriptor)
+    cost, least = 1e3 * median(ours), 1e3 * median(disk)
+    say("a record on the disk, median", f"{cost:.2f} ms", "below 2 ms")
+    say(
+        "  the same bytes written and forced out, nothing else",
+        f"{least:.2f} ms",
+        f"{cost / least:.2f} times",
+    )
+    # Where the disk itself is slower than that, the journal must not add as much again.
+    assert cost < max(2.0, 2.0 * least)
+
+
+@pytest.mark.parametrize("per_set", [20, RECORDS])
+def test_a_long_journal_opens_quickly(tmp_path: Path, say, per_set: int) -> None:
+    path = tmp_path / "journal.jsonl"
+    when = journal_lines.now()
+    path.write_bytes(b"".join(encode(Entry(n + 1, *when, sampled(n, per_set))) for n in range(RECORDS)))
+    begun, begun_on_the_wall = time.process_time(), time.perf_counter()
+    with Journal(path) as journal:
+        opened = time.process_time()
+        state = fold(journal.events)
+    folded = time.process_time()
+    wall = time.perf_counter() - begun_on_the_wall
+    assert len(state.samples(Phase.IDENTIFY)) == RECORDS
+    words = f"{RECORDS:,} records, {per_set:,} a set: opened and folded in"
+    say(words, f"{folded - begun:.2f} s", f"below 1 s; folding {folded - opened:.2f} s, wall {wall:.2f} s")
+    assert folded - begun < 1.0
+
+
+def test_reading_is_linear_in_the_records(tmp_path: Path, say) -> None:
+    path = tmp_path / "journal.jsonl"
+    when = journal_lines.now()
+    lines = [encode(Entry(n + 1, *when, sampled(n, 20))) for n in range(RECORDS)]
+    quickest = []
+    for size in (RECORDS // 4, RECORDS):
+        path.write_bytes(b"".join(lines[:size]))
+        quickest.append(min(_processor_seconds(lambda: fold(read_journal(path))) for _ in range(3)))
+    growth = quickest[1] / quickest[0]
+    say("four times the records take", f"{growth:.1f} times as long", "at most 6")
+    assert growth < 6.0
+
+
+def _processor_seconds(work: Callable[[], object]) -> float:
+    begun = time.process_time()
+    work()
+    return time.process_time() - begun

@@ -1,0 +1,118 @@
+"""The cell whose runs are broken: small, fast, without noise, so that every run gives the same numbers.
+
+Its only scatter would be rounding to the last digit on the wire, and that is the same each time: the
+gauges are put exactly around the ball and nothing is drawn. An interrupted and resumed run must
+therefore end with the very bytes that an uninterrupted one ends with.
+"""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from hexacell.archive import RunFolder
+from hexacell.bundled import bundled_config
+from hexacell.cell.file import Cell, dump, load_cell
+from hexacell.lock import lock_path
+
+POINTS = ((100.0, -100.0, 500.0), (-100.0, 100.0, 500.0))
+ORIENTATIONS = 9
+PATIENCE_S = 10.0  # a machine under load is no device that fails
+HELD_OUT_ORIENTATIONS = 2
+
+SMALL: dict[str, Any] = {
+    "identification.points": POINTS,
+    "identification.orientations": ORIENTATIONS,
+    "verification.orientations": HELD_OUT_ORIENTATIONS,
+    "noise.encoder_mm": 0.001,
+    "noise.gauge_mm": 0.001,
+    "timing.readings": 2,
+    "timing.clock_factor": 1000.0,
+    "encoders.heartbeat_ms": 65535,
+    "simulation.gauges.noise_mm": 0.0,
+    "simulation.gauges.flicker_mm": 0.0,
+    "simulation.gauges.placing_mm": 0.0,
+    "simulation.gauges.latency_s": 0.0,
+    "simulation.encoders.noise_mm": 0.0,
+    "simulation.encoders.flicker_mm": 0.0,
+    "simulation.encoders.latency_s": 0.0,
+    "simulation.motion.ringing_mm": 0.0,
+}
+WHATEVER_IS_FREE: dict[str, Any] = {"guards.free_disk_mb": 0.0}
+"""Nobody looks beforehand how full the disk is."""
+NEVER_GOOD_ENOUGH: dict[str, Any] = {
+    "acceptance.mean_deviation_mm": 1e-9,
+    "acceptance.max_deviation_mm": 1e-9,
+}
+"""No result passes this, so that what was written is rolled back."""
+
+
+def changed(section: Any, changes: dict[str, Any]) -> Any:
+    """A section of the cell file with other values at some dotted keys."""
+    for key, value in changes.items():
+        head, _, rest = key.partition(".")
+        inner = changed(getattr(section, head), {rest: value}) if rest else value
+        section = section.model_copy(update={head: inner})
+    return section
+
+
+@dataclass(frozen=True)
+class Site:
+    """A folder with the cell in it, its controller's config, and its runs."""
+
+    folder: Path
+
+    @property
+    def cell_path(self) -> Path:
+        return self.folder / "cell.toml"
+
+    @property
+    def cell(self) -> Cell:
+        return load_cell(self.cell_path)
+
+    @property
+    def config(self) -> Path:
+        return self.cell.config_path
+
+    def runs(self) -> list[RunFolder]:
+        """Runs that have a journal, oldest first."""
+        return [RunFolder(path.parent) for path in sorted(self.folder.glob("runs/*/*/journal.jsonl"))]
+
+    def run(self) -> RunFolder:
+        """The only run."""
+        [run] = self.runs()
+        return run
+
+    def strangers(self) -> list[Path]:
+        """Half-written files; those in the folder of a run that never began hurt nobody."""
+        folders = [self.folder, *(run.path for run in self.runs())]
+        return [path for folder in folders for path in folder.glob(".*.tmp")]
+
+    def beside_the_config(self) -> set[str]:
+        """Names in the cell's folder that a program may have put there."""
+        return {path.name for path in self.folder.iterdir()} - {
+            self.cell_path.name,
+            self.config.name,
+            lock_path(self.config).name,
+            "runs",
+        }
+
+
+def make_site(folder: Path, *changes: dict[str, Any], timeout_s: float = PATIENCE_S) -> Site:
+    """The cell in a folder of its own, with some values changed; its devices may take ``timeout_s``."""
+    folder.mkdir(parents=True)
+    source = load_cell(bundled_config("simulated-hexaglide"))
+    patience = {"encoders.timeout_s": timeout_s, "guards.stale_s": timeout_s}
+    settings = changed(source.settings, merged([SMALL, patience, *changes]))
+    gauges = tuple(gauge.model_copy(update={"timeout_s": timeout_s}) for gauge in settings.gauges)
+    (folder / "cell.toml").write_text(dump(changed(settings, {"gauges": gauges})))
+    shutil.copy(source.config_path, folder)
+    return Site(folder)
+
+
+def merged(changes: Iterable[dict[str, Any]]) -> dict[str, Any]:
+    """Later ones before earlier ones."""
+    return {key: value for change in changes for key, value in change.items()}

@@ -1,0 +1,164 @@
+"""The program in processes of its own that can be broken anywhere, and what it promises then."""
+
+from __future__ import annotations
+
+import pickle
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from hexacell.archive import RunFolder
+from procedures import events
+from procedures.journal import read_journal
+from tests.faults.cell import NEVER_GOOD_ENOUGH, Site, make_site
+from tests.faults.driver import UNEXPECTED, Order
+from tests.faults.interception import Call
+from tests.faults.matrix import PROPERTY, Case
+
+ROOT = Path(__file__).parents[2]
+MEMORY = Path("/dev/shm")
+"""A file system that needs no disk: what is tested here is what is called, not how long it takes."""
+
+
+@dataclass(frozen=True)
+class Ended:
+    """How a process ended: its exit code, or its signal, negative; what it said, and did to files."""
+
+    code: int
+    words: str
+    calls: tuple[Call, ...] = ()
+
+
+class Program:
+    """Starts the program in processes of its own, one after the other; ``folder`` is for its words."""
+
+    def __init__(self, server: subprocess.Popen[str], folder: Path) -> None:
+        self._server = server
+        self._output = folder / "output"
+        assert server.stdout is not None
+        assert server.stdout.readline() == "ready\n"
+
+    def __call__(self, order: Order) -> Ended:
+        """Carry out one order; a traceback is never an answer."""
+        assert self._server.stdin is not None
+        assert self._server.stdout is not None
+        self._server.stdin.write(order.to_json() + "\n")
+        self._server.stdin.flush()
+        code = int(self._server.stdout.readline())
+        words = Path(order.output).read_text()
+        assert code != UNEXPECTED, words
+        assert "Traceback" not in words, words
+        told = Path(order.output + ".calls")
+        calls = pickle.loads(told.read_bytes()) if told.exists() else []
+        told.unlink(missing_ok=True)
+        return Ended(code, words, tuple(calls))
+
+    def run(self, site: Site, *arguments: object, **breaking: Any) -> Ended:
+        """``hexacell run`` on the site's cell, with nobody at the terminal."""
+        words = tuple(str(argument) for argument in ("run", site.cell_path, *arguments))
+        return self(Order(words, str(site.folder), str(self._output), **breaking))
+
+    def resume(self, site: Site, run: RunFolder | None = None, **breaking: Any) -> Ended:
+        """``hexacell run --resume`` of the site's only run, or of this one."""
+        return self.run(site, "--resume", (run or site.run()).path, **breaking)
+
+
+@pytest.fixture(scope="session")
+def program(session_ground: Path) -> Iterator[Program]:
+    with subprocess.Popen(
+        [sys.executable, "-m", "tests.faults.driver"],
+        cwd=ROOT,
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+    ) as server:
+        session_ground.chmod(0o777)
+        yield Program(server, session_ground)
+        assert server.stdin is not None
+        server.stdin.close()
+
+
+@pytest.fixture
+def ground() -> Iterator[Path]:
+    """A folder for this test, in memory where there is such a place."""
+    with tempfile.TemporaryDirectory(dir=MEMORY if MEMORY.is_dir() else None) as folder:
+        yield Path(folder)
+
+
+@pytest.fixture(scope="session")
+def session_ground() -> Iterator[Path]:
+    with tempfile.TemporaryDirectory(dir=MEMORY if MEMORY.is_dir() else None) as folder:
+        yield Path(folder)
+
+
+@pytest.fixture
+def new_site(ground: Path) -> Callable[..., Site]:
+    """A fresh cell; those of former calls are removed."""
+
+    def make(*changes: dict[str, Any], **patience: float) -> Site:
+        shutil.rmtree(ground / "cell", ignore_errors=True)
+        return make_site(ground / "cell", *changes, **patience)
+
+    return make
+
+
+@dataclass(frozen=True)
+class Whole:
+    """A run that nothing disturbed, and everything that it left."""
+
+    site: Site
+    ended: Ended
+    history: tuple[events.Event, ...]
+    config_before: bytes
+    seconds: float
+
+    @property
+    def config_after(self) -> bytes:
+        return self.site.config.read_bytes()
+
+    @property
+    def folder(self) -> RunFolder:
+        return self.site.run()
+
+
+def whole(program: Program, folder: Path, *changes: dict[str, Any]) -> Whole:
+    site = make_site(folder / "cell", *changes)
+    before = site.config.read_bytes()
+    begun = time.monotonic()
+    ended = program.run(site, failing={})
+    return Whole(site, ended, read_journal(site.run().journal), before, time.monotonic() - begun)
+
+
+@pytest.fixture(scope="session")
+def undisturbed(program: Program, session_ground: Path) -> Whole:
+    """A run that passes."""
+    found = whole(program, session_ground / "passes")
+    assert found.ended.code == 0, found.ended.words
+    return found
+
+
+@pytest.fixture(scope="session")
+def rolled_back(program: Program, session_ground: Path) -> Whole:
+    """A run whose result is not good enough and is taken back."""
+    found = whole(program, session_ground / "rolled back", NEVER_GOOD_ENOUGH)
+    assert found.ended.code == 1, found.ended.words
+    assert found.config_after == found.config_before
+    return found
+
+
+@pytest.fixture
+def case(request: pytest.FixtureRequest) -> Callable[[str, str, str], None]:
+    """Enter a case into the fault matrix, which is printed at the end of all tests."""
+
+    def enter(fault: str, step: str, outcome: str) -> None:
+        request.node.user_properties.append((PROPERTY, Case(fault, step, outcome).to_json()))
+
+    return enter

@@ -1,0 +1,80 @@
+"""What is promised of a run that was broken and resumed, as checks that fail if it is not kept."""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from collections.abc import Sequence
+
+from hexacell.archive import RunFolder
+from hexacell.measurement_file import read_measurements
+from procedures import events
+from procedures.journal import read_journal
+from procedures.state import RunState, fold
+from procedures.steps import Phase, SetKey
+from tests.faults.cell import HELD_OUT_ORIENTATIONS, ORIENTATIONS, POINTS, Site
+
+
+def whole_lines(journal: bytes) -> bytes:
+    """A journal without a torn end."""
+    return journal[: journal.rfind(b"\n") + 1]
+
+
+def require_nothing_lost(at_the_kill: bytes, run: RunFolder) -> None:
+    """Every record that was on the disk when the process died is there, byte for byte."""
+    assert run.journal.read_bytes().startswith(whole_lines(at_the_kill))
+
+
+def require_valid(run: RunFolder) -> RunState:
+    """Every planned record counts exactly once, and all files say the same."""
+    history = read_journal(run.journal)
+    state = fold(history)
+    assert state.ended is not None
+    labels = Counter((record.point, record.orientation) for record in state.measurements().records)
+    planned = [(p, o) for p in range(1, len(POINTS) + 1) for o in range(1, ORIENTATIONS + 1)]
+    assert labels == Counter(planned)
+    for phase in (Phase.BEFORE, Phase.AFTER):
+        held_out = Counter((sample.at.point, sample.orientation) for sample in state.samples(phase))
+        assert set(held_out.values()) == {1}
+        assert len(held_out) == 2 * HELD_OUT_ORIENTATIONS
+    assert all(measured.closed for measured in state.sets.values())
+    require_one_go(history, state)
+    assert read_measurements(run.measurements) == state.measurements()
+    assert state.identified is not None
+    result = json.loads(run.result.read_text())
+    assert {key: result[key] for key in state.identified.result} == state.identified.result
+    return state
+
+
+def require_one_go(history: Sequence[events.Event], state: RunState) -> None:
+    """No record is counted that was measured against a zero, or under a geometry, that is gone."""
+    for key in state.sets:
+        ends = [n for n, event in enumerate(history) if _ends(event, key)]
+        attempt = history[max(ends, default=0) :]
+        counted = [e for e in attempt if isinstance(e, events.Sampled) and e.at == key]
+        assert tuple(counted) == state.sets[key].samples
+
+
+def _ends(event: events.Event, key: SetKey) -> bool:
+    """Whether an attempt at a set ends here."""
+    match event:
+        case events.SetVoided():
+            return event.at == key
+        case events.Committed():
+            return key.phase is Phase.AFTER
+    return False
+
+
+def require_identical(site: Site, undisturbed: Site) -> None:
+    """Without noise, an interrupted run ends as one that nothing disturbed, to the last byte."""
+    run, reference = site.run(), undisturbed.run()
+    assert (run.path / "config-before").read_bytes() == (reference.path / "config-before").read_bytes()
+    assert run.measurements.read_bytes() == reference.measurements.read_bytes()
+    assert run.result.read_bytes() == reference.result.read_bytes()
+    assert site.config.read_bytes() == undisturbed.config.read_bytes()
+
+
+def require_tidy(site: Site) -> None:
+    """Nothing that was half written lies about."""
+    assert not site.strangers()
+    assert not site.beside_the_config()

@@ -1,0 +1,76 @@
+"""The process dies before each call of a write-back and of a taking back: SIGKILL, no word, no cleaning.
+
+The same for every call in this process, and failures instead of deaths, are in
+``tests/hexacell/controller_config``; a power cut, which also loses what was written, in
+``test_power_cut``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import pytest
+
+from tests.faults.cell import NEVER_GOOD_ENOUGH
+from tests.faults.interception import Call
+from tests.faults.killing import KILLED, finish
+from tests.faults.promises import require_identical
+
+CONFIG = "simulated-hexaglide.controller.toml"
+AFTERWARDS = 6
+"""Calls after a replacement that are cut too: the folder's fsync, the note in the journal, ..."""
+
+
+def writes_of_the_config(calls: Sequence[Call]) -> list[range]:
+    """The numbers of the calls of each replacement of the config; the backup belongs to the first."""
+    replaced = [number for number, call in enumerate(calls) if call.other.endswith(CONFIG)]
+    backup = next(number for number, call in enumerate(calls) if call.other.endswith("config-before"))
+    begun = [_begun(calls, number) for number in (backup, *replaced[1:])]
+    return [range(first, last + AFTERWARDS) for first, last in zip(begun, replaced, strict=True)]
+
+
+def _begun(calls: Sequence[Call], replaced: int) -> int:
+    """The call that opened the temporary file that a later call moved to its place."""
+    return next(n for n, call in enumerate(calls) if call.path == calls[replaced].path)
+
+
+class Cutter:
+    """Ends the process at a call, looks at the config, and goes on."""
+
+    def __init__(self, program: Any, new_site: Any, whole: Any, case: Any) -> None:
+        self._program, self._new_site, self._case = program, new_site, case
+        self._whole = whole
+        self._after = (whole.folder.path / "config-after").read_bytes()
+
+    def cut(self, number: int, step: str) -> str:
+        """What the config is afterwards: old or new, and whether a temporary was left."""
+        code = self._whole.ended.code
+        site = self._new_site(NEVER_GOOD_ENOUGH if code else {})
+        assert self._program.run(site, failing={"at": number}).code == KILLED
+        config = site.config.read_bytes()
+        assert config in {self._whole.config_before, self._after}
+        found = "new config" if config == self._after else "old config"
+        left = bool(site.beside_the_config())
+        finish(self._program, site, code=code)
+        require_identical(site, self._whole.site)
+        self._case("killed in a config write", step, f"{found}, way back kept")
+        return f"{found}, leftover" if left else found
+
+
+def test_it_dies_before_the_replacement(program: Any, new_site: Any, undisturbed: Any, case: Any) -> None:
+    calls = undisturbed.ended.calls
+    replaced = next(number for number, call in enumerate(calls) if call.other.endswith(CONFIG))
+    cutter = Cutter(program, new_site, undisturbed, case)
+    assert cutter.cut(replaced, "committing") == "old config, leftover"
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(3600)
+def test_it_dies_at_every_call(program: Any, new_site: Any, rolled_back: Any, case: Any) -> None:
+    cutter = Cutter(program, new_site, rolled_back, case)
+    committing, rolling_back = writes_of_the_config(rolled_back.ended.calls)
+    found = [cutter.cut(number, "committing") for number in committing]
+    assert found == sorted(found, key=["old config", "old config, leftover", "new config"].index)
+    found = [cutter.cut(number, "rolling back") for number in rolling_back]
+    assert {"new config", "new config, leftover", "old config"} == set(found)

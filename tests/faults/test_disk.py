@@ -1,0 +1,157 @@
+"""A disk that is full, read-only, forbidden or broken at every write of a run.
+
+A first run counts the calls that change files. Then the program is run again and again, each time
+with another of them failing: what it says, what is in the controller's config, and whether the run
+goes on once the disk is well again.
+"""
+
+from __future__ import annotations
+
+import errno
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.faults.cell import Site
+from tests.faults.killing import finish, history_of
+from tests.faults.matrix import step_of
+from tests.faults.promises import require_identical
+
+ERRORS = {
+    errno.ENOSPC: ("disk full", "the disk is full. Free some space"),
+    errno.EROFS: ("read-only", "the file system is read-only. Mount it writable"),
+    errno.EACCES: ("permission denied", "permission denied. "),
+    errno.EIO: ("disk error", "the disk reports an error. Check the disk"),
+}
+
+ACTIONS = ("and apply the proposal again", "config-before over the config")
+"""What else there is to do where the config was replaced already."""
+
+TOLD = ("may hold the new geometry", "was replaced", "the controller has the new geometry")
+"""What must be said where a config that is not noted as committed is new all the same."""
+
+
+@dataclass(frozen=True)
+class Write:
+    """A call that changes a file: the how manieth it is, which it is, and in which step."""
+
+    number: int
+    name: str
+    file: str
+    step: str
+
+
+@pytest.fixture(scope="session")
+def writes(undisturbed: Any) -> Sequence[Write]:
+    """Every call of a run that changes a file."""
+    ended = undisturbed.ended
+    becoming = {call.path: call.other for call in ended.calls if call.other}
+    found, records = [], 0
+    for number, call in enumerate(ended.calls):
+        concerned = Path(becoming.get(call.path, call.path)).name  # a temporary is what it becomes
+        file = "run folder" if concerned.startswith("20") else concerned
+        found.append(Write(number, call.name, file, step_of(undisturbed.history[:records])))
+        records += (call.name, file) == ("fsync", "journal.jsonl")
+    return found
+
+
+def of_each_kind(writes: Sequence[Write]) -> list[Write]:
+    """The first call of each kind: on the same file, in the same kind of step."""
+    kinds: dict[tuple[str, str, str], Write] = {}
+    for write in writes:
+        kinds.setdefault((write.name, write.file, write.step), write)
+    return list(kinds.values())
+
+
+class Disk:
+    """Runs the program on a disk that fails at one write, once or from then on."""
+
+    def __init__(self, program: Any, new_site: Any, undisturbed: Any, case: Any) -> None:
+        self._program, self._new_site, self._undisturbed = program, new_site, undisturbed
+        self._case = case
+
+    def fail(self, write: Write, code: int, *, width: int | None = None, and_resume: bool = True) -> str:
+        """Give what the program said to it."""
+        site = self._new_site()
+        failing = {"at": write.number, "width": width, "error": code}
+        ended = self._program.run(site, failing=failing)
+        fault, words = ERRORS[code]
+        outcome = self._outcome(site, write, ended, words)
+        self._case(fault if width is None else f"{fault}, once", write.step, outcome)
+        if ended.code != 0 and and_resume:
+            finish(self._program, site)
+        if ended.code == 0 or and_resume:
+            require_identical(site, self._undisturbed.site)
+        return str(ended.words)
+
+    def _outcome(self, site: Site, write: Write, ended: Any, words: str) -> str:
+        """What came of it; whatever that is, the config is complete and the words are true."""
+        config = site.config.read_bytes()
+        is_new = config == self._undisturbed.config_after
+        assert is_new or config == self._undisturbed.config_before, (write, ended)
+        committed = any(event.kind == "committed" for event in history_of(site))
+        if ended.code == 0:
+            return "no harm, done"
+        why, _, action = words.partition(". ")
+        assert why in ended.words, (write, ended)
+        assert any(words in ended.words for words in (action, *ACTIONS)), (write, ended)
+        assert str(site.folder) in ended.words, (write, ended)
+        assert ended.code in {2, 6}, (write, ended)
+        if ended.code == 6:
+            assert not is_new, (write, ended)
+            return "exit 6, old config"
+        if is_new and not committed:
+            assert any(words in ended.words for words in TOLD), (write, ended)
+        return f"exit 2, {'new' if is_new else 'old'} config"
+
+
+@pytest.fixture
+def disk(program: Any, new_site: Any, undisturbed: Any, case: Any) -> Disk:
+    return Disk(program, new_site, undisturbed, case)
+
+
+def the(writes: Sequence[Write], name: str, file: str, step: str = "") -> Write:
+    return next(w for w in writes if (w.name, w.file) == (name, file) and step in {"", w.step})
+
+
+def test_a_disk_that_is_full_while_measuring(disk: Disk, writes: Sequence[Write]) -> None:
+    words = disk.fail(the(writes, "write", "journal.jsonl", "sampling"), errno.ENOSPC)
+    assert "journal.jsonl: the journal cannot be written" in words, "not what failed afterwards"
+
+
+@pytest.mark.slow
+def test_a_config_that_may_not_be_written(disk: Disk, writes: Sequence[Write]) -> None:
+    words = disk.fail(the(writes, "open", "simulated-hexaglide.controller.toml"), errno.EACCES)
+    assert "simulated-hexaglide.controller.toml: cannot be written and is as it was" in words
+
+
+@pytest.mark.slow
+def test_a_config_that_is_written_but_perhaps_not_for_good(disk: Disk, writes: Sequence[Write]) -> None:
+    replaced = the(writes, "replace", "simulated-hexaglide.controller.toml").number
+    synced = next(w for w in writes[replaced:] if w.name == "fsync")
+    disk.fail(synced, errno.EIO, width=1)
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(3600)
+@pytest.mark.parametrize("code", ERRORS, ids=[words for words, _ in ERRORS.values()])
+def test_every_kind_of_write_fails(code: int, disk: Disk, writes: Sequence[Write]) -> None:
+    for write in of_each_kind(writes):
+        disk.fail(write, code)
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(3600)
+def test_every_kind_of_write_fails_once(disk: Disk, writes: Sequence[Write]) -> None:
+    for write in of_each_kind(writes):
+        disk.fail(write, errno.EIO, width=1)
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(3600)
+def test_the_disk_is_full_at_every_single_write(disk: Disk, writes: Sequence[Write]) -> None:
+    for write in writes:
+        disk.fail(write, errno.ENOSPC, and_resume=False)

@@ -1,0 +1,83 @@
+"""SIGKILL after every record of a run, within records, and again while it is resumed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+from tests.faults.cell import NEVER_GOOD_ENOUGH
+from tests.faults.killing import KILLED, after, finish, history_of, places, within
+from tests.faults.matrix import step_of
+from tests.faults.promises import require_identical
+
+Break = Callable[..., None]
+
+
+@pytest.fixture
+def kill(program: Any, new_site: Any, undisturbed: Any, case: Any) -> Break:
+    """Kill a run, and its resumptions as often as more ways to die are given; then finish it."""
+
+    def broken(fault: str, *deaths: dict[str, Any]) -> None:
+        site = new_site()
+        for number, death in enumerate(deaths):
+            begun = number > 0 and history_of(site)
+            ended = program.resume(site, **death) if begun else program.run(site, **death)
+            assert ended.code == KILLED or (number and ended.code in {0, 2}), ended.words
+            if number == 0:
+                step = step_of(history_of(site))
+        outcome = finish(program, site)
+        case(fault, step, outcome)
+        require_identical(site, undisturbed.site)
+
+    return broken
+
+
+class TestASample:
+    def test_between_a_step_and_its_record(self, undisturbed: Any, kill: Break) -> None:
+        kill("killed after a record", after(places(undisturbed.history)["sampling"]))
+
+    def test_with_the_config_written_but_not_verified(self, undisturbed: Any, kill: Break) -> None:
+        kill("killed after a record", after(places(undisturbed.history)["after"]))
+
+    def test_in_the_middle_of_a_record_and_again(self, undisturbed: Any, kill: Break) -> None:
+        kill("killed twice", within(places(undisturbed.history)["committing"]), after(1))
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(3600)
+class TestEverywhere:
+    def test_after_every_record(self, undisturbed: Any, kill: Break) -> None:
+        for records in range(1, len(undisturbed.history) + 1):
+            kill("killed after a record", after(records))
+
+    def test_in_the_middle_of_a_record_of_each_kind_of_step(self, undisturbed: Any, kill: Break) -> None:
+        for record in places(undisturbed.history).values():
+            kill("killed within a record", within(record))
+            kill("killed within a record", within(record + 1))
+
+    def test_again_while_it_is_resumed(self, undisturbed: Any, kill: Break) -> None:
+        for records in places(undisturbed.history).values():
+            for more in (1, 2, 3, 5, 8):
+                kill("killed twice", after(records), after(more))
+
+    def test_over_and_over(self, undisturbed: Any, kill: Break) -> None:
+        for records in (5, 40, 90, 120):
+            kill("killed six times", *[after(records), within(2), after(7), after(1), within(4), after(9)])
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(3600)
+def test_a_run_that_is_taken_back_is_taken_back_after_every_kill(
+    program: Any, new_site: Any, rolled_back: Any, case: Any
+) -> None:
+    history = rolled_back.history
+    for records in range(places(history)["committing"], len(history) + 1):
+        site = new_site(NEVER_GOOD_ENOUGH)
+        assert program.run(site, **after(records)).code == KILLED
+        step = step_of(history_of(site))
+        outcome = finish(program, site, code=1)
+        require_identical(site, rolled_back.site)
+        assert site.config.read_bytes() == rolled_back.config_before
+        case("killed after a record, bad result", step, outcome)

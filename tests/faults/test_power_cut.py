@@ -1,0 +1,102 @@
+"""The power goes at every call of a run that changes a file: what is found then, in every case allowed."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from hexacell.controller_config.write_back import Receipt, rollback
+from procedures.journal import read_journal
+from tests.faults.cell import NEVER_GOOD_ENOUGH, Site, make_site
+from tests.faults.interception import Call
+from tests.faults.matrix import step_of
+from tests.faults.power_cut import Disk, Files
+
+CONFIG = "simulated-hexaglide.controller.toml"
+OWN = {"cell.toml", "measurements.csv", "result.json", "proposal.json", "config-before", "config-after"}
+OWN |= {"write-back.json", "wire"}
+"""Files of a run that are written once and whole."""
+
+
+class Story:
+    """A run, every call of it, and what it left in the end."""
+
+    def __init__(self, program: Any, site: Site, code: int) -> None:
+        self.site = site
+        self.start = {path.name: path.read_bytes() for path in site.folder.iterdir()}
+        ended = program.run(site, failing={})
+        assert ended.code == code, ended.words
+        self.calls: tuple[Call, ...] = ended.calls
+        run = site.run().path
+        self.run = str(run.relative_to(site.folder))
+        self.end = {path.name: path.read_bytes() for path in run.iterdir()}
+        self.history = read_journal(site.run().journal)
+        self.before = self.start[CONFIG]
+        self.after = self.end["config-after"]
+
+    def cuts(self) -> Iterator[tuple[int, Files]]:
+        """For every moment: how many records were on the disk for sure, and what may be found."""
+        disk, sure = Disk(str(self.site.folder), self.start), 0
+        for call in self.calls:
+            for found in disk.possible():
+                yield sure, found
+            disk.do(call)
+            sure += call.name == "fsync" and call.path.endswith("journal.jsonl")
+        for found in disk.possible():
+            yield sure, found
+
+    def put_down(self, found: Files) -> None:
+        """Make the site's folder what was found."""
+        for path in self.site.folder.iterdir():
+            shutil.rmtree(path) if path.is_dir() else path.unlink()
+        for name, data in found.items():
+            path = self.site.folder / name
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_bytes(data)
+
+    def require_kept(self, sure: int, found: Files) -> None:
+        """Every record that the engine went on from is there, and no file is half there."""
+        journal = found.get(f"{self.run}/journal.jsonl", b"")
+        lines = self.end["journal.jsonl"].splitlines(keepends=True)
+        assert journal.startswith(b"".join(lines[:sure]))
+        assert self.end["journal.jsonl"].startswith(journal)
+        for name in OWN & {Path(path).name for path in found if path.startswith(self.run)}:
+            assert found[f"{self.run}/{name}"] == self.end[name], name
+
+    def require_way_back(self, found: Files) -> None:
+        """A config that is not the old one is the new one, whole, and rolling back restores the old."""
+        assert found[CONFIG] == self.after
+        self.put_down(found)
+        assert rollback(Receipt.of(self.site.folder / self.run))
+        assert self.site.config.read_bytes() == self.before
+
+
+def cut_everywhere(story: Story, case: Any) -> None:
+    seen: set[frozenset[tuple[str, bytes]]] = set()
+    for sure, found in story.cuts():
+        story.require_kept(sure, found)
+        is_new = found[CONFIG] != story.before
+        state = frozenset(found.items())
+        if is_new and state not in seen:
+            story.require_way_back(found)
+        if state not in seen:
+            step = step_of(story.history[:sure])
+            case("power cut", step, "new config, way back kept" if is_new else "old config")
+        seen.add(state)
+
+
+@pytest.mark.parametrize(
+    ("changes", "code"),
+    [
+        pytest.param({}, 0, id="a good result"),
+        pytest.param(NEVER_GOOD_ENOUGH, 1, id="a bad result", marks=pytest.mark.slow),
+    ],
+)
+def test_the_power_goes_at_any_moment(
+    changes: dict[str, Any], code: int, program: Any, ground: Path, case: Any
+) -> None:
+    cut_everywhere(Story(program, make_site(ground / "cell", changes), code), case)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import signal
 import sys
-import threading
 
 from hexacell.cell.file import dump, load_cell
 from hexacell.composition.devices import served
@@ -18,9 +17,7 @@ def main(options: argparse.Namespace) -> ExitCode:
     cell = load_cell(options.cell)
     if cell.settings.simulation is None:
         raise UsageError("there is no [simulation] in it: this is a real cell", subject=cell.path)
-    stop = threading.Event()
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda *_: stop.set())
+    stops = _held_back()
     with served(cell, other_processes=True) as settings:
         controller = settings.controller.model_copy(update={"config": str(cell.config_path.resolve())})
         text = dump(settings.model_copy(update={"controller": controller}))
@@ -29,5 +26,17 @@ def main(options: argparse.Namespace) -> ExitCode:
         else:
             write_atomically(options.output, text.encode())
         print("serving; Ctrl-C ends it", file=sys.stderr, flush=True)
-        stop.wait()
+        signal.sigwait(stops)
     return ExitCode.DONE
+
+
+def _held_back() -> set[signal.Signals]:
+    """Block the signals that end it, in every thread to come, until they are waited for.
+
+    A signal that comes to one of the simulated devices' threads would not wake the main one.
+    """
+    stops = {signal.SIGINT, signal.SIGTERM}
+    if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:  # as nohup has it
+        stops.add(signal.SIGHUP)
+    signal.pthread_sigmask(signal.SIG_BLOCK, stops)
+    return stops

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from hexacell.rotations import Array
 
@@ -59,3 +59,28 @@ class Geometry:
     def toward(self, other: Geometry, fraction: float) -> Geometry:
         """The geometry ``fraction`` of the way to ``other``; 0 is this one, 1 the other."""
         return Geometry.from_vector((1.0 - fraction) * self.vector() + fraction * other.vector())
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Geometries:
+    """A geometry for each of n poses, all computed at once, mm.
+
+    Attributes:
+        S: joints on the sliders (n, 6, 3).
+        B: joints on the platform (n, 6, 3).
+        l: leg lengths (n, 6).
+    """
+
+    S: Array
+    B: Array
+    l: Array  # noqa: E741 - the paper's symbol
+
+    @classmethod
+    def from_vectors(cls, vectors: Array) -> Geometries:
+        """Of vectors (n, 42) in the order of ``PARAMETER_NAMES``, mm."""
+        return cls(
+            vectors[:, :18].reshape(-1, LEGS, 3), vectors[:, 18:36].reshape(-1, LEGS, 3), vectors[:, 36:]
+        )
+
+    def __getitem__(self, rows: NDArray[np.intp]) -> Geometries:
+        return Geometries(self.S[rows], self.B[rows], self.l[rows])

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from hexacell import rotations
 from hexacell.errors import ReachError
-from hexacell.geometry import Geometry
+from hexacell.geometry import Geometries, Geometry
 from hexacell.mechanisms.base import Branch, Mechanism
 from hexacell.pose import Poses
 from hexacell.rotations import Array, Mask
@@ -56,15 +56,22 @@ def inverse(mechanism: Mechanism, geometry: Geometry, branch: Branch, poses: Pos
 
 
 def forward(
-    mechanism: Mechanism, geometry: Geometry, joints: Array, start: Poses, *, mode: Array | None = None
+    mechanism: Mechanism,
+    geometry: Geometry | Geometries,
+    joints: Array,
+    start: Poses,
+    *,
+    mode: Array | None = None,
+    close_mm: float = CONVERGED_MM,
 ) -> Forward:
     """Poses of n joint vectors (n, 6), mm, by damped Newton steps from nearby poses.
 
-    ``mode`` (n,) is the sign of the Jacobian's determinant to be kept; by default that at ``start``.
+    ``geometry`` is one for all of them, or one for each. ``mode`` (n,) is the sign of the Jacobian's
+    determinant to be kept; by default that at ``start``. Legs may be ``close_mm`` too short or long.
     """
     if mode is None:
         mode = assembly_mode(mechanism.closure(geometry, start, joints)[1])
-    return _newton(mechanism, geometry, joints, start, mode)
+    return _newton(mechanism, geometry, joints, start, mode, close_mm)
 
 
 def assembly_mode(pose_jacobian: Array) -> Array:
@@ -146,10 +153,36 @@ def singularity_margin(mechanism: Mechanism, geometry: Geometry, poses: Poses, j
     Rotations are scaled by the platform's mean radius, so that a value of 0.1 says: some unit
     motion of the platform changes no leg by more than a tenth of it.
     """
+    smallest: Array = np.linalg.svd(_dimensionless(mechanism, geometry, poses, joints), compute_uv=False)[
+        ..., -1
+    ]
+    return smallest
+
+
+def keeps_margin(
+    mechanism: Mechanism, geometry: Geometry, poses: Poses, joints: Array, margin: float
+) -> Mask:
+    """Whether :func:`singularity_margin` is at least ``margin`` at each of n poses, in less time.
+
+    The norm of the inverse bounds the smallest singular value from both sides; only what lies between
+    needs the value itself.
+    """
+    jacobian = _dimensionless(mechanism, geometry, poses, joints)
+    try:
+        inverse_norm = np.linalg.norm(np.linalg.inv(jacobian), axis=(-2, -1))
+    except np.linalg.LinAlgError:
+        inverse_norm = np.full(len(jacobian), np.nan)
+    keeps: Mask = inverse_norm * margin <= 1.0
+    doubtful = np.flatnonzero(~keeps & ~(inverse_norm * margin > np.sqrt(6.0)))
+    keeps[doubtful] = np.linalg.svd(jacobian[doubtful], compute_uv=False)[..., -1] >= margin
+    return keeps
+
+
+def _dimensionless(mechanism: Mechanism, geometry: Geometry, poses: Poses, joints: Array) -> Array:
+    """The pose Jacobian with rotations scaled by the platform's mean radius."""
     scaled = pose_jacobian(mechanism, geometry, poses, joints).copy()
     scaled[..., 3:] /= np.mean(np.linalg.norm(geometry.B, axis=-1))
-    smallest: Array = np.linalg.svd(scaled, compute_uv=False)[..., -1]
-    return smallest
+    return scaled
 
 
 def moved(poses: Poses, step: Array) -> Poses:
@@ -180,17 +213,37 @@ def _staged(
     return Forward(poses, found)
 
 
-def _newton(mechanism: Mechanism, geometry: Geometry, joints: Array, start: Poses, mode: Array) -> Forward:
-    """Newton's method on the pose, each step bounded."""
-    poses = start
+def _newton(
+    mechanism: Mechanism,
+    geometry: Geometry | Geometries,
+    joints: Array,
+    start: Poses,
+    mode: Array,
+    close_mm: float = CONVERGED_MM,
+) -> Forward:
+    """Newton's method on each pose, every step bounded; poses that close are left as they are."""
+    positions, orientation = np.array(start.positions), np.array(start.rotations)
+    found = np.zeros(len(joints), dtype=bool)
+    rows, poses = np.arange(len(joints)), start
     error, jacobian = mechanism.closure(geometry, poses, joints)
-    for _ in range(NEWTON_STEPS):
-        if not np.isfinite(error).all() or np.abs(error).max(initial=0.0) < CONVERGED_MM:
+    for left in range(NEWTON_STEPS, -1, -1):
+        largest = np.abs(error).max(axis=-1, initial=0.0)
+        # One that is out of reach has no number for an error, and is not open either.
+        is_open = largest >= close_mm if left else np.zeros(len(rows), dtype=bool)
+        if not is_open.all():
+            ended = ~is_open
+            at = rows[ended]
+            positions[at], orientation[at] = poses.positions[ended], poses.rotations[ended]
+            found[at] = (largest[ended] < close_mm) & (assembly_mode(jacobian[ended]) == mode[at])
+            rows, poses, joints = rows[is_open], poses[is_open], joints[is_open]
+            error, jacobian = error[is_open], jacobian[is_open]
+            if isinstance(geometry, Geometries):
+                geometry = geometry[np.flatnonzero(is_open)]
+        if not len(rows):
             break
         poses = moved(poses, _step(jacobian, error))
         error, jacobian = mechanism.closure(geometry, poses, joints)
-    closed = np.abs(error).max(axis=-1, initial=0.0) < CONVERGED_MM
-    return Forward(poses, closed & (assembly_mode(jacobian) == mode))
+    return Forward(Poses(positions, orientation), found)
 
 
 def _step(jacobian: Array, error: Array) -> Array:
@@ -198,9 +251,9 @@ def _step(jacobian: Array, error: Array) -> Array:
         step = -np.linalg.solve(jacobian, error[..., None])[..., 0]
     except np.linalg.LinAlgError:
         step = -(np.linalg.pinv(jacobian) @ error[..., None])[..., 0]
-    travel = np.linalg.norm(step[..., :3], axis=-1) / LONGEST_STEP_MM
-    turn = np.linalg.norm(step[..., 3:], axis=-1) / LARGEST_TURN
-    shortened: Array = step / np.maximum(1.0, np.maximum(travel, turn))[..., None]
+    travel, turn = step[..., :3] / LONGEST_STEP_MM, step[..., 3:] / LARGEST_TURN
+    too_long = np.sqrt(np.maximum(np.sum(travel * travel, axis=-1), np.sum(turn * turn, axis=-1)))
+    shortened: Array = step / np.maximum(1.0, too_long)[..., None]
     return shortened
 
 

@@ -55,14 +55,21 @@ def skew(vector: ArrayLike) -> Array:
 def from_vector(vector: ArrayLike) -> Array:
     """Rotation matrices (..., 3, 3) of rotation vectors (..., 3), rad (Rodrigues' formula)."""
     vector = np.asarray(vector, dtype=float)
-    half = 0.5 * np.sqrt(np.einsum("...i,...i->...", vector, vector))[..., None, None]
-    k = skew(vector)
+    squared = np.einsum("...i,...i->...", vector, vector)[..., None, None]
+    half = 0.5 * np.sqrt(squared)
     # Below this half angle the quotient is 1 to the last bit, and at zero there is none.
-    tiny = half < 1e-9
-    quotient = np.where(tiny, 1.0, np.sin(half) / np.where(tiny, 1.0, half))
-    linear, quadratic = quotient * np.cos(half), 0.5 * quotient**2
-    rotation: Array = np.eye(3) + linear * k + quadratic * (k @ k)
+    quotient = np.sin(half) / half if half.min(initial=1.0) > 1e-9 else _sine_quotient(half)
+    quadratic = 0.5 * quotient**2
+    rotation: Array = (quotient * np.cos(half)) * skew(vector)
+    rotation += quadratic * (vector[..., :, None] * vector[..., None, :])
+    rotation += (1.0 - quadratic * squared) * np.eye(3)
     return rotation
+
+
+def _sine_quotient(half: Array) -> Array:
+    tiny = half < 1e-9
+    quotient: Array = np.where(tiny, 1.0, np.sin(half) / np.where(tiny, 1.0, half))
+    return quotient
 
 
 def to_vector(rotation: ArrayLike) -> Array:

@@ -16,8 +16,8 @@ from hexacell.cell.model import CellSettings
 from hexacell.design import candidates
 from hexacell.design.held_out import choose_held_out
 from hexacell.design.knowledge import Knowledge
-from hexacell.design.next_pose import Station
 from hexacell.design.path import is_clear
+from hexacell.design.station import Station
 from hexacell.errors import HexacellError, LimitError
 from hexacell.geometry import Geometry
 from hexacell.identification.estimate import identify

@@ -12,7 +12,7 @@ from drivers.simulated.world import World
 from hexacell import kinematics, rotations
 from hexacell.clock import CellClock
 from hexacell.controller_config.format import ConfigFormat, ControllerGeometry
-from hexacell.design.path import straight
+from hexacell.design.lines import straight
 from hexacell.errors import FileError
 from hexacell.mechanisms.base import Mechanism
 from hexacell.pose import Pose, Poses

@@ -91,8 +91,9 @@ def standing(knowledge: Knowledge, targets: Poses) -> Standing:
     joints = knowledge.mechanism.inverse(knowledge.estimate, knowledge.branch, targets)
     rows = np.flatnonzero(within_limits(knowledge.limits, targets, joints))
     targets, joints = targets[rows], joints[rows]
-    margin = kinematics.singularity_margin(knowledge.mechanism, knowledge.estimate, targets, joints)
-    return Standing(targets, joints)[margin >= knowledge.limits.singularity_margin]
+    margin = knowledge.limits.singularity_margin
+    clear = kinematics.keeps_margin(knowledge.mechanism, knowledge.estimate, targets, joints, margin)
+    return Standing(targets, joints)[clear]
 
 
 def commanded(knowledge: Knowledge, stands: Standing) -> tuple[Poses, Mask]:
@@ -112,11 +113,31 @@ def commanded(knowledge: Knowledge, stands: Standing) -> tuple[Poses, Mask]:
     )
     back = knowledge.mechanism.inverse(knowledge.controller, knowledge.branch, found.poses)
     agrees = np.abs(np.nan_to_num(back, nan=np.inf) - stands.joints).max(axis=-1, initial=0.0) < 1e-6
-    margin = kinematics.singularity_margin(
-        knowledge.mechanism, knowledge.controller, found.poses, stands.joints
+    margin = knowledge.limits.singularity_margin
+    held: Mask = agrees & kinematics.keeps_margin(
+        knowledge.mechanism, knowledge.controller, found.poses, stands.joints, margin
     )
-    held: Mask = found.found & agrees & (margin >= knowledge.limits.singularity_margin)
+    held &= found.found
     return found.poses, held
+
+
+def led(knowledge: Knowledge, commands: Poses) -> tuple[Standing, NDArray[np.intp]]:
+    """Where commands lead the estimated robot, and the rows of those that do so within its limits."""
+    joints = knowledge.mechanism.inverse(knowledge.controller, knowledge.branch, commands)
+    rows = np.flatnonzero(within_limits(knowledge.limits, commands, joints))
+    found = kinematics.follow(
+        knowledge.mechanism,
+        knowledge.estimate,
+        joints[rows],
+        start=commands[rows],
+        start_geometry=knowledge.controller,
+        start_joints=joints[rows],
+    )
+    margin = knowledge.limits.singularity_margin
+    clear = found.found & kinematics.keeps_margin(
+        knowledge.mechanism, knowledge.estimate, found.poses, joints[rows], margin
+    )
+    return Standing(found.poses[clear], joints[rows[clear]]), rows[clear]
 
 
 def reachable(knowledge: Knowledge, targets: Poses) -> Candidates:

@@ -13,7 +13,7 @@ import numpy as np
 from hexacell import kinematics, rotations
 from hexacell.design.candidates import within_limits
 from hexacell.design.knowledge import Knowledge
-from hexacell.design.next_pose import SAFETY_SIGMAS, TRAVEL_SHARE
+from hexacell.design.offer import SAFETY_SIGMAS, TRAVEL_SHARE
 from hexacell.design.path import is_clear
 from hexacell.errors import LimitError
 from hexacell.pose import Poses

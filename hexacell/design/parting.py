@@ -17,7 +17,8 @@ import numpy as np
 from hexacell import kinematics, rotations
 from hexacell.design.candidates import Candidates, reachable
 from hexacell.design.knowledge import Knowledge
-from hexacell.design.next_pose import SAFETY_SIGMAS, TRAVEL_SHARE, Station, station
+from hexacell.design.offer import SAFETY_SIGMAS, TRAVEL_SHARE
+from hexacell.design.station import Station, station
 from hexacell.identification.correlation import CorrelatedPair
 from hexacell.identification.model import record_covariance
 from hexacell.identification.result import Identification

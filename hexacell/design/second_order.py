@@ -14,7 +14,8 @@ import numpy as np
 from hexacell import kinematics
 from hexacell.design.candidates import Standing
 from hexacell.design.knowledge import Knowledge
-from hexacell.geometry import Geometry
+from hexacell.geometry import Geometries
+from hexacell.kinematics import Forward, Sensitivity
 from hexacell.pose import Poses
 from hexacell.rotations import Array, Mask
 
@@ -44,31 +45,38 @@ def inside(knowledge: Knowledge, reference_joints: Array, reference: Poses, stan
     # The reference is where the records of its point say it was, which is not quite where it closes.
     poses = kinematics.forward(knowledge.mechanism, knowledge.estimate, joints, poses).poses
     known = kinematics.sensitivity(knowledge.mechanism, knowledge.estimate, poses, joints)
-    possible, deviations = np.ones(len(stands), dtype=bool), []
-    for draw in _draws(len(knowledge.free)) @ np.linalg.cholesky(knowledge.covariance).T:
-        change = knowledge.basis @ draw
-        result = kinematics.forward(
-            knowledge.mechanism,
-            Geometry.from_vector(knowledge.estimate.vector() + change),
-            joints,
-            kinematics.moved(poses, known.parameters @ change),
-            mode=known.mode,
-        )
-        if result.found[0]:
-            possible &= result.found[1:]
-            deviations.append(result.poses.positions[1:] - result.poses.positions[0])
-        if not possible.any():
-            break
+    changes = _draws(len(knowledge.free)) @ np.linalg.cholesky(knowledge.covariance).T @ knowledge.basis.T
+    drawn = _drawn(knowledge, changes, joints, poses, known)
+    found = drawn.found.reshape(len(changes), -1)
+    positions = drawn.poses.positions.reshape(len(changes), -1, 3)[found[:, 0]]
+    possible = np.all(found[found[:, 0]], axis=0)[1:]
     turned = known.parameters[0, 3:] @ knowledge.basis
     uncertain = np.sqrt(np.einsum("ip,pq,iq->i", turned, knowledge.covariance, turned).max())
     travel = knowledge.limits.gauge_travel_mm / (1.0 + uncertain / HALF_AT)
-    return possible & _all_inside(np.array(deviations), travel)
+    inside: Mask = possible & _all_inside(positions[:, 1:] - positions[:, :1], travel)
+    return inside
+
+
+def _drawn(
+    knowledge: Knowledge, changes: Array, joints: Array, poses: Poses, known: Sensitivity
+) -> Forward:
+    """Where robots whose parameters differ by ``changes`` (r, 42), mm, stand: (r n) poses."""
+    robots, count = len(changes), len(joints)
+    steps = np.einsum("nip,rp->rni", known.parameters, changes).reshape(-1, 6)
+    again = np.tile(np.arange(count), robots)
+    return kinematics.forward(
+        knowledge.mechanism,
+        Geometries.from_vectors((knowledge.estimate.vector() + changes).repeat(count, axis=0)),
+        joints[again],
+        kinematics.moved(poses[again], steps),
+        mode=known.mode[again],
+    )
 
 
 def _all_inside(deviations: Array, travel_mm: float) -> Mask:
     """Whether deviations (robots, n, 3), mm, stay inside, and those of robots not drawn would too."""
     if len(deviations) < FEWEST:
-        return np.zeros(deviations.shape[1] if deviations.ndim > 1 else 1, dtype=bool)
+        return np.zeros(deviations.shape[1], dtype=bool)
     unlucky = np.abs(deviations.mean(axis=0)) + SIGMAS * deviations.std(axis=0)
     farthest = np.maximum(unlucky, np.abs(deviations).max(axis=0)).max(axis=-1)
     inside: Mask = farthest <= travel_mm

@@ -8,7 +8,7 @@ from typing import Protocol
 
 import numpy as np
 
-from hexacell.geometry import PARAMETER_NAMES, Geometry
+from hexacell.geometry import PARAMETER_NAMES, Geometries, Geometry
 from hexacell.pose import Poses
 from hexacell.rotations import Array
 
@@ -107,8 +107,11 @@ class Mechanism(Protocol):
         """How much too long each leg would have to be (n, 6), mm; zero where the machine closes."""
         ...
 
-    def closure(self, geometry: Geometry, poses: Poses, joints: Array) -> tuple[Array, Array]:
-        """:meth:`constraints` (n, 6) and their derivatives by the pose (n, 6, 6), for Newton's method."""
+    def closure(self, geometry: Geometry | Geometries, poses: Poses, joints: Array) -> tuple[Array, Array]:
+        """:meth:`constraints` (n, 6) and their derivatives by the pose (n, 6, 6), for Newton's method.
+
+        Of one robot at all poses, or of another at each.
+        """
         ...
 
     def linearise(self, geometry: Geometry, poses: Poses, joints: Array) -> Linearisation:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hexacell.geometry import Geometry
+from hexacell.geometry import Geometries, Geometry
 from hexacell.mechanisms.base import Branch, FrameChange, FrameConvention, Linearisation
 from hexacell.pose import Poses
 from hexacell.rotations import Array
@@ -31,10 +31,10 @@ class Hexaglide:
         """See :class:`~hexacell.mechanisms.base.Mechanism`."""
         return _leg_errors(geometry, _leg_vectors(geometry, poses, joints)[1])
 
-    def closure(self, geometry: Geometry, poses: Poses, joints: Array) -> tuple[Array, Array]:
+    def closure(self, geometry: Geometry | Geometries, poses: Poses, joints: Array) -> tuple[Array, Array]:
         """See :class:`~hexacell.mechanisms.base.Mechanism`."""
         b, v = _leg_vectors(geometry, poses, joints)
-        return _leg_errors(geometry, v), _by_pose(b, v / geometry.l[:, None])
+        return _leg_errors(geometry, v), _by_pose(b, v / geometry.l[..., None])
 
     def linearise(self, geometry: Geometry, poses: Poses, joints: Array) -> Linearisation:
         """See :class:`~hexacell.mechanisms.base.Mechanism`."""
@@ -74,7 +74,7 @@ class Hexaglide:
         return Geometry(S, B, geometry.l), change
 
 
-def _leg_vectors(geometry: Geometry, poses: Poses, joints: Array) -> tuple[Array, Array]:
+def _leg_vectors(geometry: Geometry | Geometries, poses: Poses, joints: Array) -> tuple[Array, Array]:
     """R B_i (n, 6, 3), and v_i (n, 6, 3) from platform joint to slider joint, mm."""
     b = geometry.B @ np.swapaxes(poses.rotations, -1, -2)
     v = geometry.S - poses.positions[:, None, :] - b
@@ -82,7 +82,7 @@ def _leg_vectors(geometry: Geometry, poses: Poses, joints: Array) -> tuple[Array
     return b, v
 
 
-def _leg_errors(geometry: Geometry, v: Array) -> Array:
+def _leg_errors(geometry: Geometry | Geometries, v: Array) -> Array:
     error: Array = (np.einsum("nij,nij->ni", v, v) - geometry.l**2) / (2.0 * geometry.l)
     return error
 
@@ -92,9 +92,11 @@ def _by_pose(b: Array, n: Array) -> Array:
     jacobian = np.empty((*n.shape[:-1], 6))
     jacobian[..., :3] = -n
     # Written out: np.cross costs as much as the rest of a Newton step.
-    for axis in range(3):
-        j, k = (axis + 1) % 3, (axis + 2) % 3
-        jacobian[..., 3 + axis] = b[..., k] * n[..., j] - b[..., j] * n[..., k]
+    bx, by, bz = b[..., 0], b[..., 1], b[..., 2]
+    nx, ny, nz = n[..., 0], n[..., 1], n[..., 2]
+    jacobian[..., 3] = bz * ny - by * nz
+    jacobian[..., 4] = bx * nz - bz * nx
+    jacobian[..., 5] = by * nx - bx * ny
     return jacobian
 
 

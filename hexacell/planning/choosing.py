@@ -10,10 +10,11 @@ from hexacell.cell.model import CellSettings
 from hexacell.design import candidates
 from hexacell.design.goal import D_OPTIMAL, Criterion, Goal
 from hexacell.design.knowledge import Knowledge
-from hexacell.design.next_pose import Choice, Station, choose
+from hexacell.design.next_pose import Choice, choose, choose_in_turn
 from hexacell.design.route import route
+from hexacell.design.station import Station
 from hexacell.errors import LimitError
-from hexacell.planning.listed import PoseList, choose_listed, not_among
+from hexacell.planning.listed import PoseList, not_among
 from hexacell.planning.situation import Situation
 from hexacell.planning.task import Task
 from hexacell.pose import Pose, Poses
@@ -42,61 +43,62 @@ class Chooser:
     def choose_round(
         self, knowledge: Knowledge, at: Station, situation: Situation
     ) -> tuple[Choice, tuple[Pose, ...]]:
-        """As :meth:`choose`, and the poses to pass on the way, if no straight line leads there.
+        """As :meth:`choose`, and the poses to pass on the way from where the robot is now.
 
-        These are in the controller's frames, poses of the point that were visited before.
+        These are in the controller's frames.
 
         Raises:
             LimitError: there is none within the limits.
         """
-        visited = _visited(situation)
-        if self.listed is None and visited and situation.present == visited[-1]:
-            with suppress(LimitError):  # as a rule the robot stands there, and the line is checked already
-                return self._chosen(knowledge, at, situation, self.held(visited[-1:])), ()
-        choice = self.choose(knowledge, at, situation)
-        if self.listed is not None or situation.present is None:
+        choice, start = self._choose(knowledge, at, situation)
+        if situation.present is None:
             return choice, ()
-        start, *between = (self.held([pose]) for pose in (situation.present, *visited))
-        way = route(knowledge, start, Poses.of([choice.command]), between, at.reference)
-        if way is None:
+        visited = _visited(situation)
+        stops = tuple(map(self.robot.to_command, choice.stops))
+        way = [*visited[start : start + 1], *stops]
+        if situation.present in way:  # as a rule, and the way is checked already
+            return choice, tuple(way[way.index(situation.present) + 1 :])
+        between = [*stops, *visited]
+        held = [self.held([pose]) for pose in between]
+        present, goal = self.held([situation.present]), Poses.of([choice.command])
+        rows = route(knowledge, present, goal, held, at.reference)
+        if rows is None:
             raise LimitError("no safe straight line leads on from here")
-        return choice, tuple(visited[row] for row in way)
+        return choice, tuple(between[row] for row in rows)
 
     def choose(self, knowledge: Knowledge, at: Station, situation: Situation) -> Choice:
         """The pose to measure next, in the mechanism's frame convention.
 
-        One of a list can be reached by a straight line from the present pose. A chosen one can be so
-        from the pose of the last record, or else from the reference, wherever the robot is now: an
-        interrupted run measures what an undisturbed one does.
+        It can be reached from the pose of the last record, or else from the reference, wherever the
+        robot is now: an interrupted run measures what an undisturbed one does.
 
         Raises:
             LimitError: there is none within the limits.
         """
-        if self.listed is not None:
-            present = None if situation.present is None else self.held([situation.present])
-            return self._listed(self.listed, knowledge, at, situation, present)
+        return self._choose(knowledge, at, situation)[0]
+
+    def _choose(self, knowledge: Knowledge, at: Station, situation: Situation) -> tuple[Choice, int]:
+        """The choice, and which of the poses visited here its way starts from."""
         visited = self.held(_visited(situation))
-        last, reference = (visited[-1:], visited[:1]) if len(visited) else (None, None)
-        try:
-            return self._chosen(knowledge, at, situation, last)
-        except LimitError:
-            pass
-        try:
-            return self._chosen(knowledge, at, situation, reference)
-        except LimitError:
-            # So little is known that nearly all turns are too large.
-            return self._chosen(knowledge, at, situation, reference, share=SMALL_SHARE)
+        last = max(0, len(visited) - 1)
+        # The last resort is for when so little is known that nearly all turns are too large.
+        *tries, resort = dict.fromkeys([(last, 1.0), (0, 1.0), (0, SMALL_SHARE)])
+        for start, share in tries:
+            with suppress(LimitError):
+                return self._chosen(knowledge, at, situation, visited[start : start + 1], share), start
+        start, share = resort
+        return self._chosen(knowledge, at, situation, visited[start : start + 1], share), start
 
     def _chosen(
-        self,
-        knowledge: Knowledge,
-        at: Station,
-        situation: Situation,
-        start: Poses | None,
-        share: float = 1.0,
+        self, knowledge: Knowledge, at: Station, situation: Situation, visited: Poses, share: float
     ) -> Choice:
-        tilt = share * knowledge.limits.tilt
-        turns = candidates.orientations(self.candidates, tilt, self._seed(situation))
+        start = visited if len(visited) else None
+        if self.listed is not None:
+            waiting = not_among(self.listed.at(situation.point or 0)[1:], _visited(situation))
+            return choose_in_turn(knowledge, at, self.held(waiting), start, situation.refusals)
+        turns = candidates.orientations(
+            self.candidates, share * knowledge.limits.tilt, self._seed(situation)
+        )
         return choose(knowledge, at, turns, start, self._goal(knowledge))
 
     def held(self, poses: Iterable[Pose]) -> Poses:
@@ -109,17 +111,6 @@ class Chooser:
             return Goal(knowledge.basis.T @ knowledge.basis)
         error = self.task.error(knowledge) if criterion is Criterion.TASK else None
         return D_OPTIMAL if error is None else Goal(error.weight())
-
-    def _listed(
-        self,
-        listed: PoseList,
-        knowledge: Knowledge,
-        at: Station,
-        situation: Situation,
-        present: Poses | None,
-    ) -> Choice:
-        waiting = not_among(listed.at(situation.point or 0)[1:], _visited(situation))
-        return choose_listed(knowledge, at, self.held(waiting), present, situation.refusals)
 
     def _seed(self, situation: Situation) -> int:
         """Other candidates for every record and every attempt, and the same when done again."""

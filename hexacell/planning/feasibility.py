@@ -10,8 +10,8 @@ import numpy as np
 
 from hexacell import kinematics
 from hexacell.design.knowledge import Knowledge
-from hexacell.design.next_pose import Station, station
 from hexacell.design.path import is_clear
+from hexacell.design.station import Station, station
 from hexacell.errors import HexacellError, LimitError, ReachError, UsageError
 from hexacell.identification.result import UNDETERMINED_RATIO
 from hexacell.planning.plan import Plan

@@ -67,11 +67,12 @@ class Forecaster:
         covariance = self.foreseen(known.knowledge, situation).covariance
         records = sum(planned.values())
         stations = len(set(planned) - {situation.point})
+        # The sets foretold may tell less than the record that was really chosen.
+        end = following if choice and records == 1 else min(error.worst(covariance), following)
         return Outlook(
             now_mm=now,
             next_mm=following,
-            # The sets foretold may tell less than the record that was really chosen.
-            end_mm=min(error.worst(covariance), following),
+            end_mm=end,
             records=records,
             minutes=self.budget.pace.minutes(records, stations),
         )

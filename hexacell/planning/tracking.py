@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hexacell.design.knowledge import Knowledge
-from hexacell.design.next_pose import Station, station
+from hexacell.design.station import Station, station
 from hexacell.errors import LimitError
 from hexacell.identification.estimate import track
 from hexacell.identification.problem import Problem

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from hexacell.cell.model import CellSettings
+from hexacell.design.passage import passages
 from hexacell.design.route import route
 from hexacell.errors import LimitError
 from hexacell.geometry import Geometry
@@ -51,6 +52,7 @@ class AdaptiveCampaign:
         self._plan = Plan(self.settings, self.robot, foretelling=False)
         self._zero: Array = np.zeros(3)
         self._standing: Pose | None = None
+        self._trail: list[Pose] = []
 
     @property
     def measurements(self) -> MeasurementSet:
@@ -86,8 +88,9 @@ class AdaptiveCampaign:
 
     def _open(self, opening: Reference) -> None:
         if self._standing is not None:
-            self._travel(opening.pose, None)
+            self._onward(opening.pose)
         self._go(opening.pose)
+        self._trail = [opening.pose]
         self._zero = self.machine.ball
         self._take(opening.point, 1, opening.pose)
 
@@ -116,10 +119,8 @@ class AdaptiveCampaign:
         )
 
     def _close(self, point: int) -> None:
-        records = self.situation.measurements.records
-        visited = [record.pose for record in records if record.point == point]
         reference = self._plan.known(self.situation).station(point).reference
-        self._travel(visited[0], reference, visited[1:])
+        self._back(reference)
         done = self.situation.done | {point}
         self.situation = Situation(self.situation.measurements, done=done)
         if self.lend and not self.robot.lending:
@@ -133,25 +134,34 @@ class AdaptiveCampaign:
         self.robot = replace(self.robot, lent=(geometry,), lending=True)
         self._plan = Plan(self.settings, self.robot, foretelling=False)
 
-    def _travel(self, goal: Pose, reference: Array | None, via: list[Pose] | None = None) -> None:
-        """Go by straight lines that the estimate finds clear; untilted poses may lie between."""
+    def _onward(self, goal: Pose) -> None:
+        """To another point by lines that the estimate finds clear, over untilted poses if need be."""
         if self._standing is None or goal == self._standing:
             return
         level = [replace(pose, a=0.0, b=0.0, c=0.0) for pose in (self._standing, goal)]
-        between = [*(via or []), *(level if reference is None else [])]
-        held = [self._held(pose) for pose in between]
+        held = [self._held(pose) for pose in level]
         knowledge = self._plan.known(self.situation).knowledge
-        way = route(knowledge, self._held(self._standing), self._held(goal), held, reference)
-        if way is None and reference is None:
+        way = route(knowledge, self._held(self._standing), self._held(goal), held)
+        if way is None:
             raise LimitError(f"no safe way leads from {self._standing} to {goal}")
-        # Within a point the way that the robot came is the last resort, as it is in a run.
-        back = [*reversed(via or [])] if way is None else [between[row] for row in way]
-        for pose in (*back, goal):
+        for row in way:
+            self._go(level[row])
+
+    def _back(self, reference: Array) -> None:
+        """To the point's reference as straight as is safe, or else the way that the robot came."""
+        start, *trail = reversed(self._trail)
+        knowledge = self._plan.known(self.situation).knowledge
+        ways = passages(knowledge, self._held(start), self._held(self._trail[0]), reference)
+        stops = [self.robot.to_command(pose) for pose in ways.passage(0).stops] if ways.clear[0] else trail
+        for pose in (*stops, self._trail[0]):
             self._go(pose)
 
     def _go(self, pose: Pose) -> None:
         self.machine.go(self._held(pose).pose(0))
         self._standing = pose
+        # What lies on the way that it came is gone back over, and need not be again.
+        passed = self._trail.index(pose) if pose in self._trail else len(self._trail)
+        self._trail = [*self._trail[:passed], pose]
 
     def _held(self, pose: Pose) -> Poses:
         return self.robot.change.poses(Poses.of([pose]))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from hexacell import kinematics
-from hexacell.design.path import straight
+from hexacell.design.lines import Lines, course, straight
 from hexacell.errors import LimitError
 from hexacell.geometry import Geometry
 from hexacell.pose import Pose, Poses
@@ -91,19 +91,20 @@ class StudiedMachine:
         if not found.found[0]:
             raise LimitError(f"the machine cannot stand at {goal.pose(0)}")
         self._real = found.poses
-        self._notice(joints)
+        self._notice(found.poses, joints)
 
     def _travel(self, way: Poses) -> None:
-        for joints in self._joints(way)[1:, None]:
-            found = kinematics.forward(self._robot.mechanism, self._truth, joints, self._standing)
-            if not found.found[0]:
-                raise LimitError("the way leads into a singularity")
-            self._real = found.poses
-            self._notice(joints)
+        joints = self._joints(way)
+        went = course(self._robot.mechanism, self._truth, Lines.of(way, 1), joints[:, None], self._standing)
+        if not went.found[0]:
+            raise LimitError("the way leads into a singularity")
+        poses = went.really.flat()
+        self._notice(poses, joints)
+        self._real = poses[[-1]]
 
-    def _notice(self, joints: Array) -> None:
-        margin = kinematics.singularity_margin(self._robot.mechanism, self._truth, self._standing, joints)
-        self.smallest_margin = min(self.smallest_margin, float(margin[0]))
+    def _notice(self, poses: Poses, joints: Array) -> None:
+        margin = kinematics.singularity_margin(self._robot.mechanism, self._truth, poses, joints)
+        self.smallest_margin = min(self.smallest_margin, float(margin.min()))
 
     def _joints(self, poses: Poses) -> Array:
         return kinematics.inverse(self._robot.mechanism, self._controller, self._robot.branch, poses)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from hexacell import kinematics
-from hexacell.design.path import straight
+from hexacell.design.lines import straight
 from hexacell.errors import IdentifiabilityError
 from hexacell.planning.plan import REFUSALS
 from hexacell.pose import Pose, Poses

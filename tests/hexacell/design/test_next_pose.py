@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
 from hexacell.design.candidates import orientations
-from hexacell.design.next_pose import SAFETY_SIGMAS, TRAVEL_SHARE, choose, station
+from hexacell.design.next_pose import choose
+from hexacell.design.offer import SAFETY_SIGMAS, TRAVEL_SHARE
+from hexacell.design.station import station
 from hexacell.errors import ExitCode, LimitError
 from hexacell.geometry import Geometry
 from hexacell.identification.estimate import track
@@ -155,21 +158,26 @@ def test_the_choice_is_the_same_every_time(know, much):
 # --- the way there ---
 
 
-def test_the_way_from_the_present_pose_is_clear_and_inside_the_travel(know, much, paper, legs, vector_of):
-    """From the reference pose, looked at more closely than the choice does."""
+@pytest.mark.parametrize("present", [0, 2])
+def test_the_way_from_the_present_pose_is_clear_and_inside_the_travel(
+    know, much, paper, legs, vector_of, present
+):
+    """From a pose of the first point, over the stops, looked at more closely than the choice does."""
     at = station_of(know, much, 1)
-    present = much.problem.commands.poses[[0]]
-    choice = choose(know(much), at, TURNS, present)
-    start, end = np.array(present.pose(0).as_tuple()), np.array(choice.command.as_tuple())
-    near = np.concatenate([at.reference, Rotation.from_matrix(at.orientation).as_rotvec()])
-    for share in np.linspace(0.0, 1.0, 60):
-        command = vector_of(Pose(*((1.0 - share) * start + share * end).tolist()))
-        joints = legs(paper.nominal).joints(command)
-        near = stands(legs, much.geometry, joints, near)
-        assert np.abs(joints).max() <= 800.0
-        assert legs(paper.nominal).margin(joints, command) > 0.024
-        assert legs(much.geometry).margin(joints, near) > 0.024
-        assert np.abs(near[:3] - at.reference).max() < TRAVEL_MM + 0.1
+    start = much.problem.commands.poses[[present]]
+    choice = choose(know(much), at, TURNS, start)
+    line = [np.array(pose.as_tuple()) for pose in (start.pose(0), *choice.stops, choice.command)]
+    real = much.poses[[present]]
+    near = np.concatenate([real.positions[0], Rotation.from_matrix(real.rotations[0]).as_rotvec()])
+    for begin, end in pairwise(line):
+        for share in np.linspace(0.0, 1.0, 40):
+            command = vector_of(Pose(*((1.0 - share) * begin + share * end).tolist()))
+            joints = legs(paper.nominal).joints(command)
+            near = stands(legs, much.geometry, joints, near)
+            assert np.abs(joints).max() <= 800.0
+            assert legs(paper.nominal).margin(joints, command) > 0.024
+            assert legs(much.geometry).margin(joints, near) > 0.024
+            assert np.abs(near[:3] - at.reference).max() < TRAVEL_MM + 0.1
 
 
 def test_an_orientation_without_a_clear_way_is_not_chosen(know, much):

@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hexacell.design.path import PIECES, is_clear, straight
+from hexacell.design.lines import PIECES, straight
+from hexacell.design.path import is_clear
 from hexacell.pose import Pose, Poses
 
 

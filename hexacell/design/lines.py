@@ -1,0 +1,169 @@
+"""Straight lines of commands, and where a robot really goes while its controller follows them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hexacell import kinematics, rotations
+from hexacell.geometry import Geometry
+from hexacell.mechanisms.base import Mechanism
+from hexacell.pose import Poses
+from hexacell.rotations import Array, Mask
+
+PIECES = 12
+PIECES_BETWEEN_STOPS = 4
+
+CLOSE_MM = 1e-4
+"""So well the poses on a line are known; travel is checked in tenths of a millimetre."""
+
+
+def straight(start: Poses, end: Poses, pieces: int = PIECES) -> Poses:
+    """The poses (pieces + 1) on a controller's straight line from one pose to another.
+
+    Controllers move all six numbers x, y, z, a, b, c evenly (LinuxCNC's G0), angles included. Of n
+    lines, with one start or n of them, the poses come piece by piece.
+    """
+    share = np.linspace(0.0, 1.0, pieces + 1)[:, None, None]
+    begin, ends = (rotations.to_angles(poses.rotations) for poses in (start, end))
+    positions = (1.0 - share) * start.positions + share * end.positions
+    angles = (1.0 - share) * begin + share * ends
+    return Poses(positions.reshape(-1, 3), rotations.from_angles(angles.reshape(-1, 3)))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Lines:
+    """Poses one after the other on n lines.
+
+    Attributes:
+        positions: (pieces + 1, n, 3), mm.
+        rotations: (pieces + 1, n, 3, 3).
+    """
+
+    positions: Array
+    rotations: Array
+
+    @classmethod
+    def of(cls, poses: Poses, count: int) -> Lines:
+        """Of poses that come piece by piece."""
+        return cls(poses.positions.reshape(-1, count, 3), poses.rotations.reshape(-1, count, 3, 3))
+
+    @classmethod
+    def over(cls, stops: Sequence[Poses]) -> Lines:
+        """From stop to stop, of which there are one or n at a time, by straight lines."""
+        pieces = PIECES if len(stops) == 2 else PIECES_BETWEEN_STOPS
+        count = len(stops[-1])
+        parts = [cls.of(straight(here, there, pieces), count) for here, there in pairwise(stops)]
+        return cls(
+            np.concatenate([parts[0].positions[:1], *(part.positions[1:] for part in parts)]),
+            np.concatenate([parts[0].rotations[:1], *(part.rotations[1:] for part in parts)]),
+        )
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """(pieces + 1, n)."""
+        return self.positions.shape[0], self.positions.shape[1]
+
+    def __getitem__(self, pieces: slice) -> Lines:
+        return Lines(self.positions[pieces], self.rotations[pieces])
+
+    def at(self, piece: int, rows: NDArray[np.intp]) -> Poses:
+        """The poses on some lines after so many pieces."""
+        return Poses(self.positions[piece, rows], self.rotations[piece, rows])
+
+    def lines(self, rows: NDArray[np.intp]) -> Lines:
+        """Some of them."""
+        return Lines(self.positions[:, rows], self.rotations[:, rows])
+
+    def flat(self) -> Poses:
+        """All poses, piece by piece."""
+        return Poses(self.positions.reshape(-1, 3), self.rotations.reshape(-1, 3, 3))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Course:
+    """Where a robot goes on n lines.
+
+    Attributes:
+        really: of lines that are not ``found`` it says nothing.
+        found: (n,) along which of them it can go, and stays on its assembly mode.
+    """
+
+    really: Lines
+    found: Mask
+
+
+def course(mechanism: Mechanism, geometry: Geometry, commands: Lines, joints: Array, here: Poses) -> Course:
+    """Where a robot goes while its controller moves the sliders (pieces + 1, n, 6), mm, along lines.
+
+    ``here`` (1) is where it is at the start of all of them. Each pose is the one that is found from
+    the pose before it. All are searched for at once, from where the robot would be if it moved as
+    commanded, and then each from the one before; lines on which that differs are followed step by step.
+    """
+    count = joints.shape[1]
+    jacobian = kinematics.pose_jacobian(mechanism, geometry, here, joints[0, :1])
+    robot = _Robot(mechanism, geometry, kinematics.assembly_mode(jacobian))
+    begin = _carried(commands[:1], commands, Lines.of(here, 1))
+    found, reached = robot.found(joints, begin)
+    again, confirmed = robot.found(joints[1:], _carried(commands[:-1], commands[1:], found[:-1]))
+    same = np.abs(again.positions - found.positions[1:]).max(axis=-1) < 10.0 * CLOSE_MM
+    sure = (same & confirmed).all(axis=0) & reached.all(axis=0)
+    doubtful = np.flatnonzero(~sure)
+    if not len(doubtful):
+        return Course(found, np.ones(count, dtype=bool))
+    stepped, went = _step_by_step(robot, commands.lines(doubtful), joints[:, doubtful], here)
+    positions, turns = found.positions.copy(), found.rotations.copy()
+    positions[:, doubtful], turns[:, doubtful] = stepped.positions, stepped.rotations
+    sure[doubtful] = went
+    return Course(Lines(positions, turns), sure)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Robot:
+    """A robot on one of its assembly modes, the sign ``mode`` (1,) of its Jacobian's determinant."""
+
+    mechanism: Mechanism
+    geometry: Geometry
+    mode: Array
+
+    def found(self, joints: Array, start: Lines) -> tuple[Lines, Mask]:
+        """Poses of joint variables (m, n, 6), mm, from nearby ones, and which were found (m, n)."""
+        shape = joints.shape[:2]
+        result = kinematics.forward(
+            self.mechanism,
+            self.geometry,
+            joints.reshape(-1, 6),
+            start.flat(),
+            mode=self.mode.repeat(shape[0] * shape[1]),
+            close_mm=CLOSE_MM,
+        )
+        return Lines.of(result.poses, shape[1]), result.found.reshape(shape)
+
+
+def _carried(before: Lines, after: Lines, real: Lines) -> Lines:
+    """Where the robot will be if it moves as the command does, from ``before`` to ``after``."""
+    turns = after.rotations @ np.swapaxes(before.rotations, -1, -2)
+    return Lines(real.positions + after.positions - before.positions, turns @ real.rotations)
+
+
+def _step_by_step(robot: _Robot, commands: Lines, joints: Array, here: Poses) -> tuple[Lines, Mask]:
+    really = Lines(commands.positions.copy(), commands.rotations.copy())
+    rows = np.arange(joints.shape[1])
+    start = Lines.of(here[np.zeros(len(rows), dtype=int)], len(rows))
+    for piece in range(len(joints)):
+        found, went = robot.found(joints[[piece]][:, rows], start)
+        # What cannot be followed is not led on: it would cost more than all the others.
+        kept = went[0]
+        rows, found = rows[kept], found.lines(np.flatnonzero(kept))
+        if not len(rows):
+            break
+        really.positions[piece, rows] = found.positions[0]
+        really.rotations[piece, rows] = found.rotations[0]
+        if piece + 1 < len(joints):
+            now, then = commands[piece : piece + 1], commands[piece + 1 : piece + 2]
+            start = _carried(now.lines(rows), then.lines(rows), found)
+    return really, np.isin(np.arange(joints.shape[1]), rows)

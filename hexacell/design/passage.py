@@ -1,0 +1,86 @@
+"""How to get from one command to others with gauges at the ball.
+
+A controller moves along a straight line of its own six numbers. Its geometry is wrong by millimetres,
+and by other ones in every orientation, so that between two poses far apart the ball leaves the travel
+though it is inside at both. There the way is led over stops at which the command gives way by as much
+as the estimate says the ball would have moved.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hexacell.design.knowledge import Knowledge
+from hexacell.design.lines import PIECES
+from hexacell.design.path import Ahead, look_ahead
+from hexacell.pose import Pose, Poses
+from hexacell.rotations import Array, Mask
+
+STOPS_AT = (PIECES // 4, PIECES // 2, 3 * PIECES // 4)
+"""Pieces of the straight line after which the stops lie."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Passage:
+    """One way.
+
+    Attributes:
+        stops: commands to pass on the way.
+        poses: where the estimated robot will be on it (m), and its ``joints`` (m, 6), mm.
+        farthest: how far the ball gets from the reference along any axis, mm.
+    """
+
+    stops: tuple[Pose, ...]
+    poses: Poses
+    joints: Array
+    farthest: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Passages:
+    """Ways (n) from one command to others.
+
+    Attributes:
+        clear: (n,) to which of them there is one.
+    """
+
+    clear: Mask
+    _straight: Ahead
+    _led: Ahead | None
+    _rows: NDArray[np.intp]
+    _stops: tuple[Poses, ...]
+
+    def passage(self, row: int) -> Passage:
+        """The way to one of those to which there is one."""
+        if self._straight.clear[row]:
+            return Passage((), *self._straight.way(row), float(self._straight.farthest[row]))
+        assert self._led is not None  # noqa: S101 - it is clear, and not straight
+        place = int(np.flatnonzero(self._rows == row)[0])
+        stops = tuple(stop.pose(place) for stop in self._stops)
+        return Passage(stops, *self._led.way(place), float(self._led.farthest[place]))
+
+
+def passages(knowledge: Knowledge, start: Poses, ends: Poses, reference: Array) -> Passages:
+    """Ways (n) from one command to others with the ball inside the travel about ``reference`` (3,), mm.
+
+    Straight ones where they are clear in the sense of :func:`hexacell.design.path.look_ahead`, else
+    ones over stops that are.
+    """
+    straight = look_ahead(knowledge, start, ends, reference)
+    rows = np.flatnonzero(straight.open & ~straight.clear)
+    if not len(rows):
+        return Passages(straight.clear, straight, None, rows, ())
+    stops = tuple(_giving_way(straight, piece, rows, reference) for piece in STOPS_AT)
+    led = look_ahead(knowledge, start, ends[rows], reference, stops)
+    clear = straight.clear.copy()
+    clear[rows] = led.clear
+    return Passages(clear, straight, led, rows, stops)
+
+
+def _giving_way(ahead: Ahead, piece: int, rows: NDArray[np.intp], reference: Array) -> Poses:
+    """The commands on some lines after so many pieces, less what the ball is off the reference there."""
+    commands, really = ahead.commands.at(piece, rows), ahead.really.at(piece, rows)
+    return Poses(commands.positions - (really.positions - reference), commands.rotations)

@@ -1,0 +1,64 @@
+"""Where a point's gauges were zeroed, as far as its records tell."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from hexacell import kinematics
+from hexacell.design.candidates import Standing, commanded
+from hexacell.design.knowledge import Knowledge
+from hexacell.errors import LimitError
+from hexacell.identification.model import record_weights
+from hexacell.pose import Poses
+from hexacell.rotations import Array
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Station:
+    """What is known of the zeroed gauges at a point.
+
+    Attributes:
+        reference: where the estimate says the ball was when they were zeroed (3,), mm.
+        orientation: the platform's then (3, 3), under the estimate.
+        joints: the sliders' positions then (6,), mm.
+        jacobian: derivative (3, p) of ``reference`` by the free parameters.
+        covariance: of ``reference`` (3, 3), mm^2, the parameters being known.
+    """
+
+    reference: Array
+    orientation: Array
+    joints: Array
+    jacobian: Array
+    covariance: Array
+
+    def command(self, knowledge: Knowledge) -> Poses:
+        """The command, one of one, that led to the reference."""
+        there = Standing(Poses.at(self.reference, self.orientation[None]), self.joints[None])
+        return commanded(knowledge, there)[0]
+
+
+def station(knowledge: Knowledge, poses: Poses, joints: Array, deviations: Array) -> Station:
+    """The station of a point's records so far (n): their poses under the estimate, the first at zero.
+
+    Raises:
+        LimitError: all of them stand at a singularity, where nothing can be said.
+    """
+    jacobian, by_joints = position_derivatives(knowledge, Standing(poses, joints))
+    weights = record_weights(by_joints, knowledge.noise)
+    try:
+        covariance = np.linalg.inv(weights.sum(axis=0))
+    except np.linalg.LinAlgError:
+        raise LimitError("the records of this point say nothing about where the ball is") from None
+    reference = covariance @ np.einsum("nij,nj->i", weights, poses.positions - deviations)
+    mean = covariance @ np.einsum("nij,njp->ip", weights, jacobian)
+    return Station(reference, poses.rotations[0], joints[0], mean, covariance)
+
+
+def position_derivatives(knowledge: Knowledge, stands: Standing) -> tuple[Array, Array]:
+    """Of the ball's position at n poses: (n, 3, p) by the free parameters, (n, 3, 6) by the joints."""
+    sensitivity = kinematics.sensitivity(
+        knowledge.mechanism, knowledge.estimate, stands.targets, stands.joints
+    )
+    return sensitivity.parameters[:, :3] @ knowledge.basis, sensitivity.joints[:, :3]

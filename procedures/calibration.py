@@ -16,7 +16,6 @@ from hexacell.cell.model import CellSettings
 from hexacell.design import candidates
 from hexacell.design.held_out import choose_held_out
 from hexacell.design.knowledge import Knowledge
-from hexacell.design.path import is_clear
 from hexacell.design.station import Station
 from hexacell.errors import HexacellError, LimitError
 from hexacell.geometry import Geometry
@@ -203,7 +202,7 @@ class Calibration:
         if visit.via:
             pose = visit.via[0].as_tuple()
             by_pose = {sample.pose: sample.orientation for sample in state.set(at).samples}
-            return Move(at=at, orientation=by_pose[pose], pose=pose)
+            return Move(at=at, orientation=by_pose.get(pose, 0), pose=pose)
         return Move(
             at=at,
             orientation=state.set(at).next_orientation,
@@ -279,8 +278,15 @@ class Calibration:
             return CloseSet(at=key)
         if not self.ways.is_in_order(state, key):
             return self._returning(state, key)
-        orientation = self._on_the_way_back(state, key)
-        return Move(at=key, orientation=orientation, pose=self._pose(state, key, orientation))
+        if key.phase is not Phase.IDENTIFY:  # held-out poses were chosen with a safe way back
+            return Move(at=key, orientation=1, pose=self._pose(state, key, 1))
+        return self.ways.back(state, key, self._known_or_nothing(state, key)) or self._returning(state, key)
+
+    def _known_or_nothing(self, state: RunState, key: SetKey) -> tuple[Knowledge, Station] | None:
+        try:
+            return self._known(state, key)
+        except HexacellError:
+            return None
 
     def _returning(self, state: RunState, key: SetKey) -> Step:
         """To the set's reference by a checked way, and see there whether the gauges kept their zero."""
@@ -298,34 +304,8 @@ class Calibration:
         """Where the ball was when the set's gauges were zeroed (3,), mm, if the records can tell."""
         if key.phase is not Phase.IDENTIFY:
             return self.ways.ball_at(state, self._pose(state, key, 1))
-        try:
-            return self._known(state, key)[1].reference
-        except HexacellError:
-            return None
-
-    def _on_the_way_back(self, state: RunState, key: SetKey) -> int:
-        """The set's first orientation, or the earliest that a safe straight line leads to from here.
-
-        The last resort is the one before: the line between the two was safe when it was chosen.
-        """
-        if key.phase is not Phase.IDENTIFY:
-            return 1  # held-out poses were chosen with a safe way back
-        samples = state.set(key).samples
-        at_set, here = state.standing or (key, 0)
-        visited = sorted(sample.orientation for sample in samples)
-        before = [number for number in visited if number < here] if at_set == key and here > 1 else visited
-        try:
-            knowledge, at = self._known(state, key)
-        except HexacellError:
-            return before[-1]
-        pose = self._present(state, samples)
-        if pose is None:
-            return before[-1]
-        present = self._held(pose.as_tuple())
-        for orientation in before[:-1]:
-            if is_clear(knowledge, present, self._held(self._pose(state, key, orientation)), at.reference):
-                return orientation
-        return before[-1]
+        known = self._known_or_nothing(state, key)
+        return None if known is None else known[1].reference
 
     @cached_property
     def ways(self) -> Ways:

@@ -77,6 +77,8 @@ class RunState:
         standing: the set and orientation whose pose the robot holds, if it holds one, and
             ``target``, the pose that it was last commanded to or found at.
         astray: it stands at a pose of no set: it was found there, or is on its way.
+        trail: orientations and poses by which it came from the reference it was at last; 0 where
+            nothing is measured.
         lost: it may stand anywhere by now; the controller must be asked before it moves.
         failures: how many, by kind and place, since the run was begun or resumed.
         withdrawing: the old geometry is being put back.
@@ -89,6 +91,7 @@ class RunState:
     standing: tuple[SetKey, int] | None = None
     target: SixNumbers | None = None
     astray: bool = False
+    trail: tuple[tuple[int, SixNumbers], ...] = ()
     lost: bool = False
     voided: int = 0
     identified: events.Identified | None = None
@@ -194,7 +197,19 @@ def apply(state: RunState, event: events.Event) -> RunState:  # noqa: C901, PLR0
 def _arrived(state: RunState, event: events.Arrived) -> RunState:
     on_the_way = event.orientation == 0
     standing = None if on_the_way else (event.at, event.orientation)
-    return replace(state, standing=standing, astray=on_the_way, target=event.pose, lost=False)
+    trail = _trail(state, event)
+    return replace(state, standing=standing, astray=on_the_way, target=event.pose, trail=trail, lost=False)
+
+
+def _trail(state: RunState, event: events.Arrived) -> tuple[tuple[int, SixNumbers], ...]:
+    """A way without loops; none where the robot did not come from the end of the one before."""
+    poses = [pose for _, pose in state.trail]
+    if event.orientation == 1:
+        return ((1, event.pose),)
+    if event.pose in poses:
+        return state.trail[: poses.index(event.pose) + 1]
+    is_at_its_end = not state.lost and bool(poses) and state.target == poses[-1]
+    return (*state.trail, (event.orientation, event.pose)) if is_at_its_end else ()
 
 
 def _nowhere(state: RunState) -> RunState:

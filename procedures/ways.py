@@ -7,7 +7,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hexacell.design.knowledge import Knowledge
+from hexacell.design.passage import passages
+from hexacell.design.path import is_clear
 from hexacell.design.route import ball_at, route
+from hexacell.design.station import Station
 from hexacell.errors import HexacellError, LimitError
 from hexacell.geometry import Geometry
 from hexacell.identification.estimate import track
@@ -50,12 +53,49 @@ class Ways:
         if reference is not None and not _inside(knowledge, start, reference):
             reference = None
         way = route(knowledge, start, end, poses, reference)
+        if way:
+            orientation, pose = via[way[0]]
+            return Move(at=goal.at, orientation=orientation, pose=pose)
         if way is None:
-            raise _no_way(state.target, goal)
-        if not way:
-            return goal
-        orientation, pose = via[way[0]]
-        return Move(at=goal.at, orientation=orientation, pose=pose)
+            return self._led(knowledge, state.target, goal, reference)
+        return goal
+
+    def _led(self, knowledge: Knowledge, here: SixNumbers, goal: Move, reference: Array | None) -> Move:
+        """The first stop on the way to a goal to which no straight lines lead."""
+        if reference is not None:
+            ways = passages(knowledge, self._held(here), self._held(goal.pose), reference)
+            if ways.clear[0]:
+                return self._stop(goal, ways.passage(0).stops[0])
+        raise _no_way(here, goal)
+
+    def back(self, state: RunState, key: SetKey, known: tuple[Knowledge, Station] | None) -> Move | None:
+        """The next move on the way back to a set's reference, the gauges being there.
+
+        As straight as what is ``known`` finds safe: to the reference itself, to it over stops, or to
+        the earliest pose of the trail. The last resort is the way that the robot came. Nothing if it
+        did not come from the reference.
+        """
+        trail = state.trail
+        if len(trail) < 2 or state.target != trail[-1][1] or trail[0][1] != state.set(key).pose(1):
+            return None
+        moves = [Move(at=key, orientation=orientation, pose=pose) for orientation, pose in trail[:-1]]
+        if known is None or len(moves) == 1:
+            return moves[-1]
+        return self._straightest(known, trail[-1][1], moves)
+
+    def _straightest(self, known: tuple[Knowledge, Station], here: SixNumbers, moves: list[Move]) -> Move:
+        knowledge, reference = known[0], known[1].reference
+        start, home = self._held(here), self._held(moves[0].pose)
+        ways = passages(knowledge, start, home, reference)
+        if ways.clear[0]:
+            stops = ways.passage(0).stops
+            return self._stop(moves[0], stops[0]) if stops else moves[0]
+        straight = (m for m in moves[1:-1] if is_clear(knowledge, start, self._held(m.pose), reference))
+        return next(straight, moves[-1])
+
+    def _stop(self, goal: Move, command: Pose) -> Move:
+        """A pose of the convention's frames on the way to a goal."""
+        return Move(at=goal.at, orientation=0, pose=self.robot.to_command(command).as_tuple())
 
     def ball_at(self, state: RunState, pose: SixNumbers) -> Array | None:
         """Where the ball really is (3,), mm, at a commanded pose, by what is known now."""

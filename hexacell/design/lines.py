@@ -97,14 +97,22 @@ class Course:
     found: Mask
 
 
-def course(mechanism: Mechanism, geometry: Geometry, commands: Lines, joints: Array, here: Poses) -> Course:
+def course(
+    mechanism: Mechanism,
+    geometry: Geometry,
+    commands: Lines,
+    joints: Array,
+    here: Poses,
+    *,
+    thorough: bool = True,
+) -> Course:
     """Where a robot goes while its controller moves the sliders (pieces + 1, n, 6), mm, along lines.
 
     ``here`` (1) is where it is at the start of all of them. Each pose is the one that is found from
     the pose before it. All are searched for at once, from where the robot would be if it moved as
-    commanded, and then each from the one before; lines on which that differs are followed step by step.
+    commanded, and then each from the one before. Lines on which that differs, a few in a hundred, are
+    followed step by step if it is to be ``thorough``, else given up.
     """
-    count = joints.shape[1]
     jacobian = kinematics.pose_jacobian(mechanism, geometry, here, joints[0, :1])
     robot = _Robot(mechanism, geometry, kinematics.assembly_mode(jacobian))
     begin = _carried(commands[:1], commands, Lines.of(here, 1))
@@ -113,8 +121,8 @@ def course(mechanism: Mechanism, geometry: Geometry, commands: Lines, joints: Ar
     same = np.abs(again.positions - found.positions[1:]).max(axis=-1) < 10.0 * CLOSE_MM
     sure = (same & confirmed).all(axis=0) & reached.all(axis=0)
     doubtful = np.flatnonzero(~sure)
-    if not len(doubtful):
-        return Course(found, np.ones(count, dtype=bool))
+    if not (thorough and len(doubtful)):
+        return Course(found, sure)
     stepped, went = _step_by_step(robot, commands.lines(doubtful), joints[:, doubtful], here)
     positions, turns = found.positions.copy(), found.rotations.copy()
     positions[:, doubtful], turns[:, doubtful] = stepped.positions, stepped.rotations

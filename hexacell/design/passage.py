@@ -67,14 +67,15 @@ def passages(knowledge: Knowledge, start: Poses, ends: Poses, reference: Array) 
     """Ways (n) from one command to others with the ball inside the travel about ``reference`` (3,), mm.
 
     Straight ones where they are clear in the sense of :func:`hexacell.design.path.look_ahead`, else
-    ones over stops that are.
+    ones over stops that are. Of many it may overlook a few.
     """
-    straight = look_ahead(knowledge, start, ends, reference)
+    thorough = len(ends) == 1
+    straight = look_ahead(knowledge, start, ends, reference, thorough=thorough)
     rows = np.flatnonzero(straight.open & ~straight.clear)
     if not len(rows):
         return Passages(straight.clear, straight, None, rows, ())
     stops = tuple(_giving_way(straight, piece, rows, reference) for piece in STOPS_AT)
-    led = look_ahead(knowledge, start, ends[rows], reference, stops)
+    led = look_ahead(knowledge, start, ends[rows], reference, stops, thorough=thorough)
     clear = straight.clear.copy()
     clear[rows] = led.clear
     return Passages(clear, straight, led, rows, stops)

@@ -41,11 +41,10 @@ class Place:
     found: Mask
 
     @classmethod
-    def drawing(cls, problem: Problem) -> Place:
-        """The drawing, with the prior in full."""
-        free = problem.mechanism.convention.free_part(problem.prior.centre)
+    def beginning(cls, problem: Problem) -> Place:
+        """Where the search begins, as a rule the drawing, with the prior in full."""
         held = np.linalg.inv(problem.prior.covariance)
-        return cls(problem, free, held, problem.start, problem.startable)
+        return cls(problem, problem.begin, held, problem.start, problem.startable)
 
     @classmethod
     def solution(cls, problem: Problem, fit: Fit) -> Place:

@@ -37,7 +37,7 @@ def track(problem: Problem, *, free: Array | None = None, poses: Poses | None = 
     """
     precision = np.linalg.inv(problem.prior.covariance)
     if free is None or poses is None:
-        free, poses = problem.mechanism.convention.free_part(problem.prior.centre), problem.start
+        free, poses = problem.begin, problem.start
     kept, solution = detour.solve(problem, precision, free=free, poses=poses)
     covariance = np.linalg.inv(solution.information + precision)
     return _result(kept, solution, covariance)

@@ -61,9 +61,8 @@ class Fit:
 
 
 def fit(problem: Problem, *, manner: Manner = FAR_AWAY) -> Fit:
-    """The geometry that explains the records, from the drawing on."""
-    centre = problem.mechanism.convention.free_part(problem.prior.centre)
-    return _released(problem, centre, problem.start, manner)
+    """The geometry that explains the records, from where the problem says on."""
+    return _released(problem, problem.begin, problem.start, manner)
 
 
 def refit(problem: Problem, free: Array, poses: Poses) -> Fit:

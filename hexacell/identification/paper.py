@@ -51,7 +51,7 @@ def gauss_newton(
     """
     if start is None:
         problem = problem.keeping(problem.startable)
-    free = problem.mechanism.convention.free_part(problem.prior.centre)
+    free = problem.begin
     poses, rows = problem.start, pairs(problem)
     if start is not None:
         free, poses = start.free, start.poses
@@ -77,7 +77,6 @@ def least_squares_without_jacobian(problem: Problem) -> Geometry:
     Raises:
         ConvergenceError: scipy reports no convergence, or the end is outside the assembly mode.
     """
-    centre = problem.mechanism.convention.free_part(problem.prior.centre)
 
     def reached(free: Array) -> Forward:
         return problem.commands.followed(Geometry.from_vector(problem.basis @ free), problem.joints)
@@ -87,7 +86,7 @@ def least_squares_without_jacobian(problem: Problem) -> Geometry:
 
     found = least_squares(
         error,
-        centre,
+        problem.begin,
         method="trf",
         x_scale=1.0,
         ftol=1e-15,

@@ -90,9 +90,11 @@ class Problem:
         deviations: (n, 3), mm, in the convention's base frame.
         first_rows: (m,) row at which each point begins.
         commands: what the records were commanded with.
-        start: poses that close the prior's centre at ``joints``.
+        begin: free parameters (p,), mm, where a search begins: the drawing's, or those of the
+            geometry that the controller was lent last, which is nearer and commanded most records.
+        start: poses that close them at ``joints``.
         startable: (n,) bool, where there is such a pose: a singularity may lie between the
-            geometry that commanded a record and the drawing.
+            geometry that commanded a record and this one.
         labels: (n, 2) point and orientation as the user counts them.
         gauges: (3, 3), columns: along which the gauges x, y and z measure, in the convention's
             base frame.
@@ -105,6 +107,7 @@ class Problem:
     deviations: Array
     first_rows: NDArray[np.intp]
     commands: Commands
+    begin: Array
     start: Poses
     startable: Mask
     labels: NDArray[np.int_]
@@ -145,6 +148,7 @@ class Problem:
             self.deviations[kept],
             _first_rows(self.labels[kept, 0]),
             self.commands[kept],
+            self.begin,
             self.start[kept],
             self.startable[kept],
             self.labels[kept],
@@ -169,8 +173,8 @@ def build_problem(
 
     Raises:
         IdentifiabilityError: joint variables do not belong to the commanded poses, or most records
-            cannot be followed from the geometry that commanded them to the drawing; the message
-            names the first.
+            cannot be followed from the geometry that commanded them to the one where the search
+            begins; the message names the first.
     """
     order = np.argsort(measurements.group, kind="stable")
     joints, labels = measurements.joints[order], measurements.labels[order]
@@ -178,7 +182,8 @@ def build_problem(
     poses = change.poses(measurements.poses[order])
     commands = Commands.of(mechanism, poses, (commanding, *lent, prior.centre), branch, joints)
     JointData(commands, joints, labels, branch, prior.centre, prior.leg_widths(mechanism)).refuse_foreign()
-    start = commands.followed(prior.centre, joints)
+    begin = lent[-1] if lent else prior.centre
+    start = commands.followed(begin, joints)
     _refuse_strangers(start.found, labels)
     return Problem(
         mechanism=mechanism,
@@ -188,6 +193,7 @@ def build_problem(
         deviations=change.deviations(measurements.deviations[order]),
         first_rows=_first_rows(labels[:, 0]),
         commands=commands,
+        begin=mechanism.convention.free_part(begin),
         start=start.poses,
         startable=start.found,
         labels=labels,

@@ -88,15 +88,15 @@ def _badness(problem: Problem, found: Fit) -> float:
 
 
 def _trials(problem: Problem, found: Fit) -> Iterator[_Trial]:
-    drawing, here = Place.drawing(problem), Place.solution(problem, found)
-    misread = drawing.misreadings()
+    beginning, here = Place.beginning(problem), Place.solution(problem, found)
+    misread = beginning.misreadings()
     lists = (misread, likeliest(Expansion.at_solution(found), found.goodness), here.likeliest())
     first, *others = zip_longest(*(causes[:TRIED_FROM_EACH] for causes in lists))
     everywhere = (suspect for suspect in misread if suspect.point is None)
     tried: set[object] = set()
     yield from _one_by_one(problem, first, tried)
     yield _removed_in_turn(problem, found)
-    yield from _one_by_one(problem, [drawing.gross_errors()], tried)
+    yield from _one_by_one(problem, [beginning.gross_errors()], tried)
     yield from _one_by_one(problem, chain(*others, everywhere), tried)
 
 

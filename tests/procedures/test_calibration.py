@@ -21,6 +21,7 @@ from procedures import events
 from procedures.calibration import Calibration, Mode, expected_records
 from procedures.state import fold
 from procedures.steps import Compute, Move, Phase, Place, Sample
+from procedures.ways import Ways
 
 POINTS, ORIENTATIONS, HELD_OUT = 2, 9, 3
 HELD_OUT_POSES = tuple(
@@ -185,7 +186,8 @@ class Choices:
         self.made = 0
         self._refusal = refusal
         monkeypatch.setattr(module.Plan, "_visit", self._choose)
-        monkeypatch.setattr(Calibration, "_on_the_way_back", lambda *_: 1)
+        monkeypatch.setattr(Ways, "_straightest", lambda _, known, here, moves: moves[0])
+        monkeypatch.setattr(Calibration, "_known", lambda *_: (None, None))
 
     def _choose(self, situation: Any, point: int) -> Visit:
         self.made += 1

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,7 @@ from hexacell.errors import IdentifiabilityError
 from hexacell.planning.plan import REFUSALS
 from hexacell.pose import Pose, Poses
 from procedures import calibration as module
-from procedures import events
+from procedures import events, ways
 from procedures.state import fold
 from procedures.steps import Move, Phase
 
@@ -26,8 +27,12 @@ class Ways:
     def __init__(self, monkeypatch: pytest.MonkeyPatch, *clear_to: int) -> None:
         self.clear_to = clear_to
         monkeypatch.setattr(module.Calibration, "_known", lambda *_: (None, self))
-        monkeypatch.setattr(module, "is_clear", self._is_clear)
+        monkeypatch.setattr(ways, "is_clear", self._is_clear)
+        monkeypatch.setattr(ways, "passages", self._passages)
         self.reference = np.zeros(3)
+
+    def _passages(self, *line: Any) -> Any:
+        return SimpleNamespace(clear=[self._is_clear(*line)], passage=lambda _: SimpleNamespace(stops=()))
 
     def _is_clear(self, _: Any, present: Any, target: Any, reference: Any) -> bool:
         assert reference is self.reference

@@ -85,7 +85,7 @@ def test_what_each_record_leaves_is_as_foretold(campaign):
     assert [outlook.records for outlook in outlooks] == [*range(15, 8, -1), *range(7, 0, -1)]
     assert all(outlook.end_mm <= outlook.next_mm <= outlook.now_mm for outlook in outlooks)
     assert outlooks[-1].end_mm == outlooks[-1].next_mm
-    assert 1.0 < outlooks[-1].end_mm / outlooks[0].end_mm < 4.0  # so few records grow late
+    assert 1.0 < outlooks[-1].end_mm / outlooks[0].end_mm < 10.0  # so few records grow late
 
 
 def test_poses_and_expectations_are_in_the_controllers_frames(campaign, two_points, paper):
@@ -211,26 +211,26 @@ def test_nothing_is_begun_that_is_not_worth_it(make_plan):
 
 def test_points_are_chosen_by_what_they_tell_for_their_time(make_plan, carry_out):
     """Beside a good point one that repeats it tells little, though it comes next in the file."""
-    points = ((100.0, -100.0, 500.0), (100.0, -99.0, 500.0), (-100.0, 100.0, 500.0))
-    plan = make_plan(
-        identification__points=points,
-        identification__orientations=8,
-        identification__choose_points=True,
-        identification__budget_records=16,
-    )
-    taken = carry_out(plan)
+
+    def plan(choose_points):
+        return make_plan(
+            identification__points=(
+                (100.0, -100.0, 500.0),
+                (100.0, -99.0, 500.0),
+                (-100.0, 100.0, 500.0),
+            ),
+            identification__orientations=8,
+            identification__choose_points=choose_points,
+            identification__budget_records=16,
+            limits__tilt_deg=15.0,  # so that what one point can tell is soon told
+        )
+
+    taken, in_order = (carry_out(plan(choose_points)) for choose_points in (True, False))
     begun = [one.decision.point for one in taken if isinstance(one.decision, Reference)]
     assert 3 in begun[:2]
     assert len(records_of(taken)) == 16
-    in_order = carry_out(
-        make_plan(
-            identification__points=points,
-            identification__orientations=8,
-            identification__budget_records=16,
-        )
-    )
-    worst = [plan.outlook(end[-1].situation).now_mm for end in (taken, in_order)]
-    assert worst[0] < worst[1]
+    worst = [plan(False).outlook(end[-1].situation).now_mm for end in (taken, in_order)]
+    assert worst[0] < 0.9 * worst[1]
 
 
 def test_dear_stations_are_left_later(make_plan, carry_out):

@@ -86,13 +86,19 @@ def _amplitudes(evenly: Array, scale: Array) -> Array:
     return np.where(scale < 0.5, SMALLEST_SHARE ** (1.0 - evenly), evenly)
 
 
-def standing(knowledge: Knowledge, targets: Poses) -> Standing:
-    """Those of the poses that the estimated robot takes within its limits."""
+def standing(knowledge: Knowledge, targets: Poses, mode: Array | None = None) -> Standing:
+    """Those of the poses that the estimated robot takes within its limits.
+
+    On an assembly ``mode`` (1,), where one is named: to another no way leads.
+    """
     joints = knowledge.mechanism.inverse(knowledge.estimate, knowledge.branch, targets)
     rows = np.flatnonzero(within_limits(knowledge.limits, targets, joints))
     targets, joints = targets[rows], joints[rows]
     margin = knowledge.limits.singularity_margin
-    clear = kinematics.keeps_margin(knowledge.mechanism, knowledge.estimate, targets, joints, margin)
+    arguments = (knowledge.mechanism, knowledge.estimate, targets, joints)
+    clear = kinematics.keeps_margin(*arguments, margin)
+    if mode is not None:
+        clear &= kinematics.assembly_mode(kinematics.pose_jacobian(*arguments)) == mode
     return Standing(targets, joints)[clear]
 
 

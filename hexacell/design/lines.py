@@ -53,9 +53,12 @@ class Lines:
         return cls(poses.positions.reshape(-1, count, 3), poses.rotations.reshape(-1, count, 3, 3))
 
     @classmethod
-    def over(cls, stops: Sequence[Poses]) -> Lines:
-        """From stop to stop, of which there are one or n at a time, by straight lines."""
-        pieces = PIECES if len(stops) == 2 else PIECES_BETWEEN_STOPS
+    def over(cls, stops: Sequence[Poses], times: int = 1) -> Lines:
+        """From stop to stop, of which there are one or n at a time, by straight lines.
+
+        In so many ``times`` the pieces that these lines have as a rule.
+        """
+        pieces = times * (PIECES if len(stops) == 2 else PIECES_BETWEEN_STOPS)
         count = len(stops[-1])
         parts = [cls.of(straight(here, there, pieces), count) for here, there in pairwise(stops)]
         return cls(
@@ -69,6 +72,7 @@ class Lines:
         return self.positions.shape[0], self.positions.shape[1]
 
     def __getitem__(self, pieces: slice) -> Lines:
+        """The poses after some pieces."""
         return Lines(self.positions[pieces], self.rotations[pieces])
 
     def at(self, piece: int, rows: NDArray[np.intp]) -> Poses:

@@ -13,7 +13,7 @@ from hexacell.design.candidates import Standing, commanded, led, standing
 from hexacell.design.goal import D_OPTIMAL, Goal
 from hexacell.design.knowledge import Knowledge
 from hexacell.design.offer import TRAVEL_SHARE, Offer, offer
-from hexacell.design.passage import passages
+from hexacell.design.passage import Departure
 from hexacell.design.station import Station
 from hexacell.errors import LimitError
 from hexacell.pose import Pose, Poses
@@ -53,31 +53,40 @@ def choose(
     turns: Array,
     start: Poses | None = None,
     goal: Goal = D_OPTIMAL,
+    home: Poses | None = None,
 ) -> Choice:
     """The best of some turns (n, 3, 3) away from the orientation at the zeroed reference.
 
     Turns start there and not at the untilted platform: with millimetres of error in the joints the
     platform may stand 20 degrees from where the controller believes it to be. From the command
-    ``start``, by default that of the reference, a clear way must lead there.
+    ``start``, by default that of the reference, a clear way must lead there, over the reference's
+    own command ``home`` if it is told.
 
     Raises:
         LimitError: none of them is reachable within the limits and surely inside the travel.
     """
-    offered = offer(knowledge, at, standing(knowledge, Poses.at(at.reference, turns @ at.orientation)))
+    targets = Poses.at(at.reference, turns @ at.orientation)
+    offered = offer(knowledge, at, standing(knowledge, targets, at.mode(knowledge)))
     if not len(offered):
         raise LimitError("no orientation is within reach, joint range, tilt limit and singularity margin")
     worth = goal.worth(knowledge.covariance, offered.change, offered.noise)
     rows = np.flatnonzero(offered.within(TRAVEL_SHARE * knowledge.limits.gauge_travel_mm))
-    start = at.command(knowledge) if start is None else start
+    leave = Departure(knowledge, at.command(knowledge) if start is None else start, home, at.reference)
     for some in _a_few_at_once(rows[np.argsort(-worth[rows], kind="stable")]):
         commands, held = commanded(knowledge, offered.stands[some])
-        if choice := _first_safe(knowledge, at, offered[some[held]], commands[held], start):
+        if choice := _first_safe(knowledge, at, offered[some[held]], commands[held], leave):
             return choice
     raise LimitError("no orientation surely keeps the ball inside the gauges' travel")
 
 
 def choose_in_turn(
-    knowledge: Knowledge, at: Station, commands: Poses, start: Poses | None = None, passed_over: int = 0
+    knowledge: Knowledge,
+    at: Station,
+    commands: Poses,
+    start: Poses | None = None,
+    *,
+    home: Poses | None = None,
+    passed_over: int = 0,
 ) -> Choice:
     """The first of some commands (n) that surely stays inside the travel, after so many passed over.
 
@@ -88,8 +97,8 @@ def choose_in_turn(
     offered = offer(knowledge, at, stands)
     inside = offered.within(TRAVEL_SHARE * knowledge.limits.gauge_travel_mm)
     kept = np.flatnonzero(inside)[passed_over:]
-    start = at.command(knowledge) if start is None else start
-    choice = _first_safe(knowledge, at, offered[kept], commands[rows[kept]], start) if len(kept) else None
+    leave = Departure(knowledge, at.command(knowledge) if start is None else start, home, at.reference)
+    choice = _first_safe(knowledge, at, offered[kept], commands[rows[kept]], leave)
     if choice is None:
         raise LimitError(
             "none of the poses left in the list surely keeps the ball inside the gauges' travel"
@@ -98,17 +107,17 @@ def choose_in_turn(
 
 
 def _first_safe(
-    knowledge: Knowledge, at: Station, offered: Offer, commands: Poses, start: Poses
+    knowledge: Knowledge, at: Station, offered: Offer, commands: Poses, leave: Departure
 ) -> Choice | None:
-    """The first pose to which a way leads from the command ``start`` with the ball inside."""
+    """The first pose to which a way leads with the ball inside."""
     if not len(offered):
         return None
-    ways = passages(knowledge, start, commands, at.reference)
-    rows = np.flatnonzero(ways.clear)
+    clear, passage = leave.to(commands)
+    rows = np.flatnonzero(clear)
     near = NEAR_SHARE * knowledge.limits.gauge_travel_mm
     is_near = offered.within(near)
     for row in rows[_surely_inside(knowledge, at, offered.stands[rows])]:
-        way = ways.passage(row)
+        way = passage(int(row))
         stays_near = is_near[row] and way.farthest <= near
         if stays_near or _surely_inside(knowledge, at, Standing(way.poses, way.joints)).all():
             return _choice(knowledge, offered[np.array([row])], commands.pose(row), way.stops)
@@ -117,8 +126,7 @@ def _first_safe(
 
 def _surely_inside(knowledge: Knowledge, at: Station, stands: Standing) -> Mask:
     """Which poses keep the ball inside the travel where straight error propagation may not hold."""
-    reference = Poses.at(at.reference, at.orientation[None])
-    return second_order.inside(knowledge, at.joints, reference, stands)
+    return second_order.inside(knowledge, at.joints, at.stand.targets, stands)
 
 
 def _choice(knowledge: Knowledge, one: Offer, command: Pose, stops: tuple[Pose, ...]) -> Choice:

@@ -8,7 +8,9 @@ as the estimate says the ball would have moved.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,6 +39,18 @@ class Passage:
     poses: Poses
     joints: Array
     farthest: float
+
+    def then(self, over: Pose, onward: Passage) -> Passage:
+        """This way, and ``onward`` from the pose ``over`` at its end."""
+        return Passage(
+            (*self.stops, over, *onward.stops),
+            Poses(
+                np.concatenate([self.poses.positions, onward.poses.positions]),
+                np.concatenate([self.poses.rotations, onward.poses.rotations]),
+            ),
+            np.concatenate([self.joints, onward.joints]),
+            max(self.farthest, onward.farthest),
+        )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -79,6 +93,49 @@ def passages(knowledge: Knowledge, start: Poses, ends: Poses, reference: Array) 
     clear = straight.clear.copy()
     clear[rows] = led.clear
     return Passages(clear, straight, led, rows, stops)
+
+
+@dataclass(frozen=True, eq=False)
+class Departure:
+    """Ways from one command with gauges at the ball, over the point's reference if need be.
+
+    Lines between two large turns often lead through a singularity, where each of the two could be
+    reached from the reference.
+
+    Attributes:
+        start: the command to leave from.
+        home: the reference's command; none if that is where it starts.
+        reference: where the ball was when the gauges were zeroed (3,), mm.
+    """
+
+    knowledge: Knowledge
+    start: Poses
+    home: Poses | None
+    reference: Array
+
+    def to(self, ends: Poses) -> tuple[Mask, Callable[[int], Passage]]:
+        """To which of n commands there is a way (n,), and the one to each of these."""
+        direct = passages(self.knowledge, self.start, ends, self.reference)
+        rows = np.flatnonzero(~direct.clear)
+        if not len(rows) or self.home is None or self._back is None:
+            return direct.clear, direct.passage
+        home, back = self.home, self._back
+        onward = passages(self.knowledge, home, ends[rows], self.reference)
+        clear = direct.clear.copy()
+        clear[rows] = onward.clear
+
+        def passage(row: int) -> Passage:
+            if direct.clear[row]:
+                return direct.passage(row)
+            return back.then(home.pose(0), onward.passage(int(np.searchsorted(rows, row))))
+
+        return clear, passage
+
+    @cached_property
+    def _back(self) -> Passage | None:
+        assert self.home is not None  # noqa: S101 - asked for on the way over it only
+        ways = passages(self.knowledge, self.start, self.home, self.reference)
+        return ways.passage(0) if ways.clear[0] else None
 
 
 def _giving_way(ahead: Ahead, piece: int, rows: NDArray[np.intp], reference: Array) -> Poses:

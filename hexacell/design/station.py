@@ -33,10 +33,21 @@ class Station:
     jacobian: Array
     covariance: Array
 
+    @property
+    def stand(self) -> Standing:
+        """The reference, one of one."""
+        return Standing(Poses.at(self.reference, self.orientation[None]), self.joints[None])
+
     def command(self, knowledge: Knowledge) -> Poses:
         """The command, one of one, that led to the reference."""
-        there = Standing(Poses.at(self.reference, self.orientation[None]), self.joints[None])
-        return commanded(knowledge, there)[0]
+        return commanded(knowledge, self.stand)[0]
+
+    def mode(self, knowledge: Knowledge) -> Array:
+        """The assembly mode (1,) of the estimated robot at the reference."""
+        stand = self.stand
+        return kinematics.assembly_mode(
+            kinematics.pose_jacobian(knowledge.mechanism, knowledge.estimate, stand.targets, stand.joints)
+        )
 
 
 def station(knowledge: Knowledge, poses: Poses, joints: Array, deviations: Array) -> Station:

@@ -14,7 +14,7 @@ from hexacell.design.next_pose import Choice, choose, choose_in_turn
 from hexacell.design.route import route
 from hexacell.design.station import Station
 from hexacell.errors import LimitError
-from hexacell.planning.listed import PoseList, not_among
+from hexacell.planning.listed import PoseList, not_among, same
 from hexacell.planning.situation import Situation
 from hexacell.planning.task import Task
 from hexacell.pose import Pose, Poses
@@ -54,7 +54,7 @@ class Chooser:
         if situation.present is None:
             return choice, ()
         visited = _visited(situation)
-        stops = tuple(map(self.robot.to_command, choice.stops))
+        stops = [self._as_visited(visited, self.robot.to_command(stop)) for stop in choice.stops]
         way = [*visited[start : start + 1], *stops]
         if situation.present in way:  # as a rule, and the way is checked already
             return choice, tuple(way[way.index(situation.present) + 1 :])
@@ -79,31 +79,37 @@ class Chooser:
 
     def _choose(self, knowledge: Knowledge, at: Station, situation: Situation) -> tuple[Choice, int]:
         """The choice, and which of the poses visited here its way starts from."""
-        visited = self.held(_visited(situation))
-        last = max(0, len(visited) - 1)
+        last = max(0, len(_visited(situation)) - 1)
         # The last resort is for when so little is known that nearly all turns are too large.
         *tries, resort = dict.fromkeys([(last, 1.0), (0, 1.0), (0, SMALL_SHARE)])
         for start, share in tries:
             with suppress(LimitError):
-                return self._chosen(knowledge, at, situation, visited[start : start + 1], share), start
+                return self._chosen(knowledge, at, situation, start, share), start
         start, share = resort
-        return self._chosen(knowledge, at, situation, visited[start : start + 1], share), start
+        return self._chosen(knowledge, at, situation, start, share), start
 
     def _chosen(
-        self, knowledge: Knowledge, at: Station, situation: Situation, visited: Poses, share: float
+        self, knowledge: Knowledge, at: Station, situation: Situation, start: int, share: float
     ) -> Choice:
-        start = visited if len(visited) else None
+        visited = self.held(_visited(situation))
+        begin = visited[start : start + 1] if len(visited) else None
+        home = visited[:1] if start else None
         if self.listed is not None:
-            waiting = not_among(self.listed.at(situation.point or 0)[1:], _visited(situation))
-            return choose_in_turn(knowledge, at, self.held(waiting), start, situation.refusals)
-        turns = candidates.orientations(
-            self.candidates, share * knowledge.limits.tilt, self._seed(situation)
-        )
-        return choose(knowledge, at, turns, start, self._goal(knowledge))
+            waiting = self.held(not_among(self.listed.at(situation.point or 0)[1:], _visited(situation)))
+            passed_over = situation.refusals
+            return choose_in_turn(knowledge, at, waiting, begin, home=home, passed_over=passed_over)
+        tilt = share * knowledge.limits.tilt
+        turns = candidates.orientations(self.candidates, tilt, self._seed(situation))
+        return choose(knowledge, at, turns, begin, self._goal(knowledge), home)
 
     def held(self, poses: Iterable[Pose]) -> Poses:
         """Commanded poses in the convention's frames."""
         return self.robot.change.poses(Poses.of(poses))
+
+    @staticmethod
+    def _as_visited(visited: list[Pose], stop: Pose) -> Pose:
+        """The pose that was visited, to the last bit, where that is one of the stops."""
+        return next((pose for pose in visited if same(pose, stop)), stop)
 
     def _goal(self, knowledge: Knowledge) -> Goal:
         criterion = Criterion(self.settings.identification.criterion)

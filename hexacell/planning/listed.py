@@ -70,8 +70,9 @@ def pose_list_of(cell: Cell) -> PoseList | None:
 
 def not_among(poses: tuple[Pose, ...], visited: list[Pose]) -> tuple[Pose, ...]:
     """The poses that were not visited yet."""
-    return tuple(pose for pose in poses if not any(_same(pose, other) for other in visited))
+    return tuple(pose for pose in poses if not any(same(pose, other) for other in visited))
 
 
-def _same(one: Pose, other: Pose) -> bool:
+def same(one: Pose, other: Pose) -> bool:
+    """Whether two poses are one, but for rounding."""
     return bool(np.abs(np.subtract(one.as_tuple(), other.as_tuple())).max() < SAME_MM_DEG)

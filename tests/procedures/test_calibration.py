@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from itertools import pairwise
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -187,7 +188,7 @@ class Choices:
         self._refusal = refusal
         monkeypatch.setattr(module.Plan, "_visit", self._choose)
         monkeypatch.setattr(Ways, "_straightest", lambda _, known, here, moves: moves[0])
-        monkeypatch.setattr(Calibration, "_known", lambda *_: (None, None))
+        monkeypatch.setattr(Calibration, "_known", lambda *_: (None, SimpleNamespace(reference=None)))
 
     def _choose(self, situation: Any, point: int) -> Visit:
         self.made += 1

@@ -23,6 +23,9 @@ from hexacell.rotations import Array, Mask
 CONVERGED_MM = 1e-10
 """Constraints below this count as closed: legs are a metre, and doubles carry 16 digits."""
 
+ON_THE_WAY_MM = 1e-3
+"""Between two stages of a continuation: near enough to begin the next one."""
+
 NEWTON_STEPS = 12
 LONGEST_STEP_MM = 60.0
 LARGEST_TURN = 0.5
@@ -204,7 +207,8 @@ def _staged(
         fraction = stage / stages
         geometry = geometries[0].toward(geometries[1], fraction)
         now = (1.0 - fraction) * joints[0][rows] + fraction * joints[1][rows]
-        result = _newton(mechanism, geometry, now, poses[rows], mode[rows])
+        close_mm = CONVERGED_MM if stage == stages else ON_THE_WAY_MM
+        result = _newton(mechanism, geometry, now, poses[rows], mode[rows], close_mm)
         poses = _replace(poses, rows, result.poses)
         # Those that failed are not led on: they would cost more than all the others.
         rows = rows[result.found]

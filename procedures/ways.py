@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hexacell.design.knowledge import Knowledge
-from hexacell.design.passage import passages
+from hexacell.design.passage import Departure
 from hexacell.design.path import is_clear
 from hexacell.design.route import ball_at, route
 from hexacell.design.station import Station
@@ -63,7 +63,7 @@ class Ways:
     def _led(self, knowledge: Knowledge, here: SixNumbers, goal: Move, reference: Array | None) -> Move:
         """The first stop on the way to a goal to which no straight lines lead."""
         if reference is not None:
-            ways = passages(knowledge, self._held(here), self._held(goal.pose), reference)
+            ways = Departure(knowledge, self._held(here), None, reference).to(self._held(goal.pose))
             if ways.clear[0]:
                 return self._stop(goal, ways.passage(0).stops[0])
         raise _no_way(here, goal)
@@ -86,7 +86,7 @@ class Ways:
     def _straightest(self, known: tuple[Knowledge, Station], here: SixNumbers, moves: list[Move]) -> Move:
         knowledge, reference = known[0], known[1].reference
         start, home = self._held(here), self._held(moves[0].pose)
-        ways = passages(knowledge, start, home, reference)
+        ways = Departure(knowledge, start, None, reference).to(home)
         if ways.clear[0]:
             stops = ways.passage(0).stops
             return self._stop(moves[0], stops[0]) if stops else moves[0]

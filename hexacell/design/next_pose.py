@@ -13,7 +13,7 @@ from hexacell.design.candidates import Standing, commanded, led, standing
 from hexacell.design.goal import D_OPTIMAL, Goal
 from hexacell.design.knowledge import Knowledge
 from hexacell.design.offer import TRAVEL_SHARE, Offer, offer
-from hexacell.design.passage import Departure
+from hexacell.design.passage import Departure, Passage
 from hexacell.design.station import Station
 from hexacell.errors import LimitError
 from hexacell.pose import Pose, Poses
@@ -112,16 +112,23 @@ def _first_safe(
     """The first pose to which a way leads with the ball inside."""
     if not len(offered):
         return None
-    clear, passage = leave.to(commands)
-    rows = np.flatnonzero(clear)
-    near = NEAR_SHARE * knowledge.limits.gauge_travel_mm
-    is_near = offered.within(near)
-    for row in rows[_surely_inside(knowledge, at, offered.stands[rows])]:
-        way = passage(int(row))
-        stays_near = is_near[row] and way.farthest <= near
-        if stays_near or _surely_inside(knowledge, at, Standing(way.poses, way.joints)).all():
+    ways, near = leave.to(commands), NEAR_SHARE * knowledge.limits.gauge_travel_mm
+    safe, is_near = _surely_inside(knowledge, at, offered.stands), offered.within(near)
+
+    def holds(row: int, way: Passage) -> bool:
+        stays_near = bool(is_near[row]) and way.farthest <= near
+        return stays_near or bool(_surely_inside(knowledge, at, Standing(way.poses, way.joints)).all())
+
+    direct = [int(row) for row in np.flatnonzero(ways.clear & safe)]
+    first = next((row for row in direct if holds(row, ways.passage(row))), len(offered))
+    better = np.flatnonzero(safe[:first] & ~ways.clear[:first])
+    for row, way in zip(better.tolist(), leave.over_home(commands[better]), strict=True):
+        if way is not None and holds(row, way):
             return _choice(knowledge, offered[np.array([row])], commands.pose(row), way.stops)
-    return None
+    if first == len(offered):
+        return None
+    stops = ways.passage(first).stops
+    return _choice(knowledge, offered[np.array([first])], commands.pose(first), stops)
 
 
 def _surely_inside(knowledge: Knowledge, at: Station, stands: Standing) -> Mask:

@@ -8,7 +8,6 @@ as the estimate says the ball would have moved.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -17,7 +16,7 @@ from numpy.typing import NDArray
 
 from hexacell.design.knowledge import Knowledge
 from hexacell.design.lines import PIECES
-from hexacell.design.path import Ahead, look_ahead
+from hexacell.design.path import Ahead, Beginning, beginning, look_ahead
 from hexacell.pose import Pose, Poses
 from hexacell.rotations import Array, Mask
 
@@ -77,7 +76,7 @@ class Passages:
         return Passage(stops, *self._led.way(place), float(self._led.farthest[place]))
 
 
-def passages(knowledge: Knowledge, start: Poses, ends: Poses, reference: Array) -> Passages:
+def passages(knowledge: Knowledge, start: Beginning, ends: Poses, reference: Array) -> Passages:
     """Ways (n) from one command to others with the ball inside the travel about ``reference`` (3,), mm.
 
     Straight ones where they are clear in the sense of :func:`hexacell.design.path.look_ahead`, else
@@ -113,28 +112,33 @@ class Departure:
     home: Poses | None
     reference: Array
 
-    def to(self, ends: Poses) -> tuple[Mask, Callable[[int], Passage]]:
-        """To which of n commands there is a way (n,), and the one to each of these."""
-        direct = passages(self.knowledge, self.start, ends, self.reference)
-        rows = np.flatnonzero(~direct.clear)
-        if not len(rows) or self.home is None or self._back is None:
-            return direct.clear, direct.passage
-        home, back = self.home, self._back
-        onward = passages(self.knowledge, home, ends[rows], self.reference)
-        clear = direct.clear.copy()
-        clear[rows] = onward.clear
+    def to(self, ends: Poses) -> Passages:
+        """Ways to n commands, straight or led."""
+        return passages(self.knowledge, self._here, ends, self.reference)
 
-        def passage(row: int) -> Passage:
-            if direct.clear[row]:
-                return direct.passage(row)
-            return back.then(home.pose(0), onward.passage(int(np.searchsorted(rows, row))))
+    def over_home(self, ends: Poses) -> list[Passage | None]:
+        """The ways to n commands over the reference, as far as there are."""
+        if self.home is None or not len(ends) or self._back is None or self._home is None:
+            return [None] * len(ends)
+        back, home = self._back, self.home.pose(0)
+        onward = passages(self.knowledge, self._home, ends, self.reference)
+        return [
+            back.then(home, onward.passage(row)) if onward.clear[row] else None for row in range(len(ends))
+        ]
 
-        return clear, passage
+    @cached_property
+    def _here(self) -> Beginning:
+        return beginning(self.knowledge, self.start)
+
+    @cached_property
+    def _home(self) -> Beginning | None:
+        return None if self.home is None else beginning(self.knowledge, self.home)
 
     @cached_property
     def _back(self) -> Passage | None:
-        assert self.home is not None  # noqa: S101 - asked for on the way over it only
-        ways = passages(self.knowledge, self.start, self.home, self.reference)
+        if self.home is None:
+            return None
+        ways = self.to(self.home)
         return ways.passage(0) if ways.clear[0] else None
 
 

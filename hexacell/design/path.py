@@ -22,9 +22,38 @@ FINER = 4
 """Times as many places at which reach and joint ranges are looked at, which costs little."""
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Beginning:
+    """Where lines begin.
+
+    Attributes:
+        command: what the controller was told (1).
+        really: where the estimated robot is then (1); none if it cannot be there.
+    """
+
+    command: Poses
+    really: Poses | None
+
+
+def beginning(knowledge: Knowledge, command: Poses) -> Beginning:
+    """Where the estimated robot is, being told to be at a command (1)."""
+    joints = knowledge.mechanism.inverse(knowledge.controller, knowledge.branch, command)
+    if np.isnan(joints).any():
+        return Beginning(command, None)
+    found = kinematics.follow(
+        knowledge.mechanism,
+        knowledge.estimate,
+        joints,
+        start=command,
+        start_geometry=knowledge.controller,
+        start_joints=joints,
+    )
+    return Beginning(command, found.poses if found.found[0] else None)
+
+
 def is_clear(knowledge: Knowledge, start: Poses, end: Poses, reference: Array | None = None) -> bool:
     """Whether the straight line between two commands keeps to the limits; see :func:`look_ahead`."""
-    return bool(look_ahead(knowledge, start, end, reference).clear[0])
+    return bool(look_ahead(knowledge, beginning(knowledge, start), end, reference).clear[0])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -54,7 +83,7 @@ class Ahead:
 
 def look_ahead(
     knowledge: Knowledge,
-    start: Poses,
+    start: Beginning,
     ends: Poses,
     reference: Array | None = None,
     stops: Sequence[Poses] = (),
@@ -68,14 +97,14 @@ def look_ahead(
     travel. One line in fifty is wrongly not clear unless the search is ``thorough``.
     """
     limits = knowledge.limits
-    closely = Lines.over((start, *stops, ends), FINER)
+    closely = Lines.over((start.command, *stops, ends), FINER)
     sliders = knowledge.mechanism.inverse(knowledge.controller, knowledge.branch, closely.flat())
     sliders = sliders.reshape(*closely.shape, 6)
     in_range = (sliders >= limits.joint_min_mm) & (sliders <= limits.joint_max_mm)
     rows = np.flatnonzero(in_range.all(axis=(0, 2)))
     commands, joints = closely[::FINER], sliders[::FINER]
     rows = rows[_clear_of_singularities(knowledge, knowledge.controller, commands, joints, rows)]
-    really, rows = _followed(knowledge, commands, joints, rows, thorough=thorough)
+    really, rows = _followed(knowledge, start, commands, joints, rows, thorough=thorough)
     rows = rows[_clear_of_singularities(knowledge, knowledge.estimate, really, joints, rows)]
     is_open, farthest = np.zeros(len(ends), dtype=bool), np.zeros(len(ends))
     is_open[rows] = True
@@ -99,27 +128,23 @@ def _clear_of_singularities(
 
 
 def _followed(
-    knowledge: Knowledge, ways: Lines, joints: Array, rows: NDArray[np.intp], *, thorough: bool
+    knowledge: Knowledge,
+    start: Beginning,
+    ways: Lines,
+    joints: Array,
+    rows: NDArray[np.intp],
+    *,
+    thorough: bool,
 ) -> tuple[Lines, NDArray[np.intp]]:
     """The estimated robot led along some lines, and those that it can be led along."""
-    if not len(rows):
-        return ways, rows
-    first = kinematics.follow(
-        knowledge.mechanism,
-        knowledge.estimate,
-        joints[0, :1],
-        start=ways.at(0, np.array([0])),
-        start_geometry=knowledge.controller,
-        start_joints=joints[0, :1],
-    )
-    if not first.found[0]:
+    if start.really is None or not len(rows):
         return ways, rows[:0]
     went = course(
         knowledge.mechanism,
         knowledge.estimate,
         ways.lines(rows),
         joints[:, rows],
-        first.poses,
+        start.really,
         thorough=thorough,
     )
     positions, turns = ways.positions.copy(), ways.rotations.copy()

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from hexacell.cell.model import CellSettings
-from hexacell.design.passage import passages
+from hexacell.design.passage import Departure
 from hexacell.design.route import route
 from hexacell.errors import LimitError
 from hexacell.geometry import Geometry
@@ -151,7 +151,8 @@ class AdaptiveCampaign:
         """To the point's reference as straight as is safe, or else the way that the robot came."""
         start, *trail = reversed(self._trail)
         knowledge = self._plan.known(self.situation).knowledge
-        ways = passages(knowledge, self._held(start), self._held(self._trail[0]), reference)
+        home = self._held(self._trail[0])
+        ways = Departure(knowledge, self._held(start), None, reference).to(home)
         stops = [self.robot.to_command(pose) for pose in ways.passage(0).stops] if ways.clear[0] else trail
         for pose in (*stops, self._trail[0]):
             self._go(pose)

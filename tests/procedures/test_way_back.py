@@ -28,11 +28,16 @@ class Ways:
         self.clear_to = clear_to
         monkeypatch.setattr(module.Calibration, "_known", lambda *_: (None, self))
         monkeypatch.setattr(ways, "is_clear", self._is_clear)
-        monkeypatch.setattr(ways, "passages", self._passages)
+        monkeypatch.setattr(ways, "Departure", self._departure)
         self.reference = np.zeros(3)
 
-    def _passages(self, *line: Any) -> Any:
-        return SimpleNamespace(clear=[self._is_clear(*line)], passage=lambda _: SimpleNamespace(stops=()))
+    def _departure(self, _: Any, start: Any, home: Any, reference: Any) -> Any:
+        def to(end: Any) -> Any:
+            clear = self._is_clear(_, start, end, reference)
+            return SimpleNamespace(clear=[clear], passage=lambda _: SimpleNamespace(stops=()))
+
+        assert home is None
+        return SimpleNamespace(to=to)
 
     def _is_clear(self, _: Any, present: Any, target: Any, reference: Any) -> bool:
         assert reference is self.reference

@@ -115,7 +115,7 @@ def follow(
 
 def pose_jacobian(mechanism: Mechanism, geometry: Geometry, poses: Poses, joints: Array) -> Array:
     """Derivatives (n, 6, 6) of the constraints by position, mm, and rotation vector, rad."""
-    return mechanism.linearise(geometry, poses, joints).pose
+    return mechanism.closure(geometry, poses, joints)[1]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

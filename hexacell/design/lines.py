@@ -21,6 +21,10 @@ PIECES_BETWEEN_STOPS = 4
 CLOSE_MM = 1e-4
 """So well the poses on a line are known; travel is checked in tenths of a millimetre."""
 
+JUMP_MM = 20.0
+JUMP = np.radians(10.0)
+"""What a robot may move otherwise than commanded in a piece of a line and be believed."""
+
 
 def straight(start: Poses, end: Poses, pieces: int = PIECES) -> Poses:
     """The poses (pieces + 1) on a controller's straight line from one pose to another.
@@ -114,16 +118,18 @@ def course(
 
     ``here`` (1) is where it is at the start of all of them. Each pose is the one that is found from
     the pose before it. All are searched for at once, from where the robot would be if it moved as
-    commanded, and then each from the one before. Lines on which that differs, a few in a hundred, are
-    followed step by step if it is to be ``thorough``, else given up.
+    commanded; where they move far otherwise, each is found again from the one before. Lines on which
+    that differs, a few in a hundred, are followed step by step if it is to be ``thorough``, else given
+    up.
     """
     jacobian = kinematics.pose_jacobian(mechanism, geometry, here, joints[0, :1])
     robot = _Robot(mechanism, geometry, kinematics.assembly_mode(jacobian))
     begin = _carried(commands[:1], commands, Lines.of(here, 1))
     found, reached = robot.found(joints, begin)
-    again, confirmed = robot.found(joints[1:], _carried(commands[:-1], commands[1:], found[:-1]))
-    same = np.abs(again.positions - found.positions[1:]).max(axis=-1) < 10.0 * CLOSE_MM
-    sure = (same & confirmed).all(axis=0) & reached.all(axis=0)
+    sure: Mask = np.all(reached, axis=0)
+    jumping = np.flatnonzero(sure & _jumps(commands, found))
+    if len(jumping):
+        sure[jumping] = robot.confirmed(joints[:, jumping], commands.lines(jumping), found.lines(jumping))
     doubtful = np.flatnonzero(~sure)
     if not (thorough and len(doubtful)):
         return Course(found, sure)
@@ -154,6 +160,25 @@ class _Robot:
             close_mm=CLOSE_MM,
         )
         return Lines.of(result.poses, shape[1]), result.found.reshape(shape)
+
+    def confirmed(self, joints: Array, commands: Lines, poses: Lines) -> Mask:
+        """On which lines (n,) each pose is found from the one before."""
+        again, found = self.found(joints[1:], _carried(commands[:-1], commands[1:], poses[:-1]))
+        same = np.abs(again.positions - poses.positions[1:]).max(axis=-1) < 10.0 * CLOSE_MM
+        confirmed: Mask = (same & found).all(axis=0)
+        return confirmed
+
+
+def _jumps(commands: Lines, poses: Lines) -> Mask:
+    """On which lines (n,) the robot moves so far otherwise than commanded that it may have jumped.
+
+    From one solution of the forward kinematics to another; these lie farther apart.
+    """
+    carried = _carried(commands[:-1], commands[1:], poses[:-1])
+    away = np.linalg.norm(poses.positions[1:] - carried.positions, axis=-1)
+    cosine = 0.5 * (np.einsum("mnij,mnij->mn", poses.rotations[1:], carried.rotations) - 1.0)
+    jumps: Mask = ((away > JUMP_MM) | (cosine < np.cos(JUMP))).any(axis=0)
+    return jumps
 
 
 def _carried(before: Lines, after: Lines, real: Lines) -> Lines:

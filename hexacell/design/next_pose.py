@@ -22,7 +22,7 @@ from hexacell.rotations import Array, Mask
 NEAR_SHARE = 0.4
 """Of the travel. What stays within it does so even if the prediction is twice as wrong as it says."""
 
-AT_ONCE = (12, 24, 48, 72, 84)
+AT_ONCE = (10, 20, 40, 80, 90)
 """Candidates looked at closely, the best first: so many at once, then so many, as one of the first will
 mostly do."""
 
@@ -113,7 +113,9 @@ def _first_safe(
     if not len(offered):
         return None
     ways, near = leave.to(commands), NEAR_SHARE * knowledge.limits.gauge_travel_mm
-    safe, is_near = _surely_inside(knowledge, at, offered.stands), offered.within(near)
+    safe = is_near = offered.within(near)
+    if not is_near.all():
+        safe = is_near | _surely_inside(knowledge, at, offered.stands)
 
     def holds(row: int, way: Passage) -> bool:
         stays_near = bool(is_near[row]) and way.farthest <= near

@@ -91,7 +91,6 @@ class Rig:
 
 
 MakeRig = Callable[..., Rig]
-
 SMALL: dict[str, Any] = {
     "identification.points": ((100.0, -100.0, 500.0), (-100.0, 100.0, 500.0)),
     "identification.orientations": 9,

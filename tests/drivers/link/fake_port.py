@@ -7,11 +7,8 @@ import time
 from drivers.link import SerialLink
 
 WORST_LATENCY_S = 0.3
-
 SOON_S = 0.05
-
 LONG_S = 30.0
-
 SLICE_S = 0.005
 
 

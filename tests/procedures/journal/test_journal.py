@@ -126,7 +126,6 @@ def test_another_process_is_refused_too(path: Path) -> None:
 
 
 numbers = st.floats()
-
 texts = st.text(st.characters(exclude_categories=["Cs"]))
 
 

@@ -36,9 +36,7 @@ def happened(rig: Any, kind: type[Any]) -> list[Any]:
 
 
 GOOD = events.Gate(name="converged", passed=True, sentence="The solver ended well.")
-
 FORBIDDEN = events.Gate(name="within tolerance", passed=False, sentence="Beyond: l3 (-13.00 mm).")
-
 DOUBTFUL = events.Gate(name="small", passed=False, sentence="It is 20 mm.", needs_person=True)
 
 

@@ -23,15 +23,10 @@ DRIVERS: dict[str, Callable[..., SerialGauge]] = {
 }
 
 PROTOCOLS = tuple(DRIVERS)
-
 TRANSPORTS = ("pty", "socket")
-
 FAST = 100.0
-
 TIMEOUT_S = 0.3
-
 WORST_LATENCY_S = 0.6
-
 LONG_S = 10.0
 
 

@@ -26,6 +26,12 @@ def never_moves(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(SimulatedMachine, "move", move)
 
 
+@pytest.fixture
+def cell_folder(short_cell: Any) -> Any:
+    """A short cell: what stands in its way is as with many points."""
+    return short_cell
+
+
 @pytest.fixture(scope="module")
 def serving(tmp_path_factory: pytest.TempPathFactory, processes: Any) -> Iterator[str]:
     """The cell file of a cell that ``simulate`` serves in another process."""
@@ -175,7 +181,7 @@ def test_a_controller_that_is_not_there(typed_here, served, closed_port):
 
 
 @pytest.mark.parametrize("command", COMMANDS)
-def test_everything_at_once(typed, served, closed_port, command):
+def test_everything_at_once(typed_here, served, closed_port, command):
     served.edit(
         (port_of(served, "x"), "/dev/nowhere"),
         ("nodes = [1, 2, 3, 4, 5, 6]", "nodes = [9, 2, 3, 4, 5, 6]"),
@@ -183,7 +189,7 @@ def test_everything_at_once(typed, served, closed_port, command):
     )
     without_controller(served, closed_port)
     words = ("gauge x", "leg 1", f"controller 127.0.0.1:{closed_port}", "verification point 2")
-    message = refused(typed, served, command, 3, *words)
+    message = refused(typed_here, served, command, 3, *words)
     assert message.count("\n  - ") >= len(words)
 
 

@@ -13,6 +13,9 @@ RUN = .venv/bin/python -m
 # What other software puts on these paths would be found before what is pinned here.
 unexport PYTHONPATH PYTHONHOME
 
+# Tests start a hundred processes, which need not compile the same files again and again.
+unexport PYTHONDONTWRITEBYTECODE
+
 # Our matrices are small: threads of the linear algebra only get into each other's way.
 export OPENBLAS_NUM_THREADS = 1
 

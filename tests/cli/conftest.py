@@ -211,7 +211,9 @@ def one_robot(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture
 def few_candidates(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Choose among few poses in this process: what is chosen is not under test."""
+    """Choose among few poses in this process, and check the plan on few: that is not under test."""
+    monkeypatch.setattr("hexacell.planning.feasibility.CANDIDATES", 8)
+    monkeypatch.setattr("hexacell.planning.feasibility.DRAWN", 4)
     monkeypatch.setattr("procedures.calibration.CANDIDATES", 64)
     monkeypatch.setattr("procedures.calibration.HELD_OUT_CANDIDATES", 128)
 

@@ -103,8 +103,13 @@ def stranger(cell_folder: Any, tmp_path: Path) -> Stranger:
     return Stranger(cell_folder.cell, cell_folder.controller, tmp_path / "m.csv")
 
 
-def test_record_by_record_to_the_end(typed_here, short_cell, stranger, monkeypatch):
+@pytest.fixture(autouse=True)
+def few(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Choose among few poses in this process: how good the choice is is not under test there."""
     monkeypatch.setattr("hexacell.cli.commands.next.Plan", partial(Plan, candidates=128))
+
+
+def test_record_by_record_to_the_end(typed_here, short_cell, stranger):
     before = short_cell.snapshot()
     said = stranger.follow(asking(typed_here, short_cell, stranger.file))
     assert short_cell.snapshot() == before

@@ -17,6 +17,8 @@ from drivers.simulated.machine import SimulatedMachine
 
 COMMANDS = ["preflight", "run"]
 
+pytestmark = pytest.mark.usefixtures("few_candidates")
+
 
 @pytest.fixture
 def never_moves(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -203,10 +203,11 @@ def test_no_python_at_all_gets_one_line(newcomer: Newcomer) -> None:
     assert said.startswith(f"hexacell: Python 3.11 or newer is needed and there is no '{newcomer.python}'")
 
 
-def test_foreign_paths_do_not_reach_python(settled: Newcomer) -> None:
+@pytest.mark.parametrize(("name", "value"), [("PYTHONPATH", "/opt/ros"), ("PYTHONDONTWRITEBYTECODE", "1")])
+def test_what_changes_pythons_ways_does_not_reach_it(settled: Newcomer, name: str, value: str) -> None:
     python = settled.checkout / ".venv/bin/python"
-    python.write_text('#!/bin/sh\necho "[$PYTHONPATH]" >&2\n')
-    settled.environment["PYTHONPATH"] = "/opt/ros"
+    python.write_text(f'#!/bin/sh\necho "[${name}]" >&2\n')
+    settled.environment[name] = value
     assert settled.make("test") == 0
     assert set(settled.printed) == {"[]"}
 

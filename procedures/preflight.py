@@ -14,22 +14,39 @@ from procedures.calibration import Calibration, Mode
 from procedures.devices import Devices, each, gathered
 from procedures.guards import rules
 from procedures.guards.space import free_bytes
+from procedures.uninterrupted import in_thread
 
 
-def plan_failures(calibration: Calibration, *, unattended: bool) -> Iterator[HexacellError]:
-    """What is wrong with the plan itself, before any device is asked."""
+async def plan_failures(calibration: Calibration, *, unattended: bool) -> list[HexacellError]:
+    """What is wrong with the plan itself, before any device is asked.
+
+    It takes a second or more. A stop is heeded after the piece of the work that is being done.
+    """
+    pieces = _plan_failures(calibration, unattended=unattended)
+    failures: list[HexacellError] = []
+    while (found := await in_thread(next, pieces, None)) is not None:
+        failures += found
+    return failures
+
+
+def _plan_failures(calibration: Calibration, *, unattended: bool) -> Iterator[list[HexacellError]]:
+    """What each piece of the work found."""
     unreachable = [*feasibility.reach_failures(calibration.plan), *_held_out_failures(calibration)]
-    yield from unreachable
+    yield unreachable
     if calibration.mode is Mode.OPTIMISE:
         too_few = [*feasibility.too_few_records(calibration.plan)]
-        yield from too_few
+        yield too_few
         if not unreachable and not too_few:
             yield from feasibility.plan_failures(calibration.plan)
     if unattended and calibration.settings.stations.placement == "by-hand":
-        yield AnswerNeeded(
-            "unattended running is not possible: the gauges are put at each point by hand",
-            action='Give every point fixed gauges and say placement = "fixed" in [stations]',
-        )
+        yield [_nobody_to_place_gauges()]
+
+
+def _nobody_to_place_gauges() -> AnswerNeeded:
+    return AnswerNeeded(
+        "unattended running is not possible: the gauges are put at each point by hand",
+        action='Give every point fixed gauges and say placement = "fixed" in [stations]',
+    )
 
 
 def _held_out_failures(calibration: Calibration) -> Iterator[HexacellError]:

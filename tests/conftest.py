@@ -6,6 +6,7 @@ import asyncio
 import contextlib
 import json
 import os
+import signal
 import threading
 import time
 from collections.abc import AsyncIterator, Iterator
@@ -50,11 +51,11 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
 
 @pytest.fixture(autouse=True)
 def nothing_left_open() -> Iterator[None]:
-    """Fail a test that leaves a thread, a file, a socket or a terminal behind."""
-    before = _threads() | _descriptors()
+    """Fail a test that leaves a thread, a file, a socket, a terminal or a blocked signal behind."""
+    before = _threads() | _descriptors() | _blocked_signals()
     yield
     give_up = time.monotonic() + GRACE_S
-    while left := (_threads() | _descriptors()) - before:
+    while left := (_threads() | _descriptors() | _blocked_signals()) - before:
         if time.monotonic() > give_up:
             pytest.fail(f"left behind: {', '.join(sorted(left))}", pytrace=False)
         time.sleep(0.01)
@@ -76,6 +77,10 @@ def _threads() -> set[str]:
         f"{'daemon ' if thread.daemon else ''}thread {thread.name} ({thread.ident})"
         for thread in threading.enumerate()
     }
+
+
+def _blocked_signals() -> set[str]:
+    return {f"{number!r} blocked" for number in signal.pthread_sigmask(signal.SIG_BLOCK, ())}
 
 
 def _descriptors() -> set[str]:

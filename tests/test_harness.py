@@ -34,6 +34,10 @@ LEAKS = {
         async def test_server():
             KEPT.append(await asyncio.start_server(print, "127.0.0.1", 0))
     """,
+    "ERROR *::test_signal - *left behind: <Signals.SIGUSR1: *> blocked": """
+        def test_signal():
+            signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGUSR1})
+    """,
     "ERROR *::test_task - *left behind: <Task pending name='listener' *": """
         async def test_task():
             KEPT.append(asyncio.create_task(asyncio.sleep(9), name="listener"))
@@ -110,7 +114,7 @@ CLEAN = """
 """
 
 HEADER = """
-    import asyncio, os, pty, socket, threading, time, warnings
+    import asyncio, os, pty, signal, socket, threading, time, warnings
     import pytest
     from hypothesis import given, settings, strategies as st
 

@@ -108,7 +108,7 @@ def test_every_target_installs_first(newcomer: Newcomer, target: str) -> None:
 
 def test_once_installed_only_the_work_is_done(settled: Newcomer) -> None:
     assert settled.make("test") == 0
-    assert settled.calls() == ["-c ", "-m pytest -n 2 --dist loadfile -m not slow and not benchmark"]
+    assert settled.calls() == ["-c ", "-m pytest -n 3 --dist loadfile -m not slow and not benchmark"]
     assert settled.printed == []
 
 
@@ -203,10 +203,11 @@ def test_no_python_at_all_gets_one_line(newcomer: Newcomer) -> None:
     assert said.startswith(f"hexacell: Python 3.11 or newer is needed and there is no '{newcomer.python}'")
 
 
-def test_foreign_paths_do_not_reach_python(settled: Newcomer) -> None:
+@pytest.mark.parametrize(("name", "value"), [("PYTHONPATH", "/opt/ros"), ("PYTHONDONTWRITEBYTECODE", "1")])
+def test_what_changes_pythons_ways_does_not_reach_it(settled: Newcomer, name: str, value: str) -> None:
     python = settled.checkout / ".venv/bin/python"
-    python.write_text('#!/bin/sh\necho "[$PYTHONPATH]" >&2\n')
-    settled.environment["PYTHONPATH"] = "/opt/ros"
+    python.write_text(f'#!/bin/sh\necho "[${name}]" >&2\n')
+    settled.environment[name] = value
     assert settled.make("test") == 0
     assert set(settled.printed) == {"[]"}
 
@@ -221,6 +222,6 @@ def test_ci_lints_and_tests_even_if_lint_fails(settled: Newcomer) -> None:
     assert done.returncode != 0
     assert "true -m ruff check" in done.stdout
     assert done.stdout.splitlines()[-2:] == [
-        "true -m pytest -n 2 --dist loadfile -m not slow and not benchmark",
+        "true -m pytest -n 3 --dist loadfile -m not slow and not benchmark",
         "make lint failed, see above",
     ]

@@ -55,14 +55,12 @@ async def preflight(cell: Cell, mode: Mode, *, unattended: bool) -> tuple[events
         HexacellError: every failure, in one report.
     """
     calibration = Calibration(cell.settings, robot_of(cell), mode, pose_list_of(cell))
-    with (
-        config_lock(cell.config_path),
-        _plan_checked(calibration, unattended=unattended) as failures,
-        served(cell) as settings,
-    ):
-        async with connected(settings, cell.path.parent) as cell_now:
-            failures.extend(await _begin_failures(cell, cell_now, runs_folder(cell)))
-            return _identities(cell_now)
+    with config_lock(cell.config_path):
+        failures = await _plan_failures(calibration, unattended=unattended)
+        with _joined(failures), served(cell) as settings:
+            async with connected(settings, cell.path.parent) as cell_now:
+                failures.extend(await _begin_failures(cell, cell_now, runs_folder(cell)))
+                return _identities(cell_now)
 
 
 async def calibrate(
@@ -84,7 +82,8 @@ async def calibrate(
             _require_own_geometry(cell)
         robot = robot_of(cell) if started is None else robot_of_run(cell, started)
         calibration = Calibration(cell.settings, robot, order.mode, pose_list_of(cell))
-        with _plan_checked(calibration, unattended=order.unattended) as failures, served(cell) as settings:
+        failures = await _plan_failures(calibration, unattended=order.unattended)
+        with _joined(failures), served(cell) as settings:
             async with connected(settings, cell.path.parent) as cell_now:
                 failures.extend(await _begin_failures(cell, cell_now, order.folder.path))
                 raise_all(failures)
@@ -154,15 +153,20 @@ async def _run(
             write_atomically(order.folder.new_wire(), cell_now.trace.text().encode())
 
 
-@contextmanager
-def _plan_checked(calibration: Calibration, *, unattended: bool) -> Iterator[list[HexacellError]]:
-    """Failures of the plan join those that are found while the context lasts, in one report."""
-    failures = list(plan_failures(calibration, unattended=unattended))
-    if failures and calibration.settings.simulation is not None:
+async def _plan_failures(calibration: Calibration, *, unattended: bool) -> list[HexacellError]:
+    """What is wrong with the plan, for the report that the devices' failures join."""
+    failures = await plan_failures(calibration, unattended=unattended)
+    if calibration.settings.simulation is not None:
         # A simulated cell stands at its first point, and cannot be served if that is out of reach.
         raise_all(failures)
+    return failures
+
+
+@contextmanager
+def _joined(failures: list[HexacellError]) -> Iterator[None]:
+    """One report of ``failures`` and of those that are found while the context lasts."""
     try:
-        yield failures
+        yield
     except HexacellError as error:
         if not failures:
             raise

@@ -12,7 +12,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import linear_sum_assignment
 
 from hexacell.errors import IdentifiabilityError
 from hexacell.geometry import LEGS, Geometry
@@ -106,6 +105,9 @@ class JointData:
 
     def _columns(self) -> list[int]:
         """Which column (6,) agrees best with each leg's commands."""
+        # Costs every command a sixth of its start, and only wrong columns need it.
+        from scipy.optimize import linear_sum_assignment  # noqa: PLC0415
+
         reached = np.isfinite(self.commands.joints).all(axis=-1)
         measured, commanded = self.measured[reached], self.commands.joints[reached]
         distance = np.median(np.abs(measured[:, None, :] - commanded[:, :, None]), axis=0)

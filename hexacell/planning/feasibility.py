@@ -102,14 +102,19 @@ def _records_needed(plan: Plan, unknowns: int) -> int:
     return records
 
 
-def plan_failures(plan: Plan) -> Iterator[HexacellError]:
-    """All that stands in the way of a plan whose poses can be reached."""
-    yield from _points_lost(plan)
-    yield from _ways(plan)
-    found = [*_no_orientation(plan)]
-    yield from found
-    if not found:
-        yield from _undetermined(plan)
+def plan_failures(plan: Plan) -> Iterator[list[HexacellError]]:
+    """All that stands in the way of a plan whose poses can be reached.
+
+    Yields what each piece of the work found, often nothing, so that whoever asks may stop in between.
+    """
+    yield [*_points_lost(plan)]
+    yield [*_ways(plan)]
+    some = False
+    for found in _no_orientation(plan):
+        some = some or bool(found)
+        yield found
+    if not some:
+        yield [*_undetermined(plan)]
 
 
 def shares_lost(plan: Plan) -> dict[int, float]:
@@ -155,19 +160,22 @@ def _no_way(between: str) -> ReachError:
     )
 
 
-def _no_orientation(plan: Plan) -> Iterator[HexacellError]:
+def _no_orientation(plan: Plan) -> Iterator[list[HexacellError]]:
     """Points at which nothing can be measured safely: the first as things are, the others later on."""
     plan = replace(plan, candidates=min(plan.candidates, CANDIDATES))
     first_known = plan.robot.knowledge()
     later_known = plan.foreseen()
-    refused = {point: _refusal(plan, first_known, point) for point in plan.points}
+    refused: dict[int, HexacellError | None] = {}
+    for point in plan.points:
+        refused[point] = _refusal(plan, first_known, point)
+        yield []
     any_order = plan.settings.identification.choose_points
     beginnings = list(plan.points) if any_order else [1]
     if all(refused[point] for point in beginnings):
-        yield from [error for point in beginnings if (error := refused[point])]
+        yield [error for point in beginnings if (error := refused[point])]
     for point in plan.points:
-        if point not in beginnings and (error := refused[point] and _refusal(plan, later_known, point)):
-            yield error
+        if point not in beginnings and refused[point]:
+            yield [error for error in [_refusal(plan, later_known, point)] if error]
 
 
 def _refusal(plan: Plan, knowledge: Knowledge, point: int) -> HexacellError | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import fcntl
 import json
 import os
 import secrets
@@ -11,7 +12,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -33,6 +34,25 @@ QUICK = (
     ("orientations = 6", "orientations = 2"),
     ("mean_deviation_mm = 0.05", "mean_deviation_mm = 0.5"),
     ("max_deviation_mm = 0.15", "max_deviation_mm = 1.5"),
+)
+
+# As few records as identify it.
+SHORT = (
+    (
+        """points = [
+  [0.0, 0.0, 550.0],
+  [0.0, -200.0, 550.0],
+  [100.0, -100.0, 500.0],
+  [100.0, 0.0, 600.0],
+  [-100.0, 100.0, 500.0],
+]
+orientations = 11""",
+        """points = [
+  [100.0, -100.0, 500.0],
+  [-100.0, 100.0, 500.0],
+]
+orientations = 7""",
+    ),
 )
 
 Edits = tuple[tuple[str, str], ...]
@@ -125,6 +145,13 @@ def quick_cell(cell_folder: CellFolder) -> CellFolder:
     return cell_folder
 
 
+@pytest.fixture
+def short_cell(cell_folder: CellFolder) -> CellFolder:
+    """The same with two points and seven orientations at each."""
+    cell_folder.edit(*SHORT)
+    return cell_folder
+
+
 def command(*arguments: object) -> list[str]:
     return [sys.executable, "-m", "hexacell", *map(str, arguments)]
 
@@ -177,8 +204,18 @@ def typed_here(
 
 @pytest.fixture
 def one_robot(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Foretell on a single robot: what it says is under test, not how well."""
+    """Foretell on a single robot and from few poses: what it says is under test, not how well."""
     monkeypatch.setattr("hexacell.planning.forecast.ROBOTS", 1)
+    monkeypatch.setattr("hexacell.planning.forecast.CANDIDATES", 32)
+
+
+@pytest.fixture
+def few_candidates(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Choose among few poses in this process, and check the plan on few: that is not under test."""
+    monkeypatch.setattr("hexacell.planning.feasibility.CANDIDATES", 8)
+    monkeypatch.setattr("hexacell.planning.feasibility.DRAWN", 4)
+    monkeypatch.setattr("procedures.calibration.CANDIDATES", 64)
+    monkeypatch.setattr("procedures.calibration.HELD_OUT_CANDIDATES", 128)
 
 
 @dataclass
@@ -235,10 +272,10 @@ def start(tmp_path: Path) -> Iterator[Start]:
 
 @pytest.fixture(scope="session")
 def processes() -> Callable[[Path], AbstractContextManager[Start]]:
-    """The same for a folder and as long as one wants; a fresh cell is put into the folder."""
+    """The same for a folder and as long as one wants; a fresh short cell is put into the folder."""
 
     def with_cell(folder: Path) -> AbstractContextManager[Start]:
-        copy_cell(folder)
+        copy_cell(folder).edit(*SHORT)
         return started_in(folder)
 
     return with_cell
@@ -310,6 +347,17 @@ class Demo:
 
 @pytest.fixture(scope="session")
 def demo(tmp_path_factory: pytest.TempPathFactory) -> Demo:
-    """``hexacell demo --json``, once for all tests; do not change what is in its folder."""
-    folder = tmp_path_factory.mktemp("demo")
-    return Demo(run_command(folder, "demo", "--json"), folder / "hexacell-demo")
+    """``hexacell demo --json``, once for all tests; do not change what is in its folder.
+
+    Of several processes that run tests the first one that needs it makes it, and the others wait.
+    """
+    together = tmp_path_factory.getbasetemp()
+    if "PYTEST_XDIST_WORKER" in os.environ:
+        together = together.parent
+    folder, kept = together / "demo", together / "demo.json"
+    with (together / "demo.lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        if not kept.exists():
+            folder.mkdir()
+            kept.write_text(json.dumps(asdict(run_command(folder, "demo", "--json"))))
+    return Demo(Outcome(**json.loads(kept.read_text())), folder / "hexacell-demo")

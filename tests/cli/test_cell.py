@@ -24,8 +24,8 @@ def test_validate_a_good_cell(typed, cell_folder):
     assert cell_folder.snapshot() == before
 
 
-def test_validate_with_json(typed, cell_folder):
-    outcome = typed("cell", "validate", cell_folder.cell, "--json")
+def test_validate_with_json(typed_here, cell_folder):
+    outcome = typed_here("cell", "validate", cell_folder.cell, "--json")
     assert outcome.code == 0
     assert outcome.document == {"valid": True, "name": "simulated-hexaglide"}
     assert "in order" in outcome.err
@@ -171,10 +171,10 @@ def test_a_config_that_is_not_there(typed_here, cell_folder, command):
     assert cell_folder.snapshot() == before
 
 
-def test_a_config_that_is_a_folder(typed, cell_folder):
+def test_a_config_that_is_a_folder(typed_here, cell_folder):
     cell_folder.controller.unlink()
     cell_folder.controller.mkdir()
-    outcome = typed("run", cell_folder.cell)
+    outcome = typed_here("run", cell_folder.cell)
     assert outcome.code == 2
     assert f"{cell_folder.controller}: this is not a file" in outcome.err
     assert cell_folder.runs() == []

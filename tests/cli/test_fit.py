@@ -147,8 +147,8 @@ def test_a_file_that_is_no_text(typed_here, cell_folder, tmp_path):
 @pytest.mark.parametrize(
     ("name", "words"), [("absent.csv", "it does not exist"), (".", "this is not a file")]
 )
-def test_a_file_that_cannot_be_read(typed, cell_folder, name, words):
-    outcome = fit(typed, cell_folder, name)
+def test_a_file_that_cannot_be_read(typed_here, cell_folder, name, words):
+    outcome = fit(typed_here, cell_folder, name)
     assert outcome.code == 2
     assert f"{name}: " in outcome.err
     assert words in outcome.err

@@ -17,6 +17,8 @@ from drivers.simulated.machine import SimulatedMachine
 
 COMMANDS = ["preflight", "run"]
 
+pytestmark = pytest.mark.usefixtures("few_candidates")
+
 
 @pytest.fixture
 def never_moves(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -24,6 +26,12 @@ def never_moves(monkeypatch: pytest.MonkeyPatch) -> None:
         pytest.fail(f"the robot was sent to {pose}")
 
     monkeypatch.setattr(SimulatedMachine, "move", move)
+
+
+@pytest.fixture
+def cell_folder(short_cell: Any) -> Any:
+    """A short cell: what stands in its way is as with many points."""
+    return short_cell
 
 
 @pytest.fixture(scope="module")
@@ -175,7 +183,7 @@ def test_a_controller_that_is_not_there(typed_here, served, closed_port):
 
 
 @pytest.mark.parametrize("command", COMMANDS)
-def test_everything_at_once(typed, served, closed_port, command):
+def test_everything_at_once(typed_here, served, closed_port, command):
     served.edit(
         (port_of(served, "x"), "/dev/nowhere"),
         ("nodes = [1, 2, 3, 4, 5, 6]", "nodes = [9, 2, 3, 4, 5, 6]"),
@@ -183,7 +191,7 @@ def test_everything_at_once(typed, served, closed_port, command):
     )
     without_controller(served, closed_port)
     words = ("gauge x", "leg 1", f"controller 127.0.0.1:{closed_port}", "verification point 2")
-    message = refused(typed, served, command, 3, *words)
+    message = refused(typed_here, served, command, 3, *words)
     assert message.count("\n  - ") >= len(words)
 
 

@@ -13,17 +13,17 @@ from procedures.journal_lines import encode
 
 
 @pytest.fixture
-def run(typed, quick_cell):
-    """A quick run on the simulated cell, in a process of its own."""
-    outcome = typed("run", quick_cell.cell, "--mode", "optimise", "--unattended")
+def run(typed_here, quick_cell, few_candidates):
+    """A quick run on the simulated cell."""
+    outcome = typed_here("run", quick_cell.cell, "--mode", "optimise", "--unattended")
     assert outcome.code in {0, 1}, outcome.err
     [folder] = quick_cell.runs()
     return folder
 
 
-def test_a_run_is_the_same_again_and_nothing_is_touched(typed, quick_cell, run):
+def test_a_run_is_the_same_again_and_nothing_is_touched(typed_here, quick_cell, run):
     before = quick_cell.snapshot()
-    outcome = typed("replay", run, "--json")
+    outcome = typed_here("replay", run, "--json")
     assert outcome.code == 0, outcome.err
     found = outcome.document
     entries = read_entries(run / "journal.jsonl")

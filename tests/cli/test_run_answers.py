@@ -81,6 +81,7 @@ def ended(process, terminal):
     return process.popen.poll()
 
 
+@pytest.mark.usefixtures("few_candidates")
 class TestNobodyIsThere:
     @pytest.mark.parametrize(
         "unattended", [[], ["--unattended", "--mode", "optimise"]], ids=["", "unattended"]

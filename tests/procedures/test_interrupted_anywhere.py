@@ -90,12 +90,20 @@ async def interrupted_twice(rig: Any, how: str, first: int, second: int) -> None
     assert set(voided) <= {"the run was interrupted in this set"}, "no set with a record was measured anew"
 
 
-HERE_AND_THERE = [("power cut", 7, 5), ("aborted", 16, 4), ("power cut", 73, 3), ("aborted", 103, 6)]
+HERE_AND_THERE = [("power cut", 7, 5), ("aborted", 16, 4)]
+LATER = [("power cut", 1, 27, 3), ("aborted", 2, 14, 6)]
+"""The first number is of sets that are measured already."""
 
 
 @pytest.mark.parametrize(("how", "first", "second"), HERE_AND_THERE)
 async def test_interrupted_here_and_there(make_rig, how: str, first: int, second: int) -> None:
     await interrupted_twice(make_rig(), how, first, second)
+
+
+@pytest.mark.parametrize(("how", "sets", "first", "second"), LATER)
+async def test_interrupted_later(recording, replayed, how: str, sets: int, first: int, second: int) -> None:
+    rig = replayed(recording.until(events.SetClosed, count=sets))
+    await interrupted_twice(rig, how, first, second)
 
 
 @pytest.mark.slow

@@ -145,7 +145,8 @@ KEY = "P2/o03/sample"
 
 @pytest.fixture
 def at_second_point(recording, replayed) -> Any:
-    return replayed(recording.until(events.SetClosed, count=1))
+    """One point measured; the second one gets four records only, which is enough to go wrong in."""
+    return replayed(recording.until(events.SetClosed, count=1), identification__orientations=4)
 
 
 @pytest.mark.parametrize(("times", "reopened", "voided"), [(1, 0, 0), (2, 1, 1), (3, 2, 2)])

@@ -5,6 +5,8 @@ from __future__ import annotations
 import argparse
 import signal
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 from hexacell.cell.file import dump, load_cell
 from hexacell.composition.devices import served
@@ -17,8 +19,7 @@ def main(options: argparse.Namespace) -> ExitCode:
     cell = load_cell(options.cell)
     if cell.settings.simulation is None:
         raise UsageError("there is no [simulation] in it: this is a real cell", subject=cell.path)
-    stops = _held_back()
-    with served(cell, other_processes=True) as settings:
+    with _held_back() as stops, served(cell, other_processes=True) as settings:
         controller = settings.controller.model_copy(update={"config": str(cell.config_path.resolve())})
         text = dump(settings.model_copy(update={"controller": controller}))
         if options.output is None:
@@ -30,7 +31,8 @@ def main(options: argparse.Namespace) -> ExitCode:
     return ExitCode.DONE
 
 
-def _held_back() -> set[signal.Signals]:
+@contextmanager
+def _held_back() -> Iterator[set[signal.Signals]]:
     """Block the signals that end it, in every thread to come, until they are waited for.
 
     A signal that comes to one of the simulated devices' threads would not wake the main one.
@@ -38,5 +40,10 @@ def _held_back() -> set[signal.Signals]:
     stops = {signal.SIGINT, signal.SIGTERM}
     if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:  # as nohup has it
         stops.add(signal.SIGHUP)
-    signal.pthread_sigmask(signal.SIG_BLOCK, stops)
-    return stops
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, stops)
+    try:
+        yield stops
+    finally:
+        while again := signal.sigpending() & stops:
+            signal.sigwait(again)
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)

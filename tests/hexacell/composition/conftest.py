@@ -22,6 +22,7 @@ from hexacell.cell.recovery import Action
 from hexacell.composition.calibration import Order, calibrate
 from hexacell.controller_config.native_toml import NativeToml
 from hexacell.mechanisms.hexaglide import Hexaglide
+from hexacell.planning import feasibility
 from hexacell.pose import Pose
 from procedures import calibration as calibration_module
 from procedures import events
@@ -89,6 +90,8 @@ def few_candidates() -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(calibration_module, "CANDIDATES", 64)
         patch.setattr(calibration_module, "HELD_OUT_CANDIDATES", 128)
+        patch.setattr(feasibility, "CANDIDATES", 8)
+        patch.setattr(feasibility, "DRAWN", 4)
         patch.setattr(machine_module, "STEPS", 8)
         yield
 

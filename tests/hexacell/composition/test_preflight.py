@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import asyncio
+
 import numpy as np
 import pytest
 
@@ -18,6 +20,7 @@ from hexacell.errors import (
     SeveralErrors,
 )
 from hexacell.lock import config_lock
+from hexacell.planning import feasibility
 from procedures.calibration import Mode
 
 FAR = (0.0, 0.0, 2000.0)
@@ -83,6 +86,24 @@ async def test_a_run_begins_with_the_same_checks_and_leaves_no_folder(make_site)
     with pytest.raises(SeveralErrors, match=r"(?s)verification point 1.*gauge y: answers in inch"):
         await site.calibrate()
     assert not site.folder.path.exists()
+
+
+async def test_a_stop_during_the_checks_of_the_plan_leaves_nothing(make_site, monkeypatch) -> None:
+    site = make_site()
+    loop = asyncio.get_running_loop()
+    run = asyncio.ensure_future(site.calibrate())
+
+    def told_to_stop(_plan: object) -> tuple[()]:
+        loop.call_soon_threadsafe(run.cancel)
+        return ()
+
+    monkeypatch.setattr(feasibility, "reach_failures", told_to_stop)
+    with pytest.raises(asyncio.CancelledError):
+        await run
+    assert not site.folder.path.exists()
+    assert not site.simulated.controller.control.on, "not even switched on"
+    with config_lock(site.cell.config_path):
+        pass
 
 
 async def test_devices_that_open_but_cannot_be_read_are_said(make_site, monkeypatch) -> None:

@@ -1,0 +1,216 @@
+"""What goes wrong with a Sylvac gauge, and what is said of it."""
+
+import pytest
+
+from drivers.gauges.errors import (
+    GaugeAtEnd,
+    GaugeSilent,
+    WrongAnswer,
+    WrongMode,
+    WrongUnit,
+    ZeroVoid,
+)
+from drivers.gauges.sylvac import SylvacGauge
+from hexacell.errors import DeviceError, ExitCode, FileError
+from tests.drivers.gauges.sylvac.dialogue import OPENING, opening
+
+
+async def test_a_silent_gauge_is_named_with_what_to_do(dialogue, gauge):
+    dialogue.expect((b"UNI?\r",))
+    with pytest.raises(GaugeSilent) as caught:
+        await gauge.open()
+    assert str(caught.value) == (
+        "gauge y: does not answer within 0.05 s on port wire. "
+        "Switch it on, check its cable, and port in the cell file"
+    )
+    assert caught.value.exit_code is ExitCode.HARDWARE
+    assert not dialogue.is_open
+
+
+async def test_an_echo_alone_is_silence(dialogue, gauge):
+    dialogue.expect((b"UNI?\r", b"UNI?\r"))
+    with pytest.raises(GaugeSilent, match="only our own question comes back"):
+        await gauge.open()
+
+
+async def test_another_protocol_is_quoted_beside_what_was_expected(dialogue, gauge):
+    dialogue.expect(*[(b"UNI?\r", b"NOT FOUND\r\n")] * 3)
+    with pytest.raises(WrongAnswer) as caught:
+        await gauge.open()
+    assert str(caught.value) == (
+        "gauge y: answers b'NOT FOUND\\r' where protocol sylvac has answers like '+12.345\\r'. "
+        "Correct protocol or port in the cell file"
+    ).replace("'+12.345\r'", "'+12.345\\r'")
+
+
+async def test_even_parity_read_as_eight_bits_is_recognised(dialogue, gauge):
+    with_parity = bytes(byte | (byte.bit_count() % 2) << 7 for byte in b"MM\r")
+    dialogue.expect(*[(b"UNI?\r", with_parity)] * 3)
+    with pytest.raises(WrongAnswer, match=r"Check parity settings.*4800 baud 7E2"):
+        await gauge.open()
+
+
+async def test_questions_with_wrong_parity_are_recognised(dialogue, opened):
+    dialogue.expect(*[(b"?\r", b"ERR2\r")] * 3)
+    with pytest.raises(WrongAnswer, match=r"ERR2.*Check parity settings"):
+        await opened.read()
+
+
+async def test_a_plunger_at_its_end_is_an_error_of_its_own(dialogue, opened):
+    dialogue.expect((b"?\r", b"ERR3\r"), (b"?\r", b"+6.000\r"), (b"?\r", b"+6.000\r"))
+    with pytest.raises(GaugeAtEnd, match="gauge y: plunger at its end"):
+        await opened.read()
+    assert (await opened.read()).value_mm == 6.0
+
+
+async def test_a_plunger_at_its_end_in_the_second_reading_counts_too(dialogue, opened):
+    dialogue.expect((b"?\r", b"+6.240\r"), (b"?\r", b"ERR3\r"))
+    with pytest.raises(GaugeAtEnd):
+        await opened.read()
+
+
+async def test_overspeed_voids_the_zero_until_it_is_opened_again(dialogue, opened):
+    dialogue.expect((b"?\r", b"ERR0\r"))
+    for _ in range(2):
+        with pytest.raises(ZeroVoid, match="ERR0"):
+            await opened.read()
+    with pytest.raises(ZeroVoid):
+        await opened.check()
+    dialogue.expect(*OPENING, (b"?\r", b"+1.000\r"), (b"?\r", b"+1.000\r"))
+    await opened.open()
+    assert (await opened.read()).value_mm == 1.0
+
+
+async def test_an_inch_gauge_is_refused(dialogue, gauge):
+    dialogue.expect(*opening(UNI=b"IN\r"))
+    with pytest.raises(WrongUnit) as caught:
+        await gauge.open()
+    assert str(caught.value) == "gauge y: answers in inch. Press its in/mm key"
+
+
+async def test_inch_pressed_during_a_set_is_found_in_a_reading(dialogue, opened):
+    dialogue.expect((b"?\r", b"+0.04858\r"))
+    with pytest.raises(WrongUnit):
+        await opened.read()
+
+
+async def test_inch_pressed_during_a_set_is_found_by_the_check(dialogue, opened):
+    dialogue.expect(*opening(UNI=b"IN\r"))
+    with pytest.raises(WrongUnit):
+        await opened.check()
+
+
+@pytest.mark.parametrize(
+    ("answers", "words"),
+    [
+        ({"STO": b"STO1\r"}, "is on hold"),
+        ({"MOD": b"MIN\r"}, "is in mode MIN"),
+        ({"MOD": b"MAX\r"}, "is in mode MAX"),
+        ({"MOD": b"TOL1\r"}, "is in mode TOL1"),
+        ({"BAT": b"BAT0\r"}, "has a low battery"),
+    ],
+)
+async def test_what_falsifies_readings_is_refused_at_opening_and_by_the_check(
+    dialogue, gauge, answers, words
+):
+    dialogue.expect(*opening(**answers))
+    with pytest.raises(WrongMode, match=words):
+        await gauge.open()
+    dialogue.expect(*OPENING, *opening(**answers))
+    await gauge.open()
+    with pytest.raises(WrongMode, match=words):
+        await gauge.check()
+
+
+@pytest.mark.parametrize(
+    ("answers", "words"),
+    [
+        ({"CHA": b"CHA-\r"}, "reversed False -> True"),
+        ({"PRE": b"PRE +5.000\r"}, r"preset \+0.000 -> \+5.000"),
+        ({"ID?": b"SY233\r"}, "identification SY276 -> SY233"),
+        ({"MOD": b"REF1\r"}, "mode NOR -> REF1"),
+    ],
+)
+async def test_what_changed_during_a_set_voids_its_zero(dialogue, opened, answers, words):
+    dialogue.expect(*opening(**answers))
+    with pytest.raises(ZeroVoid, match=words):
+        await opened.check()
+    with pytest.raises(ZeroVoid):
+        await opened.read()
+
+
+async def test_an_unchanged_gauge_passes_the_check(dialogue, opened):
+    dialogue.expect(*OPENING)
+    await opened.check()
+
+
+async def test_a_power_up_banner_before_a_question_voids_the_zero(dialogue, opened):
+    dialogue.unasked(b"SY276.1\r")
+    dialogue.expect((b"?\r", b"+0.000\r"))
+    with pytest.raises(ZeroVoid, match=r"switched on again.*SY276\.1"):
+        await opened.read()
+
+
+async def test_a_power_up_banner_instead_of_an_answer_voids_the_zero(dialogue, opened):
+    dialogue.expect((b"?\r", b"TE233.1.2\r"))
+    with pytest.raises(ZeroVoid, match="switched on again"):
+        await opened.read()
+
+
+async def test_a_power_up_banner_among_the_checks_answers_voids_the_zero(dialogue, opened):
+    dialogue.expect(*OPENING[:2], (b"ID?\r", b"SY276.1\rSY276\r"), (b"MOD?\r", b"NOR\r"))
+    with pytest.raises(ZeroVoid, match="switched on again"):
+        await opened.check()
+
+
+async def test_a_gauge_that_wakes_up_when_it_is_opened_is_asked_again(dialogue, gauge):
+    dialogue.expect((b"UNI?\r", b"SY276.1\rMM\r"), *OPENING, *[(b"?\r", b"+1.000\r")] * 2)
+    await gauge.open()
+    assert (await gauge.read()).value_mm == 1.0
+
+
+async def test_a_banner_that_came_before_opening_is_old_news(dialogue, gauge, monkeypatch):
+    opening_port = dialogue.open
+
+    def open_with_banner():
+        opening_port()
+        dialogue.unasked(b"SY276.1\r")
+
+    monkeypatch.setattr(dialogue, "open", open_with_banner)
+    dialogue.expect(OPENING[0], *OPENING)
+    await gauge.open()
+
+
+async def test_a_lost_port_is_told_and_voids_what_others_zeroed(dialogue, opened):
+    dialogue.broken = OSError(5, "Input/output error")
+    with pytest.raises(DeviceError, match="gauge y: port wire was lost"):
+        await opened.read()
+    dialogue.broken = None
+    with pytest.raises(DeviceError, match="was lost"):
+        await opened.read()
+    dialogue.expect(*OPENING, (b"?\r", b"+1.000\r"), (b"?\r", b"+1.000\r"))
+    await opened.open()
+    assert (await opened.read()).value_mm == 1.0
+
+
+async def test_it_must_be_opened_before_use_and_closes_twice(dialogue, gauge):
+    for call in (gauge.read, gauge.check):
+        with pytest.raises(DeviceError, match="gauge y: is not open"):
+            await call()
+    dialogue.expect(*OPENING)
+    await gauge.open()
+    await gauge.close()
+    await gauge.close()
+    assert not dialogue.is_open
+    with pytest.raises(DeviceError, match="is not open"):
+        await gauge.read()
+
+
+async def test_a_gauge_without_a_port_is_an_error_of_the_cell_file(links, settings):
+    with pytest.raises(FileError, match="gauge y: has no port"):
+        await SylvacGauge(settings("sylvac", port=None), links).open()
+
+
+async def test_two_gauges_cannot_have_one_port(dialogue, opened, links, settings):
+    with pytest.raises(FileError, match="gauge z: port wire already belongs to gauge y"):
+        await SylvacGauge(settings("sylvac", name="z"), links).open()

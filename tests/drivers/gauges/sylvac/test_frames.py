@@ -1,0 +1,110 @@
+"""Sylvac's opto-RS duplex protocol: what is a value, a fault, a setting, and what is nothing."""
+
+import re
+
+import pytest
+from hypothesis import example, given
+from hypothesis import strategies as st
+
+from drivers.gauges.errors import (
+    FrameRejected,
+)
+from drivers.gauges.shown import Shown
+from drivers.gauges.sylvac import BATTERY, IDENTIFICATION, PRESET, Fault, parse_value
+from drivers.simulated.gauges.sylvac import format_value
+
+
+@pytest.mark.parametrize(
+    ("frame", "value"),
+    [
+        (b"+12.345\r", 12.345),
+        (b"-0.001\r", -0.001),
+        (b" 1.000\r", 1.0),
+        (b"+12.345<\r", 12.345),
+        (b"+12.345=\r", 12.345),
+        (b"+12.345>\r", 12.345),
+        (b"+001.2340\r", 1.234),
+    ],
+)
+def test_a_value_is_read(frame, value):
+    assert parse_value(frame) == Shown(
+        value, len(re.findall(rb"\d", frame.split(b".")[1])), None, frame.decode().strip()
+    )
+
+
+@pytest.mark.parametrize("fault", Fault)
+def test_a_fault_is_read(fault):
+    assert parse_value(fault.value) is fault
+
+
+@pytest.mark.parametrize(
+    "frame",
+    [
+        b"12.345\r",
+        b"+12.345",
+        b"+12.345\r\r",
+        b"+12.345\r\n",
+        b"+12345\r",
+        b"+.345\r",
+        b"+12.\r",
+        b"+1 2.345\r",
+        b"++2.345\r",
+        b"+12,345\r",
+        b"+12.345==\r",
+        b"+1\xb2.345\r",
+        b"ERR4\r",
+        b"ERR\r",
+        b"\r",
+        b"",
+    ],
+)
+def test_anything_else_is_rejected(frame):
+    with pytest.raises(FrameRejected):
+        parse_value(frame)
+
+
+@given(st.floats(-999, 999), st.booleans())
+def test_what_the_simulated_device_writes_is_read(value, inch):
+    shown = parse_value(format_value(value, inch=inch))
+    assert isinstance(shown, Shown)
+    assert shown.value == pytest.approx(value, abs=0.51e-5 if inch else 0.51e-3)
+    assert (shown.apparent_unit == "inch") is inch
+
+
+@given(st.binary(max_size=12) | st.from_regex(rb"[+\- ]?[0-9. ]{1,9}[<=>]?\r", fullmatch=True))
+@example(b"+1.2345\r")
+def test_noise_is_a_value_only_if_it_is_one_to_the_last_byte(noise):
+    try:
+        shown = parse_value(noise)
+    except FrameRejected:
+        return
+    if isinstance(shown, Shown):
+        assert re.fullmatch(rb"[+\- ][0-9]+\.[0-9]+[<=>]?\r", noise)
+        assert shown.value == float(noise.strip(b" <=>\r"))
+
+
+@given(st.floats(-99, 99), st.integers(0, 6), st.integers(0, 6))
+def test_no_part_of_a_value_is_a_value(value, front, back):
+    frame = format_value(value, inch=False)
+    part = frame[front : len(frame) - back]
+    if part != frame:
+        with pytest.raises(FrameRejected):
+            parse_value(part)
+
+
+def test_settings_are_read_with_and_without_their_name():
+    assert BATTERY.parse(b"BAT1\r") == BATTERY.parse(b"1\r") == "1"
+    assert PRESET.parse(b"PRE +1.500\r") == PRESET.parse(b"+1.500\r") == "+1.500"
+    assert IDENTIFICATION.parse(b"ERR1\r") is None
+
+
+@given(st.binary(max_size=10))
+def test_noise_is_no_setting(noise):
+    with pytest.raises(FrameRejected):
+        BATTERY.parse(noise.replace(b"0", b"2").replace(b"1", b"2"))
+
+
+@pytest.mark.parametrize("frame", [b"ERR0\r", b"ERR2\r", b"+1.234\r", b"\x8d\r"])
+def test_an_identification_is_neither_fault_nor_value(frame):
+    with pytest.raises(FrameRejected):
+        IDENTIFICATION.parse(frame)

@@ -1,0 +1,123 @@
+"""Opening a Sylvac gauge, reading it and glancing at it."""
+
+import pytest
+
+from drivers.gauges.errors import (
+    GaugeAtEnd,
+    GaugeSilent,
+    GaugeUnsteady,
+    WrongAnswer,
+)
+from drivers.gauges.serial_gauge import READINGS
+from drivers.gauges.sylvac import SylvacGauge
+from drivers.ports import DeviceIdentity, Gauge, GaugeReading
+from hexacell.errors import DeviceError
+from tests.drivers.gauges.sylvac.dialogue import OPENING
+
+
+async def test_it_opens_and_reads(dialogue, gauge):
+    dialogue.expect(*OPENING, (b"?\r", b"+1.234\r"), (b"?\r", b"+1.236\r"))
+    assert await gauge.open() == DeviceIdentity("y", "sylvac", "SY276")
+    assert await gauge.read() == GaugeReading(1.236, "+1.236")
+    interface: Gauge = gauge
+    assert interface.name == "y"
+
+
+async def test_its_line_has_the_protocols_defaults(dialogue, opened):
+    assert dialogue.settings == {
+        "baudrate": 4800,
+        "bytesize": 7,
+        "parity": "E",
+        "stopbits": 2,
+        "exclusive": True,
+    }
+    assert (dialogue.dtr, dialogue.rts) == (True, False)
+
+
+async def test_the_cell_file_overrides_the_defaults(dialogue, links, settings):
+    dialogue.expect(*OPENING)
+    serial = {"baudrate": 9600, "xonxoff": True, "dtr": False}
+    gauge = SylvacGauge(settings("sylvac", serial=serial), links)
+    await gauge.open()
+    assert dialogue.settings["baudrate"] == 9600
+    assert dialogue.settings["xonxoff"] is True
+    assert dialogue.settings["parity"] == "E"
+    assert dialogue.dtr is False
+    await gauge.close()
+
+
+async def test_commands_that_are_echoed_are_no_answers(dialogue, gauge):
+    echoed = [(question, question, answer) for question, answer in OPENING]
+    dialogue.expect(*echoed, (b"?\r", b"?\r+1.234\r"), (b"?\r", b"?\r\n+1.234\r\n"))
+    await gauge.open()
+    assert (await gauge.read()).value_mm == 1.234
+
+
+async def test_an_instrument_that_knows_only_its_unit_will_do(dialogue, gauge):
+    unknown = [(question, b"ERR1\r") for question, _ in OPENING[1:]]
+    dialogue.expect(OPENING[0], *unknown, OPENING[0], *unknown)
+    assert (await gauge.open()).description == "Sylvac opto-RS indicator"
+    await gauge.check()
+
+
+async def test_an_instrument_that_does_not_tell_its_unit_is_refused(dialogue, gauge):
+    dialogue.expect((b"UNI?\r", b"ERR1\r"))
+    with pytest.raises(DeviceError, match="gauge y: does not tell its unit"):
+        await gauge.open()
+
+
+async def test_a_flipped_digit_does_not_get_through(dialogue, opened):
+    values = (b"+1.234\r", b"+5.234\r", b"+1.234\r", b"+1.235\r")
+    dialogue.expect(*((b"?\r", value) for value in values))
+    assert (await opened.read()).value_mm == 1.235
+
+
+async def test_readings_that_never_agree_are_an_error_of_their_own(dialogue, opened):
+    dialogue.expect(*((b"?\r", b"+%d.000\r" % number) for number in range(READINGS)))
+    with pytest.raises(GaugeUnsteady, match=r"\+0\.000, \+1\.000"):
+        await opened.read()
+
+
+async def test_a_frame_that_does_not_match_is_asked_again(dialogue, opened):
+    answers = (b"+1.2\x134\r", b"+1.234\r", b"1.234\r", b"+1.234\r")
+    dialogue.expect(*((b"?\r", answer) for answer in answers))
+    assert (await opened.read()).value_mm == 1.234
+
+
+async def test_a_frame_cut_short_is_asked_again(dialogue, opened):
+    dialogue.expect((b"?\r", b"+1.23"), (b"?\r", b"+1.234\r"), (b"?\r", b"+1.234\r"))
+    assert (await opened.read()).value_mm == 1.234
+
+
+async def test_a_glance_is_one_question(dialogue, opened):
+    dialogue.expect((b"?\r", b"+1.234\r"))
+    assert await opened.glance() == GaugeReading(1.234, "+1.234")
+
+
+async def test_glances_need_not_agree(dialogue, opened):
+    dialogue.expect((b"?\r", b"+1.234\r"), (b"?\r", b"+4.321\r"))
+    assert [(await opened.glance()).value_mm for _ in range(2)] == [1.234, 4.321]
+
+
+async def test_a_garbled_glance_is_not_repeated(dialogue, opened):
+    dialogue.expect((b"?\r", b"+1.2x4\r"), (b"?\r", b"+1.234\r"))
+    with pytest.raises(WrongAnswer, match="gauge y"):
+        await opened.glance()
+    assert (await opened.glance()).value_mm == 1.234
+
+
+async def test_a_glance_at_the_end_of_its_travel(dialogue, opened):
+    dialogue.expect((b"?\r", b"ERR3\r"))
+    with pytest.raises(GaugeAtEnd):
+        await opened.glance()
+
+
+async def test_a_glance_that_is_not_answered(dialogue, opened):
+    dialogue.expect((b"?\r", b""))
+    with pytest.raises(GaugeSilent):
+        await opened.glance()
+
+
+async def test_nobody_glances_at_a_gauge_that_is_closed(gauge):
+    with pytest.raises(DeviceError, match="is not open"):
+        await gauge.glance()

@@ -1,0 +1,72 @@
+"""Three gauges on lines of their own, and drivers that read them."""
+
+import asyncio
+import contextlib
+from collections.abc import Callable
+
+from drivers.gauges.cdi import CdiGauge
+from drivers.gauges.mux10 import Mux10Gauge
+from drivers.gauges.serial_gauge import SerialGauge
+from drivers.gauges.sylvac import SylvacGauge
+from drivers.link import SerialLinks
+from drivers.simulated.gauges.cell import GaugeRack, simulated_device
+from drivers.simulated.gauges.indicator import Indicator
+from drivers.simulated.gauges.serving import serve_gauges
+from hexacell.cell.devices import GaugeSettings
+from hexacell.cell.simulation import SimulatedGauges
+from hexacell.clock import CellClock
+
+DRIVERS: dict[str, Callable[..., SerialGauge]] = {
+    "sylvac": SylvacGauge,
+    "mux10": Mux10Gauge,
+    "cdi": CdiGauge,
+}
+
+PROTOCOLS = tuple(DRIVERS)
+TRANSPORTS = ("pty", "socket")
+FAST = 100.0
+TIMEOUT_S = 0.3
+WORST_LATENCY_S = 0.6
+LONG_S = 10.0
+
+
+class Cell:
+    """Three gauges x, y, z that see balls at 1, 2 and 3 mm, and drivers for them."""
+
+    def __init__(self, protocols, transport="pty", timeout_s=TIMEOUT_S, **simulation):
+        self.balls = {"x": 1.0, "y": 2.0, "z": 3.0}
+        settings = [
+            GaugeSettings(name=name, axis=name, protocol=protocol, channel=number, timeout_s=timeout_s)
+            for number, (name, protocol) in enumerate(zip("xyz", protocols, strict=True), start=1)
+        ]
+        plungers = {name: lambda name=name: self.balls[name] for name in "xyz"}
+        simulated = SimulatedGauges(transport=transport, **simulation)
+        self.rack = GaugeRack(settings, plungers, simulated, CellClock(FAST))
+        self.links = SerialLinks(worst_latency_s=WORST_LATENCY_S)
+        self.gauges = {each.name: DRIVERS[each.protocol](each, self.links) for each in self.rack.gauges}
+
+    async def open(self):
+        await asyncio.gather(*(gauge.open() for gauge in self.gauges.values()))
+
+    async def values(self):
+        readings = await asyncio.gather(*(gauge.read() for gauge in self.gauges.values()))
+        return [reading.value_mm for reading in readings]
+
+
+@contextlib.asynccontextmanager
+async def cell(*args, **kwargs):
+    made = Cell(*args, **kwargs)
+    try:
+        yield made
+    finally:
+        await made.links.close()
+        made.rack.close()
+
+
+def served(protocol, plunger=lambda: 1.0, transport="pty", factor=FAST, channels=(1,), **pace):
+    indicators = {channel: Indicator(plunger) for channel in channels}
+    return serve_gauges(simulated_device(protocol, indicators), transport, CellClock(factor), **pace)
+
+
+async def ask(link, question=b"?\r"):
+    return await link.exchange(question, b"\r", LONG_S)

@@ -1,0 +1,166 @@
+"""Drivers and simulated gauges over real pseudo-terminals and sockets, at the pace of a real line."""
+
+import asyncio
+import time
+from pathlib import Path
+
+import pytest
+import serial
+
+from drivers.link import SerialLink
+from drivers.simulated.gauges.cell import GaugeRack
+from drivers.simulated.gauges.faults import GaugeFault
+from hexacell.cell.devices import GaugeSettings
+from hexacell.cell.simulation import SimulatedGauges
+from hexacell.clock import CellClock
+from hexacell.errors import DeviceError, FileError
+from tests.drivers.simulated.gauges.served.cell import LONG_S, PROTOCOLS, TRANSPORTS, ask, cell, served
+
+
+@pytest.mark.parametrize("transport", TRANSPORTS)
+@pytest.mark.parametrize("protocols", [PROTOCOLS, ("mux10",) * 3, ("sylvac", "mux10", "mux10")])
+async def test_gauges_open_read_and_pass_the_check(protocols, transport):
+    async with cell(protocols, transport) as made:
+        await made.open()
+        assert await made.values() == [1.0, 2.0, 3.0]
+        made.balls["y"] = -4.5
+        assert await made.values() == [1.0, -4.5, 3.0]
+        for gauge in made.gauges.values():
+            await gauge.check()
+
+
+async def test_gauges_of_one_multiplexer_share_a_line_and_others_do_not():
+    async with cell(["mux10", "sylvac", "mux10"]) as made:
+        assert made.rack.line("x") is made.rack.line("z")
+        assert made.rack.line("x") is not made.rack.line("y")
+        assert [each.port for each in made.rack.gauges] == [made.rack.line(each).url for each in "xyz"]
+
+
+def test_multiplexers_on_different_ports_are_different_lines():
+    settings = [
+        GaugeSettings(name=name, axis=name, protocol="mux10", channel=1, port=f"/dev/{name}")
+        for name in "xyz"
+    ]
+    plungers = {name: lambda: 0.0 for name in "xyz"}
+    with GaugeRack(settings, plungers, SimulatedGauges(), CellClock()) as rack:
+        assert len({rack.line(name).url for name in "xyz"}) == 3
+
+
+def test_an_unknown_protocol_is_refused_and_nothing_is_left_open():
+    settings = [
+        GaugeSettings(name="x", axis="x", protocol="sylvac"),
+        GaugeSettings(name="y", axis="y", protocol="morse"),
+    ]
+    plungers = {"x": lambda: 0.0, "y": lambda: 0.0}
+    with pytest.raises(FileError, match=r"no simulated gauge speaks protocol morse.*cdi, mux10, sylvac"):
+        GaugeRack(settings, plungers, SimulatedGauges(), CellClock())
+
+
+@pytest.mark.parametrize("asked", [False, True])
+async def test_a_pseudo_terminal_opens_with_parity_again_and_again(asked):
+    with served("sylvac") as line:
+        for _ in range(5):
+            link = SerialLink(line.url, baudrate=4800, bytesize=7, parity="E", stopbits=2, exclusive=True)
+            await link.open()
+            if asked:
+                assert await ask(link) == b"+1.000\r"
+            await link.close()
+
+
+def test_a_foreign_client_may_open_it_with_parity_again():
+    with served("sylvac") as line:
+        for _ in range(5):
+            port = serial.Serial(line.url, 4800, bytesize=7, parity="E", stopbits=2, timeout=LONG_S)
+            port.write(b"?\r")
+            assert port.read_until(b"\r") == b"+1.000\r"
+            port.close()
+
+
+@pytest.mark.parametrize("transport", TRANSPORTS)
+async def test_questions_in_pieces_and_in_a_row_are_answered_in_order(transport):
+    with served("sylvac", transport=transport) as line:
+        port = serial.serial_for_url(line.url, timeout=LONG_S)
+        for piece in (b"U", b"NI?", b"\r\n?\rBAT?\rI", b"D?\r"):
+            port.write(piece)
+        assert port.read(len(b"MM\r+1.000\rBAT1\rSY276\r")) == b"MM\r+1.000\rBAT1\rSY276\r"
+        port.close()
+
+
+async def test_a_second_client_of_a_socket_is_turned_away():
+    with served("sylvac", transport="socket") as line:
+        one, two = SerialLink(line.url), SerialLink(line.url)
+        await one.open()
+        assert await ask(one) == b"+1.000\r"
+        await two.open()
+        with pytest.raises(DeviceError, match="lost"):
+            await ask(two)
+        assert await ask(one) == b"+1.000\r"
+        await one.close()
+        await two.close()
+        three = SerialLink(line.url)
+        await three.open()
+        assert await ask(three) == b"+1.000\r"
+        await three.close()
+
+
+@pytest.mark.parametrize(
+    ("protocol", "question", "baudrate", "wire_s"),
+    [
+        ("sylvac", b"?\r", None, 9 * 11 / 4800),
+        ("mux10", b"1\r", None, 15 * 10 / 9600),
+        ("cdi", b"R\r", None, 17 * 10 / 9600),
+        ("cdi", b"R\r", 300, 17 * 10 / 300),
+    ],
+)
+async def test_an_answer_takes_its_latency_and_its_time_on_the_wire(protocol, question, baudrate, wire_s):
+    with served(protocol, factor=4.0, latency_s=0.05, baudrate=baudrate) as line:
+        clock = CellClock(4.0)
+        link = SerialLink(line.url)
+        await link.open()
+        asked = clock.now()
+        await ask(link, question)
+        assert clock.now() - asked > 0.05 + wire_s - 0.001
+        await link.close()
+
+
+async def test_a_faster_clock_shortens_the_pace():
+    with served("sylvac", factor=1000.0, latency_s=60.0) as line:
+        link = SerialLink(line.url)
+        await link.open()
+        assert await ask(link) == b"+1.000\r"  # which waits for ten seconds on the wall at most
+        await link.close()
+
+
+async def test_closing_does_not_wait_for_answers_that_are_due():
+    line = served("sylvac", factor=1.0, latency_s=3600.0)
+    link = SerialLink(line.url)
+    await link.open()
+    waiting = asyncio.create_task(ask(link))
+    await asyncio.sleep(0.05)
+    line.close()
+    line.close()
+    with pytest.raises(DeviceError, match="lost"):
+        await waiting
+    await link.close()
+    with pytest.raises(RuntimeError, match="is closed"):
+        line.inject(GaugeFault.INCH)
+
+
+def test_nothing_stays_in_the_file_system():
+    with served("sylvac", name="gauge / of the x axis") as line:
+        path = Path(line.url)
+        assert path.name == "gauge-of-the-x-axis"
+        assert path.exists()
+    assert not path.parent.exists()
+
+
+def test_answers_to_nobody_are_lost_as_on_a_cable():
+    with served("sylvac") as line:
+        for _ in range(1000):
+            line.send_unasked(b"+1.000\r" * 10)
+        port = serial.serial_for_url(line.url, timeout=LONG_S)
+        time.sleep(0.01)
+        port.reset_input_buffer()
+        port.write(b"?\r")
+        assert port.read(7) == b"+1.000\r"
+        port.close()

@@ -1,0 +1,183 @@
+"""Devices without wires, on a clock that jumps, and a person who answers as told."""
+
+from __future__ import annotations
+
+import asyncio
+import threading
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+from drivers.gauges.errors import GaugeAtEnd
+from drivers.ports import ControllerStatus, DeviceIdentity, EncoderRound, GaugeReading
+from drivers.simulated.machine import SimulatedMachine
+from hexacell.cell.recovery import Action
+from hexacell.clock import CellClock
+from hexacell.errors import HexacellError
+from hexacell.pose import Pose
+from procedures import events
+from procedures.devices import Devices, MountedGauge
+
+HALF_TRAVEL_MM = 6.25
+
+
+class ManualClock(CellClock):
+    """A clock on which waiting is what lets time pass, and takes none on the wall."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.time_s = 0.0
+
+    def now(self) -> float:
+        return self.time_s
+
+    async def sleep(self, seconds: float) -> None:
+        self.time_s += seconds
+        await asyncio.sleep(0)
+
+    def wait(self, seconds: float, until: threading.Event | None = None) -> bool:
+        if until is not None and until.is_set():
+            return True
+        self.time_s += seconds
+        return False
+
+
+class Fake:
+    """What all fake devices can do: be dead, and be let go."""
+
+    dead: HexacellError | None = None
+    closed = 0
+
+    def _answering(self, *names: str) -> tuple[DeviceIdentity, ...]:
+        if self.dead:
+            raise self.dead
+        return tuple(DeviceIdentity(name, "fake", "a device") for name in names)
+
+    async def close(self) -> None:
+        self.closed += 1
+
+
+class FakeGauge(Fake):
+    """A gauge that shows what a function says, unless it has a failure to report first."""
+
+    def __init__(self, name: str, shown: Callable[[], float]) -> None:
+        self.name = name
+        self.shown = shown
+        self.failures: list[HexacellError] = []
+        self.void: HexacellError | None = None
+        self.reads = 0
+
+    async def open(self) -> DeviceIdentity:
+        return self._answering(self.name)[0]
+
+    async def read(self) -> GaugeReading:
+        self.reads += 1
+        if self.failures:
+            raise self.failures.pop(0)
+        value = self.shown()
+        if abs(value) > HALF_TRAVEL_MM:
+            raise GaugeAtEnd("is at an end of its travel", subject=f"gauge {self.name}")
+        return GaugeReading(value, f"{value:+.3f}")
+
+    async def glance(self) -> GaugeReading:
+        value = self.shown()
+        if abs(value) > HALF_TRAVEL_MM:
+            raise GaugeAtEnd("is at an end of its travel", subject=f"gauge {self.name}")
+        return GaugeReading(value, f"{value:+.3f}")
+
+    async def check(self) -> None:
+        if self.void:
+            raise self.void
+
+
+class FakeEncoders(Fake):
+    """Six encoders that show what a function says."""
+
+    def __init__(self, shown: Callable[[], Sequence[float]]) -> None:
+        self.shown = shown
+        self.failure: HexacellError | None = None
+
+    async def open(self) -> tuple[DeviceIdentity, ...]:
+        return self._answering(*(f"encoder {leg}" for leg in range(1, 7)))
+
+    async def read(self) -> EncoderRound:
+        if self.failure:
+            raise self.failure
+        positions = tuple(float(value) for value in self.shown())
+        return EncoderRound(tuple(round(1000 * value) for value in positions), positions)
+
+
+class FakeController(Fake):
+    """A controller that writes down what it is asked and, given a machine, does it."""
+
+    def __init__(self) -> None:
+        self.machine: SimulatedMachine | None = None
+        self.log: list[str] = []
+        self.failures: dict[str, BaseException] = {}
+        self.now = ControllerStatus(estop=False, enabled=True)
+
+    def _do(self, order: str, target: str = "") -> None:
+        self.log.append(f"{order} {target}".strip())
+        if error := self.failures.pop(order, None):
+            raise error
+
+    async def open(self) -> DeviceIdentity:
+        return self._answering("controller")[0]
+
+    async def prepare(self) -> None:
+        self._do("prepare")
+
+    async def move(self, pose: Pose) -> None:
+        self._do("move", str(pose))
+        if self.machine:
+            self.machine.move(pose)
+
+    async def pose(self) -> Pose:
+        self._do("pose")
+        return self.machine.pose() if self.machine else Pose(0.0, 0.0, 0.0)
+
+    async def status(self) -> ControllerStatus:
+        return self.now
+
+    async def stop(self) -> None:
+        self._do("stop")
+
+    async def reload(self) -> None:
+        self._do("reload")
+        if self.machine:
+            self.machine.switch_on()
+
+
+class Approver:
+    """A person who puts gauges where they belong and answers as told."""
+
+    def __init__(self, name: str | None = "a tester") -> None:
+        self.name = name
+        self.placed: list[int] = []
+        self.asked: list[tuple[Sequence[events.Gate], str]] = []
+        self.problems: list[str] = []
+        self.decisions: list[Action] = []
+
+    async def place_gauges(self, point: int, pose: Pose) -> None:
+        self.placed.append(point)
+
+    async def approve(self, gates: Sequence[events.Gate], change: str) -> str | None:
+        self.asked.append((gates, change))
+        return self.name
+
+    async def decide(self, problem: str, choices: Sequence[Action]) -> Action:
+        self.problems.append(problem)
+        return self.decisions.pop(0) if self.decisions else Action.ABORT
+
+
+@dataclass
+class Bench:
+    """Three gauges, encoders and a controller on a manual clock, to be told what to show."""
+
+    clock: ManualClock = field(default_factory=ManualClock)
+
+    def __post_init__(self) -> None:
+        self.gauges = tuple(FakeGauge(name, lambda: 0.0) for name in "xyz")
+        self.encoders = FakeEncoders(lambda: (0.0,) * 6)
+        self.controller = FakeController()
+        mounted = tuple(MountedGauge(gauge, axis, 1) for axis, gauge in enumerate(self.gauges))
+        self.devices = Devices(mounted, self.encoders, self.controller)

@@ -1,0 +1,29 @@
+"""What the journals of these tests tell, and how one is written."""
+
+from __future__ import annotations
+
+import zlib
+from pathlib import Path
+from typing import Any
+
+from procedures import events
+from procedures.journal import Journal
+
+TOLD: tuple[Any, ...] = (
+    events.Proposed(gates=(events.Gate(name="converged", passed=True, sentence="It did to 0.5 µm."),)),
+    events.Committed(approved_by="a tester"),
+    events.Interrupted(reason="line one\nline two\u2028\x85\r", exit_code=130),
+    events.Ended(exit_code=1, line="rolled back"),
+)
+
+
+def write_told(path: Path) -> bytes:
+    with Journal(path) as journal:
+        for event in TOLD:
+            journal.append(event)
+    return path.read_bytes()
+
+
+def checked(body: bytes) -> bytes:
+    """A line with the checksum that belongs to it; ``body`` is the line without."""
+    return body[:-1] + b',"crc":"%08x"}\n' % zlib.crc32(body)

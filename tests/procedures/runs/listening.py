@@ -1,0 +1,66 @@
+"""Listeners that step in at a moment of a run, and what its journal says of it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from procedures import events
+from procedures.journal import read_journal
+from procedures.state import RunState
+from procedures.steps import Phase
+
+
+def on(kind: type[Any], action: Any, count: int = 1) -> Any:
+    """A listener that does something at the ``count``-th event of a kind."""
+    seen = [0]
+
+    def listener(event: events.Event, _: RunState) -> None:
+        if isinstance(event, kind):
+            seen[0] += 1
+            if seen[0] == count:
+                action()
+
+    return listener
+
+
+def before_sampling(key: str, action: Any) -> Any:
+    def listener(event: events.Event, _: RunState) -> None:
+        if isinstance(event, events.StepBegun) and event.step.key == key:
+            action()
+
+    return listener
+
+
+def happened(rig: Any, kind: type[Any]) -> list[Any]:
+    return [event for event in read_journal(rig.folder.journal) if isinstance(event, kind)]
+
+
+GOOD = events.Gate(name="converged", passed=True, sentence="The solver ended well.")
+FORBIDDEN = events.Gate(name="within tolerance", passed=False, sentence="Beyond: l3 (-13.00 mm).")
+DOUBTFUL = events.Gate(name="small", passed=False, sentence="It is 20 mm.", needs_person=True)
+
+
+def proposed(recording, *gates: events.Gate) -> list[events.Event]:
+    return [*recording.until(events.Proposed)[:-1], events.Proposed(gates=gates)]
+
+
+def with_tiny_deviations_before(history) -> list[events.Event]:
+    """As if the uncalibrated robot had been nearly perfect: whatever comes is worse."""
+    return [
+        event.model_copy(update={"deviation_mm": (0.0, 0.0, 1e-6)})
+        if isinstance(event, events.Sampled) and event.at.phase is Phase.BEFORE
+        else event
+        for event in history
+    ]
+
+
+def commanding(rig: Any) -> Any:
+    """The geometry that the simulated controller commands with."""
+    return rig.machine._geometry.geometry
+
+
+def somebody_edits(rig: Any) -> bytes:
+    config = rig.cell.config_path
+    config.write_bytes(config.read_bytes() + b"# somebody was here\n")
+    edited: bytes = config.read_bytes()
+    return edited

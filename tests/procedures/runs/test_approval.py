@@ -1,0 +1,83 @@
+"""Who lets a geometry into the controller: gates, and a person."""
+
+from __future__ import annotations
+
+import pytest
+
+from hexacell.controller_config.proposal import Proposal
+from hexacell.errors import (
+    AnswerNeeded,
+    ExitCode,
+    LimitError,
+)
+from procedures import events
+from procedures.operators import Nobody
+from tests.procedures.runs.listening import DOUBTFUL, FORBIDDEN, GOOD, happened, proposed
+
+
+async def test_a_gate_that_forbids_ends_it_before_anything_is_written(recording, replayed) -> None:
+    rig = replayed(proposed(recording, GOOD, FORBIDDEN, DOUBTFUL))
+    with pytest.raises(LimitError, match=r"refused: Beyond: l3 \(-13\.00 mm\)\.$") as refusal:
+        await rig.run()
+    assert refusal.value.exit_code is ExitCode.OUT_OF_LIMITS
+    assert rig.config == recording.config_before
+    assert rig.operator.asked == []
+    assert "reload" not in rig.controller.log
+
+
+async def test_a_geometry_beyond_the_tolerance_is_refused(recording, replayed) -> None:
+    measured = recording.until(events.SetClosed, count=4)
+    rig = replayed(measured, tolerances__l_mm=2.0)
+    with pytest.raises(LimitError, match="Beyond the drawing's tolerance: l"):
+        await rig.run()
+    assert rig.config == recording.config_before
+    assert rig.folder.proposal.exists()
+
+
+async def test_a_gate_that_needs_a_person_waits_for_one(recording, replayed) -> None:
+    rig = replayed(proposed(recording, GOOD, DOUBTFUL))
+    object.__setattr__(rig.performer, "operator", Nobody())
+    with pytest.raises(AnswerNeeded, match=r"approval: It is 20 mm\.") as refusal:
+        await rig.run()
+    assert refusal.value.exit_code is ExitCode.ANSWER_NEEDED
+    assert rig.config == recording.config_before
+    assert Proposal.load(rig.folder.proposal).text_after.encode() == recording.config_after
+    assert happened(rig, events.Interrupted)[-1].exit_code == ExitCode.ANSWER_NEEDED
+
+
+async def test_a_large_change_needs_a_person(recording, replayed) -> None:
+    measured = recording.until(events.SetClosed, count=4)
+    rig = replayed(measured, acceptance__largest_change_mm=3.0)
+    object.__setattr__(rig.performer, "operator", Nobody())
+    with pytest.raises(AnswerNeeded, match=r"largest change is \d\.\d+ mm \(limit without a person 3 mm\)"):
+        await rig.run()
+    assert rig.config == recording.config_before
+
+
+@pytest.mark.parametrize(("gates", "approval"), [([GOOD, DOUBTFUL], "automatic"), ([GOOD], "ask")])
+async def test_a_person_may_approve(recording, replayed, gates, approval) -> None:
+    rig = replayed(proposed(recording, *gates), acceptance__approval=approval)
+    assert (await rig.run()).exit_code == ExitCode.DONE
+    assert happened(rig, events.Committed) == [events.Committed(approved_by="a tester")]
+    assert rig.config == recording.config_after
+    (asked,) = rig.operator.asked
+    assert asked == (tuple(gates), Proposal.load(rig.folder.proposal).diff)
+
+
+async def test_a_person_may_decline_and_approve_later(recording, replayed) -> None:
+    rig = replayed(proposed(recording, GOOD, DOUBTFUL))
+    rig.operator.name = None
+    with pytest.raises(LimitError, match="declined; nothing was applied"):
+        await rig.run()
+    assert rig.config == recording.config_before
+    rig.operator.name = "a tester"
+    assert (await rig.run()).exit_code == ExitCode.DONE
+    assert len(rig.operator.asked) == 2
+
+
+async def test_within_limits_nobody_is_asked(recording, replayed) -> None:
+    rig = replayed(proposed(recording, GOOD))
+    await rig.run()
+    assert rig.operator.asked == []
+    (committed,) = happened(rig, events.Committed)
+    assert committed.approved_by == "the cell file: within its limits"

@@ -1,0 +1,87 @@
+"""What goes wrong while it measures, and how the run goes on."""
+
+from __future__ import annotations
+
+import pytest
+
+from drivers.gauges.errors import GaugeAtEnd, GaugeSilent
+from hexacell.errors import (
+    AnswerNeeded,
+    ExitCode,
+    HexacellError,
+    LimitError,
+)
+from hexacell.measurement_file import read_measurements
+from procedures import events
+from procedures.operators import Nobody
+from tests.procedures.runs.listening import before_sampling, happened, on
+
+
+async def test_a_refused_record_is_chosen_anew_and_the_run_goes_on(make_rig) -> None:
+    rig = make_rig()
+    at_ends = [GaugeAtEnd("is at an end of its travel", subject=f"gauge {name}") for name in "xy"]
+
+    def once() -> None:
+        for gauge in rig.gauges[: len(at_ends)]:
+            gauge.failures.append(at_ends.pop(0))
+
+    ended = await rig.run(before_sampling("P1/o03/sample", once))
+    assert ended.exit_code == ExitCode.DONE
+    (refused,) = happened(rig, events.Refused)
+    assert (str(refused.at), refused.orientation) == ("P1", 3)
+    begun = [event.step for event in happened(rig, events.StepBegun)]
+    first, second = (step.pose for step in begun if step.key == "P1/o03/move")
+    assert first != second
+    taken = next(event for event in happened(rig, events.Sampled) if event.orientation == 3)
+    assert taken.pose == second
+
+
+async def test_a_slipped_gauge_stops_the_run_and_the_point_is_measured_again(recording, replayed) -> None:
+    rig = replayed(recording.until(events.SetClosed, count=1))
+    real = rig.gauges[1].shown
+
+    def slip() -> None:
+        rig.gauges[1].shown = lambda: real() + 0.2
+
+    with pytest.raises(LimitError, match=r"P2: back at the reference .*y \+0\.[12]"):
+        await rig.run(on(events.Sampled, slip, count=5))
+    assert happened(rig, events.Interrupted)[-1].exit_code == ExitCode.OUT_OF_LIMITS
+    assert rig.controller.log[-1] == "stop"
+    ended = await rig.run()
+    assert ended.exit_code == ExitCode.DONE
+    assert [str(event.at) for event in happened(rig, events.SetVoided)] == ["P2"]
+
+
+async def test_a_gauge_that_falls_silent_stops_the_run(recording, replayed) -> None:
+    rig = replayed(recording.until(events.SetClosed, count=1))
+    silent = GaugeSilent("does not answer", subject="gauge z")
+    with pytest.raises(GaugeSilent):
+        await rig.run(before_sampling("P2/o03/sample", lambda: rig.gauges[2].failures.append(silent)))
+    assert rig.controller.log[-1] == "stop"
+    assert happened(rig, events.Interrupted)[-1] == events.Interrupted(
+        reason="gauge z: does not answer", exit_code=3
+    )
+
+
+async def test_gauges_by_hand_are_asked_for_at_every_point(recording, replayed) -> None:
+    rig = replayed(recording.until(events.SetClosed, count=2), stations__placement="by-hand")
+    await rig.run()
+    assert rig.operator.placed == [1, 2, 1, 2]
+
+
+async def test_with_nobody_there_to_carry_gauges_the_run_ends(make_rig) -> None:
+    rig = make_rig(operator=Nobody(), stations__placement="by-hand")
+    with pytest.raises(AnswerNeeded):
+        await rig.run()
+    assert happened(rig, events.Interrupted)[-1].exit_code == ExitCode.ANSWER_NEEDED
+    assert [entry.split()[0] for entry in rig.controller.log] == ["prepare", "pose", "move", "stop"]
+
+
+async def test_too_little_to_identify_is_said_and_nothing_is_written(make_rig) -> None:
+    rig = make_rig(identification__orientations=3)
+    before = rig.config
+    with pytest.raises(HexacellError, match="12 equations for 35 parameters") as refusal:
+        await rig.run()
+    assert refusal.value.exit_code is ExitCode.OUT_OF_LIMITS
+    assert rig.config == before
+    assert len(read_measurements(rig.folder.measurements)) == 6

@@ -1,0 +1,102 @@
+"""Whole runs on devices that obey, and what is left of them."""
+
+from __future__ import annotations
+
+import json
+import tomllib
+
+import numpy as np
+
+from hexacell.controller_config.native_toml import NativeToml
+from hexacell.controller_config.proposal import Proposal
+from hexacell.controller_config.write_back import Receipt
+from hexacell.errors import (
+    ExitCode,
+)
+from hexacell.geometry import Geometry
+from hexacell.measurement_file import read_measurements
+from hexacell.mechanisms.hexaglide import Hexaglide
+from procedures import events
+from procedures.calibration import Mode
+from procedures.state import fold
+from procedures.steps import Compute, Phase, Sample
+from tests.procedures.runs.listening import happened
+
+
+def test_a_whole_run_passes(recording) -> None:
+    ended = recording.history[-1]
+    assert ended.exit_code == ExitCode.DONE
+    assert ended.line.startswith("35 parameters, 18 records at 2 points; mean deviation at held-out points")
+    assert ended.line.endswith("(limit 0.2): pass")
+    assert recording.controller_log[0] == "prepare"
+    assert recording.controller_log.count("reload") == 1
+
+
+def test_the_controller_gets_the_true_geometry(recording, tmp_path) -> None:
+    config = tmp_path / "after.toml"
+    config.write_bytes(recording.config_after)
+    written = NativeToml().read(config).geometry
+    truth = Geometry(**tomllib.loads(recording.history[0].cell_text)["simulation"]["geometry"])
+    found, expected = (Hexaglide().to_convention(geometry)[0].vector() for geometry in (written, truth))
+    (identified,) = (event for event in recording.history if isinstance(event, events.Identified))
+    sigma = Geometry(**identified.result["sigma"]).vector()
+    assert np.abs(found - expected)[sigma > 0.0].max() > 0.0
+    assert (np.abs(found - expected) <= 5.0 * sigma + 1e-6).all()
+
+
+def test_what_a_run_leaves_in_its_folder(recording) -> None:
+    folder = recording.folder
+    measured = read_measurements(folder.measurements)
+    state = fold(recording.history)
+    assert measured == state.measurements()
+    assert len(measured) == 18
+    assert state.identified
+    result = json.loads(folder.result.read_text())
+    assert {key: result[key] for key in state.identified.result} == state.identified.result
+    assert result["findings"]
+    proposal = Proposal.load(folder.proposal)
+    assert proposal.text_before.encode() == recording.config_before
+    assert proposal.text_after.encode() == recording.config_after
+    assert Receipt.of(folder.path).backup() == recording.config_before
+
+
+def test_held_out_deviations_shrink(recording) -> None:
+    state = fold(recording.history)
+    before, after = (np.linalg.norm(state.held_out(phase), axis=1) for phase in (Phase.BEFORE, Phase.AFTER))
+    assert before.min() > 1.0
+    assert after.max() < 0.1
+
+
+async def test_a_check_measures_judges_and_changes_nothing(make_rig) -> None:
+    rig = make_rig(Mode.CHECK)
+    before = rig.config
+    ended = await rig.run()
+    assert ended.exit_code in {ExitCode.DONE, ExitCode.OUT_OF_LIMITS}
+    assert "4 poses at held-out points" in ended.line
+    assert rig.config == before
+    assert "reload" not in rig.controller.log
+    phases = {event.at.phase for event in happened(rig, events.Sampled)}
+    assert phases == {Phase.BEFORE}
+    computed = [
+        event.step.kind for event in happened(rig, events.StepBegun) if isinstance(event.step, Compute)
+    ]
+    assert computed == ["judge"]
+
+
+async def test_a_check_that_finds_too_much_says_so(make_rig) -> None:
+    rig = make_rig(Mode.CHECK, acceptance__mean_deviation_mm=1e-6)
+    ended = await rig.run()
+    assert ended.exit_code == ExitCode.OUT_OF_LIMITS
+    assert ended.line.endswith("out of limits")
+
+
+def test_samples_are_taken_only_where_the_robot_stands(recording) -> None:
+    """Between a sample and the last arrival at its pose nothing has moved."""
+    arrived = None
+    for event in recording.history:
+        if isinstance(event, events.Arrived):
+            arrived = event
+        if isinstance(event, events.StepBegun) and isinstance(event.step, Sample):
+            assert arrived is not None
+            assert (arrived.at, arrived.orientation) == (event.step.at, event.step.orientation)
+            assert arrived.pose == event.step.pose

@@ -1,0 +1,58 @@
+"""Events as they would happen, short to write."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from procedures import events
+from procedures.steps import SetKey, SixNumbers, ThreeNumbers
+
+NOTHING_IS_ZERO = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class Story:
+    """Events as they would happen, short to write."""
+
+    key: SetKey
+
+    def arrived(self, orientation: int = 1, pose: SixNumbers | None = None) -> events.Event:
+        pose = pose or (100.0, -100.0, 500.0, float(orientation - 1), 0.0, 0.0)
+        return events.Arrived(at=self.key, orientation=orientation, pose=pose)
+
+    def placed(self) -> events.Event:
+        return events.Placed(at=self.key)
+
+    def sampled(
+        self,
+        orientation: int = 1,
+        deviation: ThreeNumbers = NOTHING_IS_ZERO,
+        pose: SixNumbers | None = None,
+    ) -> events.Event:
+        reading = events.Reading(
+            gauges_mm=deviation, spread_mm=NOTHING_IS_ZERO, joints_mm=(0.0,) * 6, answers=(), counts=()
+        )
+        where = self.arrived(orientation, pose).model_dump(exclude={"kind"})
+        return events.Sampled(**where, reading=reading, deviation_mm=deviation)
+
+    def refused(self, orientation: int = 2) -> events.Event:
+        return events.Refused(at=self.key, orientation=orientation, reason="the ball left the travel")
+
+    def closed(self) -> events.Event:
+        return events.SetClosed(at=self.key, drift_mm=NOTHING_IS_ZERO)
+
+    def undone(self, orientation: int) -> events.Event:
+        return events.Undone(at=self.key, orientation=orientation)
+
+    def confirmed(self) -> events.Event:
+        return events.Confirmed(at=self.key, change_mm=NOTHING_IS_ZERO)
+
+    def voided(self) -> events.Event:
+        return events.SetVoided(at=self.key, reason="interrupted")
+
+    def whole(self, orientations: int) -> list[events.Event]:
+        """A set measured from its first move to its closing."""
+        told = [self.arrived(), self.placed(), self.sampled()]
+        for orientation in range(2, orientations + 1):
+            told += [self.arrived(orientation), self.sampled(orientation)]
+        return [*told, self.arrived(), self.closed()]

@@ -16,7 +16,7 @@ TWISTS_A_TILT = 2.0
 """Turns about the platform's own normal go so many times as far as tilts: nothing limits them but
 the legs, and they tell as much."""
 
-COMMAND_TRIES = (2,)
+COMMAND_TRIES = (3,)
 """Stages of the continuation to a command. What takes more is next to a singularity, and left out."""
 
 SMALLEST_SHARE = 0.004

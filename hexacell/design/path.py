@@ -15,7 +15,7 @@ from hexacell.geometry import Geometry
 from hexacell.pose import Poses
 from hexacell.rotations import Array, Mask
 
-MARGIN_SHARE = 0.5
+MARGIN_SHARE = 0.7
 """Of the singularity margin, on the way. The ends keep all of it."""
 
 FINER = 4

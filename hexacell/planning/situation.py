@@ -91,7 +91,7 @@ class Visit:
         joints: joint variables that the controller will go to, mm.
         deviation: what the gauges should show, mm along base x, y, z, and ``sigma``.
         gain: information on the parameters, nat.
-        via: poses to pass on the way, in the controller's frames: visited before, the reference last.
+        via: poses to pass on the way without measuring, in the controller's frames.
         outlook: none where there are no task poses to predict errors at.
     """
 

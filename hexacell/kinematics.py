@@ -238,7 +238,8 @@ def _newton(
             ended = ~is_open
             at = rows[ended]
             positions[at], orientation[at] = poses.positions[ended], poses.rotations[ended]
-            found[at] = (largest[ended] < close_mm) & (assembly_mode(jacobian[ended]) == mode[at])
+            closed = largest[ended] < close_mm
+            found[at[closed]] = assembly_mode(jacobian[ended][closed]) == mode[at[closed]]
             rows, poses, joints = rows[is_open], poses[is_open], joints[is_open]
             error, jacobian = error[is_open], jacobian[is_open]
             if isinstance(geometry, Geometries):

@@ -90,8 +90,8 @@ class Problem:
         deviations: (n, 3), mm, in the convention's base frame.
         first_rows: (m,) row at which each point begins.
         commands: what the records were commanded with.
-        begin: free parameters (p,), mm, where a search begins: the drawing's, or those of the
-            geometry that the controller was lent last, which is nearer and commanded most records.
+        begin: free parameters (p,), mm, where a search begins: those of the geometry that commanded
+            most records, as a rule the drawing, or that the controller was lent last.
         start: poses that close them at ``joints``.
         startable: (n,) bool, where there is such a pose: a singularity may lie between the
             geometry that commanded a record and this one.
@@ -182,7 +182,7 @@ def build_problem(
     poses = change.poses(measurements.poses[order])
     commands = Commands.of(mechanism, poses, (commanding, *lent, prior.centre), branch, joints)
     JointData(commands, joints, labels, branch, prior.centre, prior.leg_widths(mechanism)).refuse_foreign()
-    begin = lent[-1] if lent else prior.centre
+    begin = lent[-1] if lent else commands.commonest
     start = commands.followed(begin, joints)
     _refuse_strangers(start.found, labels)
     return Problem(

@@ -49,6 +49,12 @@ class Commands:
         choice = np.argmin(distance, axis=0)
         return cls(mechanism, poses, under, choice, computed[choice, np.arange(len(poses))])
 
+    @property
+    def commonest(self) -> Geometry:
+        """The geometry that commanded most of the records."""
+        counts = np.bincount(self.choice, minlength=len(self.under))
+        return self.under[int(np.argmax(counts))]
+
     def __getitem__(self, rows: Mask | NDArray[np.intp]) -> Commands:
         return Commands(self.mechanism, self.poses[rows], self.under, self.choice[rows], self.joints[rows])
 

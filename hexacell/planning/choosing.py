@@ -108,8 +108,8 @@ class Chooser:
 
     @staticmethod
     def _as_visited(visited: list[Pose], stop: Pose) -> Pose:
-        """The pose that was visited, to the last bit, where that is one of the stops."""
-        return next((pose for pose in visited if same(pose, stop)), stop)
+        """The reference as it was visited, to the last bit, where that is one of the stops."""
+        return visited[0] if visited and same(visited[0], stop) else stop
 
     def _goal(self, knowledge: Knowledge) -> Goal:
         criterion = Criterion(self.settings.identification.criterion)

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from hexacell import kinematics
 from hexacell.errors import ExitCode, ReachError
-from hexacell.geometry import Geometry
+from hexacell.geometry import Geometries, Geometry
 from hexacell.pose import Pose, Poses
 
 degrees = st.floats(-25.0, 25.0)
@@ -296,3 +296,44 @@ def test_margin_does_not_depend_on_the_size_of_the_machine(hexaglide, paper, inv
         kinematics.singularity_margin(hexaglide, paper.actual, at, inverse(paper.actual, at)),
         rtol=1e-12,
     )
+
+
+# --- many robots, many poses ---
+
+
+def test_many_robots_at_once_stand_where_each_would(hexaglide, paper, inverse):
+    random = np.random.default_rng(3)
+    at = Poses.of([Pose(0, 0, 550, 5 * k, -3 * k, 8 * k) for k in range(4)])
+    joints = inverse(paper.nominal, at)
+    robots = [Geometry.from_vector(paper.nominal.vector() + random.normal(0, 1, 42)) for _ in range(4)]
+    together = Geometries.from_vectors(np.array([robot.vector() for robot in robots]))
+    found = kinematics.forward(hexaglide, together, joints, at)
+    assert found.found.all()
+    for row, robot in enumerate(robots):
+        alone = kinematics.forward(hexaglide, robot, joints[[row]], at[[row]])
+        np.testing.assert_allclose(found.poses.positions[row], alone.poses.positions[0], atol=1e-9)
+        np.testing.assert_allclose(found.poses.rotations[row], alone.poses.rotations[0], atol=1e-12)
+
+
+def test_a_pose_that_cannot_be_found_does_not_spoil_the_others(hexaglide, paper, inverse):
+    at = Poses.of([Pose(0, 0, 550), Pose(10, 0, 550), Pose(0, 10, 550)])
+    joints = inverse(paper.nominal, at)
+    joints[1] = np.nan
+    moved = kinematics.moved(at, np.full((3, 6), 0.01))
+    mode = kinematics.assembly_mode(
+        kinematics.pose_jacobian(hexaglide, paper.nominal, at, joints[[0, 0, 2]])
+    )
+    found = kinematics.forward(hexaglide, paper.nominal, joints, moved, mode=mode)
+    assert found.found.tolist() == [True, False, True]
+    np.testing.assert_allclose(found.poses.positions[[0, 2]], at.positions[[0, 2]], atol=1e-8)
+
+
+@given(st.lists(poses, min_size=1, max_size=6), st.floats(0.0, 0.4))
+def test_the_margin_is_kept_where_it_is_as_large(hexaglide, paper, at, margin):
+    stands = Poses.of(at)
+    joints = hexaglide.inverse(paper.nominal, paper.branch, stands)
+    assume(np.isfinite(joints).all())
+    exactly = kinematics.singularity_margin(hexaglide, paper.nominal, stands, joints)
+    assume(np.abs(exactly - margin).min() > 1e-9)
+    kept = kinematics.keeps_margin(hexaglide, paper.nominal, stands, joints, margin)
+    np.testing.assert_array_equal(kept, exactly >= margin)

@@ -71,17 +71,30 @@ def test_old_and_new_records_may_stand_in_one_file(paper, visit, make_problem):
 
 @pytest.mark.parametrize("seed", range(3))
 def test_a_calibrated_machine_is_calibrated_again(paper, visit, make_problem, seed):
-    """It goes where its drawing cannot follow: singularities lie between; no record is lost for that."""
+    """It goes where its drawing cannot follow: the search begins at what commanded it."""
     problem = make_problem(
         visit(paper.actual, paper.actual, degrees=40.0, seed=seed).measured(),
         controller=paper.actual,
         noise=Noise(1e-4, 1e-4),
     )
-    assert not problem.startable.all()
+    assert not problem.commands.followed(problem.prior.centre, problem.joints).found.all()
+    assert problem.startable.all()
     found = identify(problem)
     assert found.geometry.largest_difference(paper.actual) < EXACT_MM
     assert found.records == 55
     assert found.outliers == ()
+
+
+def test_what_was_lent_is_where_the_search_begins(paper, visit, make_problem):
+    """Many records commanded by it cannot be followed to the drawing: none is lost for that."""
+    before = visit(points=1, orientations=4, degrees=2.0, seed=5).measured()
+    after = visit(paper.actual, paper.actual, degrees=55.0, seed=7).measured()
+    both = [*before.records, *(record for record in after.records if record.point > 1)]
+    problem = make_problem(MeasurementSet(tuple(both)), lent=(paper.actual,), noise=Noise(1e-4, 1e-4))
+    lost = ~problem.commands.followed(problem.prior.centre, problem.joints).found
+    assert np.count_nonzero(lost) > 10
+    assert problem.startable.all()
+    assert identify(problem).geometry.largest_difference(paper.actual) < EXACT_MM
 
 
 def test_while_measuring_too(paper, visit, make_problem):

@@ -1,0 +1,100 @@
+"""Ways with gauges at the ball: straight, led over stops, or over the reference."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from hexacell import kinematics
+from hexacell.design.candidates import commanded, orientations, standing
+from hexacell.design.lines import straight
+from hexacell.design.passage import Departure
+from hexacell.pose import Poses
+
+TRAVEL_MM = 5.0
+BALL = np.array([0.0, 0.0, 550.0])
+
+
+@pytest.fixture(scope="module")
+def well(know, paper):
+    """The real robot, known well, behind the controller that has the drawing."""
+    return know(paper.actual)
+
+
+@pytest.fixture(scope="module")
+def commands(well):
+    """Commands that bring the ball to one place in many orientations."""
+    stands = standing(well, Poses.at(BALL, orientations(256, well.limits.tilt, seed=5)))
+    found, held = commanded(well, stands)
+    return found[held]
+
+
+@pytest.fixture(scope="module")
+def home(well):
+    stands = standing(well, Poses.at(BALL, np.eye(3)[None]))
+    return commanded(well, stands)[0]
+
+
+def farthest(well, line):
+    """How far the ball gets from its place on the way over some commands, looked at closely."""
+    away = 0.0
+    for start, end in pairwise(line):
+        way = straight(start, end, 60)
+        joints = kinematics.inverse(well.mechanism, well.controller, well.branch, way)
+        really = kinematics.follow(
+            well.mechanism,
+            well.estimate,
+            joints,
+            start=way,
+            start_geometry=well.controller,
+            start_joints=joints,
+        )
+        assert really.found.all()
+        away = max(away, float(np.abs(really.poses.positions - BALL).max()))
+    return away
+
+
+def line_of(passage, start, end):
+    return [start, *(Poses.of([stop]) for stop in passage.stops), end]
+
+
+def test_where_the_straight_line_leaves_the_travel_stops_keep_the_ball_inside(well, commands, home):
+    """From one wide turn to others: hardly any straight line is safe, many led ones are."""
+    start = commands[[int(np.argmax(commands.tilts()))]]
+    ways = Departure(well, start, None, BALL).to(commands)
+    led = [row for row in np.flatnonzero(ways.clear) if ways.passage(row).stops]
+    direct = [row for row in np.flatnonzero(ways.clear) if not ways.passage(row).stops]
+    assert len(led) > len(direct) > 0
+    for row in [*led[:10], *direct[:5]]:
+        passage, end = ways.passage(row), commands[[row]]
+        seen = farthest(well, line_of(passage, start, end))
+        assert seen <= TRAVEL_MM + 0.1
+        assert passage.farthest == pytest.approx(seen, abs=0.3)
+    for row in led[:10]:
+        assert len(ways.passage(row).stops) == 3
+        assert farthest(well, [start, commands[[row]]]) > TRAVEL_MM
+
+
+def test_over_the_reference_where_a_singularity_lies_between(well, commands, home):
+    start = commands[[int(np.argmax(commands.tilts()))]]
+    leave = Departure(well, start, home, BALL)
+    lost = np.flatnonzero(~leave.to(commands).clear)
+    over = leave.over_home(commands[lost])
+    found = [(row, way) for row, way in zip(lost, over, strict=True) if way is not None]
+    assert found
+    for row, way in found[:5]:
+        assert home.pose(0) in way.stops
+        assert farthest(well, line_of(way, start, commands[[row]])) <= TRAVEL_MM + 0.1
+
+
+def test_from_the_reference_itself_there_is_no_way_over_it(well, commands, home):
+    assert Departure(well, home, None, BALL).over_home(commands[:2]) == [None, None]
+
+
+def test_nothing_leads_away_from_where_the_robot_cannot_be(well, commands):
+    beyond = Poses.at([0.0, 0.0, 5000.0], np.eye(3)[None])
+    leave = Departure(well, beyond, beyond, BALL)
+    assert not leave.to(commands).clear.any()
+    assert leave.over_home(commands[:2]) == [None, None]

@@ -152,3 +152,34 @@ def test_rolled_back_without_a_verdict_the_proposal_waits_again(story) -> None:
     after = story(Phase.AFTER)
     state = fold([events.Committed(approved_by="a tester"), *after.whole(2), events.RolledBack()])
     assert (state.committed, state.rolled_back, state.sets) == (None, False, {})
+
+
+STOP = (1.0, 2.0, 500.0, 3.0, 0.0, 0.0)
+OTHER_STOP = (4.0, 5.0, 500.0, 6.0, 0.0, 0.0)
+
+
+def trail_of(*told: events.Event) -> list[int]:
+    return [orientation for orientation, _ in fold(told).trail]
+
+
+def test_the_trail_leads_back_to_the_reference(story) -> None:
+    s = story()
+    assert trail_of() == []
+    assert trail_of(s.arrived(1), s.arrived(2), s.arrived(0, STOP), s.arrived(3)) == [1, 2, 0, 3]
+
+
+def test_a_trail_has_no_loops(story) -> None:
+    s = story()
+    there = [s.arrived(1), s.arrived(0, STOP), s.arrived(2), s.arrived(0, OTHER_STOP), s.arrived(3)]
+    assert trail_of(*there, s.arrived(0, STOP)) == [1, 0]
+    assert trail_of(*there, s.arrived(1)) == [1]
+    assert trail_of(*there, s.arrived(2), s.arrived(4)) == [1, 0, 2, 4]
+
+
+def test_who_was_found_elsewhere_did_not_come_by_the_trail(story) -> None:
+    s = story()
+    lost = events.Interrupted(reason="a power cut", exit_code=130)
+    there = [s.arrived(1), s.arrived(2), s.arrived(3), lost]
+    assert trail_of(*there, events.Located(pose=STOP), s.arrived(4)) == []
+    assert trail_of(*there, events.Located(pose=STOP), s.arrived(2)) == [1, 2]
+    assert trail_of(*there, events.Located(pose=s.arrived(3).pose), s.arrived(4)) == [1, 2, 3, 4]

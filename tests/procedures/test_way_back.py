@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from hexacell import kinematics
+from hexacell.design import route as route_module
 from hexacell.design.lines import straight
 from hexacell.errors import IdentifiabilityError
 from hexacell.planning.plan import REFUSALS
@@ -24,8 +25,11 @@ ORIENTATIONS = 9
 class Ways:
     """Stands in for the check of straight lines: only those to some orientations are clear."""
 
-    def __init__(self, monkeypatch: pytest.MonkeyPatch, *clear_to: int) -> None:
+    def __init__(
+        self, monkeypatch: pytest.MonkeyPatch, *clear_to: int, stops: tuple[Pose, ...] = ()
+    ) -> None:
         self.clear_to = clear_to
+        self.stops = stops
         monkeypatch.setattr(module.Calibration, "_known", lambda *_: (None, self))
         monkeypatch.setattr(ways, "is_clear", self._is_clear)
         monkeypatch.setattr(ways, "Departure", self._departure)
@@ -34,7 +38,7 @@ class Ways:
     def _departure(self, _: Any, start: Any, home: Any, reference: Any) -> Any:
         def to(end: Any) -> Any:
             clear = self._is_clear(_, start, end, reference)
-            return SimpleNamespace(clear=[clear], passage=lambda _: SimpleNamespace(stops=()))
+            return SimpleNamespace(clear=[clear], passage=lambda _: SimpleNamespace(stops=self.stops))
 
         assert home is None
         return SimpleNamespace(to=to)
@@ -58,6 +62,35 @@ def test_the_way_back_is_safe(make_rig, story, monkeypatch, clear_to, way) -> No
         happened.append(story().arrived(step.orientation, step.pose))
     assert visited == way
     assert step.key == "P1/close"
+
+
+def test_a_way_back_over_stops_is_gone_stop_by_stop(make_rig, story, monkeypatch) -> None:
+    stop = Pose(100.0, -100.0, 500.0, 4.0, 1.0, 0.0)
+    Ways(monkeypatch, 1, stops=(stop,))
+    calibration, happened = make_rig().calibration, story().whole(ORIENTATIONS)[:-2]
+    step = calibration.next_step(fold(happened))
+    assert isinstance(step, Move)
+    assert step.key == "P1/o00/move"
+    assert step.pose == pytest.approx(stop.as_tuple())
+    asked: list[Any] = []
+    monkeypatch.setattr(route_module, "is_clear", lambda *line: bool(asked.append(line) or True))
+    step = calibration.next_step(fold([*happened, story().arrived(0, step.pose)]))
+    assert step.key == "P1/o01/move"
+    assert len(asked) == 1
+
+
+def test_the_way_back_leads_over_stops_that_were_passed_where_nothing_is_safe(
+    make_rig, story, monkeypatch
+) -> None:
+    Ways(monkeypatch)
+    stop = (100.0, -100.0, 500.0, 4.0, 1.0, 0.0)
+    s = story()
+    led = [s.arrived(0, stop), s.arrived(3), s.sampled(3)]
+    step = make_rig().calibration.next_step(
+        fold([*s.whole(2)[:-2], *led, *[s.refused(4)] * (REFUSALS + 1)])
+    )
+    assert isinstance(step, Move)
+    assert (step.key, step.pose) == ("P1/o00/move", stop)
 
 
 def test_the_way_back_from_a_refused_pose_begins_at_the_last_record(make_rig, story, monkeypatch) -> None:

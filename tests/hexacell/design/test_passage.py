@@ -64,8 +64,8 @@ def test_where_the_straight_line_leaves_the_travel_stops_keep_the_ball_inside(we
     """From one wide turn to others: hardly any straight line is safe, many led ones are."""
     start = commands[[int(np.argmax(commands.tilts()))]]
     ways = Departure(well, start, None, BALL).to(commands)
-    led = [row for row in np.flatnonzero(ways.clear) if ways.passage(row).stops]
-    direct = [row for row in np.flatnonzero(ways.clear) if not ways.passage(row).stops]
+    led = [row for row in np.flatnonzero(ways.clear).tolist() if ways.passage(row).stops]
+    direct = [row for row in np.flatnonzero(ways.clear).tolist() if not ways.passage(row).stops]
     assert len(led) > len(direct) > 0
     for row in [*led[:10], *direct[:5]]:
         passage, end = ways.passage(row), commands[[row]]

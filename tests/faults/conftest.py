@@ -16,9 +16,11 @@ from typing import Any
 import pytest
 
 from hexacell.archive import RunFolder
+from hexacell.controller_config.receipt import AFTER
 from procedures import events
 from procedures.journal import read_journal
-from tests.faults.cell import NEVER_GOOD_ENOUGH, Site, make_site
+from procedures.lending import FOLDER
+from tests.faults.cell import NEVER_GOOD_ENOUGH, PROVISIONAL, Site, make_site
 from tests.faults.driver import UNEXPECTED, Order
 from tests.faults.interception import Call
 from tests.faults.matrix import PROPERTY, Case
@@ -112,9 +114,10 @@ def new_site(ground: Path) -> Callable[..., Site]:
 
 @dataclass(frozen=True)
 class Whole:
-    """A run that nothing disturbed, and everything that it left."""
+    """A run that nothing disturbed, with what was changed for it, and everything that it left."""
 
     site: Site
+    changes: tuple[dict[str, Any], ...]
     ended: Ended
     history: tuple[events.Event, ...]
     config_before: bytes
@@ -123,6 +126,12 @@ class Whole:
     @property
     def config_after(self) -> bytes:
         return self.site.config.read_bytes()
+
+    @property
+    def config_lent(self) -> bytes | None:
+        """The config that was lent meanwhile, if one was."""
+        kept = self.folder.path / FOLDER / AFTER
+        return kept.read_bytes() if kept.exists() else None
 
     @property
     def folder(self) -> RunFolder:
@@ -134,7 +143,7 @@ def whole(program: Program, folder: Path, *changes: dict[str, Any]) -> Whole:
     before = site.config.read_bytes()
     begun = time.monotonic()
     ended = program.run(site, failing={})
-    return Whole(site, ended, read_journal(site.run().journal), before, time.monotonic() - begun)
+    return Whole(site, changes, ended, read_journal(site.run().journal), before, time.monotonic() - begun)
 
 
 @pytest.fixture(scope="session")
@@ -151,6 +160,14 @@ def rolled_back(program: Program, session_ground: Path) -> Whole:
     found = whole(program, session_ground / "rolled back", NEVER_GOOD_ENOUGH)
     assert found.ended.code == 1, found.ended.words
     assert found.config_after == found.config_before
+    return found
+
+
+@pytest.fixture(scope="session")
+def lent(program: Program, session_ground: Path) -> Whole:
+    """A run whose controller is lent a geometry meanwhile."""
+    found = whole(program, session_ground / "lent", PROVISIONAL)
+    assert found.ended.code == 0, found.ended.words
     return found
 
 

@@ -172,6 +172,18 @@ def lent(program: Program, session_ground: Path) -> Whole:
 
 
 @pytest.fixture
+def whole_with(request: pytest.FixtureRequest) -> Callable[[str], Whole]:
+    """The undisturbed run to compare with where a kind of step is broken: not every run has each."""
+    others = {"rolling back": "rolled_back", "lending": "lent", "taking back": "lent"}
+
+    def find(step: str) -> Whole:
+        found: Whole = request.getfixturevalue(others.get(step, "undisturbed"))
+        return found
+
+    return find
+
+
+@pytest.fixture
 def case(request: pytest.FixtureRequest) -> Callable[[str, str, str], None]:
     """Enter a case into the fault matrix, which is printed at the end of all tests."""
 

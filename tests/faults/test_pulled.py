@@ -21,12 +21,12 @@ PULLED = tuple(step for step in STEPS if step not in {"beginning", "ending"})
 class Puller:
     """Pulls a plug out of a run and says what became of it."""
 
-    def __init__(self, program: Any, new_site: Any, wholes: dict[str, Any], case: Any) -> None:
+    def __init__(self, program: Any, new_site: Any, whole_with: Any, case: Any) -> None:
         self._program, self._new_site, self._case = program, new_site, case
-        self._wholes = wholes
+        self._whole_with = whole_with
 
     def pull(self, device: str, step: str, *, back: bool) -> str:
-        whole = self._wholes.get(step, self._wholes[""])
+        whole = self._whole_with(step)
         site = self._new_site(*whole.changes, timeout_s=TIMEOUT_S)
         pulled = {"device": device, "step": step, "back": "failed" if back else ""}
         ended = self._begun(site, step, whole)(site, pull=pulled)
@@ -64,9 +64,8 @@ class Puller:
 
 
 @pytest.fixture
-def puller(program: Any, new_site: Any, undisturbed: Any, rolled_back: Any, lent: Any, case: Any) -> Puller:
-    wholes = {"": undisturbed, "rolling back": rolled_back, "lending": lent, "taking back": lent}
-    return Puller(program, new_site, wholes, case)
+def puller(program: Any, new_site: Any, whole_with: Any, case: Any) -> Puller:
+    return Puller(program, new_site, whole_with, case)
 
 
 def test_a_gauge_that_comes_back_while_measuring(puller: Puller) -> None:

@@ -125,7 +125,14 @@ class Whole:
 
     @property
     def config_after(self) -> bytes:
-        return self.site.config.read_bytes()
+        """The config that was written, whether or not it was rolled back."""
+        return (self.folder.path / AFTER).read_bytes()
+
+    def name_of(self, config: bytes) -> str:
+        """Which of the run's configs this is; it is always one of them, whole."""
+        names = {self.config_before: "old", self.config_after: "new", self.config_lent: "lent"}
+        assert config in names
+        return names[config]
 
     @property
     def config_lent(self) -> bytes | None:
@@ -159,7 +166,7 @@ def rolled_back(program: Program, session_ground: Path) -> Whole:
     """A run whose result is not good enough and is taken back."""
     found = whole(program, session_ground / "rolled back", NEVER_GOOD_ENOUGH)
     assert found.ended.code == 1, found.ended.words
-    assert found.config_after == found.config_before
+    assert found.site.config.read_bytes() == found.config_before
     return found
 
 

@@ -40,7 +40,7 @@ class Cutter:
     def __init__(self, program: Any, new_site: Any, whole: Any, case: Any) -> None:
         self._program, self._new_site, self._case = program, new_site, case
         self._whole = whole
-        self._after = whole.config_lent or (whole.folder.path / "config-after").read_bytes()
+        self._after = whole.config_lent or whole.config_after
 
     def cut(self, number: int, step: str) -> str:
         """What the config is afterwards: old or new, and whether a temporary was left."""

@@ -138,25 +138,26 @@ class Engine:
         return True
 
     async def _note(self, event: events.Event) -> None:
-        """Write down what a step caused; a commit that cannot be noted is taken back.
+        """Write down what a step caused; a geometry whose writing cannot be noted is taken back.
 
         Raises:
             HexacellError: it could not be noted.
-            SeveralErrors: nor could the commit be taken back.
+            SeveralErrors: nor could the geometry be taken back.
         """
         try:
             self.tell(event)
         except HexacellError as error:
             if isinstance(event, events.Committed) and self.state.committed is None:
-                await self._undo_commit(error)
+                await self._undo(Compute(kind="roll back"), "the new geometry", error)
+            if isinstance(event, events.Lent) and not self.state.lending:
+                await self._undo(Compute(kind="take back"), "a provisional geometry", error)
             raise
 
-    async def _undo_commit(self, cause: HexacellError) -> None:
-        step = Compute(kind="roll back")
+    async def _undo(self, step: Compute, what: str, cause: HexacellError) -> None:
         try:
             await uninterrupted(self._performer.perform(step, self.state))
         except HexacellError as error:
-            problem = "the controller has the new geometry, which could be neither noted nor taken back"
+            problem = f"the controller has {what}, which could be neither noted nor taken back"
             raise SeveralErrors(problem, [cause, error]) from cause
 
     async def _prepare(self) -> None:

@@ -48,6 +48,8 @@ NEVER_GOOD_ENOUGH: dict[str, Any] = {
     "acceptance.max_deviation_mm": 1e-9,
 }
 """No result passes this, so that what was written is rolled back."""
+PROVISIONAL: dict[str, Any] = {"identification.provisional": True}
+"""The controller is lent a geometry after the first point, which is taken back after the last."""
 
 
 def changed(section: Any, changes: dict[str, Any]) -> Any:

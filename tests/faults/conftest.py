@@ -16,9 +16,11 @@ from typing import Any
 import pytest
 
 from hexacell.archive import RunFolder
+from hexacell.controller_config.receipt import AFTER
 from procedures import events
 from procedures.journal import read_journal
-from tests.faults.cell import NEVER_GOOD_ENOUGH, Site, make_site
+from procedures.lending import FOLDER
+from tests.faults.cell import NEVER_GOOD_ENOUGH, PROVISIONAL, Site, make_site
 from tests.faults.driver import UNEXPECTED, Order
 from tests.faults.interception import Call
 from tests.faults.matrix import PROPERTY, Case
@@ -112,9 +114,10 @@ def new_site(ground: Path) -> Callable[..., Site]:
 
 @dataclass(frozen=True)
 class Whole:
-    """A run that nothing disturbed, and everything that it left."""
+    """A run that nothing disturbed, with what was changed for it, and everything that it left."""
 
     site: Site
+    changes: tuple[dict[str, Any], ...]
     ended: Ended
     history: tuple[events.Event, ...]
     config_before: bytes
@@ -122,7 +125,20 @@ class Whole:
 
     @property
     def config_after(self) -> bytes:
-        return self.site.config.read_bytes()
+        """The config that was written, whether or not it was rolled back."""
+        return (self.folder.path / AFTER).read_bytes()
+
+    def name_of(self, config: bytes) -> str:
+        """Which of the run's configs this is; it is always one of them, whole."""
+        names = {self.config_before: "old", self.config_after: "new", self.config_lent: "lent"}
+        assert config in names
+        return names[config]
+
+    @property
+    def config_lent(self) -> bytes | None:
+        """The config that was lent meanwhile, if one was."""
+        kept = self.folder.path / FOLDER / AFTER
+        return kept.read_bytes() if kept.exists() else None
 
     @property
     def folder(self) -> RunFolder:
@@ -134,7 +150,7 @@ def whole(program: Program, folder: Path, *changes: dict[str, Any]) -> Whole:
     before = site.config.read_bytes()
     begun = time.monotonic()
     ended = program.run(site, failing={})
-    return Whole(site, ended, read_journal(site.run().journal), before, time.monotonic() - begun)
+    return Whole(site, changes, ended, read_journal(site.run().journal), before, time.monotonic() - begun)
 
 
 @pytest.fixture(scope="session")
@@ -150,8 +166,28 @@ def rolled_back(program: Program, session_ground: Path) -> Whole:
     """A run whose result is not good enough and is taken back."""
     found = whole(program, session_ground / "rolled back", NEVER_GOOD_ENOUGH)
     assert found.ended.code == 1, found.ended.words
-    assert found.config_after == found.config_before
+    assert found.site.config.read_bytes() == found.config_before
     return found
+
+
+@pytest.fixture(scope="session")
+def lent(program: Program, session_ground: Path) -> Whole:
+    """A run whose controller is lent a geometry meanwhile."""
+    found = whole(program, session_ground / "lent", PROVISIONAL)
+    assert found.ended.code == 0, found.ended.words
+    return found
+
+
+@pytest.fixture
+def whole_with(request: pytest.FixtureRequest) -> Callable[[str], Whole]:
+    """The undisturbed run to compare with where a kind of step is broken: not every run has each."""
+    others = {"rolling back": "rolled_back", "lending": "lent", "taking back": "lent"}
+
+    def find(step: str) -> Whole:
+        found: Whole = request.getfixturevalue(others.get(step, "undisturbed"))
+        return found
+
+    return find
 
 
 @pytest.fixture

@@ -21,6 +21,8 @@ STEPS = (
     "to orientation",
     "sampling",
     "closing",
+    "lending",
+    "taking back",
     "identifying",
     "held-out",
     "proposing",
@@ -32,6 +34,8 @@ STEPS = (
 )
 """Kinds of steps, in the order of a run; held-out points are measured before and after the commit."""
 COMPUTING = {
+    "lend": "lending",
+    "take back": "taking back",
     "identify": "identifying",
     "propose": "proposing",
     "commit": "committing",
@@ -120,6 +124,8 @@ def _short(step: str) -> str:
         "to orientation": "move",
         "sampling": "sample",
         "closing": "close",
+        "lending": "lend",
+        "taking back": "take b",
         "identifying": "identf",
         "held-out": "before",
         "proposing": "propos",

@@ -1,4 +1,4 @@
-"""The process dies before each call of a write-back and of a taking back: SIGKILL, no word, no cleaning.
+"""The process dies before each call that writes the config or takes it back: SIGKILL, no cleaning.
 
 The same for every call in this process, and failures instead of deaths, are in
 ``tests/hexacell/controller_config``; a power cut, which also loses what was written, in
@@ -12,7 +12,6 @@ from typing import Any
 
 import pytest
 
-from tests.faults.cell import NEVER_GOOD_ENOUGH
 from tests.faults.interception import Call
 from tests.faults.killing import KILLED, finish
 from tests.faults.promises import require_identical
@@ -41,18 +40,17 @@ class Cutter:
     def __init__(self, program: Any, new_site: Any, whole: Any, case: Any) -> None:
         self._program, self._new_site, self._case = program, new_site, case
         self._whole = whole
-        self._after = (whole.folder.path / "config-after").read_bytes()
+        self._after = whole.config_lent or whole.config_after
 
     def cut(self, number: int, step: str) -> str:
         """What the config is afterwards: old or new, and whether a temporary was left."""
-        code = self._whole.ended.code
-        site = self._new_site(NEVER_GOOD_ENOUGH if code else {})
+        site = self._new_site(*self._whole.changes)
         assert self._program.run(site, failing={"at": number}).code == KILLED
         config = site.config.read_bytes()
         assert config in {self._whole.config_before, self._after}
         found = "new config" if config == self._after else "old config"
         left = bool(site.beside_the_config())
-        finish(self._program, site, code=code)
+        finish(self._program, site, code=self._whole.ended.code)
         require_identical(site, self._whole.site)
         self._case("killed in a config write", step, f"{found}, way back kept")
         return f"{found}, leftover" if left else found
@@ -70,7 +68,20 @@ def test_it_dies_before_the_replacement(program: Any, new_site: Any, undisturbed
 def test_it_dies_at_every_call(program: Any, new_site: Any, rolled_back: Any, case: Any) -> None:
     cutter = Cutter(program, new_site, rolled_back, case)
     committing, rolling_back = writes_of_the_config(rolled_back.ended.calls)
-    found = [cutter.cut(number, "committing") for number in committing]
+    require_cut_everywhere(cutter, committing, "committing", rolling_back, "rolling back")
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(3600)
+def test_it_dies_at_every_call_of_a_lending(program: Any, new_site: Any, lent: Any, case: Any) -> None:
+    cutter = Cutter(program, new_site, lent, case)
+    lending, taking_back, _ = writes_of_the_config(lent.ended.calls)
+    require_cut_everywhere(cutter, lending, "lending", taking_back, "taking back")
+
+
+def require_cut_everywhere(cutter: Cutter, there: range, to: str, back_again: range, back: str) -> None:
+    found = [cutter.cut(number, to) for number in there]
     assert found == sorted(found, key=["old config", "old config, leftover", "new config"].index)
-    found = [cutter.cut(number, "rolling back") for number in rolling_back]
+    assert {"old config", "old config, leftover", "new config"} == set(found)
+    found = [cutter.cut(number, back) for number in back_again]
     assert {"new config", "new config, leftover", "old config"} == set(found)

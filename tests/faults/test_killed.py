@@ -7,7 +7,6 @@ from typing import Any
 
 import pytest
 
-from tests.faults.cell import NEVER_GOOD_ENOUGH
 from tests.faults.killing import KILLED, after, finish, history_of, places, within
 from tests.faults.matrix import step_of
 from tests.faults.promises import require_identical
@@ -74,10 +73,26 @@ def test_a_run_that_is_taken_back_is_taken_back_after_every_kill(
 ) -> None:
     history = rolled_back.history
     for records in range(places(history)["committing"], len(history) + 1):
-        site = new_site(NEVER_GOOD_ENOUGH)
+        site = new_site(*rolled_back.changes)
         assert program.run(site, **after(records)).code == KILLED
         step = step_of(history_of(site))
         outcome = finish(program, site, code=1)
         require_identical(site, rolled_back.site)
         assert site.config.read_bytes() == rolled_back.config_before
         case("killed after a record, bad result", step, outcome)
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(3600)
+def test_what_was_lent_is_taken_back_after_every_kill(
+    program: Any, new_site: Any, lent: Any, case: Any
+) -> None:
+    begun = places(lent.history)
+    for first in (begun["lending"], begun["taking back"]):
+        for records in range(first - 1, first + 4):
+            site = new_site(*lent.changes)
+            assert program.run(site, **after(records)).code == KILLED
+            step = step_of(history_of(site))
+            outcome = finish(program, site)
+            require_identical(site, lent.site)
+            case("killed after a record, lending", step, outcome)

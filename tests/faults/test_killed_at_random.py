@@ -15,20 +15,33 @@ INSTANTS = 200
 SAMPLE = 2
 
 
+SOONER = 0.95
+
+
 @pytest.mark.parametrize(
     "number", [SAMPLE, pytest.param(INSTANTS, marks=[pytest.mark.slow, pytest.mark.timeout(3600)])]
 )
 def test_at_any_instant(number: int, program: Any, new_site: Any, undisturbed: Any, case: Any) -> None:
-    for seconds in instants(number, undisturbed.seconds):
-        site = new_site()
-        ended = program.run(site, die_after_s=seconds)
-        assert ended.code in {KILLED, 0}, ended.words
+    duration_s = undisturbed.seconds
+    for share in instants(number):
+        site, duration_s = killed(program, new_site, share, duration_s)
         step = step_of(history_of(site))
         case("killed at a random instant", step, finish(program, site))
         require_identical(site, undisturbed.site)
 
 
-def instants(number: int, duration_s: float) -> list[float]:
-    """Evenly over the time that a run takes here and now, each moved at random."""
+def instants(number: int) -> list[float]:
+    """Evenly over the time that a run takes, as shares of it, each moved at random."""
     chance = random.Random(number)
-    return [duration_s * (place + chance.random()) / number for place in range(number)]
+    return [(place + chance.random()) / number for place in range(number)]
+
+
+def killed(program: Any, new_site: Any, share: float, duration_s: float) -> tuple[Any, float]:
+    """A run killed at an instant of it; and how long a run takes, less if it was over already then."""
+    while True:
+        site = new_site()
+        ended = program.run(site, die_after_s=share * duration_s)
+        if ended.code == KILLED:
+            return site, duration_s
+        assert ended.code == 0, ended.words
+        duration_s *= SOONER

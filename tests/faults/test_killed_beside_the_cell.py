@@ -5,6 +5,7 @@ from __future__ import annotations
 import subprocess
 import sys
 from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import pytest
@@ -12,14 +13,16 @@ import pytest
 from tests.faults.cell import Site
 from tests.faults.conftest import ROOT
 from tests.faults.killing import KILLED, after, finish, history_of, places
-from tests.faults.matrix import step_of
+from tests.faults.matrix import STEPS, step_of
 from tests.faults.promises import require_identical
 
+STEPS_OF_A_RUN = [step for step in STEPS if step not in {"beginning", "revisiting", "ending"}]
+"""Those that begin in a run that nothing has disturbed yet."""
 
-@pytest.fixture
-def served(new_site: Any) -> Iterator[Site]:
-    """A cell that another process serves; its site's cell file leads there."""
-    site = new_site()
+
+@contextmanager
+def served(site: Site) -> Iterator[None]:
+    """Have another process serve the site's cell; its cell file leads there."""
     own = site.folder / "own.toml"
     site.cell_path.rename(own)
     with subprocess.Popen(
@@ -28,28 +31,33 @@ def served(new_site: Any) -> Iterator[Site]:
         stderr=subprocess.PIPE,
         text=True,
     ) as process:
-        assert process.stderr is not None
-        assert "serving" in process.stderr.readline()
-        own.unlink()
-        yield site
-        process.terminate()
+        try:
+            assert process.stderr is not None
+            assert "serving" in process.stderr.readline()
+            own.unlink()
+            yield
+        finally:
+            process.terminate()
 
 
-def run_over_killed(records: int, program: Any, site: Site, undisturbed: Any, case: Any) -> None:
-    assert program.run(site, **after(records)).code == KILLED
-    step = step_of(history_of(site))
-    case("killed beside a living cell", step, finish(program, site))
-    require_identical(site, undisturbed.site)
+def run_over_killed(records: int, program: Any, site: Site, whole: Any, case: Any) -> None:
+    with served(site):
+        assert program.run(site, **after(records)).code == KILLED
+        step = step_of(history_of(site))
+        outcome = finish(program, site, code=whole.ended.code)
+        require_identical(site, whole.site)
+        case("killed beside a living cell", step, outcome)
 
 
-def test_in_a_set(program: Any, served: Site, undisturbed: Any, case: Any) -> None:
-    run_over_killed(places(undisturbed.history)["sampling"] + 20, program, served, undisturbed, case)
+def test_in_a_set(program: Any, new_site: Any, undisturbed: Any, case: Any) -> None:
+    records = places(undisturbed.history)["sampling"] + 20
+    run_over_killed(records, program, new_site(), undisturbed, case)
 
 
 @pytest.mark.slow
 @pytest.mark.timeout(600)
-@pytest.mark.parametrize(
-    "step", ["to reference", "to orientation", "closing", "held-out", "committing", "after"]
-)
-def test_at_each_kind_of_step(step: str, program: Any, served: Site, undisturbed: Any, case: Any) -> None:
-    run_over_killed(places(undisturbed.history)[step], program, served, undisturbed, case)
+@pytest.mark.parametrize("step", STEPS_OF_A_RUN)
+def test_at_each_kind_of_step(step: str, program: Any, new_site: Any, whole_with: Any, case: Any) -> None:
+    whole = whole_with(step)
+    records = places(whole.history)[step]
+    run_over_killed(records, program, new_site(*whole.changes), whole, case)

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from hexacell.controller_config.native_toml import NativeToml
-from hexacell.errors import DeviceError, ExitCode, HexacellError, Interruption
+from hexacell.errors import DeviceError, ExitCode, FileError, HexacellError, Interruption
 from hexacell.geometry import Geometry
 from procedures import events
 from procedures.commands import Abort
-from procedures.journal import read_journal
+from procedures.journal import Journal, read_journal
 from procedures.state import fold
 from procedures.steps import Compute
 
@@ -165,3 +165,27 @@ async def test_a_controller_that_does_not_take_it_leaves_the_config_as_it_was(ri
     with pytest.raises(HexacellError, match="did not take the provisional geometry"):
         await rig.run()
     assert rig.config == before
+
+
+@pytest.mark.parametrize("comes_back", [True, False])
+async def test_what_was_lent_and_cannot_be_noted_is_taken_back_or_said(
+    rig, monkeypatch, comes_back: bool
+) -> None:
+    before, append = rig.config, Journal.append
+
+    def full(self: Journal, event: events.Event) -> None:
+        if isinstance(event, events.Lent):
+            if not comes_back:
+                rig.controller.failures["reload"] = DeviceError("is deaf", subject="controller")
+            raise FileError("the disk is full", subject=self.path)
+        append(self, event)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Journal, "append", full)
+        with pytest.raises(HexacellError, match="the disk is full") as failure:
+            await rig.run()
+    said = "the controller has a provisional geometry, which could be neither noted nor taken back"
+    assert (said in str(failure.value)) is not comes_back
+    assert rig.config == before
+    rig.controller.failures.clear()
+    await require_finished(rig)

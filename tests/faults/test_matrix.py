@@ -1,0 +1,38 @@
+"""The matrix knows every step there is, and counts only what was tried."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import get_args
+
+import pytest
+
+from procedures import events
+from procedures.steps import Compute
+from tests.faults.killing import KILLED
+from tests.faults.matrix import STEPS, Case, step_of, table
+from tests.faults.test_killed_at_random import killed
+
+
+@pytest.mark.parametrize("kind", get_args(Compute.model_fields["kind"].annotation))
+def test_every_computation_has_a_column(kind: str) -> None:
+    assert step_of([events.StepBegun(step=Compute(kind=kind))]) in STEPS
+
+
+def test_all_cases_are_counted() -> None:
+    tried = [Case("killed", "sampling", "resumed"), Case("killed", "ending", "over")]
+    assert table([*tried, tried[0]]).splitlines()[-1] == "3 cases"
+
+
+def test_a_run_that_was_over_was_not_killed() -> None:
+    codes, instants = [0, 0, KILLED], []
+
+    def program(_: object, die_after_s: float) -> SimpleNamespace:
+        instants.append(die_after_s)
+        return SimpleNamespace(code=codes.pop(0), words="")
+
+    _, duration_s = killed(SimpleNamespace(run=program), lambda: "site", 0.5, 10.0)
+    assert not codes
+    assert instants == sorted(instants, reverse=True)
+    assert instants[-1] == pytest.approx(0.5 * duration_s)
+    assert duration_s < 10.0

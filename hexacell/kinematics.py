@@ -27,6 +27,9 @@ ON_THE_WAY_MM = 1e-3
 """Between two stages of a continuation: near enough to begin the next one."""
 
 NEWTON_STEPS = 12
+STAGE_STEPS = 6
+"""In one stage of a continuation. What takes more is better served by shorter stages."""
+
 LONGEST_STEP_MM = 60.0
 LARGEST_TURN = 0.5
 CONTINUATION_STAGES = (2, 8, 32)
@@ -165,12 +168,23 @@ def singularity_margin(mechanism: Mechanism, geometry: Geometry, poses: Poses, j
 def keeps_margin(
     mechanism: Mechanism, geometry: Geometry, poses: Poses, joints: Array, margin: float
 ) -> Mask:
-    """Whether :func:`singularity_margin` is at least ``margin`` at each of n poses, in less time.
+    """Whether :func:`singularity_margin` is at least ``margin`` at each of n poses, in less time."""
+    return _keeps_margin(_dimensionless(mechanism, geometry, poses, joints), margin)
 
-    The norm of the inverse bounds the smallest singular value from both sides; only what lies between
-    needs the value itself.
-    """
+
+def margin_and_mode(
+    mechanism: Mechanism, geometry: Geometry, poses: Poses, joints: Array, margin: float
+) -> tuple[Mask, Array]:
+    """:func:`keeps_margin`, and the :func:`assembly_mode` of each of n poses."""
     jacobian = _dimensionless(mechanism, geometry, poses, joints)
+    return _keeps_margin(jacobian, margin), assembly_mode(jacobian)
+
+
+def _keeps_margin(jacobian: Array, margin: float) -> Mask:
+    """By the norm of the inverse, which bounds the smallest singular value from both sides.
+
+    Only what lies between needs the value itself.
+    """
     try:
         inverse_norm = np.linalg.norm(np.linalg.inv(jacobian), axis=(-2, -1))
     except np.linalg.LinAlgError:
@@ -208,7 +222,7 @@ def _staged(
         geometry = geometries[0].toward(geometries[1], fraction)
         now = (1.0 - fraction) * joints[0][rows] + fraction * joints[1][rows]
         close_mm = CONVERGED_MM if stage == stages else ON_THE_WAY_MM
-        result = _newton(mechanism, geometry, now, poses[rows], mode[rows], close_mm)
+        result = _newton(mechanism, geometry, now, poses[rows], mode[rows], close_mm, STAGE_STEPS)
         poses = _replace(poses, rows, result.poses)
         # Those that failed are not led on: they would cost more than all the others.
         rows = rows[result.found]
@@ -223,14 +237,15 @@ def _newton(
     joints: Array,
     start: Poses,
     mode: Array,
-    close_mm: float = CONVERGED_MM,
+    close_mm: float,
+    steps: int = NEWTON_STEPS,
 ) -> Forward:
     """Newton's method on each pose, every step bounded; poses that close are left as they are."""
     positions, orientation = np.array(start.positions), np.array(start.rotations)
     found = np.zeros(len(joints), dtype=bool)
     rows, poses = np.arange(len(joints)), start
     error, jacobian = mechanism.closure(geometry, poses, joints)
-    for left in range(NEWTON_STEPS, -1, -1):
+    for left in range(steps, -1, -1):
         largest = np.abs(error).max(axis=-1, initial=0.0)
         # One that is out of reach has no number for an error, and is not open either.
         is_open = largest >= close_mm if left else np.zeros(len(rows), dtype=bool)

@@ -17,6 +17,9 @@ Array = NDArray[np.floating[Any]]
 Mask = NDArray[np.bool_]
 
 
+_IDENTITY = np.eye(3)
+
+
 def from_angles(angles: ArrayLike) -> Array:
     """Rotation matrices (..., 3, 3) of the angles a, b, c (..., 3), rad."""
     angles = np.asarray(angles, dtype=float)
@@ -62,7 +65,7 @@ def from_vector(vector: ArrayLike) -> Array:
     quadratic = 0.5 * quotient**2
     rotation: Array = (quotient * np.cos(half)) * skew(vector)
     rotation += quadratic * (vector[..., :, None] * vector[..., None, :])
-    rotation += (1.0 - quadratic * squared) * np.eye(3)
+    rotation += (1.0 - quadratic * squared) * _IDENTITY
     return rotation
 
 

@@ -96,9 +96,9 @@ def standing(knowledge: Knowledge, targets: Poses, mode: Array | None = None) ->
     targets, joints = targets[rows], joints[rows]
     margin = knowledge.limits.singularity_margin
     arguments = (knowledge.mechanism, knowledge.estimate, targets, joints)
-    clear = kinematics.keeps_margin(*arguments, margin)
+    clear, modes = kinematics.margin_and_mode(*arguments, margin)
     if mode is not None:
-        clear &= kinematics.assembly_mode(kinematics.pose_jacobian(*arguments)) == mode
+        clear &= modes == mode
     return Standing(targets, joints)[clear]
 
 

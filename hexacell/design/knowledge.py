@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -23,7 +24,7 @@ class Limits:
     singularity_margin: float
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Knowledge:
     """The estimate and its covariance beside the geometry that the controller commands with.
 
@@ -47,7 +48,7 @@ class Knowledge:
         """(42, p), from free parameters to all of them."""
         return self.mechanism.convention.basis()
 
-    @property
+    @cached_property
     def estimate(self) -> Geometry:
         """The estimated geometry."""
         return Geometry.from_vector(self.basis @ np.asarray(self.free))

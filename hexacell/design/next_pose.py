@@ -22,9 +22,11 @@ from hexacell.rotations import Array, Mask
 NEAR_SHARE = 0.4
 """Of the travel. What stays within it does so even if the prediction is twice as wrong as it says."""
 
-AT_ONCE = (10, 20, 40, 80, 90)
-"""Candidates looked at closely, the best first: so many at once, then so many, as one of the first will
-mostly do."""
+MOST = 240
+COMMANDED = 30
+AT_ONCE = 10
+"""Candidates that are tried, the best first; for so many at a time the command is searched, and for so
+many the way, as one of the first will mostly do."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -72,10 +74,11 @@ def choose(
     worth = goal.worth(knowledge.covariance, offered.change, offered.noise)
     rows = np.flatnonzero(offered.within(TRAVEL_SHARE * knowledge.limits.gauge_travel_mm))
     leave = Departure(knowledge, at.command(knowledge) if start is None else start, home, at.reference)
-    for some in _a_few_at_once(rows[np.argsort(-worth[rows], kind="stable")]):
+    for some in _in_portions(rows[np.argsort(-worth[rows], kind="stable")][:MOST], COMMANDED):
         commands, held = commanded(knowledge, offered.stands[some])
-        if choice := _first_safe(knowledge, at, offered[some[held]], commands[held], leave):
-            return choice
+        for few in _in_portions(np.flatnonzero(held), AT_ONCE):
+            if choice := _first_safe(knowledge, at, offered[some[few]], commands[few], leave):
+                return choice
     raise LimitError("no orientation surely keeps the ball inside the gauges' travel")
 
 
@@ -143,5 +146,5 @@ def _choice(knowledge: Knowledge, one: Offer, command: Pose, stops: tuple[Pose, 
     return Choice(command, one.stands.joints[0], one.deviation[0], one.sigma[0], float(gain[0]), stops)
 
 
-def _a_few_at_once(rows: NDArray[np.intp]) -> Iterator[NDArray[np.intp]]:
-    return (some for some in np.split(rows, np.cumsum(AT_ONCE))[:-1] if len(some))
+def _in_portions(rows: NDArray[np.intp], size: int) -> Iterator[NDArray[np.intp]]:
+    return (rows[first : first + size] for first in range(0, len(rows), size))

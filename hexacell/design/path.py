@@ -121,9 +121,9 @@ def _clear_of_singularities(
     arguments = (knowledge.mechanism, geometry, ways.lines(rows).flat(), joints[:, rows].reshape(-1, 6))
     shape = (len(joints), len(rows))
     # Between two of the poses looked at a singularity may lie unseen; beyond it the mode is another.
-    mode = kinematics.assembly_mode(kinematics.pose_jacobian(*arguments)).reshape(shape)
-    keeps = kinematics.keeps_margin(*arguments, MARGIN_SHARE * knowledge.limits.singularity_margin)
-    clear: Mask = np.all(keeps.reshape(shape) & (mode == mode[:1]), axis=0)
+    least = MARGIN_SHARE * knowledge.limits.singularity_margin
+    keeps, mode = (found.reshape(shape) for found in kinematics.margin_and_mode(*arguments, least))
+    clear: Mask = np.all(keeps & (mode == mode[:1]), axis=0)
     return clear
 
 

@@ -73,7 +73,12 @@ def test_a_way_back_over_stops_is_gone_stop_by_stop(make_rig, story, monkeypatch
     assert step.key == "P1/o00/move"
     assert step.pose == pytest.approx(stop.as_tuple())
     asked: list[Any] = []
-    monkeypatch.setattr(route_module, "is_clear", lambda *line: bool(asked.append(line) or True))
+
+    def is_clear(*line: Any) -> bool:
+        asked.append(line)
+        return True
+
+    monkeypatch.setattr(route_module, "is_clear", is_clear)
     step = calibration.next_step(fold([*happened, story().arrived(0, step.pose)]))
     assert step.key == "P1/o01/move"
     assert len(asked) == 1

@@ -13,39 +13,37 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from hexacell import rotations
 from hexacell.errors import ReachError
 from hexacell.geometry import Geometries, Geometry
 from hexacell.mechanisms.base import Branch, Mechanism
+from hexacell.newton import (
+    CONVERGED_MM,
+    ON_THE_WAY_MM,
+    STAGE_STEPS,
+    Forward,
+    assembly_mode,
+    moved,
+    newton,
+)
 from hexacell.pose import Poses
 from hexacell.rotations import Array, Mask
 
-CONVERGED_MM = 1e-10
-"""Constraints below this count as closed: legs are a metre, and doubles carry 16 digits."""
+__all__ = [
+    "Forward",
+    "Sensitivity",
+    "assembly_mode",
+    "follow",
+    "forward",
+    "inverse",
+    "keeps_margin",
+    "margin_and_mode",
+    "moved",
+    "pose_jacobian",
+    "sensitivity",
+    "singularity_margin",
+]
 
-ON_THE_WAY_MM = 1e-3
-"""Between two stages of a continuation: near enough to begin the next one."""
-
-NEWTON_STEPS = 12
-STAGE_STEPS = 6
-"""In one stage of a continuation. What takes more is better served by shorter stages."""
-
-LONGEST_STEP_MM = 60.0
-LARGEST_TURN = 0.5
 CONTINUATION_STAGES = (2, 8, 32)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Forward:
-    """Poses found by forward kinematics, and which of them can be trusted.
-
-    Attributes:
-        poses: n poses; where ``found`` is false, the last iterate.
-        found: (n,) bool: converged to rounding, on the assembly mode it started from.
-    """
-
-    poses: Poses
-    found: Mask
 
 
 def inverse(mechanism: Mechanism, geometry: Geometry, branch: Branch, poses: Poses) -> Array:
@@ -77,13 +75,7 @@ def forward(
     """
     if mode is None:
         mode = assembly_mode(mechanism.closure(geometry, start, joints)[1])
-    return _newton(mechanism, geometry, joints, start, mode, close_mm)
-
-
-def assembly_mode(pose_jacobian: Array) -> Array:
-    """The sign (n,) of the determinant of pose Jacobians (n, 6, 6): it changes at a singularity."""
-    signs: Array = np.sign(np.linalg.det(pose_jacobian))
-    return signs
+    return newton(mechanism, geometry, joints, start, mode, close_mm)
 
 
 def follow(
@@ -202,11 +194,6 @@ def _dimensionless(mechanism: Mechanism, geometry: Geometry, poses: Poses, joint
     return scaled
 
 
-def moved(poses: Poses, step: Array) -> Poses:
-    """Poses after steps (n, 6): positions, mm, then rotation vectors in the base frame, rad."""
-    return Poses(poses.positions + step[..., :3], rotations.from_vector(step[..., 3:]) @ poses.rotations)
-
-
 def _staged(
     mechanism: Mechanism,
     geometries: tuple[Geometry, Geometry],
@@ -222,59 +209,13 @@ def _staged(
         geometry = geometries[0].toward(geometries[1], fraction)
         now = (1.0 - fraction) * joints[0][rows] + fraction * joints[1][rows]
         close_mm = CONVERGED_MM if stage == stages else ON_THE_WAY_MM
-        result = _newton(mechanism, geometry, now, poses[rows], mode[rows], close_mm, STAGE_STEPS)
+        result = newton(mechanism, geometry, now, poses[rows], mode[rows], close_mm, STAGE_STEPS)
         poses = _replace(poses, rows, result.poses)
         # Those that failed are not led on: they would cost more than all the others.
         rows = rows[result.found]
     found = np.zeros(len(start), dtype=bool)
     found[rows] = True
     return Forward(poses, found)
-
-
-def _newton(
-    mechanism: Mechanism,
-    geometry: Geometry | Geometries,
-    joints: Array,
-    start: Poses,
-    mode: Array,
-    close_mm: float,
-    steps: int = NEWTON_STEPS,
-) -> Forward:
-    """Newton's method on each pose, every step bounded; poses that close are left as they are."""
-    positions, orientation = np.array(start.positions), np.array(start.rotations)
-    found = np.zeros(len(joints), dtype=bool)
-    rows, poses = np.arange(len(joints)), start
-    error, jacobian = mechanism.closure(geometry, poses, joints)
-    for left in range(steps, -1, -1):
-        largest = np.abs(error).max(axis=-1, initial=0.0)
-        # One that is out of reach has no number for an error, and is not open either.
-        is_open = largest >= close_mm if left else np.zeros(len(rows), dtype=bool)
-        if not is_open.all():
-            ended = ~is_open
-            at = rows[ended]
-            positions[at], orientation[at] = poses.positions[ended], poses.rotations[ended]
-            closed = largest[ended] < close_mm
-            found[at[closed]] = assembly_mode(jacobian[ended][closed]) == mode[at[closed]]
-            rows, poses, joints = rows[is_open], poses[is_open], joints[is_open]
-            error, jacobian = error[is_open], jacobian[is_open]
-            if isinstance(geometry, Geometries):
-                geometry = geometry[np.flatnonzero(is_open)]
-        if not len(rows):
-            break
-        poses = moved(poses, _step(jacobian, error))
-        error, jacobian = mechanism.closure(geometry, poses, joints)
-    return Forward(Poses(positions, orientation), found)
-
-
-def _step(jacobian: Array, error: Array) -> Array:
-    try:
-        step = -np.linalg.solve(jacobian, error[..., None])[..., 0]
-    except np.linalg.LinAlgError:
-        step = -(np.linalg.pinv(jacobian) @ error[..., None])[..., 0]
-    travel, turn = step[..., :3] / LONGEST_STEP_MM, step[..., 3:] / LARGEST_TURN
-    too_long = np.sqrt(np.maximum(np.sum(travel * travel, axis=-1), np.sum(turn * turn, axis=-1)))
-    shortened: Array = step / np.maximum(1.0, too_long)[..., None]
-    return shortened
 
 
 def _replace(poses: Poses, rows: NDArray[np.intp], new: Poses) -> Poses:

@@ -108,7 +108,9 @@ def follow(
     return Forward(poses, found)
 
 
-def pose_jacobian(mechanism: Mechanism, geometry: Geometry, poses: Poses, joints: Array) -> Array:
+def pose_jacobian(
+    mechanism: Mechanism, geometry: Geometry | Geometries, poses: Poses, joints: Array
+) -> Array:
     """Derivatives (n, 6, 6) of the constraints by position, mm, and rotation vector, rad."""
     return mechanism.closure(geometry, poses, joints)[1]
 
@@ -158,7 +160,7 @@ def singularity_margin(mechanism: Mechanism, geometry: Geometry, poses: Poses, j
 
 
 def keeps_margin(
-    mechanism: Mechanism, geometry: Geometry, poses: Poses, joints: Array, margin: float
+    mechanism: Mechanism, geometry: Geometry | Geometries, poses: Poses, joints: Array, margin: float
 ) -> Mask:
     """Whether :func:`singularity_margin` is at least ``margin`` at each of n poses, in less time."""
     return _keeps_margin(_dimensionless(mechanism, geometry, poses, joints), margin)
@@ -187,10 +189,13 @@ def _keeps_margin(jacobian: Array, margin: float) -> Mask:
     return keeps
 
 
-def _dimensionless(mechanism: Mechanism, geometry: Geometry, poses: Poses, joints: Array) -> Array:
+def _dimensionless(
+    mechanism: Mechanism, geometry: Geometry | Geometries, poses: Poses, joints: Array
+) -> Array:
     """The pose Jacobian with rotations scaled by the platform's mean radius."""
     scaled = pose_jacobian(mechanism, geometry, poses, joints).copy()
-    scaled[..., 3:] /= np.mean(np.linalg.norm(geometry.B, axis=-1))
+    radius = np.mean(np.linalg.norm(geometry.B, axis=-1), axis=-1)
+    scaled[..., 3:] /= np.reshape(radius, (-1, 1, 1))
     return scaled
 
 

@@ -213,7 +213,9 @@ class Calibration:
     def _lends(self, state: RunState) -> bool:
         """Whether the controller is to be lent a geometry now, between two points."""
         allowed = self.settings.identification.provisional and not state.lending
-        return allowed and any(measured.closed for measured in state.sets.values())
+        if not allowed or not any(measured.closed for measured in state.sets.values()):
+            return False
+        return self.plan.may_lend(self._situation(state, None))
 
     def _in_set(self, state: RunState, key: SetKey) -> Step | None:
         """What is to be done in a set that is begun before anything new is planned there."""

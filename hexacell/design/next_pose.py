@@ -20,7 +20,8 @@ from hexacell.pose import Pose, Poses
 from hexacell.rotations import Array, Mask
 
 NEAR_SHARE = 0.4
-"""Of the travel. What stays within it does so even if the prediction is twice as wrong as it says."""
+"""Of the travel. What stays within it does so even if the prediction is twice as wrong as it says: it
+is not, once the platform's orientation is known to a few degrees."""
 
 MOST = 240
 COMMANDED = 30
@@ -116,7 +117,7 @@ def _first_safe(
     if not len(offered):
         return None
     ways, near = leave.to(commands), NEAR_SHARE * knowledge.limits.gauge_travel_mm
-    safe = is_near = offered.within(near)
+    safe = is_near = offered.within(near) & _is_known(knowledge, at)
     if not is_near.all():
         safe = is_near | _surely_inside(knowledge, at, offered.stands)
 
@@ -134,6 +135,11 @@ def _first_safe(
         return None
     stops = ways.passage(first).stops
     return _choice(knowledge, offered[np.array([first])], commands.pose(first), stops)
+
+
+def _is_known(knowledge: Knowledge, at: Station) -> bool:
+    """Whether the platform's orientation is known so well that straight error propagation holds nearby."""
+    return bool(second_order.turn_sigma(knowledge, at.stand) <= second_order.LITTLE_KNOWN)
 
 
 def _surely_inside(knowledge: Knowledge, at: Station, stands: Standing) -> Mask:

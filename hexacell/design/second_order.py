@@ -7,6 +7,7 @@ each is asked where it would really go.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
@@ -15,11 +16,20 @@ from hexacell import kinematics
 from hexacell.design.candidates import Standing
 from hexacell.design.knowledge import Knowledge
 from hexacell.geometry import Geometries
-from hexacell.kinematics import Forward, Sensitivity
+from hexacell.kinematics import Sensitivity
 from hexacell.pose import Poses
 from hexacell.rotations import Array, Mask
 
 ROBOTS = 24
+MANY_ROBOTS = 240
+LITTLE_KNOWN = np.radians(3.0)
+"""Uncertainty of the platform's orientation beyond which many robots are drawn. Under the drawing's
+tolerances one robot in a hundred then strays twenty times as far as straight propagation says."""
+
+NEARLY_ALL_SHARE = 0.4
+"""Of the travel. Nearly all of many robots, all but the worst, stay within it: of 1,000 others none left
+the travel."""
+
 FEWEST = 6
 """Robots that can stand at the reference; of fewer nothing can be said."""
 
@@ -45,32 +55,78 @@ def inside(knowledge: Knowledge, reference_joints: Array, reference: Poses, stan
     # The reference is where the records of its point say it was, which is not quite where it closes.
     poses = kinematics.forward(knowledge.mechanism, knowledge.estimate, joints, poses).poses
     known = kinematics.sensitivity(knowledge.mechanism, knowledge.estimate, poses, joints)
-    changes = _draws(len(knowledge.free)) @ np.linalg.cholesky(knowledge.covariance).T @ knowledge.basis.T
-    drawn = _drawn(knowledge, changes, joints, poses, known)
-    found = drawn.found.reshape(len(changes), -1)
-    positions = drawn.poses.positions.reshape(len(changes), -1, 3)[found[:, 0]]
-    possible = np.all(found[found[:, 0]], axis=0)[1:]
+    turn = _turn_sigma(knowledge, known)
+    if turn > LITTLE_KNOWN:
+        return _nearly_all_near(_drawn(knowledge, MANY_ROBOTS, joints, poses, known), knowledge)
+    drawn = _drawn(knowledge, ROBOTS, joints, poses, known)
+    stays: Mask = np.all(drawn.found, axis=0)
+    travel = knowledge.limits.gauge_travel_mm / (1.0 + turn / HALF_AT)
+    stays &= _all_inside(drawn.deviations, travel)
+    return stays
+
+
+def turn_sigma(knowledge: Knowledge, stands: Standing) -> float:
+    """How surely the platform's orientation is known at the first of some poses: one sigma, rad.
+
+    About the base axis about which it is known least.
+    """
+    known = kinematics.sensitivity(knowledge.mechanism, knowledge.estimate, stands.targets, stands.joints)
+    return _turn_sigma(knowledge, known)
+
+
+def _turn_sigma(knowledge: Knowledge, known: Sensitivity) -> float:
     turned = known.parameters[0, 3:] @ knowledge.basis
-    uncertain = np.sqrt(np.einsum("ip,pq,iq->i", turned, knowledge.covariance, turned).max())
-    travel = knowledge.limits.gauge_travel_mm / (1.0 + uncertain / HALF_AT)
-    inside: Mask = possible & _all_inside(positions[:, 1:] - positions[:, :1], travel)
-    return inside
+    return float(np.sqrt(np.einsum("ip,pq,iq->i", turned, knowledge.covariance, turned).max()))
 
 
-def _drawn(
-    knowledge: Knowledge, changes: Array, joints: Array, poses: Poses, known: Sensitivity
-) -> Forward:
-    """Where robots whose parameters differ by ``changes`` (r, 42), mm, stand: (r n) poses."""
-    robots, count = len(changes), len(joints)
+@dataclass(frozen=True, slots=True, eq=False)
+class _Drawn:
+    """Robots (r) that can stand at the reference, asked for n poses.
+
+    Attributes:
+        found: (r, n) whether they can take them; ``deviations`` (r, n, 3), mm.
+    """
+
+    found: Mask
+    deviations: Array
+
+
+def _drawn(knowledge: Knowledge, robots: int, joints: Array, poses: Poses, known: Sensitivity) -> _Drawn:
+    """Where robots drawn from what is known stand; the first of the poses is the reference."""
+    root = np.linalg.cholesky(knowledge.covariance)
+    changes = _draws(robots, len(knowledge.free)) @ root.T @ knowledge.basis.T
+    count = len(joints)
     steps = np.einsum("nip,rp->rni", known.parameters, changes).reshape(-1, 6)
     again = np.tile(np.arange(count), robots)
-    return kinematics.forward(
+    geometries = Geometries.from_vectors((knowledge.estimate.vector() + changes).repeat(count, axis=0))
+    result = kinematics.forward(
         knowledge.mechanism,
-        Geometries.from_vectors((knowledge.estimate.vector() + changes).repeat(count, axis=0)),
+        geometries,
         joints[again],
         kinematics.moved(poses[again], steps),
         mode=known.mode[again],
     )
+    found = result.found.reshape(robots, count)
+    first = np.arange(robots) * count
+    # One that would stand next to a singularity there is refused before anything moves.
+    stands = found[:, 0] & kinematics.keeps_margin(
+        knowledge.mechanism,
+        geometries[first],
+        result.poses[first],
+        joints[np.zeros(robots, dtype=int)],
+        knowledge.limits.singularity_margin,
+    )
+    positions = result.poses.positions.reshape(robots, count, 3)[stands]
+    return _Drawn(found[stands, 1:], positions[:, 1:] - positions[:, :1])
+
+
+def _nearly_all_near(drawn: _Drawn, knowledge: Knowledge) -> Mask:
+    """Which of the poses all robots but the worst take without straying far."""
+    if len(drawn.found) < FEWEST:
+        return np.zeros(drawn.found.shape[1], dtype=bool)
+    farthest = np.where(drawn.found, np.abs(drawn.deviations).max(axis=-1), np.inf)
+    near: Mask = np.sort(farthest, axis=0)[-2] <= NEARLY_ALL_SHARE * knowledge.limits.gauge_travel_mm
+    return near
 
 
 def _all_inside(deviations: Array, travel_mm: float) -> Mask:
@@ -84,7 +140,7 @@ def _all_inside(deviations: Array, travel_mm: float) -> Mask:
 
 
 @lru_cache
-def _draws(count: int) -> Array:
+def _draws(robots: int, count: int) -> Array:
     """The same for every choice, so that a choice can be made again: (robots, count), antithetic."""
-    half = np.random.default_rng(0).standard_normal((ROBOTS // 2, count))
+    half = np.random.default_rng(0).standard_normal((robots // 2, count))
     return np.concatenate([half, -half])

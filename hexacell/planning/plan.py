@@ -13,8 +13,10 @@ from functools import cached_property
 import numpy as np
 
 from hexacell.cell.model import CellSettings
+from hexacell.design.candidates import Standing
 from hexacell.design.knowledge import Knowledge
 from hexacell.design.path import is_clear
+from hexacell.design.second_order import turn_sigma
 from hexacell.errors import IdentifiabilityError, LimitError
 from hexacell.identification.refusals import is_enough
 from hexacell.measurements import Joints
@@ -40,6 +42,10 @@ from hexacell.robot import Robot
 from hexacell.rotations import Array
 
 CANDIDATES = 1024
+LENT_TURN = float(np.radians(2.0))
+"""Uncertainty of the platform's orientation, rad, beyond which no geometry is lent: after a whole point
+it is below one degree, after two records seven."""
+
 REFUSALS = 3
 """Records of one point that may leave the travel before the point is given up."""
 
@@ -79,6 +85,14 @@ class Plan:
             IdentifiabilityError: they do not belong to it.
         """
         return self._tracker.known(situation.measurements)
+
+    def may_lend(self, situation: Situation) -> bool:
+        """Whether the robot is known well enough for the controller to command with the estimate."""
+        found = self.known(situation)
+        if found.estimate is None:
+            return False
+        stand = Standing(found.estimate.poses[[-1]], found.estimate.problem.joints[[-1]])
+        return turn_sigma(found.knowledge, stand) <= LENT_TURN
 
     def outlook(self, situation: Situation) -> Outlook | None:
         """What going on would gain; none where there are no task poses."""

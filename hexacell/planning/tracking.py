@@ -7,6 +7,7 @@ link saves its computation and changes nothing: without it the chain is computed
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,6 +15,7 @@ import numpy as np
 from hexacell.design.knowledge import Knowledge
 from hexacell.design.station import Station, station
 from hexacell.errors import LimitError
+from hexacell.geometry import Geometry
 from hexacell.identification.estimate import track
 from hexacell.identification.problem import Problem
 from hexacell.identification.result import Identification
@@ -23,6 +25,10 @@ from hexacell.robot import Robot
 
 IMPLAUSIBLE = 3.0
 """Times the number of residuals: a cost beyond it is looked into, from the drawing on."""
+
+BEGINNINGS = 12
+BEGINNINGS_SHARE = 0.5
+"""Of what the prior lets parameters differ, for other robots at which a search may begin."""
 
 FEW_RESIDUALS = 30.0
 """Added to their number, since few of them may be large by chance."""
@@ -79,13 +85,32 @@ def continued(problem: Problem, before: Identification | None) -> Identification
     if before is None or poses is None:
         return track(problem)
     found = track(problem, free=before.free, poses=poses)
+    for another in _begun_elsewhere(problem):
+        if _is_healthy(problem, found):
+            break
+        better = (another.records, -cost(another)) > (found.records, -cost(found))
+        found = another if better else found
+    return found
+
+
+def _is_healthy(problem: Problem, found: Identification) -> bool:
     residuals = 3 * (found.records - found.points)
-    healthy = found.converged and found.records == problem.records
-    if healthy and cost(found) <= IMPLAUSIBLE * residuals + FEW_RESIDUALS:
-        return found
-    anew = track(problem)
-    better = (anew.records, -cost(anew)) > (found.records, -cost(found))
-    return anew if better else found
+    plausible = cost(found) <= IMPLAUSIBLE * residuals + FEW_RESIDUALS
+    return found.converged and found.records == problem.records and plausible
+
+
+def _begun_elsewhere(problem: Problem) -> Iterator[Identification]:
+    """Searches from the drawing, and from robots that may have been built instead.
+
+    With few records one of these may lie beyond a singularity for all of them.
+    """
+    yield track(problem)
+    root = np.linalg.cholesky(problem.prior.covariance)
+    for draw in np.random.default_rng(0).standard_normal((BEGINNINGS, len(root))):
+        free = problem.begin + BEGINNINGS_SHARE * root @ draw
+        poses = problem.commands.followed(Geometry.from_vector(problem.basis @ free), problem.joints)
+        if poses.found.all():
+            yield track(problem, free=free, poses=poses.poses)
 
 
 def cost(found: Identification) -> float:

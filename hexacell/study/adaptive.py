@@ -29,7 +29,7 @@ class AdaptiveCampaign:
     """One campaign, from the first reference to the end of the plan.
 
     Attributes:
-        lend: whether the controller is lent the estimate after the first point.
+        lend: whether the controller is lent the estimate once the robot is known well enough.
         outside: records at which the ball left the travel; they are not taken.
         largest_mm: the largest deviation, of records taken or not.
         reason: why the plan ended.
@@ -123,7 +123,7 @@ class AdaptiveCampaign:
         self._back(reference)
         done = self.situation.done | {point}
         self.situation = Situation(self.situation.measurements, done=done)
-        if self.lend and not self.robot.lending:
+        if self.lend and not self.robot.lending and self._plan.may_lend(self.situation):
             self._lend()
 
     def _lend(self) -> None:

@@ -222,7 +222,7 @@ def test_points_are_chosen_by_what_they_tell_for_their_time(make_plan, carry_out
             identification__orientations=8,
             identification__choose_points=choose_points,
             identification__budget_records=16,
-            limits__tilt_deg=15.0,  # so that what one point can tell is soon told
+            limits__tilt_deg=20.0,  # so that what one point can tell is soon told
         )
 
     taken, in_order = (carry_out(plan(choose_points)) for choose_points in (True, False))
@@ -245,3 +245,13 @@ def test_dear_stations_are_left_later(make_plan, carry_out):
     left = next(one for one in taken if isinstance(one.decision, ClosePoint))
     assert "tells more in the same time" in left.decision.reason
     assert isinstance(plan(60.0).decide(left.situation), Visit)
+
+
+def test_nothing_is_lent_before_the_robot_is_known_well_enough(campaign, make_plan):
+    """Two records leave the orientation open by degrees: with such a geometry it would be led astray."""
+    plan = make_plan(identification__points=TWO_POINTS, identification__orientations=8)
+    by_records = {len(one.situation.measurements): one.situation for one in campaign}
+    assert not plan.may_lend(Situation())
+    assert not plan.may_lend(by_records[2])
+    assert plan.may_lend(by_records[8])
+    assert plan.may_lend(campaign[-1].situation)

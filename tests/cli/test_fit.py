@@ -41,7 +41,9 @@ def test_the_document_is_as_promised(typed, demo):
     outcome = typed("fit", demo.cell, "--measurements", demo.run / "measurements.csv", "--json")
     assert (outcome.code, outcome.err) == (0, "")
     document = outcome.document
-    assert (document["records"], document["points"], document["converged"]) == (55, 5, True)
+    # A set ends early where no orientation is surely safe any more, and the noise differs every time.
+    assert 50 <= document["records"] <= 55
+    assert (document["points"], document["converged"]) == (5, True)
     assert document["frame"] == "paper"
     assert document["undetermined"] == document["outliers"] == []
     covariance = np.array(document["covariance"])
@@ -49,14 +51,14 @@ def test_the_document_is_as_promised(typed, demo):
     assert covariance.shape == (42, 42)
     np.testing.assert_allclose(np.sqrt(np.diag(covariance)), sigma, rtol=1e-9)
     assert np.count_nonzero(sigma == 0.0) == 4
-    assert document["dof"] == 3 * 55 - 3 * 5 - 35
+    assert document["dof"] == 3 * document["records"] - 3 * 5 - 35
     assert 0.5 < document["chi2"] / document["dof"] < 1.5
 
 
 def test_words_have_a_line_for_every_free_parameter(typed_here, demo):
     outcome = typed_here("fit", demo.cell, "--measurements", demo.run / "measurements.csv")
     assert (outcome.code, outcome.err) == (0, "")
-    assert "35 parameters from 55 records at 5 points" in outcome.out
+    assert re.search(r"35 parameters from 5[0-5] records at 5 points", outcome.out)
     assert max(map(len, outcome.out.splitlines())) <= 80
     rows = re.findall(r"^([SB][1-6][xyz]|l[1-6]) +(\S+) +(\S+) +(\S+)", outcome.out, flags=re.MULTILINE)
     assert len({name for name, *_ in rows}) == len(rows) == 42 - 4

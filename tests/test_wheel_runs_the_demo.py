@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import subprocess
 import sys
 import sysconfig
@@ -93,8 +94,11 @@ print(json.dumps({"path": sys.path, "files": files, "plugins": plugins}))
 
 
 def check_demo(venv: Path, folder: Path, records: int) -> None:
+    """A set may end a record or two early, where no orientation is surely safe."""
     said = run(venv / "bin" / "hexacell", "demo", folder=folder).splitlines()
-    assert said[-1].startswith(f"35 parameters, {records} records at 5 points; mean deviation at held-out")
+    found = re.match(r"35 parameters, (\d+) records at 5 points; mean deviation at held-out", said[-1])
+    assert found
+    assert records - 5 <= int(found[1]) <= records
     assert said[-1].endswith(": pass")
     result = folder / "hexacell-demo" / "run" / "result.json"
     assert json.loads(result.read_text())["converged"] is True

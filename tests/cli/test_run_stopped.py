@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import shlex
 import shutil
 import signal
@@ -85,7 +86,7 @@ def test_a_calibration_is_stopped_and_finished(start, typed, quick_cell):
     # The simulated cell began anew with the process: its gauges stand elsewhere now, and are seen to.
     assert "point 2 is measured again: back at its reference the gauges show" in resumed.err
     assert resumed.document["run"] == str(run)
-    assert "35 parameters, 25 records at 5 points" in resumed.document["line"]
+    assert re.match(r"35 parameters, 2[0-5] records at 5 points", resumed.document["line"])
     assert quick_cell.controller.read_bytes() != config
     measured = Counter(
         event.at.point

@@ -20,8 +20,8 @@ from hexacell.pose import Pose, Poses
 from hexacell.rotations import Array, Mask
 
 NEAR_SHARE = 0.4
-"""Of the travel. What stays within it does so even if the prediction is twice as wrong as it says: it
-is not, once the platform's orientation is known to a few degrees."""
+"""Of the travel. What stays within it does so even if the prediction is twice as wrong as it says, which
+holds once the platform's orientation is known to a few degrees."""
 
 MOST = 240
 COMMANDED = 30

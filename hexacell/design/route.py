@@ -7,9 +7,8 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from hexacell import kinematics
 from hexacell.design.knowledge import Knowledge
-from hexacell.design.path import is_clear
+from hexacell.design.path import beginning, is_clear
 from hexacell.pose import Poses
 from hexacell.rotations import Array
 
@@ -31,16 +30,8 @@ def route(
 
 def ball_at(knowledge: Knowledge, command: Poses) -> Array | None:
     """Where the estimate says the ball is (3,), mm, at a commanded pose; nothing if it cannot say."""
-    joints = knowledge.mechanism.inverse(knowledge.controller, knowledge.branch, command)
-    really = kinematics.follow(
-        knowledge.mechanism,
-        knowledge.estimate,
-        joints,
-        start=command,
-        start_geometry=knowledge.controller,
-        start_joints=joints,
-    )
-    return np.asarray(really.poses.positions[0]) if really.found[0] else None
+    really = beginning(knowledge, command).really
+    return None if really is None else np.asarray(really.positions[0])
 
 
 def _fewest(

@@ -8,9 +8,8 @@ from itertools import combinations, pairwise
 
 import numpy as np
 
-from hexacell import kinematics
 from hexacell.design.knowledge import Knowledge
-from hexacell.design.path import is_clear
+from hexacell.design.path import beginning, is_clear
 from hexacell.design.station import Station, station
 from hexacell.errors import HexacellError, LimitError, ReachError, UsageError
 from hexacell.identification.result import UNDETERMINED_RATIO
@@ -197,18 +196,11 @@ def _refusal(plan: Plan, knowledge: Knowledge, point: int) -> HexacellError | No
 def _zeroed(plan: Plan, knowledge: Knowledge, point: int) -> Station:
     """Where the gauges are after the reference was measured, by the estimate as it is."""
     command = plan.chooser.held([plan.reference_pose(point)])
-    joints = knowledge.mechanism.inverse(knowledge.controller, knowledge.branch, command)
-    really = kinematics.follow(
-        knowledge.mechanism,
-        knowledge.estimate,
-        joints,
-        start=command,
-        start_geometry=knowledge.controller,
-        start_joints=joints,
-    )
-    if not really.found[0]:
+    really = beginning(knowledge, command).really
+    if really is None:
         raise LimitError("the robot as drawn cannot stand where the controller would send it")
-    return station(knowledge, really.poses, joints, np.zeros((1, 3)))
+    joints = knowledge.mechanism.inverse(knowledge.controller, knowledge.branch, command)
+    return station(knowledge, really, joints, np.zeros((1, 3)))
 
 
 def _undetermined(plan: Plan) -> Iterator[HexacellError]:

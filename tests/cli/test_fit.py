@@ -42,7 +42,8 @@ def test_the_document_is_as_promised(typed, demo):
     assert (outcome.code, outcome.err) == (0, "")
     document = outcome.document
     # A set ends early where no orientation is surely safe any more, and the noise differs every time.
-    assert 50 <= document["records"] <= 55
+    rows = (demo.run / "measurements.csv").read_text().splitlines()[1:]
+    assert 50 <= document["records"] == len(rows) <= 55
     assert (document["points"], document["converged"]) == (5, True)
     assert document["frame"] == "paper"
     assert document["undetermined"] == document["outliers"] == []
@@ -58,7 +59,8 @@ def test_the_document_is_as_promised(typed, demo):
 def test_words_have_a_line_for_every_free_parameter(typed_here, demo):
     outcome = typed_here("fit", demo.cell, "--measurements", demo.run / "measurements.csv")
     assert (outcome.code, outcome.err) == (0, "")
-    assert re.search(r"35 parameters from 5[0-5] records at 5 points", outcome.out)
+    records = len((demo.run / "measurements.csv").read_text().splitlines()) - 1
+    assert f"35 parameters from {records} records at 5 points" in outcome.out
     assert max(map(len, outcome.out.splitlines())) <= 80
     rows = re.findall(r"^([SB][1-6][xyz]|l[1-6]) +(\S+) +(\S+) +(\S+)", outcome.out, flags=re.MULTILINE)
     assert len({name for name, *_ in rows}) == len(rows) == 42 - 4

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from hexacell.errors import ReachError
 from hexacell.geometry import Geometries, Geometry
-from hexacell.mechanisms.base import Branch, Mechanism
+from hexacell.mechanisms.base import Branch, Linearisation, Mechanism
 from hexacell.newton import (
     CONVERGED_MM,
     ON_THE_WAY_MM,
@@ -39,6 +39,7 @@ __all__ = [
     "margin_and_mode",
     "moved",
     "pose_jacobian",
+    "position_sensitivity",
     "sensitivity",
     "singularity_margin",
 ]
@@ -135,16 +136,29 @@ class Sensitivity:
 def sensitivity(mechanism: Mechanism, geometry: Geometry, poses: Poses, joints: Array) -> Sensitivity:
     """Implicit derivatives ``-J_pose^-1 J`` at n poses that close the mechanism."""
     linear = mechanism.linearise(geometry, poses, joints)
-    inverse_jacobian = -np.linalg.inv(linear.pose)
-    by_leg = inverse_jacobian[..., None], linear.parameters[..., None, :, :]
-    columns = [by_leg[0] * by_leg[1][..., part] for part in (slice(3), slice(3, 6), slice(6, 7))]
+    by_legs = -np.linalg.inv(linear.pose)
     return Sensitivity(
-        joints=inverse_jacobian * linear.joints[..., None, :],
-        parameters=np.concatenate(
-            [part.reshape(len(poses), 6, 6 * part.shape[-1]) for part in columns], axis=-1
-        ),
+        joints=by_legs * linear.joints[..., None, :],
+        parameters=_by_parameters(by_legs, linear),
         mode=assembly_mode(linear.pose),
     )
+
+
+def position_sensitivity(
+    mechanism: Mechanism, geometry: Geometry, poses: Poses, joints: Array
+) -> tuple[Array, Array]:
+    """Of the ball's position alone: (n, 3, 42) by the parameters, (n, 3, 6) by the joint variables."""
+    linear = mechanism.linearise(geometry, poses, joints)
+    by_legs = -np.linalg.inv(linear.pose)[:, :3]
+    return _by_parameters(by_legs, linear), by_legs * linear.joints[..., None, :]
+
+
+def _by_parameters(by_legs: Array, linear: Linearisation) -> Array:
+    """How something (n, m, 6) that depends on the legs depends on the parameters (n, m, 42)."""
+    each = by_legs[..., None] * linear.parameters[..., None, :, :]
+    kinds = [each[..., part] for part in (slice(3), slice(3, 6), slice(6, 7))]
+    flat = [kind.reshape(*by_legs.shape[:2], 6 * kind.shape[-1]) for kind in kinds]
+    return np.concatenate(flat, axis=-1)
 
 
 def singularity_margin(mechanism: Mechanism, geometry: Geometry, poses: Poses, joints: Array) -> Array:
@@ -175,16 +189,21 @@ def margin_and_mode(
 
 
 def _keeps_margin(jacobian: Array, margin: float) -> Mask:
-    """By the norm of the inverse, which bounds the smallest singular value from both sides.
+    """By norms of the inverse, which bound the smallest singular value from both sides.
 
-    Only what lies between needs the value itself.
+    Those of its Gramian's square bound it closer; only what lies between needs the value itself.
     """
     try:
-        inverse_norm = np.linalg.norm(np.linalg.inv(jacobian), axis=(-2, -1))
+        inverse = np.linalg.inv(jacobian)
     except np.linalg.LinAlgError:
-        inverse_norm = np.full(len(jacobian), np.nan)
-    keeps: Mask = inverse_norm * margin <= 1.0
-    doubtful = np.flatnonzero(~keeps & ~(inverse_norm * margin > np.sqrt(6.0)))
+        return np.asarray(np.linalg.svd(jacobian, compute_uv=False)[..., -1] >= margin)
+    largest = np.linalg.norm(inverse, axis=(-2, -1)) * margin
+    keeps: Mask = largest <= 1.0
+    doubtful = np.flatnonzero(~keeps & (largest <= np.sqrt(6.0)))
+    gramian = inverse[doubtful] @ np.swapaxes(inverse[doubtful], -1, -2)
+    largest = np.linalg.norm(gramian @ gramian, axis=(-2, -1)) ** 0.25 * margin
+    keeps[doubtful] = largest <= 1.0
+    doubtful = doubtful[(largest > 1.0) & (largest <= 6.0**0.125)]
     keeps[doubtful] = np.linalg.svd(jacobian[doubtful], compute_uv=False)[..., -1] >= margin
     return keeps
 

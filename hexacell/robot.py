@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -44,12 +45,12 @@ class Robot:
     lent: tuple[Geometry, ...] = ()
     lending: bool = False
 
-    @property
+    @cached_property
     def commanding(self) -> Geometry:
         """What the controller commands with now, in the frame convention."""
         return self.lent[-1] if self.lending else self.mechanism.to_convention(self.controller)[0]
 
-    @property
+    @cached_property
     def prior(self) -> Prior:
         """What is known before measuring."""
         return Prior.of(self.mechanism, self.drawing, self.tolerances)

@@ -63,9 +63,9 @@ class Ways:
     def _led(self, knowledge: Knowledge, here: SixNumbers, goal: Move, reference: Array | None) -> Move:
         """The first stop on the way to a goal to which no straight lines lead."""
         if reference is not None:
-            ways = Departure(knowledge, self._held(here), None, reference).to(self._held(goal.pose))
-            if ways.clear[0]:
-                return self._stop(goal, ways.passage(0).stops[0])
+            (way,) = Departure(knowledge, self._held(here), None, reference).to(self._held(goal.pose))
+            if way is not None:
+                return self._stop(goal, way.stops[0])
         raise _no_way(here, goal)
 
     def back(self, state: RunState, key: SetKey, known: tuple[Knowledge, Station] | None) -> Move | None:
@@ -86,10 +86,9 @@ class Ways:
     def _straightest(self, known: tuple[Knowledge, Station], here: SixNumbers, moves: list[Move]) -> Move:
         knowledge, reference = known[0], known[1].reference
         start, home = self._held(here), self._held(moves[0].pose)
-        ways = Departure(knowledge, start, None, reference).to(home)
-        if ways.clear[0]:
-            stops = ways.passage(0).stops
-            return self._stop(moves[0], stops[0]) if stops else moves[0]
+        (way,) = Departure(knowledge, start, None, reference).to(home)
+        if way is not None:
+            return self._stop(moves[0], way.stops[0]) if way.stops else moves[0]
         straight = (m for m in moves[1:-1] if is_clear(knowledge, start, self._held(m.pose), reference))
         return next(straight, moves[-1])
 

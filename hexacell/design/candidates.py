@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from enum import Enum
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +19,10 @@ the legs, and they tell as much."""
 
 COMMAND_TRIES = (3,)
 """Stages of the continuation to a command. What takes more is next to a singularity, and left out."""
+
+MANY_SMALL = 0.5
+FEW_SMALL = 0.0625
+"""Of the turns, spread over all scales."""
 
 SMALLEST_SHARE = 0.004
 """Of the largest amplitude. With the drawing's tolerances alone some robots bear no more."""
@@ -63,27 +68,40 @@ class Candidates:
         return Candidates(self.targets[rows], self.joints[rows], self.commands[rows])
 
 
-def orientations(count: int, tilt: float, seed: int) -> Array:
+class Amplitudes(Enum):
+    """How the amplitudes of turns are spread."""
+
+    ALL_SCALES = "half of them over all scales, so that there are small ones while little is known"
+    MOSTLY_LARGE = "nearly all of them large, because these tell most"
+
+
+def orientations(
+    count: int, tilt: float, seed: int, amplitudes: Amplitudes = Amplitudes.ALL_SCALES
+) -> Array:
     """``count`` rotations (count, 3, 3): tilts up to ``tilt``, rad, after turns up to twice as far.
 
-    Half of the amplitudes are spread over all scales, so that there are small ones to choose while
-    little is known; half evenly, because large ones tell most. ``count`` is a power of two, as
-    Sobol' sequences want it.
+    ``count`` is a power of two, as Sobol' sequences want it.
     """
     from scipy.stats import qmc  # noqa: PLC0415 - half a second that only this function needs
 
     heading, tilted, about_z, twisted, scale = qmc.Sobol(5, seed=seed).random(count).T
-    angle = tilt * _amplitudes(tilted, scale)
-    twist = TWISTS_A_TILT * tilt * _amplitudes(twisted, scale) * np.where(about_z < 0.5, -1.0, 1.0)
+    angle = tilt * _amplitudes(tilted, scale, amplitudes)
+    sense = np.where(about_z < 0.5, -1.0, 1.0)
+    twist = TWISTS_A_TILT * tilt * _amplitudes(twisted, scale, amplitudes) * sense
     heading, none = 2.0 * np.pi * heading, np.zeros(count)
     tilts = angle[:, None] * np.stack([np.cos(heading), np.sin(heading), none], axis=-1)
     twists = np.stack([none, none, twist], axis=-1)
     return rotations.from_vector(tilts) @ rotations.from_vector(twists)
 
 
-def _amplitudes(evenly: Array, scale: Array) -> Array:
+def _amplitudes(evenly: Array, scale: Array, amplitudes: Amplitudes) -> Array:
     """Shares of the largest amplitude, from values spread evenly over 0 to 1."""
-    return np.where(scale < 0.5, SMALLEST_SHARE ** (1.0 - evenly), evenly)
+    few = amplitudes is Amplitudes.MOSTLY_LARGE
+    return np.where(
+        scale < (FEW_SMALL if few else MANY_SMALL),
+        SMALLEST_SHARE ** (1.0 - evenly),
+        np.sqrt(evenly) if few else evenly,
+    )
 
 
 def standing(knowledge: Knowledge, targets: Poses, mode: Array | None = None) -> Standing:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,21 +13,27 @@ from hexacell.design.candidates import Standing, commanded, led, standing
 from hexacell.design.goal import D_OPTIMAL, Goal
 from hexacell.design.knowledge import Knowledge
 from hexacell.design.offer import TRAVEL_SHARE, Offer, offer
-from hexacell.design.passage import Departure, Passage
+from hexacell.design.passage import Departure, Passage, Rows
 from hexacell.design.station import Station
 from hexacell.errors import LimitError
 from hexacell.pose import Pose, Poses
 from hexacell.rotations import Array, Mask
+
+Manner = Callable[[Rows], Iterator[Passage | None]]
+"""Of getting to some of the candidates."""
 
 NEAR_SHARE = 0.4
 """Of the travel. What stays within it does so even if the prediction is twice as wrong as it says, which
 holds once the platform's orientation is known to a few degrees."""
 
 MOST = 240
-COMMANDED = 30
-AT_ONCE = 10
+COMMANDED = 48
+AT_ONCE = 4
 """Candidates that are tried, the best first; for so many at a time the command is searched, and for so
 many the way, as one of the first will mostly do."""
+
+ROUND_ABOUT = 1.2
+"""How much more a pose must be worth for a way that is not straight, as each stop takes another move."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -39,6 +45,8 @@ class Choice:
         joints: joint variables (6,), mm, it will go to.
         deviation: what the gauges are expected to show (3,), mm, and ``sigma`` (3,), mm.
         gain: information gained on the parameters, nat.
+        change: Jacobian (3, p) of the deviation by the free parameters; ``noise`` its covariance
+            (3, 3), mm^2, the parameters being known.
         stops: commands to pass on the way from where it was chosen to start; none on a straight line.
     """
 
@@ -47,6 +55,8 @@ class Choice:
     deviation: Array
     sigma: Array
     gain: float
+    change: Array
+    noise: Array
     stops: tuple[Pose, ...] = ()
 
 
@@ -78,7 +88,8 @@ def choose(
     for some in _in_portions(rows[np.argsort(-worth[rows], kind="stable")][:MOST], COMMANDED):
         commands, held = commanded(knowledge, offered.stands[some])
         for few in _in_portions(np.flatnonzero(held), AT_ONCE):
-            if choice := _first_safe(knowledge, at, offered[some[few]], commands[few], leave):
+            tried = some[few]
+            if choice := _first_safe(knowledge, at, offered[tried], commands[few], worth[tried], leave):
                 return choice
     raise LimitError("no orientation surely keeps the ball inside the gauges' travel")
 
@@ -102,7 +113,8 @@ def choose_in_turn(
     inside = offered.within(TRAVEL_SHARE * knowledge.limits.gauge_travel_mm)
     kept = np.flatnonzero(inside)[passed_over:]
     leave = Departure(knowledge, at.command(knowledge) if start is None else start, home, at.reference)
-    choice = _first_safe(knowledge, at, offered[kept], commands[rows[kept]], leave)
+    alike = np.full(len(kept), np.inf)
+    choice = _first_safe(knowledge, at, offered[kept], commands[rows[kept]], alike, leave)
     if choice is None:
         raise LimitError(
             "none of the poses left in the list surely keeps the ball inside the gauges' travel"
@@ -111,35 +123,50 @@ def choose_in_turn(
 
 
 def _first_safe(
-    knowledge: Knowledge, at: Station, offered: Offer, commands: Poses, leave: Departure
+    knowledge: Knowledge, at: Station, offered: Offer, commands: Poses, worth: Array, leave: Departure
 ) -> Choice | None:
-    """The first pose to which a way leads with the ball inside."""
+    """The first pose to which a way leads with the ball inside.
+
+    One to which no straight way leads comes first only where it is worth the moves that it takes
+    more; over the reference, which takes most, the way leads where there is no other to any.
+    """
     if not len(offered):
         return None
-    ways, near = leave.to(commands), NEAR_SHARE * knowledge.limits.gauge_travel_mm
-    safe = is_near = offered.within(near) & _is_known(knowledge, at)
-    if not is_near.all():
-        safe = is_near | _surely_inside(knowledge, at, offered.stands)
+    ways, every = leave.ways(commands), _may_be_safe(knowledge, at, offered.stands)
 
-    def holds(row: int, way: Passage) -> bool:
-        stays_near = bool(is_near[row]) and way.farthest <= near
-        return stays_near or bool(_surely_inside(knowledge, at, Standing(way.poses, way.joints)).all())
+    def first(manner: Manner, rows: Rows) -> tuple[int, Passage] | None:
+        found = zip(rows.tolist(), manner(rows), strict=True)
+        return next(((row, way) for row, way in found if way and _stays_inside(knowledge, at, way)), None)
 
-    direct = [int(row) for row in np.flatnonzero(ways.clear & safe)]
-    first = next((row for row in direct if holds(row, ways.passage(row))), len(offered))
-    better = np.flatnonzero(safe[:first] & ~ways.clear[:first])
-    for row, way in zip(better.tolist(), leave.over_home(commands[better]), strict=True):
-        if way is not None and holds(row, way):
-            return _choice(knowledge, offered[np.array([row])], commands.pose(row), way.stops)
-    if first == len(offered):
+    best = first(ways.straight, every)
+    better = every
+    if best is not None:
+        before = every[every < best[0]]
+        better = before[worth[before] >= ROUND_ABOUT * worth[best[0]]]
+    best = first(ways.led, better) or best or first(ways.over_home, every)
+    if best is None:
         return None
-    stops = ways.passage(first).stops
-    return _choice(knowledge, offered[np.array([first])], commands.pose(first), stops)
+    row, way = best
+    return _choice(knowledge, offered[np.array([row])], commands.pose(row), way.stops)
 
 
-def _is_known(knowledge: Knowledge, at: Station) -> bool:
-    """Whether the platform's orientation is known so well that straight error propagation holds nearby."""
-    return bool(second_order.turn_sigma(knowledge, at.stand) <= second_order.LITTLE_KNOWN)
+def _may_be_safe(knowledge: Knowledge, at: Station, stands: Standing) -> Rows:
+    """While little is known few poses are; asked together they cost less than each on its way."""
+    if _is_known(knowledge, at):
+        return np.arange(len(stands))
+    return np.flatnonzero(_surely_inside(knowledge, at, stands))
+
+
+def _stays_inside(knowledge: Knowledge, at: Station, way: Passage) -> bool:
+    """Whether the ball surely does on a way and at its end.
+
+    Every other pose is looked at; from one to the next little changes.
+    """
+    stands = Standing(way.poses[slice(None, None, -2)], way.joints[::-2])
+    if _is_known(knowledge, at):
+        near = NEAR_SHARE * knowledge.limits.gauge_travel_mm
+        stands = stands[~offer(knowledge, at, stands).within(near)]
+    return not len(stands) or bool(_surely_inside(knowledge, at, stands).all())
 
 
 def _surely_inside(knowledge: Knowledge, at: Station, stands: Standing) -> Mask:
@@ -147,9 +174,22 @@ def _surely_inside(knowledge: Knowledge, at: Station, stands: Standing) -> Mask:
     return second_order.inside(knowledge, at.joints, at.stand.targets, stands)
 
 
+def _is_known(knowledge: Knowledge, at: Station) -> bool:
+    """Whether the platform's orientation is known so well that straight error propagation holds nearby."""
+    return bool(second_order.turn_sigma(knowledge, at.stand) <= second_order.LITTLE_KNOWN)
+
+
 def _choice(knowledge: Knowledge, one: Offer, command: Pose, stops: tuple[Pose, ...]) -> Choice:
-    gain = D_OPTIMAL.worth(knowledge.covariance, one.change, one.noise)
-    return Choice(command, one.stands.joints[0], one.deviation[0], one.sigma[0], float(gain[0]), stops)
+    return Choice(
+        command=command,
+        joints=one.stands.joints[0],
+        deviation=one.deviation[0],
+        sigma=one.sigma[0],
+        gain=float(D_OPTIMAL.worth(knowledge.covariance, one.change, one.noise)[0]),
+        change=one.change[0],
+        noise=one.noise[0],
+        stops=stops,
+    )
 
 
 def _in_portions(rows: NDArray[np.intp], size: int) -> Iterator[NDArray[np.intp]]:

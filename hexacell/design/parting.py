@@ -14,13 +14,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hexacell import kinematics, rotations
-from hexacell.design.candidates import Candidates, reachable
+from hexacell import rotations
+from hexacell.design.candidates import Candidates, Standing, reachable
 from hexacell.design.knowledge import Knowledge
-from hexacell.design.offer import SAFETY_SIGMAS, TRAVEL_SHARE
+from hexacell.design.offer import SAFETY_SIGMAS, TRAVEL_SHARE, offer
 from hexacell.design.station import Station, station
 from hexacell.identification.correlation import CorrelatedPair
-from hexacell.identification.model import record_covariance
 from hexacell.identification.result import Identification
 from hexacell.pose import Pose, Poses
 from hexacell.rotations import Array
@@ -110,15 +109,11 @@ def _turns() -> Array:
 
 
 def _tried(knowledge: Knowledge, at: Station, point: int, candidates: Candidates) -> _Trials:
-    sensitivity = kinematics.sensitivity(
-        knowledge.mechanism, knowledge.estimate, candidates.targets, candidates.joints
-    )
-    change = sensitivity.parameters[:, :3] @ knowledge.basis - at.jacobian
-    noise = record_covariance(sensitivity.joints[:, :3], knowledge.noise) + at.covariance
-    spread = change @ knowledge.covariance @ np.swapaxes(change, -1, -2) + noise
-    sigma = np.sqrt(np.diagonal(spread, axis1=-2, axis2=-1))
-    inside = SAFETY_SIGMAS * sigma.max(axis=-1) <= TRAVEL_SHARE * knowledge.limits.gauge_travel_mm
-    factors = np.linalg.solve(np.linalg.cholesky(spread), change @ knowledge.covariance)
+    offered = offer(knowledge, at, Standing(candidates.targets, candidates.joints))
+    inside = SAFETY_SIGMAS * offered.sigma.max(axis=-1) <= TRAVEL_SHARE * knowledge.limits.gauge_travel_mm
+    crossing = offered.change @ knowledge.covariance
+    spread = crossing @ np.swapaxes(offered.change, -1, -2) + offered.noise
+    factors = np.linalg.solve(np.linalg.cholesky(spread), crossing)
     return _Trials(point, candidates[inside], factors[inside], knowledge.covariance)
 
 

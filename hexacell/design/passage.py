@@ -8,6 +8,7 @@ as the estimate says the ball would have moved.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -18,10 +19,13 @@ from hexacell.design.knowledge import Knowledge
 from hexacell.design.lines import PIECES
 from hexacell.design.path import Ahead, Beginning, beginning, look_ahead
 from hexacell.pose import Pose, Poses
-from hexacell.rotations import Array, Mask
+from hexacell.rotations import Array
 
-STOPS_AT = (PIECES // 4, PIECES // 2, 3 * PIECES // 4)
-"""Pieces of the straight line after which the stops lie."""
+Rows = NDArray[np.intp]
+
+STOPS_AT = (1, PIECES // 3, 2 * PIECES // 3, PIECES - 1)
+"""Pieces of the straight line after which the stops lie: closer together next to wide turns, where the
+ball moves fastest."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -52,54 +56,9 @@ class Passage:
         )
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Passages:
-    """Ways (n) from one command to others.
-
-    Attributes:
-        clear: (n,) to which of them there is one.
-    """
-
-    clear: Mask
-    _straight: Ahead
-    _led: Ahead | None
-    _rows: NDArray[np.intp]
-    _stops: tuple[Poses, ...]
-
-    def passage(self, row: int) -> Passage:
-        """The way to one of those to which there is one."""
-        if self._straight.clear[row]:
-            return Passage((), *self._straight.way(row), float(self._straight.farthest[row]))
-        assert self._led is not None  # noqa: S101 - it is clear, and not straight
-        place = int(np.flatnonzero(self._rows == row)[0])
-        stops = tuple(stop.pose(place) for stop in self._stops)
-        return Passage(stops, *self._led.way(place), float(self._led.farthest[place]))
-
-
-def passages(knowledge: Knowledge, start: Beginning, ends: Poses, reference: Array) -> Passages:
-    """Ways (n) from one command to others with the ball inside the travel about ``reference`` (3,), mm.
-
-    Straight ones where they are clear in the sense of :func:`hexacell.design.path.look_ahead`, else
-    ones over stops that are. Of many it may overlook a few.
-    """
-    thorough = len(ends) == 1
-    straight = look_ahead(knowledge, start, ends, reference, thorough=thorough)
-    rows = np.flatnonzero(straight.open & ~straight.clear)
-    if not len(rows):
-        return Passages(straight.clear, straight, None, rows, ())
-    stops = tuple(_giving_way(straight, piece, rows, reference) for piece in STOPS_AT)
-    led = look_ahead(knowledge, start, ends[rows], reference, stops, thorough=thorough)
-    clear = straight.clear.copy()
-    clear[rows] = led.clear
-    return Passages(clear, straight, led, rows, stops)
-
-
 @dataclass(frozen=True, eq=False)
 class Departure:
-    """Ways from one command with gauges at the ball, over the point's reference if need be.
-
-    Lines between two large turns often lead through a singularity, where each of the two could be
-    reached from the reference.
+    """Leaving one command with gauges at the ball.
 
     Attributes:
         start: the command to leave from.
@@ -112,37 +71,94 @@ class Departure:
     home: Poses | None
     reference: Array
 
-    def to(self, ends: Poses) -> Passages:
-        """Ways to n commands, straight or led."""
-        return passages(self.knowledge, self._here, ends, self.reference)
+    def to(self, ends: Poses) -> list[Passage | None]:
+        """The ways to n commands, straight or else led, as far as there are."""
+        return self.ways(ends).any()
 
-    def over_home(self, ends: Poses) -> list[Passage | None]:
-        """The ways to n commands over the reference, as far as there are."""
-        if self.home is None or not len(ends) or self._back is None or self._home is None:
-            return [None] * len(ends)
-        back, home = self._back, self.home.pose(0)
-        onward = passages(self.knowledge, self._home, ends, self.reference)
-        return [
-            back.then(home, onward.passage(row)) if onward.clear[row] else None for row in range(len(ends))
-        ]
+    def ways(self, ends: Poses) -> Ways:
+        """All that lead to n commands."""
+        return Ways(self, ends)
 
     @cached_property
-    def _here(self) -> Beginning:
+    def beginning(self) -> Beginning:
+        """Where it leaves from."""
         return beginning(self.knowledge, self.start)
 
     @cached_property
-    def _home(self) -> Beginning | None:
-        return None if self.home is None else beginning(self.knowledge, self.home)
-
-    @cached_property
-    def _back(self) -> Passage | None:
+    def from_home(self) -> Departure | None:
+        """Leaving the reference."""
         if self.home is None:
             return None
-        ways = self.to(self.home)
-        return ways.passage(0) if ways.clear[0] else None
+        return Departure(self.knowledge, self.home, None, self.reference)
+
+    @cached_property
+    def back(self) -> Passage | None:
+        """The way to the reference."""
+        return None if self.home is None else self.to(self.home)[0]
 
 
-def _giving_way(ahead: Ahead, piece: int, rows: NDArray[np.intp], reference: Array) -> Poses:
-    """The commands on some lines after so many pieces, less what the ball is off the reference there."""
-    commands, really = ahead.commands.at(piece, rows), ahead.really.at(piece, rows)
-    return Poses(commands.positions - (really.positions - reference), commands.rotations)
+@dataclass(frozen=True, eq=False)
+class Ways:
+    """Ways from one command to n others; each manner answers for some ``rows`` of them."""
+
+    departure: Departure
+    ends: Poses
+
+    def straight(self, rows: Rows) -> Iterator[Passage | None]:
+        """Straight ways that are clear in the sense of :func:`hexacell.design.path.look_ahead`."""
+        return _passages(self._ahead, (), rows)
+
+    def led(self, rows: Rows) -> Iterator[Passage | None]:
+        """Ways over stops; of straight ones that are not open nothing says where to give way."""
+        leading = np.flatnonzero(self._ahead.open[rows])
+        if not len(leading):
+            return iter([None] * len(rows))
+        stops = tuple(self._giving_way(piece, rows[leading]) for piece in STOPS_AT)
+        led = self._look_ahead(self.ends[rows[leading]], stops)
+        places = np.full(len(rows), -1)
+        places[leading] = np.arange(len(leading))
+        return _passages(led, stops, places)
+
+    def over_home(self, rows: Rows) -> Iterator[Passage | None]:
+        """Ways over the reference.
+
+        Lines between two large turns often lead through a singularity, where each of the two could
+        be reached from the reference.
+        """
+        home, back, onward = self.departure.home, self.departure.back, self.departure.from_home
+        if home is None or back is None or onward is None or not len(rows):
+            return iter([None] * len(rows))
+        over, ways = home.pose(0), onward.to(self.ends[rows])
+        return (None if way is None else back.then(over, way) for way in ways)
+
+    def any(self) -> list[Passage | None]:
+        """To each of them, straight or else led."""
+        ways = list(self.straight(np.arange(len(self.ends))))
+        rows = np.array([row for row, way in enumerate(ways) if way is None], dtype=np.intp)
+        for row, way in zip(rows, self.led(rows), strict=True):
+            ways[row] = way
+        return ways
+
+    @cached_property
+    def _ahead(self) -> Ahead:
+        return self._look_ahead(self.ends)
+
+    def _look_ahead(self, ends: Poses, stops: tuple[Poses, ...] = ()) -> Ahead:
+        leave, thorough = self.departure, len(self.ends) == 1
+        return look_ahead(leave.knowledge, leave.beginning, ends, leave.reference, stops, thorough=thorough)
+
+    def _giving_way(self, piece: int, rows: Rows) -> Poses:
+        """Commands on some lines after so many pieces, less what the ball is off the reference there."""
+        commands, really = self._ahead.commands.at(piece, rows), self._ahead.really.at(piece, rows)
+        off = really.positions - self.departure.reference
+        return Poses(commands.positions - off, commands.rotations)
+
+
+def _passages(ahead: Ahead, stops: tuple[Poses, ...], rows: Rows) -> Iterator[Passage | None]:
+    """Some of n ways over n stops each; none where there is none, or the row is negative."""
+    for row in rows.tolist():
+        if row < 0 or not ahead.clear[row]:
+            yield None
+        else:
+            over = tuple(stop.pose(row) for stop in stops)
+            yield Passage(over, *ahead.way(row), float(ahead.farthest[row]))

@@ -69,7 +69,7 @@ def station(knowledge: Knowledge, poses: Poses, joints: Array, deviations: Array
 
 def position_derivatives(knowledge: Knowledge, stands: Standing) -> tuple[Array, Array]:
     """Of the ball's position at n poses: (n, 3, p) by the free parameters, (n, 3, 6) by the joints."""
-    sensitivity = kinematics.sensitivity(
+    by_parameters, by_joints = kinematics.position_sensitivity(
         knowledge.mechanism, knowledge.estimate, stands.targets, stands.joints
     )
-    return sensitivity.parameters[:, :3] @ knowledge.basis, sensitivity.joints[:, :3]
+    return by_parameters @ knowledge.basis, by_joints

@@ -7,7 +7,7 @@ import numpy as np
 from hexacell.geometry import Geometry
 from hexacell.identification import centring, detour
 from hexacell.identification.cleaning import Cleaned, clean, leave_alone
-from hexacell.identification.levenberg_marquardt import Solution
+from hexacell.identification.levenberg_marquardt import FAR_AWAY, Manner, Solution
 from hexacell.identification.problem import Problem
 from hexacell.identification.refusals import refuse_one_axis, refuse_too_little
 from hexacell.identification.result import Identification
@@ -30,15 +30,22 @@ def identify(problem: Problem, *, find_outliers: bool = True) -> Identification:
     return _result(found.problem, found.solution, found.covariance, cleaned)
 
 
-def track(problem: Problem, *, free: Array | None = None, poses: Poses | None = None) -> Identification:
-    """The estimate while measuring: prior in full, nothing refused, warm-started where possible.
+def track(
+    problem: Problem,
+    *,
+    free: Array | None = None,
+    poses: Poses | None = None,
+    manner: Manner = FAR_AWAY,
+) -> Identification:
+    """The estimate while measuring: prior in full, nothing refused.
 
-    ``free`` (p,), mm, and ``poses`` that close it at the problem's records continue a former one.
+    The search begins at ``free`` (p,), mm, with ``poses`` that close it at the problem's records, or
+    else at the drawing.
     """
     precision = np.linalg.inv(problem.prior.covariance)
     if free is None or poses is None:
         free, poses = problem.begin, problem.start
-    kept, solution = detour.solve(problem, precision, free=free, poses=poses)
+    kept, solution = detour.solve(problem, precision, free=free, poses=poses, manner=manner)
     covariance = np.linalg.inv(solution.information + precision)
     return _result(kept, solution, covariance)
 

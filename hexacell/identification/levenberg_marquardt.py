@@ -90,6 +90,9 @@ class Manner:
 FAR_AWAY = Manner(CAUTIOUS_DAMPING, 1e-3)
 """From the drawing, millimetres away, to the neighbourhood of the solution."""
 
+ONE_MORE = Manner(NEARLY_NO_DAMPING, 1e-3)
+"""From the solution of all records but the last."""
+
 NEARBY = Manner(NEARLY_NO_DAMPING, FINAL_STEP_MM)
 """From the neighbourhood to the solution itself: Gauss-Newton steps unless one fails."""
 

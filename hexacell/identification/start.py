@@ -21,6 +21,9 @@ from hexacell.mechanisms.base import Branch, Mechanism
 from hexacell.pose import Poses
 from hexacell.rotations import Array, Mask
 
+AT_HOME = (1, *kinematics.CONTINUATION_STAGES)
+"""Stages of the continuation where the geometry stays: joint variables differ little from the commanded."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Commands:
@@ -64,6 +67,8 @@ class Commands:
         found = np.zeros(len(joints), dtype=bool)
         for choice, commanding in enumerate(self.under):
             rows = np.flatnonzero((self.choice == choice) & np.isfinite(self.joints).all(axis=-1))
+            if not len(rows):
+                continue
             result = kinematics.follow(
                 self.mechanism,
                 geometry,
@@ -71,6 +76,7 @@ class Commands:
                 start=self.poses[rows],
                 start_geometry=commanding,
                 start_joints=self.joints[rows],
+                tries=AT_HOME if commanding is geometry else kinematics.CONTINUATION_STAGES,
             )
             positions[rows], rotations[rows] = result.poses.positions, result.poses.rotations
             found[rows] = result.found

@@ -6,12 +6,16 @@ from collections.abc import Iterable
 from contextlib import suppress
 from dataclasses import dataclass
 
+import numpy as np
+
 from hexacell.cell.model import CellSettings
 from hexacell.design import candidates
+from hexacell.design.candidates import Amplitudes
 from hexacell.design.goal import D_OPTIMAL, Criterion, Goal
 from hexacell.design.knowledge import Knowledge
 from hexacell.design.next_pose import Choice, choose, choose_in_turn
 from hexacell.design.route import route
+from hexacell.design.second_order import turn_sigma
 from hexacell.design.station import Station
 from hexacell.errors import LimitError
 from hexacell.planning.listed import PoseList, not_among, same
@@ -19,6 +23,9 @@ from hexacell.planning.situation import Situation
 from hexacell.planning.task import Task
 from hexacell.pose import Pose, Poses
 from hexacell.robot import Robot
+
+WELL_KNOWN = np.radians(0.5)
+"""Uncertainty of the platform's orientation below which large turns are safe, and worth most."""
 
 SMALL_SHARE = 0.1
 """Of the tilts allowed, tried where no turn of full size is safe."""
@@ -99,7 +106,9 @@ class Chooser:
             passed_over = situation.refusals
             return choose_in_turn(knowledge, at, waiting, begin, home=home, passed_over=passed_over)
         tilt = share * knowledge.limits.tilt
-        turns = candidates.orientations(self.candidates, tilt, self._seed(situation))
+        is_known = turn_sigma(knowledge, at.stand) <= WELL_KNOWN
+        amplitudes = Amplitudes.MOSTLY_LARGE if is_known else Amplitudes.ALL_SCALES
+        turns = candidates.orientations(self.candidates, tilt, self._seed(situation), amplitudes)
         return choose(knowledge, at, turns, begin, self._goal(knowledge), home)
 
     def held(self, poses: Iterable[Pose]) -> Poses:

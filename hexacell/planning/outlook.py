@@ -8,17 +8,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hexacell import kinematics
 from hexacell.design.knowledge import Knowledge
 from hexacell.design.next_pose import Choice
-from hexacell.errors import LimitError
-from hexacell.identification.model import record_covariance
 from hexacell.planning.budget import Budget
 from hexacell.planning.prospect import Prospect, Seen, informed, updated
 from hexacell.planning.situation import Outlook, Situation
 from hexacell.planning.task import Task, TaskError
 from hexacell.planning.tracking import Known
-from hexacell.pose import Poses
 from hexacell.rotations import Array
 
 SIZES = (2, 4, 8, 16, 32)
@@ -62,7 +58,7 @@ class Forecaster:
         if error is None:
             return None
         now = error.worst(known.knowledge.covariance)
-        following = now if choice is None else self._after(situation, known, choice, error)
+        following = now if choice is None else error.worst(_after(known.knowledge, choice))
         planned = self.planned(situation)
         covariance = self.foreseen(known.knowledge, situation).covariance
         records = sum(planned.values())
@@ -135,28 +131,10 @@ class Forecaster:
         left = [p for p in self.sizes if p not in situation.done and p != situation.point]
         return left if situation.point is None else [situation.point, *left]
 
-    def _after(self, situation: Situation, known: Known, choice: Choice, error: TaskError) -> float:
-        """The worst error after the chosen record."""
-        knowledge = known.knowledge
-        try:
-            at = known.station(situation.point or 0)
-        except LimitError:
-            return error.worst(knowledge.covariance)
-        joints = np.asarray(choice.joints)[None]
-        command = Poses.of([choice.command])
-        start_joints = knowledge.mechanism.inverse(knowledge.controller, knowledge.branch, command)
-        poses = kinematics.follow(
-            knowledge.mechanism,
-            knowledge.estimate,
-            joints,
-            start=command,
-            start_geometry=knowledge.controller,
-            start_joints=start_joints,
-        ).poses
-        sensitivity = kinematics.sensitivity(knowledge.mechanism, knowledge.estimate, poses, joints)
-        change = sensitivity.parameters[0, :3] @ knowledge.basis - at.jacobian
-        noise = record_covariance(sensitivity.joints[:, :3], knowledge.noise)[0] + at.covariance
-        return error.worst(updated(knowledge.covariance, change, noise))
+
+def _after(knowledge: Knowledge, choice: Choice) -> Array:
+    """The covariance (p, p), mm^2, after the chosen record."""
+    return updated(knowledge.covariance, choice.change, choice.noise)
 
 
 def _told(seen: Seen, situation: Situation, point: int, records: int) -> Array:

@@ -16,10 +16,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from hexacell import kinematics
 from hexacell.design import candidates
-from hexacell.design.candidates import reachable
+from hexacell.design.candidates import Standing, reachable
 from hexacell.design.knowledge import Knowledge
+from hexacell.design.station import position_derivatives
 from hexacell.identification.model import record_covariance, record_weights
 from hexacell.pose import Poses
 from hexacell.rotations import Array
@@ -52,7 +52,7 @@ class Prospect:
         )
         joints = knowledge.mechanism.inverse(knowledge.estimate, knowledge.branch, poses)
         rows = np.flatnonzero(np.isfinite(joints).all(axis=-1))
-        jacobian, by_joints = _derivatives(knowledge, poses[rows], joints[rows])
+        jacobian, by_joints = position_derivatives(knowledge, Standing(poses[rows], joints[rows]))
         sizes = np.cumsum([len(poses) for poses in self.sets])
         return Seen(
             jacobian, record_weights(by_joints, knowledge.noise), np.searchsorted(rows, [0, *sizes])
@@ -93,7 +93,7 @@ def _spread(drawn: Knowledge, poses: Poses, records: int) -> Poses:
     if not len(offered) or not np.array_equal(offered.targets.rotations[0], poses.rotations[0]):
         return poses[[]]
     taken = [0]
-    jacobian, by_joints = _derivatives(drawn, offered.targets, offered.joints)
+    jacobian, by_joints = position_derivatives(drawn, Standing(offered.targets, offered.joints))
     change = jacobian - jacobian[0]
     noise = record_covariance(by_joints, drawn.noise)
     noise = noise + noise[0]
@@ -119,8 +119,3 @@ def informed(covariance: Array, information: Array) -> Array:
     """A covariance (p, p) after records that tell ``information`` (p, p)."""
     after: Array = np.linalg.inv(np.linalg.inv(covariance) + information)
     return 0.5 * (after + after.T)
-
-
-def _derivatives(knowledge: Knowledge, poses: Poses, joints: Array) -> tuple[Array, Array]:
-    sensitivity = kinematics.sensitivity(knowledge.mechanism, knowledge.estimate, poses, joints)
-    return sensitivity.parameters[:, :3] @ knowledge.basis, sensitivity.joints[:, :3]

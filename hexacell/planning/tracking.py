@@ -15,9 +15,11 @@ import numpy as np
 from hexacell.design.knowledge import Knowledge
 from hexacell.design.station import Station, station
 from hexacell.errors import LimitError
-from hexacell.geometry import Geometry
+from hexacell.identification.beginnings import beginnings
 from hexacell.identification.estimate import track
+from hexacell.identification.levenberg_marquardt import FAR_AWAY, ONE_MORE
 from hexacell.identification.problem import Problem
+from hexacell.identification.refusals import is_enough
 from hexacell.identification.result import Identification
 from hexacell.measurements import MeasurementSet, Record
 from hexacell.pose import Poses
@@ -25,10 +27,6 @@ from hexacell.robot import Robot
 
 IMPLAUSIBLE = 3.0
 """Times the number of residuals: a cost beyond it is looked into, from the drawing on."""
-
-BEGINNINGS = 12
-BEGINNINGS_SHARE = 0.5
-"""Of what the prior lets parameters differ, for other robots at which a search may begin."""
 
 FEW_RESIDUALS = 30.0
 """Added to their number, since few of them may be large by chance."""
@@ -84,7 +82,9 @@ def continued(problem: Problem, before: Identification | None) -> Identification
     poses = None if before is None else _poses_under(problem, before)
     if before is None or poses is None:
         return track(problem)
-    found = track(problem, free=before.free, poses=poses)
+    # Undamped steps lead some robots astray while the records leave much open.
+    manner = ONE_MORE if is_enough(problem) else FAR_AWAY
+    found = track(problem, free=before.free, poses=poses, manner=manner)
     others = _begun_elsewhere(problem)
     while not _is_healthy(problem, found) and (another := next(others, None)):
         better = (another.records, -cost(another)) > (found.records, -cost(found))
@@ -104,12 +104,8 @@ def _begun_elsewhere(problem: Problem) -> Iterator[Identification]:
     With few records one of these may lie beyond a singularity for all of them.
     """
     yield track(problem)
-    root = np.linalg.cholesky(problem.prior.covariance)
-    for draw in np.random.default_rng(0).standard_normal((BEGINNINGS, len(root))):
-        free = problem.begin + BEGINNINGS_SHARE * root @ draw
-        poses = problem.commands.followed(Geometry.from_vector(problem.basis @ free), problem.joints)
-        if poses.found.all():
-            yield track(problem, free=free, poses=poses.poses)
+    for free, poses in beginnings(problem):
+        yield track(problem, free=free, poses=poses)
 
 
 def cost(found: Identification) -> float:

@@ -152,8 +152,8 @@ class AdaptiveCampaign:
         start, *trail = reversed(self._trail)
         knowledge = self._plan.known(self.situation).knowledge
         home = self._held(self._trail[0])
-        ways = Departure(knowledge, self._held(start), None, reference).to(home)
-        stops = [self.robot.to_command(pose) for pose in ways.passage(0).stops] if ways.clear[0] else trail
+        (way,) = Departure(knowledge, self._held(start), None, reference).to(home)
+        stops = trail if way is None else [self.robot.to_command(pose) for pose in way.stops]
         for pose in (*stops, self._trail[0]):
             self._go(pose)
 

@@ -235,6 +235,11 @@ def test_sensitivity_is_how_the_pose_really_moves(hexaglide, paper, legs, vector
         ends = [(Geometry.from_vector(geometry.vector() + s), joints) for s in (shift, -shift)]
         moved = pose_difference(legs, joints, ends, near) / (2 * step)
         np.testing.assert_allclose(found.parameters[0, :, n], moved, atol=1e-5)
+    by_parameters, by_joints = kinematics.position_sensitivity(
+        hexaglide, geometry, Poses.of([pose]), joints[None]
+    )
+    np.testing.assert_allclose(by_parameters, found.parameters[:, :3], atol=1e-12)
+    np.testing.assert_allclose(by_joints, found.joints[:, :3], atol=1e-12)
 
 
 @given(poses)

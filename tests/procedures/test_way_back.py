@@ -38,7 +38,7 @@ class Ways:
     def _departure(self, _: Any, start: Any, home: Any, reference: Any) -> Any:
         def to(end: Any) -> Any:
             clear = self._is_clear(_, start, end, reference)
-            return SimpleNamespace(clear=[clear], passage=lambda _: SimpleNamespace(stops=self.stops))
+            return [SimpleNamespace(stops=self.stops) if clear else None]
 
         assert home is None
         return SimpleNamespace(to=to)

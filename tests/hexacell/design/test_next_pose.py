@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from hexacell.design import next_pose
 from hexacell.design.candidates import orientations
-from hexacell.design.next_pose import choose
+from hexacell.design.next_pose import ROUND_ABOUT, choose
 from hexacell.design.offer import SAFETY_SIGMAS, TRAVEL_SHARE
 from hexacell.design.station import station
 from hexacell.errors import ExitCode, LimitError
@@ -136,7 +137,7 @@ def test_no_other_orientation_that_fits_gains_more(know, much):
     at = station_of(know, much, 1)
     best = choose(know(much), at, TURNS)
     for rows in (slice(0, 64), slice(64, 128), slice(128, 256)):
-        assert choose(know(much), at, TURNS[rows]).gain <= best.gain + 1e-12
+        assert choose(know(much), at, TURNS[rows]).gain <= ROUND_ABOUT * best.gain
 
 
 def test_amplitudes_grow_with_what_is_known(know, little, much):
@@ -186,6 +187,38 @@ def test_an_orientation_without_a_clear_way_is_not_chosen(know, much):
     beyond = Poses.of([Pose(0, 0, 550, 0, 0, 100)])
     with pytest.raises(LimitError, match="inside the gauges' travel"):
         choose(know(much), at, TURNS, beyond)
+
+
+def test_stops_must_be_worth_the_moves_that_they_take(know, much, monkeypatch):
+    """From a tilted pose: which orientation is chosen depends on what a way round may cost."""
+    at, start = station_of(know, much, 1), much.problem.commands.poses[[2]]
+
+    def chosen(least):
+        monkeypatch.setattr(next_pose, "ROUND_ABOUT", least)
+        return choose(know(much), at, TURNS, start)
+
+    free, dear, usual = chosen(1.0), chosen(100.0), chosen(ROUND_ABOUT)
+    assert free.stops
+    assert not dear.stops
+    assert free.gain > dear.gain
+    assert usual.gain >= (ROUND_ABOUT if usual.stops else 1.0) * dear.gain
+
+
+def test_what_a_record_will_depend_on_is_how_it_moves_with_the_parameters(stage, legs, hexaglide):
+    """By central differences of the test's own forward kinematics."""
+    estimate, at, choice = stage
+    goes_to = aimed_at(legs, estimate, choice, at)
+
+    def ball(free):
+        return stands(
+            legs, Geometry.from_vector(hexaglide.convention.basis() @ free), choice.joints, goes_to
+        )[:3]
+
+    steps = 1e-3 * np.eye(len(estimate.free))
+    moved = [(ball(estimate.free + step) - ball(estimate.free - step)) / 2e-3 for step in steps]
+    np.testing.assert_allclose(choice.change, np.transpose(moved) - at.jacobian, atol=1e-4)
+    by_encoders = choice.noise - at.covariance - 0.01**2 * np.eye(3)
+    assert (np.linalg.eigvalsh(by_encoders) > 0.0).all()
 
 
 # --- nothing to choose ---

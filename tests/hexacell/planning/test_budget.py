@@ -38,6 +38,12 @@ def test_a_cells_pace(make_plan):
     by_hand = {"stations__placement": "by-hand", "identification__minutes_per_station": 7.0}
     assert Pace.of(make_plan(**by_hand).settings).station_minutes == 7.0
     assert Pace.of(make_plan().settings).station_minutes == 0.0, "fixed gauges are not carried"
-    assert Pace.of(make_plan(timing__move_s=2.0, timing__window_s=1.0).settings).record_seconds == 3.0
+    timing = {"timing__move_s": 2.0, "timing__window_s": 1.0}
+    seconds = [
+        Pace.of(make_plan(**timing, **others).settings).record_seconds
+        for others in ({"identification__poses": "list.csv"}, {"identification__provisional": True}, {})
+    ]
+    assert seconds[0] == 3.0
+    assert seconds[0] < seconds[1] < seconds[2] < 12.0, "stops on the way are moves as well"
     stated = make_plan(identification__seconds_per_record=9.0)
     assert Pace.of(stated.settings).record_seconds == 9.0

@@ -20,11 +20,12 @@ class Pace:
     record_seconds: float
 
     @classmethod
-    def of(cls, settings: CellSettings) -> Pace:
-        """The pace that a cell file states."""
+    def of(cls, settings: CellSettings, moves: float | None = None) -> Pace:
+        """The pace that a cell file states, with so many ``moves`` a record, or as they are chosen."""
         by_hand = settings.stations.placement == "by-hand"
         stated = settings.identification.seconds_per_record
-        usual = _moves_a_record(settings) * settings.timing.move_s + settings.timing.window_s
+        moves = _moves_a_record(settings) if moves is None else moves
+        usual = moves * settings.timing.move_s + settings.timing.window_s
         return cls(settings.identification.minutes_per_station if by_hand else 0.0, stated or usual)
 
     def minutes(self, records: int, stations: int) -> float:

@@ -12,6 +12,7 @@ from hexacell.errors import HexacellError
 from hexacell.geometry import Geometry
 from hexacell.identification.refusals import is_enough
 from hexacell.measurements import MeasurementSet, Record
+from hexacell.planning.budget import Pace
 from hexacell.planning.plan import Plan
 from hexacell.planning.robots import Built, drawn_robots
 from hexacell.planning.situation import ClosePoint, Finished, Situation
@@ -90,7 +91,8 @@ def _summary(plan: Plan, drawn: int, ended: list[_Ended]) -> Foretold:
     records = round(median(one.records for one in ended))
     errors = [one.worst_sigma_mm for one in ended if one.worst_sigma_mm is not None]
     held_out = plan.settings.verification
-    judging = plan.budget.pace.minutes(len(held_out.points) * held_out.orientations, len(held_out.points))
+    in_line = Pace.of(plan.settings, moves=1.0)
+    judging = in_line.minutes(len(held_out.points) * held_out.orientations, len(held_out.points))
     return Foretold(
         drawn=drawn,
         robots=len(ended),

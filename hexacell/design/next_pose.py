@@ -132,7 +132,7 @@ def _first_safe(
     """
     if not len(offered):
         return None
-    ways, every = leave.ways(commands), _may_be_safe(knowledge, at, offered.stands)
+    ways, every = leave.ways(commands), _safe(knowledge, at, offered)
 
     def first(manner: Manner, rows: Rows) -> tuple[int, Passage] | None:
         found = zip(rows.tolist(), manner(rows), strict=True)
@@ -150,33 +150,34 @@ def _first_safe(
     return _choice(knowledge, offered[np.array([row])], commands.pose(row), way.stops)
 
 
-def _may_be_safe(knowledge: Knowledge, at: Station, stands: Standing) -> Rows:
-    """While little is known few poses are; asked together they cost less than each on its way."""
-    if _is_known(knowledge, at):
-        return np.arange(len(stands))
-    return np.flatnonzero(_surely_inside(knowledge, at, stands))
+def _safe(knowledge: Knowledge, at: Station, offered: Offer) -> Rows:
+    """Which of some poses keep the ball inside; asked together they cost less than each on its way."""
+    safe = _near(knowledge, at, offered)
+    if not safe.all():
+        safe[~safe] = _surely_inside(knowledge, at, offered.stands[~safe])
+    return np.flatnonzero(safe)
 
 
 def _stays_inside(knowledge: Knowledge, at: Station, way: Passage) -> bool:
-    """Whether the ball surely does on a way and at its end.
+    """Whether the ball surely does on a way.
 
     Every other pose is looked at; from one to the next little changes.
     """
     stands = Standing(way.poses[slice(None, None, -2)], way.joints[::-2])
-    if _is_known(knowledge, at):
-        near = NEAR_SHARE * knowledge.limits.gauge_travel_mm
-        stands = stands[~offer(knowledge, at, stands).within(near)]
-    return not len(stands) or bool(_surely_inside(knowledge, at, stands).all())
+    near = _near(knowledge, at, offer(knowledge, at, stands))
+    return bool(near.all() or _surely_inside(knowledge, at, stands[~near]).all())
+
+
+def _near(knowledge: Knowledge, at: Station, offered: Offer) -> Mask:
+    """Which poses need no closer look: straight propagation says near, and holds nearby."""
+    is_known = second_order.turn_sigma(knowledge, at.stand) <= second_order.LITTLE_KNOWN
+    near: Mask = offered.within(NEAR_SHARE * knowledge.limits.gauge_travel_mm) & is_known
+    return near
 
 
 def _surely_inside(knowledge: Knowledge, at: Station, stands: Standing) -> Mask:
     """Which poses keep the ball inside the travel where straight error propagation may not hold."""
     return second_order.inside(knowledge, at.joints, at.stand.targets, stands)
-
-
-def _is_known(knowledge: Knowledge, at: Station) -> bool:
-    """Whether the platform's orientation is known so well that straight error propagation holds nearby."""
-    return bool(second_order.turn_sigma(knowledge, at.stand) <= second_order.LITTLE_KNOWN)
 
 
 def _choice(knowledge: Knowledge, one: Offer, command: Pose, stops: tuple[Pose, ...]) -> Choice:

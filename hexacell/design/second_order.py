@@ -33,6 +33,9 @@ the travel."""
 FEWEST = 6
 """Robots that can stand at the reference; of fewer nothing can be said."""
 
+DRAWN_MARGIN_SHARE = 0.5
+"""Of the singularity margin, kept by all drawn robots that are not the estimated one."""
+
 SIGMAS = 4.0
 """So far the deviations of a robot that was not drawn are supposed to scatter."""
 
@@ -84,7 +87,7 @@ class _Drawn:
     """Robots (r) that can stand at the reference, asked for n poses.
 
     Attributes:
-        found: (r, n) whether they can take them; ``deviations`` (r, n, 3), mm.
+        found: (r, n) whether they can take them clear of singularities; ``deviations`` (r, n, 3), mm.
     """
 
     found: Mask
@@ -116,6 +119,13 @@ def _drawn(knowledge: Knowledge, robots: int, joints: Array, poses: Poses, known
         joints[np.zeros(robots, dtype=int)],
         knowledge.limits.singularity_margin,
     )
+    found &= kinematics.keeps_margin(
+        knowledge.mechanism,
+        geometries,
+        result.poses,
+        joints[again],
+        DRAWN_MARGIN_SHARE * knowledge.limits.singularity_margin,
+    ).reshape(robots, count)
     positions = result.poses.positions.reshape(robots, count, 3)[stands]
     return _Drawn(found[stands, 1:], positions[:, 1:] - positions[:, :1])
 

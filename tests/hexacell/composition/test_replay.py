@@ -5,19 +5,23 @@ from __future__ import annotations
 import shutil
 import tempfile
 from collections.abc import Iterable
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from hexacell.archive import RunFolder
+from hexacell.composition.calibration import calibrate
 from hexacell.composition.replay import replay
-from hexacell.errors import ExitCode, FileError
+from hexacell.errors import ExitCode, FileError, HexacellError
 from procedures import events
-from procedures.journal import read_entries
+from procedures.journal import read_entries, read_journal
 from procedures.journal_lines import Entry, encode
 from procedures.replaying.comparing import Aspect
 from procedures.replaying.replayer import Scope
+from tests.hexacell.composition.conftest import order_of
 
 
 def recorded(finished: Any) -> list[Any]:
@@ -56,6 +60,31 @@ async def test_the_journal_alone_will_do(finished, tmp_path) -> None:
     assert replayed.is_same
     assert {event.kind for event in finished.history} >= {"proposed", "committed"}
     assert replayed.tally.results > 60
+
+
+async def test_a_run_that_followed_a_list_is_the_same_without_the_list(make_cell, tmp_path) -> None:
+    """Gauges with a long travel can follow it; the journal keeps what stood in it."""
+    listed, run = tmp_path / "list.csv", RunFolder(tmp_path / "run")
+    points = (100.0, -100.0, 500.0), (0.0, 0.0, 550.0)
+    rows = ["point,orientation,x,y,z,a,b,c"]
+    for number, (x, y, z) in enumerate(points, start=1):
+        for n in range(1, 13):
+            turned = [0.0] * 3
+            turned[n % 3] = 0.2 * n * (n - 1)
+            rows.append(",".join(map(str, (number, n, x, y, z, *turned))))
+    listed.write_text("\n".join(rows) + "\n")
+    gauges = [gauge.model_copy(update={"travel_mm": 130.0}) for gauge in make_cell().settings.gauges]
+    changes = {"gauges": tuple(gauges), "limits.gauge_travel_mm": 60.0, "identification.points": points}
+    cell = make_cell(**changes, identification__poses=listed.name)
+    with suppress(HexacellError):  # how well such a list calibrates is not under test
+        await calibrate(order_of(cell, run))
+    listed.unlink()
+    replayed = await replay(run.path)
+    assert replayed.tally.differences == []
+    assert replayed.tally.decisions > 2 * 2 * 10
+    started = read_journal(run.journal)[0]
+    assert isinstance(started, events.RunStarted)
+    assert started.pose_list == "\n".join(rows) + "\n"
 
 
 async def test_a_config_that_is_not_the_one_of_the_beginning_is_not_used(finished, tmp_path) -> None:

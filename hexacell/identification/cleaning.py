@@ -8,9 +8,13 @@ somebody has to look at the machine or at the file.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import islice
+
+import numpy as np
 
 from hexacell.identification import sentences
 from hexacell.identification.anomaly import Anomaly, FalseReadings, Kind
+from hexacell.identification.beginnings import beginnings
 from hexacell.identification.causes import (
     Cause,
     GrossErrors,
@@ -35,9 +39,16 @@ from hexacell.identification.search import (
     led_astray,
     search,
 )
+from hexacell.rotations import Array
 
 CONFIRMED = 0.5
 """Of the gain expected to first order, what a new solution must show of it."""
+
+FEW_RECORDS = 60
+ELSEWHERE = 4
+WITHIN = 3.0
+"""Before so few readings are called false, a search is begun at so many other robots; mean square of their
+differences from the drawing, in sigma."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -56,13 +67,41 @@ def clean(problem: Problem) -> Cleaned:
         FalseReadings: gauges were misread, or so much came after a slip that too little is left.
     """
     cleaning = _Cleaning(problem)
-    cleaning.run()
+    try:
+        cleaning.run()
+    except FalseReadings:
+        found = _begun_elsewhere(problem)
+        if found is None:
+            raise
+        return Cleaned(found, (), ())
     return cleaning.result()
 
 
 def leave_alone(problem: Problem) -> Cleaned:
     """Fit a problem with all records that the solver can keep."""
     return Cleaned(fit(problem), (), ())
+
+
+def _begun_elsewhere(problem: Problem) -> Fit | None:
+    """A robot within the tolerances that explains all readings as they are, if a search finds one.
+
+    From the drawing a search may not: with few records the cost has other minima.
+    """
+    if problem.records > FEW_RECORDS:
+        return None
+    everywhere = np.ones(problem.records, dtype=bool)
+    for free, poses in islice(beginnings(problem), ELSEWHERE):
+        begun = replace(problem, begin=free, start=poses, startable=everywhere)
+        found = fit(begun, manner=IN_A_HURRY)
+        if explains(problem, found) and _is_within(problem, found.solution.free):
+            return found
+    return None
+
+
+def _is_within(problem: Problem, free: Array) -> bool:
+    """Whether a robot is as near to the drawing as tolerances let some robots be."""
+    moved = free - problem.mechanism.convention.free_part(problem.prior.centre)
+    return bool(moved @ np.linalg.solve(problem.prior.covariance, moved) <= WITHIN * len(moved))
 
 
 class _Cleaning:

@@ -86,7 +86,7 @@ def test_what_the_plan_will_give_is_said_before_any_motion(typed_here: Any, cell
     assert expected["points"] == 5
     assert expected["outside"] <= 1
     assert 0.02 < expected["worst_sigma_mm"] < 1.0
-    assert 1.0 < expected["minutes"] < 4.0
+    assert 1.0 < expected["minutes"] < 6.0
     assert all(0.0 <= share < 0.3 for share in expected["lost"].values())
     said = re.sub(r"\s+", " ", outcome.err)
     words = r"\d+ records at 5 points will give about 0\.\d{3} mm at the worst of your task poses"

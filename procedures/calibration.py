@@ -278,10 +278,10 @@ class Calibration:
     def _closing(self, state: RunState, key: SetKey) -> Step:
         if state.standing == (key, 1):
             return CloseSet(at=key)
-        if not self.ways.is_in_order(state, key):
-            return self._returning(state, key)
         if key.phase is not Phase.IDENTIFY:  # held-out poses were chosen with a safe way back
-            return Move(at=key, orientation=1, pose=self._pose(state, key, 1))
+            home = Move(at=key, orientation=1, pose=self._pose(state, key, 1))
+            return home if self.ways.is_in_order(state, key) else self._returning(state, key)
+        # Also from a stop on the way back, where anything else might lead to where it came from.
         return self.ways.back(state, key, self._known_or_nothing(state, key)) or self._returning(state, key)
 
     def _known_or_nothing(self, state: RunState, key: SetKey) -> tuple[Knowledge, Station] | None:

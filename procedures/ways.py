@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,6 +15,7 @@ from hexacell.design.station import Station
 from hexacell.errors import HexacellError, LimitError
 from hexacell.geometry import Geometry
 from hexacell.identification.estimate import track
+from hexacell.planning.listed import same
 from hexacell.pose import Pose, Poses
 from hexacell.robot import Robot
 from hexacell.rotations import Array
@@ -81,15 +83,26 @@ class Ways:
         moves = [Move(at=key, orientation=orientation, pose=pose) for orientation, pose in trail[:-1]]
         if known is None or len(moves) == 1:
             return moves[-1]
-        return self._straightest(known, trail[-1][1], moves)
+        return self._straightest(known, trail, moves)
 
-    def _straightest(self, known: tuple[Knowledge, Station], here: SixNumbers, moves: list[Move]) -> Move:
-        knowledge, reference = known[0], known[1].reference
-        start, home = self._held(here), self._held(moves[0].pose)
-        (way,) = Departure(knowledge, start, None, reference).to(home)
-        if way is not None:
-            return self._stop(moves[0], way.stops[0]) if way.stops else moves[0]
-        straight = (m for m in moves[1:-1] if is_clear(knowledge, start, self._held(m.pose), reference))
+    def _straightest(
+        self, known: tuple[Knowledge, Station], trail: Sequence[tuple[int, SixNumbers]], moves: list[Move]
+    ) -> Move:
+        """What is decided at a stop follows from where the way over the stops began.
+
+        Decided anew, it might lead back there, and from there to the stop again.
+        """
+        here, home, (knowledge, reference) = trail[-1][1], moves[0], (known[0], known[1].reference)
+        begun = next(pose for orientation, pose in reversed(trail) if orientation)
+        (way,) = Departure(knowledge, self._held(begun), None, reference).to(self._held(home.pose))
+        line = [] if way is None else [Pose(*begun), *map(self.robot.to_command, way.stops)]
+        passed = next((row for row, pose in enumerate(line) if same(pose, Pose(*here))), None)
+        if passed is not None:
+            stops = line[passed + 1 :]
+            return Move(at=home.at, orientation=0, pose=stops[0].as_tuple()) if stops else home
+        start = self._held(here)
+        nearest_first = (home, *moves[1:-1])
+        straight = (m for m in nearest_first if is_clear(knowledge, start, self._held(m.pose), reference))
         return next(straight, moves[-1])
 
     def _stop(self, goal: Move, command: Pose) -> Move:

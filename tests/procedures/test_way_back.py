@@ -72,16 +72,29 @@ def test_a_way_back_over_stops_is_gone_stop_by_stop(make_rig, story, monkeypatch
     assert isinstance(step, Move)
     assert step.key == "P1/o00/move"
     assert step.pose == pytest.approx(stop.as_tuple())
-    asked: list[Any] = []
-
-    def is_clear(*line: Any) -> bool:
-        asked.append(line)
-        return True
-
-    monkeypatch.setattr(route_module, "is_clear", is_clear)
     step = calibration.next_step(fold([*happened, story().arrived(0, step.pose)]))
     assert step.key == "P1/o01/move"
-    assert len(asked) == 1
+
+
+def test_at_a_stop_it_is_not_decided_anew(make_rig, story, monkeypatch) -> None:
+    """From the stop alone nothing leads on, and back to where it came from would go on for ever."""
+    stop = Pose(100.0, -100.0, 500.0, 4.0, 1.0, 0.0)
+    stands_in = Ways(monkeypatch, 1, stops=(stop,))
+    calibration, happened = make_rig().calibration, story().whole(ORIENTATIONS)[:-2]
+    to_stop = calibration.next_step(fold(happened))
+    assert isinstance(to_stop, Move)
+    asked: list[float] = []
+
+    def from_the_last_record_only(_: Any, start: Any, home: Any, reference: Any) -> Any:
+        asked.append(start.pose(0).a)
+        return stands_in._departure(_, start, home, reference)
+
+    monkeypatch.setattr(ways, "Departure", from_the_last_record_only)
+    monkeypatch.setattr(ways, "is_clear", lambda *_: False)
+    monkeypatch.setattr(route_module, "is_clear", lambda *_: False)
+    step = calibration.next_step(fold([*happened, story().arrived(0, to_stop.pose)]))
+    assert step.key == "P1/o01/move"
+    assert asked == pytest.approx([ORIENTATIONS - 1.0])
 
 
 def test_the_way_back_leads_over_stops_that_were_passed_where_nothing_is_safe(

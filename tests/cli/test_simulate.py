@@ -73,7 +73,7 @@ def test_run_does_the_whole_job_over_the_wires(served, typed_here, quick_cell, f
     truth = tomllib.loads(quick_cell.cell.read_text())["simulation"]["geometry"]
     after = tomllib.loads(quick_cell.controller.read_text())
     for name in ("S", "B", "l"):
-        assert np.abs(np.subtract(after["geometry"][name], truth[name])).max() < 3.0
+        assert np.abs(np.subtract(after["geometry"][name], truth[name])).max() < 5.0
         assert np.abs(np.subtract(before["geometry"][name], truth[name])).max() > 5.0
     assert quick_cell.controller.read_text() == (quick_cell.runs()[0] / "config-after").read_text()
 

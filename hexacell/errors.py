@@ -128,3 +128,13 @@ class SeveralErrors(HexacellError):
 
     def __str__(self) -> str:
         return "\n".join([f"{self.problem}:", *(f"  - {error}" for error in self.errors)])
+
+
+def consists_only_of(error: HexacellError, *kinds: type[HexacellError]) -> bool:
+    """Whether an error, or each of several that came at once, is of these kinds."""
+    return all(isinstance(one, kinds) for one in flatten_errors(error))
+
+
+def flatten_errors(error: HexacellError) -> list[HexacellError]:
+    """The errors that one report is made of."""
+    return error.errors if isinstance(error, SeveralErrors) else [error]

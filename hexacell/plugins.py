@@ -8,7 +8,7 @@ from enum import StrEnum
 from importlib.metadata import EntryPoint, entry_points
 from typing import Any
 
-from hexacell.cell.names import nearest
+from hexacell.cell.diagnostics import nearest
 from hexacell.errors import UsageError
 
 Factory = Callable[..., Any]

@@ -13,20 +13,25 @@ import pytest
 
 CHECKOUT = Path(__file__).parent.parent
 PACKAGES = ("hexacell", "drivers", "procedures")
-MATHEMATICS = ("rotations", "geometry", "kinematics", "mechanisms", "identification", "design")
+MATHEMATICS = ("kinematics", "identification", "motion", "experiment_design")
 
 FORBIDDEN = [
     ("hexacell.errors", "hexacell.cli"),
-    ("hexacell.errors", "hexacell.composition"),
+    ("hexacell.errors", "hexacell.application"),
     ("hexacell.errors", "procedures"),
     ("hexacell.errors", "drivers"),
-    ("hexacell.a_module_nobody_listed", "drivers.ports"),
+    ("hexacell.presentation.layout", "hexacell.cli"),
+    ("hexacell.application.device_setup", "hexacell.presentation"),
+    ("hexacell.campaign.planner", "drivers.interfaces"),
+    ("hexacell.experiment_design.candidates", "hexacell.campaign"),
+    ("hexacell.motion.trajectory", "hexacell.experiment_design"),
     ("hexacell.cli", "drivers.simulated"),
-    ("drivers.ports", "procedures"),
-    ("drivers.ports", "hexacell.composition"),
-    ("drivers.ports", "drivers.simulated"),
+    ("drivers.interfaces", "procedures"),
+    ("drivers.interfaces", "hexacell.application"),
+    ("drivers.interfaces", "drivers.simulated"),
     ("procedures", "hexacell.cli"),
     ("procedures", "drivers.simulated"),
+    ("procedures.run.steps", "procedures.engine"),
     *((f"hexacell.{module}", "hexacell.cell.model") for module in MATHEMATICS),
     *((f"hexacell.{module}", "pydantic") for module in MATHEMATICS),
     ("hexacell.kinematics", "asyncio"),

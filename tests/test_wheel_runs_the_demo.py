@@ -78,7 +78,7 @@ def test_the_checkout_is_out_of_sight(elsewhere: Path, tmp_path: Path) -> None:
     script = """
 import json, sys
 import drivers, hexacell, procedures
-from hexacell.bundled import bundled_config
+from hexacell.cell.bundled import bundled_config
 from hexacell.plugins import Group, names
 files = [module.__file__ for module in (drivers, hexacell, procedures)]
 files.append(str(bundled_config("simulated-hexaglide")))

@@ -5,16 +5,16 @@ from __future__ import annotations
 import threading
 from functools import partial
 
-from drivers.encoders.owner import OwnerThread
 from drivers.encoders.session import EncoderSession
-from drivers.ports import DeviceIdentity, EncoderRound
-from drivers.trace import Recorder
+from drivers.encoders.worker_thread import WorkerThread
+from drivers.interfaces import DeviceIdentity, EncoderSample
+from drivers.wire_trace import Recorder
 from hexacell.cell.devices import EncoderSettings
 from hexacell.errors import DeviceError
 
 
 class Cia406Bank:
-    """The encoder bank of a cell; implements :class:`drivers.ports.EncoderBank`.
+    """The encoder bank of a cell; implements :class:`drivers.interfaces.EncoderBank`.
 
     Any interface of python-can will do: ``settings.bus`` is passed to ``can.Bus`` as it is.
     ``trace`` is called from the bus's threads with every CANopen frame. Every failure is a
@@ -24,7 +24,7 @@ class Cia406Bank:
     def __init__(self, settings: EncoderSettings, trace: Recorder | None = None) -> None:
         self._settings = settings
         self._trace = trace
-        self._owner: OwnerThread | None = None
+        self._owner: WorkerThread | None = None
         self._session: EncoderSession | None = None
 
     async def open(self) -> tuple[DeviceIdentity, ...]:
@@ -37,14 +37,14 @@ class Cia406Bank:
             DeviceError: What is wrong; nothing is left open then.
         """
         await self.close()
-        self._owner = OwnerThread("encoders")
+        self._owner = WorkerThread("encoders")
         try:
             return await self._owner.run(partial(self._open, self._owner.interrupted))
         except BaseException:
             await self.close()
             raise
 
-    async def read(self) -> EncoderRound:
+    async def read(self) -> EncoderSample:
         """One complete round: all six positions at the same instant.
 
         Raises:
@@ -64,7 +64,7 @@ class Cia406Bank:
         self._session = EncoderSession(self._settings, interrupted, self._trace)
         return self._session.identities
 
-    def _read(self) -> EncoderRound:
+    def _read(self) -> EncoderSample:
         if self._session is None:
             raise _not_open()
         return self._session.read()

@@ -5,24 +5,22 @@ from __future__ import annotations
 import threading
 from functools import partial
 
-from drivers.encoders.alarms import AlarmPoll
-from drivers.encoders.bus import EncoderBus
-from drivers.encoders.configure import configure
-from drivers.encoders.errors import BusError
-from drivers.encoders.identify import (
+from drivers.encoders.can_bus import EncoderBus
+from drivers.encoders.canopen_node import EncoderNode, NmtCommand
+from drivers.encoders.errors import BusError, Leg
+from drivers.encoders.node_identity import (
     check_measuring_step,
     check_serial_number,
     device_type,
     find,
     identify,
 )
-from drivers.encoders.legs import Leg
-from drivers.encoders.node import EncoderNode, NmtCommand
-from drivers.encoders.objects import DeviceType
-from drivers.encoders.rounds import SyncRounds
-from drivers.encoders.watch import NodeWatch, check
-from drivers.ports import DeviceIdentity, EncoderRound
-from drivers.trace import Recorder
+from drivers.encoders.node_monitor import AlarmPoll, NodeMonitor, check
+from drivers.encoders.object_dictionary import DeviceType
+from drivers.encoders.pdo_configuration import configure
+from drivers.encoders.sync_sampling import SyncSampler
+from drivers.interfaces import DeviceIdentity, EncoderSample
+from drivers.wire_trace import Recorder
 from hexacell.cell.devices import EncoderSettings
 
 NM_TO_MM = 1e-6
@@ -51,7 +49,7 @@ class EncoderSession:
         """Who answered, legs 1 to 6."""
         return self._identities
 
-    def read(self) -> EncoderRound:
+    def read(self) -> EncoderSample:
         """One complete round; kept only if nothing was wrong after it either.
 
         Raises:
@@ -61,7 +59,7 @@ class EncoderSession:
         counts = self._rounds.take(signed=self._settings.signed)
         self._alarms.check()
         self._bus.check()
-        return EncoderRound(counts, positions_mm(counts, self._settings))
+        return EncoderSample(counts, positions_mm(counts, self._settings))
 
     def close(self) -> None:
         """Let the bus go."""
@@ -74,7 +72,7 @@ class EncoderSession:
         for node in nodes:
             node.command(NmtCommand.ENTER_PRE_OPERATIONAL)
         find(nodes, self._bus, settings.timeout_s)
-        watches = tuple(NodeWatch(leg, self._bus, settings.heartbeat_ms) for leg in legs)
+        watches = tuple(NodeMonitor(leg, self._bus, settings.heartbeat_ms) for leg in legs)
         kinds = tuple(device_type(node) for node in nodes)
         self._identities = tuple(map(self._identify, nodes, kinds))
         channels = tuple(
@@ -82,12 +80,12 @@ class EncoderSession:
         )
         for watch in watches:
             watch.expect_heartbeats()
-        self._rounds = SyncRounds(legs, channels, self._bus, settings.timeout_s)
+        self._rounds = SyncSampler(legs, channels, self._bus, settings.timeout_s)
         self._bus.guard = partial(_check_all, nodes, watches, self._rounds)
         self._alarms = AlarmPoll(nodes, watches)
         for node in nodes:
             node.command(NmtCommand.START)
-        self._rounds.prove(signed=settings.signed)
+        self._rounds.self_test(signed=settings.signed)
 
     def _identify(self, node: EncoderNode, kind: DeviceType) -> DeviceIdentity:
         check_measuring_step(node, self._settings.measuring_step_nm)
@@ -103,7 +101,9 @@ def positions_mm(counts: tuple[int, ...], settings: EncoderSettings) -> tuple[fl
     return tuple(direction * count * step_mm + offset for direction, count, offset in terms)
 
 
-def _check_all(nodes: tuple[EncoderNode, ...], watches: tuple[NodeWatch, ...], rounds: SyncRounds) -> None:
+def _check_all(
+    nodes: tuple[EncoderNode, ...], watches: tuple[NodeMonitor, ...], rounds: SyncSampler
+) -> None:
     for node in nodes:
         node.check_alone()
     check(watches)

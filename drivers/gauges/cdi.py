@@ -13,11 +13,9 @@ from enum import Enum, IntEnum
 from functools import partial
 from typing import ClassVar
 
-from drivers.gauges.dialect import Dialect, LineSettings
 from drivers.gauges.errors import FrameRejected, GaugeAtEnd, GaugeSilent
+from drivers.gauges.protocol import DisplayedValue, GaugeState, LineSettings, ProtocolSpec, Unit
 from drivers.gauges.serial_gauge import SerialGauge
-from drivers.gauges.shown import Shown, Unit
-from drivers.gauges.state import GaugeState
 
 ASK = b"R\r"
 VALUE = re.compile(rb"([+-])(?=.{8}, )( *\d+\.\d+ *), (IN|MM)\r")
@@ -46,14 +44,14 @@ class Parameter(IntEnum):
     RATIO = 40
 
 
-def parse_value(frame: bytes) -> Shown | Refusal:
+def parse_value(frame: bytes) -> DisplayedValue | Refusal:
     """What an answer to ``R`` says.
 
     Raises:
         FrameRejected: The frame is neither a value nor a refusal, to the last byte.
     """
     if match := VALUE.fullmatch(frame):
-        return Shown.of(match[1], match[2], frame, UNITS[match[3]])
+        return DisplayedValue.of(match[1], match[2], frame, UNITS[match[3]])
     try:
         return Refusal(frame)
     except ValueError:
@@ -77,7 +75,7 @@ def parse_parameter(frame: bytes, parameter: Parameter) -> int | None:
 class CdiGauge(SerialGauge):
     """A CDI or Starrett dial indicator."""
 
-    dialect: ClassVar[Dialect] = Dialect(
+    dialect: ClassVar[ProtocolSpec] = ProtocolSpec(
         "cdi", "CDI or Starrett indicator", LineSettings(9600), "+  2.1380, MM\r\n"
     )
     normal_modes: ClassVar[frozenset[str]] = frozenset({"ABS", "INCR"})
@@ -89,9 +87,9 @@ class CdiGauge(SerialGauge):
         """What asks for the value shown."""
         return ASK
 
-    def _understand(self, frame: bytes) -> Shown:
+    def _understand(self, frame: bytes) -> DisplayedValue:
         answer = parse_value(frame)
-        if isinstance(answer, Shown):
+        if isinstance(answer, DisplayedValue):
             return answer
         if answer is Refusal.OUT_OF_BOUNDS:
             raise GaugeAtEnd(

@@ -13,12 +13,10 @@ import re
 from dataclasses import dataclass
 from typing import ClassVar
 
-from drivers.gauges.dialect import Dialect, LineSettings
 from drivers.gauges.errors import FrameRejected, GaugeAtEnd, GaugeSilent, WrongAnswer
+from drivers.gauges.protocol import DisplayedValue, GaugeState, LineSettings, ProtocolSpec
 from drivers.gauges.serial_gauge import SerialGauge
-from drivers.gauges.shown import Shown
-from drivers.gauges.state import GaugeState
-from drivers.ports import GaugeReading
+from drivers.interfaces import GaugeReading
 from hexacell.errors import DeviceError
 
 VALUE = re.compile(rb"0(\d{1,2})A([+-])(?=.{8}\r)(\d+\.\d+)\r")
@@ -41,7 +39,7 @@ class MultiplexerError:
     code: int
 
 
-def parse_value(frame: bytes, channel: int) -> Shown | MultiplexerError:
+def parse_value(frame: bytes, channel: int) -> DisplayedValue | MultiplexerError:
     """What an answer to the question for ``channel`` says.
 
     Raises:
@@ -49,7 +47,7 @@ def parse_value(frame: bytes, channel: int) -> Shown | MultiplexerError:
     """
     value = VALUE.fullmatch(frame)
     if value and int(value[1]) == channel:
-        return Shown.of(value[2], value[3], frame)
+        return DisplayedValue.of(value[2], value[3], frame)
     error = ERROR.fullmatch(frame)
     if error and int(error[1]) in {1, channel}:
         return MultiplexerError(int(error[2]))
@@ -71,7 +69,7 @@ def parse_about(frame: bytes) -> str:
 class Mux10Gauge(SerialGauge):
     """A dial indicator on one channel of a Mitutoyo MUX-10 or a multiplexer with its format."""
 
-    dialect: ClassVar[Dialect] = Dialect(
+    dialect: ClassVar[ProtocolSpec] = ProtocolSpec(
         "mux10", "Mitutoyo MUX-10 channel", LineSettings(9600), "01A+0000.123\r"
     )
 
@@ -85,10 +83,10 @@ class Mux10Gauge(SerialGauge):
         """What asks for the value shown."""
         return b"%d\r" % self.channel
 
-    async def glance(self) -> GaugeReading:
+    async def read_once(self) -> GaugeReading:
         """As :meth:`SerialGauge.glance`; a multiplexer that is busy has not answered it."""
         try:
-            return await super().glance()
+            return await super().read_once()
         except MultiplexerBusy:
             raise WrongAnswer(
                 "its multiplexer is busy (918)",
@@ -96,7 +94,7 @@ class Mux10Gauge(SerialGauge):
                 action="Disconnect the foot switch and other triggers",
             ) from None
 
-    async def _shown(self) -> Shown:
+    async def _shown(self) -> DisplayedValue:
         for _ in range(BUSY_TRIES):
             try:
                 return await super()._shown()
@@ -108,9 +106,9 @@ class Mux10Gauge(SerialGauge):
             action="Disconnect the foot switch and other triggers",
         )
 
-    def _understand(self, frame: bytes) -> Shown:
+    def _understand(self, frame: bytes) -> DisplayedValue:
         answer = parse_value(frame, self.channel)
-        if isinstance(answer, Shown):
+        if isinstance(answer, DisplayedValue):
             return answer
         if answer.code == BUSY:
             raise MultiplexerBusy
@@ -128,7 +126,7 @@ class Mux10Gauge(SerialGauge):
         )
 
     async def _inspect(self) -> GaugeState:
-        shown: Shown | None
+        shown: DisplayedValue | None
         try:
             shown = await self._shown()
         except GaugeAtEnd:

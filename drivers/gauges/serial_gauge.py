@@ -6,13 +6,19 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from typing import ClassVar, TypeVar
 
-from drivers.gauges.dialect import TERMINATOR, Dialect, silence, wrong_answer
 from drivers.gauges.errors import FrameRejected, GaugeUnsteady, WrongMode, WrongUnit, ZeroVoid
-from drivers.gauges.shown import Shown, Unit
-from drivers.gauges.state import GaugeState
-from drivers.link import SerialLink, SerialLinks
-from drivers.ports import DeviceIdentity, GaugeReading
-from drivers.wire import NoAnswer
+from drivers.gauges.protocol import (
+    TERMINATOR,
+    DisplayedValue,
+    GaugeState,
+    ProtocolSpec,
+    Unit,
+    silence,
+    wrong_answer,
+)
+from drivers.interfaces import DeviceIdentity, GaugeReading
+from drivers.serial.port import NoAnswer
+from drivers.serial.shared_port import SharedSerialPort, SharedSerialPorts
 from hexacell.cell.devices import GaugeSettings
 from hexacell.errors import DeviceError, FileError
 
@@ -24,19 +30,19 @@ Parsed = TypeVar("Parsed")
 
 
 class SerialGauge(ABC):
-    """A :class:`drivers.ports.Gauge` on a serial line. A protocol is a subclass.
+    """A :class:`drivers.interfaces.Gauge` on a serial line. A protocol is a subclass.
 
     Values are what the instrument shows, mm, in its own zero and direction.
     """
 
-    dialect: ClassVar[Dialect]
+    dialect: ClassVar[ProtocolSpec]
     normal_modes: ClassVar[frozenset[str]] = frozenset()
 
-    def __init__(self, settings: GaugeSettings, links: SerialLinks) -> None:
+    def __init__(self, settings: GaugeSettings, links: SharedSerialPorts) -> None:
         self.settings = settings
         self.subject = f"gauge {settings.name}"
         self._links = links
-        self._link: SerialLink | None = None
+        self._link: SharedSerialPort | None = None
         self._session = 0
         self._state: GaugeState | None = None
         self._void: ZeroVoid | None = None
@@ -57,7 +63,7 @@ class SerialGauge(ABC):
         """What asks for the value shown."""
 
     @abstractmethod
-    def _understand(self, frame: bytes) -> Shown:
+    def _understand(self, frame: bytes) -> DisplayedValue:
         """The value in an answer to the question; raises FrameRejected or a DeviceError."""
 
     @abstractmethod
@@ -104,7 +110,7 @@ class SerialGauge(ABC):
             action="Wait until it stands still; if it does, check its cable",
         )
 
-    async def glance(self) -> GaugeReading:
+    async def read_once(self) -> GaugeReading:
         """The value shown in this moment, mm, moving or not: one question, no second opinion.
 
         Raises:
@@ -155,7 +161,7 @@ class SerialGauge(ABC):
             self._void = None
             return await self._inspect()
 
-    async def _shown(self) -> Shown:
+    async def _shown(self) -> DisplayedValue:
         return await self._query(self.question, self._understand)
 
     async def _query(self, request: bytes, parse: Callable[[bytes], Parsed]) -> Parsed:
@@ -180,12 +186,12 @@ class SerialGauge(ABC):
             raise silence(self.subject, link.url, self.settings.timeout_s, echo=echo) from missing
 
     def _distrust(self) -> None:
-        self._live_link().distrust()
+        self._live_link().require_silence()
 
     def _nonsense(self, received: bytes) -> DeviceError:
         return wrong_answer(self.subject, self.dialect, received)
 
-    def _in_mm(self, shown: Shown) -> Shown:
+    def _in_mm(self, shown: DisplayedValue) -> DisplayedValue:
         if shown.apparent_unit is Unit.INCH:
             raise self._inch()
         return shown
@@ -219,7 +225,7 @@ class SerialGauge(ABC):
             raise DeviceError("is not open", subject=self.subject)
         return self._state
 
-    def _live_link(self) -> SerialLink:
+    def _live_link(self) -> SharedSerialPort:
         if self._link is None:
             raise DeviceError("is not open", subject=self.subject)
         if self._void is not None:

@@ -14,11 +14,9 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import ClassVar
 
-from drivers.gauges.dialect import Dialect, LineSettings
 from drivers.gauges.errors import FrameRejected, GaugeAtEnd, WrongAnswer
+from drivers.gauges.protocol import DisplayedValue, GaugeState, LineSettings, ProtocolSpec, Unit
 from drivers.gauges.serial_gauge import SerialGauge
-from drivers.gauges.shown import Shown, Unit
-from drivers.gauges.state import GaugeState
 from hexacell.errors import DeviceError
 
 ASK = b"?\r"
@@ -68,14 +66,14 @@ PRESET = Query(b"PRE?\r", re.compile(rb"(?:PRE ?)?([+\- ]?\d{1,5}\.\d{1,6})\r"))
 BATTERY = Query(b"BAT?\r", re.compile(rb"(?:BAT ?)?([01])\r"))
 
 
-def parse_value(frame: bytes) -> Shown | Fault:
+def parse_value(frame: bytes) -> DisplayedValue | Fault:
     """What an answer to ``?`` says.
 
     Raises:
         FrameRejected: The frame is neither a value nor an error, to the last byte.
     """
     if match := VALUE.fullmatch(frame):
-        return Shown.of(match[1], match[2], frame)
+        return DisplayedValue.of(match[1], match[2], frame)
     try:
         return Fault(frame)
     except ValueError:
@@ -86,7 +84,7 @@ class SylvacGauge(SerialGauge):
     """A dial indicator that speaks Sylvac's opto-RS duplex protocol."""
 
     # duplex cables are fed by DTR high and RTS low
-    dialect: ClassVar[Dialect] = Dialect(
+    dialect: ClassVar[ProtocolSpec] = ProtocolSpec(
         "sylvac", "Sylvac opto-RS indicator", LineSettings(4800, 7, "E", 2, rts=False), "+12.345\r"
     )
     normal_modes: ClassVar[frozenset[str]] = frozenset({"NOR", "REF", "REF1", "REF2"})
@@ -96,9 +94,9 @@ class SylvacGauge(SerialGauge):
         """What asks for the value shown."""
         return ASK
 
-    def _understand(self, frame: bytes) -> Shown:
+    def _understand(self, frame: bytes) -> DisplayedValue:
         match parse_value(frame):
-            case Shown() as shown:
+            case DisplayedValue() as shown:
                 return shown
             case Fault.RANGE:
                 raise GaugeAtEnd(

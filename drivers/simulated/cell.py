@@ -8,21 +8,21 @@ from tempfile import TemporaryDirectory
 from types import TracebackType
 from typing import Any, Self
 
-from drivers.simulated.controller.server import SimulatedController
 from drivers.simulated.encoders import SimulatedEncoderBank
-from drivers.simulated.faults import CellFaults, FaultSchedule
-from drivers.simulated.gauges.cell import GaugeRack
-from drivers.simulated.machine import SimulatedMachine
+from drivers.simulated.fault_schedule import CellFaults, FaultSchedule
+from drivers.simulated.gauges.rack import GaugeRack
+from drivers.simulated.linuxcnc.server import SimulatedController
+from drivers.simulated.physics import RobotPhysics
+from drivers.simulated.robot import SimulatedMachine
 from drivers.simulated.slcan import serve_slcan
-from drivers.simulated.world import World
-from hexacell import kinematics
 from hexacell.cell.devices import GaugeSettings
 from hexacell.cell.model import CellSettings
 from hexacell.cell.simulation import SimulationSettings
 from hexacell.clock import CellClock
-from hexacell.controller_config.format import ConfigFormat
-from hexacell.mechanisms.base import Mechanism
-from hexacell.pose import Pose, Poses
+from hexacell.controller_config.interface import ConfigFormat
+from hexacell.kinematics.inverse import inverse_kinematics
+from hexacell.kinematics.mechanism import Mechanism
+from hexacell.kinematics.pose import Pose, PoseBatch
 
 
 class SimulatedCell:
@@ -102,11 +102,11 @@ def _world(
     config_format: ConfigFormat,
     config: Path,
     home: Pose,
-) -> World:
+) -> RobotPhysics:
     commanding = config_format.read(config)
-    start = Poses.of([home])
-    joints = kinematics.inverse(mechanism, commanding.geometry, commanding.branch, start)[0]
-    return World(
+    start = PoseBatch.of([home])
+    joints = inverse_kinematics(mechanism, commanding.geometry, commanding.branch, start)[0]
+    return RobotPhysics(
         mechanism,
         simulation,
         clock,
@@ -117,14 +117,14 @@ def _world(
 
 
 def _rack(
-    settings: CellSettings, simulation: SimulationSettings, world: World, clock: CellClock
+    settings: CellSettings, simulation: SimulationSettings, world: RobotPhysics, clock: CellClock
 ) -> GaugeRack:
     plungers = {gauge.name: _Plunger(world, gauge) for gauge in settings.gauges}
     return GaugeRack(settings.gauges, plungers, simulation.gauges, clock, seed=simulation.seed)
 
 
 def _bank(
-    settings: CellSettings, simulation: SimulationSettings, world: World, clock: CellClock
+    settings: CellSettings, simulation: SimulationSettings, world: RobotPhysics, clock: CellClock
 ) -> SimulatedEncoderBank:
     latency = simulation.encoders.latency_s
     return SimulatedEncoderBank(
@@ -145,7 +145,7 @@ def _controller(settings: CellSettings, machine: SimulatedMachine, config: Path)
 class _Plunger:
     """What one gauge's plunger does, in the instrument's own direction."""
 
-    def __init__(self, world: World, gauge: GaugeSettings) -> None:
+    def __init__(self, world: RobotPhysics, gauge: GaugeSettings) -> None:
         self._world = world
         self._gauge = gauge
 

@@ -15,7 +15,7 @@ from typing import Any, Literal, Self
 
 import can
 
-from drivers.simulated.encoders.serial_line import PtyLine, SerialLine, SocketLine
+from drivers.simulated.transports.can_lines import PtyLine, SerialLine, SocketLine
 
 SLICE_S = 0.02
 CLIENT_TIMEOUT_S = 0.05

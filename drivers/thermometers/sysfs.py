@@ -13,17 +13,17 @@ import os
 from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 
-from drivers.ports import DeviceIdentity, TemperatureReading
-from hexacell.cell.thermometers import ThermometerSettings
+from drivers.interfaces import DeviceIdentity, TemperatureReading
+from hexacell.cell.model import ThermometerSettings
 from hexacell.errors import DeviceError
-from hexacell.files import plain_error
+from hexacell.storage.atomic_files import os_error_to_file_error
 
 LONGEST = 64
 PLAUSIBLE_C = (-100.0, 300.0)
 
 
 class SysfsThermometer:
-    """A thermometer behind a file; implements :class:`drivers.ports.Thermometer`.
+    """A thermometer behind a file; implements :class:`drivers.interfaces.Thermometer`.
 
     The kernel may let a read wait. Each thermometer has a thread for that, and one read at a time.
     """
@@ -59,7 +59,7 @@ class SysfsThermometer:
         except TimeoutError:
             raise self._error(f"does not answer within {self._settings.timeout_s:g} s") from None
         except OSError as error:
-            plain = plain_error("cannot be read", self._path, error)
+            plain = os_error_to_file_error("cannot be read", self._path, error)
             raise self._error(plain.problem) from error
         return TemperatureReading(self._celsius(raw), raw)
 

@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
-from hexacell.cell.base import Finite, NotNegative, Positive, Section, SixNumbers, broken_rule
+from hexacell.cell.fields import Finite, NotNegative, Positive, Section, SixNumbers, broken_rule
 
 NodeId = Annotated[int, Field(ge=1, le=127)]
 Direction = Literal[1, -1]

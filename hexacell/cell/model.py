@@ -1,4 +1,9 @@
-"""The cell file as a whole, and the rules that span its sections."""
+"""The cell file as a whole, and the rules that span its sections.
+
+The section of the cell file that says when motion is stopped, and how a person forbids it.
+
+The section of the cell file that names a thermometer.
+"""
 
 from __future__ import annotations
 
@@ -7,15 +12,6 @@ from typing import Literal, Self
 from pydantic import Field, ValidationError, field_validator, model_validator
 from pydantic_core import InitErrorDetails
 
-from hexacell.cell.base import (
-    GeometryValues,
-    NotNegative,
-    Point,
-    Positive,
-    Section,
-    SixNumbers,
-    broken_rule,
-)
 from hexacell.cell.devices import (
     ControllerSettings,
     EncoderSettings,
@@ -25,10 +21,54 @@ from hexacell.cell.devices import (
     TimingSettings,
     ToleranceSettings,
 )
-from hexacell.cell.guards import GuardSettings
+from hexacell.cell.fields import (
+    GeometryValues,
+    NotNegative,
+    Point,
+    Positive,
+    Section,
+    SixNumbers,
+    broken_rule,
+)
 from hexacell.cell.recovery import RecoverySettings
 from hexacell.cell.simulation import SimulationSettings
-from hexacell.cell.thermometers import ThermometerSettings
+
+
+class GuardSettings(Section):
+    """Limits beyond which nothing moves on; most others are in [limits] and [acceptance]."""
+
+    stop_file: str | None = Field(
+        None, description="while this file exists nothing moves; relative to the cell file"
+    )
+    stop_port: str | None = Field(
+        None, description="serial port of a stop contact, closed while motion is allowed"
+    )
+    stop_contact: Literal["dsr", "cts"] = Field(
+        "dsr", description="dsr: the contact joins DTR and DSR of stop_port, cts: RTS and CTS"
+    )
+    stale_s: Positive = Field(
+        0.12, description="longest a watched device may stay silent while the robot moves, on the wall"
+    )
+    plate_margin_mm: NotNegative = Field(
+        0.5, description="beyond limits.gauge_travel_mm, for the ball's swing while it moves"
+    )
+    following_mm: Positive = Field(
+        1.0, description="largest difference of a slider from where the controller was told to send it"
+    )
+    free_disk_mb: NotNegative = Field(50.0, description="least free space where the run is kept, MB")
+
+
+class ThermometerSettings(Section):
+    """A thermometer at the machine or in the room; its readings are kept with every record."""
+
+    name: str = Field(min_length=1, description="where it is: room, rails, platform")
+    protocol: str = Field("sysfs", description="sysfs, or one that a plug-in adds")
+    path: str = Field(
+        min_length=1,
+        description="sysfs: the file with the temperature in millidegrees, such as "
+        "/sys/bus/w1/devices/28-.../temperature",
+    )
+    timeout_s: Positive = Field(2.0, description="longest wait for a reading")
 
 
 class RobotSettings(Section):

@@ -7,7 +7,7 @@ from typing import Literal, Self
 
 from pydantic import Field, model_validator
 
-from hexacell.cell.base import NotNegative, Positive, Section, broken_rule
+from hexacell.cell.fields import NotNegative, Positive, Section, broken_rule
 
 
 class Action(StrEnum):

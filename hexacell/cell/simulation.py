@@ -6,7 +6,7 @@ from typing import Literal
 
 from pydantic import Field
 
-from hexacell.cell.base import GeometryValues, NotNegative, Positive, Section
+from hexacell.cell.fields import GeometryValues, NotNegative, Positive, Section
 
 
 class SimulatedGauges(Section):

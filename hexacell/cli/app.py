@@ -9,7 +9,7 @@ from importlib import import_module
 
 from hexacell.cli.console import Console
 from hexacell.cli.parser import make_parser
-from hexacell.cli.stopping import every_stop_as_ctrl_c
+from hexacell.cli.signals import stop_signals_as_sigint
 from hexacell.errors import ExitCode, HexacellError, SeveralErrors
 
 
@@ -24,7 +24,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return int(ExitCode.USAGE)
     console = Console("--json" in typed)
     try:
-        with every_stop_as_ctrl_c():
+        with stop_signals_as_sigint():
             options = parser.parse_args(typed)
             command = import_module(f"hexacell.cli.commands.{options.module}")
             return int(command.main(options))
@@ -41,5 +41,5 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _failed(message: str, code: ExitCode, console: Console) -> int:
     console.document({"error": message, "exit_code": int(code)})
-    console.complain(f"hexacell: {message}")
+    console.error(f"hexacell: {message}")
     return int(code)

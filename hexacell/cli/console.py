@@ -19,7 +19,7 @@ class Console:
         """One line, or several, for a person."""
         _write(sys.stderr if self.wants_json else sys.stdout, words + "\n")
 
-    def complain(self, words: str) -> None:
+    def error(self, words: str) -> None:
         """What went wrong, on stderr."""
         _write(sys.stderr, words + "\n")
 

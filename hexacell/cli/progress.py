@@ -11,10 +11,10 @@ from rich.console import Console as RichConsole
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from hexacell.cli.console import Console
-from hexacell.cli.words.planning import minutes_words
-from procedures import events
-from procedures.state import RunState
-from procedures.steps import Compute, Forecast, Move, Phase, Place, SetKey
+from hexacell.presentation.planning import minutes_words
+from procedures.run import events
+from procedures.run.state import RunState
+from procedures.run.steps import Compute, Move, Phase, Place, RunForecast, SetKey
 
 COMPUTING = {
     "lend": "lending the controller a better geometry",
@@ -46,7 +46,7 @@ class RunProgress:
     def __init__(self, console: Console, expected_records: int) -> None:
         self.has_begun = False
         self._console = console
-        self._forecast: Forecast | None = None
+        self._forecast: RunForecast | None = None
         self._bar = _bar()
         self._task = self._bar.add_task("connecting", total=expected_records)
 
@@ -136,7 +136,7 @@ def _promise(step: Move) -> str:
     return f": {forecast.now_mm:.3f} -> {forecast.end_mm:.3f} mm" if forecast else ""
 
 
-def forecast_line(forecast: Forecast) -> str:
+def forecast_line(forecast: RunForecast) -> str:
     """What is known after the record that was forecast, and what going on would gain."""
     line = f"  predicted error at the task {forecast.next_mm:.3f} mm"
     left = forecast.records - 1
@@ -152,13 +152,13 @@ def words(event: events.Event, state: RunState) -> str | None:
     match event:
         case events.SetClosed():
             return set_line(event, state)
-        case events.SetVoided():
+        case events.SetInvalidated():
             return f"{name(event.at)} is measured again: {event.reason}"
-        case events.Refused():
+        case events.RecordRejected():
             return f"{name(event.at)}, orientation {event.orientation} left out: {event.reason}"
         case events.Committed():
             return f"written to the controller, approved by {event.approved_by}"
-        case events.Lent() | events.TakenBack() | events.RolledBack():
+        case events.ProvisionalApplied() | events.ProvisionalReverted() | events.RolledBack():
             return REWRITTEN[event.kind]
         case _:
             return _interlude(event)
@@ -167,13 +167,13 @@ def words(event: events.Event, state: RunState) -> str | None:
 def _interlude(event: events.Event) -> str | None:
     """What there is to say about interruptions and what followed them."""
     match event:
-        case events.Confirmed():
+        case events.ReferenceConfirmed():
             return f"{name(event.at)} goes on: its reference is as it was"
-        case events.Undone():
+        case events.RecordDiscarded():
             return f"{name(event.at)}, orientation {event.orientation} is measured again"
         case events.Failed():
             return f"{event.reason}\n  attempt {event.attempt}: {event.action.value}"
-        case events.Declined():
+        case events.CommandRejected():
             return f"{event.command}: {event.reason}"
         case events.Paused() | events.Resumed():
             return event.kind

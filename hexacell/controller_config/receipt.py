@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from hexacell import files
-from hexacell.controller_config.document import Document
-from hexacell.controller_config.proposal import Proposal
+from hexacell.controller_config.change import ConfigChange, Document
 from hexacell.errors import FileError
+from hexacell.storage import atomic_files
 
 BEFORE = "config-before"
 AFTER = "config-after"
@@ -33,7 +32,7 @@ class Receipt(Document):
         return cls.load(folder / RECEIPT).model_copy(update={"backup_folder": folder.absolute()})
 
     @classmethod
-    def for_proposal(cls, proposal: Proposal, backup_folder: Path) -> Receipt:
+    def for_proposal(cls, proposal: ConfigChange, backup_folder: Path) -> Receipt:
         """The receipt that a commit of ``proposal`` leaves in ``backup_folder``."""
         return cls(
             path=proposal.path,
@@ -45,8 +44,8 @@ class Receipt(Document):
 
     def backup(self) -> bytes:
         """The config as it was before; raises ``FileError`` if the backup is gone or damaged."""
-        data = files.read_bytes(self.backup_folder / BEFORE)
-        if files.sha256(data) != self.sha256_before:
+        data = atomic_files.read_bytes(self.backup_folder / BEFORE)
+        if atomic_files.sha256(data) != self.sha256_before:
             raise FileError(
                 "the backup is damaged",
                 subject=self.backup_folder / BEFORE,

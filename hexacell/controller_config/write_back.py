@@ -11,15 +11,15 @@ from contextlib import suppress
 from pathlib import Path
 from typing import NoReturn
 
-from hexacell import files
-from hexacell.controller_config.proposal import Proposal, diff, fingerprint, propose, require_fingerprint
+from hexacell.controller_config.change import ConfigChange, diff, fingerprint, propose, require_fingerprint
 from hexacell.controller_config.receipt import AFTER, BEFORE, RECEIPT, STRANGER, Receipt
 from hexacell.errors import FileError, HexacellError, WriteBackUndone
+from hexacell.storage import atomic_files
 
-__all__ = ["Proposal", "Receipt", "commit", "diff", "fingerprint", "propose", "rollback"]
+__all__ = ["ConfigChange", "Receipt", "commit", "diff", "fingerprint", "propose", "rollback"]
 
 
-def commit(proposal: Proposal, backup_folder: Path) -> Receipt:
+def commit(proposal: ConfigChange, backup_folder: Path) -> Receipt:
     """Write ``proposal`` into the controller's config.
 
     ``backup_folder`` gets the text before and after and the receipt. A commit that was made already,
@@ -32,7 +32,7 @@ def commit(proposal: Proposal, backup_folder: Path) -> Receipt:
     """
     receipt = Receipt.for_proposal(proposal, backup_folder)
     before, after = proposal.text_before.encode(), proposal.text_after.encode()
-    found = files.read_bytes(proposal.path)
+    found = atomic_files.read_bytes(proposal.path)
     if found == after and _is_kept(receipt):
         return receipt
     require_fingerprint(proposal.path, found, proposal.sha256_before)
@@ -57,18 +57,18 @@ def rollback(receipt: Receipt, *, force: bool = False) -> bool:
             be written; the message says so if it was replaced nevertheless.
     """
     before = receipt.backup()
-    found = _content(receipt.path) if force else files.read_bytes(receipt.path)
+    found = _content(receipt.path) if force else atomic_files.read_bytes(receipt.path)
     if found == before:
         return False
     if force:
         _keep_stranger(receipt, found)
-    elif files.sha256(found or b"") != receipt.sha256_after:
+    elif atomic_files.sha256(found or b"") != receipt.sha256_after:
         raise FileError(
             "the config was changed since it was written; rolling back would lose that change",
             subject=receipt.path,
             action="Look at it, and roll back with force if it may go",
         )
-    files.write_atomically(receipt.path, before, expected=found)
+    atomic_files.write_atomically(receipt.path, before, expected=found)
     _require_written(receipt.path, before)
     return True
 
@@ -82,21 +82,21 @@ def _is_kept(receipt: Receipt) -> bool:
 
 def _back_up(receipt: Receipt, before: bytes, after: bytes) -> None:
     folder = receipt.backup_folder
-    files.make_folder(folder)
-    if files.read_if_present(folder / BEFORE) not in {None, before}:
+    atomic_files.create_folder_durably(folder)
+    if atomic_files.read_if_present(folder / BEFORE) not in {None, before}:
         raise FileError(
             "this folder already keeps the backup of another version",
             subject=folder / BEFORE,
             action="Use a folder of its own for each write-back",
         )
     for name, data in ((BEFORE, before), (AFTER, after), (RECEIPT, receipt.to_json())):
-        files.write_atomically(folder / name, data)
+        atomic_files.write_atomically(folder / name, data)
     receipt.backup()
 
 
 def _replace(receipt: Receipt, before: bytes, after: bytes) -> None:
     try:
-        files.write_atomically(receipt.path, after, expected=before)
+        atomic_files.write_atomically(receipt.path, after, expected=before)
     except BaseException as error:
         # Nothing was replaced, and so there is nothing to undo, unless the new text is there.
         if _content(receipt.path) in {after, None}:
@@ -111,7 +111,7 @@ def _replace(receipt: Receipt, before: bytes, after: bytes) -> None:
 def _undo(receipt: Receipt, before: bytes, cause: BaseException) -> NoReturn:
     _keep_stranger(receipt, _content(receipt.path))
     try:
-        files.write_atomically(receipt.path, before)
+        atomic_files.write_atomically(receipt.path, before)
         _require_written(receipt.path, before)
     except FileError as error:
         if _content(receipt.path) != before:
@@ -140,14 +140,16 @@ def _words(error: BaseException) -> str:
 
 def _keep_stranger(receipt: Receipt, found: bytes | None) -> None:
     """Lose nobody's work: a version that no commit wrote is kept beside the backup, if it can be."""
-    if found is None or files.sha256(found) in {receipt.sha256_before, receipt.sha256_after}:
+    if found is None or atomic_files.sha256(found) in {receipt.sha256_before, receipt.sha256_after}:
         return
     with suppress(FileError):
-        files.write_atomically(receipt.backup_folder / f"{STRANGER}-{files.sha256(found)[:12]}", found)
+        atomic_files.write_atomically(
+            receipt.backup_folder / f"{STRANGER}-{atomic_files.sha256(found)[:12]}", found
+        )
 
 
 def _require_written(path: Path, expected: bytes) -> None:
-    if files.read_bytes(path) != expected:
+    if atomic_files.read_bytes(path) != expected:
         raise FileError(
             "the file does not read back as it was written", subject=path, action="Check the disk"
         )
@@ -155,6 +157,6 @@ def _require_written(path: Path, expected: bytes) -> None:
 
 def _content(path: Path) -> bytes | None:
     try:
-        return files.read_bytes(path)
+        return atomic_files.read_bytes(path)
     except FileError:
         return None

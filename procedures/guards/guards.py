@@ -17,20 +17,19 @@ from typing import TypeVar
 
 import numpy as np
 
-from drivers.ports import EncoderRound
-from drivers.stop_line import SUBJECT as STOP_LINE
+from drivers.interfaces import EncoderSample
+from drivers.stop_input.stop_input import SUBJECT as STOP_LINE
 from hexacell.cell.model import CellSettings
 from hexacell.clock import CellClock
-from hexacell.rotations import Array
-from procedures.devices import Devices, MountedGauge
+from hexacell.kinematics.rotations import Array
+from procedures.devices.device_set import Devices, MountedGauge
 from procedures.guards import rules
-from procedures.guards.lanes import Lane, Line
-from procedures.guards.patrol import Lanes
-from procedures.guards.snapshot import Limits, PlungerSeen
-from procedures.guards.trips import GuardTripped, Trip
-from procedures.guards.watching import Action, Watch
-from procedures.state import RunState
-from procedures.steps import Move, ThreeNumbers
+from procedures.guards.polling import DevicePoller, DevicePollers, LineActivity
+from procedures.guards.snapshot import GaugeDeviation, Limits
+from procedures.guards.supervision import MotionSupervisor, Supervised
+from procedures.run.state import RunState
+from procedures.run.steps import Move, ThreeNumbers
+from procedures.run.trips import GuardTripped, Trip
 
 Result = TypeVar("Result")
 
@@ -49,7 +48,7 @@ class Guards:
     def __init__(self, settings: CellSettings, devices: Devices, clock: CellClock, folder: Path) -> None:
         self._settings = settings
         self._devices = devices
-        self.watch = Watch(devices.controller, clock, folder, settings.guards.free_disk_mb)
+        self.watch = MotionSupervisor(devices.controller, clock, folder, settings.guards.free_disk_mb)
 
     async def prepare(self) -> None:
         """Make the controller ready to move; whoever decides to do so has seen to what is latched.
@@ -58,7 +57,9 @@ class Guards:
             GuardTripped: motion is forbidden, an encoder is not to be trusted, or the disk is full.
         """
         self.watch.clear()
-        await self.watch.over(self._devices.controller.prepare, self._lanes(), self._limits(), ENDING_S)
+        await self.watch.supervise(
+            self._devices.controller.prepare, self._lanes(), self._limits(), ENDING_S
+        )
 
     async def move(self, step: Move, state: RunState, commanded: Callable[[], Array]) -> None:
         """Send the robot where a step says; ``commanded`` gives the sliders (6,), mm, for its pose.
@@ -68,29 +69,31 @@ class Guards:
         """
         plungers = self._plungers(step, state)
         lanes = self._lanes(controller=True, plungers=plungers)
-        reached = await self.watch.over(lambda: self._go(step), lanes, self._limits(), ENDING_S)
+        reached = await self.watch.supervise(lambda: self._go(step), lanes, self._limits(), ENDING_S)
         limit = self._settings.guards.following_mm
-        trip = rules.following(await asyncio.to_thread(commanded), np.array(reached.positions_mm), limit)
+        trip = rules.following_error(
+            await asyncio.to_thread(commanded), np.array(reached.positions_mm), limit
+        )
         if trip := trip or _frozen(step, state, plungers):
             raise await self.watch.stop(trip)
 
-    async def stand(self, action: Action[Result]) -> Result:
+    async def stand(self, action: Supervised[Result]) -> Result:
         """Do something at the robot, which must not move.
 
         Raises:
             GuardTripped: it did, or may no longer.
         """
         limits = self._limits(rest_mm=self._settings.guards.following_mm)
-        return await self.watch.over(action, self._lanes(controller=True), limits)
+        return await self.watch.supervise(action, self._lanes(controller=True), limits)
 
-    async def sample(self, action: Action[Result]) -> Result:
+    async def sample(self, action: Supervised[Result]) -> Result:
         """Take readings; the devices that are read are left to who reads them.
 
         Raises:
             GuardTripped: the robot may no longer move.
         """
         lanes = self._lanes(controller=True, encoders=False)
-        return await self.watch.over(action, lanes, self._limits())
+        return await self.watch.supervise(action, lanes, self._limits())
 
     async def reload(self) -> None:
         """Make the controller read its config again.
@@ -98,14 +101,14 @@ class Guards:
         Raises:
             GuardTripped: motion is forbidden, or an encoder is not to be trusted.
         """
-        await self.watch.over(self._devices.controller.reload, self._lanes(), self._limits(), ENDING_S)
+        await self.watch.supervise(self._devices.controller.reload, self._lanes(), self._limits(), ENDING_S)
 
     def drift(self, point: str, drift_mm: ThreeNumbers) -> GuardTripped | None:
         """The error to raise where a set's reference drifted too far; it is not latched: nothing moved."""
         trip = rules.drift(point, drift_mm, self._settings.acceptance.drift_mm)
         return None if trip is None else trip.as_error()
 
-    async def _go(self, step: Move) -> EncoderRound:
+    async def _go(self, step: Move) -> EncoderSample:
         await self._devices.controller.move(step.target)
         return await self._devices.encoders.read()
 
@@ -120,26 +123,28 @@ class Guards:
         controller: bool = False,
         encoders: bool = True,
         plungers: tuple[Plunger, ...] = (),
-    ) -> Lanes:
+    ) -> DevicePollers:
         devices = self._devices
-        return Lanes(
+        return DevicePollers(
             gauges=self._gauge_lanes(plungers),
-            encoders=Lane("encoders", devices.encoders.read, PAUSE_S) if encoders else None,
-            controller=Lane("controller", devices.controller.status, PAUSE_S) if controller else None,
-            stop_line=Lane(STOP_LINE, self._forbidden, PAUSE_S),
+            encoders=DevicePoller("encoders", devices.encoders.read, PAUSE_S) if encoders else None,
+            controller=DevicePoller("controller", devices.controller.status, PAUSE_S)
+            if controller
+            else None,
+            stop_line=DevicePoller(STOP_LINE, self._forbidden, PAUSE_S),
         )
 
-    def _gauge_lanes(self, plungers: tuple[Plunger, ...]) -> tuple[Lane[PlungerSeen], ...]:
+    def _gauge_lanes(self, plungers: tuple[Plunger, ...]) -> tuple[DevicePoller[GaugeDeviation], ...]:
         """Gauges behind one multiplexer share a port, and with it a line."""
         ports = {f"gauge {gauge.name}": gauge.port or gauge.name for gauge in self._settings.gauges}
-        lines: defaultdict[str, Line] = defaultdict(Line)
+        lines: defaultdict[str, LineActivity] = defaultdict(LineActivity)
         return tuple(
-            Lane(plunger.device, plunger.look, PAUSE_S, lines[ports[plunger.device]])
+            DevicePoller(plunger.device, plunger.look, PAUSE_S, lines[ports[plunger.device]])
             for plunger in plungers
         )
 
     async def _forbidden(self) -> str:
-        return await self._devices.stop_line.pressed() or ""
+        return await self._devices.stop_line.active_reason() or ""
 
     def _plungers(self, step: Move, state: RunState) -> tuple[Plunger, ...]:
         samples = state.set(step.at).samples
@@ -159,12 +164,12 @@ class Plunger:
         self._mounted = mounted
         self._reference_mm = reference_mm
 
-    async def look(self) -> PlungerSeen:
+    async def look(self) -> GaugeDeviation:
         """How far the plunger is from the set's reference now."""
-        reading = await self._mounted.gauge.glance()
+        reading = await self._mounted.gauge.read_once()
         self.shown.append(reading.raw)
         on_axis = self._mounted.sign * reading.value_mm
-        return PlungerSeen(self.axis, on_axis - self._reference_mm)
+        return GaugeDeviation(self.axis, on_axis - self._reference_mm)
 
 
 def _frozen(step: Move, state: RunState, plungers: tuple[Plunger, ...]) -> Trip | None:
@@ -175,6 +180,6 @@ def _frozen(step: Move, state: RunState, plungers: tuple[Plunger, ...]) -> Trip 
     for plunger in plungers:
         way = step.expected.deviation_mm[plunger.axis] - samples[-1].deviation_mm[plunger.axis]
         surely = max(0.0, abs(way) - SIGMAS * step.expected.sigma_mm[plunger.axis])
-        if trip := rules.frozen(plunger.device, tuple(plunger.shown), float(np.copysign(surely, way))):
+        if trip := rules.stuck_gauge(plunger.device, tuple(plunger.shown), float(np.copysign(surely, way))):
             return trip
     return None

@@ -2,19 +2,24 @@
 
 They are asked in the order of ``RULES``, so that the plainest cause is named: a machine that was
 switched off by the emergency stop, not the encoder that lost its supply with it.
+
+How much room is left where a run is kept.
 """
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Callable, Iterator
+from pathlib import Path
 
 import numpy as np
 
 from drivers.gauges.errors import GaugeAtEnd
-from drivers.stop_line import SUBJECT as STOP_LINE
-from hexacell.rotations import Array
-from procedures.guards.snapshot import Heard, Limits, Snapshot
-from procedures.guards.trips import Guard, Trip
+from drivers.stop_input.stop_input import SUBJECT as STOP_LINE
+from hexacell.kinematics.rotations import Array
+from hexacell.storage import atomic_files
+from procedures.guards.snapshot import DeviceReport, Limits, Snapshot
+from procedures.run.trips import Guard, Trip
 
 GARBLED = 3
 """So many answers in a row that make no sense are a broken device, fewer a noisy line."""
@@ -81,7 +86,7 @@ def devices(snapshot: Snapshot, _limits: Limits) -> Trip | None:
     return Trip(Guard.DEVICE, trips[0].device, "; ".join(problems), ". ".join(actions), causes)
 
 
-def stale(snapshot: Snapshot, limits: Limits) -> Trip | None:
+def device_silent(snapshot: Snapshot, limits: Limits) -> Trip | None:
     """A device has not answered for too long."""
     for heard in _all(snapshot):
         if heard.silent_s > limits.stale_s:
@@ -94,7 +99,7 @@ def stale(snapshot: Snapshot, limits: Limits) -> Trip | None:
     return None
 
 
-def plate(snapshot: Snapshot, limits: Limits) -> Trip | None:
+def ball_off_gauge(snapshot: Snapshot, limits: Limits) -> Trip | None:
     """The ball is leaving the plate: farther off than allowed, and than it was in the beginning."""
     for gauge in snapshot.gauges:
         if gauge.value is None or gauge.first is None:
@@ -111,7 +116,7 @@ def plate(snapshot: Snapshot, limits: Limits) -> Trip | None:
     return None
 
 
-def rest(snapshot: Snapshot, limits: Limits) -> Trip | None:
+def unexpected_motion(snapshot: Snapshot, limits: Limits) -> Trip | None:
     """A slider moves although nothing was commanded."""
     heard = snapshot.encoders
     if limits.rest_mm is None or heard is None or heard.value is None or heard.first is None:
@@ -121,7 +126,16 @@ def rest(snapshot: Snapshot, limits: Limits) -> Trip | None:
     return _off(moved, limits.rest_mm, words)
 
 
-RULES: tuple[Rule, ...] = (stop_line, controller, encoders, gauge_end, plate, rest, devices, stale)
+RULES: tuple[Rule, ...] = (
+    stop_line,
+    controller,
+    encoders,
+    gauge_end,
+    ball_off_gauge,
+    unexpected_motion,
+    devices,
+    device_silent,
+)
 
 
 def forbidden(reason: str) -> Trip:
@@ -134,13 +148,13 @@ def forbidden(reason: str) -> Trip:
     )
 
 
-def following(commanded: Array, measured: Array, limit_mm: float) -> Trip | None:
+def following_error(commanded: Array, measured: Array, limit_mm: float) -> Trip | None:
     """At the end of a move: sliders (6,), mm, are where the controller was told to send them."""
     words = f"is {{:+.3f}} mm from where the controller was told to send it (limit {limit_mm:g} mm)"
     return _off(np.subtract(measured, commanded), limit_mm, words)
 
 
-def frozen(gauge: str, shown: tuple[str, ...], expected_mm: float) -> Trip | None:
+def stuck_gauge(gauge: str, shown: tuple[str, ...], expected_mm: float) -> Trip | None:
     """At the end of a move: a gauge that showed one value all the way, while its ball had to move."""
     if len(shown) < GARBLED or len(set(shown)) > 1 or abs(expected_mm) <= FROZEN_MM:
         return None
@@ -178,17 +192,17 @@ def disk(folder: str, free_bytes: int, limit_mb: float) -> Trip | None:
     )
 
 
-def _all(snapshot: Snapshot) -> Iterator[Heard[object]]:
+def _all(snapshot: Snapshot) -> Iterator[DeviceReport[object]]:
     for heard in (*snapshot.gauges, snapshot.encoders, snapshot.controller, snapshot.stop_line):
         if heard is not None:
             yield heard
 
 
-def _counts(heard: Heard[object]) -> bool:
+def _counts(heard: DeviceReport[object]) -> bool:
     return heard.garbled == 0 or heard.garbled >= GARBLED
 
 
-def _reported(guard: Guard, heard: Heard[object]) -> Trip:
+def _reported(guard: Guard, heard: DeviceReport[object]) -> Trip:
     assert heard.error is not None  # noqa: S101 - callers see to it
     error = heard.error
     action = error.action or "Check it, then resume"
@@ -205,3 +219,16 @@ def _off(difference: Array, limit_mm: float, words: str) -> Trip | None:
         words.format(difference[leg]),
         "Look for what holds or moves that leg, and whether encoders and controller count alike",
     )
+
+
+def free_bytes(folder: Path) -> int:
+    """Free bytes on the file system of a folder that may not exist yet.
+
+    Raises:
+        FileError: nobody can tell.
+    """
+    there = next((path for path in (folder, *folder.parents) if path.exists()), folder)
+    try:
+        return shutil.disk_usage(there).free
+    except OSError as error:
+        raise atomic_files.os_error_to_file_error("its free space cannot be told", there, error) from error

@@ -5,14 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Generic, TypeVar
 
-from drivers.ports import ControllerStatus, EncoderRound
+from drivers.interfaces import ControllerStatus, EncoderSample
 from hexacell.errors import HexacellError
 
 T_co = TypeVar("T_co", covariant=True)
 
 
 @dataclass(frozen=True, slots=True)
-class Heard(Generic[T_co]):
+class DeviceReport(Generic[T_co]):
     """The latest of one device.
 
     Attributes:
@@ -33,7 +33,7 @@ class Heard(Generic[T_co]):
 
 
 @dataclass(frozen=True, slots=True)
-class PlungerSeen:
+class GaugeDeviation:
     """A gauge in the middle of a set: how far its plunger is from the set's reference, mm."""
 
     axis: int
@@ -44,10 +44,10 @@ class PlungerSeen:
 class Snapshot:
     """All that is watched, in one moment; what is not watched is empty."""
 
-    gauges: tuple[Heard[PlungerSeen], ...] = ()
-    encoders: Heard[EncoderRound] | None = None
-    controller: Heard[ControllerStatus] | None = None
-    stop_line: Heard[str] | None = None
+    gauges: tuple[DeviceReport[GaugeDeviation], ...] = ()
+    encoders: DeviceReport[EncoderSample] | None = None
+    controller: DeviceReport[ControllerStatus] | None = None
+    stop_line: DeviceReport[str] | None = None
     """Its value is why motion is forbidden; empty while it is not."""
 
 

@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hexacell.bundled import bundled_config
-from hexacell.cell.file import load_cell
-from hexacell.geometry import Geometry
-from hexacell.robot import Robot, robot_of
-from hexacell.rotations import Array
+from hexacell.cell.bundled import bundled_config
+from hexacell.cell.loader import load_cell
+from hexacell.kinematics.geometry import Geometry
+from hexacell.kinematics.rotations import Array
+from hexacell.robot_model import Robot, robot_of
 
 Say = Callable[[str, str, str], None]
 

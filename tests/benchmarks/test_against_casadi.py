@@ -12,10 +12,10 @@ import time
 import numpy as np
 import pytest
 
-from hexacell.identification import model
-from hexacell.identification.estimate import identify
-from hexacell.identification.problem import Problem
-from hexacell.study import campaigns
+from hexacell.identification.estimator import identify
+from hexacell.identification.problem.problem import Problem
+from hexacell.identification.solver import measurement_model
+from hexacell.study import data_sets
 
 
 @pytest.fixture
@@ -30,7 +30,7 @@ def peer(casadi, problem: Problem, weights: np.ndarray):
     vector = casadi.DM(problem.basis) @ parameters
     S, B = (casadi.reshape(vector[part], 3, 6) for part in (slice(0, 18), slice(18, 36)))
     constants = [casadi.SX.sym(f"c{point}", 3) for point in range(problem.points)]
-    unknowns, start = [parameters], [problem.mechanism.convention.free_part(problem.prior.centre)]
+    unknowns, start = [parameters], [problem.mechanism.convention.free_parameters(problem.prior.centre)]
     legs, residuals = [], []
     points = np.cumsum(np.isin(np.arange(problem.records), problem.first_rows)) - 1
     factors = np.swapaxes(np.linalg.cholesky(weights), 1, 2)
@@ -65,12 +65,12 @@ def _rotation(casadi, turn):
 
 def test_no_slower_than_the_compiled_peer(casadi, table_one, say) -> None:
     random = np.random.default_rng(20)
-    campaign = campaigns.unlimited_travel(
+    campaign = data_sets.unlimited_travel(
         table_one.robot, table_one.truth, table_one.points, 20, np.radians(20), random
     )
     problem = table_one.robot.problem(campaign.measured(0.01, random))
     found = identify(problem)
-    weights = model.predict(found.problem, found.free, found.poses).weights
+    weights = measurement_model.predict(found.problem, found.free, found.poses).weights
     solver, start = peer(casadi, problem, weights)
     theirs, ours = [], []
     for _ in range(5):

@@ -9,9 +9,9 @@ from __future__ import annotations
 import numpy as np
 
 from hexacell.errors import ConvergenceError
-from hexacell.identification.estimate import identify
-from hexacell.identification.paper import gauss_newton
-from hexacell.study import campaigns
+from hexacell.identification.estimator import identify
+from hexacell.study import data_sets
+from hexacell.study.reference_solvers import gauss_newton
 
 SETS = 100
 
@@ -21,7 +21,7 @@ def test_error_is_at_least_halved(table_one, say) -> None:
     ours, paper, diverged = [], [], 0
     for seed in range(SETS):
         random = np.random.default_rng(seed)
-        campaign = campaigns.unlimited_travel(
+        campaign = data_sets.unlimited_travel(
             robot, truth, table_one.points, 11, np.radians(30), random, margin=0.0
         )
         problem = robot.problem(campaign.measured(0.01, random))

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from hexacell.errors import LimitError
-from hexacell.identification.estimate import identify
-from hexacell.study import campaigns
-from hexacell.study.robots import random_robot
+from hexacell.identification.estimator import identify
+from hexacell.study import data_sets
+from hexacell.virtual_robot.random_robots import random_robot
 
 ROBOTS = 1000
 SIGMAS = 6.0
@@ -20,12 +20,12 @@ def test_every_robot_is_found(table_one, say) -> None:
         random = np.random.default_rng(seed)
         truth = random_robot(robot.mechanism, robot.drawing, 7.0, random)
         try:
-            campaign = campaigns.within_travel(robot, truth, table_one.points, 11, np.radians(30), random)
+            campaign = data_sets.within_travel(robot, truth, table_one.points, 11, np.radians(30), random)
         except LimitError:
             unreachable += 1
             continue
         found = identify(robot.problem(campaign.measured(0.01, random)))
-        error = np.abs(found.free - robot.mechanism.convention.free_part(truth))
+        error = np.abs(found.free - robot.mechanism.convention.free_parameters(truth))
         failed += not found.converged
         wrong += bool((error > SIGMAS * np.sqrt(np.diag(found.free_covariance))).any())
         short += found.records < len(campaign.joints)

@@ -17,24 +17,24 @@ from typing import Any
 import numpy as np
 import pytest
 
-from drivers.link import SerialLinks
+from drivers.serial.shared_port import SharedSerialPorts
 from drivers.simulated.cell import SimulatedCell
-from drivers.simulated.faults import FaultKind
-from drivers.trace import WireTrace
-from hexacell.bundled import bundled_config
-from hexacell.cell.file import Cell, load_cell
-from hexacell.cell.guards import GuardSettings
+from drivers.simulated.fault_schedule import FaultKind
+from drivers.wire_trace import WireTrace
+from hexacell.application.device_setup import devices_of
+from hexacell.cell.bundled import bundled_config
+from hexacell.cell.loader import Cell, load_cell
+from hexacell.cell.model import GuardSettings
 from hexacell.cell.simulation import SimulatedFault
 from hexacell.clock import CellClock
-from hexacell.composition.devices import devices_of
-from hexacell.controller_config.native_toml import NativeToml
-from hexacell.mechanisms.hexaglide import Hexaglide
-from procedures import events
-from procedures.devices import Devices
+from hexacell.controller_config.toml_format import NativeToml
+from hexacell.kinematics.mechanisms.hexaglide import Hexaglide
+from procedures.devices.device_set import Devices
 from procedures.guards.guards import Guards
-from procedures.guards.trips import Guard, GuardTripped
-from procedures.state import RunState, fold
-from procedures.steps import Move, Phase, SetKey
+from procedures.run import events
+from procedures.run.state import RunState, fold
+from procedures.run.steps import Move, Phase, SetKey
+from procedures.run.trips import Guard, GuardTripped
 
 P1 = SetKey(phase=Phase.IDENTIFY, point=1)
 MUST_S = 0.2
@@ -101,7 +101,7 @@ async def watched(folder: Path, protocol: str) -> AsyncIterator[Watched]:
         settings, settings.simulation, Hexaglide(), NativeToml(), cell.config_path, other_processes=False
     )
     with served as simulated:
-        links = SerialLinks()
+        links = SharedSerialPorts()
         devices = devices_of(simulated.settings, links, WireTrace(), folder)
         try:
             await devices.open()
@@ -128,7 +128,7 @@ async def reference(devices: Devices) -> RunState:
     )
     pose = (0.0, 0.0, 550.0, 0.0, 0.0, 0.0)
     zero = (0.0, 0.0, 0.0)
-    return fold([events.Sampled(at=P1, orientation=1, pose=pose, reading=reading, deviation_mm=zero)])
+    return fold([events.RecordTaken(at=P1, orientation=1, pose=pose, reading=reading, deviation_mm=zero)])
 
 
 class Pulse:

@@ -11,11 +11,12 @@ from statistics import median
 
 import pytest
 
-from procedures import events, journal_lines
-from procedures.journal import Journal, read_journal
-from procedures.journal_lines import Entry, encode
-from procedures.state import fold
-from procedures.steps import Phase, SetKey
+from procedures.journal import line_format
+from procedures.journal.journal import Journal, read_journal
+from procedures.journal.line_format import Entry, encode
+from procedures.run import events
+from procedures.run.state import fold
+from procedures.run.steps import Phase, SetKey
 
 RECORDS = 10_000
 APPENDED = 400
@@ -23,7 +24,7 @@ WINDOW = 7
 """Readings in a settled window, as with the times of the demo's cell."""
 
 
-def sampled(number: int, per_set: int) -> events.Sampled:
+def sampled(number: int, per_set: int) -> events.RecordTaken:
     """A record such as a run has, in a set of ``per_set``."""
     value = number / 7
     reading = events.Reading(
@@ -34,7 +35,7 @@ def sampled(number: int, per_set: int) -> events.Sampled:
         counts=((123456, 123457, 123458, -123459, 123460, 123461),) * WINDOW,
     )
     place, orientation = divmod(number, per_set)
-    return events.Sampled(
+    return events.RecordTaken(
         at=SetKey(phase=Phase.IDENTIFY, point=place + 1),
         orientation=orientation + 1,
         pose=(100.0, -100.0, 500.0, value, -value, 0.125),
@@ -52,7 +53,7 @@ def timed(work: Callable[[], object]) -> float:
 
 def test_a_record_against_the_bare_disk(tmp_path: Path, say) -> None:
     """Taken in turns, so that whatever else keeps the disk busy counts for both."""
-    line = encode(Entry(1, *journal_lines.now(), sampled(1, 20)))
+    line = encode(Entry(1, *line_format.now(), sampled(1, 20)))
     descriptor = os.open(tmp_path / "bare", os.O_CREAT | os.O_WRONLY | os.O_APPEND)
 
     def bare() -> None:
@@ -79,7 +80,7 @@ def test_a_record_against_the_bare_disk(tmp_path: Path, say) -> None:
 @pytest.mark.parametrize("per_set", [20, RECORDS])
 def test_a_long_journal_opens_quickly(tmp_path: Path, say, per_set: int) -> None:
     path = tmp_path / "journal.jsonl"
-    when = journal_lines.now()
+    when = line_format.now()
     path.write_bytes(b"".join(encode(Entry(n + 1, *when, sampled(n, per_set))) for n in range(RECORDS)))
     begun, begun_on_the_wall = time.process_time(), time.perf_counter()
     with Journal(path) as journal:
@@ -95,7 +96,7 @@ def test_a_long_journal_opens_quickly(tmp_path: Path, say, per_set: int) -> None
 
 def test_reading_is_linear_in_the_records(tmp_path: Path, say) -> None:
     path = tmp_path / "journal.jsonl"
-    when = journal_lines.now()
+    when = line_format.now()
     lines = [encode(Entry(n + 1, *when, sampled(n, 20))) for n in range(RECORDS)]
     quickest = []
     for size in (RECORDS // 4, RECORDS):

@@ -16,19 +16,19 @@ from multiprocessing import get_context
 import numpy as np
 import pytest
 
-from hexacell.bundled import bundled_config
-from hexacell.cell.file import Cell, load_cell
+from hexacell.campaign.decisions import CampaignState
+from hexacell.campaign.planner import Plan
+from hexacell.cell.bundled import bundled_config
+from hexacell.cell.loader import Cell, load_cell
 from hexacell.errors import HexacellError
-from hexacell.geometry import Geometry
-from hexacell.identification.estimate import identify
-from hexacell.measurements import MeasurementSet
-from hexacell.planning.plan import Plan
-from hexacell.planning.situation import Situation
-from hexacell.pose import Pose, Poses
-from hexacell.robot import Robot, robot_of
-from hexacell.study.adaptive import AdaptiveCampaign
-from hexacell.study.machine import StudiedMachine
-from hexacell.study.robots import random_robot
+from hexacell.identification.estimator import identify
+from hexacell.kinematics.geometry import Geometry
+from hexacell.kinematics.pose import Pose, PoseBatch
+from hexacell.measurements.records import MeasurementSet
+from hexacell.robot_model import Robot, robot_of
+from hexacell.study.simulated_campaign import AdaptiveCampaign
+from hexacell.virtual_robot.random_robots import random_robot
+from hexacell.virtual_robot.virtual_robot import StudiedMachine
 
 Say = Callable[[str, str, str], None]
 
@@ -80,7 +80,7 @@ def truth_of(cell: Cell, robot: Robot, number: int) -> Geometry:
     if number == 0:
         assert cell.settings.simulation is not None
         actual = cell.settings.simulation.geometry
-        return robot.mechanism.to_convention(Geometry(actual.S, actual.B, actual.l))[0]
+        return robot.mechanism.normalize_frames(Geometry(actual.S, actual.B, actual.l))[0]
     return random_robot(robot.mechanism, robot.drawing, ERROR_MM, np.random.default_rng([4, number]))
 
 
@@ -89,7 +89,7 @@ def can_stand_everywhere(cell: Cell, robot: Robot, truth: Geometry) -> bool:
     machine = StudiedMachine(robot, truth)
     try:
         for point in cell.settings.identification.points:
-            machine.go(robot.change.poses(Poses.of([Pose(*point)])).pose(0))
+            machine.go(robot.change.poses(PoseBatch.of([Pose(*point)])).pose(0))
     except HexacellError:
         return False
     return machine.smallest_margin >= robot.limits.singularity_margin
@@ -182,7 +182,7 @@ def costs_of(number: int) -> dict[int, float]:
     costs: dict[int, float] = {}
     plan = Plan(cell.settings, robot)
     while campaign.step():
-        situation: Situation = campaign.situation
+        situation: CampaignState = campaign.situation
         if situation.point is None or len(situation.measurements) in costs:
             continue
         if situation.records_at(situation.point) < cell.settings.identification.orientations:

@@ -13,13 +13,13 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares, root
 
-from hexacell import rotations
-from hexacell.geometry import Geometry
-from hexacell.identification.estimate import identify, track
-from hexacell.identification.paper import error_vector, least_squares_without_jacobian
-from hexacell.identification.problem import Problem
-from hexacell.measurements import MeasurementSet, Record
-from hexacell.study import campaigns
+from hexacell.identification.estimator import estimate_online, identify
+from hexacell.identification.problem.problem import Problem
+from hexacell.kinematics import rotations
+from hexacell.kinematics.geometry import Geometry
+from hexacell.measurements.records import MeasurementSet, Record
+from hexacell.study import data_sets
+from hexacell.study.reference_solvers import error_vector, least_squares_without_jacobian
 
 SIZES = (1_000, 3_000, 10_000, 30_000, 100_000)
 
@@ -37,7 +37,7 @@ def processor_seconds(work: Callable[[], object], repeats: int) -> float:
 @pytest.fixture(scope="module")
 def records_5x20(table_one) -> Problem:
     random = np.random.default_rng(20)
-    campaign = campaigns.unlimited_travel(
+    campaign = data_sets.unlimited_travel(
         table_one.robot, table_one.truth, table_one.points, 20, np.radians(20), random
     )
     problem: Problem = table_one.robot.problem(campaign.measured(0.01, random))
@@ -78,7 +78,7 @@ def as_the_paper_says(problem: Problem) -> np.ndarray:
         found = np.array([position(row, geometry) for row in range(problem.records)])
         return error_vector(problem, found - problem.deviations)
 
-    centre = problem.mechanism.convention.free_part(problem.prior.centre)
+    centre = problem.mechanism.convention.free_parameters(problem.prior.centre)
     solution: np.ndarray = least_squares(errors, centre).x
     return solution
 
@@ -91,9 +91,9 @@ def growth(table_one) -> dict[int, tuple[float, float]]:
 
 def _measure(table_one, size: int) -> tuple[float, float]:
     problem = table_one.robot.problem(_many_records(table_one, size))
-    seconds = processor_seconds(lambda: track(problem), 2)
+    seconds = processor_seconds(lambda: estimate_online(problem), 2)
     tracemalloc.start()
-    track(problem)
+    estimate_online(problem)
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     return seconds, float(peak)
@@ -102,7 +102,7 @@ def _measure(table_one, size: int) -> tuple[float, float]:
 def _many_records(table_one, size: int) -> MeasurementSet:
     """A campaign of 20 poses at each point, visited again and again with new noise."""
     random = np.random.default_rng(size)
-    campaign = campaigns.unlimited_travel(
+    campaign = data_sets.unlimited_travel(
         table_one.robot, table_one.truth, table_one.points, 20, np.radians(20), random
     )
     records: list[Record] = []

@@ -12,11 +12,11 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from hexacell import kinematics
-from hexacell.geometry import Geometry
-from hexacell.identification.estimate import identify
-from hexacell.rotations import Array
-from hexacell.study import campaigns
+from hexacell.identification.estimator import identify
+from hexacell.kinematics.forward import continue_solution, forward_kinematics
+from hexacell.kinematics.geometry import Geometry
+from hexacell.kinematics.rotations import Array
+from hexacell.study import data_sets
 
 SETS = 1000
 NOISE_MM = 0.01
@@ -38,8 +38,8 @@ class Outcome:
 def outcome(table_one) -> Outcome:
     robot, truth = table_one.robot, table_one.truth
     random = np.random.default_rng(1)
-    campaign = campaigns.unlimited_travel(robot, truth, table_one.points, 11, np.radians(30), random)
-    free = robot.mechanism.convention.free_part(truth)
+    campaign = data_sets.unlimited_travel(robot, truth, table_one.points, 11, np.radians(30), random)
+    free = robot.mechanism.convention.free_parameters(truth)
     errors, covered, removed = [], [], 0
     for _ in range(SETS):
         found = identify(robot.problem(campaign.measured(NOISE_MM, random)))
@@ -51,7 +51,7 @@ def outcome(table_one) -> Outcome:
     return Outcome(np.array(errors), np.array(covered), bound, removed, SETS * len(campaign.joints))
 
 
-def cramer_rao_bound(robot, truth: Geometry, campaign: campaigns.Campaign) -> Array:
+def cramer_rao_bound(robot, truth: Geometry, campaign: data_sets.Campaign) -> Array:
     """Smallest standard deviations (35,) of an unbiased estimator, mm."""
     positions = _position_of(robot, truth, campaign)
     by_joints = _by_joints(lambda joints: positions(truth, joints), campaign.joints)
@@ -78,7 +78,7 @@ def cramer_rao_bound(robot, truth: Geometry, campaign: campaigns.Campaign) -> Ar
 
 
 def _position_of(robot, truth, campaign):
-    really = kinematics.follow(
+    really = continue_solution(
         robot.mechanism,
         truth,
         campaign.joints,
@@ -88,7 +88,7 @@ def _position_of(robot, truth, campaign):
     ).poses
 
     def positions(geometry: Geometry, joints: Array) -> Array:
-        return kinematics.forward(robot.mechanism, geometry, joints, really).poses.positions
+        return forward_kinematics(robot.mechanism, geometry, joints, really).poses.positions
 
     return positions
 

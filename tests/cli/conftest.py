@@ -19,8 +19,8 @@ from typing import Any
 import pytest
 
 from hexacell.cli.app import main
-from procedures import events
-from procedures.journal import Journal, read_journal
+from procedures.journal.journal import Journal, read_journal
+from procedures.run import events
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 CELL = "simulated-hexaglide.toml"
@@ -205,17 +205,17 @@ def typed_here(
 @pytest.fixture
 def one_robot(monkeypatch: pytest.MonkeyPatch) -> None:
     """Foretell on a single robot and from few poses: what it says is under test, not how well."""
-    monkeypatch.setattr("hexacell.planning.forecast.ROBOTS", 1)
-    monkeypatch.setattr("hexacell.planning.forecast.CANDIDATES", 32)
+    monkeypatch.setattr("hexacell.campaign.dry_run.ROBOTS", 1)
+    monkeypatch.setattr("hexacell.campaign.dry_run.CANDIDATES", 32)
 
 
 @pytest.fixture
 def few_candidates(monkeypatch: pytest.MonkeyPatch) -> None:
     """Choose among few poses in this process, and check the plan on few: that is not under test."""
-    monkeypatch.setattr("hexacell.planning.feasibility.CANDIDATES", 8)
-    monkeypatch.setattr("hexacell.planning.feasibility.DRAWN", 4)
-    monkeypatch.setattr("procedures.calibration.CANDIDATES", 64)
-    monkeypatch.setattr("procedures.calibration.HELD_OUT_CANDIDATES", 128)
+    monkeypatch.setattr("hexacell.campaign.feasibility.CANDIDATES", 8)
+    monkeypatch.setattr("hexacell.campaign.feasibility.DRAWN", 4)
+    monkeypatch.setattr("procedures.calibration.workflow.CANDIDATES", 64)
+    monkeypatch.setattr("procedures.calibration.workflow.HELD_OUT_CANDIDATES", 128)
 
 
 @dataclass

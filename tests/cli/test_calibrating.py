@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import pytest
 
-from hexacell.archive import RunFolder
-from hexacell.cell.file import load_cell
-from hexacell.cli.calibrating import carry_out
+from hexacell.application.calibration_run import RunRequest
+from hexacell.cell.loader import load_cell
 from hexacell.cli.console import Console
-from hexacell.composition.calibration import Order
+from hexacell.cli.run_session import execute_run
 from hexacell.errors import CellBusy
-from hexacell.lock import config_lock
-from procedures import events
-from procedures.calibration import Mode
-from procedures.journal import Journal
-from procedures.operators import Nobody
-from procedures.steps import Compute
+from hexacell.runs.run_folder import RunFolder
+from hexacell.storage.cell_lock import config_lock
+from procedures.calibration.workflow import Mode
+from procedures.engine.operator import UnattendedOperator
+from procedures.journal.journal import Journal
+from procedures.run import events
+from procedures.run.steps import Compute
 
 COMMITTED = events.Committed(approved_by="a tester")
 WITHDRAWN = [events.StepBegun(step=Compute(kind="roll back")), events.RolledBack()]
@@ -35,7 +35,7 @@ def test_a_geometry_that_nobody_verified_is_never_left_without_a_word(
         for event in history:
             journal.append(event)
     cell = load_cell(cell_folder.cell)
-    order = Order(cell, folder, Mode.OPTIMISE, Nobody(), unattended=True, resume=True)
+    order = RunRequest(cell, folder, Mode.OPTIMISE, UnattendedOperator(), unattended=True, resume=True)
     with config_lock(cell.config_path), pytest.raises(CellBusy):
-        carry_out(order, Console())
+        execute_run(order, Console())
     assert (UNVERIFIED in capsys.readouterr().err) == is_said

@@ -13,8 +13,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hexacell.lock import config_lock
-from procedures import events
+from hexacell.storage.cell_lock import config_lock
+from procedures.run import events
 
 # An independent reading of TOML, good enough for a config: what is text, remark, number, or neither.
 TOKEN = re.compile(
@@ -50,7 +50,7 @@ def distances(demo, phase: str) -> list[float]:
     zeros: dict[int, np.ndarray] = {}
     found = []
     for event in demo.events():
-        if isinstance(event, events.Sampled) and event.at.phase == phase:
+        if isinstance(event, events.RecordTaken) and event.at.phase == phase:
             shown = np.array(event.reading.gauges_mm)
             zero = zeros.setdefault(event.at.point, shown)
             if event.orientation > 1:
@@ -104,8 +104,8 @@ def test_what_it_says_on_the_way_fits_a_terminal(demo):
 
 def test_the_ball_never_leaves_the_gauges_travel(demo):
     history = demo.events()
-    assert not [event for event in history if isinstance(event, events.Refused)]
-    samples = [event for event in history if isinstance(event, events.Sampled)]
+    assert not [event for event in history if isinstance(event, events.RecordRejected)]
+    samples = [event for event in history if isinstance(event, events.RecordTaken)]
     assert len(samples) == 5 * 11 + 2 * 2 * 6
     zeros = {event.at: np.array(event.reading.gauges_mm) for event in samples if event.orientation == 1}
     for event in samples:

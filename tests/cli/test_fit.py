@@ -9,7 +9,7 @@ import shutil
 import numpy as np
 import pytest
 
-from hexacell.measurement_file import HEADER
+from hexacell.measurements.csv_file import HEADER
 
 SHAPES = {"S": (6, 3), "B": (6, 3), "l": (6,)}
 

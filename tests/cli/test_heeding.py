@@ -13,10 +13,10 @@ import pytest
 
 from hexacell.cli import app
 from hexacell.cli.console import Console
-from hexacell.cli.heeding import ENDS, Signals
+from hexacell.cli.signals import ENDS, Signals
 from hexacell.errors import Interruption
-from procedures.commands import Abort, Command, Stop
-from procedures.uninterrupted import uninterrupted
+from procedures.run.cancellation import shielded
+from procedures.run.commands import Abort, Command, Stop
 
 
 @pytest.fixture(autouse=True)
@@ -81,7 +81,7 @@ def test_before_an_engine_runs_the_work_is_cancelled_and_cleans_up_undisturbed(s
             send(INT)
             await asyncio.Event().wait()
         finally:
-            await uninterrupted(cleaning_up())
+            await shielded(cleaning_up())
 
     async def cleaning_up() -> None:
         for _ in range(3):

@@ -13,11 +13,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from hexacell import kinematics
-from hexacell.geometry import Geometry
-from hexacell.mechanisms.hexaglide import Hexaglide
-from hexacell.planning.plan import Plan
-from hexacell.pose import Pose, Poses
+from hexacell.campaign.planner import Plan
+from hexacell.kinematics.forward import continue_solution
+from hexacell.kinematics.geometry import Geometry
+from hexacell.kinematics.inverse import inverse_kinematics
+from hexacell.kinematics.mechanisms.hexaglide import Hexaglide
+from hexacell.kinematics.pose import Pose, PoseBatch
 
 HEADER = ["point", "orientation", *"xyzabc", *(f"q{leg}" for leg in range(1, 7)), "dx", "dy", "dz"]
 NOISE_MM = 0.01
@@ -56,10 +57,10 @@ class Stranger:
     def measure(self, asked: dict[str, Any]) -> None:
         """Go where it is said, read, and write it down."""
         pose = [asked["pose"][name] for name in "xyzabc"]
-        command = Poses.of([Pose(*pose)])
-        joints = kinematics.inverse(Hexaglide(), self.believed, self.branch, command)
+        command = PoseBatch.of([Pose(*pose)])
+        joints = inverse_kinematics(Hexaglide(), self.believed, self.branch, command)
         np.testing.assert_allclose(joints[0], asked["joint_targets"], atol=1e-6)
-        really = kinematics.follow(
+        really = continue_solution(
             Hexaglide(),
             self.truth,
             joints,
@@ -78,7 +79,7 @@ class Stranger:
             row = [asked["point"], asked["orientation"], *pose, *sliders, *deviation]
             csv.writer(stream).writerow(row)
 
-    def follow(self, ask: Callable[[], dict[str, Any]]) -> list[dict[str, Any]]:
+    def continue_solution(self, ask: Callable[[], dict[str, Any]]) -> list[dict[str, Any]]:
         """Measure whatever is asked for until it is done; all that was said."""
         said: list[dict[str, Any]] = []
         while not said or not said[-1]["done"]:
@@ -111,7 +112,7 @@ def few(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_record_by_record_to_the_end(typed_here, short_cell, stranger):
     before = short_cell.snapshot()
-    said = stranger.follow(asking(typed_here, short_cell, stranger.file))
+    said = stranger.continue_solution(asking(typed_here, short_cell, stranger.file))
     assert short_cell.snapshot() == before
     *asked, end = said
     assert [(one["point"], one["orientation"]) for one in asked] == [
@@ -140,7 +141,7 @@ def test_record_by_record_to_the_end(typed_here, short_cell, stranger):
 @pytest.mark.timeout(600)
 def test_it_reaches_the_accuracy_of_a_run(typed, cell_folder, stranger, demo):
     """Every question a process of its own; the demo ran the same cell on its own devices."""
-    said = stranger.follow(asking(typed, cell_folder, stranger.file))
+    said = stranger.continue_solution(asking(typed, cell_folder, stranger.file))
     assert len(said) == 56
     assert stranger.farthest < TRAVEL_MM
     fit = typed("fit", cell_folder.cell, "--measurements", stranger.file, "--json")
@@ -148,7 +149,7 @@ def test_it_reaches_the_accuracy_of_a_run(typed, cell_folder, stranger, demo):
     run = json.loads((demo.run / "result.json").read_text())
     promised = [found["accuracy"]["after"]["position_largest_mm"] for found in (fit.document, run)]
     assert promised[0] < 1.25 * promised[1]
-    truth, _ = Hexaglide().to_convention(stranger.truth)
+    truth, _ = Hexaglide().normalize_frames(stranger.truth)
     errors = [_worst_error(found["geometry"], truth) for found in (fit.document, run)]
     assert errors[0] < max(1.5 * errors[1], 0.6)  # 0.57 mm is the paper's
 

@@ -13,7 +13,7 @@ from typing import Any, Self
 import pytest
 
 from drivers.simulated.cell import SimulatedCell
-from drivers.simulated.machine import SimulatedMachine
+from drivers.simulated.robot import SimulatedMachine
 
 COMMANDS = ["preflight", "run"]
 

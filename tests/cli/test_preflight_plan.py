@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from drivers.simulated.machine import SimulatedMachine
+from drivers.simulated.robot import SimulatedMachine
 
 P5 = "[-100.0, 100.0, 500.0],\n]\norientations = 11"
 

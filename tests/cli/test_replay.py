@@ -6,10 +6,10 @@ from dataclasses import replace
 
 import pytest
 
-from hexacell.verification import Verdict
-from procedures import events
-from procedures.journal import read_entries
-from procedures.journal_lines import encode
+from hexacell.acceptance.validation import Verdict
+from procedures.journal.journal import read_entries
+from procedures.journal.line_format import encode
+from procedures.run import events
 
 
 @pytest.fixture
@@ -41,7 +41,7 @@ def manipulated(demo, tmp_path):
     """The demo's journal with another verdict and other words, all checksums right."""
     entries = list(read_entries(demo.run / "journal.jsonl"))
     for place, entry in enumerate(entries):
-        if isinstance(entry.event, events.Judged):
+        if isinstance(entry.event, events.ResultValidated):
             judged = entry.event.model_copy(update={"verdict": Verdict.WORSE, "line": "Not at all."})
             entries[place] = replace(entry, event=judged)
             line = entry.number

@@ -13,8 +13,8 @@ from dataclasses import dataclass, field
 
 import pytest
 
-from procedures import events
-from procedures.journal import read_journal
+from procedures.journal.journal import read_journal
+from procedures.run import events
 
 FAST = ("clock_factor = 50.0", "clock_factor = 200.0\ngive_up_s = 2000.0")
 ASK = ('approval = "automatic"', 'approval = "ask"')
@@ -159,7 +159,7 @@ class TestNobodyIsThere:
         assert document["measurements"] is None
         assert fast_cell.controller.read_bytes() == config
         [run] = fast_cell.runs()
-        sampled = [e for e in read_journal(run / "journal.jsonl") if isinstance(e, events.Sampled)]
+        sampled = [e for e in read_journal(run / "journal.jsonl") if isinstance(e, events.RecordTaken)]
         assert {event.at.phase.value for event in sampled} == {"before-V"}
 
     def test_closed_standard_streams_are_nobody(self, start, fast_cell, demo):
@@ -222,7 +222,7 @@ class TestAPersonAtTheTerminal:
         assert "Point 2: the robot stands at X100.000 Y100.000 Z550.000" in second
         time.sleep(0.3)
         [run] = quick_cell.runs()
-        placed = [e for e in read_journal(run / "journal.jsonl") if isinstance(e, events.Placed)]
+        placed = [e for e in read_journal(run / "journal.jsonl") if isinstance(e, events.GaugesPlaced)]
         assert len(placed) == 1
         terminal.type("\n")
         assert ended(process, terminal) == 1

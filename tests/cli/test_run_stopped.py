@@ -14,9 +14,9 @@ from collections import Counter
 
 import pytest
 
-from procedures import events
-from procedures.journal import read_journal
-from procedures.steps import Phase
+from procedures.journal.journal import read_journal
+from procedures.run import events
+from procedures.run.steps import Phase
 
 STOPPED_S = 2.0
 
@@ -91,7 +91,7 @@ def test_a_calibration_is_stopped_and_finished(start, typed, quick_cell):
     measured = Counter(
         event.at.point
         for event in history(run)
-        if isinstance(event, events.Sampled) and event.at.phase is Phase.IDENTIFY
+        if isinstance(event, events.RecordTaken) and event.at.phase is Phase.IDENTIFY
     )
     assert measured.pop(2) > 5
     assert measured == {1: 5, 3: 5, 4: 5, 5: 5}  # what was finished is not measured again

@@ -8,13 +8,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hexacell import kinematics
-from hexacell.cell.base import GeometryValues
-from hexacell.cell.file import Cell, describe, dump, load_cell
-from hexacell.controller_config.native_toml import NativeToml
-from hexacell.geometry import Geometry
-from hexacell.mechanisms.hexaglide import Hexaglide
-from hexacell.pose import Pose, Poses
+from hexacell.cell.fields import GeometryValues
+from hexacell.cell.loader import Cell, describe, dump, load_cell
+from hexacell.controller_config.toml_format import NativeToml
+from hexacell.kinematics.geometry import Geometry
+from hexacell.kinematics.inverse import inverse_kinematics
+from hexacell.kinematics.mechanisms.hexaglide import Hexaglide
+from hexacell.kinematics.pose import Pose, PoseBatch
+from hexacell.kinematics.sensitivity import singularity_margin
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 NAMES = ["simulated-hexaglide", "paper-experiment"]
@@ -65,10 +66,12 @@ def test_points_and_task_poses_can_be_reached(cell):
     settings = cell.settings
     assert settings.simulation is not None
     points = (*settings.identification.points, *settings.verification.points)
-    poses = Poses.of([*(Pose(*point) for point in points), *(Pose(*pose) for pose in settings.task.poses)])
+    poses = PoseBatch.of(
+        [*(Pose(*point) for point in points), *(Pose(*pose) for pose in settings.task.poses)]
+    )
     for values in (settings.robot.nominal, settings.simulation.geometry):
-        joints = kinematics.inverse(Hexaglide(), geometry(values), BRANCH, poses)
-        margins = kinematics.singularity_margin(Hexaglide(), geometry(values), poses, joints)
+        joints = inverse_kinematics(Hexaglide(), geometry(values), BRANCH, poses)
+        margins = singularity_margin(Hexaglide(), geometry(values), poses, joints)
         assert joints.min() > settings.limits.joint_min_mm
         assert joints.max() < settings.limits.joint_max_mm
         assert margins.min() > settings.limits.singularity_margin

@@ -13,10 +13,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from hexacell.archive import RunFolder
-from hexacell.bundled import bundled_config
-from hexacell.cell.file import Cell, dump, load_cell
-from hexacell.lock import lock_path
+from hexacell.cell.bundled import bundled_config
+from hexacell.cell.loader import Cell, dump, load_cell
+from hexacell.runs.run_folder import RunFolder
+from hexacell.storage.cell_lock import lock_path
 
 POINTS = ((100.0, -100.0, 500.0), (-100.0, 100.0, 500.0))
 ORIENTATIONS = 9

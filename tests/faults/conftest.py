@@ -15,11 +15,11 @@ from typing import Any
 
 import pytest
 
-from hexacell.archive import RunFolder
 from hexacell.controller_config.receipt import AFTER
-from procedures import events
-from procedures.journal import read_journal
-from procedures.lending import FOLDER
+from hexacell.runs.run_folder import RunFolder
+from procedures.calibration.provisional_geometry import FOLDER
+from procedures.journal.journal import read_journal
+from procedures.run import events
 from tests.faults.cell import NEVER_GOOD_ENOUGH, PROVISIONAL, Site, make_site
 from tests.faults.driver import UNEXPECTED, Order
 from tests.faults.interception import Call

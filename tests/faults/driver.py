@@ -27,10 +27,11 @@ import scipy.stats
 import hexacell.cli.commands.run
 import hexacell.cli.commands.simulate
 from drivers.simulated import cell as simulated_cell
-from drivers.simulated import machine
+from drivers.simulated import robot
 from hexacell.cli.app import main
 from hexacell.plugins import Group, load
-from procedures import calibration, journal
+from procedures.calibration import workflow
+from procedures.journal import journal
 from tests.faults.interception import Failing, intercepted
 from tests.faults.pulling import pull_out
 
@@ -88,7 +89,7 @@ def serve() -> None:
         (Group.CONFIG_FORMATS, "toml"),
     ):
         load(group, name)
-    calibration.CANDIDATES, calibration.HELD_OUT_CANDIDATES, machine.STEPS = 64, 64, 8
+    workflow.CANDIDATES, workflow.HELD_OUT_CANDIDATES, robot.STEPS = 64, 64, 8
     scipy.stats.qmc.Sobol(3).random(2)  # which reads a file that not everybody may read
     print("ready", flush=True)
     for line in sys.stdin:

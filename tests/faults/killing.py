@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from procedures import events
-from procedures.journal import read_journal
+from procedures.journal.journal import read_journal
+from procedures.run import events
 from tests.faults.cell import Site
 from tests.faults.matrix import step_of
 from tests.faults.promises import require_tidy, require_valid, whole_lines

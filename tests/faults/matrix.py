@@ -7,8 +7,8 @@ from collections import Counter
 from collections.abc import Iterable
 from dataclasses import astuple, dataclass
 
-from procedures import events
-from procedures.steps import CloseSet, Compute, Locate, Move, Phase, Place, Revisit, Sample, Step
+from procedures.run import events
+from procedures.run.steps import CloseSet, Compute, Locate, Move, Phase, Place, Revisit, Sample, Step
 
 PROPERTY = "fault-matrix"
 STEPS = (

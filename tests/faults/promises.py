@@ -6,12 +6,12 @@ import json
 from collections import Counter
 from collections.abc import Sequence
 
-from hexacell.archive import RunFolder
-from hexacell.measurement_file import read_measurements
-from procedures import events
-from procedures.journal import read_journal
-from procedures.state import RunState, fold
-from procedures.steps import Phase, SetKey
+from hexacell.measurements.csv_file import read_measurements
+from hexacell.runs.run_folder import RunFolder
+from procedures.journal.journal import read_journal
+from procedures.run import events
+from procedures.run.state import RunState, fold
+from procedures.run.steps import Phase, SetKey
 from tests.faults.cell import HELD_OUT_ORIENTATIONS, ORIENTATIONS, POINTS, Site
 
 
@@ -51,14 +51,14 @@ def require_one_go(history: Sequence[events.Event], state: RunState) -> None:
     for key in state.sets:
         ends = [n for n, event in enumerate(history) if _ends(event, key)]
         attempt = history[max(ends, default=0) :]
-        counted = [e for e in attempt if isinstance(e, events.Sampled) and e.at == key]
+        counted = [e for e in attempt if isinstance(e, events.RecordTaken) and e.at == key]
         assert tuple(counted) == state.sets[key].samples
 
 
 def _ends(event: events.Event, key: SetKey) -> bool:
     """Whether an attempt at a set ends here."""
     match event:
-        case events.SetVoided():
+        case events.SetInvalidated():
             return event.at == key
         case events.Committed():
             return key.phase is Phase.AFTER

@@ -5,8 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 from drivers.simulated import cell as simulated_cell
-from drivers.simulated.gauges.faults import GaugeFault
-from procedures import events, journal
+from drivers.simulated.gauges.faults import InjectedGaugeFault
+from procedures.journal import journal
+from procedures.run import events
 from tests.faults.matrix import step_of
 
 DEVICES = ("gauge x", "gauge y", "gauge z", "encoder 3", "all encoders", "controller")
@@ -45,7 +46,7 @@ def _set(cell: Any, device: str, *, out: bool) -> None:
     if device == "controller":
         (cell.controller.unplug if out else cell.controller.plug_in)()
     elif device.startswith("gauge"):
-        (cell.gauges.inject if out else cell.gauges.clear)(device.split()[1], GaugeFault.UNPLUGGED)
+        (cell.gauges.inject if out else cell.gauges.clear)(device.split()[1], InjectedGaugeFault.UNPLUGGED)
     else:
         faults = cell.encoders.faults
         legs = range(1, 7) if device == "all encoders" else [int(device.split()[1])]

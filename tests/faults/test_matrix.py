@@ -7,8 +7,8 @@ from typing import get_args
 
 import pytest
 
-from procedures import events
-from procedures.steps import Compute
+from procedures.run import events
+from procedures.run.steps import Compute
 from tests.faults.killing import KILLED
 from tests.faults.matrix import STEPS, Case, step_of, table
 from tests.faults.test_killed_at_random import killed

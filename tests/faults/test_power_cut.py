@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from hexacell.controller_config.write_back import Receipt, rollback
-from procedures.journal import read_journal
+from procedures.journal.journal import read_journal
 from tests.faults.cell import NEVER_GOOD_ENOUGH, Site, make_site
 from tests.faults.interception import Call
 from tests.faults.matrix import step_of

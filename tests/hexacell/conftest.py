@@ -19,14 +19,14 @@ from numpy.typing import NDArray
 from scipy.optimize import root
 from scipy.spatial.transform import Rotation
 
-from hexacell.geometry import Geometry
-from hexacell.identification.estimate import identify
-from hexacell.identification.problem import Noise, Prior, Problem, Tolerances, build_problem
-from hexacell.identification.result import Identification
-from hexacell.measurements import MeasurementSet, Record
-from hexacell.mechanisms.base import Branch
-from hexacell.mechanisms.hexaglide import Hexaglide
-from hexacell.pose import Pose
+from hexacell.identification.estimator import identify
+from hexacell.identification.problem.problem import Noise, Prior, Problem, Tolerances, build_problem
+from hexacell.identification.solver.result import Identification
+from hexacell.kinematics.geometry import Geometry
+from hexacell.kinematics.mechanism import Branch
+from hexacell.kinematics.mechanisms.hexaglide import Hexaglide
+from hexacell.kinematics.pose import Pose
+from hexacell.measurements.records import MeasurementSet, Record
 
 Array = NDArray[np.float64]
 

@@ -14,10 +14,10 @@ from typing import Any
 
 import pytest
 
-from hexacell.controller_config.proposal import Proposal
+from hexacell.controller_config.change import ConfigChange
 from hexacell.controller_config.write_back import commit
-from procedures import events
-from procedures.steps import Phase, SetKey
+from procedures.run import events
+from procedures.run.steps import Phase, SetKey
 from tests.procedures.fakes import Bench
 from tests.procedures.rig import MakeRig, Recording, Rig, hurry, new_rig
 from tests.procedures.story import Story
@@ -58,7 +58,7 @@ def replayed(recording: Recording, make_rig: MakeRig) -> Callable[..., Rig]:
             moved = str(recording.folder.path.parent), str(rig.folder.path.parent)
             rig.folder.proposal.write_text(recording.folder.proposal.read_text().replace(*moved))
         if events.Committed in kinds:
-            commit(Proposal.load(rig.folder.proposal), rig.folder.path)
+            commit(ConfigChange.load(rig.folder.proposal), rig.folder.path)
             rig.machine.switch_on()
         return rig
 

@@ -8,14 +8,14 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 from drivers.gauges.errors import GaugeAtEnd
-from drivers.ports import ControllerStatus, DeviceIdentity, EncoderRound, GaugeReading
-from drivers.simulated.machine import SimulatedMachine
+from drivers.interfaces import ControllerStatus, DeviceIdentity, EncoderSample, GaugeReading
+from drivers.simulated.robot import SimulatedMachine
 from hexacell.cell.recovery import Action
 from hexacell.clock import CellClock
 from hexacell.errors import HexacellError
-from hexacell.pose import Pose
-from procedures import events
-from procedures.devices import Devices, MountedGauge
+from hexacell.kinematics.pose import Pose
+from procedures.devices.device_set import Devices, MountedGauge
+from procedures.run import events
 
 HALF_TRAVEL_MM = 6.25
 
@@ -78,7 +78,7 @@ class FakeGauge(Fake):
             raise GaugeAtEnd("is at an end of its travel", subject=f"gauge {self.name}")
         return GaugeReading(value, f"{value:+.3f}")
 
-    async def glance(self) -> GaugeReading:
+    async def read_once(self) -> GaugeReading:
         value = self.shown()
         if abs(value) > HALF_TRAVEL_MM:
             raise GaugeAtEnd("is at an end of its travel", subject=f"gauge {self.name}")
@@ -99,11 +99,11 @@ class FakeEncoders(Fake):
     async def open(self) -> tuple[DeviceIdentity, ...]:
         return self._answering(*(f"encoder {leg}" for leg in range(1, 7)))
 
-    async def read(self) -> EncoderRound:
+    async def read(self) -> EncoderSample:
         if self.failure:
             raise self.failure
         positions = tuple(float(value) for value in self.shown())
-        return EncoderRound(tuple(round(1000 * value) for value in positions), positions)
+        return EncoderSample(tuple(round(1000 * value) for value in positions), positions)
 
 
 class FakeController(Fake):
@@ -153,14 +153,14 @@ class Approver:
     def __init__(self, name: str | None = "a tester") -> None:
         self.name = name
         self.placed: list[int] = []
-        self.asked: list[tuple[Sequence[events.Gate], str]] = []
+        self.asked: list[tuple[Sequence[events.GateOutcome], str]] = []
         self.problems: list[str] = []
         self.decisions: list[Action] = []
 
     async def place_gauges(self, point: int, pose: Pose) -> None:
         self.placed.append(point)
 
-    async def approve(self, gates: Sequence[events.Gate], change: str) -> str | None:
+    async def approve(self, gates: Sequence[events.GateOutcome], change: str) -> str | None:
         self.asked.append((gates, change))
         return self.name
 

@@ -12,26 +12,26 @@ from typing import Any
 
 import pytest
 
-from drivers.simulated import machine as machine_module
+from drivers.simulated import robot as machine_module
 from drivers.simulated.cell import _world
-from drivers.simulated.machine import SimulatedMachine
-from drivers.simulated.world import World
-from hexacell.archive import RunFolder
-from hexacell.bundled import bundled_config
-from hexacell.cell.file import Cell, dump, load_cell
-from hexacell.composition.calibration import _beginning
-from hexacell.controller_config.native_toml import NativeToml
-from hexacell.mechanisms.hexaglide import Hexaglide
-from hexacell.pose import Pose
-from hexacell.robot import robot_of
-from procedures import calibration as calibration_module
-from procedures import events
-from procedures.calibration import Calibration, Mode
-from procedures.desk import Desk
-from procedures.engine import Engine, Listener
-from procedures.journal import Journal
-from procedures.performing import Performer
-from procedures.recovery import GIVE_UP, Policy
+from drivers.simulated.physics import RobotPhysics
+from drivers.simulated.robot import SimulatedMachine
+from hexacell.application.calibration_run import _beginning
+from hexacell.cell.bundled import bundled_config
+from hexacell.cell.loader import Cell, dump, load_cell
+from hexacell.controller_config.toml_format import NativeToml
+from hexacell.kinematics.mechanisms.hexaglide import Hexaglide
+from hexacell.kinematics.pose import Pose
+from hexacell.robot_model import robot_of
+from hexacell.runs.run_folder import RunFolder
+from procedures.calibration import workflow as calibration_module
+from procedures.calibration.workflow import Calibration, Mode
+from procedures.engine.engine import Engine, Listener
+from procedures.engine.operator import QuestionBroker
+from procedures.engine.recovery_policy import GIVE_UP, RecoveryPolicy
+from procedures.engine.step_executor import StepExecutor
+from procedures.journal.journal import Journal
+from procedures.run import events
 from tests.procedures.fakes import Approver, Bench
 
 
@@ -51,14 +51,14 @@ class Rig:
         bench = self.bench = Bench()
         self.clock, self.gauges, self.controller = bench.clock, bench.gauges, bench.controller
         home, config = Pose(*self.cell.settings.identification.points[0]), self.cell.config_path
-        self.world: World = _world(Hexaglide(), simulation, self.clock, NativeToml(), config, home)
+        self.world: RobotPhysics = _world(Hexaglide(), simulation, self.clock, NativeToml(), config, home)
         self.machine = SimulatedMachine(Hexaglide(), NativeToml(), config, self.world, self.clock, home)
         for gauge in bench.gauges:
             gauge.shown = partial(self.world.displacement, gauge.name)
         bench.encoders.shown = lambda: list(self.world.sliders())
         bench.controller.machine = self.machine
         self.calibration = Calibration(self.cell.settings, robot_of(self.cell), self.mode)
-        self.performer = Performer(
+        self.performer = StepExecutor(
             self.cell, self.calibration, bench.devices, self.clock, self.operator, self.folder
         )
 
@@ -70,10 +70,10 @@ class Rig:
         nobody: Any = SimpleNamespace(identities=())
         return _beginning(self.cell, self.calibration, nobody)
 
-    async def run(self, *listeners: Listener, policy: Policy = GIVE_UP) -> events.Ended:
+    async def run(self, *listeners: Listener, policy: RecoveryPolicy = GIVE_UP) -> events.Ended:
         """Begin, or go on where the folder's journal ends; ``engine`` is the one that does."""
         self.folder.path.mkdir(exist_ok=True)
-        desk = Desk(self.performer.operator)
+        desk = QuestionBroker(self.performer.operator)
         performer = replace(self.performer, operator=desk)
         with Journal(self.folder.journal) as journal:
             engine = self.engine = Engine(performer, journal, listeners, desk=desk, policy=policy)

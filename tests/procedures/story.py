@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from procedures import events
-from procedures.steps import SetKey, SixNumbers, ThreeNumbers
+from procedures.run import events
+from procedures.run.steps import SetKey, SixNumbers, ThreeNumbers
 
 NOTHING_IS_ZERO = (0.0, 0.0, 0.0)
 
@@ -21,7 +21,7 @@ class Story:
         return events.Arrived(at=self.key, orientation=orientation, pose=pose)
 
     def placed(self) -> events.Event:
-        return events.Placed(at=self.key)
+        return events.GaugesPlaced(at=self.key)
 
     def sampled(
         self,
@@ -33,22 +33,24 @@ class Story:
             gauges_mm=deviation, spread_mm=NOTHING_IS_ZERO, joints_mm=(0.0,) * 6, answers=(), counts=()
         )
         where = self.arrived(orientation, pose).model_dump(exclude={"kind"})
-        return events.Sampled(**where, reading=reading, deviation_mm=deviation)
+        return events.RecordTaken(**where, reading=reading, deviation_mm=deviation)
 
     def refused(self, orientation: int = 2) -> events.Event:
-        return events.Refused(at=self.key, orientation=orientation, reason="the ball left the travel")
+        return events.RecordRejected(
+            at=self.key, orientation=orientation, reason="the ball left the travel"
+        )
 
     def closed(self) -> events.Event:
         return events.SetClosed(at=self.key, drift_mm=NOTHING_IS_ZERO)
 
     def undone(self, orientation: int) -> events.Event:
-        return events.Undone(at=self.key, orientation=orientation)
+        return events.RecordDiscarded(at=self.key, orientation=orientation)
 
     def confirmed(self) -> events.Event:
-        return events.Confirmed(at=self.key, change_mm=NOTHING_IS_ZERO)
+        return events.ReferenceConfirmed(at=self.key, change_mm=NOTHING_IS_ZERO)
 
     def voided(self) -> events.Event:
-        return events.SetVoided(at=self.key, reason="interrupted")
+        return events.SetInvalidated(at=self.key, reason="interrupted")
 
     def whole(self, orientations: int) -> list[events.Event]:
         """A set measured from its first move to its closing."""

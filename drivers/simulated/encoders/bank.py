@@ -1,4 +1,7 @@
-"""The simulated bank: positions in, sampled once per SYNC, counts out on the wire."""
+"""The simulated bank: positions in, sampled once per SYNC, counts out on the wire.
+
+What can be made to go wrong on the simulated encoder bus; legs count from 1.
+"""
 
 from __future__ import annotations
 
@@ -7,10 +10,9 @@ from collections.abc import Callable, Sequence
 from types import TracebackType
 from typing import Any, Self
 
-from drivers.simulated.encoders.encoder import DeviceData, SimulatedEncoder
-from drivers.simulated.encoders.faults import EncoderFaults
-from drivers.simulated.encoders.line import SimulatedLine
-from drivers.simulated.encoders.maker import EVENTS_AND_SYNC, Maker
+from drivers.simulated.encoders.can_bus import SimulatedLine
+from drivers.simulated.encoders.node import DeviceData, SimulatedEncoder
+from drivers.simulated.encoders.vendors import EVENTS_AND_SYNC, Vendor
 from hexacell.cell.devices import EncoderSettings
 from hexacell.clock import CellClock
 
@@ -36,7 +38,7 @@ class SimulatedEncoderBank:
         positions: Positions,
         clock: CellClock,
         latency_s: float = 0.0,
-        makers: Sequence[Maker] = (EVENTS_AND_SYNC,) * 6,
+        makers: Sequence[Vendor] = (EVENTS_AND_SYNC,) * 6,
     ) -> None:
         self.channel = f"hexacell-encoders-{uuid.uuid4().hex}"
         self.line = SimulatedLine(self.channel)
@@ -129,3 +131,70 @@ class SimulatedEncoderBank:
         from_zero = (position_mm - settings.offset_mm[leg - 1]) * settings.direction[leg - 1]
         counts = round(from_zero / step_mm) % _ALL_BITS
         return counts - _ALL_BITS if settings.signed and counts >= _ALL_BITS // 2 else counts
+
+
+NO_MAGNET = 0xFF00
+POSITION_ERROR = 0x21
+"""Error register: generic and device profile specific."""
+
+
+class EncoderFaults:
+    """Injects faults into a bank, at once, from any thread."""
+
+    def __init__(self, bank: SimulatedEncoderBank) -> None:
+        self._bank = bank
+
+    def unplug(self, leg: int) -> None:
+        """The node vanishes; before ``start`` it was never there."""
+        with self._bank.line.lock:
+            self._bank.encoder(leg).unplug()
+            self._bank.unplugged.add(leg)
+
+    def plug_in(self, leg: int) -> None:
+        """It comes back, without configuration."""
+        with self._bank.line.lock:
+            self._bank.unplugged.discard(leg)
+            self._bank.encoder(leg).plug_in()
+
+    def duplicate(self, leg: int) -> None:
+        """A second device with the same node id and another serial number appears."""
+        with self._bank.line.lock:
+            self._bank.add_twin(leg)
+
+    def silence(self, leg: int, *, silent: bool = True) -> None:
+        """It no longer answers SYNC, but everything else."""
+        with self._bank.line.lock:
+            self._bank.encoder(leg).is_silent = silent
+
+    def emergency(self, leg: int, code: int = NO_MAGNET, register: int = POSITION_ERROR) -> None:
+        """It reports an error; ``clear_emergency`` takes it back."""
+        with self._bank.line.lock:
+            self._bank.encoder(leg).emergency(code, register)
+
+    def clear_emergency(self, leg: int) -> None:
+        """It reports that there is no error any more."""
+        self.emergency(leg, 0, 0)
+
+    def alarm(self, leg: int, bits: int = 1) -> None:
+        """It raises alarms in 6503h without a message; 0 takes them back."""
+        with self._bank.line.lock:
+            self._bank.encoder(leg).set_alarms(bits)
+
+    def reboot(self, leg: int) -> None:
+        """It restarts and loses its configuration."""
+        with self._bank.line.lock:
+            self._bank.encoder(leg).boot()
+
+    def stop_heartbeat(self, leg: int) -> None:
+        """Its heartbeat ends; it still answers."""
+        with self._bank.line.lock:
+            self._bank.encoder(leg).stop_heartbeat()
+
+    def delay(self, leg: int, seconds: float) -> None:
+        """Its answers come so much later, with what it sampled at their SYNC: stale rounds."""
+        with self._bank.line.lock:
+            self._bank.encoder(leg).delay_s = seconds
+
+    def kill_bus(self) -> None:
+        """Every node falls silent for good."""
+        self._bank.line.stop()

@@ -12,7 +12,7 @@ DIGITS = b"0123456789"
 DATA_BITS = 7
 
 
-class GaugeFault(StrEnum):
+class InjectedGaugeFault(StrEnum):
     """A fault, on the line, of the instrument, or of the plug."""
 
     SILENT = "silent"
@@ -30,24 +30,24 @@ class GaugeFault(StrEnum):
     FROZEN = "frozen"
 
 
-def afflict(indicator: Indicator, fault: GaugeFault, *, on: bool) -> bool:
+def apply_fault(indicator: Indicator, fault: InjectedGaugeFault, *, on: bool) -> bool:
     """Set an instrument's fault or take it away; false if ``fault`` is none of an instrument."""
     match fault:
-        case GaugeFault.INCH:
+        case InjectedGaugeFault.INCH:
             indicator.inch = on
-        case GaugeFault.REVERSED:
+        case InjectedGaugeFault.REVERSED:
             indicator.reversed = on
-        case GaugeFault.BATTERY_LOW:
+        case InjectedGaugeFault.BATTERY_LOW:
             indicator.battery_low = on
-        case GaugeFault.AT_END:
+        case InjectedGaugeFault.AT_END:
             indicator.at_end = on
-        case GaugeFault.PUSHED:
+        case InjectedGaugeFault.PUSHED:
             indicator.push(on=on)
-        case GaugeFault.FROZEN:
+        case InjectedGaugeFault.FROZEN:
             indicator.stick(on=on)
-        case GaugeFault.HOLD:
+        case InjectedGaugeFault.HOLD:
             (indicator.hold if on else indicator.release)()
-        case GaugeFault.AUTO_OFF:
+        case InjectedGaugeFault.AUTO_OFF:
             (indicator.switch_off if on else indicator.switch_on)()
         case _:
             return False
@@ -73,27 +73,27 @@ class WireFaults:
 
     def __init__(self, seed: int = 0) -> None:
         self._random = Random(seed)  # noqa: S311 - a simulation
-        self._active: dict[GaugeFault, _Strike] = {}
+        self._active: dict[InjectedGaugeFault, _Strike] = {}
 
-    def begin(self, fault: GaugeFault, *, answers: int | None, seconds: float) -> None:
+    def begin(self, fault: InjectedGaugeFault, *, answers: int | None, seconds: float) -> None:
         """Let ``fault`` strike the next ``answers``, or all of them; ``seconds`` is how late."""
         self._active[fault] = _Strike(answers, seconds)
 
-    def end(self, fault: GaugeFault) -> None:
+    def end(self, fault: InjectedGaugeFault) -> None:
         """Let it strike no more."""
         self._active.pop(fault, None)
 
-    def strike(self, answer: bytes) -> tuple[bytes, float]:
+    def inject(self, answer: bytes) -> tuple[bytes, float]:
         """What becomes of ``answer``: the bytes that leave, and how many seconds late."""
         delay = 0.0
         for fault, strike in tuple(self._active.items()):
             if not strike.strikes():
                 self.end(fault)
-            elif fault is GaugeFault.SILENT:
+            elif fault is InjectedGaugeFault.SILENT:
                 answer = b""
-            elif fault is GaugeFault.LATE:
+            elif fault is InjectedGaugeFault.LATE:
                 delay = strike.seconds
-            elif fault is GaugeFault.GARBLED_DIGIT:
+            elif fault is InjectedGaugeFault.GARBLED_DIGIT:
                 answer = flip_digit(answer, self._random)
             else:
                 answer = flip_bit(answer, self._random)

@@ -5,11 +5,11 @@ from __future__ import annotations
 import argparse
 import json
 
-from hexacell.cell.file import describe, load_cell, schema
+from hexacell.application.device_setup import require_drivers
+from hexacell.cell.loader import describe, load_cell, schema
 from hexacell.cli.console import Console
-from hexacell.composition.devices import require_drivers
 from hexacell.errors import ExitCode
-from hexacell.robot import robot_of
+from hexacell.robot_model import robot_of
 
 
 def main(options: argparse.Namespace) -> ExitCode:

@@ -7,17 +7,17 @@ import shutil
 from contextlib import ExitStack
 from pathlib import Path
 
-from hexacell.archive import RunFolder
-from hexacell.bundled import CONTROLLER, bundled_config
-from hexacell.cell.file import load_cell
-from hexacell.cli.calibrating import carry_out, finish
+from hexacell.application.calibration_run import RunRequest
+from hexacell.cell.bundled import CONTROLLER, bundled_config
+from hexacell.cell.loader import load_cell
 from hexacell.cli.console import Console
-from hexacell.composition.calibration import Order
+from hexacell.cli.run_session import execute_run, finish
 from hexacell.errors import ExitCode, FileError, UsageError
-from hexacell.files import make_folder, plain_error, write_atomically
-from hexacell.lock import config_lock, lock_path
-from procedures.calibration import Mode
-from procedures.operators import Nobody
+from hexacell.runs.run_folder import RunFolder
+from hexacell.storage.atomic_files import create_folder_durably, os_error_to_file_error, write_atomically
+from hexacell.storage.cell_lock import config_lock, lock_path
+from procedures.calibration.workflow import Mode
+from procedures.engine.operator import UnattendedOperator
 
 MARK = ".hexacell-demo"
 
@@ -31,8 +31,10 @@ def main(options: argparse.Namespace) -> ExitCode:
         "The geometry that its controller works with is wrong by millimetres:\n"
         f"  {cell.config_path}"
     )
-    order = Order(cell, RunFolder(options.folder / "run"), Mode.OPTIMISE, Nobody(), unattended=True)
-    ended = carry_out(order, console)
+    order = RunRequest(
+        cell, RunFolder(options.folder / "run"), Mode.OPTIMISE, UnattendedOperator(), unattended=True
+    )
+    ended = execute_run(order, console)
     return finish(order, ended, console)
 
 
@@ -62,7 +64,7 @@ def _prepare(folder: Path, cell_file: Path) -> Path:
                 action="Choose another with --folder",
             )
         _clear(folder)
-    make_folder(folder)
+    create_folder_durably(folder)
     write_atomically(folder / MARK, b"made by hexacell demo, which replaces this folder\n")
     for source in cell_file.parent.glob(f"{cell_file.stem}*.toml"):
         write_atomically(folder / source.name, source.read_bytes())
@@ -80,4 +82,4 @@ def _clear(folder: Path) -> None:
             for item in set(folder.iterdir()) - kept:
                 shutil.rmtree(item) if item.is_dir() and not item.is_symlink() else item.unlink()
         except OSError as error:
-            raise plain_error("the former demo cannot be removed", folder, error) from error
+            raise os_error_to_file_error("the former demo cannot be removed", folder, error) from error

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import argparse
 
-from hexacell.assessment import assess
-from hexacell.cell.file import load_cell
+from hexacell.cell.loader import load_cell
 from hexacell.cli.console import Console
-from hexacell.cli.words.identification import identification_words
 from hexacell.errors import ExitCode
-from hexacell.identification.estimate import identify
-from hexacell.measurement_file import read_measurements
-from hexacell.robot import robot_of
-from hexacell.summary import assessment_document, identification_document
+from hexacell.identification.estimator import identify
+from hexacell.measurements.csv_file import read_measurements
+from hexacell.presentation.identification import identification_words
+from hexacell.reporting.assessment import assess
+from hexacell.reporting.documents import assessment_document, identification_document
+from hexacell.robot_model import robot_of
 
 
 def main(options: argparse.Namespace) -> ExitCode:

@@ -5,17 +5,17 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from hexacell.cell.file import load_cell
+from hexacell.campaign.decisions import Finished, Forecast, MeasurePose, StartPoint
+from hexacell.campaign.from_file import decide, situation_of
+from hexacell.campaign.planner import Plan
+from hexacell.campaign.pose_list import pose_list_of
+from hexacell.cell.loader import load_cell
 from hexacell.cli.console import Console
-from hexacell.cli.words.layout import wrapped
-from hexacell.cli.words.planning import outlook_words, visit_words
 from hexacell.errors import ExitCode
-from hexacell.measurement_file import read_measurements
-from hexacell.planning.by_file import decide, situation_of
-from hexacell.planning.listed import pose_list_of
-from hexacell.planning.plan import Plan
-from hexacell.planning.situation import Finished, Outlook, Reference, Visit
-from hexacell.robot import robot_of
+from hexacell.measurements.csv_file import read_measurements
+from hexacell.presentation.layout import wrapped
+from hexacell.presentation.planning import outlook_words, visit_words
+from hexacell.robot_model import robot_of
 
 
 def main(options: argparse.Namespace) -> ExitCode:
@@ -26,7 +26,7 @@ def main(options: argparse.Namespace) -> ExitCode:
     measurements = read_measurements(options.measurements, allow_partial=True)
     situation = situation_of(plan, measurements, refusals=options.refused)
     decision = decide(plan, situation)
-    outlook = decision.outlook if isinstance(decision, Visit) else plan.outlook(situation)
+    outlook = decision.outlook if isinstance(decision, MeasurePose) else plan.outlook(situation)
     console.document(next_document(decision, outlook))
     if not options.json:
         console.say(wrapped(visit_words(decision)))
@@ -34,7 +34,9 @@ def main(options: argparse.Namespace) -> ExitCode:
     return ExitCode.DONE
 
 
-def next_document(decision: Reference | Visit | Finished, outlook: Outlook | None) -> dict[str, Any]:
+def next_document(
+    decision: StartPoint | MeasurePose | Finished, outlook: Forecast | None
+) -> dict[str, Any]:
     """The document of ``docs/interface.md``."""
     now = None if outlook is None else outlook.now_mm
     if isinstance(decision, Finished):
@@ -51,8 +53,8 @@ def next_document(decision: Reference | Visit | Finished, outlook: Outlook | Non
     }
 
 
-def _step(decision: Reference | Visit) -> dict[str, Any]:
-    if isinstance(decision, Reference):
+def _step(decision: StartPoint | MeasurePose) -> dict[str, Any]:
+    if isinstance(decision, StartPoint):
         zero = [0.0, 0.0, 0.0]
         return {
             "orientation": 1,
@@ -72,7 +74,7 @@ def _step(decision: Reference | Visit) -> dict[str, Any]:
     }
 
 
-def _going_on(outlook: Outlook) -> dict[str, Any]:
+def _going_on(outlook: Forecast) -> dict[str, Any]:
     return {
         "records": outlook.records,
         "minutes": outlook.minutes,

@@ -6,18 +6,19 @@ import argparse
 import asyncio
 from dataclasses import asdict
 
-from hexacell.cell.file import load_cell
+from hexacell.application.calibration_run import preflight
+from hexacell.campaign.dry_run import dry_run
+from hexacell.campaign.feasibility import unreachable_share
+from hexacell.campaign.planner import Plan
+from hexacell.campaign.pose_list import pose_list_of
+from hexacell.cell.loader import load_cell
 from hexacell.cli.console import Console
-from hexacell.cli.words import device_words, wrapped
-from hexacell.cli.words.planning import foretold_words
-from hexacell.composition.calibration import preflight
 from hexacell.errors import ExitCode
-from hexacell.planning.feasibility import shares_lost
-from hexacell.planning.forecast import foretell
-from hexacell.planning.listed import pose_list_of
-from hexacell.planning.plan import Plan
-from hexacell.robot import robot_of
-from procedures.calibration import Mode
+from hexacell.presentation.devices import device_words
+from hexacell.presentation.layout import wrapped
+from hexacell.presentation.planning import foretold_words
+from hexacell.robot_model import robot_of
+from procedures.calibration.workflow import Mode
 
 
 def main(options: argparse.Namespace) -> ExitCode:
@@ -30,7 +31,7 @@ def main(options: argparse.Namespace) -> ExitCode:
     console.say("ok  all points can be reached, all devices answer; nothing was moved")
     console.say("Trying the plan on simulated robots within the tolerances, some seconds ...")
     plan = Plan(cell.settings, robot_of(cell), pose_list_of(cell))
-    foretold, lost = foretell(plan), shares_lost(plan)
+    foretold, lost = dry_run(plan), unreachable_share(plan)
     console.document(
         {
             "ready": True,

@@ -5,12 +5,12 @@ from __future__ import annotations
 import argparse
 import asyncio
 
+from hexacell.application.replay_run import replay
 from hexacell.cli.console import Console
-from hexacell.cli.words.replay import replay_document, replay_words
-from hexacell.composition.replay import replay
 from hexacell.errors import ExitCode, UsageError
-from procedures.replaying.comparing import TOLERANCE
-from procedures.replaying.replayer import Scope
+from hexacell.presentation.replay import replay_document, replay_words
+from procedures.replay.comparison import TOLERANCE
+from procedures.replay.replayer import Scope
 
 
 def main(options: argparse.Namespace) -> ExitCode:

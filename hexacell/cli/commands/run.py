@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import argparse
 
-from hexacell.archive import find_run, new_run
-from hexacell.cell.file import load_cell
-from hexacell.cli.calibrating import carry_out, finish
+from hexacell.application.calibration_run import RunRequest
+from hexacell.cell.loader import load_cell
 from hexacell.cli.console import Console
-from hexacell.cli.people import AtTerminal, somebody_is_there
-from hexacell.composition.calibration import Order
+from hexacell.cli.run_session import execute_run, finish
+from hexacell.cli.terminal import TerminalOperator, somebody_is_there
 from hexacell.errors import ExitCode
-from procedures.calibration import Mode
-from procedures.operators import Nobody
+from hexacell.runs.run_folder import find_run, new_run
+from procedures.calibration.workflow import Mode
+from procedures.engine.operator import UnattendedOperator
 
 
 def main(options: argparse.Namespace) -> ExitCode:
@@ -20,15 +20,15 @@ def main(options: argparse.Namespace) -> ExitCode:
     console = Console(options.json)
     cell = load_cell(options.cell)
     attended = somebody_is_there() and not options.unattended
-    order = Order(
+    order = RunRequest(
         cell=cell,
         folder=find_run(cell, options.resume) if options.resume else new_run(cell),
         mode=_mode(options),
-        operator=AtTerminal(console) if attended else Nobody(),
+        operator=TerminalOperator(console) if attended else UnattendedOperator(),
         unattended=not attended,
         resume=options.resume is not None,
     )
-    return finish(order, carry_out(order, console), console)
+    return finish(order, execute_run(order, console), console)
 
 
 def _mode(options: argparse.Namespace) -> Mode:

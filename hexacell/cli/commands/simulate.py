@@ -8,10 +8,10 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from hexacell.cell.file import dump, load_cell
-from hexacell.composition.devices import served
+from hexacell.application.device_setup import device_addresses
+from hexacell.cell.loader import dump, load_cell
 from hexacell.errors import ExitCode, UsageError
-from hexacell.files import write_atomically
+from hexacell.storage.atomic_files import write_atomically
 
 
 def main(options: argparse.Namespace) -> ExitCode:
@@ -19,7 +19,7 @@ def main(options: argparse.Namespace) -> ExitCode:
     cell = load_cell(options.cell)
     if cell.settings.simulation is None:
         raise UsageError("there is no [simulation] in it: this is a real cell", subject=cell.path)
-    with _held_back() as stops, served(cell, other_processes=True) as settings:
+    with _held_back() as stops, device_addresses(cell, other_processes=True) as settings:
         controller = settings.controller.model_copy(update={"config": str(cell.config_path.resolve())})
         text = dump(settings.model_copy(update={"controller": controller}))
         if options.output is None:

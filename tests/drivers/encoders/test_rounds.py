@@ -10,8 +10,8 @@ import pytest
 
 from drivers.encoders.cia406 import Cia406Bank
 from drivers.encoders.errors import BusError, DuplicatedNodeError, SilentNodeError, WrongDeviceError
-from drivers.encoders.rounds import TRIES
-from drivers.trace import Direction, TraceEntry
+from drivers.encoders.sync_sampling import TRIES
+from drivers.wire_trace import Direction, TraceEntry
 
 
 def counts(value: int) -> bytes:

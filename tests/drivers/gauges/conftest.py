@@ -5,7 +5,7 @@ import time
 import pytest
 import serial
 
-from drivers.link import SerialLinks
+from drivers.serial.shared_port import SharedSerialPorts
 from hexacell.cell.devices import GaugeSettings
 
 TIMEOUT_S = 0.05
@@ -73,7 +73,7 @@ def dialogue(monkeypatch):
 
 @pytest.fixture
 async def links():
-    links = SerialLinks(worst_latency_s=WORST_LATENCY_S)
+    links = SharedSerialPorts(worst_latency_s=WORST_LATENCY_S)
     yield links
     await links.close()
 

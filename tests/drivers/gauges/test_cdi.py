@@ -16,8 +16,8 @@ from drivers.gauges.errors import (
     WrongUnit,
     ZeroVoid,
 )
-from drivers.gauges.shown import Shown
-from drivers.ports import DeviceIdentity, GaugeReading
+from drivers.gauges.protocol import DisplayedValue
+from drivers.interfaces import DeviceIdentity, GaugeReading
 from drivers.simulated.gauges.cdi import format_value
 
 VALUE = b"+  2.1380, MM\r\n"
@@ -58,7 +58,7 @@ async def opened(dialogue, gauge):
 )
 def test_a_value_is_read_with_its_unit(frame, value, unit):
     shown = parse_value(frame)
-    assert isinstance(shown, Shown)
+    assert isinstance(shown, DisplayedValue)
     assert (shown.value, shown.apparent_unit) == (value, unit)
 
 
@@ -94,7 +94,7 @@ def test_anything_else_is_rejected(frame):
 @given(st.floats(-99, 99), st.booleans())
 def test_what_the_simulated_device_writes_is_read(value, inch):
     shown = parse_value(format_value(value, inch=inch).removesuffix(b"\n"))
-    assert isinstance(shown, Shown)
+    assert isinstance(shown, DisplayedValue)
     assert shown.value == pytest.approx(value, abs=0.51e-5 if inch else 0.51e-4)
     assert shown.unit == ("inch" if inch else "mm")
 
@@ -109,7 +109,7 @@ def test_noise_is_a_value_only_if_it_is_one_to_the_last_byte(noise):
         shown = parse_value(noise)
     except FrameRejected:
         return
-    if isinstance(shown, Shown):
+    if isinstance(shown, DisplayedValue):
         assert re.fullmatch(rb"[+-] *[0-9]+\.[0-9]+ *, (IN|MM)\r", noise)
         assert len(noise) == 14
         assert abs(shown.value) == float(noise[1:9])
@@ -239,6 +239,6 @@ async def test_another_protocol_is_quoted_beside_what_was_expected(dialogue, gau
 
 async def test_a_glance_is_one_question(dialogue, opened):
     dialogue.expect((b"R\r", b"+  2.1380, MM\r\n"), (b"R\r", b"OUT OF BOUNDS\r\n"))
-    assert (await opened.glance()).value_mm == 2.138
+    assert (await opened.read_once()).value_mm == 2.138
     with pytest.raises(GaugeAtEnd):
-        await opened.glance()
+        await opened.read_once()

@@ -8,17 +8,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drivers.gauges import mux10
-from drivers.gauges.errors import (
-    FrameRejected,
-    GaugeAtEnd,
-    GaugeSilent,
-    WrongAnswer,
-    WrongUnit,
-    ZeroVoid,
-)
+from drivers.gauges.errors import FrameRejected, GaugeAtEnd, GaugeSilent, WrongAnswer, WrongUnit, ZeroVoid
 from drivers.gauges.mux10 import MultiplexerError, Mux10Gauge, parse_about, parse_value
-from drivers.gauges.shown import Shown
-from drivers.ports import DeviceIdentity, GaugeReading
+from drivers.gauges.protocol import DisplayedValue
+from drivers.interfaces import DeviceIdentity, GaugeReading
 from drivers.simulated.gauges.mux10 import format_value
 from hexacell.errors import DeviceError, FileError
 
@@ -58,7 +51,7 @@ def no_pause(monkeypatch):
     ],
 )
 def test_a_value_is_read(frame, value, decimals):
-    assert parse_value(frame, 2) == Shown(value, decimals, None, frame.decode().strip())
+    assert parse_value(frame, 2) == DisplayedValue(value, decimals, None, frame.decode().strip())
 
 
 @pytest.mark.parametrize(("frame", "code"), [(b"911\r", 1), (b"918\r", 8), (b"912\r", 2), (b"921\r", 1)])
@@ -92,7 +85,7 @@ def test_anything_else_is_rejected(frame):
 @given(st.integers(1, 99), st.floats(-99, 99), st.booleans())
 def test_what_the_simulated_device_writes_is_read(channel, value, inch):
     shown = parse_value(format_value(channel, value, inch=inch), channel)
-    assert isinstance(shown, Shown)
+    assert isinstance(shown, DisplayedValue)
     assert shown.value == pytest.approx(value, abs=0.51e-5 if inch else 0.51e-3)
     assert (shown.apparent_unit == "inch") is inch
 
@@ -103,7 +96,7 @@ def test_noise_is_a_value_only_if_it_is_one_to_the_last_byte(noise):
         shown = parse_value(noise, 2)
     except FrameRejected:
         return
-    if isinstance(shown, Shown):
+    if isinstance(shown, DisplayedValue):
         assert re.fullmatch(rb"02A[+-][0-9]+\.[0-9]+\r", noise)
         assert len(noise) == 13
         assert shown.value == float(noise[3:])
@@ -269,17 +262,17 @@ async def test_two_speeds_on_one_line_are_refused(dialogue, opened, links, setti
 
 async def test_a_glance_is_one_question(dialogue, opened):
     dialogue.expect((b"2\r", VALUE))
-    assert await opened.glance() == GaugeReading(0.123, "02A+0000.123")
+    assert await opened.read_once() == GaugeReading(0.123, "02A+0000.123")
 
 
 async def test_a_busy_multiplexer_has_not_answered_a_glance(dialogue, opened):
     dialogue.expect((b"2\r", b"918\r"), (b"2\r", VALUE))
     with pytest.raises(WrongAnswer, match=r"busy \(918\)"):
-        await opened.glance()
-    assert (await opened.glance()).value_mm == 0.123
+        await opened.read_once()
+    assert (await opened.read_once()).value_mm == 0.123
 
 
 async def test_a_glance_at_the_end_of_its_travel(dialogue, opened):
     dialogue.expect((b"2\r", b"912\r"))
     with pytest.raises(GaugeAtEnd):
-        await opened.glance()
+        await opened.read_once()

@@ -12,18 +12,18 @@ from typing import Any
 import numpy as np
 import pytest
 
-from drivers.simulated.machine import SimulatedMachine
-from drivers.simulated.world import World
-from hexacell import kinematics
-from hexacell.bundled import bundled_config
-from hexacell.cell.file import Cell, load_cell
+from drivers.simulated.physics import RobotPhysics
+from drivers.simulated.robot import SimulatedMachine
+from hexacell.cell.bundled import bundled_config
+from hexacell.cell.loader import Cell, load_cell
 from hexacell.cell.simulation import SimulationSettings
 from hexacell.clock import CellClock
-from hexacell.controller_config.native_toml import NativeToml
-from hexacell.geometry import Geometry
-from hexacell.mechanisms.hexaglide import Hexaglide
-from hexacell.pose import Pose, Poses
-from hexacell.rotations import Array
+from hexacell.controller_config.toml_format import NativeToml
+from hexacell.kinematics.geometry import Geometry
+from hexacell.kinematics.inverse import inverse_kinematics
+from hexacell.kinematics.mechanisms.hexaglide import Hexaglide
+from hexacell.kinematics.pose import Pose, PoseBatch
+from hexacell.kinematics.rotations import Array
 
 HOME = Pose(0.0, 0.0, 550.0)
 STILL: dict[str, Any] = {
@@ -62,7 +62,7 @@ class Twin:
     """A world and the machine in it, beside what an onlooker may compute for himself."""
 
     clock: StillClock
-    world: World
+    world: RobotPhysics
     machine: SimulatedMachine
     config: Path
     truth: Geometry
@@ -71,7 +71,7 @@ class Twin:
     def joints_for(self, pose: Pose) -> Array:
         """Where the controller's geometry puts the sliders for a pose."""
         branch = NativeToml().read(self.config).branch
-        joints: Array = kinematics.inverse(Hexaglide(), self.commanding, branch, Poses.of([pose]))[0]
+        joints: Array = inverse_kinematics(Hexaglide(), self.commanding, branch, PoseBatch.of([pose]))[0]
         return joints
 
     def ball_at(self, pose: Pose) -> Array:
@@ -82,7 +82,7 @@ class Twin:
         legs = np.array([1.0, 0.0, 0.0])
 
         def error(numbers: Array) -> Array:
-            platform = Poses.of([Pose(*(float(number) for number in numbers))])
+            platform = PoseBatch.of([Pose(*(float(number) for number in numbers))])
             ends = platform.positions[0] + self.truth.B @ platform.rotations[0].T
             sliders = self.truth.S + joints[:, None] * legs
             return np.asarray(np.linalg.norm(sliders - ends, axis=1) - self.truth.l, dtype=float)
@@ -119,10 +119,10 @@ def make_twin(bundled_cell: Cell) -> MakeTwin:
         simulation = changed(simulation, changes)
         config = bundled_cell.config_path
         read = NativeToml().read(config)
-        start = Poses.of([home])
-        joints = kinematics.inverse(Hexaglide(), read.geometry, read.branch, start)[0]
+        start = PoseBatch.of([home])
+        joints = inverse_kinematics(Hexaglide(), read.geometry, read.branch, start)[0]
         clock = StillClock()
-        world = World(
+        world = RobotPhysics(
             Hexaglide(),
             simulation,
             clock,

@@ -12,19 +12,19 @@ from typing import Any
 import pytest
 
 from drivers.controllers.errors import MotionInterrupted, MoveRefused
-from drivers.controllers.linuxcncrsh import LinuxcncrshController
+from drivers.controllers.linuxcnc.controller import LinuxcncrshController
 from drivers.encoders.cia406 import Cia406Bank
 from drivers.gauges.cdi import CdiGauge
 from drivers.gauges.mux10 import Mux10Gauge
 from drivers.gauges.sylvac import SylvacGauge
-from drivers.link import SerialLinks
+from drivers.serial.shared_port import SharedSerialPorts
 from drivers.simulated.cell import SimulatedCell
-from drivers.simulated.gauges.faults import GaugeFault
+from drivers.simulated.gauges.faults import InjectedGaugeFault
 from hexacell.cell.model import CellSettings
-from hexacell.controller_config.native_toml import NativeToml
+from hexacell.controller_config.toml_format import NativeToml
 from hexacell.errors import FileError, HexacellError, ReachError
-from hexacell.mechanisms.hexaglide import Hexaglide
-from hexacell.pose import Pose
+from hexacell.kinematics.mechanisms.hexaglide import Hexaglide
+from hexacell.kinematics.pose import Pose
 
 DRIVERS: dict[str, Any] = {"sylvac": SylvacGauge, "mux10": Mux10Gauge, "cdi": CdiGauge}
 
@@ -65,7 +65,7 @@ async def under_way(cell: SimulatedCell) -> None:
 
 @asynccontextmanager
 async def drivers(settings: CellSettings) -> AsyncIterator[tuple[list[Any], Any, Any]]:
-    links = SerialLinks()
+    links = SharedSerialPorts()
     gauges = [DRIVERS[gauge.protocol](gauge, links) for gauge in settings.gauges]
     encoders, controller = Cia406Bank(settings.encoders), LinuxcncrshController(settings.controller)
     try:
@@ -155,7 +155,7 @@ async def test_reloading_reads_the_config_and_moves_nothing(bundled_cell) -> Non
 
 
 def _geometry(values: Any) -> Any:
-    from hexacell.geometry import Geometry
+    from hexacell.kinematics.geometry import Geometry
 
     return Geometry(values.S, values.B, values.l)
 
@@ -222,7 +222,7 @@ async def test_faults_of_devices_reach_the_drivers(bundled_cell) -> None:
     hasty = settings.encoders.model_copy(update={"timeout_s": 0.3})
     with serve(bundled_cell, settings.model_copy(update={"encoders": hasty})) as cell:
         async with drivers(cell.settings) as (gauges, encoders, _):
-            cell.gauges.inject("x", GaugeFault.INCH)
+            cell.gauges.inject("x", InjectedGaugeFault.INCH)
             with pytest.raises(HexacellError, match="gauge x"):
                 await gauges[0].read()
             cell.encoders.faults.silence(3)

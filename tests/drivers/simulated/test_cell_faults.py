@@ -10,14 +10,14 @@ import pytest
 
 from drivers.gauges.errors import GaugeAtEnd, GaugeSilent
 from drivers.gauges.sylvac import SylvacGauge
-from drivers.link import SerialLinks
+from drivers.serial.shared_port import SharedSerialPorts
 from drivers.simulated.cell import SimulatedCell
-from drivers.simulated.faults import FaultKind, FaultSchedule
+from drivers.simulated.fault_schedule import FaultKind, FaultSchedule
 from hexacell.cell.simulation import SimulatedFault
 from hexacell.clock import CellClock
-from hexacell.controller_config.native_toml import NativeToml
+from hexacell.controller_config.toml_format import NativeToml
 from hexacell.errors import DeviceError, UsageError
-from hexacell.mechanisms.hexaglide import Hexaglide
+from hexacell.kinematics.mechanisms.hexaglide import Hexaglide
 
 PATIENCE_S = 5.0
 
@@ -40,7 +40,7 @@ def cell(bundled_cell):
 
 @pytest.fixture
 async def gauge(cell):
-    links = SerialLinks()
+    links = SharedSerialPorts()
     opened = SylvacGauge(cell.settings.gauges[0].model_copy(update={"timeout_s": 2.0}), links)
     await opened.open()
     yield opened
@@ -49,51 +49,51 @@ async def gauge(cell):
 
 
 async def test_a_plunger_at_its_end_comes_back(cell, gauge) -> None:
-    cell.faults.strike(FaultKind.AT_END, "x")
+    cell.faults.inject(FaultKind.AT_END, "x")
     with pytest.raises(GaugeAtEnd):
-        await gauge.glance()
-    cell.faults.lift(FaultKind.AT_END, "x")
-    assert abs((await gauge.glance()).value_mm) < 3.0
+        await gauge.read_once()
+    cell.faults.clear(FaultKind.AT_END, "x")
+    assert abs((await gauge.read_once()).value_mm) < 3.0
 
 
 async def test_a_frozen_gauge_answers_the_same_again_and_again(cell, gauge) -> None:
-    cell.faults.strike(FaultKind.FROZEN, "x")
-    assert len({(await gauge.glance()).raw for _ in range(20)}) == 1
-    cell.faults.lift(FaultKind.FROZEN, "x")
-    assert len({(await gauge.glance()).raw for _ in range(50)}) > 1
+    cell.faults.inject(FaultKind.FROZEN, "x")
+    assert len({(await gauge.read_once()).raw for _ in range(20)}) == 1
+    cell.faults.clear(FaultKind.FROZEN, "x")
+    assert len({(await gauge.read_once()).raw for _ in range(50)}) > 1
 
 
 async def test_a_ball_off_its_plate_and_back(cell, gauge) -> None:
-    before = (await gauge.glance()).value_mm
-    cell.faults.strike(FaultKind.OFF_PLATE, "x")
-    assert abs((await gauge.glance()).value_mm - before) == pytest.approx(6.0, abs=0.1)
-    cell.faults.lift(FaultKind.OFF_PLATE, "x")
-    assert (await gauge.glance()).value_mm == pytest.approx(before, abs=0.1)
+    before = (await gauge.read_once()).value_mm
+    cell.faults.inject(FaultKind.OFF_PLATE, "x")
+    assert abs((await gauge.read_once()).value_mm - before) == pytest.approx(6.0, abs=0.1)
+    cell.faults.clear(FaultKind.OFF_PLATE, "x")
+    assert (await gauge.read_once()).value_mm == pytest.approx(before, abs=0.1)
 
 
 async def test_a_cable_that_is_pulled_and_put_back(cell, gauge) -> None:
-    cell.faults.strike(FaultKind.UNPLUGGED, "x")
+    cell.faults.inject(FaultKind.UNPLUGGED, "x")
     with pytest.raises(DeviceError, match="lost"):
-        await gauge.glance()
-    cell.faults.lift(FaultKind.UNPLUGGED, "x")
+        await gauge.read_once()
+    cell.faults.clear(FaultKind.UNPLUGGED, "x")
     await gauge.open()
-    await gauge.glance()
+    await gauge.read_once()
 
 
 async def test_a_silent_gauge(cell, gauge) -> None:
-    cell.faults.strike(FaultKind.SILENT, "x")
+    cell.faults.inject(FaultKind.SILENT, "x")
     with pytest.raises(GaugeSilent):
-        await gauge.glance()
-    cell.faults.lift(FaultKind.SILENT, "x")
+        await gauge.read_once()
+    cell.faults.clear(FaultKind.SILENT, "x")
 
 
 def test_the_stop_line_is_a_file(cell) -> None:
     stop_file = Path(cell.settings.guards.stop_file)
-    cell.faults.strike(FaultKind.STOP_LINE)
+    cell.faults.inject(FaultKind.STOP_LINE)
     assert stop_file.exists()
-    cell.faults.lift(FaultKind.STOP_LINE)
+    cell.faults.clear(FaultKind.STOP_LINE)
     assert not stop_file.exists()
-    cell.faults.lift(FaultKind.STOP_LINE)
+    cell.faults.clear(FaultKind.STOP_LINE)
 
 
 def test_an_emergency_stop_and_a_following_error_switch_the_machine_off(cell) -> None:
@@ -102,7 +102,7 @@ def test_an_emergency_stop_and_a_following_error_switch_the_machine_off(cell) ->
         control.set_estop(on=False)
         control.set_machine(on=True)
         assert control.on
-        cell.faults.strike(kind)
+        cell.faults.inject(kind)
         assert (control.on, control.estop) == (False, estop)
     assert control.next_error() == "joint 3 following error"
 
@@ -122,7 +122,7 @@ def test_an_emergency_stop_and_a_following_error_switch_the_machine_off(cell) ->
 )
 def test_what_cannot_go_wrong_is_refused(cell, kind: FaultKind, device: str) -> None:
     with pytest.raises(UsageError, match=f"no fault '{kind}' can be simulated of '{device}'"):
-        cell.faults.strike(kind, device)
+        cell.faults.inject(kind, device)
 
 
 class Log:

@@ -10,10 +10,10 @@ from pathlib import Path
 
 import pytest
 
-from drivers.ports import DeviceIdentity, TemperatureReading
+from drivers.interfaces import DeviceIdentity, TemperatureReading
 from drivers.thermometers import sysfs
 from drivers.thermometers.sysfs import SysfsThermometer
-from hexacell.cell.thermometers import ThermometerSettings
+from hexacell.cell.model import ThermometerSettings
 from hexacell.errors import DeviceError
 
 

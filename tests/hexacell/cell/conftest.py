@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from hexacell.cell.file import Cell, load_cell
+from hexacell.cell.loader import Cell, load_cell
 
 CONFIGS = Path(__file__).parents[3] / "configs"
 

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hexacell.cell.file import Origin, load_cell
+from hexacell.cell.loader import Origin, load_cell
 from hexacell.errors import ExitCode, FileError, HexacellError, SeveralErrors
 
 

@@ -9,7 +9,7 @@ from itertools import count
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hexacell.cell.lines import line_of, locate
+from hexacell.cell.diagnostics import line_of, locate
 
 DECOYS = ["", "# [x] = {", "  # '''", '# """', "\t"]
 TEXTS = ["'[a]'", '"}#\\""', "'''\n]\n[[b]]\n'''", '"""\n k = 1 \\"""\n"""', "''", '""']

@@ -7,8 +7,8 @@ from typing import Any
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hexacell.cell import base, devices, model, simulation
-from hexacell.cell.file import describe, dump, schema
+from hexacell.cell import devices, fields, model, simulation
+from hexacell.cell.loader import describe, dump, schema
 
 finite = st.floats(allow_nan=False, allow_infinity=False)
 positive = st.floats(min_value=0, exclude_min=True, allow_infinity=False)
@@ -21,7 +21,7 @@ anything = st.recursive(
     scalars, lambda inner: st.lists(inner, max_size=3) | st.dictionaries(texts, inner, max_size=3)
 )
 tables = st.dictionaries(texts, anything, max_size=3)
-geometries = st.builds(base.GeometryValues, S=st.tuples(*[points] * 6), B=st.tuples(*[points] * 6), l=six)
+geometries = st.builds(fields.GeometryValues, S=st.tuples(*[points] * 6), B=st.tuples(*[points] * 6), l=six)
 
 
 def _gauges(axes: tuple[str, ...]) -> st.SearchStrategy[tuple[Any, ...]]:

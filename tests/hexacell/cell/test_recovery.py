@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from hexacell.bundled import bundled_config
-from hexacell.cell.file import load_cell
+from hexacell.cell.bundled import bundled_config
+from hexacell.cell.loader import load_cell
 from hexacell.cell.recovery import (
     Action,
     AttendedRecovery,

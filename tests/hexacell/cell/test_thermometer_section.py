@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from hexacell.cell.file import describe
+from hexacell.cell.loader import describe
 from hexacell.errors import FileError
 
 ROOM = '\n[[thermometers]]\nname = "room"\npath = "/sys/class/hwmon/hwmon0/temp1_input"\n'

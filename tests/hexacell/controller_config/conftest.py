@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hexacell.geometry import Geometry
+from hexacell.kinematics.geometry import Geometry
 
 CONFIG = """\
 # The owner's remarks stay.

@@ -3,13 +3,13 @@ from pathlib import Path
 
 import pytest
 
-from hexacell import files
 from hexacell.controller_config import write_back
-from hexacell.controller_config.native_toml import NativeToml
-from hexacell.controller_config.proposal import Proposal, fingerprint, propose
+from hexacell.controller_config.change import ConfigChange, fingerprint, propose
+from hexacell.controller_config.toml_format import NativeToml
 from hexacell.controller_config.write_back import Receipt, commit, rollback
 from hexacell.errors import FileError, WriteBackUndone
-from hexacell.geometry import Geometry
+from hexacell.kinematics.geometry import Geometry
+from hexacell.storage import atomic_files
 
 
 def names(folder: Path) -> list[str]:
@@ -17,7 +17,7 @@ def names(folder: Path) -> list[str]:
 
 
 @pytest.fixture
-def proposal(config: Path, geometry: Geometry) -> Proposal:
+def proposal(config: Path, geometry: Geometry) -> ConfigChange:
     return propose(config, NativeToml(), "toml", geometry, fingerprint_at_start=fingerprint(config))
 
 
@@ -27,7 +27,7 @@ def run(tmp_path: Path) -> Path:
 
 
 def test_a_commit_writes_what_was_proposed(
-    config: Path, run: Path, geometry: Geometry, proposal: Proposal
+    config: Path, run: Path, geometry: Geometry, proposal: ConfigChange
 ) -> None:
     config.chmod(0o640)
     commit(proposal, run)
@@ -37,7 +37,7 @@ def test_a_commit_writes_what_was_proposed(
     assert names(config.parent) == [config.name]
 
 
-def test_the_run_folder_keeps_both_texts_and_the_receipt(run: Path, proposal: Proposal) -> None:
+def test_the_run_folder_keeps_both_texts_and_the_receipt(run: Path, proposal: ConfigChange) -> None:
     receipt = commit(proposal, run)
     assert (run / "config-before").read_bytes() == proposal.text_before.encode()
     assert (run / "config-after").read_bytes() == proposal.text_after.encode()
@@ -60,7 +60,7 @@ def test_rollback_is_bit_for_bit_and_may_be_repeated(config: Path, run: Path, ge
     assert config.read_bytes() == original
 
 
-def test_rollback_works_from_a_moved_run_folder(config: Path, run: Path, proposal: Proposal) -> None:
+def test_rollback_works_from_a_moved_run_folder(config: Path, run: Path, proposal: ConfigChange) -> None:
     commit(proposal, run)
     run.rename(run.parent / "archived")
     assert rollback(Receipt.of(run.parent / "archived"))
@@ -68,10 +68,10 @@ def test_rollback_works_from_a_moved_run_folder(config: Path, run: Path, proposa
 
 
 def test_commits_are_undone_one_after_another(
-    config: Path, run: Path, geometry: Geometry, proposal: Proposal
+    config: Path, run: Path, geometry: Geometry, proposal: ConfigChange
 ) -> None:
     first = commit(proposal, run)
-    further = geometry.toward(NativeToml().read(config).geometry, 2.0)
+    further = geometry.interpolate(NativeToml().read(config).geometry, 2.0)
     further = Geometry(S=further.S + 1.0, B=further.B, l=further.l)
     second = commit(
         propose(config, NativeToml(), "toml", further, fingerprint_at_start=fingerprint(config)), run / "2"
@@ -95,7 +95,7 @@ def test_a_link_to_the_config_stays_a_link(config: Path, run: Path, geometry: Ge
     assert config.read_bytes() == made.text_before.encode()
 
 
-def test_a_config_that_changed_since_is_refused(config: Path, run: Path, proposal: Proposal) -> None:
+def test_a_config_that_changed_since_is_refused(config: Path, run: Path, proposal: ConfigChange) -> None:
     changed = config.read_bytes() + b"# edited\n"
     config.write_bytes(changed)
     with pytest.raises(FileError, match=r"changed since the run began.*run again") as caught:
@@ -106,7 +106,7 @@ def test_a_config_that_changed_since_is_refused(config: Path, run: Path, proposa
 
 
 def test_a_config_that_changes_in_the_last_moment_is_left_alone(
-    config: Path, run: Path, proposal: Proposal, monkeypatch: pytest.MonkeyPatch
+    config: Path, run: Path, proposal: ConfigChange, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def back_up_slowly(*args: object) -> None:
         config.write_bytes(b"somebody's new work")
@@ -119,7 +119,7 @@ def test_a_config_that_changes_in_the_last_moment_is_left_alone(
 
 
 def test_a_commit_interrupted_after_the_replacement_is_recognised(
-    config: Path, run: Path, proposal: Proposal
+    config: Path, run: Path, proposal: ConfigChange
 ) -> None:
     receipt = commit(proposal, run)
     assert commit(proposal, run) == receipt
@@ -137,7 +137,7 @@ def test_a_proposal_without_a_change_is_committed_without_writing(config: Path, 
 
 
 def test_a_backup_of_another_version_is_not_overwritten(
-    config: Path, run: Path, proposal: Proposal
+    config: Path, run: Path, proposal: ConfigChange
 ) -> None:
     run.mkdir(parents=True)
     (run / "config-before").write_bytes(b"precious")
@@ -148,7 +148,7 @@ def test_a_backup_of_another_version_is_not_overwritten(
 
 
 def test_a_run_folder_that_cannot_be_made_stops_the_commit(
-    config: Path, run: Path, proposal: Proposal
+    config: Path, run: Path, proposal: ConfigChange
 ) -> None:
     run.parent.write_text("a file where a folder must be")
     with pytest.raises(FileError, match="folder cannot be made"):
@@ -157,7 +157,7 @@ def test_a_run_folder_that_cannot_be_made_stops_the_commit(
 
 
 def test_rollback_refuses_to_lose_a_later_edit_unless_forced(
-    config: Path, run: Path, proposal: Proposal
+    config: Path, run: Path, proposal: ConfigChange
 ) -> None:
     receipt = commit(proposal, run)
     config.write_bytes(b"# a later edit\n")
@@ -170,7 +170,7 @@ def test_rollback_refuses_to_lose_a_later_edit_unless_forced(
     assert kept.read_bytes() == b"# a later edit\n"
 
 
-def test_a_deleted_config_comes_back_only_by_force(config: Path, run: Path, proposal: Proposal) -> None:
+def test_a_deleted_config_comes_back_only_by_force(config: Path, run: Path, proposal: ConfigChange) -> None:
     receipt = commit(proposal, run)
     config.unlink()
     with pytest.raises(FileError, match="does not exist"):
@@ -181,7 +181,7 @@ def test_a_deleted_config_comes_back_only_by_force(config: Path, run: Path, prop
 
 @pytest.mark.parametrize("force", [False, True])
 def test_a_damaged_backup_is_never_restored(
-    config: Path, run: Path, proposal: Proposal, force: bool
+    config: Path, run: Path, proposal: ConfigChange, force: bool
 ) -> None:
     receipt = commit(proposal, run)
     (run / "config-before").write_bytes(b"damaged")
@@ -196,7 +196,7 @@ def test_a_missing_receipt_is_said_so(tmp_path: Path) -> None:
 
 
 def test_what_does_not_read_back_is_undone(
-    config: Path, run: Path, proposal: Proposal, monkeypatch: pytest.MonkeyPatch
+    config: Path, run: Path, proposal: ConfigChange, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A disk that garbles what it was given: the backup returns, and what was found is kept."""
     replace = os.replace
@@ -216,7 +216,7 @@ def test_what_does_not_read_back_is_undone(
 
 
 def test_an_interrupt_after_the_replacement_is_undone_and_stays_an_interrupt(
-    config: Path, run: Path, proposal: Proposal, monkeypatch: pytest.MonkeyPatch
+    config: Path, run: Path, proposal: ConfigChange, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def interrupt(path: Path, expected: bytes) -> None:
         if expected == proposal.text_after.encode():
@@ -229,23 +229,23 @@ def test_an_interrupt_after_the_replacement_is_undone_and_stays_an_interrupt(
 
 
 def test_a_full_disk_leaves_the_config_alone(
-    config: Path, run: Path, proposal: Proposal, monkeypatch: pytest.MonkeyPatch
+    config: Path, run: Path, proposal: ConfigChange, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    write = files.write_atomically
+    write = atomic_files.write_atomically
 
     def full(path: Path, data: bytes, **options: bytes) -> None:
         if path == config:
             raise FileError("cannot be written and is as it was: the disk is full", subject=path)
         write(path, data, **options)
 
-    monkeypatch.setattr(files, "write_atomically", full)
+    monkeypatch.setattr(atomic_files, "write_atomically", full)
     with pytest.raises(FileError, match="disk is full"):
         commit(proposal, run)
     assert config.read_bytes() == proposal.text_before.encode()
 
 
 def test_a_backup_that_does_not_read_back_stops_the_commit(
-    config: Path, run: Path, proposal: Proposal, monkeypatch: pytest.MonkeyPatch
+    config: Path, run: Path, proposal: ConfigChange, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     replace = os.replace
 

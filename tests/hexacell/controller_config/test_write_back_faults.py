@@ -8,11 +8,11 @@ from typing import Any
 
 import pytest
 
-from hexacell.controller_config.native_toml import NativeToml
-from hexacell.controller_config.proposal import Proposal, fingerprint, propose
+from hexacell.controller_config.change import ConfigChange, fingerprint, propose
+from hexacell.controller_config.toml_format import NativeToml
 from hexacell.controller_config.write_back import Receipt, commit, rollback
 from hexacell.errors import FileError, WriteBackUndone
-from hexacell.geometry import Geometry
+from hexacell.kinematics.geometry import Geometry
 
 Job = Callable[[Path], object]
 
@@ -34,7 +34,7 @@ class Bench:
         self._runs = (folder / f"run-{number}" for number in count())
         self._faults = faults
 
-    def _proposal(self, geometry: Geometry) -> Proposal:
+    def _proposal(self, geometry: Geometry) -> ConfigChange:
         return propose(
             self.link, NativeToml(), "toml", geometry, fingerprint_at_start=fingerprint(self.link)
         )

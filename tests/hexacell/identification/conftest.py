@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from hexacell.identification.estimate import identify
-from hexacell.identification.result import Identification
-from hexacell.measurements import MeasurementSet
+from hexacell.identification.estimator import identify
+from hexacell.identification.solver.result import Identification
+from hexacell.measurements.records import MeasurementSet
 
 NOISE_MM = 0.01
 REPETITIONS = range(100, 140)

@@ -17,12 +17,12 @@ import pytest
 
 from drivers.controllers.errors import MotionInterrupted
 from drivers.gauges.errors import GaugeSilent, WrongUnit
-from drivers.ports import ControllerStatus, EncoderRound, GaugeReading
-from hexacell.cell.guards import GuardSettings
+from drivers.interfaces import ControllerStatus, EncoderSample, GaugeReading
+from hexacell.cell.model import GuardSettings
 from hexacell.errors import DeviceError
-from procedures import events
-from procedures.state import RunState, apply
-from procedures.steps import Step
+from procedures.run import events
+from procedures.run.state import RunState, apply
+from procedures.run.steps import Step
 
 QUIET = 12
 """So many turns of the event loop without a new sleeper: everybody waits for time to pass."""
@@ -92,7 +92,7 @@ class Scene:
         self.rig.bench.encoders.read = self.round
         for gauge in self.rig.gauges:
             gauge.shown = self._shown(gauge.name, gauge.shown)
-            gauge.glance = self._asked(gauge.name, gauge.glance)
+            gauge.read_once = self._asked(gauge.name, gauge.read_once)
             gauge.read = self._asked(gauge.name, gauge.read)
         object.__setattr__(self.rig.bench.devices, "stop_line", self)
 
@@ -131,12 +131,12 @@ class Scene:
         await self._answer("controller", STATUS_S)
         return self.controller.now  # type: ignore[no-any-return]
 
-    async def round(self) -> EncoderRound:
+    async def round(self) -> EncoderSample:
         await self._answer("encoders", ENCODERS_S)
         if self.encoder_alarm:
             raise DeviceError("reports no magnet", subject="encoder 3", action="Look at it")
         positions = tuple(float(value) + self.slip_mm for value in self.rig.world.sliders())
-        return EncoderRound(tuple(round(1000 * value) for value in positions), positions)
+        return EncoderSample(tuple(round(1000 * value) for value in positions), positions)
 
     async def pressed(self) -> str | None:
         return self.forbidden

@@ -13,10 +13,10 @@ from typing import Any
 import pytest
 
 from hexacell.errors import ExitCode, HexacellError
-from procedures import events
-from procedures.guards import watching
-from procedures.guards.trips import Guard, GuardTripped
-from procedures.steps import CloseSet, Compute, Move, Phase, Place, Sample, SetKey
+from procedures.guards import supervision
+from procedures.run import events
+from procedures.run.steps import CloseSet, Compute, Move, Phase, Place, Sample, SetKey
+from procedures.run.trips import Guard, GuardTripped
 
 MUST_S = 0.2
 STRIKES_S = 0.3
@@ -132,8 +132,8 @@ def stage(scene: Any, recording: Any, replayed: Any) -> Callable[..., Any]:
     def make(step: Any) -> Any:
         if step is not reload:
             return scene(stations__placement="by-hand")
-        from procedures.journal import read_journal
-        from procedures.state import fold
+        from procedures.journal.journal import read_journal
+        from procedures.run.state import fold
 
         staged = scene(replayed(recording.until(events.Proposed), guards__stale_s=0.12))
         staged.state = fold(read_journal(staged.rig.folder.journal))
@@ -174,7 +174,7 @@ async def happens(stage: Any, step: Any, fault: Fault) -> None:
     assert (scene.rig.config == config) is not goes_on
     assert scene.rig.world.still_since_s <= at_s + MUST_S or (step in OUTSIDE and step not in fault.steps)
     if step is move_afterwards and fault.guard in {Guard.GAUGE_END, Guard.PLATE}:
-        assert isinstance(ended, events.Refused), "a verdict on the new geometry"
+        assert isinstance(ended, events.RecordRejected), "a verdict on the new geometry"
         assert scene.rig.performer.guards.watch.latched is None
     elif step in fault.steps:
         tripped = root(ended)
@@ -225,7 +225,7 @@ async def test_on_a_full_disk_nothing_begins(stage: Any, step: Any, monkeypatch:
     config = scene.rig.config
     doing = await step(scene)
     orders, still_since_s = len(scene.controller.log), scene.rig.world.still_since_s
-    monkeypatch.setattr(watching, "free_bytes", lambda folder: 49_900_000)
+    monkeypatch.setattr(supervision, "free_bytes", lambda folder: 49_900_000)
     with pytest.raises(HexacellError) as refusal:
         await doing()
     assert root(refusal.value).trip.guard is Guard.DISK

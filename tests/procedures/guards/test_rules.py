@@ -10,40 +10,40 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drivers.gauges.errors import GaugeAtEnd, GaugeSilent, WrongAnswer, ZeroVoid
-from drivers.ports import ControllerStatus, EncoderRound
+from drivers.interfaces import ControllerStatus, EncoderSample
 from hexacell.errors import DeviceError, ExitCode, LimitError
-from procedures import events
 from procedures.guards import rules
-from procedures.guards.snapshot import Heard, Limits, PlungerSeen, Snapshot
-from procedures.guards.trips import DriftTripped, Guard, GuardTripped, Trip
+from procedures.guards.snapshot import DeviceReport, GaugeDeviation, Limits, Snapshot
+from procedures.run import events
+from procedures.run.trips import DriftTripped, Guard, GuardTripped, Trip
 
 LIMITS = Limits(stale_s=0.12, plate_mm=5.5)
 AT_END = GaugeAtEnd("plunger at its end", subject="gauge x", action="Move the gauge or the ball")
 
 
 def gauge(now: float | None = 0.0, first: float | None = 0.0, axis: int = 0, **changes: Any) -> Any:
-    def seen(deviation: float | None) -> PlungerSeen | None:
-        return None if deviation is None else PlungerSeen(axis, deviation)
+    def seen(deviation: float | None) -> GaugeDeviation | None:
+        return None if deviation is None else GaugeDeviation(axis, deviation)
 
-    return Heard(f"gauge {'xyz'[axis]}", value=seen(now), first=seen(first), **changes)
+    return DeviceReport(f"gauge {'xyz'[axis]}", value=seen(now), first=seen(first), **changes)
 
 
 def sliders(now: tuple[float, ...], first: tuple[float, ...] = (0.0,) * 6) -> Any:
-    def taken(positions: tuple[float, ...]) -> EncoderRound:
-        return EncoderRound((0,) * 6, positions)
+    def taken(positions: tuple[float, ...]) -> EncoderSample:
+        return EncoderSample((0,) * 6, positions)
 
-    return Heard("encoders", value=taken(now), first=taken(first))
+    return DeviceReport("encoders", value=taken(now), first=taken(first))
 
 
 def status(*complaints: str, estop: bool = False, enabled: bool = True) -> Any:
-    return Heard("controller", value=ControllerStatus(estop, enabled, complaints))
+    return DeviceReport("controller", value=ControllerStatus(estop, enabled, complaints))
 
 
 WELL = Snapshot(
     gauges=(gauge(axis=0), gauge(5.5, axis=1), gauge(-5.5, axis=2)),
     encoders=sliders((100.0,) * 6),
     controller=status(),
-    stop_line=Heard("stop line", value=""),
+    stop_line=DeviceReport("stop line", value=""),
 )
 
 
@@ -61,13 +61,18 @@ def test_where_all_is_well_nothing_trips() -> None:
 
 
 def test_what_was_not_heard_yet_trips_nothing_but_time() -> None:
-    unheard = Snapshot((Heard("gauge x"),), Heard("encoders"), Heard("controller"), Heard("stop line"))
+    unheard = Snapshot(
+        (DeviceReport("gauge x"),),
+        DeviceReport("encoders"),
+        DeviceReport("controller"),
+        DeviceReport("stop line"),
+    )
     assert rules.first_trip(unheard, LIMITS) is None
-    assert tripped(encoders=Heard("encoders", silent_s=0.13)).guard is Guard.STALE
+    assert tripped(encoders=DeviceReport("encoders", silent_s=0.13)).guard is Guard.STALE
 
 
 def test_the_stop_line_says_how_it_is_pressed() -> None:
-    trip = tripped(stop_line=Heard("stop line", value="/cell/stop exists"))
+    trip = tripped(stop_line=DeviceReport("stop line", value="/cell/stop exists"))
     assert trip.guard is Guard.STOP_LINE
     assert "/cell/stop exists" in trip.problem
 
@@ -96,7 +101,7 @@ def test_complaints_of_a_machine_that_is_on_trip_nothing() -> None:
 
 def test_an_encoder_is_named_with_what_it_says() -> None:
     error = DeviceError("reports no magnet", subject="leg 3", action="Look at it")
-    trip = tripped(encoders=Heard("encoders", error=error))
+    trip = tripped(encoders=DeviceReport("encoders", error=error))
     assert (trip.guard, trip.device, trip.action) == (Guard.ENCODERS, "leg 3", "Look at it")
 
 
@@ -155,7 +160,7 @@ def test_a_noisy_line_is_no_broken_device(garbled: int, trips: bool) -> None:
 @pytest.mark.parametrize("device", ["gauges", "encoders", "controller", "stop_line"])
 def test_any_device_may_be_silent_for_so_long_and_no_longer(device: str) -> None:
     def snapshot(silent_s: float) -> Snapshot:
-        heard: Any = Heard("it", silent_s)
+        heard: Any = DeviceReport("it", silent_s)
         only: dict[str, Any] = {device: (heard,) if device == "gauges" else heard}
         return Snapshot(**only)
 
@@ -168,9 +173,9 @@ def test_any_device_may_be_silent_for_so_long_and_no_longer(device: str) -> None
 def test_the_plainest_cause_comes_first() -> None:
     everything: dict[str, Any] = {
         "gauges": (gauge(9.0, error=AT_END, silent_s=1.0),),
-        "encoders": Heard("encoders", error=DeviceError("has an alarm"), silent_s=1.0),
+        "encoders": DeviceReport("encoders", error=DeviceError("has an alarm"), silent_s=1.0),
         "controller": status(estop=True, enabled=False),
-        "stop_line": Heard("stop line", value="pressed"),
+        "stop_line": DeviceReport("stop line", value="active_reason"),
     }
     order = []
     for key in ("stop_line", "controller", "encoders", "gauges"):
@@ -182,9 +187,9 @@ def test_the_plainest_cause_comes_first() -> None:
 
 def test_sliders_are_where_they_were_sent() -> None:
     sent = np.arange(6.0)
-    assert rules.following(sent, sent + 1.0, 1.0) is None
+    assert rules.following_error(sent, sent + 1.0, 1.0) is None
     measured = sent + np.array([0.0, 0.5, 0.0, 0.0, -1.25, 1.0])
-    trip = rules.following(sent, measured, 1.0)
+    trip = rules.following_error(sent, measured, 1.0)
     assert trip is not None
     assert (trip.guard, trip.device) == (Guard.FOLLOWING, "slider 5")
     assert "is -1.250 mm from where the controller was told to send it (limit 1 mm)" in trip.problem
@@ -204,7 +209,7 @@ def test_sliders_are_where_they_were_sent() -> None:
 def test_a_gauge_that_does_not_follow_its_ball(
     shown: tuple[str, ...], expected_mm: float, trips: bool
 ) -> None:
-    trip = rules.frozen("gauge y", shown, expected_mm)
+    trip = rules.stuck_gauge("gauge y", shown, expected_mm)
     assert (trip is not None) is trips
     if trip:
         assert (

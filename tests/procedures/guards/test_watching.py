@@ -9,15 +9,14 @@ import numpy as np
 import pytest
 
 from drivers.gauges.errors import GaugeAtEnd, WrongAnswer
-from drivers.ports import GaugeReading
+from drivers.interfaces import GaugeReading
 from hexacell.errors import DeviceError, HexacellError, LimitError
-from procedures import events
-from procedures.guards.lanes import Lane, Line
-from procedures.guards.patrol import Lanes, Patrol
+from procedures.guards.polling import DevicePoller, DevicePollers, GuardMonitor, LineActivity
 from procedures.guards.snapshot import Limits
-from procedures.guards.trips import Guard, GuardTripped
-from procedures.journal import read_journal
-from procedures.steps import CloseSet, Expectation, Move, Phase, Sample, SetKey
+from procedures.journal.journal import read_journal
+from procedures.run import events
+from procedures.run.steps import CloseSet, Expectation, Move, Phase, Sample, SetKey
+from procedures.run.trips import Guard, GuardTripped
 
 P1 = SetKey(phase=Phase.IDENTIFY, point=1)
 P2 = SetKey(phase=Phase.IDENTIFY, point=2)
@@ -155,7 +154,7 @@ async def test_a_mistake_in_the_watch_itself_ends_the_move(scene) -> None:
     async def mistaken() -> Any:
         raise ZeroDivisionError
 
-    stage.pressed = mistaken
+    stage.active_reason = mistaken
     with pytest.raises(ZeroDivisionError):
         await stage.do(move(2))
 
@@ -173,7 +172,7 @@ async def test_cancelling_ends_the_action_and_the_watch(scene) -> None:
 async def test_a_noisy_line_is_borne(scene) -> None:
     stage = await reference(scene())
     gauge = stage.rig.gauges[1]
-    real, asked = gauge.glance, [0]
+    real, asked = gauge.read_once, [0]
 
     async def noisy() -> GaugeReading:
         asked[0] += 1
@@ -183,7 +182,7 @@ async def test_a_noisy_line_is_borne(scene) -> None:
             raise WrongAnswer("answers b'?'", subject="gauge y", action="Check it")
         return await real()  # type: ignore[no-any-return]
 
-    gauge.glance = noisy
+    gauge.read_once = noisy
     await stage.do(move(2))
     assert asked[0] > 3
 
@@ -195,15 +194,15 @@ async def test_gauges_are_left_alone_on_the_way_to_another_point(scene) -> None:
         raise AssertionError("its zero would be void")
 
     for gauge in stage.rig.gauges:
-        gauge.glance = forbidden
+        gauge.read_once = forbidden
     await stage.do(move(1, P2))
-    assert isinstance(await stage.do(sample(1, P2)), events.Sampled)
+    assert isinstance(await stage.do(sample(1, P2)), events.RecordTaken)
 
 
 async def test_a_move_that_begins_off_the_plate_may_lead_back_onto_it(scene) -> None:
     stage = await reference(scene())
     stage.shift["x"] = 5.9
-    assert isinstance(await stage.do(sample(2)), events.Refused)
+    assert isinstance(await stage.do(sample(2)), events.RecordRejected)
 
     async def creep_back() -> None:
         while stage.shift["x"] > 0.0:
@@ -274,7 +273,7 @@ async def test_a_drifted_reference_is_not_latched(scene) -> None:
 
 async def test_lanes_of_one_line_are_silent_together(scene) -> None:
     stage = scene()
-    clock, shared = stage.rig.clock, Line()
+    clock, shared = stage.rig.clock, LineActivity()
     turn = asyncio.Lock()
 
     async def queued() -> str:
@@ -282,8 +281,8 @@ async def test_lanes_of_one_line_are_silent_together(scene) -> None:
             await clock.sleep(0.05)
         return "here"
 
-    lanes = tuple(Lane("it", queued, 0.0, shared) for _ in range(5))
-    async with Patrol(Lanes(gauges=lanes), Limits(0.12, 5.5), clock) as patrol:  # type: ignore[arg-type]
+    lanes = tuple(DevicePoller("it", queued, 0.0, shared) for _ in range(5))
+    async with GuardMonitor(DevicePollers(gauges=lanes), Limits(0.12, 5.5), clock) as patrol:  # type: ignore[arg-type]
         await clock.sleep(2.0)
         assert patrol.trip is None, "one answer in 0.25 s each, but one in 0.05 s altogether"
 
@@ -296,8 +295,8 @@ async def test_a_process_without_turns_is_deaf_not_its_devices_silent(scene) -> 
         await clock.sleep(0.05)
         return ""
 
-    lanes = Lanes(stop_line=Lane("stop line", slow, 0.02))
-    async with Patrol(lanes, Limits(0.12, 5.5), clock) as patrol:
+    lanes = DevicePollers(stop_line=DevicePoller("stop line", slow, 0.02))
+    async with GuardMonitor(lanes, Limits(0.12, 5.5), clock) as patrol:
         await clock.sleep(0.2)
         clock.time_s += 5.0
         await clock.sleep(0.2)
@@ -313,7 +312,7 @@ async def test_errors_of_a_lane_do_not_hide_what_it_said() -> None:
             raise answer
         return float(answer)
 
-    lane = Lane("g", ask, 0.0)
+    lane = DevicePoller("g", ask, 0.0)
     seen = []
     for _ in range(4):
         lane._heard = await lane._look()

@@ -12,8 +12,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from hexacell.errors import FileError
-from procedures.journal import Journal, read_entries, read_journal
-from procedures.journal_lines import VERSION, Entry
+from procedures.journal.journal import Journal, read_entries, read_journal
+from procedures.journal.line_format import VERSION, Entry
 from tests.procedures.journal.told import TOLD, checked, write_told
 
 

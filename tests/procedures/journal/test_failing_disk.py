@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from hexacell.errors import FileError
-from procedures import events
-from procedures.journal import Journal, read_journal
+from procedures.journal.journal import Journal, read_journal
+from procedures.run import events
 from tests.procedures.journal.told import TOLD
 
 

@@ -20,9 +20,10 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from hexacell.errors import CellBusy, FileError
-from procedures import events, journal_lines
-from procedures.journal import Journal, read_entries, read_journal
-from procedures.steps import Phase, SetKey
+from procedures.journal import line_format
+from procedures.journal.journal import Journal, read_entries, read_journal
+from procedures.run import events
+from procedures.run.steps import Phase, SetKey
 from tests.procedures.journal.told import TOLD, write_told
 
 
@@ -116,7 +117,7 @@ def test_one_writer_at_a_time(path: Path) -> None:
 
 
 def test_another_process_is_refused_too(path: Path) -> None:
-    script = "from pathlib import Path; from procedures.journal import Journal; import sys; "
+    script = "from pathlib import Path; from procedures.journal.journal import Journal; import sys; "
     script += "Journal(Path(sys.argv[1]))"
     with Journal(path):
         refused = subprocess.run(
@@ -135,7 +136,7 @@ def test_every_number_and_every_text_comes_back(path: Path, text, values, result
     key = SetKey(phase=Phase.IDENTIFY, point=1)
     told = (
         events.SetClosed(at=key, drift_mm=values),
-        events.SetVoided(at=key, reason=text),
+        events.SetInvalidated(at=key, reason=text),
         events.Identified(result=result, held_out=()),
     )
     path.unlink(missing_ok=True)
@@ -173,7 +174,7 @@ def test_clocks_that_jump_do_no_harm(path: Path, monkeypatch) -> None:
         def now(zone: Any) -> datetime:
             return real(zone) + timedelta(hours=next(hours))
 
-    monkeypatch.setattr(journal_lines, "datetime", Clock)
+    monkeypatch.setattr(line_format, "datetime", Clock)
     write_told(path)
     monkeypatch.undo()
     entries = read_entries(path)

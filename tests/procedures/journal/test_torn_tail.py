@@ -9,8 +9,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from hexacell.errors import FileError
-from procedures import journal as journal_module
-from procedures.journal import Journal, read_journal
+from procedures.journal import journal as journal_module
+from procedures.journal.journal import Journal, read_journal
 from tests.procedures.journal.told import TOLD, checked, write_told
 
 

@@ -6,11 +6,13 @@ import zlib
 from pathlib import Path
 from typing import Any
 
-from procedures import events
-from procedures.journal import Journal
+from procedures.journal.journal import Journal
+from procedures.run import events
 
 TOLD: tuple[Any, ...] = (
-    events.Proposed(gates=(events.Gate(name="converged", passed=True, sentence="It did to 0.5 µm."),)),
+    events.Proposed(
+        gates=(events.GateOutcome(name="converged", passed=True, sentence="It did to 0.5 µm."),)
+    ),
     events.Committed(approved_by="a tester"),
     events.Interrupted(reason="line one\nline two\u2028\x85\r", exit_code=130),
     events.Ended(exit_code=1, line="rolled back"),

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
-from procedures import events
-from procedures.journal import read_journal
-from procedures.state import RunState
-from procedures.steps import Phase
+from procedures.journal.journal import read_journal
+from procedures.run import events
+from procedures.run.state import RunState
+from procedures.run.steps import Phase
 
 
 def on(kind: type[Any], action: Any, count: int = 1) -> Any:
@@ -35,12 +35,12 @@ def happened(rig: Any, kind: type[Any]) -> list[Any]:
     return [event for event in read_journal(rig.folder.journal) if isinstance(event, kind)]
 
 
-GOOD = events.Gate(name="converged", passed=True, sentence="The solver ended well.")
-FORBIDDEN = events.Gate(name="within tolerance", passed=False, sentence="Beyond: l3 (-13.00 mm).")
-DOUBTFUL = events.Gate(name="small", passed=False, sentence="It is 20 mm.", needs_person=True)
+GOOD = events.GateOutcome(name="converged", passed=True, sentence="The solver ended well.")
+FORBIDDEN = events.GateOutcome(name="within tolerance", passed=False, sentence="Beyond: l3 (-13.00 mm).")
+DOUBTFUL = events.GateOutcome(name="small", passed=False, sentence="It is 20 mm.", needs_person=True)
 
 
-def proposed(recording, *gates: events.Gate) -> list[events.Event]:
+def proposed(recording, *gates: events.GateOutcome) -> list[events.Event]:
     return [*recording.until(events.Proposed)[:-1], events.Proposed(gates=gates)]
 
 
@@ -48,7 +48,7 @@ def with_tiny_deviations_before(history) -> list[events.Event]:
     """As if the uncalibrated robot had been nearly perfect: whatever comes is worse."""
     return [
         event.model_copy(update={"deviation_mm": (0.0, 0.0, 1e-6)})
-        if isinstance(event, events.Sampled) and event.at.phase is Phase.BEFORE
+        if isinstance(event, events.RecordTaken) and event.at.phase is Phase.BEFORE
         else event
         for event in history
     ]

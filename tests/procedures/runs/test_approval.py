@@ -4,14 +4,10 @@ from __future__ import annotations
 
 import pytest
 
-from hexacell.controller_config.proposal import Proposal
-from hexacell.errors import (
-    AnswerNeeded,
-    ExitCode,
-    LimitError,
-)
-from procedures import events
-from procedures.operators import Nobody
+from hexacell.controller_config.change import ConfigChange
+from hexacell.errors import AnswerNeeded, ExitCode, LimitError
+from procedures.engine.operator import UnattendedOperator
+from procedures.run import events
 from tests.procedures.runs.listening import DOUBTFUL, FORBIDDEN, GOOD, happened, proposed
 
 
@@ -36,19 +32,19 @@ async def test_a_geometry_beyond_the_tolerance_is_refused(recording, replayed) -
 
 async def test_a_gate_that_needs_a_person_waits_for_one(recording, replayed) -> None:
     rig = replayed(proposed(recording, GOOD, DOUBTFUL))
-    object.__setattr__(rig.performer, "operator", Nobody())
+    object.__setattr__(rig.performer, "operator", UnattendedOperator())
     with pytest.raises(AnswerNeeded, match=r"approval: It is 20 mm\.") as refusal:
         await rig.run()
     assert refusal.value.exit_code is ExitCode.ANSWER_NEEDED
     assert rig.config == recording.config_before
-    assert Proposal.load(rig.folder.proposal).text_after.encode() == recording.config_after
+    assert ConfigChange.load(rig.folder.proposal).text_after.encode() == recording.config_after
     assert happened(rig, events.Interrupted)[-1].exit_code == ExitCode.ANSWER_NEEDED
 
 
 async def test_a_large_change_needs_a_person(recording, replayed) -> None:
     measured = recording.until(events.SetClosed, count=4)
     rig = replayed(measured, acceptance__largest_change_mm=3.0)
-    object.__setattr__(rig.performer, "operator", Nobody())
+    object.__setattr__(rig.performer, "operator", UnattendedOperator())
     with pytest.raises(AnswerNeeded, match=r"largest change is \d\.\d+ mm \(limit without a person 3 mm\)"):
         await rig.run()
     assert rig.config == recording.config_before
@@ -61,7 +57,7 @@ async def test_a_person_may_approve(recording, replayed, gates, approval) -> Non
     assert happened(rig, events.Committed) == [events.Committed(approved_by="a tester")]
     assert rig.config == recording.config_after
     (asked,) = rig.operator.asked
-    assert asked == (tuple(gates), Proposal.load(rig.folder.proposal).diff)
+    assert asked == (tuple(gates), ConfigChange.load(rig.folder.proposal).diff)
 
 
 async def test_a_person_may_decline_and_approve_later(recording, replayed) -> None:

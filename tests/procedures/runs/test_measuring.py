@@ -5,15 +5,10 @@ from __future__ import annotations
 import pytest
 
 from drivers.gauges.errors import GaugeAtEnd, GaugeSilent
-from hexacell.errors import (
-    AnswerNeeded,
-    ExitCode,
-    HexacellError,
-    LimitError,
-)
-from hexacell.measurement_file import read_measurements
-from procedures import events
-from procedures.operators import Nobody
+from hexacell.errors import AnswerNeeded, ExitCode, HexacellError, LimitError
+from hexacell.measurements.csv_file import read_measurements
+from procedures.engine.operator import UnattendedOperator
+from procedures.run import events
 from tests.procedures.runs.listening import before_sampling, happened, on
 
 
@@ -27,12 +22,12 @@ async def test_a_refused_record_is_chosen_anew_and_the_run_goes_on(make_rig) -> 
 
     ended = await rig.run(before_sampling("P1/o03/sample", once))
     assert ended.exit_code == ExitCode.DONE
-    (refused,) = happened(rig, events.Refused)
+    (refused,) = happened(rig, events.RecordRejected)
     assert (str(refused.at), refused.orientation) == ("P1", 3)
     begun = [event.step for event in happened(rig, events.StepBegun)]
     first, second = (step.pose for step in begun if step.key == "P1/o03/move")
     assert first != second
-    taken = next(event for event in happened(rig, events.Sampled) if event.orientation == 3)
+    taken = next(event for event in happened(rig, events.RecordTaken) if event.orientation == 3)
     assert taken.pose == second
 
 
@@ -44,12 +39,12 @@ async def test_a_slipped_gauge_stops_the_run_and_the_point_is_measured_again(rec
         rig.gauges[1].shown = lambda: real() + 0.2
 
     with pytest.raises(LimitError, match=r"P2: back at the reference .*y \+0\.[12]"):
-        await rig.run(on(events.Sampled, slip, count=5))
+        await rig.run(on(events.RecordTaken, slip, count=5))
     assert happened(rig, events.Interrupted)[-1].exit_code == ExitCode.OUT_OF_LIMITS
     assert rig.controller.log[-1] == "stop"
     ended = await rig.run()
     assert ended.exit_code == ExitCode.DONE
-    assert [str(event.at) for event in happened(rig, events.SetVoided)] == ["P2"]
+    assert [str(event.at) for event in happened(rig, events.SetInvalidated)] == ["P2"]
 
 
 async def test_a_gauge_that_falls_silent_stops_the_run(recording, replayed) -> None:
@@ -70,7 +65,7 @@ async def test_gauges_by_hand_are_asked_for_at_every_point(recording, replayed) 
 
 
 async def test_with_nobody_there_to_carry_gauges_the_run_ends(make_rig) -> None:
-    rig = make_rig(operator=Nobody(), stations__placement="by-hand")
+    rig = make_rig(operator=UnattendedOperator(), stations__placement="by-hand")
     with pytest.raises(AnswerNeeded):
         await rig.run()
     assert happened(rig, events.Interrupted)[-1].exit_code == ExitCode.ANSWER_NEEDED

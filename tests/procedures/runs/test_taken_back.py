@@ -5,14 +5,9 @@ from __future__ import annotations
 import pytest
 
 from drivers.gauges.errors import GaugeAtEnd
-from hexacell.errors import (
-    DeviceError,
-    ExitCode,
-    FileError,
-    WriteBackUndone,
-)
-from hexacell.verification import Verdict
-from procedures import events
+from hexacell.acceptance.validation import Verdict
+from hexacell.errors import DeviceError, ExitCode, FileError, WriteBackUndone
+from procedures.run import events
 from tests.procedures.runs.listening import (
     before_sampling,
     commanding,
@@ -28,7 +23,7 @@ async def test_what_is_worse_is_rolled_back_bit_for_bit(recording, replayed) -> 
     ended = await rig.run()
     assert ended.exit_code == ExitCode.OUT_OF_LIMITS
     assert ended.line.endswith("worse than before; rolled back, the controller is as it was")
-    assert happened(rig, events.Judged)[0].verdict is Verdict.WORSE
+    assert happened(rig, events.ResultValidated)[0].verdict is Verdict.WORSE
     assert happened(rig, events.Committed)
     assert rig.config == recording.config_before
     assert rig.controller.log.count("reload") == 2
@@ -38,7 +33,7 @@ async def test_what_is_worse_is_rolled_back_bit_for_bit(recording, replayed) -> 
 async def test_what_is_better_but_out_of_limits_is_rolled_back_too(recording, replayed) -> None:
     rig = replayed(recording.until(events.Proposed), acceptance__mean_deviation_mm=0.0001)
     assert (await rig.run()).exit_code == ExitCode.OUT_OF_LIMITS
-    assert happened(rig, events.Judged)[0].verdict is Verdict.OUT_OF_LIMITS
+    assert happened(rig, events.ResultValidated)[0].verdict is Verdict.OUT_OF_LIMITS
     assert rig.config == recording.config_before
 
 
@@ -48,7 +43,7 @@ async def test_a_ball_outside_the_travel_afterwards_is_rolled_back(recording, re
     at_end = GaugeAtEnd("is at an end of its travel", subject="gauge x")
     fault = before_sampling(key, lambda: rig.gauges[0].failures.append(at_end))
     assert (await rig.run(fault)).exit_code == ExitCode.OUT_OF_LIMITS
-    assert happened(rig, events.Judged)[0].verdict is Verdict.WORSE
+    assert happened(rig, events.ResultValidated)[0].verdict is Verdict.WORSE
     assert happened(rig, events.RolledBack)
     assert rig.config == recording.config_before
 
@@ -103,7 +98,7 @@ async def test_a_config_that_somebody_changed_meanwhile_is_left_alone(recording,
 async def test_rolling_back_does_not_lose_what_somebody_wrote(recording, replayed) -> None:
     rig = replayed(with_tiny_deviations_before(recording.until(events.Proposed)))
     edited: list[bytes] = []
-    edit = on(events.Judged, lambda: edited.append(somebody_edits(rig)))
+    edit = on(events.ResultValidated, lambda: edited.append(somebody_edits(rig)))
     with pytest.raises(FileError, match="changed since it was written"):
         await rig.run(edit)
     assert [rig.config] == edited
@@ -112,7 +107,7 @@ async def test_rolling_back_does_not_lose_what_somebody_wrote(recording, replaye
 async def test_a_roll_back_that_was_interrupted_is_finished(recording, replayed) -> None:
     rig = replayed(with_tiny_deviations_before(recording.until(events.Proposed)))
     broken = DeviceError("does not come back", subject="controller")
-    fault = on(events.Judged, lambda: rig.controller.failures.update(reload=broken))
+    fault = on(events.ResultValidated, lambda: rig.controller.failures.update(reload=broken))
     with pytest.raises(DeviceError, match="does not come back"):
         await rig.run(fault)
     assert rig.config == recording.config_before

@@ -7,19 +7,17 @@ import tomllib
 
 import numpy as np
 
-from hexacell.controller_config.native_toml import NativeToml
-from hexacell.controller_config.proposal import Proposal
+from hexacell.controller_config.change import ConfigChange
+from hexacell.controller_config.toml_format import NativeToml
 from hexacell.controller_config.write_back import Receipt
-from hexacell.errors import (
-    ExitCode,
-)
-from hexacell.geometry import Geometry
-from hexacell.measurement_file import read_measurements
-from hexacell.mechanisms.hexaglide import Hexaglide
-from procedures import events
-from procedures.calibration import Mode
-from procedures.state import fold
-from procedures.steps import Compute, Phase, Sample
+from hexacell.errors import ExitCode
+from hexacell.kinematics.geometry import Geometry
+from hexacell.kinematics.mechanisms.hexaglide import Hexaglide
+from hexacell.measurements.csv_file import read_measurements
+from procedures.calibration.workflow import Mode
+from procedures.run import events
+from procedures.run.state import fold
+from procedures.run.steps import Compute, Phase, Sample
 from tests.procedures.runs.listening import happened
 
 
@@ -37,7 +35,7 @@ def test_the_controller_gets_the_true_geometry(recording, tmp_path) -> None:
     config.write_bytes(recording.config_after)
     written = NativeToml().read(config).geometry
     truth = Geometry(**tomllib.loads(recording.history[0].cell_text)["simulation"]["geometry"])
-    found, expected = (Hexaglide().to_convention(geometry)[0].vector() for geometry in (written, truth))
+    found, expected = (Hexaglide().normalize_frames(geometry)[0].vector() for geometry in (written, truth))
     (identified,) = (event for event in recording.history if isinstance(event, events.Identified))
     sigma = Geometry(**identified.result["sigma"]).vector()
     assert np.abs(found - expected)[sigma > 0.0].max() > 0.0
@@ -54,7 +52,7 @@ def test_what_a_run_leaves_in_its_folder(recording) -> None:
     result = json.loads(folder.result.read_text())
     assert {key: result[key] for key in state.identified.result} == state.identified.result
     assert result["findings"]
-    proposal = Proposal.load(folder.proposal)
+    proposal = ConfigChange.load(folder.proposal)
     assert proposal.text_before.encode() == recording.config_before
     assert proposal.text_after.encode() == recording.config_after
     assert Receipt.of(folder.path).backup() == recording.config_before
@@ -75,7 +73,7 @@ async def test_a_check_measures_judges_and_changes_nothing(make_rig) -> None:
     assert "4 poses at held-out points" in ended.line
     assert rig.config == before
     assert "reload" not in rig.controller.log
-    phases = {event.at.phase for event in happened(rig, events.Sampled)}
+    phases = {event.at.phase for event in happened(rig, events.RecordTaken)}
     assert phases == {Phase.BEFORE}
     computed = [
         event.step.kind for event in happened(rig, events.StepBegun) if isinstance(event.step, Compute)

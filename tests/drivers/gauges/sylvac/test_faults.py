@@ -2,14 +2,7 @@
 
 import pytest
 
-from drivers.gauges.errors import (
-    GaugeAtEnd,
-    GaugeSilent,
-    WrongAnswer,
-    WrongMode,
-    WrongUnit,
-    ZeroVoid,
-)
+from drivers.gauges.errors import GaugeAtEnd, GaugeSilent, WrongAnswer, WrongMode, WrongUnit, ZeroVoid
 from drivers.gauges.sylvac import SylvacGauge
 from hexacell.errors import DeviceError, ExitCode, FileError
 from tests.drivers.gauges.sylvac.dialogue import OPENING, opening

@@ -6,10 +6,8 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from drivers.gauges.errors import (
-    FrameRejected,
-)
-from drivers.gauges.shown import Shown
+from drivers.gauges.errors import FrameRejected
+from drivers.gauges.protocol import DisplayedValue
 from drivers.gauges.sylvac import BATTERY, IDENTIFICATION, PRESET, Fault, parse_value
 from drivers.simulated.gauges.sylvac import format_value
 
@@ -27,7 +25,7 @@ from drivers.simulated.gauges.sylvac import format_value
     ],
 )
 def test_a_value_is_read(frame, value):
-    assert parse_value(frame) == Shown(
+    assert parse_value(frame) == DisplayedValue(
         value, len(re.findall(rb"\d", frame.split(b".")[1])), None, frame.decode().strip()
     )
 
@@ -66,7 +64,7 @@ def test_anything_else_is_rejected(frame):
 @given(st.floats(-999, 999), st.booleans())
 def test_what_the_simulated_device_writes_is_read(value, inch):
     shown = parse_value(format_value(value, inch=inch))
-    assert isinstance(shown, Shown)
+    assert isinstance(shown, DisplayedValue)
     assert shown.value == pytest.approx(value, abs=0.51e-5 if inch else 0.51e-3)
     assert (shown.apparent_unit == "inch") is inch
 
@@ -78,7 +76,7 @@ def test_noise_is_a_value_only_if_it_is_one_to_the_last_byte(noise):
         shown = parse_value(noise)
     except FrameRejected:
         return
-    if isinstance(shown, Shown):
+    if isinstance(shown, DisplayedValue):
         assert re.fullmatch(rb"[+\- ][0-9]+\.[0-9]+[<=>]?\r", noise)
         assert shown.value == float(noise.strip(b" <=>\r"))
 

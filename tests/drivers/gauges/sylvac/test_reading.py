@@ -2,15 +2,10 @@
 
 import pytest
 
-from drivers.gauges.errors import (
-    GaugeAtEnd,
-    GaugeSilent,
-    GaugeUnsteady,
-    WrongAnswer,
-)
+from drivers.gauges.errors import GaugeAtEnd, GaugeSilent, GaugeUnsteady, WrongAnswer
 from drivers.gauges.serial_gauge import READINGS
 from drivers.gauges.sylvac import SylvacGauge
-from drivers.ports import DeviceIdentity, Gauge, GaugeReading
+from drivers.interfaces import DeviceIdentity, Gauge, GaugeReading
 from hexacell.errors import DeviceError
 from tests.drivers.gauges.sylvac.dialogue import OPENING
 
@@ -91,33 +86,33 @@ async def test_a_frame_cut_short_is_asked_again(dialogue, opened):
 
 async def test_a_glance_is_one_question(dialogue, opened):
     dialogue.expect((b"?\r", b"+1.234\r"))
-    assert await opened.glance() == GaugeReading(1.234, "+1.234")
+    assert await opened.read_once() == GaugeReading(1.234, "+1.234")
 
 
 async def test_glances_need_not_agree(dialogue, opened):
     dialogue.expect((b"?\r", b"+1.234\r"), (b"?\r", b"+4.321\r"))
-    assert [(await opened.glance()).value_mm for _ in range(2)] == [1.234, 4.321]
+    assert [(await opened.read_once()).value_mm for _ in range(2)] == [1.234, 4.321]
 
 
 async def test_a_garbled_glance_is_not_repeated(dialogue, opened):
     dialogue.expect((b"?\r", b"+1.2x4\r"), (b"?\r", b"+1.234\r"))
     with pytest.raises(WrongAnswer, match="gauge y"):
-        await opened.glance()
-    assert (await opened.glance()).value_mm == 1.234
+        await opened.read_once()
+    assert (await opened.read_once()).value_mm == 1.234
 
 
 async def test_a_glance_at_the_end_of_its_travel(dialogue, opened):
     dialogue.expect((b"?\r", b"ERR3\r"))
     with pytest.raises(GaugeAtEnd):
-        await opened.glance()
+        await opened.read_once()
 
 
 async def test_a_glance_that_is_not_answered(dialogue, opened):
     dialogue.expect((b"?\r", b""))
     with pytest.raises(GaugeSilent):
-        await opened.glance()
+        await opened.read_once()
 
 
 async def test_nobody_glances_at_a_gauge_that_is_closed(gauge):
     with pytest.raises(DeviceError, match="is not open"):
-        await gauge.glance()
+        await gauge.read_once()

@@ -15,7 +15,7 @@ from drivers.encoders.errors import (
     RestartedNodeError,
     SilentNodeError,
 )
-from drivers.ports import EncoderRound
+from drivers.interfaces import EncoderSample
 from drivers.simulated.encoders import EVENTS_AND_SYNC, EVENTS_ONLY, TWO_MAGNETS
 from drivers.simulated.slcan import serve_slcan
 from hexacell.clock import CellClock
@@ -208,7 +208,7 @@ async def test_stale_answers_never_mix_instants(make_bank, driver, hurry, timeou
         if isinstance(outcome, DeviceError):
             assert "leg 3" in str(outcome)
         else:
-            assert isinstance(outcome, EncoderRound)
+            assert isinstance(outcome, EncoderSample)
             assert len(set(outcome.counts)) == 1
 
 

@@ -6,14 +6,9 @@ import logging
 
 import pytest
 
-from drivers.gauges.errors import (
-    GaugeSilent,
-    GaugeUnsteady,
-    WrongAnswer,
-    ZeroVoid,
-)
-from drivers.link import SerialLink, SerialLinks
-from drivers.simulated.gauges.faults import GaugeFault
+from drivers.gauges.errors import GaugeSilent, GaugeUnsteady, WrongAnswer, ZeroVoid
+from drivers.serial.shared_port import SharedSerialPort, SharedSerialPorts
+from drivers.simulated.gauges.faults import InjectedGaugeFault
 from hexacell.cell.devices import GaugeSettings
 from hexacell.errors import DeviceError
 from tests.drivers.simulated.gauges.served.cell import (
@@ -29,16 +24,16 @@ from tests.drivers.simulated.gauges.served.cell import (
 
 
 async def test_silent(sylvac):
-    sylvac.rack.inject("y", GaugeFault.SILENT)
+    sylvac.rack.inject("y", InjectedGaugeFault.SILENT)
     with pytest.raises(GaugeSilent, match="gauge y"):
         await sylvac.gauges["y"].read()
-    sylvac.rack.clear("y", GaugeFault.SILENT)
+    sylvac.rack.clear("y", InjectedGaugeFault.SILENT)
     assert await sylvac.values() == [1.0, 2.0, 3.0]
 
 
 async def test_a_late_answer_is_never_the_next_reading(sylvac):
     late_s = (TIMEOUT_S + 0.1) * FAST
-    sylvac.rack.inject("y", GaugeFault.LATE, answers=1, seconds=late_s)
+    sylvac.rack.inject("y", InjectedGaugeFault.LATE, answers=1, seconds=late_s)
     with pytest.raises(GaugeSilent):
         await sylvac.gauges["y"].read()
     sylvac.balls["y"] = 5.0
@@ -58,7 +53,7 @@ async def test_cancelled_readings_leave_the_line_in_step(sylvac):
 
 
 @pytest.mark.parametrize("protocol", PROTOCOLS)
-@pytest.mark.parametrize("fault", [GaugeFault.GARBLED_DIGIT, GaugeFault.GARBLED_BIT])
+@pytest.mark.parametrize("fault", [InjectedGaugeFault.GARBLED_DIGIT, InjectedGaugeFault.GARBLED_BIT])
 async def test_one_garbled_answer_never_gets_through(protocol, fault):
     async with cell([protocol] * 3, timeout_s=0.1) as made:
         await made.open()
@@ -69,7 +64,7 @@ async def test_one_garbled_answer_never_gets_through(protocol, fault):
 
 
 async def test_garbled_for_ever(sylvac):
-    sylvac.rack.inject("y", GaugeFault.GARBLED_DIGIT)
+    sylvac.rack.inject("y", InjectedGaugeFault.GARBLED_DIGIT)
     outcomes = []
     for _ in range(5):
         try:
@@ -85,7 +80,7 @@ async def test_a_wrong_protocol_is_recognised(spoken, driver):
     if spoken == driver:
         return
     with served(spoken) as line:
-        links = SerialLinks(worst_latency_s=0.05)
+        links = SharedSerialPorts(worst_latency_s=0.05)
         settings = GaugeSettings(name="y", axis="y", protocol=driver, port=line.url, timeout_s=0.1)
         with pytest.raises((WrongAnswer, GaugeSilent), match=r"gauge y: (answers|does not answer)"):
             await DRIVERS[driver](settings, links).open()
@@ -96,7 +91,7 @@ async def test_a_wrong_protocol_is_recognised(spoken, driver):
 async def test_unplugged_and_plugged_in_again(transport):
     async with cell(["sylvac"] * 3, transport) as made:
         await made.open()
-        made.rack.inject("y", GaugeFault.UNPLUGGED)
+        made.rack.inject("y", InjectedGaugeFault.UNPLUGGED)
         with pytest.raises(DeviceError, match=r"gauge y: port .* was lost"):
             await made.gauges["y"].read()
         absent = "is absent" if transport == "pty" else "cannot be opened"
@@ -104,7 +99,7 @@ async def test_unplugged_and_plugged_in_again(transport):
             with pytest.raises(DeviceError, match=f"gauge y: port .* {absent}"):
                 await made.gauges["y"].open()
         assert (await made.gauges["z"].read()).value_mm == 3.0
-        made.rack.clear("y", GaugeFault.UNPLUGGED)
+        made.rack.clear("y", InjectedGaugeFault.UNPLUGGED)
         with pytest.raises(DeviceError, match="gauge y: is not open"):
             await made.gauges["y"].read()
         await made.gauges["y"].open()
@@ -116,16 +111,16 @@ async def test_unplugged_during_a_question():
         await made.gauges["x"].open()
         reading = asyncio.create_task(made.gauges["x"].read())
         await asyncio.sleep(0.05)
-        made.rack.inject("x", GaugeFault.UNPLUGGED)
+        made.rack.inject("x", InjectedGaugeFault.UNPLUGGED)
         with pytest.raises(DeviceError, match="was lost"):
             await reading
 
 
 async def test_opening_again_finds_the_gauge_that_was_unplugged_unnoticed(sylvac):
     for _ in range(2):
-        sylvac.rack.inject("y", GaugeFault.UNPLUGGED)
+        sylvac.rack.inject("y", InjectedGaugeFault.UNPLUGGED)
     for _ in range(2):
-        sylvac.rack.clear("y", GaugeFault.UNPLUGGED)
+        sylvac.rack.clear("y", InjectedGaugeFault.UNPLUGGED)
     await sylvac.gauges["y"].open()
     assert (await sylvac.gauges["y"].read()).value_mm == 2.0
 
@@ -133,8 +128,8 @@ async def test_opening_again_finds_the_gauge_that_was_unplugged_unnoticed(sylvac
 async def test_a_socket_ended_unnoticed_is_opened_again():
     async with cell(["mux10"] * 3, "socket") as made:
         await made.open()
-        made.rack.inject("x", GaugeFault.UNPLUGGED)
-        made.rack.clear("x", GaugeFault.UNPLUGGED)
+        made.rack.inject("x", InjectedGaugeFault.UNPLUGGED)
+        made.rack.clear("x", InjectedGaugeFault.UNPLUGGED)
         await made.gauges["x"].open()
         assert (await made.gauges["x"].read()).value_mm == 1.0
         with pytest.raises(ZeroVoid, match="gauge y: lost its port in between"):
@@ -146,7 +141,7 @@ async def test_a_truth_that_fails_is_as_loud_as_a_broken_cable(caplog):
         raise ArithmeticError("the truth has no such pose")
 
     with served("sylvac", broken) as line, caplog.at_level(logging.ERROR):
-        link = SerialLink(line.url)
+        link = SharedSerialPort(line.url)
         await link.open()
         with pytest.raises(DeviceError, match="was lost"):
             await ask(link)

@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 import serial
 
-from drivers.link import SerialLink
-from drivers.simulated.gauges.cell import GaugeRack
-from drivers.simulated.gauges.faults import GaugeFault
+from drivers.serial.shared_port import SharedSerialPort
+from drivers.simulated.gauges.faults import InjectedGaugeFault
+from drivers.simulated.gauges.rack import GaugeRack
 from hexacell.cell.devices import GaugeSettings
 from hexacell.cell.simulation import SimulatedGauges
 from hexacell.clock import CellClock
@@ -60,7 +60,9 @@ def test_an_unknown_protocol_is_refused_and_nothing_is_left_open():
 async def test_a_pseudo_terminal_opens_with_parity_again_and_again(asked):
     with served("sylvac") as line:
         for _ in range(5):
-            link = SerialLink(line.url, baudrate=4800, bytesize=7, parity="E", stopbits=2, exclusive=True)
+            link = SharedSerialPort(
+                line.url, baudrate=4800, bytesize=7, parity="E", stopbits=2, exclusive=True
+            )
             await link.open()
             if asked:
                 assert await ask(link) == b"+1.000\r"
@@ -88,7 +90,7 @@ async def test_questions_in_pieces_and_in_a_row_are_answered_in_order(transport)
 
 async def test_a_second_client_of_a_socket_is_turned_away():
     with served("sylvac", transport="socket") as line:
-        one, two = SerialLink(line.url), SerialLink(line.url)
+        one, two = SharedSerialPort(line.url), SharedSerialPort(line.url)
         await one.open()
         assert await ask(one) == b"+1.000\r"
         await two.open()
@@ -97,7 +99,7 @@ async def test_a_second_client_of_a_socket_is_turned_away():
         assert await ask(one) == b"+1.000\r"
         await one.close()
         await two.close()
-        three = SerialLink(line.url)
+        three = SharedSerialPort(line.url)
         await three.open()
         assert await ask(three) == b"+1.000\r"
         await three.close()
@@ -115,7 +117,7 @@ async def test_a_second_client_of_a_socket_is_turned_away():
 async def test_an_answer_takes_its_latency_and_its_time_on_the_wire(protocol, question, baudrate, wire_s):
     with served(protocol, factor=4.0, latency_s=0.05, baudrate=baudrate) as line:
         clock = CellClock(4.0)
-        link = SerialLink(line.url)
+        link = SharedSerialPort(line.url)
         await link.open()
         asked = clock.now()
         await ask(link, question)
@@ -125,7 +127,7 @@ async def test_an_answer_takes_its_latency_and_its_time_on_the_wire(protocol, qu
 
 async def test_a_faster_clock_shortens_the_pace():
     with served("sylvac", factor=1000.0, latency_s=60.0) as line:
-        link = SerialLink(line.url)
+        link = SharedSerialPort(line.url)
         await link.open()
         assert await ask(link) == b"+1.000\r"  # which waits for ten seconds on the wall at most
         await link.close()
@@ -133,7 +135,7 @@ async def test_a_faster_clock_shortens_the_pace():
 
 async def test_closing_does_not_wait_for_answers_that_are_due():
     line = served("sylvac", factor=1.0, latency_s=3600.0)
-    link = SerialLink(line.url)
+    link = SharedSerialPort(line.url)
     await link.open()
     waiting = asyncio.create_task(ask(link))
     await asyncio.sleep(0.05)
@@ -143,7 +145,7 @@ async def test_closing_does_not_wait_for_answers_that_are_due():
         await waiting
     await link.close()
     with pytest.raises(RuntimeError, match="is closed"):
-        line.inject(GaugeFault.INCH)
+        line.inject(InjectedGaugeFault.INCH)
 
 
 def test_nothing_stays_in_the_file_system():

@@ -1,0 +1,1 @@
+"""The linuxcncrsh protocol of LinuxCNC."""

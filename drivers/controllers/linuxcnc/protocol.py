@@ -1,0 +1,132 @@
+"""The linuxcncrsh language as pure functions: what to send, and what an answer means.
+
+A client says ``get <what>`` or ``set <what> <value>``, one line each. ``get`` answers
+``<WHAT> <words>``, ``set`` answers ``SET <WHAT> ACK`` once verbose is on, and both answer ``NAK``
+when refused. LinuxCNC 2.9 ends lines with CR LF after ``get`` and with LF CR after ``set``, and
+adds a blank line after some refusals; 2.10 ends all with CR LF and explains a refusal in
+``error: ...`` lines before the NAK. (linuxcncrsh(1), and a wire trace of 2.9.)
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from hexacell.kinematics.pose import Pose
+
+LONGEST_LINE = 255
+"""Bytes of one command with its line end; the server of LinuxCNC 2.9 overruns its buffer beyond."""
+
+_LEGS = 6
+_EXPLANATION = "error:"
+_OTHER_NAME = {"SET_WAIT": "WAIT_MODE"}
+_DECIMALS = 8
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """What the controller said to one command.
+
+    ``text`` is what follows the name of what was asked for, empty after ``set``. ``remarks`` are
+    the explanations that came along with it.
+    """
+
+    accepted: bool
+    text: str = ""
+    remarks: tuple[str, ...] = ()
+
+
+class LineBuffer:
+    """Bytes in, lines out, whatever mixture of CR and LF ends them; blank lines are dropped."""
+
+    def __init__(self) -> None:
+        self._rest = b""
+
+    def feed(self, data: bytes) -> list[str]:
+        """The lines that ``data`` completes; undecodable bytes become replacement characters."""
+        *complete, self._rest = (self._rest + data).replace(b"\r", b"\n").split(b"\n")
+        return [line.decode("utf-8", "replace").strip() for line in complete if line.strip()]
+
+    @property
+    def rest(self) -> str:
+        """What came without a line end so far."""
+        return self._rest.decode("utf-8", "replace").strip()
+
+
+def encode(command: str) -> bytes:
+    """The bytes of one command line.
+
+    Raises:
+        ValueError: It is longer than the server's buffer, or is more than one line.
+    """
+    line = command.encode() + b"\r\n"
+    if len(line) > LONGEST_LINE:
+        raise ValueError(f"a command of {len(line)} bytes is longer than the {LONGEST_LINE} it can take")
+    if b"\r" in line[:-2] or b"\n" in line[:-2]:
+        raise ValueError("a command must be a single line")
+    return line
+
+
+def rapid_move(pose: Pose) -> str:
+    """The block that moves to ``pose``, finer than the six decimals in which positions come back.
+
+    Raises:
+        ValueError: A coordinate is not a finite number.
+    """
+    if not all(math.isfinite(value) for value in pose.as_tuple()):
+        raise ValueError("a coordinate is not a finite number")
+    words = zip("XYZABC", pose.as_tuple(), strict=True)
+    return "G0 " + " ".join(f"{axis}{value:.{_DECIMALS}f}" for axis, value in words)
+
+
+def explanation_in(line: str) -> str:
+    """The explanation in one of 2.10's ``error: ...`` lines, empty for any other line."""
+    return line[len(_EXPLANATION) :].strip() if line.lower().startswith(_EXPLANATION) else ""
+
+
+def answer_in(line: str, command: str) -> Answer | None:
+    """What ``line`` says to ``command``, or nothing if it is no answer to it, such as an echo."""
+    verb, name = (word.upper() for word in command.split()[:2])
+    names = (name, _OTHER_NAME.get(name, name))
+    match line.upper().split():
+        case [said, "NAK"] if said == verb:
+            return Answer(accepted=False)
+        case [said, what, "NAK"] if said == verb and what in names:
+            return Answer(accepted=False)
+        case ["SET", what, "ACK"] if verb == "SET" and what in names:
+            return Answer(accepted=True)
+        case [what, *_] if verb == "GET" and what in names:
+            return Answer(accepted=True, text=line[len(what) :].strip())
+    return None
+
+
+def parse_pose(text: str) -> Pose:
+    """The pose, mm and deg, in the words after ``ABS_ACT_POS``."""
+    return Pose(*parse_positions(text))
+
+
+def parse_positions(text: str) -> tuple[float, float, float, float, float, float]:
+    """The first six numbers of an answer: joints 1 to 6, mm, or a pose's coordinates.
+
+    Raises:
+        ValueError: There are fewer than six, or one of them is no finite number.
+    """
+    try:
+        x, y, z, a, b, c = (float(word) + 0.0 for word in text.split()[:_LEGS])  # -0.0 becomes 0.0
+    except ValueError as error:
+        raise ValueError(f"it reports {text!r} where six positions belong") from error
+    if not all(math.isfinite(value) for value in (x, y, z, a, b, c)):
+        raise ValueError(f"it reports {text!r}, which is no position")
+    return x, y, z, a, b, c
+
+
+def parse_homed(text: str) -> tuple[bool, ...]:
+    """Whether each joint is homed, from the words after ``JOINT_HOMED``."""
+    return tuple(word.upper() == "YES" for word in text.split())
+
+
+def pose_difference(one: Pose, other: Pose) -> tuple[float, float]:
+    """The largest difference of a position, mm, and of an angle, deg; a full turn counts as none."""
+    differences = [a - b for a, b in zip(one.as_tuple(), other.as_tuple(), strict=True)]
+    angles = [math.remainder(difference, 360.0) for difference in differences[3:]]
+    return max(map(abs, differences[:3])), max(map(abs, angles))

@@ -1,0 +1,54 @@
+"""Where a linuxcncrsh listens, its two passwords, and how long to wait for it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Self
+
+from hexacell.cell.devices import ControllerSettings
+from hexacell.errors import UsageError
+
+
+@dataclass(frozen=True, slots=True)
+class Address:
+    """A server and the passwords it was started with; they travel in clear text."""
+
+    host: str
+    port: int
+    connect_password: str = field(repr=False)
+    enable_password: str = field(repr=False)
+
+    @classmethod
+    def of(cls, settings: ControllerSettings) -> Self:
+        """The address in a cell file.
+
+        Raises:
+            UsageError: It names no port.
+        """
+        if settings.port is None:
+            raise UsageError("the cell file names no controller port", action="Set controller.port")
+        return cls(settings.host, settings.port, settings.connect_password, settings.enable_password)
+
+    @property
+    def name(self) -> str:
+        """What messages call the controller."""
+        return f"controller {self.host}:{self.port}"
+
+
+@dataclass(frozen=True, slots=True)
+class Timeouts:
+    """Longest waits on the wall, s; a move's own limit is in the cell file.
+
+    Measured on LinuxCNC 2.9: a question is answered in 1 ms, a switch in 0.4 s at most, an abort
+    in 0.6 s, and a 2.10 refusal comes together with its explanation.
+    """
+
+    connect: float = 3.0
+    answer: float = 5.0
+    remark: float = 0.3
+    poll: float = 0.05
+    arrival: float = 1.0
+    stop: float = 5.0
+    switch: float = 5.0
+    reload: float = 120.0
+    comeback: float = 60.0

@@ -1,0 +1,183 @@
+"""One encoder as a CANopen node: its dictionary entries, read and written, and its state.
+
+SDO requests that can be interrupted, and that notice a second device answering.
+"""
+
+from __future__ import annotations
+
+from enum import IntEnum
+
+from canopen.objectdictionary import ObjectDictionary
+from canopen.sdo.client import SdoClient
+from canopen.sdo.exceptions import SdoAbortedError, SdoCommunicationError
+
+from drivers.encoders.can_bus import EncoderBus
+from drivers.encoders.errors import (
+    ConfigurationError,
+    DuplicatedNodeError,
+    Leg,
+    SilentNodeError,
+    WrongDeviceError,
+)
+from drivers.encoders.object_dictionary import Entry
+
+_NMT = 0x000
+
+
+class NmtCommand(IntEnum):
+    """What the network manager tells a node (CiA 301)."""
+
+    START = 0x01
+    ENTER_PRE_OPERATIONAL = 0x80
+
+
+class EncoderNode:
+    """The node of one leg's encoder. Integers in the dictionary are taken as unsigned."""
+
+    def __init__(self, leg: Leg, bus: EncoderBus, timeout_s: float) -> None:
+        self.leg = leg
+        self.sdo = CountingSdoClient(bus, leg.node, timeout_s)
+        self._bus = bus
+
+    def command(self, command: NmtCommand) -> None:
+        """Change the node's state; nodes do not acknowledge that.
+
+        Raises:
+            BusError: The bus does not take the frame.
+        """
+        self._bus.network.send_message(_NMT, bytes((command, self.leg.node)))
+
+    def read(self, entry: Entry) -> int:
+        """The value of an entry that must be there.
+
+        Raises:
+            NodeError: It is not, or nobody answers.
+        """
+        value = self.read_optional(entry)
+        if value is None:
+            raise WrongDeviceError(
+                f"has no {entry}", self.leg, action="Check that it is a CANopen encoder (CiA 406)"
+            )
+        return value
+
+    def read_optional(self, entry: Entry) -> int | None:
+        """The value of an entry; none if the device says that it has no such thing.
+
+        Raises:
+            NodeError: Nobody answers, or two do.
+        """
+        try:
+            return int.from_bytes(self.sdo.upload(entry.index, entry.subindex), "little")
+        except SdoAbortedError:
+            return None
+        except SdoCommunicationError as error:
+            raise self._no_sense(entry, error) from error
+
+    def write(self, entry: Entry, value: int) -> None:
+        """Write an entry.
+
+        Raises:
+            NodeError: The device refuses, nobody answers, or two do.
+        """
+        try:
+            self.sdo.download(entry.index, entry.subindex, value.to_bytes(entry.size, "little"))
+        except SdoAbortedError as error:
+            raise ConfigurationError(
+                f"does not let {entry} be set to {value:#x}: {error}",
+                self.leg,
+                action="Set it with the maker's tool, or use another device",
+            ) from error
+        except SdoCommunicationError as error:
+            raise self._no_sense(entry, error) from error
+
+    def check_alone(self) -> None:
+        """Raise if a second device answered under this node id.
+
+        Raises:
+            DuplicatedNodeError: One did.
+        """
+        if self.sdo.surplus:
+            raise duplicated("answered one request twice", self.leg)
+
+    def _no_sense(self, entry: Entry, error: Exception) -> DuplicatedNodeError | SilentNodeError:
+        if self.sdo.surplus:
+            return duplicated("answered one request twice", self.leg)
+        return SilentNodeError(
+            f"does not answer for {entry}: {error}",
+            self.leg,
+            action="Check its supply and cable, then open the encoders again",
+        )
+
+
+def duplicated(what: str, leg: Leg) -> DuplicatedNodeError:
+    """The error for a node id that two devices share."""
+    return DuplicatedNodeError(
+        f"{what}: two devices share node id {leg.node}, or another program uses this bus",
+        leg,
+        action="Unplug one of them, or give it another node id, then open the encoders again",
+    )
+
+
+SDO_REQUEST = 0x600
+SDO_ANSWER = 0x580
+_UPLOAD_DEVICE_TYPE = bytes((0x40, 0x00, 0x10, 0, 0, 0, 0, 0))
+
+
+class CountingSdoClient(SdoClient):
+    """canopen's SDO client, waiting on the bus's terms and counting requests and answers.
+
+    ``surplus`` is set once there were more answers than requests: two devices share the node id.
+    ``answered`` says whether anybody ever answered.
+    """
+
+    RESPONSE_TIMEOUT = 0.0  # the wait has happened before canopen looks
+
+    def __init__(self, bus: EncoderBus, node: int, timeout_s: float) -> None:
+        dictionary = ObjectDictionary()  # type: ignore[no-untyped-call]
+        super().__init__(SDO_REQUEST + node, SDO_ANSWER + node, dictionary)  # type: ignore[no-untyped-call]
+        self.network = bus.network
+        self.surplus = False
+        self.answered = False
+        self._bus = bus
+        self._timeout_s = timeout_s
+        self._owed = 0
+        bus.network.subscribe(self.tx_cobid, self.on_response)
+
+    def probe(self) -> None:
+        """Ask for the device type without waiting; the answer shows in ``answered``."""
+        self._owed += 1
+        self.send_request(_UPLOAD_DEVICE_TYPE)  # type: ignore[no-untyped-call]
+
+    def on_response(self, can_id: int, data: bytearray, timestamp: float) -> None:
+        """Take an answer that came in; too short a frame is none."""
+        if len(data) != 8:
+            return
+        self.answered = True
+        self._owed -= 1
+        self.surplus = self.surplus or self._owed < 0
+        super().on_response(can_id, data, timestamp)  # type: ignore[no-untyped-call]
+        self._bus.news.notify_all()
+
+    def request_response(self, sdo_request: bytes) -> bytes:
+        """Send one request and return its answer, once no earlier answer is under way.
+
+        Raises:
+            DeviceError: As :meth:`EncoderBus.check`.
+            canopen.SdoError: No answer, an abort, or nonsense.
+        """
+        self._bus.wait_for(lambda: self._owed <= 0, self._timeout_s)
+        with self._bus.news:
+            self._owed = 1
+        answer: bytes = super().request_response(sdo_request)  # type: ignore[no-untyped-call]
+        return answer
+
+    def read_response(self) -> bytes:
+        """Wait for the answer in bounded slices.
+
+        Raises:
+            DeviceError: As :meth:`EncoderBus.check`.
+            canopen.SdoError: No answer, or an abort.
+        """
+        self._bus.wait_for(lambda: not self.responses.empty(), self._timeout_s)
+        answer: bytes = super().read_response()  # type: ignore[no-untyped-call]
+        return answer

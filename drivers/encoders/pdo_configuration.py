@@ -1,0 +1,167 @@
+"""Make a node send its position once per SYNC, and nothing else, and a heartbeat.
+
+To be done in PRE-OPERATIONAL. Nothing is stored in the device: a power cycle undoes it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from drivers.encoders.canopen_node import EncoderNode
+from drivers.encoders.errors import ConfigurationError
+from drivers.encoders.object_dictionary import (
+    POSITION,
+    POSITION_OF_MAGNET_1,
+    PRODUCER_HEARTBEAT,
+    TPDO_COUNT,
+    DeviceType,
+    Entry,
+    tpdo_cob_id,
+    tpdo_event_timer,
+    tpdo_mapping,
+    tpdo_transmission_type,
+)
+
+WITH_EVERY_SYNC = 1
+_OFF = 1 << 31
+_NO_REMOTE_REQUESTS = 1 << 30
+_POSITION_BITS = 32
+
+
+@dataclass(frozen=True, slots=True)
+class MappedEntry:
+    """One entry of a TPDO: which, and how many bits of it."""
+
+    index: int
+    subindex: int
+    bits: int
+
+    @classmethod
+    def of(cls, value: int) -> MappedEntry:
+        """Decode a mapping parameter (CiA 301: index, subindex, length)."""
+        return cls(value >> 16, value >> 8 & 0xFF, value & 0xFF)
+
+    @property
+    def value(self) -> int:
+        """The mapping parameter."""
+        return self.index << 16 | self.subindex << 8 | self.bits
+
+    @property
+    def is_position(self) -> bool:
+        """Whether it is a whole position value."""
+        return self in (_mapped(POSITION), _mapped(POSITION_OF_MAGNET_1))
+
+
+@dataclass(frozen=True, slots=True)
+class Tpdo:
+    """A transmit PDO as the device has it."""
+
+    number: int
+    cob_id: int
+    transmission_type: int
+    mapping: tuple[MappedEntry, ...]
+
+    @property
+    def position_offset(self) -> int | None:
+        """Where the position begins in it, bits; none if it is not mapped."""
+        bits = 0
+        for entry in self.mapping:
+            if entry.is_position:
+                return bits
+            bits += entry.bits
+        return None
+
+
+@dataclass(frozen=True, slots=True)
+class PositionChannel:
+    """Where a leg's position comes from: a CAN id, and four bytes from ``first`` on."""
+
+    cob_id: int
+    first: int
+
+    @property
+    def length(self) -> int:
+        """Shortest frame that holds the position, bytes."""
+        return self.first + _POSITION_BITS // 8
+
+    def counts(self, data: bytes, *, signed: bool) -> int:
+        """The position in a frame, counts."""
+        return int.from_bytes(data[self.first : self.length], "little", signed=signed)
+
+
+def configure(node: EncoderNode, kind: DeviceType, heartbeat_ms: int) -> PositionChannel:
+    """Set one TPDO to the position with every SYNC, switch the others off, start the heartbeat.
+
+    Raises:
+        NodeError: The device does not take that, or does not answer.
+    """
+    tpdos = [tpdo for number in range(1, TPDO_COUNT + 1) if (tpdo := _read(node, number)) is not None]
+    if not tpdos:
+        raise _refused(node, "has no transmit PDO")
+    chosen = _choose(tpdos)
+    for tpdo in tpdos:
+        node.write(tpdo_cob_id(tpdo.number), tpdo.cob_id | _OFF)
+    channel = _set_up(node, chosen, kind)
+    if heartbeat_ms or node.read_optional(PRODUCER_HEARTBEAT):
+        node.write(PRODUCER_HEARTBEAT, heartbeat_ms)
+    return channel
+
+
+def _read(node: EncoderNode, number: int) -> Tpdo | None:
+    cob_id = node.read_optional(tpdo_cob_id(number))
+    if cob_id is None:
+        return None
+    slots = range(1, node.read(tpdo_mapping(number, 0)) + 1)
+    return Tpdo(
+        number,
+        cob_id,
+        node.read(tpdo_transmission_type(number)),
+        tuple(MappedEntry.of(node.read(tpdo_mapping(number, slot))) for slot in slots),
+    )
+
+
+def _choose(tpdos: Sequence[Tpdo]) -> Tpdo:
+    """The one that needs the least change: position mapped, synchronous, lowest number."""
+    return min(
+        tpdos,
+        key=lambda tpdo: (tpdo.position_offset is None, tpdo.transmission_type > 240, tpdo.number),
+    )
+
+
+def _set_up(node: EncoderNode, tpdo: Tpdo, kind: DeviceType) -> PositionChannel:
+    offset = tpdo.position_offset
+    if offset is None:
+        _map_only(node, tpdo.number, kind.position)
+        offset = 0
+    if offset % 8:
+        raise _refused(node, f"has its position {offset} bits into TPDO {tpdo.number}")
+    node.write(tpdo_transmission_type(tpdo.number), WITH_EVERY_SYNC)
+    if node.read_optional(tpdo_event_timer(tpdo.number)):
+        node.write(tpdo_event_timer(tpdo.number), 0)
+    cob_id = 0x80 + 0x100 * tpdo.number + node.leg.node
+    node.write(tpdo_cob_id(tpdo.number), cob_id | tpdo.cob_id & _NO_REMOTE_REQUESTS)
+    _check_kept(node, tpdo.number)
+    return PositionChannel(cob_id, offset // 8)
+
+
+def _map_only(node: EncoderNode, number: int, position: Entry) -> None:
+    node.write(tpdo_mapping(number, 0), 0)
+    node.write(tpdo_mapping(number, 1), _mapped(position).value)
+    node.write(tpdo_mapping(number, 0), 1)
+
+
+def _check_kept(node: EncoderNode, number: int) -> None:
+    """Some devices acknowledge what they do not do."""
+    if node.read(tpdo_transmission_type(number)) != WITH_EVERY_SYNC:
+        raise _refused(node, f"acknowledges, but does not keep, TPDO {number} with every SYNC")
+    if node.read(tpdo_cob_id(number)) & _OFF:
+        raise _refused(node, f"acknowledges, but does not do, switching TPDO {number} on")
+
+
+def _mapped(entry: Entry) -> MappedEntry:
+    return MappedEntry(entry.index, entry.subindex, _POSITION_BITS)
+
+
+def _refused(node: EncoderNode, what: str) -> ConfigurationError:
+    return ConfigurationError(what, node.leg, action="Set it with the maker's tool, or use another device")

@@ -1,0 +1,138 @@
+"""How a protocol looks on the line, and what to say when something else is heard.
+
+What a dial indicator shows, as its answer says it.
+
+What an instrument is set to, as far as its protocol tells.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field, fields
+from enum import StrEnum
+
+from drivers.gauges.errors import GaugeSilent, WrongAnswer
+
+BIT_7 = 0x80
+TERMINATOR = b"\r"  # of every question, and the first line end of every answer
+
+
+@dataclass(frozen=True, slots=True)
+class LineSettings:
+    """A protocol's defaults for the serial port, as pyserial names them."""
+
+    baudrate: int
+    bytesize: int = 8
+    parity: str = "N"
+    stopbits: int = 1
+    dtr: bool = True
+    rts: bool = True
+    exclusive: bool = True
+
+    def overlaid(self, settings: Mapping[str, object]) -> dict[str, object]:
+        """These defaults with the cell file's ``serial`` table over them."""
+        return {**asdict(self), **settings}
+
+    def __str__(self) -> str:
+        return f"{self.baudrate} baud {self.bytesize}{self.parity}{self.stopbits}"
+
+
+@dataclass(frozen=True, slots=True)
+class ProtocolSpec:
+    """One protocol: its name in the cell file, its makers, its line, and a typical answer."""
+
+    protocol: str
+    makers: str
+    line: LineSettings
+    example: str
+
+
+def silence(subject: str, port: str, timeout_s: float, *, echo: bool) -> GaugeSilent:
+    """Nothing came; with ``echo``, nothing but our own question."""
+    if echo:
+        return GaugeSilent(
+            f"only our own question comes back from port {port}",
+            subject=subject,
+            action="Switch the gauge on and check that the cable is not looped",
+        )
+    return GaugeSilent(
+        f"does not answer within {timeout_s:g} s on port {port}",
+        subject=subject,
+        action="Switch it on, check its cable, and port in the cell file",
+    )
+
+
+def wrong_answer(subject: str, dialect: ProtocolSpec, received: bytes) -> WrongAnswer:
+    """Something came that is no frame of the protocol, again and again."""
+    if any(byte & BIT_7 for byte in received):
+        return WrongAnswer(
+            f"answers {received!r}, bytes with bit 7 set",
+            subject=subject,
+            action=f"Check parity settings and baud rate: {dialect.protocol} uses {dialect.line}",
+        )
+    return WrongAnswer(
+        f"answers {received!r} where protocol {dialect.protocol} has answers like {dialect.example!r}",
+        subject=subject,
+        action="Correct protocol or port in the cell file",
+    )
+
+
+INCH_DECIMALS = 5  # no instrument resolves 10 nm, so this many decimals are inches
+
+
+class Unit(StrEnum):
+    """The unit an instrument is switched to."""
+
+    MM = "mm"
+    INCH = "inch"
+
+
+@dataclass(frozen=True, slots=True)
+class DisplayedValue:
+    """A number on the display: in ``unit``, or in one that the answer does not name."""
+
+    value: float
+    decimals: int
+    unit: Unit | None
+    text: str
+
+    @classmethod
+    def of(cls, sign: bytes, digits: bytes, frame: bytes, unit: Unit | None = None) -> DisplayedValue:
+        """From an answer's sign, ``+``, ``-`` or blank, and its digits with one decimal point."""
+        number = digits.strip().decode("ascii")
+        value = float(number)
+        decimals = len(number.partition(".")[2])
+        return cls(-value if sign == b"-" else value, decimals, unit, frame.decode("ascii").strip())
+
+    @property
+    def apparent_unit(self) -> Unit:
+        """The unit named in the answer, else the one that its decimals give away."""
+        guess = Unit.INCH if self.decimals >= INCH_DECIMALS else Unit.MM
+        return self.unit or guess
+
+
+@dataclass(frozen=True, slots=True)
+class GaugeState:
+    """The settings that falsify readings if they are wrong, or the zero if they change.
+
+    None where the protocol, or this instrument, does not say.
+    """
+
+    identification: str | None = None
+    unit: Unit | None = None
+    decimals: int | None = None
+    mode: str | None = None
+    hold: bool | None = None
+    reversed: bool | None = None
+    preset: str | None = None
+    scaling: bool | None = None
+    battery_low: bool | None = field(default=None, compare=False)
+
+    def changes_since(self, before: GaugeState) -> tuple[str, ...]:
+        """Each setting that differs from what was known ``before``, in words."""
+        found = []
+        for setting in fields(self):
+            old, new = getattr(before, setting.name), getattr(self, setting.name)
+            if setting.compare and old is not None and new is not None and old != new:
+                found.append(f"{setting.name} {old} -> {new}")
+        return tuple(found)

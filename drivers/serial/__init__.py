@@ -1,0 +1,1 @@
+"""Serial ports: one owner, bounded waits, a trace of every byte."""

@@ -1,0 +1,256 @@
+"""The blocking side of a serial line. All of it runs in the line's one owner thread.
+
+Nothing here waits longer than :data:`SLICE_S` at a time without looking whether the line is to be
+closed, except the opening of a network port, which pyserial bounds to five seconds.
+
+Cutting frames out of what a line delivers; pure functions on bytes.
+"""
+
+from __future__ import annotations
+
+import errno
+import termios
+import threading
+import time
+from collections import deque
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
+
+import serial
+
+from drivers.serial.errors import cannot_open, closed, keeps_sending, lost, settings_refused
+from drivers.wire_trace import Direction, Recorder, TraceEntry
+from hexacell.errors import DeviceError
+
+SLICE_S = 0.05
+WRITE_SLICE_S = 0.2
+WORST_LATENCY_S = 2.0
+FRAME_GAP_S = 0.1
+FRAME_LIMIT = 256
+CHUNK_LIMIT = 4096
+PATIENCE = 5  # how many times the silence it needs a line may take to fall silent
+OPEN_TRIES = 5
+
+
+class NoAnswer(DeviceError):
+    """No whole frame came in time; ``received`` is what did come, the command's echo included."""
+
+    def __init__(self, problem: str, *, subject: str, received: bytes) -> None:
+        self.received = received
+        super().__init__(problem, subject=subject, action="Switch the device on and check its cable")
+
+
+class SerialPort:
+    """One serial port: questions and answers, kept in step.
+
+    An answer that comes too late must never pass for the answer to the next question. So after a
+    time-out nothing is asked until the line has been silent for ``worst_latency_s`` since, and
+    bytes that nobody asked for are read away, never taken for an answer; ``strays`` keeps them.
+    """
+
+    def __init__(
+        self,
+        url: str,
+        settings: Mapping[str, object],
+        recorder: Recorder | None = None,
+        worst_latency_s: float = WORST_LATENCY_S,
+    ) -> None:
+        self.url = url
+        self.subject = f"port {url}"
+        self.stopping = threading.Event()
+        self.strays: deque[bytes] = deque(maxlen=64)
+        self._settings = settings
+        self._recorder = recorder
+        self._worst_latency_s = worst_latency_s
+        self._port: serial.Serial | None = None
+        self.session = 0
+        self._asked_at = 0.0
+        self._last_traffic = 0.0
+        self._silence_s = 0.0
+        self._early = b""
+
+    def open(self) -> int:
+        """Open the port unless it is open and alive; the number of its session, counted from 1.
+
+        Raises:
+            DeviceError: The port is absent, in use, or refused.
+            FileError: pyserial does not know the URL or a setting.
+        """
+        if self._port is not None and not self._is_alive(self._port):
+            self.close()
+        if self._port is None:
+            self._port = self._opened()
+            self.session += 1
+            self._silence_s, self._early = 0.0, b""
+        return self.session
+
+    def exchange(self, request: bytes, terminator: bytes, timeout_s: float) -> bytes:
+        """Send ``request``; the first whole frame that answers it, ``terminator`` included.
+
+        Raises:
+            NoAnswer: Nothing, or no whole frame, within ``timeout_s``.
+            DeviceError: The port is not open, was lost, or is being closed.
+        """
+        if self._port is None:
+            raise lost(self.subject, self.url, "it is not open")
+        with self._losing_the_port():
+            self._resynchronise(self._port)
+            self._send(self._port, request)
+            return self._frame(self._port, request, terminator, timeout_s)
+
+    def require_silence(self) -> None:
+        """Have the line fall silent for a moment before the next question."""
+        self._silence_s = max(self._silence_s, FRAME_GAP_S)
+
+    def close(self) -> None:
+        """Close the port; closing twice is harmless."""
+        if self._port is not None:
+            _close(self._port)
+            self._port = None
+
+    def _is_alive(self, port: serial.Serial) -> bool:
+        """Whether it is still there: a port may have been unplugged while nobody used it."""
+        try:
+            if port.in_waiting:  # also what a connection says that the far side has ended
+                self._put_aside(self._read(port))
+        except (OSError, termios.error):
+            return False
+        return True
+
+    def _opened(self) -> serial.Serial:
+        tries = 0
+        try:
+            port = self._configured()
+            while not port.is_open:
+                tries += 1
+                self._try_to_open(port, last=tries == OPEN_TRIES)
+        except (ValueError, TypeError) as error:
+            raise settings_refused(self.subject, self.url, error) from error
+        except (OSError, termios.error) as error:
+            raise cannot_open(self.subject, self.url, error) from error
+        return port
+
+    def _try_to_open(self, port: serial.Serial, *, last: bool) -> None:
+        try:
+            port.open()
+        except termios.error as error:
+            if last or not _refuses_parity(error):
+                raise
+            self._pause(SLICE_S)
+
+    def _configured(self) -> serial.Serial:
+        lines = {name: value for name, value in self._settings.items() if name in {"dtr", "rts"}}
+        settings = {name: value for name, value in self._settings.items() if name not in lines}
+        port = serial.serial_for_url(self.url, do_not_open=True, **settings)  # type: ignore[arg-type]
+        port.timeout = SLICE_S  # set once and before opening: a pseudo-terminal refuses later changes
+        port.write_timeout = WRITE_SLICE_S
+        for name, level in lines.items():
+            setattr(port, name, level)
+        return port
+
+    def _resynchronise(self, port: serial.Serial) -> None:
+        """Read away what nobody asked for, until it is certain that no more of it comes."""
+        self._put_aside(self._early)
+        self._early = b""
+        give_up_at = time.monotonic() + PATIENCE * max(self._silence_s, FRAME_GAP_S)
+        while self._since_traffic_s() < self._silence_s or port.in_waiting:
+            if time.monotonic() > give_up_at:
+                raise keeps_sending(self.subject, self.url)
+            self._put_aside(self._read(port))
+        self._silence_s = 0.0
+
+    def _put_aside(self, data: bytes) -> None:
+        if data.strip(LINE_ENDS):
+            self.strays.append(data)
+            self.require_silence()
+
+    def _since_traffic_s(self) -> float:
+        return time.monotonic() - self._last_traffic
+
+    def _frame(self, port: serial.Serial, request: bytes, terminator: bytes, timeout_s: float) -> bytes:
+        received = b""
+        while len(received) <= FRAME_LIMIT and time.monotonic() < self._asked_at + timeout_s:
+            received += self._read(port)
+            if cut := cut_frame(received, request, terminator):
+                frame, self._early = cut
+                return frame
+        self._silence_s = self._worst_latency_s
+        raise NoAnswer(
+            f"no answer within {timeout_s:g} s on {self.url}", subject=self.subject, received=received
+        )
+
+    def _read(self, port: serial.Serial) -> bytes:
+        """Whatever comes within one slice, perhaps nothing."""
+        if self.stopping.is_set():
+            raise closed(self.subject, self.url)
+        data = port.read(1)
+        if data:
+            data += self._waiting(port)
+            self._last_traffic = time.monotonic()
+            self._record(Direction.RECEIVED, data)
+        return data
+
+    def _waiting(self, port: serial.Serial) -> bytes:
+        """What has come already."""
+        data = b""
+        while len(data) < CHUNK_LIMIT and (count := port.in_waiting):
+            data += port.read(count)
+        return data
+
+    def _send(self, port: serial.Serial, request: bytes) -> None:
+        if self.stopping.is_set():
+            raise closed(self.subject, self.url)
+        self._record(Direction.SENT, request)
+        self._asked_at = self._last_traffic = time.monotonic()
+        # pyserial raises it also where all was sent and this thread then got no turn for so long;
+        # whether anybody heard, the answer tells.
+        with suppress(serial.SerialTimeoutException):
+            port.write(request)
+
+    def _record(self, direction: Direction, data: bytes) -> None:
+        if data and self._recorder is not None:
+            self._recorder(TraceEntry(time.time(), self.url, direction, data))
+
+    def _pause(self, seconds: float) -> None:
+        if self.stopping.wait(seconds):
+            raise closed(self.subject, self.url)
+
+    @contextmanager
+    def _losing_the_port(self) -> Iterator[None]:
+        try:
+            yield
+        except (OSError, termios.error) as error:
+            self.close()
+            raise lost(self.subject, self.url, str(error)) from error
+
+
+def _refuses_parity(error: termios.error) -> bool:
+    """A pseudo-terminal carries no parity and says so until its server has reset its speed.
+
+    glibc's ``tcsetattr`` succeeds if it changed anything at all, so the first open passes and the
+    next one, with nothing left to change, fails (pyserial issue 196).
+    """
+    return bool(error.args[:1] == (errno.EINVAL,))
+
+
+def _close(port: serial.Serial) -> None:
+    # pyserial's socket:// forgets its socket unclosed if the far side has reset the connection
+    connection = getattr(port, "_socket", None)
+    with suppress(OSError, termios.error):
+        port.close()
+    if connection is not None:
+        connection.close()
+
+
+LINE_ENDS = b"\r\n"
+
+
+def cut_frame(received: bytes, request: bytes, terminator: bytes) -> tuple[bytes, bytes] | None:
+    """The first whole frame in ``received``, ``terminator`` included, and the bytes behind it.
+
+    Line ends before the frame are left out (some devices end lines with more than they document),
+    and so is the echo of ``request`` that some devices send. None as long as no frame is whole.
+    """
+    body = received.lstrip(LINE_ENDS).removeprefix(request).lstrip(LINE_ENDS)
+    head, end, rest = body.partition(terminator)
+    return (head + end, rest) if end else None

@@ -1,0 +1,192 @@
+"""One simulated encoder: canopen's local node, and what that leaves out.
+
+Added are boot-up, NMT gating, TPDOs with SYNC and on event timers, emergencies, and the rules of
+CiA 301 for changing PDOs.
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import canopen
+from canopen.objectdictionary import ODVariable
+from canopen.sdo.exceptions import SdoAbortedError
+
+from drivers.simulated.encoders import object_dictionary
+from drivers.simulated.encoders.can_bus import SimulatedLine, Timer
+from drivers.simulated.encoders.vendors import Vendor
+
+_NMT = 0x000
+_RESET_COMMANDS = (0x81, 0x82)
+_SYNCHRONOUS = range(1, 241)
+_NOT_NOW = 0x0800_0022
+_READ_ONLY = 0x0601_0002
+_WRONG_VALUE = 0x0609_0030
+
+
+@dataclass(frozen=True, slots=True)
+class DeviceData:
+    """What is engraved on one device and set in it."""
+
+    node: int
+    serial_number: int
+    step_nm: int
+    signed: bool
+
+
+class SimulatedEncoder:
+    """A device on the line. ``counts`` is the position of its last sample."""
+
+    def __init__(
+        self, line: SimulatedLine, maker: Vendor, data: DeviceData, on_the_wall: Callable[[float], float]
+    ) -> None:
+        self.data = data
+        self.counts = 0
+        self.is_silent = False
+        self.delay_s = 0.0
+        self._line = line
+        self._maker = maker
+        self._on_the_wall = on_the_wall
+        self._event_timers: list[Timer] = []
+        self._syncs = 0
+        objects = object_dictionary.build(
+            maker, data.node, data.serial_number, data.step_nm, signed=data.signed
+        )
+        self._node = canopen.LocalNode(data.node, objects)
+        self._node.add_read_callback(self._read_position)  # type: ignore[no-untyped-call]
+        self._node.add_write_callback(self._guard_pdo_rules)  # type: ignore[no-untyped-call]
+
+    @property
+    def is_operational(self) -> bool:
+        """Whether it may send PDOs."""
+        return self._node.has_network() and self._node.nmt.state == "OPERATIONAL"
+
+    def plug_in(self) -> None:
+        """Appear on the line and boot, unless it is there already."""
+        if not self._node.has_network():
+            self._node.associate_network(self._line)
+            self._line.subscribe(_NMT, self._on_nmt)
+            self.boot()
+
+    def unplug(self) -> None:
+        """Vanish from the line without a word."""
+        if self._node.has_network():
+            self._node.nmt.stop_heartbeat()  # type: ignore[no-untyped-call]
+            self._stop_event_timers()
+            self._line.unsubscribe(_NMT, self._on_nmt)
+            self._node.remove_network()
+
+    def boot(self) -> None:
+        """Start with the maker's defaults: boot-up message, then PRE-OPERATIONAL."""
+        self._node.nmt.stop_heartbeat()  # type: ignore[no-untyped-call]
+        self._stop_event_timers()
+        self._node.data_store.clear()
+        self._syncs = 0
+        self._node.nmt.state = "RESET"
+        self._node.nmt.state = "PRE-OPERATIONAL"
+
+    def on_sync(self) -> Iterator[tuple[int, bytes]]:
+        """The frames (COB-ID, data) that this SYNC calls for, with the sample as it is now."""
+        self._syncs += 1
+        if not self.is_operational or self.is_silent:
+            return
+        for number in range(1, len(self._maker.tpdos) + 1):
+            kind = self._value(0x1800 + number - 1, 2)
+            if kind in _SYNCHRONOUS and self._syncs % kind == 0:
+                yield from self._frames(number)
+
+    def send(self, cob_id: int, data: bytes) -> None:
+        """Send a PDO, if that is still allowed."""
+        if self.is_operational:
+            self._line.send_message(cob_id, data)
+
+    def emergency(self, code: int, register: int) -> None:
+        """Report an error, or with code 0 that it is gone, and remember it."""
+        self._node.set_data(object_dictionary.ERROR_REGISTER, 0, bytes((register,)))
+        self._line.send_message(0x80 + self.data.node, struct.pack("<HB5x", code, register))
+
+    def set_alarms(self, bits: int) -> None:
+        """Raise alarms in 6503h without a message."""
+        self._node.set_data(object_dictionary.ALARMS, 0, struct.pack("<H", bits))
+
+    def stop_heartbeat(self) -> None:
+        """Send no heartbeat any more; everything else goes on."""
+        self._node.nmt.stop_heartbeat()  # type: ignore[no-untyped-call]
+
+    def _on_nmt(self, _can_id: int, data: bytearray, _timestamp: float) -> None:
+        command, addressed = data[:2]
+        if addressed not in (0, self.data.node):
+            return
+        if command in _RESET_COMMANDS:
+            self.boot()
+        self._stop_event_timers()
+        if self.is_operational:
+            self._start_event_timers()
+
+    def _frames(self, number: int) -> Iterator[tuple[int, bytes]]:
+        cob_id = self._value(0x1800 + number - 1, 1)
+        if not cob_id & object_dictionary.TPDO_OFF:
+            yield cob_id & 0x7FF, self._mapped_data(0x1A00 + number - 1)
+
+    def _mapped_data(self, mapping: int) -> bytes:
+        slots = (self._value(mapping, slot) for slot in range(1, self._value(mapping, 0) + 1))
+        return b"".join(self._node.get_data(slot >> 16, slot >> 8 & 0xFF) for slot in slots)
+
+    def _value(self, index: int, subindex: int) -> int:
+        return int.from_bytes(self._node.get_data(index, subindex), "little")
+
+    def _start_event_timers(self) -> None:
+        for number in range(1, len(self._maker.tpdos) + 1):
+            is_on = not self._value(0x1800 + number - 1, 1) & object_dictionary.TPDO_OFF
+            period_ms = self._value(0x1800 + number - 1, 5)
+            if is_on and period_ms and self._value(0x1800 + number - 1, 2) not in _SYNCHRONOUS:
+                self._repeat(number, self._on_the_wall(period_ms / 1000))
+
+    def _repeat(self, number: int, period_s: float) -> None:
+        def send() -> None:
+            self._event_timers.remove(timer)
+            for cob_id, data in self._frames(number):
+                self.send(cob_id, data)
+            self._repeat(number, period_s)
+
+        timer = self._line.call_later(period_s, send)
+        self._event_timers.append(timer)
+
+    def _stop_event_timers(self) -> None:
+        for timer in self._event_timers:
+            timer.cancel()
+        self._event_timers.clear()
+
+    def _read_position(self, index: int, subindex: int, **_: object) -> int | None:
+        if index == object_dictionary.POSITION or (index, subindex) == (
+            object_dictionary.POSITION_OF_MAGNET,
+            1,
+        ):
+            return self.counts
+        return None
+
+    def _guard_pdo_rules(self, index: int, subindex: int, od: ODVariable, data: bytes) -> None:
+        """CiA 301: PDOs are changed in PRE-OPERATIONAL, COB-ID and mapping only while off."""
+        del od
+        if 0x1800 <= index < 0x1C00 and self.is_operational:
+            raise SdoAbortedError(_NOT_NOW)
+        value = int.from_bytes(data, "little")
+        if 0x1800 <= index < 0x1A00 and subindex == 1:
+            self._guard_cob_id(self._value(index, 1), value)
+        if 0x1A00 <= index < 0x1C00:
+            self._guard_mapping(index, subindex)
+
+    def _guard_cob_id(self, old: int, new: int) -> None:
+        both_on = not (old | new) & object_dictionary.TPDO_OFF
+        if both_on and old != new:
+            raise SdoAbortedError(_WRONG_VALUE)
+
+    def _guard_mapping(self, index: int, subindex: int) -> None:
+        if not self._maker.mapping_writable:
+            raise SdoAbortedError(_READ_ONLY)
+        if not self._value(index - 0x200, 1) & object_dictionary.TPDO_OFF:
+            raise SdoAbortedError(_NOT_NOW)
+        if subindex and self._value(index, 0):
+            raise SdoAbortedError(_NOT_NOW)

@@ -1,0 +1,111 @@
+"""The object dictionary of a simulated encoder, built from a table."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from canopen.objectdictionary import ObjectDictionary, ODRecord, ODVariable
+from canopen.objectdictionary.datatypes import (
+    INTEGER16,
+    INTEGER32,
+    UNSIGNED8,
+    UNSIGNED16,
+    UNSIGNED32,
+)
+
+from drivers.simulated.encoders.vendors import TpdoDefaults, Vendor
+
+POSITION = 0x6004
+POSITION_OF_MAGNET = 0x6020
+ERROR_REGISTER = 0x1001
+ALARMS = 0x6503
+TPDO_OFF = 1 << 31
+MAPPING_SLOTS = 8
+
+
+@dataclass(frozen=True, slots=True)
+class _Row:
+    index: int
+    subindex: int
+    name: str
+    kind: int
+    value: int
+    access: str = "ro"
+
+
+def build(maker: Vendor, node: int, serial_number: int, step_nm: int, *, signed: bool) -> ObjectDictionary:
+    """What the device answers for after power-on."""
+    dictionary = ObjectDictionary()  # type: ignore[no-untyped-call]
+    position = INTEGER32 if signed else UNSIGNED32
+    rows = [*_communication(maker, serial_number), *_profile(maker, step_nm, position)]
+    for number, tpdo in enumerate(maker.tpdos, 1):
+        rows += _tpdo(number, tpdo, node)
+    for row in rows:
+        _add(dictionary, row)
+    return dictionary
+
+
+def _communication(maker: Vendor, serial_number: int) -> Iterator[_Row]:
+    yield _Row(0x1000, 0, "device type", UNSIGNED32, maker.device_type)
+    yield _Row(ERROR_REGISTER, 0, "error register", UNSIGNED8, 0)
+    yield _Row(0x1017, 0, "producer heartbeat time", UNSIGNED16, 0, "rw")
+    yield _Row(0x1018, 0, "number of identity entries", UNSIGNED8, 4)
+    yield _Row(0x1018, 1, "vendor", UNSIGNED32, 0x0000_0406)
+    yield _Row(0x1018, 2, "product code", UNSIGNED32, maker.device_type >> 16)
+    yield _Row(0x1018, 3, "revision", UNSIGNED32, 0x0001_0000)
+    yield _Row(0x1018, 4, "serial number in identity", UNSIGNED32, serial_number)
+    yield _Row(0x650B, 0, "serial number", UNSIGNED32, serial_number)
+
+
+def _profile(maker: Vendor, step_nm: int, position: int) -> Iterator[_Row]:
+    yield _Row(0x6000, 0, "operating parameters", UNSIGNED16, 0, "rw")
+    if maker.magnets == 1:
+        yield _Row(POSITION, 0, "position", position, 0)
+    else:
+        yield _Row(POSITION_OF_MAGNET, 0, "number of magnets", UNSIGNED8, maker.magnets)
+        for magnet in range(1, maker.magnets + 1):
+            yield _Row(POSITION_OF_MAGNET, magnet, f"position of magnet {magnet}", position, 0)
+    if maker.step_in_6005:
+        yield _Row(0x6005, 0, "number of step settings", UNSIGNED8, 2)
+        yield _Row(0x6005, 1, "position step", UNSIGNED32, step_nm)
+        yield _Row(0x6005, 2, "speed step", UNSIGNED32, 100)
+    yield _Row(0x6030, 0, "number of speeds", UNSIGNED8, 1)
+    yield _Row(0x6030, 1, "speed", INTEGER16, 0)
+    yield _Row(0x6501, 0, "measuring step", UNSIGNED32, step_nm)
+    yield _Row(ALARMS, 0, "alarms", UNSIGNED16, 0)
+    yield _Row(0x6504, 0, "supported alarms", UNSIGNED16, 1)
+    yield _Row(0x6505, 0, "warnings", UNSIGNED16, 0)
+
+
+def _tpdo(number: int, tpdo: TpdoDefaults, node: int) -> Iterator[_Row]:
+    parameter, mapping = 0x1800 + number - 1, 0x1A00 + number - 1
+    cob_id = 0x80 + 0x100 * number + node
+    off = 0 if tpdo.enabled else TPDO_OFF
+    yield _Row(parameter, 0, f"entries of TPDO {number}", UNSIGNED8, 5)
+    yield _Row(parameter, 1, "COB-ID", UNSIGNED32, cob_id | off, "rw")
+    yield _Row(parameter, 2, "transmission type", UNSIGNED8, tpdo.transmission_type, "rw")
+    yield _Row(parameter, 3, "inhibit time", UNSIGNED16, 0, "rw")
+    yield _Row(parameter, 5, "event timer", UNSIGNED16, tpdo.event_timer_ms, "rw")
+    yield _Row(mapping, 0, f"mapped entries of TPDO {number}", UNSIGNED8, len(tpdo.mapping), "rw")
+    slots = [index << 16 | subindex << 8 | bits for index, subindex, bits in tpdo.mapping]
+    for slot, value in enumerate(slots + [0] * (MAPPING_SLOTS - len(slots)), 1):
+        yield _Row(mapping, slot, f"slot {slot}", UNSIGNED32, value, "rw")
+
+
+def _add(dictionary: ObjectDictionary, row: _Row) -> None:
+    variable = ODVariable(row.name, row.index, row.subindex)
+    variable.data_type = row.kind
+    variable.default = row.value
+    variable.access_type = row.access
+    if row.subindex == 0 and row.index not in _RECORDS:
+        dictionary.add_object(variable)
+        return
+    if row.index not in dictionary:
+        dictionary.add_object(ODRecord(f"record {row.index:04X}h", row.index))
+    record = dictionary[row.index]
+    assert isinstance(record, ODRecord)  # noqa: S101 - for the type checker
+    record.add_member(variable)
+
+
+_RECORDS = {0x1018, 0x6005, 0x6020, 0x6030, *range(0x1800, 0x1804), *range(0x1A00, 0x1A04)}

@@ -1,0 +1,62 @@
+"""How makers differ: device type, where the step is kept, what the TPDOs do out of the box."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class TpdoDefaults:
+    """A transmit PDO after power-on; ``mapping`` holds (index, subindex, bits)."""
+
+    mapping: tuple[tuple[int, int, int], ...]
+    transmission_type: int
+    event_timer_ms: int = 0
+    enabled: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class Vendor:
+    """One make of encoder."""
+
+    device_type: int
+    tpdos: tuple[TpdoDefaults, ...]
+    step_in_6005: bool = True
+    mapping_writable: bool = True
+    magnets: int = 1
+
+
+_POSITION = (0x6004, 0, 32)
+_SPEED = (0x6030, 1, 16)
+_MAGNET_1 = (0x6020, 1, 32)
+_MAGNET_2 = (0x6020, 2, 32)
+
+EVENTS_AND_SYNC = Vendor(
+    device_type=0x0008_0196,
+    tpdos=(
+        TpdoDefaults((_POSITION, _SPEED), transmission_type=254, event_timer_ms=10),
+        TpdoDefaults((_POSITION, _SPEED), transmission_type=1),
+    ),
+)
+"""TPDO1 on its event timer, TPDO2 with every SYNC."""
+
+EVENTS_ONLY = Vendor(
+    device_type=0x0008_0196,
+    tpdos=(
+        TpdoDefaults((_POSITION,), transmission_type=254, event_timer_ms=1),
+        TpdoDefaults((), transmission_type=1, enabled=False),
+    ),
+    step_in_6005=False,
+)
+"""TPDO1 every millisecond, TPDO2 off and empty; the step is in 6501h."""
+
+TWO_MAGNETS = Vendor(
+    device_type=0x000A_0196,
+    tpdos=(
+        TpdoDefaults((_MAGNET_1, _SPEED), transmission_type=254, event_timer_ms=10),
+        TpdoDefaults((_MAGNET_2, _MAGNET_1), transmission_type=1),
+    ),
+    mapping_writable=False,
+    magnets=2,
+)
+"""Positions in 6020h, and a fixed mapping in which the first magnet comes second."""

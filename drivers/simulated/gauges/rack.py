@@ -1,0 +1,125 @@
+"""The simulated lines of a whole cell: one a gauge, or one for all gauges of a multiplexer."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack
+from typing import Self
+
+from drivers.simulated.gauges.cdi import CdiDevice
+from drivers.simulated.gauges.device import Device
+from drivers.simulated.gauges.faults import InjectedGaugeFault
+from drivers.simulated.gauges.indicator import Indicator, Plunger
+from drivers.simulated.gauges.mux10 import Mux10Device
+from drivers.simulated.gauges.server import ServedLine, serve_gauges
+from drivers.simulated.gauges.sylvac import SylvacDevice
+from hexacell.cell.devices import GaugeSettings
+from hexacell.cell.simulation import SimulatedGauges
+from hexacell.clock import CellClock
+from hexacell.errors import FileError
+
+DEVICES: dict[str, Callable[[Mapping[int, Indicator]], Device]] = {
+    "sylvac": SylvacDevice,
+    "mux10": Mux10Device,
+    "cdi": CdiDevice,
+}
+MULTIPLEXED = frozenset({"mux10"})
+
+
+def simulated_device(protocol: str, indicators: Mapping[int, Indicator]) -> Device:
+    """A device that speaks ``protocol``, with ``indicators`` by channel.
+
+    Raises:
+        FileError: Nothing simulated speaks it.
+    """
+    if protocol not in DEVICES:
+        raise FileError(
+            f"no simulated gauge speaks protocol {protocol}",
+            action=f"Choose one of {', '.join(sorted(DEVICES))}",
+        )
+    return DEVICES[protocol](indicators)
+
+
+class GaugeRack:
+    """The gauges of a simulated cell, each on a line that is served until the rack is closed.
+
+    ``plungers`` are by gauge name: mm from the middle of the travel, in the instrument's own
+    direction, noise included; they are called from the lines' threads. Gauges on a multiplexer share
+    one line.
+
+    Raises:
+        FileError: Nothing simulated speaks a gauge's protocol.
+    """
+
+    def __init__(
+        self,
+        gauges: Sequence[GaugeSettings],
+        plungers: Mapping[str, Plunger],
+        settings: SimulatedGauges,
+        clock: CellClock,
+        *,
+        seed: int = 0,
+    ) -> None:
+        self.indicators = {gauge.name: Indicator(plungers[gauge.name], gauge.travel_mm) for gauge in gauges}
+        self._settings = settings
+        self._clock = clock
+        self._lines: dict[str, ServedLine] = {}
+        with ExitStack() as served:
+            for number, group in enumerate(_by_line(gauges)):
+                line = served.enter_context(self._serve(group, seed + number))
+                self._lines |= {gauge.name: line for gauge in group}
+            self._served = served.pop_all()
+        self._channels = {gauge.name: _channel(gauge) for gauge in gauges}
+        self.gauges = tuple(
+            gauge.model_copy(update={"port": self._lines[gauge.name].url}) for gauge in gauges
+        )
+        """The gauges' settings as given, with the ports under which they are reached."""
+
+    def line(self, gauge: str) -> ServedLine:
+        """The line that ``gauge`` is on."""
+        return self._lines[gauge]
+
+    def inject(
+        self, gauge: str, fault: InjectedGaugeFault, *, answers: int | None = None, seconds: float = 1.0
+    ) -> None:
+        """Let ``fault`` happen to a gauge or its line; see :meth:`ServedLine.inject`."""
+        self.line(gauge).inject(fault, channel=self._channels[gauge], answers=answers, seconds=seconds)
+
+    def clear(self, gauge: str, fault: InjectedGaugeFault) -> None:
+        """Undo :meth:`inject`."""
+        self.line(gauge).clear(fault, channel=self._channels[gauge])
+
+    def _serve(self, group: Sequence[GaugeSettings], seed: int) -> ServedLine:
+        indicators = {_channel(gauge): self.indicators[gauge.name] for gauge in group}
+        return serve_gauges(
+            simulated_device(group[0].protocol, indicators),
+            self._settings.transport,
+            self._clock,
+            name="-".join(gauge.name for gauge in group),
+            latency_s=self._settings.latency_s,
+            baudrate=self._settings.baudrate,
+            seed=seed,
+        )
+
+    def close(self) -> None:
+        """End every line; twice is harmless."""
+        self._served.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+
+def _channel(gauge: GaugeSettings) -> int:
+    return gauge.channel if gauge.protocol in MULTIPLEXED else 1
+
+
+def _by_line(gauges: Sequence[GaugeSettings]) -> list[list[GaugeSettings]]:
+    """The gauges of one multiplexer, which is one protocol and port, together; the others alone."""
+    lines: dict[tuple[str | None, ...], list[GaugeSettings]] = {}
+    for gauge in gauges:
+        line = (gauge.protocol, gauge.port) if gauge.protocol in MULTIPLEXED else (gauge.name,)
+        lines.setdefault(line, []).append(gauge)
+    return list(lines.values())

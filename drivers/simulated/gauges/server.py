@@ -1,0 +1,203 @@
+"""A thread that serves one simulated line at the pace of a real one."""
+
+from __future__ import annotations
+
+import logging
+import os
+import queue
+import select
+import threading
+from collections import deque
+from collections.abc import Callable
+from concurrent.futures import Future
+from typing import Literal, Self
+
+from drivers.simulated.gauges.device import Device
+from drivers.simulated.gauges.faults import InjectedGaugeFault, WireFaults, apply_fault
+from drivers.simulated.gauges.indicator import Indicator
+from drivers.simulated.transports.interface import Transport
+from drivers.simulated.transports.pty import PtyTransport
+from drivers.simulated.transports.tcp import SocketTransport
+from hexacell.clock import CellClock
+
+COMMAND_END = b"\r"
+COMMAND_LIMIT = 256
+LONGEST_WAIT_S = 5.0
+
+_log = logging.getLogger(__name__)
+
+
+class ServedLine:
+    """A device on a transport, answered for by a thread of its own until it is closed.
+
+    An answer leaves ``latency_s`` and the time that question and answer take on the wire after the
+    question came, in seconds of the cell's clock. One answer follows the other, as on a cable.
+    """
+
+    def __init__(
+        self,
+        device: Device,
+        transport: Transport,
+        clock: CellClock,
+        *,
+        latency_s: float,
+        baudrate: int | None = None,
+        seed: int = 0,
+    ) -> None:
+        self.device = device
+        self.url = transport.url
+        self._transport = transport
+        self._clock = clock
+        self._latency_s = latency_s
+        self._byte_s = device.bits_a_byte / (baudrate or device.baudrate)
+        self._faults = WireFaults(seed)
+        self._heard = b""
+        self._answers: deque[tuple[float, bytes]] = deque()
+        self._jobs: queue.SimpleQueue[tuple[Callable[[], None], Future[None]]] = queue.SimpleQueue()
+        self._woken, self._waker = os.pipe()
+        self._stopping = False
+        self._thread = threading.Thread(target=self._serve, name=f"gauges on {self.url}")
+        self._thread.start()
+
+    def inject(
+        self,
+        fault: InjectedGaugeFault,
+        *,
+        channel: int | None = None,
+        answers: int | None = None,
+        seconds: float = 1.0,
+    ) -> None:
+        """Let ``fault`` happen now.
+
+        Args:
+            fault: What goes wrong.
+            channel: Whose instrument, where the fault is one of an instrument; the first by default.
+            answers: How many answers a fault of the line strikes; None for all until it is cleared.
+            seconds: How late a late answer is, in the cell's time.
+        """
+        self._do(lambda: self._begin(fault, channel, answers, seconds))
+
+    def clear(self, fault: InjectedGaugeFault, *, channel: int | None = None) -> None:
+        """Undo :meth:`inject`: a plug is plugged in, an instrument is switched on again."""
+        self._do(lambda: self._end(fault, channel))
+
+    def send_unasked(self, data: bytes) -> None:
+        """Put ``data`` on the line now, as a data button or a foot switch does."""
+        self._do(lambda: self._transport.send(data))
+
+    def close(self) -> None:
+        """End the thread and take the line away; twice is harmless."""
+        if self._stopping:
+            return
+        self._stopping = True
+        os.write(self._waker, b"x")
+        self._thread.join()
+        self._transport.close()
+        os.close(self._woken)
+        os.close(self._waker)
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def _do(self, job: Callable[[], None]) -> None:
+        """Have the thread do it, so that nothing is touched by two at once."""
+        if self._stopping:
+            raise RuntimeError(f"{self.url} is closed")
+        done: Future[None] = Future()
+        self._jobs.put((job, done))
+        os.write(self._waker, b"x")
+        done.result(LONGEST_WAIT_S)
+
+    def _serve(self) -> None:
+        try:
+            self._serve_until_stopped()
+        except Exception:  # what is simulated behind the plunger may fail: as loud as a broken cable
+            _log.exception("the simulated gauges on %s have died", self.url)
+            self._unplug()
+
+    def _serve_until_stopped(self) -> None:
+        while not self._stopping:
+            watched = [self._woken, *self._transport.descriptors()]
+            ready, _, _ = select.select(watched, [], [], self._until_next_answer_s())
+            if self._woken in ready:
+                os.read(self._woken, COMMAND_LIMIT)
+                self._do_jobs()
+            else:
+                self._hear(self._transport.receive(ready))
+            self._send_due()
+
+    def _do_jobs(self) -> None:
+        while not self._jobs.empty():
+            job, done = self._jobs.get()
+            try:
+                job()
+            except Exception as error:
+                done.set_exception(error)
+            else:
+                done.set_result(None)
+
+    def _hear(self, data: bytes) -> None:
+        *commands, self._heard = (self._heard + data).split(COMMAND_END)
+        self._heard = self._heard[-COMMAND_LIMIT:]
+        for command in commands:
+            self._answer(command.strip(b"\n"))
+
+    def _answer(self, command: bytes) -> None:
+        answer, delay_s = self._faults.inject(self.device.answer(command))
+        wire_s = (len(command) + len(COMMAND_END) + len(answer)) * self._byte_s
+        free_at = max([self._clock.now(), *(due for due, _ in self._answers)])
+        self._answers.append((free_at + self._latency_s + wire_s + delay_s, answer))
+
+    def _until_next_answer_s(self) -> float | None:
+        if not self._answers:
+            return None
+        return max(0.0, self._clock.on_the_wall(self._answers[0][0] - self._clock.now()))
+
+    def _send_due(self) -> None:
+        while self._answers and self._answers[0][0] <= self._clock.now():
+            self._transport.send(self._answers.popleft()[1])
+
+    def _begin(
+        self, fault: InjectedGaugeFault, channel: int | None, answers: int | None, seconds: float
+    ) -> None:
+        if fault is InjectedGaugeFault.UNPLUGGED:
+            self._unplug()
+        elif not apply_fault(self._indicator(channel), fault, on=True):
+            self._faults.begin(fault, answers=answers, seconds=seconds)
+
+    def _end(self, fault: InjectedGaugeFault, channel: int | None) -> None:
+        if fault is InjectedGaugeFault.UNPLUGGED:
+            self._transport.plug_in()
+        elif not apply_fault(self._indicator(channel), fault, on=False):
+            self._faults.end(fault)
+        elif fault is InjectedGaugeFault.AUTO_OFF:
+            self._transport.send(self.device.power_up())
+
+    def _unplug(self) -> None:
+        self._heard = b""
+        self._answers.clear()
+        self._transport.unplug()
+
+    def _indicator(self, channel: int | None) -> Indicator:
+        return self.device.indicators[min(self.device.indicators) if channel is None else channel]
+
+
+def serve_gauges(
+    device: Device,
+    transport: Literal["pty", "socket"],
+    clock: CellClock,
+    *,
+    name: str = "gauge",
+    latency_s: float = 0.02,
+    baudrate: int | None = None,
+    seed: int = 0,
+) -> ServedLine:
+    """Serve ``device`` from now on; ``url`` says where, ``close`` ends it.
+
+    ``name`` is what a pseudo-terminal is called in its folder.
+    """
+    line = PtyTransport(name) if transport == "pty" else SocketTransport()
+    return ServedLine(device, line, clock, latency_s=latency_s, baudrate=baudrate, seed=seed)

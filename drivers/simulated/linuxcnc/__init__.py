@@ -1,0 +1,1 @@
+"""A LinuxCNC that answers linuxcncrsh."""

@@ -1,0 +1,95 @@
+"""One client of a simulated controller: its lines in, the answers out, byte for byte.
+
+Answers to ``get`` end with CR LF, answers to ``set`` with LF CR, a refused ``get`` with two CR LF;
+what is received is echoed as it came once the client is greeted. (Traces of LinuxCNC 2.9.)
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+
+from drivers.simulated.linuxcnc.faults import Fault, Faults
+from drivers.simulated.linuxcnc.get_commands import QUESTIONS
+from drivers.simulated.linuxcnc.session import Access, Context
+from drivers.simulated.linuxcnc.set_commands import ORDERS, Level
+from drivers.simulated.linuxcnc.state import ConnectionCut, Control
+
+LONGEST_LINE = 255
+
+_LINE_ENDS = re.compile(rb"[\r\n]")
+
+
+class Client:
+    """One connection; ``write`` sends bytes back over it."""
+
+    def __init__(
+        self, control: Control, faults: Faults, access: Access, write: Callable[[bytes], None]
+    ) -> None:
+        self._context = Context(control, access)
+        self._faults = faults
+        self._write = write
+        self._rest = b""
+
+    def receive(self, data: bytes) -> None:
+        """Take what came, and answer the lines that it completes.
+
+        Raises:
+            ConnectionCut: The client said ``quit``, overran the buffer, or met with a fault.
+        """
+        if self._faults.strikes(Fault.SILENT):
+            return
+        if self._context.echo and self._context.greeted:
+            self._write(data)
+        *lines, self._rest = _LINE_ENDS.split(self._rest + data)
+        for line in lines:
+            if len(line) > LONGEST_LINE:
+                raise ConnectionCut
+            self._obey(line.decode("utf-8", "replace"))
+
+    def _obey(self, line: str) -> None:
+        verb, what, argument = (*line.split(maxsplit=2), "", "", "")[:3]
+        match verb.upper():
+            case "HELLO":
+                self._hello(what, argument)
+            case "GET":
+                self._get(what.upper())
+            case "SET":
+                self._set(what.upper(), argument.strip())
+            case "QUIT":
+                raise ConnectionCut
+
+    def _hello(self, password: str, name_and_version: str) -> None:
+        refused = self._faults.strikes(Fault.REFUSES_PASSWORD)
+        known = password == self._context.access.connect_password and len(name_and_version.split()) >= 2
+        if known and not refused:
+            self._context.greeted = True
+            self._write(f"HELLO ACK {self._context.access.server}\r\n".encode())
+        else:
+            self._write(b"HELLO NAK\r\n")
+
+    def _get(self, what: str) -> None:
+        if not what:
+            self._write(b"GET NAK\r\n")
+        elif what in QUESTIONS:
+            self._write(f"{what} {QUESTIONS[what](self._context)}\r\n".encode())
+        else:
+            self._write(f"GET {what} NAK\r\n\r\n".encode())
+
+    def _set(self, what: str, argument: str) -> None:
+        if not self._context.greeted:
+            self._write(b"SET NAK\r\n")
+        elif not what:
+            self._write(b"SET NAK\n\r")
+        elif not (self._may(what) and ORDERS[what].obey(self._context, argument)):
+            self._write(f"SET {what} NAK\n\r".encode())
+        elif self._context.verbose:
+            self._write(f"SET {what} ACK\n\r".encode())
+
+    def _may(self, what: str) -> bool:
+        if what not in ORDERS:
+            return False
+        level = ORDERS[what].level
+        return (level < Level.COMMANDER or self._context.commands) and (
+            level < Level.ON or self._context.control.on
+        )

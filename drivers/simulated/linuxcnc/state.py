@@ -1,0 +1,226 @@
+"""The state that all clients of a simulated controller share, and what their orders do to it.
+
+Names and texts are LinuxCNC's: task state, mode, teleoperation, and a queue of operator errors.
+Orders return whether they succeeded; that becomes ACK or NAK.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections import deque
+from collections.abc import Callable
+from concurrent.futures import CancelledError, Future, ThreadPoolExecutor, wait
+from enum import Enum
+
+from drivers.simulated.linuxcnc.faults import Fault, Faults
+from drivers.simulated.linuxcnc.machine import KinematicsFailure, Machine
+from drivers.simulated.linuxcnc.mdi import BlockError, target_of
+from hexacell.errors import HexacellError
+from hexacell.kinematics.pose import Pose
+
+MID_MOVE_S = 0.02
+"""When faults in the middle of a move strike, s after it began."""
+
+LAGGING = 3
+"""The joint whose following errors are simulated, as LinuxCNC counts them: from 0."""
+
+_AGAIN_S = 0.05
+
+
+class Mode(Enum):
+    """The task mode."""
+
+    MANUAL = "MANUAL"
+    AUTO = "AUTO"
+    MDI = "MDI"
+
+
+class Wait(Enum):
+    """When an order is answered."""
+
+    RECEIVED = "RECEIVED"
+    DONE = "DONE"
+
+
+class ConnectionCut(Exception):
+    """The connection over which something was ordered is to be cut."""
+
+
+class Control:
+    """One machine's controller; one thread of its own carries out motions, one after another."""
+
+    def __init__(self, machine: Machine, faults: Faults) -> None:
+        self.estop = True
+        self.on = False
+        self.mode = Mode.MANUAL
+        self.teleop = False
+        self.homed = False
+        self.answers = Wait.RECEIVED
+        self.commander: object | None = None
+        self.machine = machine
+        self._faults = faults
+        self._errors: deque[str] = deque()
+        self._jobs: list[Future[bool]] = []
+        self._stops = 0
+        self._closed = False
+        self._lock = threading.RLock()
+        self._motion = ThreadPoolExecutor(1, thread_name_prefix="simulated motion")
+
+    def close(self) -> None:
+        """Stop everything; returns when the motion thread has ended."""
+        with self._lock:
+            self._closed = True
+        self.abort()
+        while wait(self._jobs, timeout=_AGAIN_S).not_done:  # one may only just have begun
+            self.abort()
+        self._motion.shutdown()
+
+    def next_error(self) -> str:
+        """The oldest operator error, which is gone then; OK if there is none."""
+        return self._errors.popleft() if self._errors else "OK"
+
+    def set_estop(self, *, on: bool) -> bool:
+        """Enter or leave emergency stop; entering switches the machine off."""
+        with self._lock:
+            if on:
+                self._switch_off()
+            self.estop = on
+        return True
+
+    def lag(self, joint: int = LAGGING) -> None:
+        """A joint's following error exceeds its limit: the drives are switched off, and it says why."""
+        with self._lock:
+            self._errors.append(following_error(joint))
+            self._switch_off()
+
+    def set_machine(self, *, on: bool) -> bool:
+        """Switch on or off; in emergency stop it is acknowledged and stays off."""
+        with self._lock:
+            if not on:
+                self._switch_off()
+            elif not self.estop and not self.on:
+                self._switch_on()
+        return True
+
+    def set_mode(self, mode: Mode) -> bool:
+        """Change mode; MDI before homing is acknowledged and refused."""
+        if mode is not Mode.MANUAL and not self.homed:
+            self._errors.append("all joints must be homed before going into coordinated mode")
+            return True
+        self.mode = mode
+        self.teleop = mode is Mode.MANUAL and self.homed
+        return True
+
+    def home(self) -> bool:
+        """Begin to home; acknowledged at once, and without effect outside joint mode."""
+        if self.mode is not Mode.MANUAL:
+            self._errors.append("can't do that (EMC_JOINT_HOME:123) in MDI mode")
+        elif self.teleop:
+            self._errors.append("must be in joint mode to home")
+        else:
+            self._start(self._home)
+        return True
+
+    def abort(self) -> bool:
+        """Stop motion in place; blocks that wait are dropped."""
+        with self._lock:
+            self._stops += 1
+            for job in self._jobs:
+                job.cancel()
+            self.machine.stop()
+        return True
+
+    def mdi(self, block: str) -> bool:
+        """Carry out one block; blocks until it has ended if ``answers`` says so.
+
+        Raises:
+            ConnectionCut: A fault demands it, or the controller is being closed.
+        """
+        try:
+            target = target_of(block, self.machine.pose())
+            self._expect_mdi()
+        except BlockError as error:
+            return self._failed(str(error))
+        if self._faults.strikes(Fault.REFUSES_MOVE):
+            return self._failed(following_error(LAGGING))
+        if target is None or self._faults.strikes(Fault.STAYS_PUT):
+            return True
+        job = self._start(lambda: self._travel(target))
+        self._strike_in_mid_move(job)
+        return self.answers is Wait.RECEIVED or _outcome(job)
+
+    def _expect_mdi(self) -> None:
+        if not self.homed:
+            raise BlockError("Can't issue MDI command when not homed")
+        if self.mode is not Mode.MDI:
+            raise BlockError("Must be in MDI mode to issue MDI command")
+
+    def _failed(self, *errors: str) -> bool:
+        self._errors.extend(errors)
+        return self.answers is Wait.RECEIVED
+
+    def _strike_in_mid_move(self, job: Future[bool]) -> None:
+        drops = self._faults.strikes(Fault.DROPS_CONNECTION)
+        stops = self._faults.strikes(Fault.EMERGENCY_STOP)
+        lags = self._faults.strikes(Fault.FOLLOWING_ERROR)
+        if drops or stops or lags:
+            wait([job], timeout=MID_MOVE_S)
+        if stops:
+            self.set_estop(on=True)
+        if lags:
+            self.lag()
+        if drops:
+            raise ConnectionCut
+
+    def _start(self, motion: Callable[[], bool]) -> Future[bool]:
+        with self._lock:
+            if self._closed:
+                raise ConnectionCut
+            job = self._motion.submit(motion)
+            self._jobs = [other for other in self._jobs if not other.done()] + [job]
+            return job
+
+    def _travel(self, target: Pose) -> bool:
+        try:
+            self.machine.move(target)
+        except KinematicsFailure:
+            self._errors.append("Linear move on line 0 fails kinematicsInverse")
+            self._errors.append("invalid params in linear command")
+            return False
+        except HexacellError as error:
+            self._errors.append(str(error))
+            return False
+        return True
+
+    def _home(self) -> bool:
+        stops = self._stops
+        self.machine.home()
+        self.homed = self._stops == stops
+        return self.homed
+
+    def _switch_on(self) -> None:
+        try:
+            self.machine.switch_on()
+        except HexacellError as error:
+            self._errors.append(str(error))
+        else:
+            self.on = True
+
+    def _switch_off(self) -> None:
+        self.abort()
+        if self.on:
+            self.on = False
+            self.machine.switch_off()
+
+
+def following_error(joint: int) -> str:
+    """What LinuxCNC says when it switches the machine off for one."""
+    return f"joint {joint} following error"
+
+
+def _outcome(job: Future[bool]) -> bool:
+    """How a motion ended; one that was aborted counts as done, as in LinuxCNC."""
+    try:
+        return job.result()
+    except CancelledError:
+        return True

@@ -1,0 +1,1 @@
+"""How simulated devices are reached: pseudo-terminals, TCP, CAN over a line."""

@@ -1,0 +1,1 @@
+"""A stop line that is watched while the robot moves."""

@@ -1,0 +1,1 @@
+"""Whether a result may be accepted: gates before, validation after it is written."""

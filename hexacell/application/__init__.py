@@ -1,0 +1,1 @@
+"""Runs put together: cell, devices, procedure, identification, write-back."""

@@ -1,0 +1,137 @@
+"""Where the parts come together: the only place that knows which devices are real."""
+
+from __future__ import annotations
+
+from collections.abc import AsyncIterator, Iterator
+from contextlib import asynccontextmanager, contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from drivers.interfaces import DeviceIdentity
+from drivers.serial.shared_port import SharedSerialPorts
+from drivers.stop_input.stop_input import stop_line
+from drivers.wire_trace import WireTrace
+from hexacell.cell.loader import Cell
+from hexacell.cell.model import CellSettings
+from hexacell.clock import CellClock
+from hexacell.errors import HexacellError
+from hexacell.kinematics.mechanism import Mechanism
+from hexacell.plugins import Group, load
+from hexacell.robot_model import config_format
+from procedures.calibration.preflight import raise_all
+from procedures.devices.device_set import Devices, MountedGauge
+from procedures.devices.temperatures import Thermometers
+from procedures.run.cancellation import shielded
+
+
+@contextmanager
+def device_addresses(cell: Cell, *, other_processes: bool = False) -> Iterator[CellSettings]:
+    """The cell's settings with an address for every device; a simulated cell answers meanwhile.
+
+    Raises:
+        HexacellError: a device speaks what no driver does, or the simulation cannot begin.
+    """
+    settings = cell.settings
+    require_drivers(settings)
+    if settings.simulation is None:
+        yield settings
+        return
+    # Imported here: a cell of real devices needs nothing of the simulation.
+    from drivers.simulated.cell import SimulatedCell  # noqa: PLC0415
+
+    mechanism: Mechanism = load(Group.MECHANISMS, settings.robot.mechanism)()
+    with SimulatedCell(
+        settings,
+        settings.simulation,
+        mechanism,
+        config_format(settings),
+        cell.config_path,
+        other_processes=other_processes,
+    ) as simulated:
+        yield simulated.settings
+
+
+def require_drivers(settings: CellSettings) -> None:
+    """Make sure that every device's protocol is known.
+
+    Raises:
+        UsageError: one is not; the message has the nearest that is.
+        SeveralErrors: more than one.
+    """
+    protocols = {(Group.GAUGES, gauge.protocol) for gauge in settings.gauges} | {
+        *((Group.THERMOMETERS, thermometer.protocol) for thermometer in settings.thermometers),
+        (Group.ENCODERS, settings.encoders.protocol),
+        (Group.CONTROLLERS, settings.controller.protocol),
+    }
+    failures: list[HexacellError] = []
+    for group, protocol in sorted(protocols):
+        try:
+            load(group, protocol)
+        except HexacellError as error:
+            failures.append(error)
+    raise_all(failures)
+
+
+@dataclass(frozen=True)
+class Connected:
+    """A cell's devices, open, and what goes over their wires."""
+
+    devices: Devices
+    identities: tuple[DeviceIdentity, ...]
+    clock: CellClock
+    trace: WireTrace
+    thermometers: Thermometers
+
+
+def devices_of(
+    settings: CellSettings, links: SharedSerialPorts, trace: WireTrace, folder: Path | None = None
+) -> Devices:
+    """The drivers that the settings name, not yet connected; ``folder`` has the cell file.
+
+    Raises:
+        UsageError: a protocol that no driver speaks.
+    """
+    gauges = tuple(
+        MountedGauge(load(Group.GAUGES, gauge.protocol)(gauge, links), "xyz".index(gauge.axis), gauge.sign)
+        for gauge in settings.gauges
+    )
+    encoders = load(Group.ENCODERS, settings.encoders.protocol)(settings.encoders, trace=trace)
+    controller = load(Group.CONTROLLERS, settings.controller.protocol)(settings.controller, trace=trace)
+    return Devices(gauges, encoders, controller, stop_line(settings.guards, folder or Path()))
+
+
+@asynccontextmanager
+async def open_devices(settings: CellSettings, folder: Path | None = None) -> AsyncIterator[Connected]:
+    """The cell's devices, connected; they are let go at the end, whatever happens.
+
+    ``folder`` has the cell file, to which the file of its stop line is relative.
+
+    Raises:
+        HexacellError: one or more devices do not answer as they must.
+    """
+    trace = WireTrace()
+    links = SharedSerialPorts(trace=trace)
+    devices = devices_of(settings, links, trace, folder)
+    thermometers = thermometers_of(settings)
+    try:
+        identities = (*await devices.open(), *await thermometers.open())
+        clock = CellClock(settings.timing.clock_factor)
+        yield Connected(devices, identities, clock, trace, thermometers)
+    finally:
+        await shielded(_let_go(devices, links, thermometers))
+
+
+def thermometers_of(settings: CellSettings) -> Thermometers:
+    """The thermometers that the settings name, not yet connected; raises ``UsageError``."""
+    return Thermometers([load(Group.THERMOMETERS, one.protocol)(one) for one in settings.thermometers])
+
+
+async def _let_go(devices: Devices, links: SharedSerialPorts, thermometers: Thermometers) -> None:
+    await thermometers.close()
+    await devices.close()
+    await links.close()
+
+
+def with_settings(cell: Cell, settings: CellSettings) -> Cell:
+    """The cell under the settings that :func:`device_addresses` gave."""
+    return replace(cell, settings=settings)

@@ -1,0 +1,178 @@
+"""A recorded run once more, in a folder that is thrown away: no device, no config of anybody's."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from hexacell import __version__
+from hexacell.application.calibration_run import robot_of_run
+from hexacell.application.device_setup import with_settings
+from hexacell.campaign.pose_list import pose_list_of
+from hexacell.cell.loader import Cell, load_cell
+from hexacell.cell.model import IdentificationSettings
+from hexacell.cell.toml_writer import to_toml
+from hexacell.controller_config.change import ConfigChange
+from hexacell.controller_config.receipt import BEFORE
+from hexacell.errors import FileError, HexacellError
+from hexacell.runs.run_folder import RunFolder
+from hexacell.storage import atomic_files
+from procedures.calibration.workflow import Calibration, Mode
+from procedures.journal.journal import read_entries
+from procedures.journal.line_format import Entry
+from procedures.replay.comparison import TOLERANCE, Aspect, Difference
+from procedures.replay.recorded_devices import (
+    Playback,
+    RecordedClock,
+    RecordedOperator,
+    RecordedPerformer,
+    RecordedThermometers,
+    recorded_devices,
+)
+from procedures.replay.replayer import Replayer, ReplayReport, Scope
+from procedures.run.events import RunStarted
+
+CONFIG = "controller-config"
+POSES = "poses.csv"
+
+
+@dataclass(frozen=True)
+class Replay:
+    """A run that was replayed.
+
+    Attributes:
+        recorded_by: the software that recorded it.
+        replayed_by: this software.
+    """
+
+    journal: Path
+    recorded_by: str
+    replayed_by: str
+    events: int
+    tally: ReplayReport
+
+    @property
+    def is_same_software(self) -> bool:
+        """Whether decisions must be the same; another version may have learnt to choose better."""
+        return self.recorded_by == self.replayed_by
+
+    @property
+    def is_same(self) -> bool:
+        """Whether everything that must be the same is."""
+        return not any(self.counts(difference) for difference in self.tally.differences)
+
+    def counts(self, difference: Difference) -> bool:
+        """Whether a difference makes the replay another run."""
+        match difference.aspect:
+            case Aspect.WORDS:
+                return False
+            case Aspect.DECISION:
+                return self.is_same_software
+            case Aspect.RESULT:
+                return True
+
+
+async def replay(run: Path, scope: Scope = Scope.ALL, tolerance: float = TOLERANCE) -> Replay:
+    """Put a recorded run through the procedure again and compare.
+
+    Args:
+        run: a run folder, or a journal.
+        scope: what is done again.
+        tolerance: of every number, in its own unit, above 1 relative.
+
+    Raises:
+        FileError: the journal, or the cell file in it, cannot be read.
+    """
+    folder, journal = _found(run)
+    entries = read_entries(journal)
+    started = _started(journal, entries)
+    with TemporaryDirectory(prefix="hexacell-replay-") as name:
+        replayer, started = _set_up(Path(name), folder, started, scope, tolerance)
+        tally = await replayer.replay([replace(entries[0], event=started), *entries[1:]])
+    return Replay(journal, started.software, f"hexacell {__version__}", len(entries), tally)
+
+
+def _found(run: Path) -> tuple[RunFolder, Path]:
+    if run.is_dir():
+        return RunFolder(run), RunFolder(run).journal
+    return RunFolder(run.parent), run
+
+
+def _started(journal: Path, entries: Sequence[Entry]) -> RunStarted:
+    first = entries[0].event if entries else None
+    if not isinstance(first, RunStarted):
+        raise FileError("the journal has no beginning", subject=journal, action="Copy the whole run folder")
+    return first
+
+
+def _set_up(
+    scratch: Path, folder: RunFolder, started: RunStarted, scope: Scope, tolerance: float
+) -> tuple[Replayer, RunStarted]:
+    """The procedure with recorded devices, and the run's beginning with the config that it has here."""
+    cell = _cell(scratch, started, folder.journal)
+    text = _config_text(folder, started)
+    settings = cell.settings.model_copy(
+        update={
+            "controller": cell.settings.controller.model_copy(update={"config": CONFIG}),
+            "identification": _identification(cell, started),
+        }
+    )
+    if text is None:
+        native = settings.controller.model_copy(update={"config_format": "toml"})
+        settings = settings.model_copy(update={"controller": native})
+        text = _native_config(started)
+    cell = with_settings(cell, settings)
+    cell.config_path.write_bytes(text)
+    run = RunFolder(scratch / "run")
+    run.path.mkdir()
+    calibration = Calibration(settings, robot_of_run(cell, started), Mode(started.mode), pose_list_of(cell))
+    tape = Playback(settings.timing.window_s)
+    performer = RecordedPerformer(
+        cell,
+        calibration,
+        recorded_devices(settings, tape),
+        RecordedClock(tape),
+        RecordedOperator(tape),
+        run,
+        RecordedThermometers(tape),
+    )
+    replayer = Replayer(performer, tape, run.journal, scope, tolerance)
+    return replayer, started.model_copy(update={"config_sha256": atomic_files.sha256(text)})
+
+
+def _cell(scratch: Path, started: RunStarted, journal: Path) -> Cell:
+    path = scratch / "cell.toml"
+    path.write_text(started.cell_text, encoding="utf-8")
+    try:
+        return load_cell(path)
+    except HexacellError as error:
+        raise FileError(
+            f"the cell file in it is none that this version reads ({error})",
+            subject=journal,
+            action=f"Replay it with {started.software}",
+        ) from error
+
+
+def _identification(cell: Cell, started: RunStarted) -> IdentificationSettings:
+    """The plan, with the poses that it names in a file of our own."""
+    plan = cell.settings.identification
+    if started.pose_list is None:
+        return plan
+    (cell.path.parent / POSES).write_text(started.pose_list, encoding="utf-8")
+    return plan.model_copy(update={"poses": POSES})
+
+
+def _config_text(folder: RunFolder, started: RunStarted) -> bytes | None:
+    """The controller's config as it was when the run began, if the run folder kept it."""
+    kept = atomic_files.read_if_present(folder.path / BEFORE)
+    if kept is None and folder.proposal.is_file():
+        kept = ConfigChange.load(folder.proposal).text_before.encode()
+    return kept if kept is not None and atomic_files.sha256(kept) == started.config_sha256 else None
+
+
+def _native_config(started: RunStarted) -> bytes:
+    """A config of our own with the geometry that commanded the run."""
+    geometry = to_toml(started.controller)
+    return f"[geometry]\n{geometry}branch = {list(started.branch)}\n".encode()

@@ -1,0 +1,1 @@
+"""What a campaign does next and what it will give: points, budget, forecasts, decisions."""

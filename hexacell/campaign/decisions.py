@@ -1,0 +1,124 @@
+"""Where a campaign of measurements stands, and what is to be done about it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+from hexacell.kinematics.pose import Pose
+from hexacell.measurements.records import Joints, MeasurementSet
+
+Three = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class CampaignState:
+    """All that a decision depends on.
+
+    Attributes:
+        measurements: the records so far, point after point as they were measured.
+        point: the point at which the gauges stand, as people count them; none between points.
+        done: points that are not to be measured any more.
+        present: the pose last commanded, in the controller's frames; none if it is not known.
+        refusals: records of the present point that could not be taken.
+    """
+
+    measurements: MeasurementSet = field(default_factory=lambda: MeasurementSet(()))
+    point: int | None = None
+    done: frozenset[int] = frozenset()
+    present: Pose | None = None
+    refusals: int = 0
+
+    def records_at(self, point: int) -> int:
+        """How many records a point has."""
+        return int((self.measurements.points == point).sum())
+
+    @property
+    def stations(self) -> int:
+        """How many points have been begun, the present one included."""
+        begun = set(self.measurements.points.tolist())
+        return len(begun if self.point is None else begun | {self.point})
+
+
+@dataclass(frozen=True, slots=True)
+class Forecast:
+    """What a record would do to the predicted error at the task poses, and what going on would.
+
+    Errors are one standard deviation at the worst task pose, mm; none where the robot can take no
+    task pose.
+
+    Attributes:
+        now_mm: by the records so far.
+        next_mm: with the proposed one.
+        end_mm: once everything that is still planned is measured.
+        records: that are still planned, and the ``minutes`` they will take.
+    """
+
+    now_mm: float
+    next_mm: float
+    end_mm: float
+    records: int
+    minutes: float
+
+    @property
+    def gain_mm(self) -> float:
+        """What going on to the end takes away."""
+        return self.now_mm - self.end_mm
+
+
+@dataclass(frozen=True, slots=True)
+class StartPoint:
+    """Begin a point: go there, and zero the gauges.
+
+    Attributes:
+        pose: in the controller's frames.
+        joints: joint variables that the controller will go to, mm.
+    """
+
+    point: int
+    pose: Pose
+    joints: Joints
+    orientation: Literal[1] = 1
+
+
+@dataclass(frozen=True, slots=True)
+class MeasurePose:
+    """Measure the present point in one more orientation.
+
+    Attributes:
+        orientation: as people count them; the reference is the first.
+        pose: what to command, in the controller's frames.
+        joints: joint variables that the controller will go to, mm.
+        deviation: what the gauges should show, mm along base x, y, z, and ``sigma``.
+        gain: information on the parameters, nat.
+        via: poses to pass on the way without measuring, in the controller's frames.
+        outlook: none where there are no task poses to predict errors at.
+    """
+
+    point: int
+    orientation: int
+    pose: Pose
+    joints: Joints
+    deviation: Three
+    sigma: Three
+    gain: float
+    outlook: Forecast | None
+    via: tuple[Pose, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class FinishPoint:
+    """The present point is done, and why."""
+
+    point: int
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class Finished:
+    """Nothing more is to be measured, and why."""
+
+    reason: str
+
+
+Decision = StartPoint | MeasurePose | FinishPoint | Finished

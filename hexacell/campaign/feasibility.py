@@ -1,0 +1,223 @@
+"""Whether a plan can work at all: what its points and limits make impossible, before anything moves."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from itertools import combinations, pairwise
+
+import numpy as np
+
+from hexacell.campaign.decisions import CampaignState
+from hexacell.campaign.planner import Plan
+from hexacell.errors import HexacellError, LimitError, ReachError, UsageError
+from hexacell.experiment_design.gauge_zero import GaugeZero, station
+from hexacell.identification.belief import RobotBelief
+from hexacell.identification.solver.result import UNDETERMINED_RATIO
+from hexacell.kinematics.pose import Pose, PoseBatch
+from hexacell.motion.path_check import beginning, is_clear
+from hexacell.virtual_robot.virtual_robot import VirtualRobot, drawn_robots
+
+DRAWN = 32
+TOO_MANY = 0.5
+"""Share of the robots within the tolerances that cannot stand at a point: it is out of the question."""
+
+NAMES_SHOWN = 4
+
+CANDIDATES = 128
+"""Enough to see whether there is any orientation."""
+
+UNDETERMINED_SHARE = 0.25
+"""Of all parameters: a few that stay as uncertain as drawn are said afterwards, this many before."""
+
+
+def reach_failures(plan: Plan) -> Iterator[HexacellError]:
+    """Poses named by the cell, points or a list, that the controller cannot take within the limits."""
+    for point in plan.points:
+        yield from refusals(plan, f"identification point {point}", plan.reference_pose(point))
+        for number, pose in enumerate(plan.poses_at(point)[1:], start=2):
+            name = f"point {point}, pose {number} of the list"
+            yield from [*refusals(plan, name, pose), *_out_of_travel(plan, name, point, pose)]
+
+
+def refusals(plan: Plan, name: str, pose: Pose) -> Iterator[HexacellError]:
+    """Why the controller cannot take a pose, if it cannot."""
+    try:
+        plan.robot.require_reach(name, pose)
+    except HexacellError as error:
+        yield error if error.subject else type(error)(error.problem, subject=name, action=error.action)
+    tilt = float(np.degrees(PoseBatch.of([pose]).tilts()[0]))
+    if tilt > plan.settings.limits.tilt_deg:
+        limit = plan.settings.limits.tilt_deg
+        yield ReachError(f"is tilted by {tilt:.1f} deg, beyond tilt_deg = {limit:g}", subject=name)
+
+
+def _out_of_travel(plan: Plan, name: str, point: int, pose: Pose) -> Iterator[HexacellError]:
+    """A pose elsewhere than its point: measured files have the robot's error in their positions."""
+    travel = plan.settings.limits.gauge_travel_mm
+    stated = plan.settings.tolerances
+    error = stated.S_mm + stated.B_mm + stated.l_mm + stated.ball_mm
+    apart = float(np.abs(pose.position - plan.reference_pose(point).position).max())
+    if apart > travel + error:
+        yield ReachError(
+            f"is {apart:.1f} mm from its reference, where the gauges reach {travel:g}", subject=name
+        )
+
+
+def too_few_records(plan: Plan) -> Iterator[HexacellError]:
+    """That points, orientations and budget give fewer equations than there are parameters."""
+    unknowns = len(plan.robot.mechanism.convention.free_names())
+    planned = plan.planned(CampaignState())
+    equations = sum(3 * (records - 1) for records in planned.values())
+    if equations >= unknowns:
+        return
+    whole = sum(plan.records_at(point) - 1 for point in plan.points)
+    if 3 * whole >= unknowns:
+        yield UsageError(
+            f"the budget of {plan.budget.words} allows {sum(planned.values())} records at "
+            f"{len(planned)} points, {equations} equations for {unknowns} parameters",
+            subject="[identification]",
+            action=f"Allow {_records_needed(plan, unknowns)} records at least",
+        )
+        return
+    points, size = len(plan.points), plan.settings.identification.orientations
+    needed = 1 - (-unknowns // (3 * points))
+    what = f"{points} points with {size} orientations" if plan.listed is None else str(plan.listed.path)
+    yield UsageError(
+        f"{what} give {equations} equations for {unknowns} parameters",
+        subject="[identification]",
+        action=f"Have at least {needed} orientations at each point",
+    )
+
+
+def _records_needed(plan: Plan, unknowns: int) -> int:
+    """The least number of records, the points taken in their order, that gives enough equations."""
+    differences = records = -(-unknowns // 3)
+    for point in plan.points:
+        if differences <= 0:
+            break
+        records += 1  # the point's reference
+        differences -= plan.records_at(point) - 1
+    return records
+
+
+def plan_failures(plan: Plan) -> Iterator[list[HexacellError]]:
+    """All that stands in the way of a plan whose poses can be reached.
+
+    Yields what each piece of the work found, often nothing, so that whoever asks may stop in between.
+    """
+    yield [*_points_lost(plan)]
+    yield [*_ways(plan)]
+    some = False
+    for found in _no_orientation(plan):
+        some = some or bool(found)
+        yield found
+    if not some:
+        yield [*_undetermined(plan)]
+
+
+def unreachable_share(plan: Plan) -> dict[int, float]:
+    """At each point the share of robots within the tolerances that cannot stand there."""
+    references = plan.chooser.held([plan.reference_pose(point) for point in plan.points])
+    robots = drawn_robots(plan.robot, DRAWN, plan.settings.identification.seed)
+    stands = np.array([VirtualRobot(plan.robot, truth).actual_poses(references)[1] for truth in robots])
+    lost = 1.0 - stands.mean(axis=0)
+    return dict(zip(plan.points, lost.tolist(), strict=True))
+
+
+def _points_lost(plan: Plan) -> Iterator[HexacellError]:
+    for point, share in unreachable_share(plan).items():
+        if share > TOO_MANY:
+            yield UsageError(
+                f"{share:.0%} of the robots within the tolerances cannot stand there, though the "
+                "controller takes it for reachable",
+                subject=f"identification point {point}",
+                action="Move it away from singularities and from the ends of reach",
+            )
+
+
+def _ways(plan: Plan) -> Iterator[HexacellError]:
+    """Straight lines between points, and between the poses of a list, that may have to be gone."""
+    knowledge = plan.robot.knowledge()
+    poses = {point: plan.chooser.held([plan.reference_pose(point)]) for point in plan.points}
+    any_order = plan.settings.identification.choose_points
+    for start, end in combinations(plan.points, 2) if any_order else pairwise(plan.points):
+        if not is_clear(knowledge, poses[start], poses[end]):
+            yield _no_way(f"identification points {start} and {end}")
+    for point in plan.points if plan.listed is not None else ():
+        listed = plan.chooser.held(plan.poses_at(point))
+        for row in range(1, len(listed)):
+            if not is_clear(knowledge, listed[[row - 1]], listed[[row]]):
+                yield _no_way(f"point {point}, poses {row} and {row + 1} of the list")
+
+
+def _no_way(between: str) -> ReachError:
+    return ReachError(
+        "the straight line between them leaves the joint ranges or comes next to a singularity",
+        subject=between,
+        action="Put one between them, or change their order",
+    )
+
+
+def _no_orientation(plan: Plan) -> Iterator[list[HexacellError]]:
+    """Points at which nothing can be measured safely: the first as things are, the others later on."""
+    plan = replace(plan, candidates=min(plan.candidates, CANDIDATES))
+    first_known = plan.robot.knowledge()
+    later_known = plan.predicted_belief()
+    refused: dict[int, HexacellError | None] = {}
+    for point in plan.points:
+        refused[point] = _refusal(plan, first_known, point)
+        yield []
+    any_order = plan.settings.identification.choose_points
+    beginnings = list(plan.points) if any_order else [1]
+    if all(refused[point] for point in beginnings):
+        yield [error for point in beginnings if (error := refused[point])]
+    for point in plan.points:
+        if point not in beginnings and refused[point]:
+            yield [error for error in [_refusal(plan, later_known, point)] if error]
+
+
+def _refusal(plan: Plan, knowledge: RobotBelief, point: int) -> HexacellError | None:
+    """Why no record can follow a point's reference, with the robot known so well."""
+    try:
+        at = _zeroed(plan, knowledge, point)
+        plan.chooser.choose(knowledge, at, CampaignState(point=point, present=plan.reference_pose(point)))
+    except LimitError as error:
+        travel = plan.settings.limits.gauge_travel_mm
+        return UsageError(
+            error.problem,
+            subject=f"identification point {point}",
+            action=f"gauge_travel_mm = {travel:g} is too little for these tolerances and this noise, "
+            "or tilt_deg, joint ranges or singularity_margin leave no room",
+        )
+    return None
+
+
+def _zeroed(plan: Plan, knowledge: RobotBelief, point: int) -> GaugeZero:
+    """Where the gauges are after the reference was measured, by the estimate as it is."""
+    command = plan.chooser.held([plan.reference_pose(point)])
+    really = beginning(knowledge, command).actual
+    if really is None:
+        raise LimitError("the robot as drawn cannot stand where the controller would send it")
+    joints = knowledge.mechanism.inverse(knowledge.controller, knowledge.branch, command)
+    return station(knowledge, really, joints, np.zeros((1, 3)))
+
+
+def _undetermined(plan: Plan) -> Iterator[HexacellError]:
+    """That even well spread poses within the limits would leave parameters as uncertain as drawn."""
+    names = plan.robot.mechanism.convention.free_names()
+    before = np.sqrt(np.diag(plan.robot.prior.covariance))
+    after = np.sqrt(np.diag(plan.predicted_belief().covariance))
+    silent = [
+        name
+        for name, then, now in zip(names, after, before, strict=True)
+        if then > UNDETERMINED_RATIO * now
+    ]
+    if len(silent) > UNDETERMINED_SHARE * len(names):
+        more = ", ..." if len(silent) > NAMES_SHOWN else ""
+        yield UsageError(
+            f"points, orientations and limits leave {len(silent)} of {len(names)} parameters undetermined "
+            f"({', '.join(silent[:NAMES_SHOWN])}{more})",
+            subject="[identification]",
+            action="Allow more tilt, more orientations, or points farther apart",
+        )

@@ -1,0 +1,46 @@
+"""Where a campaign stands, by its measurement file alone."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from hexacell.campaign.decisions import CampaignState, Finished, FinishPoint, MeasurePose, StartPoint
+from hexacell.campaign.planner import Plan
+from hexacell.errors import UsageError
+from hexacell.measurements.records import MeasurementSet
+
+
+def situation_of(plan: Plan, measurements: MeasurementSet, *, refusals: int = 0) -> CampaignState:
+    """The situation after the last record: the gauges stand at its point, all others are done.
+
+    Raises:
+        UsageError: a record is of a point that the plan does not have.
+    """
+    for point in measurements.points.tolist():
+        if point not in plan.points:
+            raise UsageError(
+                f"there are records of point {point}, but the cell file has {len(plan.points)} points",
+                action="Take the measurement file and the cell file that belong together",
+            )
+    if not len(measurements):
+        return CampaignState(refusals=refusals)
+    last = measurements.records[-1]
+    others = frozenset(measurements.points.tolist()) - {last.point}
+    return CampaignState(measurements, last.point, others, last.pose, refusals)
+
+
+def decide(plan: Plan, situation: CampaignState) -> StartPoint | MeasurePose | Finished:
+    """What to measure now; a point that is done is left for the next one.
+
+    Raises:
+        HexacellError: the records cannot be understood.
+    """
+    decision = plan.decide(situation)
+    if isinstance(decision, FinishPoint):
+        leaving = replace(
+            situation, point=None, done=situation.done | {decision.point}, present=None, refusals=0
+        )
+        decision = plan.decide(leaving)
+    if isinstance(decision, FinishPoint):  # between points there is none to close
+        raise TypeError(decision)
+    return decision

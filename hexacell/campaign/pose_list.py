@@ -1,0 +1,78 @@
+"""A fixed list of poses instead of chosen ones: read from a file, visited where it is safe.
+
+The file has the columns ``point,orientation,x,y,z,a,b,c`` of a measurement file, in the controller's
+frames, mm and deg. Points are those of the cell file; a point's first row is its reference. The
+other rows are visited in their order, but a pose at which the ball is not yet sure to stay inside
+the travel waits until more is known.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from hexacell.cell.loader import Cell
+from hexacell.errors import FileError
+from hexacell.kinematics.pose import Pose
+from hexacell.measurements.csv_file import read_poses
+
+SAME_MM_DEG = 1e-6
+"""Numbers of a pose that differ by less are the same number, written down once more."""
+
+
+@dataclass(frozen=True, slots=True)
+class PoseList:
+    """Poses to visit at each point of a cell, in the controller's frames."""
+
+    path: Path
+    poses: tuple[tuple[Pose, ...], ...]
+
+    def __len__(self) -> int:
+        return sum(map(len, self.poses))
+
+    def at(self, point: int) -> tuple[Pose, ...]:
+        """Those of a point, its reference first."""
+        return self.poses[point - 1]
+
+
+def pose_list_of(cell: Cell) -> PoseList | None:
+    """The list that a cell file names, relative to itself; none if poses are to be chosen.
+
+    Raises:
+        FileError: it cannot be read, or its points are not those of the cell file.
+    """
+    name = cell.settings.identification.poses
+    if name is None:
+        return None
+    path = cell.path.parent / name
+    points = len(cell.settings.identification.points)
+    at_points: list[list[Pose]] = [[] for _ in range(points)]
+    for line, point, pose in read_poses(path):
+        if point > points:
+            raise FileError(
+                f"there is no point {point}, the cell file has {points}",
+                subject=path,
+                line=line,
+                action="Correct the number, or add the point under [identification]",
+            )
+        at_points[point - 1].append(pose)
+    for number, poses in enumerate(at_points, start=1):
+        if len(poses) < 2:
+            raise FileError(
+                f"point {number} has {'one pose' if poses else 'no pose'}, two are the least",
+                subject=path,
+                action="Add poses, or take the point out of the cell file",
+            )
+    return PoseList(path, tuple(map(tuple, at_points)))
+
+
+def not_among(poses: tuple[Pose, ...], visited: list[Pose]) -> tuple[Pose, ...]:
+    """The poses that were not visited yet."""
+    return tuple(pose for pose in poses if not any(same(pose, other) for other in visited))
+
+
+def same(one: Pose, other: Pose) -> bool:
+    """Whether two poses are one, but for rounding."""
+    return bool(np.abs(np.subtract(one.as_tuple(), other.as_tuple())).max() < SAME_MM_DEG)

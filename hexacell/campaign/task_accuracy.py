@@ -1,0 +1,83 @@
+"""The predicted error where the robot will work: what all measuring is for."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from hexacell.cell.model import CellSettings
+from hexacell.experiment_design.workspace import workspace_poses
+from hexacell.identification.belief import RobotBelief
+from hexacell.identification.diagnostics.frame_alignment import FrameFit
+from hexacell.kinematics.pose import Pose, PoseBatch
+from hexacell.kinematics.rotations import Array
+from hexacell.kinematics.sensitivity import pose_sensitivity
+from hexacell.robot_model import Robot
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TaskError:
+    """How the error at n task poses follows from an error of the free parameters.
+
+    Attributes:
+        jacobian: (n, 3, p) of positions, mm, what the best frames explain left out.
+    """
+
+    jacobian: Array
+
+    def variances(self, covariance: Array) -> Array:
+        """Mean square distances (n,), mm^2, under a covariance (p, p) of the free parameters."""
+        squares: Array = np.einsum("nap,pq,naq->n", self.jacobian, covariance, self.jacobian, optimize=True)
+        return squares
+
+    def weight(self) -> Array:
+        """What the variances of the free parameters count (p, p): theirs is the mean square error."""
+        weight: Array = np.einsum("nap,naq->pq", self.jacobian, self.jacobian, optimize=True)
+        return weight / len(self.jacobian)
+
+    def worst(self, covariance: Array) -> float:
+        """One standard deviation at the worst pose, mm."""
+        return float(np.sqrt(self.variances(covariance).max()))
+
+    def mean_square(self, covariance: Array) -> float:
+        """Over all poses, mm^2."""
+        return float(self.variances(covariance).mean())
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Task:
+    """Task poses, and poses across the workspace over which the frames are chosen.
+
+    Both are in the mechanism's frame convention. Where a cell names no task, the workspace is it.
+    """
+
+    poses: PoseBatch
+    workspace: PoseBatch
+
+    @classmethod
+    def of(cls, settings: CellSettings, robot: Robot) -> Task:
+        """The task of a cell."""
+        points = PoseBatch.of(Pose(*point) for point in settings.identification.points)
+        workspace = workspace_poses(robot.knowledge(), robot.change.poses(points).positions)
+        named = robot.change.poses(PoseBatch.of(Pose(*pose) for pose in settings.task.poses))
+        poses = named if len(named) else workspace
+        return cls(poses, workspace if len(workspace) else poses)
+
+    def error(self, knowledge: RobotBelief) -> TaskError | None:
+        """How it depends on the parameters; none if the estimated robot can take no task pose."""
+        task, by_task = _derivatives(knowledge, self.poses)
+        workspace, by_workspace = _derivatives(knowledge, self.workspace)
+        if not len(task) or not len(workspace):
+            return None
+        fit = FrameFit(workspace, float(np.mean(np.linalg.norm(knowledge.estimate.B, axis=-1))))
+        return TaskError(fit.remove_frame_motion(task, by_task, by_workspace)[:, :3])
+
+
+def _derivatives(knowledge: RobotBelief, poses: PoseBatch) -> tuple[PoseBatch, Array]:
+    """The poses that the estimated robot reaches, and theirs (n, 6, p) by the free parameters."""
+    joints = knowledge.mechanism.inverse(knowledge.estimate, knowledge.branch, poses)
+    rows = np.flatnonzero(np.isfinite(joints).all(axis=-1))
+    reached = poses[rows]
+    sensitivity = pose_sensitivity(knowledge.mechanism, knowledge.estimate, reached, joints[rows])
+    return reached, sensitivity.parameters @ knowledge.basis

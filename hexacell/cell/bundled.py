@@ -1,0 +1,43 @@
+"""The cells that come with the package, wherever it is installed."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from hexacell.cell.diagnostics import nearest
+from hexacell.errors import UsageError
+
+CONTROLLER = ".controller.toml"
+"""How the name of a controller's config ends; what precedes it is the name of its cell."""
+
+_IN_THE_WHEEL = Path(__file__).parents[1] / "_configs"
+_IN_A_CHECKOUT = Path(__file__).parents[2] / "configs"
+
+
+def bundled_configs() -> tuple[Path, ...]:
+    """Everything in ``configs``, sorted: a TOML file or a folder each.
+
+    Treat them as read-only: a calibration writes beside its cell file, so copy them first.
+    """
+    return tuple(sorted(path for path in _folder().iterdir() if not path.name.startswith(".")))
+
+
+def bundled_config(name: str) -> Path:
+    """The cell called ``name``, with or without its suffix: ``simulated-hexaglide``.
+
+    It is a cell file, or a folder with one and what belongs to it.
+
+    Raises:
+        UsageError: no such config comes with the package; the message names the nearest.
+    """
+    known = {path.stem: path for path in bundled_configs() if not path.name.endswith(CONTROLLER)}
+    found = known.get(name) or known.get(name.removesuffix(".toml"))
+    if found is None:
+        likely = nearest(name, known)
+        action = f"Did you mean '{likely}'?" if likely else f"There are: {', '.join(known)}"
+        raise UsageError(f"no cell called '{name}' comes with hexacell", action=action)
+    return found
+
+
+def _folder() -> Path:
+    return _IN_THE_WHEEL if _IN_THE_WHEEL.is_dir() else _IN_A_CHECKOUT

@@ -1,1 +1,0 @@
-"""Where mathematics, procedures and drivers come together for the faces."""

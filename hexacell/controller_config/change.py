@@ -1,0 +1,145 @@
+"""A change of the controller's config, complete and reviewable, before anything is written.
+
+Records that have a JSON file of their own in the run folder.
+"""
+
+from __future__ import annotations
+
+import difflib
+import io
+from pathlib import Path
+from typing import Literal, Self
+
+from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
+
+from hexacell.cell.fields import GeometryValues
+from hexacell.controller_config.interface import ConfigFormat
+from hexacell.errors import FileError
+from hexacell.kinematics.geometry import Geometry
+from hexacell.storage import atomic_files
+
+
+class Document(BaseModel):
+    """A frozen record; written atomically, checked when read."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    version: Literal[1] = 1
+
+    def to_json(self) -> bytes:
+        """The record as a JSON file's content."""
+        return self.model_dump_json(indent=2).encode() + b"\n"
+
+    def save(self, path: Path) -> None:
+        """Write the record atomically; raises ``FileError``."""
+        atomic_files.write_atomically(path, self.to_json())
+
+    @classmethod
+    def load(cls, path: Path) -> Self:
+        """The record in a JSON file; raises ``FileError`` if there is none or it is damaged."""
+        try:
+            return cls.model_validate_json(atomic_files.read_bytes(path))
+        except ValidationError as error:
+            first = error.errors(include_url=False)[0]
+            where = ".".join(str(key) for key in first["loc"]) or "the whole"
+            problem = f"this is no {cls.__name__.lower()}: {where}: {first['msg']}"
+            raise FileError(problem, subject=path, action="Restore the file") from error
+
+
+class ConfigChange(Document):
+    """A new geometry for a controller, and exactly the text it would put into the config.
+
+    It holds all that a person must see and all that a commit needs, so that what is written is what
+    was approved, whatever happens to the program in between.
+    """
+
+    path: Path
+    format: str
+    before: GeometryValues
+    after: GeometryValues
+    sha256_before: str
+    sha256_after: str
+    text_before: str
+    text_after: str
+
+    @model_validator(mode="after")
+    def _texts_are_whole(self) -> Self:
+        for words, text, expected in (
+            ("text_before", self.text_before, self.sha256_before),
+            ("text_after", self.text_after, self.sha256_after),
+        ):
+            if atomic_files.sha256(text.encode()) != expected:
+                raise ValueError(f"{words} does not have the checksum stated for it")
+        return self
+
+    @property
+    def diff(self) -> str:
+        """The exact change of the text."""
+        return diff(self.text_before, self.text_after)
+
+
+def fingerprint(path: Path) -> str:
+    """The SHA-256 of a config, to be taken when a run begins; raises ``FileError``."""
+    return atomic_files.sha256(atomic_files.read_bytes(path))
+
+
+def propose(
+    path: Path, config_format: ConfigFormat, format_name: str, after: Geometry, *, fingerprint_at_start: str
+) -> ConfigChange:
+    """The change that gives the controller the geometry ``after``, mm; nothing is written.
+
+    Args:
+        path: the controller's config.
+        config_format: how to read and rewrite it.
+        format_name: the name of that format in the cell file.
+        after: the identified geometry.
+        fingerprint_at_start: :func:`fingerprint` of the config when the run began; measurements were
+            commanded with that geometry, and with another one they mean something else.
+
+    Raises:
+        FileError: the config changed since, or is none.
+    """
+    data = atomic_files.read_bytes(path)
+    require_fingerprint(path, data, fingerprint_at_start)
+    before = config_format.read(path).geometry
+    text_before = atomic_files.decode(data, path)
+    text_after = config_format.rewrite(text_before, after)
+    return ConfigChange(
+        path=path.absolute(),
+        format=format_name,
+        before=_values(before),
+        after=_values(after),
+        sha256_before=fingerprint_at_start,
+        sha256_after=atomic_files.sha256(text_after.encode()),
+        text_before=text_before,
+        text_after=text_after,
+    )
+
+
+def require_fingerprint(path: Path, data: bytes, expected: str) -> None:
+    """Raise ``FileError`` if ``data``, the content of ``path``, is not what the run began with."""
+    if atomic_files.sha256(data) != expected:
+        raise FileError(
+            "the config changed since the run began; the new geometry does not belong to it",
+            subject=path,
+            action="Nothing was written: run again",
+        )
+
+
+def diff(before: str, after: str) -> str:
+    """The exact text change as a unified diff; ``patch`` accepts it. Empty if there is none."""
+    lines = difflib.unified_diff(_lines(before), _lines(after), "config-before", "config-after")
+    return "".join(
+        line if line.endswith("\n") else f"{line}\n\\ No newline at end of file\n" for line in lines
+    )
+
+
+def _lines(text: str) -> list[str]:
+    # str.splitlines also splits at form feeds and other characters that end no line in a file.
+    return list(io.StringIO(text, newline="\n"))
+
+
+def _values(geometry: Geometry) -> GeometryValues:
+    return GeometryValues.model_validate(
+        {name: getattr(geometry, name).tolist() for name in ("S", "B", "l")}
+    )

@@ -1,1 +1,0 @@
-"""Which poses to visit: to learn the most while measuring, and to judge the result afterwards."""

@@ -1,0 +1,1 @@
+"""Which pose to measure next: candidates, predicted records, criteria, selection."""

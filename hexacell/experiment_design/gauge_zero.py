@@ -1,0 +1,76 @@
+"""Where a point's gauges were zeroed, as far as its records tell."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from hexacell.errors import LimitError
+from hexacell.experiment_design.candidates import ReachableTargets, commands_for
+from hexacell.identification.belief import RobotBelief
+from hexacell.identification.solver.measurement_model import record_weights
+from hexacell.kinematics.forward import assembly_mode
+from hexacell.kinematics.pose import PoseBatch
+from hexacell.kinematics.rotations import Array
+from hexacell.kinematics.sensitivity import pose_jacobian, position_sensitivity
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class GaugeZero:
+    """What is known of the zeroed gauges at a point.
+
+    Attributes:
+        reference: where the estimate says the ball was when they were zeroed (3,), mm.
+        orientation: the platform's then (3, 3), under the estimate.
+        joints: the sliders' positions then (6,), mm.
+        jacobian: derivative (3, p) of ``reference`` by the free parameters.
+        covariance: of ``reference`` (3, 3), mm^2, the parameters being known.
+    """
+
+    reference: Array
+    orientation: Array
+    joints: Array
+    jacobian: Array
+    covariance: Array
+
+    @property
+    def stand(self) -> ReachableTargets:
+        """The reference, one of one."""
+        return ReachableTargets(PoseBatch.at(self.reference, self.orientation[None]), self.joints[None])
+
+    def command(self, knowledge: RobotBelief) -> PoseBatch:
+        """The command, one of one, that led to the reference."""
+        return commands_for(knowledge, self.stand)[0]
+
+    def mode(self, knowledge: RobotBelief) -> Array:
+        """The assembly mode (1,) of the estimated robot at the reference."""
+        stand = self.stand
+        return assembly_mode(
+            pose_jacobian(knowledge.mechanism, knowledge.estimate, stand.targets, stand.joints)
+        )
+
+
+def station(knowledge: RobotBelief, poses: PoseBatch, joints: Array, deviations: Array) -> GaugeZero:
+    """The station of a point's records so far (n): their poses under the estimate, the first at zero.
+
+    Raises:
+        LimitError: all of them stand at a singularity, where nothing can be said.
+    """
+    jacobian, by_joints = position_derivatives(knowledge, ReachableTargets(poses, joints))
+    weights = record_weights(by_joints, knowledge.noise)
+    try:
+        covariance = np.linalg.inv(weights.sum(axis=0))
+    except np.linalg.LinAlgError:
+        raise LimitError("the records of this point say nothing about where the ball is") from None
+    reference = covariance @ np.einsum("nij,nj->i", weights, poses.positions - deviations)
+    mean = covariance @ np.einsum("nij,njp->ip", weights, jacobian)
+    return GaugeZero(reference, poses.rotations[0], joints[0], mean, covariance)
+
+
+def position_derivatives(knowledge: RobotBelief, stands: ReachableTargets) -> tuple[Array, Array]:
+    """Of the ball's position at n poses: (n, 3, p) by the free parameters, (n, 3, 6) by the joints."""
+    by_parameters, by_joints = position_sensitivity(
+        knowledge.mechanism, knowledge.estimate, stands.targets, stands.joints
+    )
+    return by_parameters @ knowledge.basis, by_joints

@@ -1,0 +1,54 @@
+"""What is known of the robot at one moment, and what may be asked of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from hexacell.identification.problem.problem import Noise
+from hexacell.kinematics.geometry import Geometry
+from hexacell.kinematics.mechanism import Branch, Mechanism
+from hexacell.kinematics.rotations import Array
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """What no commanded pose may exceed: mm and rad; the margin is dimensionless."""
+
+    gauge_travel_mm: float
+    tilt: float
+    joint_min_mm: float
+    joint_max_mm: float
+    singularity_margin: float
+
+
+@dataclass(frozen=True, eq=False)
+class RobotBelief:
+    """The estimate and its covariance beside the geometry that the controller commands with.
+
+    All geometries are in the mechanism's frame convention.
+
+    Attributes:
+        free: estimated free parameters (p,), mm.
+        covariance: theirs (p, p), mm^2.
+    """
+
+    mechanism: Mechanism
+    controller: Geometry
+    branch: Branch
+    free: Array
+    covariance: Array
+    noise: Noise
+    limits: Limits
+
+    @property
+    def basis(self) -> Array:
+        """(42, p), from free parameters to all of them."""
+        return self.mechanism.convention.basis()
+
+    @cached_property
+    def estimate(self) -> Geometry:
+        """The estimated geometry."""
+        return Geometry.from_vector(self.basis @ np.asarray(self.free))

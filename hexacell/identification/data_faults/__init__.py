@@ -1,0 +1,1 @@
+"""Gross errors, zero shifts and misread gauges: found, named, left out."""

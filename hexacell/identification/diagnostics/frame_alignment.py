@@ -1,0 +1,80 @@
+"""What a choice of frames can and cannot mend in the errors of poses.
+
+Where the base frame lies and how the platform frame is turned is a choice, made anew whenever a
+fixture or a tool is taught. Errors of poses are therefore compared only after both frames are
+chosen best. To first order a base frame moved by t and turned by f, and a platform frame turned by
+p about the ball, change a pose (P, R) by
+
+    dP = t + f x P,    dr = f + R p,
+
+with dr the rotation vector in the base frame. The best (t, f, p) minimise the sum of squares over
+poses that span the workspace; rotations are weighed by a length, the platform's radius.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from hexacell.kinematics import rotations
+from hexacell.kinematics.mechanism import FrameTransform
+from hexacell.kinematics.pose import PoseBatch
+from hexacell.kinematics.rotations import Array
+
+ROUNDS = 20
+SETTLED = 1e-12
+"""Of the last round's turn, rad, and of its shift over the length."""
+
+
+def pose_errors(reached: PoseBatch, commanded: PoseBatch) -> Array:
+    """Errors (n, 6): positions, mm, then rotation vectors in the base frame, rad."""
+    turned = reached.rotations @ np.swapaxes(commanded.rotations, -1, -2)
+    return np.concatenate([reached.positions - commanded.positions, rotations.to_vector(turned)], axis=-1)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FrameFit:
+    """The best frames over some poses (n), rotations weighed by ``length``, mm."""
+
+    workspace: PoseBatch
+    length: float
+
+    def coefficients(self, errors: Array) -> Array:
+        """The (t, f, p) (9, ...), mm and rad, that explain errors (n, 6, ...) best."""
+        scale = np.repeat([1.0, self.length], 3)
+        design = (_design(self.workspace) * scale[:, None]).reshape(-1, 9)
+        values = (errors.reshape(len(errors), 6, -1) * scale[:, None]).reshape(len(design), -1)
+        # One pose, or many alike, leave a frame open: then the smallest change will do.
+        best: Array = np.linalg.lstsq(design, values)[0]
+        return best.reshape(9, *errors.shape[2:])
+
+    def remove_frame_motion(self, poses: PoseBatch, errors: Array, workspace_errors: Array) -> Array:
+        """Errors (k, 6, ...) of other poses less what the best frames explain, to first order."""
+        explained: Array = np.tensordot(_design(poses), self.coefficients(workspace_errors), axes=1)
+        return errors - explained
+
+    def aligned(self, reached: PoseBatch, others: PoseBatch) -> PoseBatch:
+        """Poses ``others``, seen in the frames that bring ``reached`` nearest to the workspace."""
+        for _ in range(ROUNDS):
+            best = self.coefficients(pose_errors(reached, self.workspace))
+            change = _undoing(best)
+            reached, others = change.poses(reached), change.poses(others)
+            if max(np.abs(best[:3]).max() / self.length, np.abs(best[3:]).max()) < SETTLED:
+                break
+        return others
+
+
+def _design(poses: PoseBatch) -> Array:
+    """Derivatives (n, 6, 9) of pose errors by t, f and p."""
+    design = np.zeros((len(poses), 6, 9))
+    design[:, :3, :3] = np.eye(3)
+    design[:, :3, 3:6] = -rotations.skew(poses.positions)
+    design[:, 3:, 3:6] = np.eye(3)
+    design[:, 3:, 6:] = poses.rotations
+    return design
+
+
+def _undoing(coefficients: Array) -> FrameTransform:
+    shift, base, platform = coefficients.reshape(3, 3)
+    return FrameTransform(rotations.from_vector(-base), shift, rotations.from_vector(platform))

@@ -1,0 +1,1 @@
+"""Regularized weighted least squares: from a problem to a geometry with its covariance."""

@@ -1,0 +1,1 @@
+"""Kinematics of six-legged parallel mechanisms: poses, geometry, inverse, forward, sensitivity."""

@@ -1,0 +1,1 @@
+"""One mechanism a file: its constraints, their derivatives, its frame convention."""

@@ -1,0 +1,118 @@
+"""The 6-PUS Hexaglide: six sliders on parallel rails, six fixed legs, one platform.
+
+Leg i closes when ``|S_i + q_i e - P - R B_i| = l_i``, with e the rails' direction (base x). The
+constraint used is ``(|v_i|^2 - l_i^2) / (2 l_i)``: polynomial, and near zero the leg's error in mm.
+Source: Abtahi et al. 2010, eq. 4 and 14, and the leg equation in ``docs/method.md``.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hexacell.kinematics.geometry import Geometry, GeometryBatch
+from hexacell.kinematics.mechanism import Branch, ConstraintDerivatives, FrameConvention, FrameTransform
+from hexacell.kinematics.pose import PoseBatch
+from hexacell.kinematics.rotations import Array
+
+PAPER_FRAME = FrameConvention(
+    name="paper",
+    zero=("S2x", "S2y", "S2z", "S3z"),
+    equal=(("B2z", "B3z", "B5z"), ("B2y", "B5y")),
+)
+
+
+class Hexaglide:
+    """The Hexaglide as six constraints; stateless."""
+
+    name = "hexaglide"
+    convention = PAPER_FRAME
+
+    def constraints(self, geometry: Geometry, poses: PoseBatch, joints: Array) -> Array:
+        """See :class:`~hexacell.kinematics.mechanism.Mechanism`."""
+        return _leg_errors(geometry, _leg_vectors(geometry, poses, joints)[1])
+
+    def residual_and_jacobian(
+        self, geometry: Geometry | GeometryBatch, poses: PoseBatch, joints: Array
+    ) -> tuple[Array, Array]:
+        """See :class:`~hexacell.kinematics.mechanism.Mechanism`."""
+        b, v = _leg_vectors(geometry, poses, joints)
+        return _leg_errors(geometry, v), _by_pose(b, v / geometry.l[..., None])
+
+    def derivatives(self, geometry: Geometry, poses: PoseBatch, joints: Array) -> ConstraintDerivatives:
+        """See :class:`~hexacell.kinematics.mechanism.Mechanism`."""
+        b, v = _leg_vectors(geometry, poses, joints)
+        n = v / geometry.l[:, None]
+        by_length = -0.5 * (np.sum(n * n, axis=-1, keepdims=True) + 1.0)
+        return ConstraintDerivatives(
+            pose=_by_pose(b, n),
+            joints=n[..., 0],
+            parameters=np.concatenate([n, -n @ poses.rotations, by_length], axis=-1),
+        )
+
+    def inverse(self, geometry: Geometry, branch: Branch, poses: PoseBatch) -> Array:
+        """See :class:`~hexacell.kinematics.mechanism.Mechanism`."""
+        _, v = _leg_vectors(geometry, poses, np.zeros((len(poses), 6)))
+        along_rail_squared = geometry.l**2 - v[..., 1] ** 2 - v[..., 2] ** 2
+        reachable = along_rail_squared >= 0.0
+        along_rail = np.sqrt(np.where(reachable, along_rail_squared, np.nan))
+        return np.asarray(branch) * along_rail - v[..., 0]
+
+    def branch(self, geometry: Geometry, poses: PoseBatch, joints: Array) -> Array:
+        """See :class:`~hexacell.kinematics.mechanism.Mechanism`."""
+        _, v = _leg_vectors(geometry, poses, joints)
+        return np.where(v[..., 0] < 0.0, -1, 1)
+
+    def normalize_frames(self, geometry: Geometry) -> tuple[Geometry, FrameTransform]:
+        """Origin at S2, S3 level with it, platform axes through B2, B5 and B3."""
+        base = _roll_that_levels(geometry.S[2] - geometry.S[1])
+        platform = _axes_through(geometry.B[1], geometry.B[4], geometry.B[2])
+        change = FrameTransform(base, geometry.S[1].copy(), platform)
+        S = (geometry.S - geometry.S[1]) @ base.T
+        B = geometry.B @ platform.T
+        # The rules hold exactly, not just to rounding: later code relies on the equalities.
+        S[1], S[2, 2] = 0.0, 0.0
+        B[[2, 4], 2] = B[1, 2]
+        B[4, 1] = B[1, 1]
+        return Geometry(S, B, geometry.l), change
+
+
+def _leg_vectors(
+    geometry: Geometry | GeometryBatch, poses: PoseBatch, joints: Array
+) -> tuple[Array, Array]:
+    """R B_i (n, 6, 3), and v_i (n, 6, 3) from platform joint to slider joint, mm."""
+    b = geometry.B @ np.swapaxes(poses.rotations, -1, -2)
+    v = geometry.S - poses.positions[:, None, :] - b
+    v[..., 0] += joints
+    return b, v
+
+
+def _leg_errors(geometry: Geometry | GeometryBatch, v: Array) -> Array:
+    error: Array = (np.einsum("nij,nij->ni", v, v) - geometry.l**2) / (2.0 * geometry.l)
+    return error
+
+
+def _by_pose(b: Array, n: Array) -> Array:
+    """Minus n, and minus b x n, side by side (n, 6, 6)."""
+    jacobian = np.empty((*n.shape[:-1], 6))
+    jacobian[..., :3] = -n
+    # Written out: np.cross costs as much as the rest of a Newton step.
+    bx, by, bz = b[..., 0], b[..., 1], b[..., 2]
+    nx, ny, nz = n[..., 0], n[..., 1], n[..., 2]
+    jacobian[..., 3] = bz * ny - by * nz
+    jacobian[..., 4] = bx * nz - bz * nx
+    jacobian[..., 5] = by * nx - bx * ny
+    return jacobian
+
+
+def _roll_that_levels(vector: Array) -> Array:
+    """The rotation about x that turns ``vector`` into z = 0, y > 0."""
+    y, z = vector[1:] / np.hypot(vector[1], vector[2])
+    return np.array([[1.0, 0.0, 0.0], [0.0, y, z], [0.0, -z, y]])
+
+
+def _axes_through(second: Array, fifth: Array, third: Array) -> Array:
+    """Rows: x from B2 to B5, z normal to the plane of B2, B5, B3, y toward B3."""
+    x = (fifth - second) / np.linalg.norm(fifth - second)
+    z = np.cross(x, third - second)
+    z /= np.linalg.norm(z)
+    return np.stack([x, np.cross(z, x), z])

@@ -1,0 +1,90 @@
+"""Poses at the edges: six numbers in millimetres and degrees."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from hexacell.kinematics import rotations
+from hexacell.kinematics.rotations import Array, Mask
+
+
+@dataclass(frozen=True, slots=True)
+class Pose:
+    """A platform pose as files, controllers and people write it.
+
+    ``x, y, z`` is the ball's centre in the base frame, mm; ``a, b, c`` are the angles about the
+    fixed axes x, y, z in that order, deg: ``R = Rz(c) Ry(b) Rx(a)``.
+    """
+
+    x: float
+    y: float
+    z: float
+    a: float = 0.0
+    b: float = 0.0
+    c: float = 0.0
+
+    @classmethod
+    def of(cls, position: Array, rotation: Array) -> Pose:
+        """The pose of a ball centre (3,), mm, and a rotation matrix (3, 3)."""
+        angles = np.degrees(rotations.to_angles(rotation))
+        return cls(*(float(value) for value in (*position, *angles)))
+
+    @property
+    def position(self) -> Array:
+        """The ball's centre (3,), mm."""
+        return np.array([self.x, self.y, self.z])
+
+    @property
+    def rotation(self) -> Array:
+        """The rotation matrix (3, 3) from the platform frame to the base frame."""
+        return rotations.from_angles(np.radians([self.a, self.b, self.c]))
+
+    def as_tuple(self) -> tuple[float, float, float, float, float, float]:
+        """``(x, y, z, a, b, c)``, mm and deg."""
+        return (self.x, self.y, self.z, self.a, self.b, self.c)
+
+    def __str__(self) -> str:
+        words = zip("XYZABC", self.as_tuple(), strict=True)
+        return " ".join(f"{axis}{value:z.3f}" for axis, value in words)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PoseBatch:
+    """Many poses as mathematics wants them.
+
+    Attributes:
+        positions: ball centres (n, 3), mm.
+        rotations: rotation matrices (n, 3, 3), platform frame to base frame.
+    """
+
+    positions: Array
+    rotations: Array
+
+    @classmethod
+    def of(cls, poses: Iterable[Pose]) -> PoseBatch:
+        """The arrays of some poses."""
+        numbers = np.array([pose.as_tuple() for pose in poses], dtype=float).reshape(-1, 6)
+        return cls(numbers[:, :3], rotations.from_angles(np.radians(numbers[:, 3:])))
+
+    @classmethod
+    def at(cls, position: ArrayLike, orientations: Array) -> PoseBatch:
+        """One position (3,), mm, in several orientations (n, 3, 3)."""
+        return cls(np.broadcast_to(np.asarray(position, dtype=float), (len(orientations), 3)), orientations)
+
+    def __len__(self) -> int:
+        return len(self.positions)
+
+    def __getitem__(self, rows: slice | NDArray[np.intp] | Mask | list[int]) -> PoseBatch:
+        return PoseBatch(self.positions[rows], self.rotations[rows])
+
+    def pose(self, row: int) -> Pose:
+        """One of them, in mm and deg."""
+        return Pose.of(self.positions[row], self.rotations[row])
+
+    def tilts(self) -> Array:
+        """Angles (n,), rad, between the platform's z axis and the base's."""
+        return np.arccos(np.clip(self.rotations[:, 2, 2], -1.0, 1.0))

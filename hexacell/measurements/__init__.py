@@ -1,0 +1,1 @@
+"""Records of joint variables and deviations, in memory and as CSV."""

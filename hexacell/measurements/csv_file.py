@@ -1,0 +1,205 @@
+"""Measurements as a CSV file.
+
+One row a record, under the header ``point,orientation,x,y,z,a,b,c,q1,...,q6,dx,dy,dz``: the pose as
+commanded, mm and deg, the encoders, mm, and the deviation from the point's first row, mm. Columns
+may stand in any order and more of them may follow; these are ignored.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+from collections import Counter
+from collections.abc import Iterator
+from operator import itemgetter
+from pathlib import Path
+
+from hexacell.errors import FileError
+from hexacell.kinematics.pose import Pose
+from hexacell.measurements.records import MeasurementSet, Record
+from hexacell.storage.atomic_files import read_text, write_atomically
+
+COUNTS = ("point", "orientation")
+NUMBERS = (*"xyzabc", "q1", "q2", "q3", "q4", "q5", "q6", "dx", "dy", "dz")
+HEADER = (*COUNTS, *NUMBERS)
+POSE_HEADER = HEADER[:8]
+LARGEST_COUNT = 1_000_000
+Label = tuple[int, int]
+
+
+def read_measurements(path: Path, *, allow_partial: bool = False) -> MeasurementSet:
+    """Read a measurement file.
+
+    ``allow_partial`` accepts what a calibration still under way may leave: a file without rows, or
+    without even a header, and points with one row.
+
+    Raises:
+        FileError: The file cannot be read, a column is missing, a cell is no number, a record
+            stands twice, or there are too few; with the line.
+    """
+    text = read_text(path).removeprefix("\N{BYTE ORDER MARK}")
+    if allow_partial and not text.strip():
+        return MeasurementSet(())
+    records = _by_label(path, _Table(path, text, HEADER))
+    if not allow_partial:
+        _require_two_rows_a_point(path, {label: line for label, (line, _) in records.items()})
+    return MeasurementSet(tuple(record for _, record in records.values()))
+
+
+def read_poses(path: Path) -> list[tuple[int, int, Pose]]:
+    """Read only the poses of such a file: line, point and pose of each row.
+
+    Raises:
+        FileError: as for a measurement file, but columns other than the poses' need not be there.
+    """
+    table = _Table(path, read_text(path).removeprefix("\N{BYTE ORDER MARK}"), POSE_HEADER)
+    records = _by_label(path, table).values()
+    return [(line, record.point, record.pose) for line, record in records]
+
+
+def write_measurements(path: Path, measurements: MeasurementSet) -> None:
+    """Write a measurement file; every number reads back exactly.
+
+    Raises:
+        FileError: The file cannot be written; an older one is then still there.
+    """
+    text = io.StringIO()
+    rows = csv.writer(text, lineterminator="\n")
+    rows.writerow(HEADER)
+    rows.writerows(map(_row, measurements.records))
+    write_atomically(path, text.getvalue().encode())
+
+
+def _row(record: Record) -> list[str]:
+    numbers = (*record.pose.as_tuple(), *record.joints, *record.deviation)
+    # float: a numpy number's repr names its type.
+    return [str(record.point), str(record.orientation), *(repr(float(number)) for number in numbers)]
+
+
+def _by_label(path: Path, table: _Table) -> dict[Label, tuple[int, Record]]:
+    """The records of a table, each with its line, in their order."""
+    found: dict[Label, tuple[int, Record]] = {}
+    for line, record in table.records():
+        label = (record.point, record.orientation)
+        if label in found:
+            raise _stands_twice(path, label, found[label][0], line)
+        found[label] = (line, record)
+    return found
+
+
+class _Table:
+    """The rows of one file, and where the columns are that count: the first ones of ``HEADER``."""
+
+    def __init__(self, path: Path, text: str, wanted: tuple[str, ...]) -> None:
+        self._path = path
+        self._rows = _filled_rows(path, text)
+        line, self._header = next(self._rows, (1, []))
+        columns = _columns(path, line, self._header, wanted)
+        self._cells = itemgetter(*columns)
+        self._absent = ("0",) * (len(HEADER) - len(wanted))
+
+    def records(self) -> Iterator[tuple[int, Record]]:
+        """Each record with its line."""
+        for line, row in self._rows:
+            if len(row) != len(self._header):
+                raise self._wrong_width(line, row)
+            cells = (*self._cells(row), *self._absent)
+            record = _record(cells)
+            if record is None:
+                raise _bad_cell(self._path, line, cells)
+            yield line, record
+
+    def _wrong_width(self, line: int, row: list[str]) -> FileError:
+        hint = "; is the decimal sign a comma?" if len(row) > len(self._header) else ""
+        return FileError(
+            f"the row has {len(row)} cells, the header {len(self._header)}{hint}",
+            subject=self._path,
+            line=line,
+            action="Correct this row",
+        )
+
+
+def _filled_rows(path: Path, text: str) -> Iterator[tuple[int, list[str]]]:
+    """Rows in which anything stands, each with its line."""
+    reader = csv.reader(io.StringIO(text, newline=""), strict=True)
+    try:
+        for row in reader:
+            if any(cell.strip() for cell in row):
+                yield reader.line_num, row
+    except csv.Error as error:
+        raise FileError(
+            f"is not valid CSV: {error}", subject=path, line=reader.line_num, action="Correct this line"
+        ) from None
+
+
+def _columns(path: Path, line: int, header: list[str], wanted: tuple[str, ...]) -> list[int]:
+    """The place of each column wanted in the file."""
+    names = [name.strip() for name in header]
+    missing = [name for name in wanted if name not in names]
+    twice = [name for name in wanted if names.count(name) > 1]
+    if not names:
+        problem = "is empty"
+    elif len(names) == 1 and (";" in names[0] or "\t" in names[0]):
+        problem = f"columns are separated by {'semicolons' if ';' in names[0] else 'tabs'}, not by commas"
+    elif missing:
+        problem = f"columns are missing: {', '.join(missing)}"
+    elif twice:
+        problem = f"columns stand twice: {', '.join(twice)}"
+    else:
+        return [names.index(name) for name in wanted]
+    raise FileError(problem, subject=path, line=line, action=f"The header must be {','.join(wanted)}")
+
+
+def _record(cells: tuple[str, ...]) -> Record | None:
+    """The record in the cells of ``HEADER``, or none if one of them is unfit."""
+    # Python's numbers may have underscores, a CSV file's may not.
+    if "_" in "".join(cells):
+        return None
+    try:
+        point, orientation = int(cells[0]), int(cells[1])
+        numbers = tuple(map(float, cells[2:]))
+    except ValueError:
+        return None
+    counts = 1 <= point <= LARGEST_COUNT and 1 <= orientation <= LARGEST_COUNT
+    if not counts or not all(map(math.isfinite, numbers)):
+        return None
+    q1, q2, q3, q4, q5, q6, dx, dy, dz = numbers[6:]
+    return Record(point, orientation, Pose(*numbers[:6]), (q1, q2, q3, q4, q5, q6), (dx, dy, dz))
+
+
+def _bad_cell(path: Path, line: int, cells: tuple[str, ...]) -> FileError:
+    """Which cell made :func:`_record` give up."""
+    good = ("1", "1", *("0" for _ in NUMBERS))
+    alone = ((*good[:place], cell, *good[place + 1 :]) for place, cell in enumerate(cells))
+    place = [_record(candidate) is None for candidate in alone].index(True)
+    name, cell = HEADER[place], cells[place]
+    expected = "a whole number from 1" if name in COUNTS else "a finite number"
+    found = f'"{cell}"' if cell.strip() else "empty"
+    return FileError(
+        f"{name} is {found}, but must be {expected}", subject=path, line=line, action="Correct this cell"
+    )
+
+
+def _stands_twice(path: Path, label: Label, first: int, line: int) -> FileError:
+    point, orientation = label
+    return FileError(
+        f"point {point}, orientation {orientation} stands here and in line {first}",
+        subject=path,
+        line=line,
+        action="Remove one of the two rows",
+    )
+
+
+def _require_two_rows_a_point(path: Path, lines: dict[Label, int]) -> None:
+    if not lines:
+        raise FileError("there are no measurements in it", subject=path, action="Measure some first")
+    rows = Counter(point for point, _ in lines)
+    for (point, _), line in lines.items():
+        if rows[point] < 2:
+            raise FileError(
+                f"point {point} has one row, and at least two are needed to compare",
+                subject=path,
+                line=line,
+                action="Measure it in another orientation, or remove the row",
+            )

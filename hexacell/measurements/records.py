@@ -1,0 +1,123 @@
+"""What calibration starts from: records of joint variables and of how far the ball moved."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hexacell.errors import UsageError
+from hexacell.kinematics.pose import Pose, PoseBatch
+from hexacell.kinematics.rotations import Array
+
+Scalar = TypeVar("Scalar", bound=np.generic)
+Joints = tuple[float, float, float, float, float, float]
+Deviation = tuple[float, float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Record:
+    """One settled measurement.
+
+    Attributes:
+        point: which of the cell's points the gauges stand at, from 1.
+        orientation: which pose at this point, from 1.
+        pose: what was commanded, under the geometry that the controller then had.
+        joints: slider positions q1 to q6 from the encoders, mm.
+        deviation: of the ball from where the point's gauges were zeroed, along base x, y, z, mm.
+    """
+
+    point: int
+    orientation: int
+    pose: Pose
+    joints: Joints
+    deviation: Deviation
+
+
+@dataclass(frozen=True)
+class MeasurementSet:
+    """Records in the order of measurement, and the same as arrays of n rows.
+
+    Deviations compare only within one point. Its reference, where the gauges were zeroed, is its
+    first record. The arrays are computed once and read-only.
+
+    Raises:
+        UsageError: two records have the same point and orientation.
+    """
+
+    records: tuple[Record, ...]
+
+    def __post_init__(self) -> None:
+        twice = [label for label, n in Counter(map(_label, self.records)).items() if n > 1]
+        if twice:
+            point, orientation = twice[0]
+            raise UsageError(f"there are two records of point {point}, orientation {orientation}")
+
+    def __len__(self) -> int:
+        return len(self.records)
+
+    @cached_property
+    def labels(self) -> NDArray[np.int_]:
+        """Point and orientation (n, 2) of each record, as people count them."""
+        return _frozen(np.array([*map(_label, self.records)], dtype=np.int_).reshape(-1, 2))
+
+    @property
+    def points(self) -> NDArray[np.int_]:
+        """The point (n,) of each record, as people count them."""
+        return self.labels[:, 0]
+
+    @cached_property
+    def group(self) -> NDArray[np.intp]:
+        """The point (n,) of each record, counted 0 to m-1 in the order of first appearance."""
+        places = {point: place for place, point in enumerate(dict.fromkeys(self.points.tolist()))}
+        return _frozen(np.array([places[record.point] for record in self.records], dtype=np.intp))
+
+    @property
+    def number_of_points(self) -> int:
+        """How many points (m) have records."""
+        return len(self.reference_rows)
+
+    @cached_property
+    def reference_rows(self) -> NDArray[np.intp]:
+        """The row (m,) of each point's reference, in the order of ``group``."""
+        _, first_rows = np.unique(self.group, return_index=True)
+        return _frozen(first_rows)
+
+    @cached_property
+    def poses(self) -> PoseBatch:
+        """The commanded poses."""
+        poses = PoseBatch.of(record.pose for record in self.records)
+        return PoseBatch(_frozen(poses.positions), _frozen(poses.rotations))
+
+    @property
+    def positions(self) -> Array:
+        """Commanded ball centres (n, 3), mm."""
+        return self.poses.positions
+
+    @property
+    def rotations(self) -> Array:
+        """Commanded rotation matrices (n, 3, 3), platform frame to base frame."""
+        return self.poses.rotations
+
+    @cached_property
+    def joints(self) -> Array:
+        """Slider positions (n, 6), mm."""
+        return _frozen(np.array([record.joints for record in self.records], dtype=float).reshape(-1, 6))
+
+    @cached_property
+    def deviations(self) -> Array:
+        """Deviations (n, 3) from the point's reference, mm."""
+        return _frozen(np.array([record.deviation for record in self.records], dtype=float).reshape(-1, 3))
+
+
+def _label(record: Record) -> tuple[int, int]:
+    return record.point, record.orientation
+
+
+def _frozen(array: NDArray[Scalar]) -> NDArray[Scalar]:
+    array.setflags(write=False)
+    return array

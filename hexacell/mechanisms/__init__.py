@@ -1,1 +1,0 @@
-"""What a robot is: six constraints, one a leg, and their derivatives."""

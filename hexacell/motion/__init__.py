@@ -1,0 +1,1 @@
+"""Paths between poses: traced, checked against limits, planned over waypoints."""

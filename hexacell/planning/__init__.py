@@ -1,1 +1,0 @@
-"""What to measure next, as one decision on the records so far: for ``run``, ``next`` and forecasts."""

@@ -1,0 +1,1 @@
+"""What is said to people about events, results and devices, for every face."""

@@ -1,0 +1,65 @@
+"""What a replay found, for people and for programs."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from hexacell.application.replay_run import Replay
+from hexacell.presentation.layout import wrapped
+from procedures.replay.comparison import Aspect, Difference
+
+LISTED = 10
+
+
+def replay_document(replayed: Replay) -> dict[str, Any]:
+    """What ``replay --json`` prints."""
+    tally = replayed.tally
+    return {
+        "same": replayed.is_same,
+        "journal": str(replayed.journal),
+        "events": replayed.events,
+        "decisions": tally.decisions,
+        "results": tally.results,
+        "taken": tally.taken,
+        "recorded_by": replayed.recorded_by,
+        "replayed_by": replayed.replayed_by,
+        "differences": [_difference(replayed, difference) for difference in tally.differences],
+    }
+
+
+def replay_words(replayed: Replay) -> str:
+    """The same in a few lines, the verdict last."""
+    found = sorted(replayed.tally.differences, key=lambda one: not replayed.counts(one))
+    lines = [wrapped(_line(replayed, difference), indent=4) for difference in found[:LISTED]]
+    if len(found) > LISTED:
+        lines.append(f"and {len(found) - LISTED} more (--json lists them)")
+    if any(one.aspect is Aspect.DECISION for one in found) and not replayed.is_same_software:
+        lines.append(
+            wrapped(f"{replayed.recorded_by} recorded it: {replayed.replayed_by} may decide otherwise.")
+        )
+    return "\n".join([*lines, _verdict(replayed)])
+
+
+def _difference(replayed: Replay, difference: Difference) -> dict[str, Any]:
+    return {
+        "line": difference.line,
+        "place": difference.place,
+        "aspect": difference.aspect.value,
+        "counts": replayed.counts(difference),
+        "field": difference.change.field,
+        "recorded": difference.change.recorded,
+        "replayed": difference.change.replayed,
+    }
+
+
+def _line(replayed: Replay, difference: Difference) -> str:
+    return f"{'NO' if replayed.counts(difference) else '--'}  {difference}"
+
+
+def _verdict(replayed: Replay) -> str:
+    tally = replayed.tally
+    what = f"{tally.decisions} decisions and {tally.results} results of {replayed.events} events"
+    if replayed.is_same:
+        return f"{what}: the same as recorded"
+    first = next(one for one in tally.differences if replayed.counts(one))
+    return f"{what}: different, first in line {first.line} ({first.place})"

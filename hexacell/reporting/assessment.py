@@ -1,0 +1,123 @@
+"""Everything that is said of an identification beyond its numbers: can it be trusted, how good is it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from hexacell.cell.model import CellSettings
+from hexacell.experiment_design.decorrelation import DecorrelatingPose, partings
+from hexacell.experiment_design.workspace import workspace_poses
+from hexacell.identification.diagnostics.correlations import CorrelatedPair, strongly_correlated
+from hexacell.identification.diagnostics.pose_accuracy import Accuracy, predicted_accuracy
+from hexacell.identification.diagnostics.repeatability import Repeatability, repeatability
+from hexacell.identification.diagnostics.tolerance_check import ToleranceViolation, tolerance_violations
+from hexacell.identification.diagnostics.variance_components import NoiseLevels, noise_levels
+from hexacell.identification.solver.chi_square import ChiSquareTest, goodness
+from hexacell.identification.solver.linearized_solution import LinearizedSolution
+from hexacell.identification.solver.result import Identification
+from hexacell.kinematics.pose import Pose, PoseBatch
+from hexacell.measurements.records import MeasurementSet
+from hexacell.robot_model import Robot
+
+CONTRADICTED_RATIO = 10.0
+"""Residuals over the stated noise from which on no noise explains them, but something false."""
+
+PAIRS_TO_PART = 5
+"""Of the strongest correlations, for which a measurement is looked for."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Assessment:
+    """The checks of a model against its data, and what they promise.
+
+    Attributes:
+        goodness: residuals against the stated noise.
+        noise: noise levels seen in the residuals; none without redundancy.
+        repeatability: none where no pose was visited twice.
+        record_noise_mm: what the stated noise makes a deviation scatter by (root mean square
+            distance), to compare the repeatability with.
+        correlated: pairs of parameters found only together, the strongest first.
+        partings: for the first of these pairs, the record that would part them; commands as the
+            controller takes them.
+        task: poses at which the accuracy is stated, as the controller takes them.
+        task_named: whether the cell file names them; else they span the workspace.
+        accuracy: at these poses; none where the robot can take none of them. Where the residuals
+            are larger than the stated noise, so is the error to be expected afterwards.
+        tolerance_violations: parameters that the data push out of the drawing's tolerances.
+    """
+
+    goodness: ChiSquareTest
+    noise: NoiseLevels | None
+    repeatability: Repeatability | None
+    record_noise_mm: float
+    correlated: tuple[CorrelatedPair, ...]
+    partings: tuple[DecorrelatingPose | None, ...]
+    task: tuple[Pose, ...]
+    task_named: bool
+    accuracy: Accuracy | None
+    tolerance_violations: tuple[ToleranceViolation, ...] = ()
+
+    @property
+    def refused(self) -> bool:
+        """Whether the geometry must not be used, however well everything else looks."""
+        contradicted = self.goodness.ratio > CONTRADICTED_RATIO and not self.does_not_repeat
+        return contradicted or bool(self.tolerance_violations)
+
+    @property
+    def does_not_repeat(self) -> bool:
+        """Whether the machine's scatter exceeds the error that calibrating would remove."""
+        if self.repeatability is None or self.accuracy is None:
+            return False
+        return self.repeatability.dominates(self.accuracy.removable_mm)
+
+
+def assess(
+    settings: CellSettings, robot: Robot, measurements: MeasurementSet, found: Identification
+) -> Assessment:
+    """Check an identification of some measurements, and predict what it is good for."""
+    model = LinearizedSolution.at(found)
+    pairs = strongly_correlated(found)
+    left_out = {(outlier.point, outlier.orientation) for outlier in found.outliers}
+    fitting = goodness(model)
+    task, accuracy = _accuracy(settings, robot, found)
+    return Assessment(
+        goodness=fitting,
+        noise=noise_levels(model),
+        repeatability=repeatability(measurements, left_out),
+        record_noise_mm=model.record_noise_mm,
+        correlated=pairs,
+        partings=_partings(robot, found, pairs[:PAIRS_TO_PART]),
+        task=tuple(robot.to_command(task.pose(row)) for row in range(len(task))),
+        task_named=bool(settings.task.poses),
+        accuracy=accuracy and replace(accuracy, after=accuracy.after.times(fitting.noise_factor)),
+        tolerance_violations=tolerance_violations(found, robot.drawing, robot.tolerances),
+    )
+
+
+def _partings(
+    robot: Robot, found: Identification, pairs: Sequence[CorrelatedPair]
+) -> tuple[DecorrelatingPose | None, ...]:
+    return tuple(
+        part and replace(part, command=robot.to_command(part.command))
+        for part in partings(robot.knowledge(found), found, pairs)
+    )
+
+
+def _accuracy(
+    settings: CellSettings, robot: Robot, found: Identification
+) -> tuple[PoseBatch, Accuracy | None]:
+    """The task poses in the convention's frames, and the accuracy there."""
+    knowledge = robot.knowledge(found)
+    points = PoseBatch.of(Pose(*point) for point in settings.identification.points)
+    workspace = workspace_poses(knowledge, robot.change.poses(points).positions)
+    task = robot.change.poses(PoseBatch.of(Pose(*pose) for pose in settings.task.poses))
+    task = task if len(task) else workspace
+    accuracy = predicted_accuracy(
+        found,
+        knowledge.controller,
+        robot.branch,
+        task=task,
+        workspace=workspace if len(workspace) else task,
+    )
+    return task, accuracy

@@ -1,0 +1,175 @@
+"""What an identification says, for programs (the ``fit --json`` document) and in one line."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from itertools import zip_longest
+from typing import Any
+
+import numpy as np
+
+from hexacell.acceptance.validation import DeviationStatistics, Verdict
+from hexacell.experiment_design.decorrelation import DecorrelatingPose
+from hexacell.identification.diagnostics.pose_accuracy import PoseErrors
+from hexacell.identification.diagnostics.variance_components import NoiseLevels
+from hexacell.identification.solver.chi_square import ChiSquareTest
+from hexacell.identification.solver.result import Identification, Outlier
+from hexacell.kinematics.geometry import Geometry
+from hexacell.kinematics.pose import Pose
+from hexacell.reporting.assessment import Assessment
+from hexacell.reporting.findings import findings
+
+
+def geometry_values(geometry: Geometry) -> dict[str, Any]:
+    """``{"S": [6x3], "B": [6x3], "l": [6]}``, mm."""
+    return {"S": geometry.S.tolist(), "B": geometry.B.tolist(), "l": geometry.l.tolist()}
+
+
+def identification_document(found: Identification) -> dict[str, Any]:
+    """The document that ``hexacell fit --json`` prints (``docs/interface.md``)."""
+    return {
+        "converged": found.converged,
+        "termination": found.termination.value,
+        "iterations": found.iterations,
+        "records": found.records,
+        "points": found.points,
+        "residual_rms_mm": found.residual_rms_mm,
+        "chi2": found.chi2,
+        "dof": found.dof,
+        "geometry": geometry_values(found.geometry),
+        "sigma": geometry_values(Geometry.from_vector(found.sigma)),
+        "covariance": found.covariance.tolist(),
+        "undetermined": list(found.undetermined),
+        "outliers": [_outlier(outlier) for outlier in found.outliers],
+        "frame": found.frame,
+    }
+
+
+def _outlier(outlier: Outlier) -> dict[str, Any]:
+    return {
+        "point": outlier.point,
+        "orientation": outlier.orientation,
+        "kind": outlier.kind.value,
+        "gauges": list(outlier.gauges),
+        "off_mm": None if outlier.off_mm is None else list(outlier.off_mm),
+    }
+
+
+def assessment_document(found: Identification, assessed: Assessment) -> dict[str, Any]:
+    """What ``hexacell fit --json`` adds: whether the result can be trusted, and how good it is."""
+    return {
+        "findings": list(findings(found, assessed)),
+        "goodness": _goodness(assessed.goodness),
+        "noise": _noise(assessed.noise),
+        "repeatability": _repeatability(assessed),
+        "correlated": _correlated(assessed),
+        "accuracy": _accuracy(assessed),
+        "refused": assessed.refused,
+        "beyond_tolerance": [asdict(excess) for excess in assessed.tolerance_violations],
+    }
+
+
+def _goodness(goodness: ChiSquareTest) -> dict[str, Any]:
+    return {
+        "expected_chi2": goodness.expected,
+        "probability": goodness.probability,
+        "noise_ratio": goodness.ratio,
+        "agreement": goodness.agreement.value,
+    }
+
+
+def _noise(noise: NoiseLevels | None) -> dict[str, Any] | None:
+    if noise is None:
+        return None
+    levels = {
+        name: {
+            "stated": level.stated,
+            "estimated": level.estimated,
+            "standard_error": level.standard_error,
+            "at_most": level.at_most,
+            "seen": level.is_resolved,
+        }
+        for name, level in (("encoder_mm", noise.encoder), ("gauge_mm", noise.gauge))
+    }
+    return levels | {"correlation": noise.correlation, "told_apart": noise.are_separable}
+
+
+def _repeatability(assessed: Assessment) -> dict[str, Any] | None:
+    scatter = assessed.repeatability
+    if scatter is None:
+        return None
+    return {
+        "per_axis_mm": list(scatter.per_axis_mm),
+        "distance_mm": scatter.distance_mm,
+        "degrees_of_freedom": scatter.degrees_of_freedom,
+        "poses": scatter.poses,
+        "recalibrating_helps": not assessed.does_not_repeat,
+    }
+
+
+def _correlated(assessed: Assessment) -> list[dict[str, Any]]:
+    parts = zip_longest(assessed.correlated, assessed.partings)
+    return [
+        {
+            "parameters": [pair.first, pair.second],
+            "correlation": pair.correlation,
+            "measure": _parting(part),
+        }
+        for pair, part in parts
+        if pair
+    ]
+
+
+def _parting(part: DecorrelatingPose | None) -> dict[str, Any] | None:
+    if part is None:
+        return None
+    return {
+        "point": part.point,
+        "axis": part.axis,
+        "angle_deg": part.degrees,
+        "pose": _pose(part.command),
+        "correlation": part.correlation,
+    }
+
+
+def _accuracy(assessed: Assessment) -> dict[str, Any] | None:
+    accuracy = assessed.accuracy
+    if accuracy is None:
+        return None
+    return {
+        "task_named": assessed.task_named,
+        "before": _errors(accuracy.before),
+        "after": _errors(accuracy.after),
+        "poses": [_pose(pose) for pose in assessed.task],
+        "reachable": accuracy.reachable.tolist(),
+    }
+
+
+def _errors(errors: PoseErrors) -> dict[str, Any]:
+    return {
+        "position_rms_mm": errors.position_rms_mm,
+        "position_largest_mm": errors.position_largest_mm,
+        "orientation_rms_deg": errors.orientation_rms_deg,
+        "orientation_largest_deg": errors.orientation_largest_deg,
+        "position_mm": errors.distances_mm.tolist(),
+        "orientation_deg": np.degrees(errors.angles).tolist(),
+    }
+
+
+def _pose(pose: Pose) -> dict[str, float]:
+    return dict(zip("xyzabc", pose.as_tuple(), strict=True))
+
+
+def outcome_line(
+    found: Identification,
+    before: DeviationStatistics | None,
+    after: DeviationStatistics | None,
+    limit_mm: float,
+    verdict: Verdict,
+) -> str:
+    """The one line everywhere: what was used, held-out deviation before and after, the verdict."""
+    what = f"{len(found.free)} parameters, {found.records} records at {found.points} points"
+    if before is None or after is None:
+        return f"{what}; held-out points: {verdict}"
+    means = f"{before.mean_mm:.2f} -> {after.mean_mm:.3f} mm"
+    return f"{what}; mean deviation at held-out points {means} (limit {limit_mm:g}): {verdict}"

@@ -1,0 +1,153 @@
+"""One robot as the mathematics sees it: what the cell file and the controller's config say together."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from hexacell.cell.loader import Cell
+from hexacell.cell.model import CellSettings
+from hexacell.controller_config.interface import Branch, ConfigFormat, ControllerGeometry
+from hexacell.errors import ReachError
+from hexacell.identification.belief import Limits, RobotBelief
+from hexacell.identification.problem.problem import Noise, Prior, Problem, Tolerances, build_problem
+from hexacell.identification.solver.result import Identification
+from hexacell.kinematics.geometry import Geometry
+from hexacell.kinematics.inverse import inverse_kinematics
+from hexacell.kinematics.mechanism import FrameTransform, Mechanism
+from hexacell.kinematics.pose import Pose, PoseBatch
+from hexacell.kinematics.sensitivity import singularity_margin
+from hexacell.measurements.records import MeasurementSet
+from hexacell.plugins import Group, load
+
+
+@dataclass(frozen=True, eq=False)
+class Robot:
+    """A mechanism, its drawing, and the geometry that its controller commands with.
+
+    ``controller`` is as the config states it, in the config's own frames; ``drawing`` and all that
+    is computed are in the mechanism's frame convention. ``change`` leads from the first to the second.
+
+    Attributes:
+        lent: geometries, in the frame convention, that the controller was lent while measuring.
+        lending: whether it commands with the last of them now.
+    """
+
+    mechanism: Mechanism
+    drawing: Geometry
+    controller: Geometry
+    branch: Branch
+    tolerances: Tolerances
+    noise: Noise
+    limits: Limits
+    change: FrameTransform
+    lent: tuple[Geometry, ...] = ()
+    lending: bool = False
+
+    @cached_property
+    def commanding(self) -> Geometry:
+        """What the controller commands with now, in the frame convention."""
+        return self.lent[-1] if self.lending else self.mechanism.normalize_frames(self.controller)[0]
+
+    @cached_property
+    def prior(self) -> Prior:
+        """What is known before measuring."""
+        return Prior.of(self.mechanism, self.drawing, self.tolerances)
+
+    def problem(self, measurements: MeasurementSet) -> Problem:
+        """The identification of records that were commanded with the controller's geometries."""
+        return build_problem(
+            self.mechanism,
+            measurements,
+            controller=self.controller,
+            branch=self.branch,
+            prior=self.prior,
+            noise=self.noise,
+            lent=self.lent,
+        )
+
+    def knowledge(self, identified: Identification | None = None) -> RobotBelief:
+        """What is known of the robot: by an identification, or by its drawing alone."""
+        prior = self.prior
+        free = self.mechanism.convention.free_parameters(prior.centre)
+        covariance = prior.covariance
+        if identified is not None:
+            free, covariance = identified.free, identified.free_covariance
+        return RobotBelief(
+            self.mechanism, self.commanding, self.branch, free, covariance, self.noise, self.limits
+        )
+
+    def for_controller(self, geometry: Geometry) -> Geometry:
+        """A geometry of the convention in the frames of the controller's config."""
+        return self.change.inverse().geometry(geometry)
+
+    def to_command(self, pose: Pose) -> Pose:
+        """A pose of the convention's frames as the controller takes it."""
+        return self.change.inverse().poses(PoseBatch.of([pose])).pose(0)
+
+    def require_reach(self, name: str, pose: Pose) -> None:
+        """Raise where the controller cannot take a pose within the limits.
+
+        Raises:
+            ReachError: names the pose, the leg and the limit.
+        """
+        poses = PoseBatch.of([pose])
+        joints = inverse_kinematics(self.mechanism, self.controller, self.branch, poses)
+        low, high = self.limits.joint_min_mm, self.limits.joint_max_mm
+        outside = np.flatnonzero((joints[0] < low) | (joints[0] > high))
+        if len(outside):
+            leg = int(outside[0])
+            raise ReachError(
+                f"q{leg + 1} would be {joints[0, leg]:.1f} mm, outside {low:g} to {high:g}", subject=name
+            )
+        margin = singularity_margin(self.mechanism, self.controller, poses, joints)[0]
+        if margin < self.limits.singularity_margin:
+            raise ReachError(
+                f"the singularity margin is {margin:.3f}, below {self.limits.singularity_margin:g}",
+                subject=name,
+            )
+
+
+def config_format(settings: CellSettings) -> ConfigFormat:
+    """The reader and writer of a cell's controller config."""
+    made: ConfigFormat = load(Group.CONFIG_FORMATS, settings.controller.config_format)()
+    return made
+
+
+def robot_of(cell: Cell) -> Robot:
+    """The robot of a cell, with the geometry its controller's config holds now.
+
+    Raises:
+        FileError: the config is absent or does not hold a geometry.
+    """
+    return make_robot(cell.settings, config_format(cell.settings).read(cell.config_path))
+
+
+def make_robot(settings: CellSettings, controller: ControllerGeometry) -> Robot:
+    """The robot of a cell's settings and a controller geometry."""
+    mechanism: Mechanism = load(Group.MECHANISMS, settings.robot.mechanism)()
+    nominal, limits = settings.robot.nominal, settings.limits
+    drawing, _ = mechanism.normalize_frames(Geometry(nominal.S, nominal.B, nominal.l))
+    return Robot(
+        mechanism=mechanism,
+        drawing=drawing,
+        controller=controller.geometry,
+        branch=controller.branch,
+        tolerances=Tolerances(**settings.tolerances.model_dump()),
+        noise=Noise(
+            settings.noise.encoder_mm,
+            settings.noise.gauge_mm,
+            float(np.radians(settings.stations.alignment_deg)),
+            settings.noise.gauge_scale,
+        ),
+        limits=Limits(
+            limits.gauge_travel_mm,
+            float(np.radians(limits.tilt_deg)),
+            limits.joint_min_mm,
+            limits.joint_max_mm,
+            limits.singularity_margin,
+        ),
+        change=mechanism.normalize_frames(controller.geometry)[1],
+    )

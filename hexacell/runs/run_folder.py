@@ -1,0 +1,100 @@
+"""Run folders: where every run of a cell is kept, and what is in one."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+from hexacell.cell.loader import Cell
+from hexacell.errors import UsageError
+from hexacell.storage.atomic_files import create_folder_durably, write_atomically
+
+
+@dataclass(frozen=True, slots=True)
+class RunFolder:
+    """One run on disk: its journal, and files derived from it for people and other programs."""
+
+    path: Path
+
+    @property
+    def journal(self) -> Path:
+        """The run itself; all else can be derived from it."""
+        return self.path / "journal.jsonl"
+
+    @property
+    def measurements(self) -> Path:
+        """The records as a measurement file, for ``hexacell fit``."""
+        return self.path / "measurements.csv"
+
+    @property
+    def result(self) -> Path:
+        """The identification, as ``hexacell fit --json`` prints it."""
+        return self.path / "result.json"
+
+    @property
+    def proposal(self) -> Path:
+        """The change of the controller's config, for ``hexacell apply``."""
+        return self.path / "proposal.json"
+
+    @property
+    def wire(self) -> Path:
+        """What went over the wires."""
+        return self.path / "wire"
+
+    def new_wire(self) -> Path:
+        """The same for a run that goes on: what went over the wires before stays."""
+        path, part = self.wire, 1
+        while path.exists():
+            part += 1
+            path = self.wire.with_name(f"{self.wire.name}-{part}")
+        return path
+
+    def create(self, cell: Cell) -> None:
+        """Make the folder and keep the cell file's text in it.
+
+        Raises:
+            UsageError: it holds a run already.
+            FileError: it cannot be made.
+        """
+        if self.journal.exists():
+            raise UsageError(
+                "this folder holds a run already", subject=self.path, action="Resume it, or name another"
+            )
+        create_folder_durably(self.path)
+        write_atomically(self.path / "cell.toml", cell.text.encode())
+
+    def write_result(self, document: dict[str, Any]) -> None:
+        """Keep an identification; raises ``FileError``."""
+        write_atomically(self.result, json.dumps(document, indent=1).encode() + b"\n")
+
+
+def runs_folder(cell: Cell) -> Path:
+    """Where a cell's runs are kept: beside its file."""
+    return cell.path.parent / "runs" / cell.settings.name
+
+
+def new_run(cell: Cell) -> RunFolder:
+    """A folder for a run that begins now; nothing is made yet."""
+    name = datetime.now(UTC).strftime("%Y-%m-%dT%H%M%SZ")
+    parent = runs_folder(cell)
+    attempt = 1
+    path = parent / name
+    while path.exists():
+        attempt += 1
+        path = parent / f"{name}-{attempt}"
+    return RunFolder(path)
+
+
+def find_run(cell: Cell, named: str) -> RunFolder:
+    """A run by its folder, or by its name within the cell's runs.
+
+    Raises:
+        UsageError: there is none.
+    """
+    for path in (Path(named), runs_folder(cell) / named):
+        if RunFolder(path).journal.is_file():
+            return RunFolder(path)
+    raise UsageError(f"there is no run '{named}'", action=f"The cell's runs are in {runs_folder(cell)}")

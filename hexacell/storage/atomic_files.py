@@ -1,0 +1,255 @@
+"""Whole files: read with plain errors, replaced in one step that survives a power cut.
+
+A replacement is written to a temporary file in the same folder, forced to the disk, renamed over
+the old file, and the folder is forced to the disk too. POSIX ``rename`` is atomic: whoever opens
+the file sees the old text or the new one, never a mixture. A process that dies in between leaves its
+temporary file, ``.hexacell-*.tmp``; who next holds the cell removes it.
+"""
+
+from __future__ import annotations
+
+import errno
+import hashlib
+import os
+import secrets
+import stat
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from functools import partial
+from pathlib import Path
+
+from hexacell.errors import FileError
+
+_WORDS: dict[int, tuple[str, str]] = {
+    errno.ENOENT: ("it does not exist", "Check the path"),
+    errno.ENOTDIR: ("a part of the path is not a folder", "Check the path"),
+    errno.EISDIR: ("it is a folder", "Name a file"),
+    errno.EEXIST: ("something else has that name", "Choose another name"),
+    errno.ELOOP: ("its symbolic links go round in a circle", "Repair the link"),
+    errno.EACCES: ("permission denied", "Run as a user who may, or change the permissions"),
+    errno.EPERM: ("permission denied", "Run as a user who may, or change the permissions"),
+    errno.EROFS: ("the file system is read-only", "Mount it writable, or move the file"),
+    errno.ENOSPC: ("the disk is full", "Free some space and try again"),
+    errno.EDQUOT: ("the disk quota is used up", "Free some space and try again"),
+    errno.EFBIG: ("it may not become larger", "Raise the limit on the size of files (ulimit -f)"),
+    errno.EBUSY: ("the file is a mount point", "Mount its folder instead of the single file"),
+    errno.EIO: ("the disk reports an error", "Check the disk"),
+}
+_NOT_SUPPORTED = (errno.ENOTSUP, errno.EOPNOTSUPP, errno.EINVAL)
+
+
+def sha256(data: bytes) -> str:
+    """The SHA-256 of ``data`` in hexadecimal."""
+    return hashlib.sha256(data).hexdigest()
+
+
+def read_bytes(path: Path) -> bytes:
+    """The content of a regular file; a pipe or a device is refused instead of waited for.
+
+    Raises:
+        FileError: absent, unreadable, or no regular file.
+    """
+    try:
+        _require_regular(path, path.stat())
+        return path.read_bytes()
+    except OSError as error:
+        raise os_error_to_file_error("cannot be read", path, error) from error
+
+
+def read_if_present(path: Path) -> bytes | None:
+    """The content of a regular file, None if there is no such file; raises ``FileError``."""
+    try:
+        path.lstat()
+    except FileNotFoundError:
+        return None
+    except OSError as error:
+        raise os_error_to_file_error("cannot be read", path, error) from error
+    return read_bytes(path)
+
+
+def read_text(path: Path) -> str:
+    """The content of a UTF-8 file, line ends and byte order mark as they are.
+
+    Raises:
+        FileError: as for :func:`read_bytes`, or not UTF-8; then with the line.
+    """
+    return decode(read_bytes(path), path)
+
+
+def decode(data: bytes, path: Path) -> str:
+    """``data`` as UTF-8 text; ``path`` and the line appear in the ``FileError`` if it is not."""
+    try:
+        return data.decode()
+    except UnicodeDecodeError as error:
+        line = data.count(b"\n", 0, error.start) + 1
+        action = "Save it as UTF-8"
+        raise FileError("the file is not UTF-8 text", subject=path, line=line, action=action) from error
+
+
+def write_atomically(path: Path, data: bytes, *, expected: bytes | None = None) -> None:
+    """Replace the content of ``path``, or create it, in one step that survives a power cut.
+
+    A symbolic link is followed and stays. Mode, owner and extended attributes (access control
+    lists among them) stay too; where the owner cannot be kept, nothing is written. If ``expected``
+    is given, the file must still hold exactly that in the moment before it is replaced.
+
+    Raises:
+        FileError: the file is as it was, and no temporary file is left. Only if the message says
+            that the file was replaced, it holds the new content, but a power cut may undo that.
+    """
+    try:
+        target = _followed(path)
+        with _temporary_beside(target) as temporary:
+            _write_like(target, temporary, data)
+            _require_content(target, expected)
+            os.replace(temporary, target)  # noqa: PTH105 - named as the system call it is
+    except OSError as error:
+        raise os_error_to_file_error("cannot be written and is as it was", path, error) from error
+    try:
+        sync_folder(target.parent)
+    except OSError as error:
+        raise os_error_to_file_error("was replaced, but perhaps not for good", path, error) from error
+
+
+def sync_folder(folder: Path) -> None:
+    """Force the names in ``folder`` to the disk; raises ``OSError``.
+
+    Some network file systems know no such call and answer ``EINVAL``; there is nothing to do then.
+    """
+    descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+    try:
+        with _tolerating(errno.EINVAL):
+            os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
+
+
+def create_folder_durably(folder: Path) -> None:
+    """Create ``folder`` and the folders above it where absent, for good; raises ``FileError``."""
+    try:
+        absent = [parent for parent in (folder, *folder.parents) if not parent.exists()]
+        folder.mkdir(parents=True, exist_ok=True)
+        # Each is a name in the one above: were a single one lost, so would be all below it.
+        for made in absent or [folder]:
+            sync_folder(made.parent)
+    except OSError as error:
+        raise os_error_to_file_error("the folder cannot be made", folder, error) from error
+
+
+def os_error_to_file_error(what: str, path: Path, error: OSError) -> FileError:
+    """``error`` in plain words: what failed with which file, why, and what to do."""
+    why, action = _WORDS.get(error.errno or 0, (error.strerror or str(error), "Try again"))
+    return FileError(f"{what}: {why}", subject=path, action=action)
+
+
+def _followed(path: Path) -> Path:
+    try:
+        # Strict: where a link cannot be read for a moment, the link itself would be replaced.
+        return Path(os.path.realpath(path, strict=True))
+    except FileNotFoundError:
+        return Path(os.path.realpath(path))
+
+
+def remove_stale_temporaries(path: Path) -> None:
+    """Remove temporary files that processes left when they died in :func:`write_atomically`.
+
+    Those for the file ``path``, or all in it if it is a folder. Only for who alone may write there now:
+    a temporary file that somebody is still writing looks no different.
+    """
+    target = _followed(path)
+    folder, own = (target, "*") if target.is_dir() else (target.parent, f"{_mark(target)}-*")
+    for temporary in folder.glob(f".hexacell-{own}.tmp"):
+        with suppress(OSError):  # untidy, but nobody reads it
+            temporary.unlink()
+
+
+def _mark(target: Path) -> str:
+    """Of a file's temporaries; not its name, which may already have the greatest length allowed."""
+    return sha256(os.fsencode(target.name))[:8]
+
+
+@contextmanager
+def _temporary_beside(target: Path) -> Iterator[Path]:
+    temporary = target.with_name(f".hexacell-{_mark(target)}-{secrets.token_hex(8)}.tmp")
+    try:
+        yield temporary
+    finally:
+        with suppress(OSError):
+            temporary.unlink(missing_ok=True)
+
+
+def _write_like(target: Path, temporary: Path, data: bytes) -> None:
+    status = _status(target)
+    # Whoever may not read the old file must not read the new one, not even while it is written.
+    mode = 0o666 if status is None else 0o600
+    with open(temporary, "xb", opener=partial(os.open, mode=mode)) as stream:
+        stream.write(data)
+        stream.flush()
+        if status is not None:
+            _keep_attributes(stream.fileno(), target, status)
+        os.fsync(stream.fileno())
+
+
+def _status(target: Path) -> os.stat_result | None:
+    try:
+        status = target.stat()
+    except FileNotFoundError:
+        return None
+    _require_regular(target, status)
+    # A rename asks only the folder; an owner who protects the file itself means it.
+    if not os.access(target, os.W_OK, effective_ids=os.access in os.supports_effective_ids):
+        raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
+    return status
+
+
+def _require_regular(path: Path, status: os.stat_result) -> None:
+    if not stat.S_ISREG(status.st_mode):
+        raise FileError("this is not a file", subject=path, action="Check the path")
+
+
+def _require_content(target: Path, expected: bytes | None) -> None:
+    if expected is not None and target.read_bytes() != expected:
+        raise FileError(
+            "the file was changed by somebody else in this moment and is left as it is",
+            subject=target,
+            action="Run again",
+        )
+
+
+def _keep_attributes(descriptor: int, target: Path, status: os.stat_result) -> None:
+    own = os.fstat(descriptor)
+    if (own.st_uid, own.st_gid) != (status.st_uid, status.st_gid):
+        _keep_owner(descriptor, target, status)
+    if hasattr(os, "listxattr"):
+        _copy_extended_attributes(descriptor, target)
+    os.fchmod(descriptor, stat.S_IMODE(status.st_mode))
+
+
+def _keep_owner(descriptor: int, target: Path, status: os.stat_result) -> None:
+    try:
+        os.fchown(descriptor, status.st_uid, status.st_gid)
+    except PermissionError as error:
+        raise FileError(
+            f"the file belongs to user {status.st_uid}, group {status.st_gid}, and replacing it would "
+            "change that; it is as it was",
+            subject=target,
+            action="Run as its owner",
+        ) from error
+
+
+def _copy_extended_attributes(descriptor: int, target: Path) -> None:
+    names: list[str] = []
+    with _tolerating(*_NOT_SUPPORTED):
+        names = os.listxattr(target)
+    for name in names:
+        with _tolerating(*_NOT_SUPPORTED, errno.EPERM, errno.EACCES, errno.ENODATA):
+            os.setxattr(descriptor, name, os.getxattr(target, name))
+
+
+@contextmanager
+def _tolerating(*codes: int) -> Iterator[None]:
+    try:
+        yield
+    except OSError as error:
+        if error.errno not in codes:
+            raise

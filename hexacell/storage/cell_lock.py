@@ -1,0 +1,169 @@
+"""One process per cell: whoever moves the robot holds its lock.
+
+The lock is an advisory ``flock`` on a small file beside the controller's config, the file that the
+cell file names. This place was chosen because it is the one thing that everybody who moves this
+robot shares:
+
+- A second cell file for the same robot, a copy or a link, names the same config and so the same lock.
+- The technician and the scheduler are different users, often on one shared folder. A folder of each
+  user's own would give each a lock of their own, and both could move the robot.
+- The config itself cannot carry the lock: a write-back replaces it, and whoever came afterwards would
+  lock the new file while the old one is still held.
+
+A config copied to another folder makes another lock; the controller and the serial ports then refuse
+the second process.
+
+The kernel lets go when the process ends, however it ends, so there are no stale locks. The file stays:
+were it deleted, two processes could hold two files of the same name. What it says about the holder is
+for people only.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import getpass
+import json
+import os
+import socket
+import tomllib
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import asdict, dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+
+from hexacell.errors import CellBusy, FileError
+from hexacell.storage import atomic_files
+
+_LONGEST_NOTE = 4096
+# O_NOFOLLOW: in a shared folder nobody may turn the holder's note into a write to another file.
+_FLAGS = os.O_RDWR | os.O_NOFOLLOW
+
+
+@dataclass(frozen=True, slots=True)
+class LockOwner:
+    """Who holds a cell; ``since`` is local time with its offset, ISO 8601."""
+
+    pid: int
+    user: str
+    host: str
+    since: str
+
+    @classmethod
+    def this_process(cls) -> LockOwner:
+        """The holder that this process would be, from now on."""
+        since = datetime.now(UTC).astimezone().isoformat(timespec="seconds")
+        return cls(os.getpid(), _user(), socket.gethostname(), since)
+
+    def __str__(self) -> str:
+        return f"process {self.pid} of {self.user} on {self.host} since {self.since}"
+
+
+@contextmanager
+def cell_lock(cell_path: Path) -> Iterator[None]:
+    """Hold the cell of a cell file for as long as the context lasts; never waits.
+
+    Raises:
+        CellBusy: another process, or this one, holds it; the message names pid, user, host and since.
+        FileError: the cell file names no config, or the lock file cannot be opened.
+    """
+    with config_lock(config_of(cell_path)):
+        yield
+
+
+@contextmanager
+def config_lock(config: Path) -> Iterator[None]:
+    """Hold the cell whose controller reads ``config``; the same as :func:`cell_lock`."""
+    path = lock_path(config)
+    descriptor = _open(path)
+    try:
+        _acquire(descriptor, config)
+        _note(descriptor, json.dumps(asdict(LockOwner.this_process())) + "\n")
+        try:
+            yield
+        finally:
+            _note(descriptor, "")
+            # Said aloud, because a forked child may still have the descriptor open.
+            fcntl.flock(descriptor, fcntl.LOCK_UN)
+    finally:
+        os.close(descriptor)
+
+
+def lock_path(config: Path) -> Path:
+    """The lock file of a controller config: beside the file itself, links followed."""
+    target = Path(os.path.realpath(config))
+    return target.with_name(f".{target.name}.hexacell-lock")
+
+
+def config_of(cell_path: Path) -> Path:
+    """The controller config that a cell file names, whatever else may be wrong with that file."""
+    try:
+        config = tomllib.loads(atomic_files.read_text(cell_path))["controller"]["config"]
+        return cell_path.parent / Path(config)
+    except (KeyError, TypeError, ValueError) as error:
+        raise FileError(
+            "this cell file names no controller config ([controller] config)",
+            subject=cell_path,
+            action="Check it with `hexacell cell validate`",
+        ) from error
+
+
+def _open(path: Path) -> int:
+    try:
+        with suppress(FileExistsError):
+            return _create(path)
+        return os.open(path, _FLAGS)
+    except OSError as error:
+        raise _cannot_open(path, error) from error
+
+
+def _create(path: Path) -> int:
+    descriptor = os.open(path, _FLAGS | os.O_CREAT | os.O_EXCL, 0o666)
+    # The other users of the cell must be able to open it, whatever this one's umask is.
+    with suppress(OSError):
+        os.fchmod(descriptor, 0o666)
+    return descriptor
+
+
+def _cannot_open(path: Path, error: OSError) -> FileError:
+    plain = atomic_files.os_error_to_file_error("the cell's lock file cannot be opened", path, error)
+    if isinstance(error, PermissionError):
+        plain.action = "Have the owner of the folder create it once, empty, with mode 666"
+    return plain
+
+
+def _acquire(descriptor: int, config: Path) -> None:
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError as error:
+        holder = _holder(descriptor)
+        raise CellBusy(
+            f"the cell is in use by {holder or 'another process'}",
+            subject=config,
+            action="Wait until that has ended, or stop it",
+        ) from error
+    except OSError as error:
+        raise atomic_files.os_error_to_file_error("the cell cannot be locked", config, error) from error
+
+
+def _note(descriptor: int, text: str) -> None:
+    # Written before it is cut to length: a reader finds a complete first line at every moment.
+    data = text.encode()
+    with suppress(OSError):
+        os.pwrite(descriptor, data, 0)
+        os.ftruncate(descriptor, len(data))
+
+
+def _holder(descriptor: int) -> LockOwner | None:
+    try:
+        line = os.pread(descriptor, _LONGEST_NOTE, 0).splitlines()[0]
+        return LockOwner(**json.loads(line))
+    except (OSError, IndexError, TypeError, ValueError):
+        return None
+
+
+def _user() -> str:
+    try:
+        return getpass.getuser()
+    except (KeyError, OSError):
+        return f"user {os.getuid()}"

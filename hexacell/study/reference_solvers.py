@@ -1,0 +1,98 @@
+"""The paper's own two solvers, kept as cross-checks (Abtahi et al. 2010, section 2).
+
+Both minimise the plain sum of squares of all pairwise differences, eq. 5-8:
+``E = (P_r - d_r) - (P_n - d_n)`` for every two records r, n of a point. No weights, no prior.
+"""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+
+from hexacell.errors import ConvergenceError
+from hexacell.identification.problem.problem import Problem
+from hexacell.identification.solver import measurement_model
+from hexacell.identification.solver.result import Identification
+from hexacell.kinematics.forward import ForwardResult, forward_kinematics
+from hexacell.kinematics.geometry import Geometry
+from hexacell.kinematics.rotations import Array
+
+
+def pairs(problem: Problem) -> NDArray[np.intp]:
+    """Rows (r, n) of every two records of one point (pairs, 2), r < n."""
+    ends = np.append(problem.first_rows[1:], problem.records)
+    spans = zip(problem.first_rows, ends, strict=True)
+    found = [pair for first, end in spans for pair in itertools.combinations(range(first, end), 2)]
+    return np.array(found, dtype=np.intp).reshape(-1, 2)
+
+
+def error_vector(problem: Problem, residuals: Array) -> Array:
+    """E of eq. 6-8 (3 m k (k-1) / 2,), mm, of residuals P - d (n, 3)."""
+    rows = pairs(problem)
+    return (residuals[rows[:, 0]] - residuals[rows[:, 1]]).ravel()
+
+
+def gauss_newton(
+    problem: Problem,
+    *,
+    start: Identification | None = None,
+    steps: int = 30,
+    tolerance_mm: float = 1e-9,
+) -> Geometry:
+    """Eq. 13: ``d <- d - (A^T A)^-1 A^T E``, from the drawing, or from a result for these records.
+
+    Raises:
+        ConvergenceError: it left the assembly mode or did not settle; the paper's method needs a
+            good initial estimate.
+    """
+    if start is None:
+        problem = problem.subset(problem.has_start_pose)
+    free = problem.initial_parameters
+    poses, rows = problem.start, pairs(problem)
+    if start is not None:
+        free, poses = start.free, start.poses
+    for _ in range(steps):
+        prediction = measurement_model.predict(problem, free, poses)
+        error = error_vector(problem, prediction.residuals)
+        jacobian = prediction.jacobian[rows[:, 0]] - prediction.jacobian[rows[:, 1]]
+        step: Array = -np.linalg.lstsq(jacobian.reshape(len(error), -1), error)[0]
+        free = free + step
+        geometry = Geometry.from_vector(problem.basis @ free)
+        reached = forward_kinematics(problem.mechanism, geometry, problem.joints, poses)
+        if not reached.found.all():
+            raise ConvergenceError("Gauss-Newton left the assembly mode of a record")
+        poses = reached.poses
+        if np.abs(step).max() < tolerance_mm:
+            return geometry
+    raise ConvergenceError(f"Gauss-Newton did not settle in {steps} steps")
+
+
+def least_squares_without_jacobian(problem: Problem) -> Geometry:
+    """The paper's second way (its lsqnonlin): finite differences, a trust region, scipy's TRF.
+
+    Raises:
+        ConvergenceError: scipy reports no convergence, or the end is outside the assembly mode.
+    """
+
+    def reached(free: Array) -> ForwardResult:
+        return problem.commands.solve_poses(Geometry.from_vector(problem.basis @ free), problem.joints)
+
+    def error(free: Array) -> Array:
+        return error_vector(problem, reached(free).poses.positions - problem.deviations)
+
+    found = least_squares(
+        error,
+        problem.initial_parameters,
+        method="trf",
+        x_scale=1.0,
+        ftol=1e-15,
+        xtol=1e-15,
+        gtol=1e-15,
+        max_nfev=100,
+    )
+    if not found.success or not reached(found.x).found.all():
+        raise ConvergenceError(f"the least-squares solver ended without a solution: {found.message}")
+    return Geometry.from_vector(problem.basis @ found.x)

@@ -1,0 +1,1 @@
+"""Robots drawn within their tolerances, and how they move when commanded."""

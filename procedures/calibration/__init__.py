@@ -1,0 +1,1 @@
+"""The calibration: every point zeroed, commanded and recorded, then identified and verified."""

@@ -1,0 +1,85 @@
+"""Everything that must hold before motion, checked at once; nothing moves."""
+
+from __future__ import annotations
+
+from collections.abc import Awaitable, Iterator
+from pathlib import Path
+
+from drivers.gauges.errors import GaugeAtEnd
+from drivers.interfaces import EncoderSample, GaugeReading
+from hexacell.campaign import feasibility
+from hexacell.errors import AnswerNeeded, HexacellError, SeveralErrors, flatten_errors
+from hexacell.kinematics.pose import Pose
+from procedures.calibration.workflow import Calibration, Mode
+from procedures.devices.device_set import Devices, gather_errors
+from procedures.guards import rules
+from procedures.guards.rules import free_bytes
+from procedures.run.cancellation import in_thread
+
+
+async def plan_failures(calibration: Calibration, *, unattended: bool) -> list[HexacellError]:
+    """What is wrong with the plan itself, before any device is asked.
+
+    It takes a second or more. A stop is heeded after the piece of the work that is being done.
+    """
+    pieces = _plan_failures(calibration, unattended=unattended)
+    failures: list[HexacellError] = []
+    while (found := await in_thread(next, pieces, None)) is not None:
+        failures += found
+    return failures
+
+
+def _plan_failures(calibration: Calibration, *, unattended: bool) -> Iterator[list[HexacellError]]:
+    """What each piece of the work found."""
+    unreachable = [*feasibility.reach_failures(calibration.plan), *_held_out_failures(calibration)]
+    yield unreachable
+    if calibration.mode is Mode.OPTIMISE:
+        too_few = [*feasibility.too_few_records(calibration.plan)]
+        yield too_few
+        if not unreachable and not too_few:
+            yield from feasibility.plan_failures(calibration.plan)
+    if unattended and calibration.settings.stations.placement == "by-hand":
+        yield [_nobody_to_place_gauges()]
+
+
+def _nobody_to_place_gauges() -> AnswerNeeded:
+    return AnswerNeeded(
+        "unattended running is not possible: the gauges are put at each point by hand",
+        action='Give every point fixed gauges and say placement = "fixed" in [stations]',
+    )
+
+
+def _held_out_failures(calibration: Calibration) -> Iterator[HexacellError]:
+    for number, point in enumerate(calibration.settings.verification.points, start=1):
+        yield from feasibility.refusals(calibration.plan, f"verification point {number}", Pose(*point))
+
+
+async def device_failures(devices: Devices) -> list[HexacellError]:
+    """What is wrong with opened devices: each is asked for one reading.
+
+    A plunger at an end of its travel is no failure: the robot is not at the gauges yet.
+    """
+    calls: list[Awaitable[GaugeReading | EncoderSample]] = [m.gauge.read() for m in devices.gauges]
+    try:
+        await gather_errors("devices cannot be read", [*calls, devices.encoders.read()])
+    except HexacellError as error:
+        return [one for one in flatten_errors(error) if not isinstance(one, GaugeAtEnd)]
+    return []
+
+
+async def start_failures(devices: Devices, folder: Path, free_disk_mb: float) -> list[HexacellError]:
+    """What keeps a run from beginning beside its devices: the stop line, and a disk without room."""
+    pressed = await devices.stop_line.active_reason()
+    trips = [
+        None if pressed is None else rules.forbidden(pressed),
+        rules.disk(str(folder), free_bytes(folder), free_disk_mb),
+    ]
+    return [trip.as_error() for trip in trips if trip is not None]
+
+
+def raise_all(failures: list[HexacellError]) -> None:
+    """Raise one failure as it is, several in one report, none not at all."""
+    if len(failures) == 1:
+        raise failures[0]
+    if failures:
+        raise SeveralErrors(f"{len(failures)} things stand in the way", failures)

@@ -1,0 +1,77 @@
+"""The devices of one cell, together."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Awaitable, Sequence
+from dataclasses import dataclass, field
+from typing import TypeVar
+
+from drivers.interfaces import Controller, DeviceIdentity, EncoderBank, Gauge, StopInput
+from drivers.stop_input.stop_input import ContactLine
+from hexacell.errors import HexacellError, SeveralErrors, flatten_errors
+
+Result = TypeVar("Result")
+
+
+@dataclass(frozen=True, slots=True)
+class MountedGauge:
+    """A gauge and how it stands: which base axis its plunger moves along, and which way it counts."""
+
+    gauge: Gauge
+    axis: int
+    sign: int
+
+
+@dataclass(frozen=True, slots=True)
+class Devices:
+    """Three gauges, the encoders, the controller, and the line by which anybody may stop it."""
+
+    gauges: tuple[MountedGauge, ...]
+    encoders: EncoderBank
+    controller: Controller
+    stop_line: StopInput = field(default_factory=ContactLine)
+
+    async def open(self) -> tuple[DeviceIdentity, ...]:
+        """Connect to all of them at once; nothing moves.
+
+        Raises:
+            SeveralErrors: one or more do not answer as they must; all are named.
+        """
+        calls: list[Awaitable[tuple[DeviceIdentity, ...]]] = [_alone(m.gauge.open()) for m in self.gauges]
+        calls += [self.encoders.open(), _alone(self.controller.open()), _if_any(self.stop_line.open())]
+        found = await gather_errors("devices do not answer as they must", calls)
+        return tuple(identity for identities in found for identity in identities)
+
+    async def close(self) -> None:
+        """Let all of them go, whatever happens to one."""
+        ports: list[Gauge | EncoderBank | Controller | StopInput] = [
+            *(mounted.gauge for mounted in self.gauges),
+            self.encoders,
+            self.controller,
+            self.stop_line,
+        ]
+        await asyncio.gather(*(port.close() for port in ports), return_exceptions=True)
+
+
+async def _alone(identity: Awaitable[DeviceIdentity]) -> tuple[DeviceIdentity, ...]:
+    return (await identity,)
+
+
+async def _if_any(identity: Awaitable[DeviceIdentity | None]) -> tuple[DeviceIdentity, ...]:
+    found = await identity
+    return () if found is None else (found,)
+
+
+async def gather_errors(problem: str, calls: Sequence[Awaitable[Result]]) -> list[Result]:
+    """Wait for all of the calls; one failure is raised as it is, several in one report."""
+    results = await asyncio.gather(*calls, return_exceptions=True)
+    errors = [result for result in results if isinstance(result, HexacellError)]
+    others = [result for result in results if isinstance(result, BaseException)]
+    if others and len(others) > len(errors):
+        raise next(error for error in others if not isinstance(error, HexacellError))
+    if len(errors) == 1:
+        raise errors[0]
+    if errors:
+        raise SeveralErrors(problem, [one for error in errors for one in flatten_errors(error)])
+    return [result for result in results if not isinstance(result, BaseException)]

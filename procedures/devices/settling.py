@@ -1,0 +1,140 @@
+"""Settled means seen: readings are taken until a whole window of them agrees."""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass
+
+import numpy as np
+
+from drivers.gauges.errors import GaugeAtEnd, GaugeUnsteady
+from drivers.interfaces import EncoderSample, GaugeReading
+from hexacell.cell.devices import TimingSettings
+from hexacell.clock import CellClock
+from hexacell.errors import DeviceError, HexacellError, consists_only_of, flatten_errors
+from hexacell.kinematics.rotations import Array
+from procedures.devices.device_set import Devices, gather_errors
+
+LEAST_WINDOWS = 3
+"""So many windows' worth of readings are taken before giving up, however long they take."""
+
+
+class NeverSettled(DeviceError):
+    """The readings did not come to rest in the time allowed."""
+
+
+@dataclass(frozen=True, slots=True)
+class DeviceSnapshot:
+    """All devices read once, one after the other's question: gauges and encoders at ``at_s``."""
+
+    at_s: float
+    gauges: tuple[GaugeReading, ...]
+    encoders: EncoderSample
+
+    def gauge_values(self) -> Array:
+        """What the gauges show (3,), mm."""
+        return np.array([reading.value_mm for reading in self.gauges])
+
+    def joints(self) -> Array:
+        """Slider positions (6,), mm."""
+        return np.array(self.encoders.positions_mm)
+
+
+@dataclass(frozen=True, slots=True)
+class Settled:
+    """A window of readings that agree."""
+
+    window: tuple[DeviceSnapshot, ...]
+
+    def gauge_means(self) -> Array:
+        """Means (3,), mm, of what the gauges showed."""
+        return np.asarray(np.mean([glance.gauge_values() for glance in self.window], axis=0))
+
+    def joint_means(self) -> Array:
+        """Means (6,), mm, of the slider positions."""
+        return np.asarray(np.mean([glance.joints() for glance in self.window], axis=0))
+
+    def gauge_spread(self) -> Array:
+        """Ranges (3,), mm, of what the gauges showed."""
+        return np.asarray(np.ptp([glance.gauge_values() for glance in self.window], axis=0))
+
+    def joint_spread(self) -> Array:
+        """Ranges (6,), mm, of the slider positions."""
+        return np.asarray(np.ptp([glance.joints() for glance in self.window], axis=0))
+
+
+async def read_all(devices: Devices, clock: CellClock) -> DeviceSnapshot:
+    """Read everything once."""
+    readings = await gather_errors(
+        "gauges cannot be read", [mounted.gauge.read() for mounted in devices.gauges]
+    )
+    return DeviceSnapshot(clock.now(), tuple(readings), await devices.encoders.read())
+
+
+async def settle(devices: Devices, timing: TimingSettings, clock: CellClock) -> Settled:
+    """Read until the last window of readings agrees, and give that window.
+
+    A gauge that still swings too much to be read at all counts as one that has not settled yet.
+
+    Raises:
+        DeviceError: it never did within the time allowed; the message names what kept moving.
+    """
+    window: deque[DeviceSnapshot] = deque()
+    begun, looks = clock.now(), 0
+    while True:
+        looks += 1
+        moving = await _look(devices, timing, clock, window)
+        if not moving and _is_full(window, timing):
+            return Settled(tuple(window))
+        # Counted too, because a slow device or a machine under load must not run out of time unread.
+        if looks >= LEAST_WINDOWS * timing.readings and clock.now() - begun > timing.give_up_s:
+            raise _never_settled(timing, moving)
+        await clock.sleep(timing.interval_s)
+
+
+async def _look(
+    devices: Devices, timing: TimingSettings, clock: CellClock, window: deque[DeviceSnapshot]
+) -> list[str]:
+    """Take one more reading into the window; gives what moved meanwhile, in words."""
+    try:
+        window.append(await read_all(devices, clock))
+    except HexacellError as error:
+        if not _still_swings(error):
+            raise
+        window.clear()
+        return [f"{one.subject}: {one.problem}" for one in flatten_errors(error)]
+    while len(window) > timing.readings and window[-1].at_s - window[1].at_s >= timing.window_s:
+        window.popleft()
+    return _moving(devices, timing, Settled(tuple(window)))
+
+
+def _is_full(window: deque[DeviceSnapshot], timing: TimingSettings) -> bool:
+    return len(window) >= timing.readings and window[-1].at_s - window[0].at_s >= timing.window_s
+
+
+def _still_swings(error: HexacellError) -> bool:
+    """Whether it says no more than that the ball moves; that may touch an end of the travel too."""
+    unsteady = any(isinstance(one, GaugeUnsteady) for one in flatten_errors(error))
+    return unsteady and consists_only_of(error, GaugeUnsteady, GaugeAtEnd)
+
+
+def _moving(devices: Devices, timing: TimingSettings, settled: Settled) -> list[str]:
+    """Names of what moved within the window, with how much."""
+    gauges = zip(devices.gauges, settled.gauge_spread(), strict=True)
+    moving = [
+        f"gauge {m.gauge.name} by {spread:.3f} mm"
+        for m, spread in gauges
+        if spread > timing.spread_gauge_mm
+    ]
+    legs = enumerate(settled.joint_spread(), start=1)
+    return moving + [
+        f"slider {leg} by {spread:.3f} mm" for leg, spread in legs if spread > timing.spread_encoder_mm
+    ]
+
+
+def _never_settled(timing: TimingSettings, moving: list[str]) -> NeverSettled:
+    words = ", ".join(moving) or "the window of readings is longer than that"
+    return NeverSettled(
+        f"the readings did not settle within {timing.give_up_s:g} s: {words}",
+        action="Look for vibration or a slipping gauge; the limits are in [timing] of the cell file",
+    )

@@ -1,0 +1,1 @@
+"""What drives a run: takes commands, executes steps, appends events."""

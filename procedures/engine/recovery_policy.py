@@ -1,0 +1,139 @@
+"""What follows a failure: by its kind, by how often it came, and by whether a person is there.
+
+The policy is data, a ladder of actions for every kind of failure (``[recovery]`` in the cell file).
+Each attempt is an event, so where a run stands on a ladder is part of its state.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+from drivers.controllers import errors as controller
+from drivers.encoders import errors as encoder
+from drivers.gauges import errors as gauge
+from drivers.serial.errors import LinkLost
+from hexacell.cell.recovery import (
+    Action,
+    AttendedRecovery,
+    FailureKind,
+    RecoverySettings,
+    UnattendedRecovery,
+)
+from hexacell.errors import DeviceError, FileError, HexacellError
+from procedures.calibration.path_planning import NoSafePath
+from procedures.calibration.workflow import TravelError
+from procedures.devices.settling import NeverSettled
+from procedures.run import events
+from procedures.run.state import RunState
+from procedures.run.steps import Compute, Step
+from procedures.run.trips import Guard, GuardTripped, Trip, causes_of
+
+KINDS: Mapping[type[HexacellError], FailureKind] = {
+    gauge.GaugeSilent: FailureKind.GAUGE_SILENT,
+    gauge.WrongAnswer: FailureKind.GAUGE_SILENT,
+    gauge.WrongUnit: FailureKind.GAUGE_SETTING,
+    gauge.WrongMode: FailureKind.GAUGE_SETTING,
+    gauge.GaugeAtEnd: FailureKind.GAUGE_AT_END,
+    gauge.GaugeUnsteady: FailureKind.UNSETTLED,
+    gauge.ZeroVoid: FailureKind.ZERO_VOID,
+    encoder.SilentNodeError: FailureKind.ENCODER_SILENT,
+    encoder.InvalidSampleError: FailureKind.ENCODER_ALARM,
+    encoder.RestartedNodeError: FailureKind.ENCODER_RESTARTED,
+    encoder.MissingNodeError: FailureKind.LINK_LOST,
+    encoder.BusError: FailureKind.LINK_LOST,
+    controller.ConnectionLost: FailureKind.LINK_LOST,
+    controller.CommandRefused: FailureKind.CONTROLLER,
+    controller.MotionInterrupted: FailureKind.CONTROLLER,
+    LinkLost: FailureKind.LINK_LOST,
+    NeverSettled: FailureKind.UNSETTLED,
+    TravelError: FailureKind.GAUGE_AT_END,
+    NoSafePath: FailureKind.NO_WAY,
+    FileError: FailureKind.FILE,
+    DeviceError: FailureKind.OTHER,
+}
+"""The nearest class that an error belongs to decides; any other is final."""
+
+OF_GUARDS: Mapping[Guard, FailureKind] = {
+    Guard.CONTROLLER: FailureKind.CONTROLLER,
+    Guard.FOLLOWING: FailureKind.CONTROLLER,
+    Guard.GAUGE_END: FailureKind.GAUGE_AT_END,
+    Guard.PLATE: FailureKind.GAUGE_AT_END,
+    Guard.ENCODERS: FailureKind.ENCODER_SILENT,
+    Guard.DRIFT: FailureKind.DRIFT,
+    Guard.DISK: FailureKind.FILE,
+}
+"""Guards that tripped on nothing that a device said; any other is a kind of its own."""
+
+GRAVITY = (Action.RETRY, Action.MEASURE_AGAIN, Action.REDO_SET, Action.ASK, Action.ABORT)
+
+
+def kind_of(error: HexacellError) -> FailureKind:
+    """The kind of one failure."""
+    if isinstance(error, GuardTripped):
+        return _kind_of_trip(error.trip)
+    return next((KINDS[base] for base in type(error).__mro__ if base in KINDS), FailureKind.FINAL)
+
+
+def _kind_of_trip(trip: Trip) -> FailureKind:
+    if trip.guard is Guard.STALE:
+        return FailureKind.GAUGE_SILENT if trip.device.startswith("gauge") else FailureKind.LINK_LOST
+    return OF_GUARDS.get(trip.guard, FailureKind.GUARD)
+
+
+@dataclass(frozen=True, slots=True)
+class RecoveryPolicy:
+    """What follows the failures of a run.
+
+    Attributes:
+        ladders: by kind; a kind without one ends the run.
+        wait_s: cell seconds before a device is tried again.
+    """
+
+    ladders: Mapping[FailureKind, tuple[Action, ...]]
+    wait_s: float = 0.0
+
+    @classmethod
+    def of(cls, settings: RecoverySettings, *, attended: bool) -> RecoveryPolicy:
+        """The policy that a cell file states."""
+        rules: AttendedRecovery | UnattendedRecovery = (
+            settings.attended if attended else settings.unattended
+        )
+        kinds = (kind for kind in FailureKind if kind is not FailureKind.FINAL)
+        return cls({kind: rules.ladder(kind) for kind in kinds}, settings.wait_s)
+
+    def action(self, kind: FailureKind, attempt: int) -> Action:
+        """What follows the failure of a kind that is the ``attempt``-th, counted from 1."""
+        ladder = self.ladders.get(kind, (Action.ABORT,))
+        return ladder[min(attempt, len(ladder)) - 1]
+
+
+GIVE_UP = RecoveryPolicy({})
+"""Every failure ends the run."""
+
+
+def failed(
+    policy: RecoveryPolicy, error: HexacellError, step: Step | None, state: RunState
+) -> events.Failed:
+    """What is to be written down of a failure; of several at once, what the gravest calls for."""
+    verdicts = (_verdict(policy, kind, step, state) for kind in _kinds(error))
+    kind, attempt, action = max(verdicts, key=lambda verdict: GRAVITY.index(verdict[2]))
+    return events.Failed(step=step, failure=kind, attempt=attempt, reason=str(error), action=action)
+
+
+def choices(failure: events.Failed) -> tuple[Action, ...]:
+    """What a person may choose; where no set is being measured there is none to redo."""
+    if isinstance(failure.step, Compute):
+        return Action.RETRY, Action.ABORT
+    return Action.RETRY, Action.MEASURE_AGAIN, Action.REDO_SET, Action.ABORT
+
+
+def _kinds(error: HexacellError) -> Iterable[FailureKind]:
+    return dict.fromkeys(kind_of(one) for one in causes_of(error))
+
+
+def _verdict(
+    policy: RecoveryPolicy, kind: FailureKind, step: Step | None, state: RunState
+) -> tuple[FailureKind, int, Action]:
+    attempt = state.failures.get((kind.value, events.place_of(step)), 0) + 1
+    return kind, attempt, policy.action(kind, attempt)

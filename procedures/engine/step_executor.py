@@ -1,0 +1,325 @@
+"""Doing a step: with the devices, the disk or the mathematics. Each gives the events it caused."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from drivers.gauges.errors import GaugeAtEnd
+from hexacell.acceptance.gates import gates
+from hexacell.acceptance.validation import DeviationStatistics, Verdict, validate
+from hexacell.cell.loader import Cell
+from hexacell.clock import CellClock
+from hexacell.controller_config.change import ConfigChange, propose
+from hexacell.controller_config.interface import ControllerGeometry
+from hexacell.controller_config.write_back import Receipt, commit, rollback
+from hexacell.errors import HexacellError, LimitError, WriteBackUndone, consists_only_of
+from hexacell.kinematics.pose import Pose, PoseBatch
+from hexacell.kinematics.rotations import Array
+from hexacell.measurements.csv_file import write_measurements
+from hexacell.reporting.assessment import assess
+from hexacell.reporting.documents import assessment_document, identification_document, outcome_line
+from hexacell.robot_model import config_format
+from hexacell.runs.run_folder import RunFolder
+from procedures.calibration.provisional_geometry import ProvisionalGeometry
+from procedures.calibration.workflow import Calibration, Mode
+from procedures.devices.device_set import Devices, gather_errors
+from procedures.devices.reference_check import check_reference, in_words
+from procedures.devices.settling import Settled, settle
+from procedures.devices.temperatures import Thermometers
+from procedures.engine.operator import Operator
+from procedures.guards.guards import Guards
+from procedures.run import events
+from procedures.run.cancellation import in_thread
+from procedures.run.state import RunState
+from procedures.run.steps import CloseSet, Compute, Locate, Move, Phase, Place, Revisit, Sample, Step
+from procedures.run.trips import GuardTripped
+
+
+@dataclass(frozen=True, eq=False)
+class StepExecutor:
+    """Everything a step may need."""
+
+    cell: Cell
+    calibration: Calibration
+    devices: Devices
+    clock: CellClock
+    operator: Operator
+    folder: RunFolder
+    thermometers: Thermometers = field(default_factory=Thermometers)
+
+    @cached_property
+    def guards(self) -> Guards:
+        """What stops the robot when something is wrong; what they latch lasts as long as this."""
+        return Guards(self.cell.settings, self.devices, self.clock, self.folder.path)
+
+    @cached_property
+    def lending(self) -> ProvisionalGeometry:
+        """Lends the controller a geometry, and takes it back."""
+        return ProvisionalGeometry(self.cell, self.calibration, self.guards, self.folder)
+
+    async def prepare(self) -> None:
+        """Make the controller ready to move; raises ``HexacellError``."""
+        await self.guards.prepare()
+
+    async def perform(self, step: Step, state: RunState) -> events.Event:  # noqa: PLR0911 - a case a step
+        """Do one step.
+
+        Raises:
+            HexacellError: it could not be done; the message says what to do.
+        """
+        match step:
+            case Locate():
+                return events.Located(pose=(await self.devices.controller.pose()).as_tuple())
+            case Move():
+                return await self._move(step, state)
+            case Place():
+                return await self._place(step)
+            case Sample():
+                return await self._sample(step, state)
+            case Revisit():
+                return await self._revisit(step, state)
+            case CloseSet():
+                return await self._close(step, state)
+            case Compute():
+                return await self._compute(step, state)
+
+    async def _move(self, step: Move, state: RunState) -> events.Event:
+        try:
+            await self.guards.move(step, state, lambda: self._commanded(step, lending=state.lending))
+        except GuardTripped as tripped:
+            if step.at.phase is not Phase.AFTER or not tripped.trip.is_about_the_ball:
+                raise
+            # The new geometry takes the ball off its plate: that is a verdict, and it is rolled back.
+            self.guards.watch.clear()
+            return events.RecordRejected(at=step.at, orientation=step.orientation, reason=str(tripped))
+        return events.Arrived(at=step.at, orientation=step.orientation, pose=step.pose)
+
+    def _commanded(self, step: Move, *, lending: bool) -> Array:
+        """Where the sliders (6,), mm, belong by the geometry that the controller has now."""
+        robot = self.calibration.robot
+        commanding = ControllerGeometry(robot.controller, robot.branch)
+        if lending or step.at.phase is Phase.AFTER:
+            commanding = config_format(self.cell.settings).read(self.cell.config_path)
+        target = PoseBatch.of([step.target])
+        joints: Array = robot.mechanism.inverse(commanding.geometry, commanding.branch, target)[0]
+        return joints
+
+    async def _place(self, step: Place) -> events.Event:
+        if self.cell.settings.stations.placement == "by-hand":
+            await self.guards.stand(lambda: self.operator.place_gauges(step.at.point, Pose(*step.pose)))
+        return events.GaugesPlaced(at=step.at)
+
+    async def _sample(self, step: Sample, state: RunState) -> events.Event:
+        try:
+            reading = await self._read()
+        except HexacellError as error:
+            if not consists_only_of(error, GaugeAtEnd):
+                raise
+            return events.RecordRejected(at=step.at, orientation=step.orientation, reason=str(error))
+        samples = state.set(step.at).samples
+        zero = samples[0].reading if samples else reading
+        deviation = np.subtract(reading.gauges_mm, zero.gauges_mm)
+        travel = self.cell.settings.limits.gauge_travel_mm
+        if np.abs(deviation).max() > travel:
+            reason = f"the ball is {in_words(deviation)} mm from its reference, farther than {travel:g} mm"
+            return events.RecordRejected(
+                at=step.at, orientation=step.orientation, reason=reason, reading=reading
+            )
+        return events.RecordTaken(
+            at=step.at,
+            orientation=step.orientation,
+            pose=step.pose,
+            reading=reading,
+            deviation_mm=_three(deviation),
+        )
+
+    async def _revisit(self, step: Revisit, state: RunState) -> events.Event:
+        try:
+            reading = await self._read()
+        except HexacellError as error:
+            if not consists_only_of(error, GaugeAtEnd):
+                raise
+            return events.SetInvalidated(at=step.at, reason=str(error))
+        await self._check_gauges()
+        return check_reference(step.at, state.set(step.at).samples[0].reading, reading, self.agreement_mm)
+
+    @property
+    def agreement_mm(self) -> float:
+        """The largest change of a reference with which a set goes on after an interruption."""
+        return self.cell.settings.recovery.agreement_mm
+
+    async def _check_gauges(self) -> None:
+        checks = [mounted.gauge.check() for mounted in self.devices.gauges]
+        await gather_errors("gauges are not as they were", checks)
+
+    async def _close(self, step: CloseSet, state: RunState) -> events.Event:
+        reading = await self._read()
+        zero = state.set(step.at).samples[0].reading
+        drift = np.subtract(reading.gauges_mm, zero.gauges_mm)
+        await self._check_gauges()
+        if drifted := self.guards.drift(str(step.at), _three(drift)):
+            raise drifted
+        return events.SetClosed(at=step.at, drift_mm=_three(drift), reading=reading)
+
+    async def _read(self) -> events.Reading:
+        timing = self.cell.settings.timing
+        settled = await self.guards.sample(lambda: settle(self.devices, timing, self.clock))
+        return _reading(self.devices, settled, await self.thermometers.read())
+
+    async def _compute(self, step: Compute, state: RunState) -> events.Event:
+        match step.kind:
+            case "identify":
+                return await in_thread(self._identify, state)
+            case "propose":
+                return await in_thread(self._propose, state)
+            case "judge":
+                return await in_thread(self._judge, state)
+            case _:
+                return await self._rewritten(step, state)
+
+    async def _rewritten(self, step: Compute, state: RunState) -> events.Event:
+        """The controller's config changed, and the controller has read it."""
+        match step.kind:
+            case "lend":
+                return await self.lending.lend(state)
+            case "take back":
+                return await self.lending.take_back(state)
+            case "commit":
+                return await self._commit(state)
+            case _:
+                return await self._roll_back()
+
+    def _identify(self, state: RunState) -> events.Event:
+        write_measurements(self.folder.measurements, state.measurements())
+        identified = self.calibration.identification(state)
+        robot = self.calibration.robot_of(state)
+        assessed = assess(self.cell.settings, robot, state.measurements(), identified)
+        document = identification_document(identified)
+        self.folder.write_result(document | assessment_document(identified, assessed))
+        return events.Identified(result=document, held_out=self.calibration.held_out_poses(identified))
+
+    def _propose(self, state: RunState) -> events.Event:
+        identified = self.calibration.identification(state)
+        robot, settings = self.calibration.robot, self.cell.settings
+        commanding, _ = robot.mechanism.normalize_frames(robot.controller)
+        conditions = gates(
+            identified,
+            robot.drawing,
+            robot.tolerances,
+            largest_change_mm=settings.acceptance.largest_change_mm,
+            before=commanding,
+        )
+        proposal = propose(
+            self.cell.config_path,
+            config_format(settings),
+            settings.controller.config_format,
+            robot.for_controller(identified.geometry),
+            fingerprint_at_start=state.started.config_sha256 if state.started else "",
+        )
+        proposal.save(self.folder.proposal)
+        return events.Proposed(
+            gates=tuple(
+                events.GateOutcome(
+                    name=g.name, passed=g.passed, sentence=g.sentence, needs_person=g.needs_person
+                )
+                for g in conditions
+            )
+        )
+
+    async def _commit(self, state: RunState) -> events.Event:
+        conditions = state.proposed.gates if state.proposed else ()
+        refused = [gate.sentence for gate in conditions if not gate.passed and not gate.needs_person]
+        if refused:
+            raise LimitError("the new geometry is refused: " + " ".join(refused))
+        proposal = ConfigChange.load(self.folder.proposal)
+        approved_by = await self._approval(conditions, proposal)
+        receipt = await in_thread(commit, proposal, self.folder.path)
+        try:
+            await self.guards.reload()
+        except HexacellError as error:
+            await in_thread(rollback, receipt)
+            raise await self._undone(receipt, error) from error
+        return events.Committed(approved_by=approved_by)
+
+    async def _undone(self, receipt: Receipt, error: HexacellError) -> WriteBackUndone:
+        """What to raise after a reload that failed, with the old config already back."""
+        action = None
+        try:
+            await self.devices.controller.reload()
+        except HexacellError:
+            action = "Start the controller anew before it moves: nobody knows which geometry it has"
+        return WriteBackUndone(
+            f"the controller did not take the new geometry ({error}); its config is as it was",
+            subject=receipt.path,
+            action=action,
+        )
+
+    async def _approval(self, conditions: tuple[events.GateOutcome, ...], proposal: ConfigChange) -> str:
+        automatic = self.cell.settings.acceptance.approval == "automatic"
+        if automatic and all(gate.passed for gate in conditions):
+            return "the cell file: within its limits"
+        name = await self.operator.approve(conditions, proposal.diff)
+        if name is None:
+            raise LimitError("the new geometry was declined; nothing was applied")
+        return name
+
+    def _judge(self, state: RunState) -> events.Event:
+        acceptance = self.cell.settings.acceptance
+        before = DeviationStatistics.of(state.held_out(Phase.BEFORE))
+        if self.calibration.mode is Mode.CHECK:
+            verdict = validate(
+                before, before, mean_mm=acceptance.mean_deviation_mm, largest_mm=acceptance.max_deviation_mm
+            )
+            return events.ResultValidated(
+                verdict=verdict, line=_check_line(before, acceptance.mean_deviation_mm, verdict)
+            )
+        after = DeviationStatistics.of(state.held_out(Phase.AFTER))
+        verdict = validate(
+            before, after, mean_mm=acceptance.mean_deviation_mm, largest_mm=acceptance.max_deviation_mm
+        )
+        if state.refusals(Phase.AFTER):
+            verdict = Verdict.WORSE
+        identified = self.calibration.identification(state)
+        line = outcome_line(identified, before, after, acceptance.mean_deviation_mm, verdict)
+        return events.ResultValidated(verdict=verdict, line=line)
+
+    async def _roll_back(self) -> events.Event:
+        await in_thread(rollback, Receipt.of(self.folder.path))
+        await self.guards.reload()
+        return events.RolledBack()
+
+
+def _reading(
+    devices: Devices, settled: Settled, temperatures: tuple[events.Temperature, ...]
+) -> events.Reading:
+    means, spreads = settled.gauge_means(), settled.gauge_spread()
+    on_axes, spread = np.zeros(3), np.zeros(3)
+    for row, mounted in enumerate(devices.gauges):
+        on_axes[mounted.axis] = mounted.sign * means[row]
+        spread[mounted.axis] = spreads[row]
+    q1, q2, q3, q4, q5, q6 = (float(value) for value in settled.joint_means())
+    return events.Reading(
+        gauges_mm=_three(on_axes),
+        spread_mm=_three(spread),
+        joints_mm=(q1, q2, q3, q4, q5, q6),
+        answers=tuple(tuple(reading.raw for reading in glance.gauges) for glance in settled.window),
+        counts=tuple(glance.encoders.counts for glance in settled.window),
+        temperatures=temperatures,
+    )
+
+
+def _check_line(found: DeviationStatistics | None, limit_mm: float, verdict: Verdict) -> str:
+    if found is None:
+        return f"held-out points: {verdict}"
+    return (
+        f"{found.poses} poses at held-out points; mean deviation {found.mean_mm:.3f} mm "
+        f"(limit {limit_mm:g}): {verdict}"
+    )
+
+
+def _three(values: Array) -> tuple[float, float, float]:
+    x, y, z = (float(value) for value in values)
+    return x, y, z

@@ -1,0 +1,153 @@
+"""One line of the journal: how an event is written, and how a line is told from damage.
+
+A line is ``{"n":7,"at":"2026-11-20T10:30:00.000Z","s":5.125,"event":{...},"crc":"89abcdef"}`` and a
+line feed. The checksum is CRC-32 over the line's own bytes as they would be without it. The first
+line has ``"version"`` behind ``"n"`` and begins so in every version; without it, it is version 1.
+"""
+
+from __future__ import annotations
+
+import re
+import time
+import zlib
+from dataclasses import dataclass
+from datetime import UTC, datetime
+
+from pydantic import TypeAdapter, ValidationError
+from pydantic_core import PydanticSerializationError
+
+from procedures.run.events import Event
+
+VERSION = 2
+"""What this program writes; it reads this and all before. Version 1 had neither version nor ``s``."""
+
+RESTORE = "Restore the run folder from a copy; it cannot be continued"
+
+_EVENTS: TypeAdapter[Event] = TypeAdapter(Event)
+_FIRST = re.compile(rb'\{"n":1,"version":(\d{1,9}),')
+_LINE = re.compile(
+    rb'\{"n":([1-9]\d*),(?:"version":\d+,)?"at":"([^"]+)",(?:"s":(\d+\.\d+),)?"event":(\{.*\})}', re.DOTALL
+)
+_TAIL = re.compile(rb',"crc":"([0-9a-f]{8})"\}')
+_TAIL_LENGTH = 18
+
+
+@dataclass(frozen=True, slots=True)
+class Entry:
+    """A line of the journal.
+
+    Attributes:
+        number: its place in the journal, from 1; also its line in the file.
+        at: when it was written, UTC, by a clock that somebody may have set in between.
+        monotonic_s: the same by a clock that only goes forward, for durations, s; it begins anew
+            when the machine does. None in journals of version 1.
+    """
+
+    number: int
+    at: datetime
+    monotonic_s: float | None
+    event: Event
+
+
+class LineRefused(Exception):
+    """A line that is as it was written and still cannot be used."""
+
+    def __init__(self, problem: str, action: str) -> None:
+        self.problem = problem
+        self.action = action
+        super().__init__(problem)
+
+
+def now() -> tuple[datetime, float]:
+    """The time of a record: the wall's, UTC, and that of a clock which only goes forward, s."""
+    return datetime.now(UTC), round(time.monotonic(), 3)
+
+
+def encode(entry: Entry) -> bytes:
+    """The line of an entry.
+
+    Raises:
+        ValueError: its text has no bytes in UTF-8 (a file name that is no text).
+    """
+    at = entry.at.isoformat(timespec="milliseconds").replace("+00:00", "Z")
+    version = f'"version":{VERSION},' if entry.number == 1 else ""
+    try:
+        event = entry.event.model_dump_json().encode()
+    except PydanticSerializationError as error:
+        raise ValueError(str(error)) from error
+    monotonic = "" if entry.monotonic_s is None else f'"s":{entry.monotonic_s},'
+    head = f'{{"n":{entry.number},{version}"at":"{at}",{monotonic}"event":'
+    body = head.encode() + event
+    return b'%b,"crc":"%08x"}\n' % (body, _checksum(body))
+
+
+def decode(line: bytes, due: int) -> Entry | None:
+    """The entry in a line, None if the line is damaged.
+
+    ``due`` is the number that it should have.
+
+    Raises:
+        LineRefused: the line is whole, but not the one that is due, or of a version or an event that
+            this program does not know.
+    """
+    if not line.endswith(b"\n") or not is_whole(line[:-1]):
+        return None
+    if due == 1:
+        _require_known_version(line)
+    match = _LINE.fullmatch(line[: -_TAIL_LENGTH - 1] + b"}")
+    if match is None:
+        raise _foreign("it has an unknown form")
+    number, at, monotonic, event = match.groups()
+    if int(number) != due:
+        raise LineRefused(
+            f"the journal is damaged: record {int(number)} stands where record {due} is due", RESTORE
+        )
+    try:
+        found = _EVENTS.validate_json(event)
+        when = datetime.fromisoformat(at.decode())
+    except (ValidationError, ValueError) as error:
+        raise _foreign(_first_words(error)) from error
+    return Entry(due, when, float(monotonic) if monotonic else None, found)
+
+
+def is_whole(line: bytes) -> bool:
+    """Whether a line, without its line feed, has the checksum that stands in it."""
+    tail = _TAIL.fullmatch(line[-_TAIL_LENGTH:])
+    return tail is not None and int(tail[1], 16) == _checksum(line[:-_TAIL_LENGTH])
+
+
+def begins_whole(line: bytes) -> bool:
+    """Whether a damaged line begins with a whole one that something else follows.
+
+    Then only the line feed between the two is gone. Zeros are nothing: they were never written.
+    """
+    ends = (match.end() for match in _TAIL.finditer(line))
+    return any(line[end + 1 :].strip(b"\0") and is_whole(line[:end]) for end in ends)
+
+
+def _checksum(body: bytes) -> int:
+    return zlib.crc32(b"}", zlib.crc32(body))
+
+
+def _require_known_version(line: bytes) -> None:
+    stated = _FIRST.match(line)
+    if stated is not None and int(stated[1]) > VERSION:
+        raise LineRefused(
+            f"a newer hexacell wrote this journal: its format has version {int(stated[1])}, known are "
+            f"1 to {VERSION}",
+            "Use that hexacell, or update this one",
+        )
+
+
+def _foreign(reason: str) -> LineRefused:
+    return LineRefused(
+        f"this line of the journal is not understood ({reason})",
+        "Use the version of hexacell that wrote it",
+    )
+
+
+def _first_words(error: ValueError) -> str:
+    if isinstance(error, ValidationError):
+        first = error.errors(include_url=False, include_context=False)[0]
+        return ".".join(map(str, first["loc"])) + ": " + first["msg"]
+    return str(error)

@@ -1,0 +1,1 @@
+"""A recorded run decided and computed again, and compared."""

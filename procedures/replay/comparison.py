@@ -1,0 +1,101 @@
+"""Two events side by side: what is not the same, field by field."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+from pydantic import BaseModel
+
+from drivers.encoders.session import positions_mm
+from hexacell.cell.devices import EncoderSettings
+from procedures.run.events import Reading
+
+TOLERANCE = 1e-9
+"""The largest difference that rounding may make: in a field's own unit, above 1 relative."""
+
+PROSE = frozenset({"sentence", "line", "reason"})
+"""Fields for people; a later version may word them otherwise."""
+
+
+class Aspect(StrEnum):
+    """What a difference is about."""
+
+    DECISION = "decision"
+    RESULT = "result"
+    WORDS = "words"
+
+
+@dataclass(frozen=True, slots=True)
+class Change:
+    """One field that is not the same; ``field`` is empty where nothing can be compared."""
+
+    field: str
+    recorded: object
+    replayed: object
+
+
+@dataclass(frozen=True, slots=True)
+class Difference:
+    """A change, and where: the journal's line, and the step or the kind of event."""
+
+    line: int
+    place: str
+    aspect: Aspect
+    change: Change
+
+    def __str__(self) -> str:
+        field = f"{self.change.field}: " if self.change.field else ""
+        return (
+            f"line {self.line}, {self.place}: {field}recorded {_short(self.change.recorded)}, "
+            f"replayed {_short(self.change.replayed)}"
+        )
+
+
+def changes(recorded: BaseModel, replayed: BaseModel, tolerance: float) -> list[Change]:
+    """What differs in fields that the recorded one states; later versions may state more."""
+    stated = recorded.model_dump(mode="json", exclude_unset=True)
+    return list(_changes("", stated, replayed.model_dump(mode="json"), tolerance))
+
+
+def is_prose(change: Change) -> bool:
+    """Whether nothing but the wording differs."""
+    return change.field.rpartition(".")[2] in PROSE
+
+
+def unlike_its_counts(reading: Reading, encoders: EncoderSettings) -> Change | None:
+    """Slider positions that do not follow from the counts behind them, by more than half a count."""
+    means = np.mean([positions_mm(counts, encoders) for counts in reading.counts], axis=0)
+    half_mm = encoders.measuring_step_nm * 0.5e-6
+    if np.abs(means - reading.joints_mm).max() <= half_mm + TOLERANCE:
+        return None
+    return Change("reading.joints_mm", reading.joints_mm, tuple(means.tolist()))
+
+
+def _changes(field: str, recorded: object, replayed: object, tolerance: float) -> Iterator[Change]:
+    match recorded, replayed:
+        case Mapping(), Mapping():
+            for key, value in recorded.items():
+                name = f"{field}.{key}" if field else str(key)
+                yield from _changes(name, value, replayed.get(key), tolerance)
+        case list(), list() if len(recorded) == len(replayed):
+            for place, (first, second) in enumerate(zip(recorded, replayed, strict=True)):
+                yield from _changes(f"{field}[{place}]", first, second, tolerance)
+        case _:
+            if not _same(recorded, replayed, tolerance):
+                yield Change(field, recorded, replayed)
+
+
+def _same(recorded: object, replayed: object, tolerance: float) -> bool:
+    if isinstance(recorded, float) and isinstance(replayed, int | float):
+        both_nan = math.isnan(recorded) and math.isnan(replayed)
+        return both_nan or math.isclose(recorded, replayed, rel_tol=tolerance, abs_tol=tolerance)
+    return recorded == replayed
+
+
+def _short(value: object) -> str:
+    text = str(value)
+    return text if len(text) <= 80 else f"{text[:77]}..."

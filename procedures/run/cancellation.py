@@ -1,0 +1,53 @@
+"""What must not be left half done: stopping the machine, letting devices go."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable, Coroutine
+from typing import Any, ParamSpec, TypeVar
+
+Arguments = ParamSpec("Arguments")
+Result = TypeVar("Result")
+
+
+async def shielded(action: Coroutine[Any, Any, Result]) -> Result:
+    """Wait for an action to its end, however often the waiting is cancelled.
+
+    Raises:
+        asyncio.CancelledError: it was; raised when the action has ended.
+    """
+    task = asyncio.ensure_future(action)
+    was_cancelled = await _end_of(task)
+    result = task.result()
+    if was_cancelled:
+        raise asyncio.CancelledError
+    return result
+
+
+async def cancel_and_wait(task: asyncio.Future[Any]) -> None:
+    """Cancel a task and wait for its end, however often the waiting is cancelled.
+
+    Raises:
+        asyncio.CancelledError: the waiting was; raised when the task has ended.
+    """
+    task.cancel()
+    if await _end_of(task):
+        raise asyncio.CancelledError
+
+
+async def _end_of(task: asyncio.Future[Any]) -> bool:
+    """Wait for it; whether the waiting was cancelled meanwhile."""
+    was_cancelled = False
+    while not task.done():
+        try:
+            await asyncio.wait([task])
+        except asyncio.CancelledError:
+            was_cancelled = True
+    return was_cancelled
+
+
+async def in_thread(
+    work: Callable[Arguments, Result], *args: Arguments.args, **kwargs: Arguments.kwargs
+) -> Result:
+    """Work that may write files: who cancels it waits for its end, or it would write behind his back."""
+    return await shielded(asyncio.to_thread(work, *args, **kwargs))

@@ -1,0 +1,103 @@
+"""What a face may tell a running engine, and the inbox in which it does so."""
+
+from __future__ import annotations
+
+import asyncio
+from collections import deque
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+
+from procedures.run.steps import SetKey
+
+
+@dataclass(frozen=True, slots=True)
+class Pause:
+    """Rest after the record that is being taken; ``at_once`` stops motion in place instead."""
+
+    at_once: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Resume:
+    """Go on after a pause: the step that was broken off is decided again."""
+
+
+@dataclass(frozen=True, slots=True)
+class Undo:
+    """Take the last record of the set that is being measured again; its reference voids the set."""
+
+
+@dataclass(frozen=True, slots=True)
+class MeasureAgain:
+    """Take one record of a set again at the same pose, or the whole set."""
+
+    at: SetKey
+    orientation: int | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """The answer to the open question, of the type that the question's coroutine gives."""
+
+    value: object = None
+
+
+@dataclass(frozen=True, slots=True)
+class Stop:
+    """End after the step that is being done; the run can be resumed."""
+
+    reason: str = "a stop was asked for"
+
+
+@dataclass(frozen=True, slots=True)
+class Abort:
+    """Stop motion in place and end; the run can be resumed."""
+
+    reason: str = "aborted"
+
+
+Command = Pause | Resume | Undo | MeasureAgain | Answer | Stop | Abort
+
+
+class CommandQueue:
+    """Commands on their way to one engine, in order; any thread or signal handler may put them in."""
+
+    def __init__(self) -> None:
+        self._commands: deque[Command] = deque()
+        self._arrived = asyncio.Event()
+        self._loop: asyncio.AbstractEventLoop | None = None
+        self.is_over = False
+
+    @property
+    def is_attended(self) -> bool:
+        """Whether an engine takes out what is put in."""
+        return self._loop is not None
+
+    def put(self, command: Command) -> None:
+        """Leave a command; returns at once."""
+        self._commands.append(command)
+        if self._loop is not None:
+            with suppress(RuntimeError):  # the loop has just been closed: nobody needs it any more
+                self._loop.call_soon_threadsafe(self._arrived.set)
+
+    async def next(self) -> Command:
+        """The oldest command, as soon as there is one."""
+        while not self._commands:
+            self._arrived.clear()
+            await self._arrived.wait()
+        return self._commands.popleft()
+
+    def take(self) -> Iterator[Command]:
+        """All that are there, oldest first."""
+        while self._commands:
+            yield self._commands.popleft()
+
+    @contextmanager
+    def attended(self) -> Iterator[None]:
+        """Within this context the running loop takes commands out; afterwards all is over."""
+        self._loop = asyncio.get_running_loop()
+        try:
+            yield
+        finally:
+            self._loop, self.is_over = None, True

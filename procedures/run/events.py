@@ -1,0 +1,334 @@
+"""What happened: the journal's records, from which everything else is derived.
+
+Raw readings do not depend on any geometry: encoder counts and gauge answers as they came, the pose
+commanded, and in ``RunStarted`` the geometry that commanded it.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import Field
+
+from hexacell.acceptance.validation import Verdict
+from hexacell.cell.fields import GeometryValues
+from hexacell.cell.recovery import Action, FailureKind
+from hexacell.controller_config.interface import Branch
+from procedures.run.steps import Frozen, SetKey, SixNumbers, Step, ThreeNumbers
+from procedures.run.trips import Guard, Trip
+
+
+def place_of(step: Step | None) -> str:
+    """The set that a step belongs to, or the step's own key."""
+    if step is None:
+        return "deciding"
+    key = getattr(step, "at", None)
+    return step.key if key is None else str(key)
+
+
+class Identity(Frozen):
+    """A device that answered when the run began."""
+
+    name: str
+    protocol: str
+    description: str
+    serial_number: str = ""
+
+
+class RunStarted(Frozen):
+    """The run's first record."""
+
+    kind: Literal["started"] = "started"
+    software: str
+    cell: str
+    cell_text: str
+    mode: Literal["check", "optimise"]
+    config: str
+    config_sha256: str
+    controller: GeometryValues
+    branch: Branch
+    devices: tuple[Identity, ...]
+    pose_list: str | None = None
+
+
+class StepBegun(Frozen):
+    """A step was decided and is being done."""
+
+    kind: Literal["begun"] = "begun"
+    step: Step
+
+
+class Arrived(Frozen):
+    """The robot is where a move sent it."""
+
+    kind: Literal["arrived"] = "arrived"
+    at: SetKey
+    orientation: int
+    pose: SixNumbers
+
+
+class Located(Frozen):
+    """The controller said where the robot stands, after a time in which nobody knew."""
+
+    kind: Literal["located"] = "located"
+    pose: SixNumbers
+
+
+class GaugesPlaced(Frozen):
+    """The gauges stand around the ball."""
+
+    kind: Literal["placed"] = "placed"
+    at: SetKey
+
+
+class Temperature(Frozen):
+    """What a thermometer said, deg C; without a number, ``problem`` says why there is none."""
+
+    name: str
+    celsius: float | None
+    raw: str = ""
+    problem: str = ""
+
+
+class Reading(Frozen):
+    """A settled window of readings.
+
+    ``gauges_mm`` and ``spread_mm`` are mean and range along base x, y, z; ``joints_mm`` the mean
+    slider positions. ``answers`` and ``counts`` are the raw readings behind them, in the order taken.
+    ``temperatures`` are those of the cell's thermometers just afterwards.
+    """
+
+    gauges_mm: ThreeNumbers
+    spread_mm: ThreeNumbers
+    joints_mm: SixNumbers
+    answers: tuple[tuple[str, ...], ...]
+    counts: tuple[tuple[int, ...], ...]
+    temperatures: tuple[Temperature, ...] = ()
+
+
+class RecordTaken(Frozen):
+    """A record was taken; ``deviation_mm`` is from the set's reference."""
+
+    kind: Literal["sampled"] = "sampled"
+    at: SetKey
+    orientation: int
+    pose: SixNumbers
+    reading: Reading
+    deviation_mm: ThreeNumbers
+
+
+class RecordRejected(Frozen):
+    """A record was not taken: the ball left the travel. The orientation is chosen anew.
+
+    There is no ``reading`` where a plunger at its end gave none.
+    """
+
+    kind: Literal["refused"] = "refused"
+    at: SetKey
+    orientation: int
+    reason: str
+    reading: Reading | None = None
+
+
+class RecordDiscarded(Frozen):
+    """A record no longer counts and is taken again at the same pose; it stays here."""
+
+    kind: Literal["undone"] = "undone"
+    at: SetKey
+    orientation: int
+
+
+class ReferenceConfirmed(Frozen):
+    """Back at the reference after an interruption: ``change_mm`` is small, the set goes on."""
+
+    kind: Literal["confirmed"] = "confirmed"
+    at: SetKey
+    change_mm: ThreeNumbers
+    reading: Reading | None = None
+
+
+class SetClosed(Frozen):
+    """The reference was read again; ``drift_mm`` is the change since it was zeroed."""
+
+    kind: Literal["closed"] = "closed"
+    at: SetKey
+    drift_mm: ThreeNumbers
+    reading: Reading | None = None
+
+
+class SetInvalidated(Frozen):
+    """The set is no longer to be trusted and will be measured again; its records stay here.
+
+    There is a ``reading`` where its reference was seen again and is no longer the same.
+    """
+
+    kind: Literal["voided"] = "voided"
+    at: SetKey
+    reason: str
+    reading: Reading | None = None
+
+
+class ProvisionalApplied(Frozen):
+    """The controller commands with a provisional geometry while the points are measured.
+
+    ``geometry`` is in the mechanism's frame convention. The config as it was is kept in ``folder``,
+    a part of the run folder.
+    """
+
+    kind: Literal["lent"] = "lent"
+    geometry: GeometryValues
+    folder: str
+
+
+class ProvisionalReverted(Frozen):
+    """The controller's config is as it was before a geometry was lent, and has been read."""
+
+    kind: Literal["taken back"] = "taken back"
+
+
+class Identified(Frozen):
+    """The geometry was identified, and the poses that will judge it were chosen."""
+
+    kind: Literal["identified"] = "identified"
+    result: dict[str, Any]
+    held_out: tuple[tuple[SixNumbers, ...], ...]
+
+
+class GateOutcome(Frozen):
+    """One condition for writing back, and the sentence that says how it stands."""
+
+    name: str
+    passed: bool
+    sentence: str
+    needs_person: bool = False
+
+
+class Proposed(Frozen):
+    """The new geometry stands in the run folder, beside the conditions for writing it."""
+
+    kind: Literal["proposed"] = "proposed"
+    gates: tuple[GateOutcome, ...]
+
+
+class Committed(Frozen):
+    """The controller's config holds the new geometry and the controller has read it."""
+
+    kind: Literal["committed"] = "committed"
+    approved_by: str
+
+
+class ResultValidated(Frozen):
+    """The held-out points were compared."""
+
+    kind: Literal["judged"] = "judged"
+    verdict: Verdict
+    line: str
+
+
+class RolledBack(Frozen):
+    """The controller's config is as it was before the run, bit for bit, and has been read."""
+
+    kind: Literal["rolled back"] = "rolled back"
+
+
+class Tripped(Frozen):
+    """A guard stopped the robot, or kept it from moving: which, on account of what, and what to do."""
+
+    kind: Literal["tripped"] = "tripped"
+    guard: Guard
+    device: str
+    problem: str
+    action: str
+
+    @classmethod
+    def of(cls, trip: Trip) -> Self:
+        """The event of a trip."""
+        return cls(guard=trip.guard, device=trip.device, problem=trip.problem, action=trip.action)
+
+
+class Paused(Frozen):
+    """The run rests; ``at_once``: motion was stopped in place, in the middle of a step."""
+
+    kind: Literal["paused"] = "paused"
+    at_once: bool = False
+
+
+class Resumed(Frozen):
+    """The run goes on after a pause."""
+
+    kind: Literal["resumed"] = "resumed"
+
+
+class Failed(Frozen):
+    """A step, or deciding on one, failed; motion was stopped.
+
+    ``failure`` is its kind, ``attempt`` counts failures of this kind at this set or step since the
+    run was begun or resumed, and ``action`` is what follows; ``asked`` tells whether a person chose it.
+    """
+
+    kind: Literal["failed"] = "failed"
+    step: Step | None
+    failure: FailureKind
+    attempt: int
+    reason: str
+    action: Action
+    asked: bool = False
+
+    @property
+    def place(self) -> str:
+        """Where attempts are counted: the set, or the step that belongs to none."""
+        return place_of(self.step)
+
+
+class CommandRejected(Frozen):
+    """A command that could not be obeyed, and why."""
+
+    kind: Literal["declined"] = "declined"
+    command: str
+    reason: str
+
+
+class Interrupted(Frozen):
+    """The run stopped here: by a person, a fault, or because an answer is missing."""
+
+    kind: Literal["interrupted"] = "interrupted"
+    reason: str
+    exit_code: int
+
+
+class Ended(Frozen):
+    """The run is over."""
+
+    kind: Literal["ended"] = "ended"
+    exit_code: int
+    line: str
+
+
+Event = Annotated[
+    RunStarted
+    | StepBegun
+    | Arrived
+    | Located
+    | GaugesPlaced
+    | RecordTaken
+    | RecordRejected
+    | RecordDiscarded
+    | ReferenceConfirmed
+    | SetClosed
+    | SetInvalidated
+    | ProvisionalApplied
+    | ProvisionalReverted
+    | Identified
+    | Proposed
+    | Committed
+    | ResultValidated
+    | RolledBack
+    | Paused
+    | Resumed
+    | Failed
+    | CommandRejected
+    | Tripped
+    | Interrupted
+    | Ended,
+    Field(discriminator="kind"),
+]

@@ -1,0 +1,275 @@
+"""Where a run stands: a fold over its events, and nothing else."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field, replace
+from functools import reduce
+
+from hexacell.cell.recovery import Action, FailureKind
+from hexacell.kinematics.pose import Pose
+from hexacell.measurements.records import MeasurementSet, Record
+from procedures.run import events
+from procedures.run.steps import Compute, Move, Phase, SetKey, SixNumbers
+
+
+@dataclass(frozen=True, slots=True)
+class SetState:
+    """One set as far as it is measured.
+
+    Attributes:
+        samples: those that count, in the order taken; the first is the reference.
+        again: poses whose records were undone and are to be taken again, by orientation.
+        reference_unverified: nobody watched the gauges for a while; their zero must be seen again.
+    """
+
+    samples: tuple[events.RecordTaken, ...] = ()
+    placed: bool = False
+    refusals: int = 0
+    drift_mm: tuple[float, float, float] | None = None
+    again: tuple[tuple[int, SixNumbers], ...] = ()
+    reference_unverified: bool = False
+
+    @property
+    def closed(self) -> bool:
+        """Whether its reference was read again at the end."""
+        return self.drift_mm is not None
+
+    @property
+    def next_orientation(self) -> int:
+        """The lowest orientation without a record."""
+        taken = {sample.orientation for sample in self.samples}
+        return next(number for number in range(1, len(taken) + 2) if number not in taken)
+
+    def pose(self, orientation: int) -> SixNumbers | None:
+        """Where a record was, or is to be, taken; nothing where that is not decided."""
+        found = [sample.pose for sample in self.samples if sample.orientation == orientation]
+        return found[0] if found else dict(self.again).get(orientation)
+
+    def doubted(self) -> SetState:
+        """The same after a time in which nobody watched; a closed set is done with."""
+        return self if self.closed or not self.samples else replace(self, reference_unverified=True)
+
+    def with_sample(self, sample: events.RecordTaken) -> SetState:
+        """One more record."""
+        again = tuple(pair for pair in self.again if pair[0] != sample.orientation)
+        return replace(self, samples=(*self.samples, sample), again=again)
+
+    def refused(self, orientation: int) -> SetState:
+        """One more record that could not be taken; its orientation is chosen anew."""
+        again = tuple(pair for pair in self.again if pair[0] != orientation)
+        return replace(self, refusals=self.refusals + 1, again=again)
+
+    def without(self, orientation: int) -> SetState:
+        """One record less; a set that was closed is open again, and its gauges are not believed."""
+        kept = tuple(sample for sample in self.samples if sample.orientation != orientation)
+        undone = [(s.orientation, s.pose) for s in self.samples if s.orientation == orientation]
+        less = replace(self, samples=kept, again=(*self.again, *undone), drift_mm=None)
+        return less.doubted() if self.closed else less
+
+
+@dataclass(frozen=True, slots=True)
+class RunState:
+    """A run as far as it got.
+
+    Attributes:
+        sets: by key, voided ones left out.
+        standing: the set and orientation whose pose the robot holds, if it holds one, and
+            ``target``, the pose that it was last commanded to or found at.
+        off_plan: it stands at a pose of no set: it was found there, or is on its way.
+        path_from_reference: orientations and poses by which it came from the reference it was at last;
+            0 where nothing is measured.
+        position_unknown: it may stand anywhere by now; the controller must be asked before it moves.
+        failures: how many, by kind and place, since the run was begun or resumed.
+        rolling_back: the old geometry is being put back.
+        lent: the provisional geometry that the controller was lent last, and ``lending``: whether it
+            has it now; ``config_write_pending``: it is being lent or taken back, and nobody knows how
+            far that got.
+    """
+
+    started: events.RunStarted | None = None
+    sets: dict[SetKey, SetState] = field(default_factory=dict)
+    standing: tuple[SetKey, int] | None = None
+    target: SixNumbers | None = None
+    off_plan: bool = False
+    path_from_reference: tuple[tuple[int, SixNumbers], ...] = ()
+    position_unknown: bool = False
+    voided: int = 0
+    identified: events.Identified | None = None
+    proposed: events.Proposed | None = None
+    committed: events.Committed | None = None
+    judged: events.ResultValidated | None = None
+    rolled_back: bool = False
+    rolling_back: bool = False
+    lent: events.ProvisionalApplied | None = None
+    lending: bool = False
+    config_write_pending: bool = False
+    failures: dict[tuple[str, str], int] = field(default_factory=dict)
+    ended: events.Ended | None = None
+
+    @property
+    def is_unverified(self) -> bool:
+        """Whether the controller has a new geometry on which no verdict was given."""
+        return self.committed is not None and self.judged is None
+
+    def set(self, key: SetKey) -> SetState:
+        """One set; an empty one where nothing was measured yet."""
+        return self.sets.get(key, SetState())
+
+    def samples(self, phase: Phase) -> tuple[events.RecordTaken, ...]:
+        """All records of a phase, in the order of their points."""
+        keys = sorted((key for key in self.sets if key.phase is phase), key=lambda key: key.point)
+        return tuple(sample for key in keys for sample in self.sets[key].samples)
+
+    def measurements(self) -> MeasurementSet:
+        """The records that the geometry is identified from."""
+        return MeasurementSet(tuple(record(sample) for sample in self.samples(Phase.IDENTIFY)))
+
+    def refusals(self, phase: Phase) -> int:
+        """How many records of a phase were refused."""
+        return sum(value.refusals for key, value in self.sets.items() if key.phase is phase)
+
+    def held_out(self, phase: Phase) -> list[tuple[float, float, float]]:
+        """Deviations at held-out poses, mm, references left out."""
+        return [sample.deviation_mm for sample in self.samples(phase) if sample.orientation > 1]
+
+
+def fold(history: Iterable[events.Event]) -> RunState:
+    """Where a run stands after these events."""
+    return reduce(apply, history, RunState())
+
+
+def apply(state: RunState, event: events.Event) -> RunState:  # noqa: C901, PLR0911, PLR0912 - a case an event
+    """The state after one more event."""
+    match event:
+        case events.RunStarted():
+            return replace(state, started=event, position_unknown=True)
+        case events.StepBegun(step=Compute(kind="roll back")):
+            return replace(state, rolling_back=True)
+        case events.StepBegun(step=Compute(kind="lend" | "take back")):
+            return replace(state, config_write_pending=True)
+        case events.ProvisionalApplied():
+            return replace(
+                state,
+                lent=event,
+                lending=True,
+                config_write_pending=False,
+                standing=None,
+                position_unknown=True,
+            )
+        case events.ProvisionalReverted():
+            return replace(
+                state, lending=False, config_write_pending=False, standing=None, position_unknown=True
+            )
+        case events.Located():
+            return replace(state, standing=None, off_plan=True, target=event.pose, position_unknown=False)
+        case events.Arrived():
+            return _doubted(_arrived(state, event), but=event.at)
+        case events.GaugesPlaced():
+            return _with_set(state, event.at, replace(state.set(event.at), placed=True))
+        case events.RecordTaken():
+            return _with_set(state, event.at, state.set(event.at).with_sample(event))
+        case events.RecordRejected():
+            refused = state.set(event.at).refused(event.orientation)
+            return _with_set(replace(state, standing=None), event.at, refused)
+        case events.RecordDiscarded():
+            return _with_set(state, event.at, state.set(event.at).without(event.orientation))
+        case events.ReferenceConfirmed():
+            return _with_set(state, event.at, replace(state.set(event.at), reference_unverified=False))
+        case events.SetClosed():
+            return _with_set(state, event.at, replace(state.set(event.at), drift_mm=event.drift_mm))
+        case events.SetInvalidated():
+            kept = {key: value for key, value in state.sets.items() if key != event.at}
+            return replace(state, sets=kept, standing=None, voided=state.voided + 1)
+        case events.Identified():
+            return replace(state, identified=event)
+        case events.Proposed():
+            return replace(state, proposed=event)
+        case events.Committed():
+            # The same sliders are another pose under another geometry.
+            return replace(state, committed=event, standing=None, position_unknown=True)
+        case events.ResultValidated():
+            return replace(state, judged=event)
+        case events.RolledBack():
+            return _rolled_back(replace(state, standing=None, position_unknown=True, rolling_back=False))
+        case events.Paused(at_once=True):
+            return _doubted(_nowhere(state))
+        case events.Failed():
+            return _failed(_nowhere(state), event)
+        case events.Interrupted():
+            return _doubted(replace(_nowhere(state), failures={}))
+        case events.Ended():
+            return replace(state, ended=event)
+        case _:
+            return state
+
+
+def _arrived(state: RunState, event: events.Arrived) -> RunState:
+    on_the_way = event.orientation == 0
+    standing = None if on_the_way else (event.at, event.orientation)
+    trail = _trail(state, event)
+    return replace(
+        state,
+        standing=standing,
+        off_plan=on_the_way,
+        target=event.pose,
+        path_from_reference=trail,
+        position_unknown=False,
+    )
+
+
+def _trail(state: RunState, event: events.Arrived) -> tuple[tuple[int, SixNumbers], ...]:
+    """A way without loops; none where the robot did not come from the end of the one before."""
+    poses = [pose for _, pose in state.path_from_reference]
+    if event.orientation == 1:
+        return ((1, event.pose),)
+    if event.pose in poses:
+        return state.path_from_reference[: poses.index(event.pose) + 1]
+    is_at_its_end = not state.position_unknown and bool(poses) and state.target == poses[-1]
+    return (*state.path_from_reference, (event.orientation, event.pose)) if is_at_its_end else ()
+
+
+def _nowhere(state: RunState) -> RunState:
+    return replace(state, standing=None, position_unknown=True)
+
+
+def _doubted(state: RunState, but: SetKey | None = None) -> RunState:
+    """Sets that are left open lose their trust: gauges are carried away, slip, or are switched off."""
+    return replace(state, sets={k: v if k == but else v.doubted() for k, v in state.sets.items()})
+
+
+def _failed(state: RunState, event: events.Failed) -> RunState:
+    where = (event.failure.value, event.place)
+    counted = replace(state, failures={**state.failures, where: event.attempt})
+    match event.step:
+        # The ball left its plate on the way to a pose that was chosen: another one is to be chosen.
+        case Move(at=at, orientation=orientation) if _is_plate(event) and at.phase is Phase.IDENTIFY:
+            counted = _with_set(counted, at, counted.set(at).refused(orientation))
+    return _doubted(counted) if event.action is Action.MEASURE_AGAIN else counted
+
+
+def _is_plate(event: events.Failed) -> bool:
+    return event.failure is FailureKind.GAUGE_AT_END and event.action is not Action.REDO_SET
+
+
+def _rolled_back(state: RunState) -> RunState:
+    """Without a verdict the proposal waits again: nothing was verified under the geometry that went."""
+    if state.judged is not None:
+        return replace(state, rolled_back=True)
+    kept = {key: value for key, value in state.sets.items() if key.phase is not Phase.AFTER}
+    return replace(state, committed=None, sets=kept)
+
+
+def _with_set(state: RunState, key: SetKey, value: SetState) -> RunState:
+    return replace(state, sets={**state.sets, key: value})
+
+
+def record(sample: events.RecordTaken) -> Record:
+    """A record as the mathematics takes it."""
+    return Record(
+        sample.at.point,
+        sample.orientation,
+        Pose(*sample.pose),
+        sample.reading.joints_mm,
+        sample.deviation_mm,
+    )

@@ -1,0 +1,54 @@
+"""The engine's state machine: a handful of facts, and the one word for them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+
+class Status(StrEnum):
+    """What an engine is doing, for screens."""
+
+    IDLE = "idle"
+    RUNNING = "running"
+    PAUSING = "pausing"
+    PAUSED = "paused"
+    AWAITING_OPERATOR = "awaiting operator"
+    STOPPING = "stopping"
+    ENDED = "ended"
+    FAULTED = "faulted"
+
+
+@dataclass(frozen=True, slots=True)
+class EngineFlags:
+    """What is the case; several facts may hold at once.
+
+    Attributes:
+        fault: what failed, until somebody has said how to go on.
+        asking: a question waits for a person.
+        pausing: a pause is wanted, ``at_once`` in mid-step; ``resting``: it has begun.
+        stopping: why the run is to end; nothing where it is not.
+    """
+
+    begun: bool = False
+    ended: bool = False
+    fault: str | None = None
+    asking: bool = False
+    pausing: bool = False
+    at_once: bool = False
+    resting: bool = False
+    stopping: str | None = None
+
+    @property
+    def status(self) -> Status:
+        """The gravest fact decides; a fault stays until it is cleared, also after the end."""
+        words = (
+            (self.fault is not None, Status.FAULTED),
+            (self.ended, Status.ENDED),
+            (self.stopping is not None, Status.STOPPING),
+            (self.resting, Status.PAUSED),
+            (self.asking, Status.AWAITING_OPERATOR),
+            (self.pausing, Status.PAUSING),
+            (self.begun, Status.RUNNING),
+        )
+        return next((status for holds, status in words if holds), Status.IDLE)

@@ -1,0 +1,158 @@
+"""The steps of a calibration: data, each with a stable key such as ``P2/o07/sample``."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from hexacell.kinematics.pose import Pose
+
+SixNumbers = tuple[float, float, float, float, float, float]
+ThreeNumbers = tuple[float, float, float]
+
+
+class Frozen(BaseModel):
+    """A record of the journal."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", ser_json_inf_nan="constants")
+
+
+class Phase(StrEnum):
+    """What a set of poses is measured for; the value begins the keys of its steps."""
+
+    IDENTIFY = "P"
+    BEFORE = "before-V"
+    AFTER = "after-V"
+
+
+class SetKey(Frozen):
+    """The poses at one point, measured with gauges zeroed once; points count from 1."""
+
+    phase: Phase
+    point: int
+
+    def __str__(self) -> str:
+        return f"{self.phase.value}{self.point}"
+
+
+class RunForecast(Frozen):
+    """The predicted error at the worst task pose, 1 sigma, mm: now, after this record, at the end.
+
+    The end is ``records`` more away, this one included, and that many ``minutes``.
+    """
+
+    now_mm: float
+    next_mm: float
+    end_mm: float
+    records: int
+    minutes: float
+
+
+class Expectation(Frozen):
+    """What the gauges should show (mm, base x y z), one sigma, and what is learnt (nat)."""
+
+    deviation_mm: ThreeNumbers
+    sigma_mm: ThreeNumbers
+    gain: float
+    forecast: RunForecast | None = None
+
+
+class Locate(Frozen):
+    """Ask the controller where the robot stands: nobody knows, and no way is safe from nowhere."""
+
+    kind: Literal["locate"] = "locate"
+
+    @property
+    def key(self) -> str:
+        """Stable name of the step."""
+        return self.kind
+
+
+class Move(Frozen):
+    """Send the robot to a pose; the first orientation of a set is its reference.
+
+    Orientation 0 is a pose on the way, at which nothing is measured.
+    """
+
+    kind: Literal["move"] = "move"
+    at: SetKey
+    orientation: int
+    pose: SixNumbers
+    expected: Expectation | None = None
+
+    @property
+    def key(self) -> str:
+        """Stable name of the step."""
+        return f"{self.at}/o{self.orientation:02d}/move"
+
+    @property
+    def target(self) -> Pose:
+        """Where to: the pose as the controller takes it."""
+        return Pose(*self.pose)
+
+
+class Place(Frozen):
+    """Have the gauges put around the ball, plungers in the middle of their travel."""
+
+    kind: Literal["place"] = "place"
+    at: SetKey
+    pose: SixNumbers
+
+    @property
+    def key(self) -> str:
+        """Stable name of the step."""
+        return f"{self.at}/place"
+
+
+class Sample(Frozen):
+    """Wait for settled readings and record them; the first of a set is the gauges' zero."""
+
+    kind: Literal["sample"] = "sample"
+    at: SetKey
+    orientation: int
+    pose: SixNumbers
+
+    @property
+    def key(self) -> str:
+        """Stable name of the step."""
+        return f"{self.at}/o{self.orientation:02d}/sample"
+
+
+class Revisit(Frozen):
+    """Back at a set's reference after an interruption: see whether the gauges kept their zero."""
+
+    kind: Literal["revisit"] = "revisit"
+    at: SetKey
+
+    @property
+    def key(self) -> str:
+        """Stable name of the step."""
+        return f"{self.at}/revisit"
+
+
+class CloseSet(Frozen):
+    """Back at the set's reference pose: read again; the difference is drift."""
+
+    kind: Literal["close"] = "close"
+    at: SetKey
+
+    @property
+    def key(self) -> str:
+        """Stable name of the step."""
+        return f"{self.at}/close"
+
+
+class Compute(Frozen):
+    """A step that moves nothing."""
+
+    kind: Literal["lend", "take back", "identify", "propose", "commit", "judge", "roll back"]
+
+    @property
+    def key(self) -> str:
+        """Stable name of the step."""
+        return self.kind
+
+
+Step = Annotated[Locate | Move | Place | Sample | Revisit | CloseSet | Compute, Field(discriminator="kind")]

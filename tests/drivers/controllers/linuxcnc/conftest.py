@@ -1,0 +1,187 @@
+"""A server that follows a script, and drivers that talk to it."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator
+from contextlib import suppress
+from enum import Enum, auto
+
+import pytest
+
+from drivers.controllers.linuxcnc.controller import LinuxcncrshController
+from drivers.controllers.linuxcnc.settings import Timeouts
+from drivers.wire_trace import WireTrace
+from hexacell.cell.devices import ControllerSettings
+
+PATIENT = Timeouts(remark=0.05, poll=0.002)
+IMPATIENT = Timeouts(answer=0.4, remark=0.05, poll=0.002, arrival=0.02, stop=0.6, switch=0.02, comeback=0.2)
+"""For tests in which something does not happen."""
+
+
+class Then(Enum):
+    """What a script can do beside sending bytes."""
+
+    SAY_NOTHING = auto()
+    HANG_UP = auto()
+
+
+Step = bytes | asyncio.Event | Then
+Exchange = tuple[str, Step] | tuple[str, Step, Step] | tuple[str, Step, Step, Step]
+
+GREETING: list[Exchange] = [
+    ("hello EMC hexacell 1.0", b"HELLO ACK EMCNETSVR 1.1\r\n"),
+    ("set echo off", b"set echo off\r\n"),
+    ("set verbose on", b"SET VERBOSE ACK\n\r"),
+    ("set enable EMCTOO", b"SET ENABLE ACK\n\r"),
+]
+OPENING: list[Exchange] = [
+    *GREETING,
+    ("set set_wait done", b"SET SET_WAIT ACK\n\r"),
+    ("get inifile", b"INIFILE /home/operator/machine.ini\r\n"),
+]
+AT_REST = b"ABS_ACT_POS 0.000000 0.000000 0.000000 0.000000 -0.000000 0.000000\r\n"
+STOPPING: list[Exchange] = [
+    *GREETING,
+    ("set abort", b"SET ABORT ACK\n\r"),
+    *[("get abs_act_pos", AT_REST)] * 3,
+]
+
+
+class ScriptedServer:
+    """Plays one conversation to each connection in turn, and remembers what did not follow it.
+
+    ``afterwards`` answers what is asked again and again once a conversation has been played; the
+    last of several answers is repeated.
+    """
+
+    def __init__(self, *conversations: list[Exchange]) -> None:
+        self.deviations: list[str] = []
+        self.afterwards: dict[str, bytes | list[bytes]] = {}
+        self.port = 0
+        self.connections = 0
+        self._conversing: set[asyncio.Task[None]] = set()
+        self._left = [list(conversation) for conversation in conversations]
+        self._waiting = iter(self._left)
+        self._server: asyncio.Server | None = None
+
+    async def start(self) -> None:
+        self._server = await asyncio.start_server(self._converse, "127.0.0.1", self.port)
+        self.port = self._server.sockets[0].getsockname()[1]
+
+    def stop_listening(self) -> None:
+        """Connections go on, and no new one is taken."""
+        assert self._server is not None
+        self._server.close()
+
+    async def close(self) -> None:
+        assert self._server is not None
+        self.stop_listening()
+        for task in self._conversing:
+            task.cancel()
+        await asyncio.gather(*self._conversing)
+        await self._server.wait_closed()
+
+    def assert_followed(self) -> None:
+        assert self.deviations == []
+        assert [conversation for conversation in self._left if conversation] == []
+
+    async def _converse(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        task = asyncio.current_task()
+        assert task is not None
+        self._conversing.add(task)
+        self.connections += 1
+        conversation = next(self._waiting, None)
+        if conversation is None:
+            self.deviations.append("one connection more than the script has")
+        with suppress(asyncio.CancelledError, OSError):
+            while conversation is not None and (line := (await reader.readline()).decode()):
+                if not await self._answer(line.removesuffix("\r\n"), conversation, writer):
+                    break
+        writer.transport.abort()
+
+    async def _answer(self, line: str, conversation: list[Exchange], writer: asyncio.StreamWriter) -> bool:
+        if not conversation and line in self.afterwards:
+            writer.write(self._afterwards(line))
+            return True
+        expected, *steps = conversation.pop(0) if conversation else ("nothing",)
+        if line != expected:
+            self.deviations.append(f"{line!r} came where {expected!r} was expected")
+            return False
+        for step in steps:
+            if step is Then.HANG_UP:
+                return False
+            if isinstance(step, asyncio.Event):
+                await step.wait()
+            elif isinstance(step, bytes):
+                writer.write(step)
+        return True
+
+    def _afterwards(self, line: str) -> bytes:
+        answer = self.afterwards[line]
+        if isinstance(answer, bytes):
+            return answer
+        return answer.pop(0) if len(answer) > 1 else answer[0]
+
+
+class Play:
+    """Scripts, and drivers that talk to servers which follow them."""
+
+    GREETING = GREETING
+    OPENING = OPENING
+    STOPPING = STOPPING
+    AT_REST = AT_REST
+    SILENCE = Then.SAY_NOTHING
+    HANG_UP = Then.HANG_UP
+    IMPATIENT = IMPATIENT
+
+    def __init__(self) -> None:
+        self.patience = PATIENT
+        self.servers: list[ScriptedServer] = []
+        self._drivers: list[LinuxcncrshController] = []
+
+    async def driver(
+        self, *conversations: list[Exchange], trace: WireTrace | None = None, **settings: object
+    ) -> LinuxcncrshController:
+        """A driver for a server that plays ``conversations``, one to each connection."""
+        server = ScriptedServer(*conversations)
+        self.servers.append(server)
+        await server.start()
+        return self.driver_at(server.port, trace=trace, **settings)
+
+    async def opened(
+        self,
+        conversation: list[Exchange],
+        *others: list[Exchange],
+        trace: WireTrace | None = None,
+        **settings: object,
+    ) -> LinuxcncrshController:
+        """The same, connected: ``conversation`` goes on after the opening."""
+        driver = await self.driver([*OPENING, *conversation], *others, trace=trace, **settings)
+        await driver.open()
+        return driver
+
+    def driver_at(
+        self, port: int, trace: WireTrace | None = None, **settings: object
+    ) -> LinuxcncrshController:
+        """A driver for whatever is at ``port``; keywords are controller settings."""
+        values = ControllerSettings.model_validate({"config": "machine.ini", "port": port, **settings})
+        self._drivers.append(LinuxcncrshController(values, trace=trace, patience=self.patience))
+        return self._drivers[-1]
+
+    async def end(self) -> None:
+        """Close everything; fail unless every conversation was played to its end."""
+        for driver in self._drivers:
+            await driver.close()
+        for server in self.servers:
+            await server.close()
+        for server in self.servers:
+            server.assert_followed()
+
+
+@pytest.fixture
+async def play() -> AsyncIterator[Play]:
+    """Servers that follow scripts; a test fails unless each script was played to its end."""
+    playing = Play()
+    yield playing
+    await playing.end()

@@ -1,0 +1,135 @@
+"""A line that stays in step: what is cancelled, late, garbled or cut off is not for the next question."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+
+import pytest
+
+from drivers.controllers.errors import AnswerOverdue, MoveRefused
+from hexacell.errors import DeviceError
+from tests.drivers.controllers.linuxcnc.motion_dialogue import (
+    ACK,
+    AGAIN_IN_CONTROL,
+    ARRIVED,
+    HALF_WAY,
+    MDI,
+    NO_ERROR,
+    TARGET,
+)
+
+
+async def test_a_cancelled_move_is_stopped_and_its_late_answer_is_not_mistaken(play):
+    aborted = asyncio.Event()
+    driver = await play.opened(
+        [(MDI, aborted, ACK), AGAIN_IN_CONTROL, (MDI, ACK), ("get abs_act_pos", ARRIVED)],
+        play.STOPPING,
+    )
+    moving = asyncio.create_task(driver.move(TARGET))
+    await asyncio.sleep(0.01)
+    moving.cancel()
+    with pytest.raises(asyncio.CancelledError):
+        await moving
+    aborted.set()
+    await driver.move(TARGET)
+
+
+async def test_a_cancelled_move_stays_cancelled_though_it_cannot_be_stopped(play):
+    never = asyncio.Event()
+    driver = await play.opened([(MDI, never)], *[[("hello EMC hexacell 1.0", play.HANG_UP)]] * 3)
+    moving = asyncio.create_task(driver.move(TARGET))
+    await asyncio.sleep(0.01)
+    moving.cancel()
+    with pytest.raises(asyncio.CancelledError):
+        await moving
+
+
+async def test_a_move_cancelled_before_its_turn_stops_nothing(play):
+    answer = asyncio.Event()
+    driver = await play.opened([("get joint_pos", answer, b"JOINT_POS 1 2 3 4 5 6\r\n")])
+    asking = asyncio.create_task(driver.joint_positions())
+    await asyncio.sleep(0)
+    moving = asyncio.create_task(driver.move(TARGET))
+    await asyncio.sleep(0.01)
+    moving.cancel()
+    answer.set()
+    assert await asking == (1.0, 2.0, 3.0, 4.0, 5.0, 6.0)
+    with pytest.raises(asyncio.CancelledError):
+        await moving
+
+
+async def test_a_cancelled_question_leaves_the_line_in_step(play):
+    late = asyncio.Event()
+    driver = await play.opened(
+        [
+            ("get joint_pos", late, b"JOINT_POS 1 2 3 4 5 6\r\n"),
+            ("get joint_pos", b"JOINT_POS 6 5 4 3 2 1\r\n"),
+        ]
+    )
+    asking = asyncio.create_task(driver.joint_positions())
+    await asyncio.sleep(0.01)
+    asking.cancel()
+    with pytest.raises(asyncio.CancelledError):
+        await asking
+    late.set()
+    assert await driver.joint_positions() == (6.0, 5.0, 4.0, 3.0, 2.0, 1.0)
+
+
+async def test_an_overdue_answer_leaves_the_line_in_step(play):
+    play.patience = play.IMPATIENT
+    late = asyncio.Event()
+    driver = await play.opened(
+        [("get abs_act_pos", late, ARRIVED), ("get abs_act_pos", HALF_WAY)],
+    )
+    with pytest.raises(AnswerOverdue, match=r"did not answer 'get abs_act_pos' within 0\.4 s"):
+        await driver.pose()
+    late.set()
+    assert (await driver.pose()).x == 5.0
+
+
+async def test_an_answer_that_never_comes_costs_the_connection(play):
+    play.patience = play.IMPATIENT
+    driver = await play.opened(
+        [("get abs_act_pos", play.SILENCE)], [*play.OPENING[:-1], ("get abs_act_pos", HALF_WAY)]
+    )
+    with pytest.raises(AnswerOverdue):
+        await driver.pose()
+    assert (await driver.pose()).x == 5.0
+
+
+async def test_a_server_that_was_started_anew_is_connected_to_again(play):
+    driver = await play.opened(
+        [("get abs_act_pos", ARRIVED, play.HANG_UP)],
+        [*play.OPENING[:-1], ("get abs_act_pos", HALF_WAY)],
+    )
+    assert (await driver.pose()).x == 10.0
+    await asyncio.sleep(0.02)
+    assert (await driver.pose()).x == 5.0
+
+
+async def test_a_garbled_question_is_asked_again_and_an_order_is_not(play):
+    driver = await play.opened(
+        [
+            ("get joint_pos", b"GET EMCTOO NAK\r\n\r\nGET JOINT_POS NAK\r\n\r\n"),
+            ("get joint_pos", b"JOINT_POS 1 2 3 4 5 6\r\n"),
+            (MDI, b"SET NAK\r\n"),
+            ("get enable", b"ENABLE ON\r\n"),
+            ("get error", b"ERROR No characters found in reading real value\r\n"),
+            NO_ERROR,
+        ]
+    )
+    assert await driver.joint_positions() == (1.0, 2.0, 3.0, 4.0, 5.0, 6.0)
+    with pytest.raises(MoveRefused):
+        await driver.move(TARGET)
+
+
+async def test_closing_while_an_answer_is_awaited(play):
+    driver = await play.opened([("get joint_pos", play.SILENCE)])
+    asking = asyncio.create_task(driver.joint_positions())
+    await asyncio.sleep(0.01)
+    begun = time.monotonic()
+    await driver.close()
+    with pytest.raises(DeviceError):
+        await asking
+    assert time.monotonic() - begun < 0.1

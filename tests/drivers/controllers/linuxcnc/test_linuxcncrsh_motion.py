@@ -1,0 +1,156 @@
+"""Moving: what is acknowledged is not yet true, and what is refused is said."""
+
+from __future__ import annotations
+
+import asyncio
+
+import pytest
+
+from drivers.controllers.errors import ConnectionLost, MotionInterrupted, MoveRefused
+from hexacell.errors import DeviceError
+from hexacell.kinematics.pose import Pose
+from tests.drivers.controllers.linuxcnc.motion_dialogue import (
+    ACK,
+    AGAIN_IN_CONTROL,
+    ARRIVED,
+    HALF_WAY,
+    MDI,
+    NO_ERROR,
+    TARGET,
+)
+
+
+async def test_a_move_and_its_arrival(play):
+    driver = await play.opened([(MDI, ACK), ("get abs_act_pos", ARRIVED)])
+    await driver.move(TARGET)
+
+
+async def test_the_position_may_take_a_moment_to_agree(play):
+    nearly = b"ABS_ACT_POS 10.000000 20.000000 559.980000 5.000000 -4.000000 3.000000\r\n"
+    within = b"ABS_ACT_POS 10.009000 20.000000 560.000000 5.009000 -4.000000 363.000000\r\n"
+    driver = await play.opened(
+        [(MDI, ACK), *[("get abs_act_pos", nearly)] * 2, ("get abs_act_pos", within)]
+    )
+    await driver.move(TARGET)
+
+
+@pytest.mark.parametrize(
+    "elsewhere",
+    [
+        b"ABS_ACT_POS 10.000000 20.011000 560.000000 5.000000 -4.000000 3.000000\r\n",
+        b"ABS_ACT_POS 10.000000 20.000000 560.000000 5.000000 -4.011000 3.000000\r\n",
+    ],
+)
+async def test_an_acknowledgement_is_not_an_arrival(play, elsewhere):
+    play.patience = play.IMPATIENT
+    driver = await play.opened([(MDI, ACK)])
+    play.servers[0].afterwards = {
+        "get abs_act_pos": elsewhere,
+        "get error": [b"ERROR joint 2 following error\r\n", b"ERROR OK\r\n"],
+    }
+    with pytest.raises(MotionInterrupted, match=r"on the way to X10\.000 Y20\.000 Z560") as caught:
+        await driver.move(TARGET)
+    assert "joint 2 following error" in caught.value.problem
+
+
+@pytest.mark.parametrize(
+    ("estop", "machine", "why"),
+    [
+        (b"ESTOP ON\r\n", b"MACHINE OFF\r\n", "it is in emergency stop"),
+        (b"ESTOP OFF\r\n", b"MACHINE OFF\r\n", "it is switched off"),
+        (b"ESTOP OFF\r\n", b"MACHINE ON\r\n", "it is on, and gives no reason"),
+    ],
+)
+async def test_a_move_that_ends_elsewhere_without_a_word(play, estop, machine, why):
+    play.patience = play.IMPATIENT
+    driver = await play.opened([(MDI, ACK)])
+    play.servers[0].afterwards = {
+        "get abs_act_pos": HALF_WAY,
+        "get error": b"ERROR OK\r\n",
+        "get estop": estop,
+        "get machine": machine,
+    }
+    with pytest.raises(MotionInterrupted, match=f"stopped at X5.000 Y10.000 Z555.000 .*: {why}"):
+        await driver.move(TARGET)
+
+
+async def test_a_refused_move_tells_all_errors_and_leaves_none_behind(play):
+    driver = await play.opened(
+        [
+            (MDI, b"SET MDI NAK\n\r"),
+            ("get enable", b"ENABLE ON\r\n"),
+            ("get error", b"ERROR Linear move on line 0 fails kinematicsInverse\r\n"),
+            ("get error", b"ERROR invalid params in linear command\r\n"),
+            NO_ERROR,
+            (MDI, ACK),
+            ("get abs_act_pos", ARRIVED),
+        ]
+    )
+    with pytest.raises(MoveRefused) as caught:
+        await driver.move(TARGET)
+    assert caught.value.problem == (
+        "refuses to move to X10.000 Y20.000 Z560.000 A5.000 B-4.000 C3.000: "
+        "Linear move on line 0 fails kinematicsInverse; invalid params in linear command"
+    )
+    await driver.move(TARGET)
+
+
+async def test_a_controller_that_never_stops_complaining_does_not_hold_us_up(play):
+    driver = await play.opened([(MDI, b"SET MDI NAK\n\r")])
+    play.servers[0].afterwards = {
+        "get enable": b"ENABLE ON\r\n",
+        "get error": b"ERROR emc_error: bad status from EMC\r\n",
+    }
+    with pytest.raises(MoveRefused, match=r": emc_error: bad status from EMC$"):
+        await driver.move(TARGET)
+
+
+async def test_control_that_another_client_took_is_not_taken_back_unasked(play):
+    driver = await play.opened(
+        [
+            (MDI, b"SET MDI NAK\n\r"),
+            ("get enable", b"ENABLE OFF\r\n"),
+            (MDI, b"SET MDI NAK\n\r"),
+            ("get enable", b"ENABLE OFF\r\n"),
+        ]
+    )
+    for _ in range(2):
+        with pytest.raises(MoveRefused, match=r"another client has taken control of it\. See that nobody"):
+            await driver.move(TARGET)
+
+
+async def test_a_pose_that_is_none_is_not_sent(play):
+    driver = await play.opened([])
+    with pytest.raises(MoveRefused, match="a coordinate is not a finite number"):
+        await driver.move(Pose(float("nan"), 0, 0))
+
+
+async def test_a_move_that_takes_too_long_is_stopped_and_its_late_answer_is_not_mistaken(play):
+    stopped = asyncio.Event()
+    driver = await play.opened(
+        [
+            (MDI, stopped, ACK),
+            AGAIN_IN_CONTROL,
+            ("get joint_pos", b"JOINT_POS 1 2 3 4 5 6\r\n"),
+        ],
+        [*play.GREETING, ("set abort", b"SET ABORT ACK\n\r"), *play.STOPPING[-3:]],
+        move_timeout_s=0.03,
+    )
+    with pytest.raises(MotionInterrupted, match=r"still moving after 0\.03 s and was stopped"):
+        await driver.move(TARGET)
+    stopped.set()
+    assert await driver.joint_positions() == (1.0, 2.0, 3.0, 4.0, 5.0, 6.0)
+
+
+async def test_a_line_that_breaks_in_mid_move_stops_the_machine(play):
+    driver = await play.opened([(MDI, play.HANG_UP)], play.STOPPING)
+    with pytest.raises(ConnectionLost, match="closed the connection"):
+        await driver.move(TARGET)
+
+
+async def test_a_controller_that_dies_in_mid_move_asks_for_the_emergency_stop(play):
+    driver = await play.opened([(MDI, play.HANG_UP)], *[[("hello EMC hexacell 1.0", play.HANG_UP)]] * 3)
+    with pytest.raises(
+        DeviceError, match=r"could not be stopped: it closed the connection\. Press the emer"
+    ):
+        await driver.move(TARGET)

@@ -1,0 +1,228 @@
+"""Opening: who answers, and what is said when it is not the one that was meant."""
+
+from __future__ import annotations
+
+import asyncio
+import socket
+
+import pytest
+
+from drivers.controllers.errors import AnswerOverdue, ConnectionLost
+from drivers.controllers.linuxcnc.controller import LinuxcncrshController
+from drivers.controllers.linuxcnc.settings import Timeouts
+from drivers.interfaces import DeviceIdentity
+from drivers.wire_trace import WireTrace
+from hexacell.cell.devices import ControllerSettings
+from hexacell.errors import DeviceError, ExitCode, UsageError
+
+HELLO = "hello EMC hexacell 1.0"
+
+
+async def test_opening_greets_takes_control_and_orders_nothing_else(play):
+    driver = await play.driver(play.OPENING)
+    identity = await driver.open()
+    name = f"controller 127.0.0.1:{play.servers[0].port}"
+    assert identity == DeviceIdentity(name, "linuxcncrsh", "EMCNETSVR 1.1, machine.ini")
+
+
+async def test_opening_twice_is_harmless(play):
+    driver = await play.opened([("get inifile", b"GET INIFILE NAK\r\n\r\n")] * 2)
+    assert (await driver.open()).description == "EMCNETSVR 1.1"
+
+
+async def test_the_dialect_of_2_10(play):
+    driver = await play.driver(
+        [
+            (
+                HELLO,
+                b"warning: Requested version '1.0' is newer than '0.9'\r\nHELLO ACK EMCNETSVR 0.9\r\n",
+            ),
+            ("set echo off", b"set echo off\r\n"),
+            ("set verbose on", b"SET VERBOSE ACK\r\n"),
+            ("set enable EMCTOO", b"SET ENABLE ACK\r\n"),
+            ("set set_wait done", b"error: Subcommand not found: SET set_wait\r\nSET NAK\r\n"),
+            ("get enable", b"ENABLE ON\r\n"),
+            ("get error", b"ERROR OK\r\n"),
+            ("set wait_mode done", b"SET WAIT_MODE ACK\r\n"),
+            ("get inifile", b"INIFILE /a/b.ini\r\n"),
+        ]
+    )
+    assert (await driver.open()).description == "EMCNETSVR 0.9, b.ini"
+
+
+async def test_a_server_without_echo_and_with_the_alias(play):
+    driver = await play.driver(
+        [
+            (HELLO, b"\r\n\r\nHELLO ACK EMCNETSVR 1.1\n\r"),
+            ("set echo off", play.SILENCE),
+            ("set verbose on", b"\r\nSET VERBOSE ACK\r\n"),
+            ("set enable EMCTOO", b"SET ENABLE ACK\r\n"),
+            ("set set_wait done", b"SET WAIT_MODE ACK\r\n"),
+            ("get inifile", b"GET INIFILE NAK\r\n\r\n"),
+            ("get inifile", b"GET INIFILE NAK\r\n\r\n"),
+        ]
+    )
+    assert (await driver.open()).description == "EMCNETSVR 1.1"
+
+
+async def test_answers_that_come_in_pieces(play):
+    gap = asyncio.Event()
+    driver = await play.opened([("get joint_pos", b"JOINT_POS 1 2 3 ", gap, b"4 5 6\r\n")])
+    asking = asyncio.create_task(driver.joint_positions())
+    await asyncio.sleep(0.01)
+    gap.set()
+    assert await asking == (1.0, 2.0, 3.0, 4.0, 5.0, 6.0)
+
+
+@pytest.mark.parametrize(
+    ("said", "problem"),
+    [
+        (b"HELLO NAK\r\n", "refuses the connect password"),
+        (b"SSH-2.0-OpenSSH_9.2p1\r\n", "is no linuxcncrsh, it says 'SSH-2.0-OpenSSH_9.2p1'"),
+        (b"HTTP/1.1 400 Bad Request\r\nServer: x\r\n", "it says 'HTTP/1.1 400 Bad Request'"),
+        (b"login: ", "is no linuxcncrsh, it says 'login:'"),
+        (b"\xff\xfd\x18" * 1000, "is no linuxcncrsh, it says"),
+    ],
+)
+async def test_another_answer_is_shown(play, said, problem):
+    play.patience = play.IMPATIENT
+    driver = await play.driver([(HELLO, said)])
+    with pytest.raises(DeviceError, match=problem) as caught:
+        await driver.open()
+    assert not isinstance(caught.value, ConnectionLost)
+    assert f"127.0.0.1:{play.servers[0].port}" in str(caught.value)
+    assert len(str(caught.value)) < 400
+    assert caught.value.exit_code is ExitCode.HARDWARE
+
+
+async def test_a_wrong_enable_password(play):
+    driver = await play.driver(
+        [
+            *play.GREETING[:3],
+            ("set enable sesame", b"SET ENABLE NAK\n\r"),
+        ],
+        enable_password="sesame",
+    )
+    with pytest.raises(DeviceError, match="refuses the enable password") as caught:
+        await driver.open()
+    assert "sesame" not in str(caught.value)
+
+
+async def test_nothing_listens():
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        port = taken.getsockname()[1]
+        driver = LinuxcncrshController(ControllerSettings(config="x", port=port))
+        with pytest.raises(
+            ConnectionLost, match=f"127.0.0.1:{port}: cannot be reached: Connection refused"
+        ):
+            await driver.open()
+
+
+async def test_a_host_that_does_not_exist(monkeypatch):
+    async def fail(*_where: object) -> None:
+        raise socket.gaierror(socket.EAI_NONAME, "Name or service not known")
+
+    monkeypatch.setattr(asyncio, "open_connection", fail)
+    driver = LinuxcncrshController(ControllerSettings(config="x", host="nowhere", port=5007))
+    with pytest.raises(ConnectionLost, match="nowhere:5007: cannot be reached: Name or service not known"):
+        await driver.open()
+
+
+async def test_a_host_that_takes_no_notice(monkeypatch):
+    monkeypatch.setattr(asyncio, "open_connection", lambda *_where: asyncio.sleep(60))
+    settings = ControllerSettings(config="x", host="far", port=5007)
+    driver = LinuxcncrshController(settings, patience=Timeouts(connect=0.01))
+    with pytest.raises(ConnectionLost, match=r"far:5007: cannot be reached within 0\.01 s"):
+        await driver.open()
+
+
+async def test_a_mute_server(play):
+    play.patience = play.IMPATIENT
+    driver = await play.driver([(HELLO, play.SILENCE)])
+    with pytest.raises(AnswerOverdue, match="takes the connection but says nothing"):
+        await driver.open()
+
+
+async def test_a_server_that_falls_silent_while_greeting_is_no_reason_to_wait_for_ever(play):
+    play.patience = play.IMPATIENT
+    driver = await play.driver([*play.GREETING[:2], ("set verbose on", play.SILENCE)])
+    with pytest.raises(AnswerOverdue, match=r"did not answer 'set verbose' within 0\.4 s"):
+        await driver.open()
+
+
+async def test_a_server_that_hangs_up(play):
+    driver = await play.driver([(HELLO, play.HANG_UP)])
+    with pytest.raises(ConnectionLost, match="closed the connection"):
+        await driver.open()
+
+
+async def test_a_failed_opening_can_be_repeated_and_leaves_it_closed(play):
+    driver = await play.driver([(HELLO, play.HANG_UP)], play.OPENING)
+    with pytest.raises(ConnectionLost):
+        await driver.open()
+    with pytest.raises(DeviceError, match="is not connected"):
+        await driver.pose()
+    await driver.open()
+
+
+async def test_a_cell_file_without_a_port():
+    with pytest.raises(UsageError, match="names no controller port"):
+        LinuxcncrshController(ControllerSettings(config="x"))
+
+
+async def test_a_password_that_would_overrun_the_servers_buffer_is_not_sent(play):
+    driver = await play.driver([], connect_password="x" * 300)
+    with pytest.raises(UsageError, match="longer than the 255"):
+        await driver.open()
+
+
+async def test_closing_twice_and_without_opening(play):
+    driver = await play.opened([])
+    await driver.close()
+    await driver.close()
+    with pytest.raises(DeviceError, match="is not connected"):
+        await driver.joint_positions()
+
+
+async def test_a_cancelled_opening_leaves_nothing_behind(play):
+    driver = await play.driver([*play.GREETING[:2], ("set verbose on", play.SILENCE)])
+    opening = asyncio.create_task(driver.open())
+    await asyncio.sleep(0.02)
+    opening.cancel()
+    with pytest.raises(asyncio.CancelledError):
+        await opening
+
+
+async def test_closing_while_it_connects(play):
+    greeted = asyncio.Event()
+    driver = await play.driver(
+        [*play.GREETING[:2], ("set verbose on", greeted, b"SET VERBOSE ACK\n\r"), *play.OPENING[3:5]]
+    )
+    opening = asyncio.create_task(driver.open())
+    await asyncio.sleep(0.02)
+    await driver.close()
+    greeted.set()
+    with pytest.raises(DeviceError, match="is not connected"):
+        await opening
+
+
+async def test_passwords_stay_out_of_the_trace(play):
+    trace = WireTrace()
+    driver = await play.driver(
+        [
+            ("hello knock hexacell 1.0", b"HELLO ACK EMCNETSVR 1.1\r\n"),
+            *play.GREETING[1:3],
+            ("set enable sesame", b"SET ENABLE ACK\n\r"),
+            *play.OPENING[4:],
+        ],
+        trace=trace,
+        connect_password="knock",
+        enable_password="sesame",
+    )
+    await driver.open()
+    sent = b"".join(entry.data for entry in trace.entries() if entry.direction == ">")
+    assert sent.startswith(
+        b"hello *** hexacell 1.0\r\nset echo off\r\nset verbose on\r\nset enable ***\r\n"
+    )
+    assert "machine.ini" in trace.text()

@@ -1,0 +1,147 @@
+"""The language of linuxcncrsh, without a line."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from drivers.controllers.linuxcnc.protocol import (
+    Answer,
+    LineBuffer,
+    answer_in,
+    encode,
+    explanation_in,
+    parse_homed,
+    parse_pose,
+    parse_positions,
+    pose_difference,
+    rapid_move,
+)
+from hexacell.kinematics.pose import Pose
+
+WORDS = st.text(st.characters(min_codepoint=33, max_codepoint=126), min_size=1)
+LINE_ENDS = st.sampled_from([b"\r\n", b"\n\r", b"\n", b"\r", b"\r\n\r\n", b"\n\r\r\n"])
+COORDINATES = st.floats(-1e6, 1e6)
+
+
+@given(st.lists(st.tuples(WORDS, LINE_ENDS)), st.data())
+def test_lines_come_out_whatever_ends_them_and_however_they_are_cut(lines, data):
+    stream = b"".join(line.encode() + end for line, end in lines)
+    cuts = sorted(data.draw(st.lists(st.integers(0, len(stream)))))
+    buffer = LineBuffer()
+    found = []
+    for start, end in zip([0, *cuts], [*cuts, len(stream)], strict=True):
+        found += buffer.feed(stream[start:end])
+    assert found == [line for line, _ in lines]
+    assert buffer.rest == ""
+
+
+def test_what_has_no_line_end_yet_is_kept():
+    buffer = LineBuffer()
+    assert buffer.feed(b"login: ") == []
+    assert buffer.rest == "login:"
+
+
+def test_bytes_that_are_no_text_do_not_raise():
+    assert LineBuffer().feed(b"\xff\xfe\x00\r\n") == ["\ufffd\ufffd\x00"]
+
+
+@given(st.text())
+def test_an_encoded_command_fits_the_server_and_is_one_line(command):
+    try:
+        line = encode(command)
+    except ValueError:
+        assert len(command.encode()) > 253 or "\r" in command or "\n" in command
+    else:
+        assert len(line) <= 255
+        assert line.endswith(b"\r\n")
+        assert line.count(b"\n") == line.count(b"\r") == 1
+
+
+def test_the_longest_command():
+    assert len(encode("x" * 253)) == 255
+    with pytest.raises(ValueError, match="256 bytes is longer than the 255"):
+        encode("x" * 254)
+
+
+def test_a_rapid_move_word_for_word():
+    pose = Pose(10.0, -20.5, 560.123456789, 5.0, -4.0, 3.0)
+    assert rapid_move(pose) == (
+        "G0 X10.00000000 Y-20.50000000 Z560.12345679 A5.00000000 B-4.00000000 C3.00000000"
+    )
+
+
+@given(st.builds(Pose, *[COORDINATES] * 6))
+def test_a_rapid_move_says_the_pose_to_a_millionth_and_fits_a_line(pose):
+    letters, values = zip(*((word[0], float(word[1:])) for word in rapid_move(pose).split()), strict=True)
+    assert "".join(letters) == "GXYZABC"
+    assert values[1:] == pytest.approx(pose.as_tuple(), abs=1e-7)
+    encode(f"set mdi {rapid_move(pose)}")
+
+
+@pytest.mark.parametrize("value", [float("nan"), float("inf"), float("-inf")])
+def test_a_pose_that_is_none_is_not_sent(value):
+    with pytest.raises(ValueError, match="not a finite number"):
+        rapid_move(Pose(0.0, 0.0, 500.0, 0.0, value, 0.0))
+
+
+@pytest.mark.parametrize(
+    ("line", "command", "answer"),
+    [
+        ("SET MDI ACK", "set mdi G0 X1", Answer(accepted=True)),
+        ("SET MDI NAK", "set mdi G0 X1", Answer(accepted=False)),
+        ("SET NAK", "set mdi G0 X1", Answer(accepted=False)),
+        ("SET WAIT_MODE ACK", "set set_wait done", Answer(accepted=True)),
+        ("SET MODE ACK", "set mdi G0 X1", None),
+        ("set mdi G0 X1", "set mdi G0 X1", None),
+        ("MDI ACK", "set mdi G0 X1", None),
+        ("GET MDI NAK", "set mdi G0 X1", None),
+        ("ESTOP ON", "get estop", Answer(accepted=True, text="ON")),
+        ("ERROR OK", "get error", Answer(accepted=True, text="OK")),
+        ("ERROR", "get error", Answer(accepted=True, text="")),
+        ("ERROR a  b NAK", "get error", Answer(accepted=True, text="a  b NAK")),
+        ("error: no", "get error", None),
+        ("GET FOO NAK", "get foo", Answer(accepted=False)),
+        ("GET NAK", "get foo", Answer(accepted=False)),
+        ("JOINT_POS 1 2 3 4 5 6", "get abs_act_pos", None),
+        ("get estop", "get estop", None),
+        ("SET ESTOP ACK", "get estop", None),
+    ],
+)
+def test_what_answers_what(line, command, answer):
+    assert answer_in(line, command) == answer
+
+
+def test_explanations_are_told_from_answers():
+    assert explanation_in("error: Machine must be 'ON' for SET MDI") == "Machine must be 'ON' for SET MDI"
+    assert explanation_in("ERROR OK") == ""
+    assert explanation_in("warning: newer") == ""
+
+
+def test_positions_beyond_the_sixth_belong_to_other_axes():
+    assert parse_positions("1 -2 3.5 4 5 6 7 8") == (1.0, -2.0, 3.5, 4.0, 5.0, 6.0)
+
+
+def test_a_negative_zero_is_zero():
+    assert str(parse_pose("-0.000000 0 0 0 -0.0 0").x) == "0.0"
+
+
+@given(st.text() | st.lists(st.floats().map(str)).map(" ".join))
+def test_positions_are_six_finite_numbers_or_refused(text):
+    try:
+        positions = parse_positions(text)
+    except ValueError:
+        return
+    assert len(positions) == 6
+    assert all(abs(position) < float("inf") for position in positions)
+
+
+def test_homed_joints():
+    assert parse_homed("YES NO yes") == (True, False, True)
+    assert parse_homed("") == ()
+
+
+def test_apart_ignores_full_turns_and_keeps_the_worst():
+    one, other = Pose(1, 2, 3, 180.0, 0.1, 0), Pose(1, 2.5, 2, -180.0, -0.2, 0)
+    assert pose_difference(one, other) == pytest.approx((1.0, 0.3))

@@ -1,0 +1,180 @@
+"""How the machine is, asked over a second connection while the first one waits for a move."""
+
+from __future__ import annotations
+
+import asyncio
+
+import pytest
+
+from drivers.controllers.errors import MotionInterrupted
+from drivers.controllers.linuxcnc.send_arbiter import PARSED_S, SendArbiter
+from drivers.interfaces import ControllerStatus
+from hexacell.errors import DeviceError
+from hexacell.kinematics.pose import Pose
+
+GREETING = [
+    ("hello EMC hexacell 1.0", b"HELLO ACK EMCNETSVR 1.1\r\n"),
+    ("set echo off", b"set echo off\r\n"),
+    ("set verbose on", b"SET VERBOSE ACK\n\r"),
+]
+"""Whoever only looks on does not take control."""
+
+
+def asked(*, estop: str = "OFF", machine: str = "ON") -> list[tuple[str, bytes]]:
+    return [
+        ("get estop", f"ESTOP {estop}\r\n".encode()),
+        ("get machine", f"MACHINE {machine}\r\n".encode()),
+    ]
+
+
+ON = ControllerStatus(estop=False, enabled=True)
+ERROR_OK = ("get error", b"ERROR OK\r\n")
+
+
+async def test_it_looks_on_without_taking_control(play) -> None:
+    driver = await play.opened([], [*GREETING, *asked(), *asked()])
+    assert await driver.status() == ON
+    assert await driver.status() == ON
+    assert play.servers[0].connections == 2
+
+
+async def test_a_machine_that_went_off_is_asked_why(play) -> None:
+    off = asked(estop="OFF", machine="OFF")
+    lagging = ("get error", b"ERROR joint 3 following error\r\n")
+    driver = await play.opened([], [*GREETING, *asked(), *off, lagging, ERROR_OK, *off, ERROR_OK])
+    assert await driver.status() == ON
+    for _ in range(2):
+        status = await driver.status()
+        assert status == ControllerStatus(False, False, ("joint 3 following error",))
+        assert not status.may_move
+
+
+async def test_complaints_of_a_machine_that_was_never_on_are_left_to_who_switches_it_on(play) -> None:
+    driver = await play.opened([], [*GREETING, *asked(estop="ON", machine="OFF")])
+    assert await driver.status() == ControllerStatus(estop=True, enabled=False)
+
+
+async def test_it_is_answered_while_a_move_is_under_way(play) -> None:
+    arrived = asyncio.Event()
+    there = b"ABS_ACT_POS 1.000000 2.000000 3.000000 0.000000 0.000000 0.000000\r\n"
+    block = "set mdi G0 X1.00000000 Y2.00000000 Z3.00000000 A0.00000000 B0.00000000 C0.00000000"
+    main = [(block, arrived, b"SET MDI ACK\n\r"), ("get abs_act_pos", there)]
+    driver = await play.opened(main, [*GREETING, *asked()])
+    moving = asyncio.create_task(driver.move(Pose(1.0, 2.0, 3.0)))
+    await asyncio.sleep(0.05)
+    assert await asyncio.wait_for(driver.status(), 1.0) == ON
+    assert not moving.done()
+    arrived.set()
+    await moving
+
+
+async def test_stopping_takes_the_connection_that_looks_on(play) -> None:
+    stopping = [("set enable EMCTOO", b"SET ENABLE ACK\n\r"), ("set abort", b"SET ABORT ACK\n\r")]
+    still = [("get abs_act_pos", play.AT_REST)] * 3
+    driver = await play.opened([], [*GREETING, *asked(), *stopping, *still])
+    await driver.status()
+    await driver.stop()
+    assert play.servers[0].connections == 2, "no time is lost on opening a third one"
+
+
+async def test_a_connection_that_died_does_not_keep_it_from_stopping(play) -> None:
+    driver = await play.opened(
+        [], [*GREETING, *asked(), ("set enable EMCTOO", play.HANG_UP)], play.STOPPING
+    )
+    await driver.status()
+    await driver.stop()
+
+
+async def test_a_connection_that_is_mute_does_not_keep_it_from_stopping(play) -> None:
+    driver = await play.opened(
+        [], [*GREETING, *asked(), ("set enable EMCTOO", play.SILENCE)], play.STOPPING
+    )
+    await driver.status()
+    await driver.stop()
+
+
+async def test_a_connection_that_was_cut_is_opened_anew(play) -> None:
+    driver = await play.opened([], [*GREETING, ("get estop", play.HANG_UP)], [*GREETING, *asked()])
+    with pytest.raises(DeviceError, match="closed the connection"):
+        await driver.status()
+    assert await driver.status() == ON
+
+
+async def test_after_closing_it_cannot_be_asked(play) -> None:
+    driver = await play.opened([])
+    await driver.close()
+    with pytest.raises(DeviceError, match="is not connected"):
+        await driver.status()
+
+
+async def test_it_is_silent_while_the_machine_is_being_stopped(play) -> None:
+    at_rest = asyncio.Event()
+    stopping = [*play.STOPPING[:-1], ("get abs_act_pos", at_rest, play.AT_REST)]
+    driver = await play.opened([], stopping, [*GREETING, *asked()])
+    stop = asyncio.create_task(driver.stop())
+    await asyncio.sleep(0.05)
+    looking = asyncio.create_task(driver.status())
+    await asyncio.sleep(0.05)
+    assert play.servers[0].connections == 2
+    at_rest.set()
+    await stop
+    assert await looking == ON
+
+
+async def test_two_never_speak_at_once_but_a_long_order_keeps_nobody_waiting() -> None:
+    floor = SendArbiter()
+    said: list[str] = []
+
+    async def order() -> None:
+        async with floor.taken():
+            said.append("order")
+            await asyncio.sleep(10 * PARSED_S)
+            said.append("order done")
+
+    async def question() -> None:
+        async with floor.taken():
+            said.append("question")
+
+    await asyncio.gather(order(), question())
+    assert said == ["order", "question", "order done"]
+
+
+async def test_whoever_keeps_the_floor_keeps_it() -> None:
+    floor = SendArbiter()
+    said: list[str] = []
+
+    async def opening() -> None:
+        async with floor.kept():
+            await asyncio.sleep(3 * PARSED_S)
+            said.append("opened")
+
+    async def question() -> None:
+        async with floor.taken():
+            said.append("question")
+
+    await asyncio.gather(opening(), question())
+    assert said == ["opened", "question"]
+
+
+async def test_a_stop_that_came_while_it_moved_is_told_by_the_move(play) -> None:
+    """The order that was under way fails by itself; the watch over it needs no second stop."""
+    stopped = asyncio.Event()
+    block = "set mdi G0 X1.00000000 Y2.00000000 Z3.00000000 A0.00000000 B0.00000000 C0.00000000"
+    main = [(block, stopped, b"SET MDI ACK\n\r"), ("get abs_act_pos", play.AT_REST)]
+    driver = await play.opened(
+        main,
+        [
+            *GREETING,
+            *asked(),
+            ("set enable EMCTOO", b"SET ENABLE ACK\n\r"),
+            ("set abort", b"SET ABORT ACK\n\r"),
+            *[("get abs_act_pos", play.AT_REST)] * 3,
+        ],
+    )
+    await driver.status()
+    moving = asyncio.create_task(driver.move(Pose(1.0, 2.0, 3.0)))
+    await asyncio.sleep(0.05)
+    await driver.stop()
+    stopped.set()
+    with pytest.raises(MotionInterrupted, match="it was told to"):
+        await moving

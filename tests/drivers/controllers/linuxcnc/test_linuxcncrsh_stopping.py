@@ -1,0 +1,153 @@
+"""Stopping: over a connection of its own, until the machine stands."""
+
+from __future__ import annotations
+
+import asyncio
+
+import pytest
+
+from drivers.controllers.errors import MotionInterrupted
+from hexacell.errors import DeviceError
+from tests.drivers.controllers.linuxcnc.motion_dialogue import (
+    ACK,
+    AGAIN_IN_CONTROL,
+    ARRIVED,
+    HALF_WAY,
+    MDI,
+    TARGET,
+)
+
+
+async def test_stopping_goes_over_a_second_connection_while_the_first_is_mute(play):
+    aborted = asyncio.Event()
+    driver = await play.opened(
+        [
+            (MDI, aborted, ACK),
+            ("get abs_act_pos", HALF_WAY),
+            AGAIN_IN_CONTROL,
+            (MDI, ACK),
+            ("get abs_act_pos", ARRIVED),
+        ],
+        [*play.GREETING, ("set abort", b"SET ABORT ACK\n\r"), *[("get abs_act_pos", HALF_WAY)] * 3],
+    )
+    moving = asyncio.create_task(driver.move(TARGET))
+    await asyncio.sleep(0.01)
+    await driver.stop()
+    aborted.set()
+    with pytest.raises(MotionInterrupted, match=r"stopped at X5\.000 .*: it was told to"):
+        await moving
+    await driver.move(TARGET)
+
+
+async def test_one_client_is_silent_while_the_other_speaks(play):
+    """LinuxCNC 2.9 garbles commands of two clients that coincide."""
+    speak = asyncio.Event()
+    driver = await play.opened(
+        [(MDI, ACK), ("get abs_act_pos", HALF_WAY)],
+        [*play.GREETING, ("set abort", speak, b"SET ABORT ACK\n\r"), *play.STOPPING[-3:]],
+    )
+    moving = asyncio.create_task(driver.move(TARGET))
+    await asyncio.sleep(0)
+    stopping = asyncio.create_task(driver.stop())
+    await asyncio.sleep(0.05)
+    silent_so_far = not moving.done()
+    speak.set()
+    await stopping
+    with pytest.raises(MotionInterrupted):
+        await moving
+    assert silent_so_far
+
+
+async def test_stopping_aborts_again_while_it_still_moves(play):
+    moving = [b"ABS_ACT_POS %d 0 0 0 0 0\r\n" % n for n in range(1, 4)]
+    driver = await play.opened(
+        [],
+        [
+            *play.GREETING,
+            ("set abort", b"SET ABORT ACK\n\r"),
+            ("get abs_act_pos", moving[0]),
+            ("get abs_act_pos", moving[1]),
+            AGAIN_IN_CONTROL,
+            ("set abort", b"SET ABORT ACK\n\r"),
+            ("get abs_act_pos", moving[2]),
+            ("get abs_act_pos", moving[2]),
+            ("get abs_act_pos", moving[2]),
+        ],
+    )
+    await driver.stop()
+
+
+async def test_a_machine_that_is_off_refuses_to_abort_and_stands(play):
+    driver = await play.opened(
+        [], [*play.GREETING, ("set abort", b"SET ABORT NAK\n\r"), *[("get abs_act_pos", play.AT_REST)] * 3]
+    )
+    await driver.stop()
+
+
+async def test_a_machine_that_does_not_stop(play):
+    play.patience = play.IMPATIENT
+    driver = await play.opened([], play.GREETING)
+    play.servers[0].afterwards = {
+        "set enable EMCTOO": b"SET ENABLE ACK\n\r",
+        "set abort": b"SET ABORT ACK\n\r",
+        "get abs_act_pos": [f"ABS_ACT_POS {n} 0 0 0 0 0\r\n".encode() for n in range(100_000)],
+    }
+    with pytest.raises(DeviceError, match=r"does not stand still 0\.6 s after .*Press the emergency stop"):
+        await driver.stop()
+
+
+async def test_stopping_tries_again_what_another_clients_command_garbled(play):
+    driver = await play.opened([], [("hello EMC hexacell 1.0", b"HELLO NAK\r\n")], play.STOPPING)
+    await driver.stop()
+
+
+async def test_stopping_without_a_connection_works_all_the_same(play):
+    driver = await play.driver(play.STOPPING)
+    await driver.stop()
+
+
+async def test_two_stops_at_once_do_not_disturb_each_other(play):
+    speak = asyncio.Event()
+    first = [*play.GREETING, ("set abort", speak, b"SET ABORT ACK\n\r"), *play.STOPPING[-3:]]
+    driver = await play.opened([], first, play.STOPPING)
+    stopping = [asyncio.create_task(driver.stop()) for _ in range(2)]
+    await asyncio.sleep(0.03)
+    connections_so_far = play.servers[0].connections
+    speak.set()
+    await asyncio.gather(*stopping)
+    assert connections_so_far == 2
+
+
+async def test_nothing_is_connected_to_again_while_a_stop_is_under_way(play):
+    speak = asyncio.Event()
+    joints = ("get joint_pos", b"JOINT_POS 1 2 3 4 5 6\r\n")
+    driver = await play.opened(
+        [(*joints, play.HANG_UP)],
+        [*play.GREETING, ("set abort", speak, b"SET ABORT ACK\n\r"), *play.STOPPING[-3:]],
+        [*play.OPENING[:-1], joints],
+    )
+    await driver.joint_positions()
+    stopping = asyncio.create_task(driver.stop())
+    asking = asyncio.create_task(driver.joint_positions())
+    await asyncio.sleep(0.03)
+    connections_so_far = play.servers[0].connections
+    speak.set()
+    await asyncio.gather(stopping, asking)
+    assert connections_so_far == 2
+
+
+async def test_a_move_that_waits_for_its_turn_is_not_begun_after_a_stop(play):
+    answer = asyncio.Event()
+    driver = await play.opened(
+        [("get joint_pos", answer, b"JOINT_POS 1 2 3 4 5 6\r\n"), AGAIN_IN_CONTROL], play.STOPPING
+    )
+    asking = asyncio.create_task(driver.joint_positions())
+    moving = asyncio.create_task(driver.move(TARGET))
+    await asyncio.sleep(0.01)
+    stopping = asyncio.create_task(driver.stop())
+    await asyncio.sleep(0.01)
+    answer.set()
+    await asking
+    with pytest.raises(MotionInterrupted, match="was stopped before it moved"):
+        await moving
+    await stopping

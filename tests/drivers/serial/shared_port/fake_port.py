@@ -1,0 +1,66 @@
+"""A serial port that delivers what it is told to, and links that lead to it."""
+
+import asyncio
+import threading
+import time
+
+from drivers.serial.shared_port import SharedSerialPort
+
+WORST_LATENCY_S = 0.3
+SOON_S = 0.05
+LONG_S = 30.0
+SLICE_S = 0.005
+
+
+class FakePort:
+    """Delivers what ``answer`` says for each question, each part after its delay."""
+
+    def __init__(self, answer=lambda request: [(0.0, b"+1.234\r")]):
+        self.is_open = False
+        self.asked = []
+        self.due = []
+        self.broken = None
+        self.threads = set()
+        self.written = threading.Event()
+        self._answer = answer
+
+    def open(self):
+        self.is_open = True
+
+    def close(self):
+        self.is_open = False
+
+    @property
+    def in_waiting(self):
+        self._fail()
+        return sum(len(data) for due, data in self.due if due <= time.monotonic())
+
+    def read(self, size):
+        self._fail()
+        if not self.in_waiting:
+            time.sleep(SLICE_S)
+        here = b"".join(data for due, data in self.due if due <= time.monotonic())
+        later = [(due, data) for due, data in self.due if due > time.monotonic()]
+        self.due = [(0.0, here[size:])] * bool(here[size:]) + later
+        return here[:size]
+
+    def write(self, request):
+        self._fail()
+        self.threads.add(threading.current_thread().name)
+        self.asked.append(request)
+        self.due += [(time.monotonic() + delay, data) for delay, data in self._answer(request)]
+        self.written.set()
+
+    def _fail(self):
+        if self.broken is not None:
+            raise self.broken
+
+
+async def opened(url="fake", **settings):
+    link = SharedSerialPort(url, worst_latency_s=WORST_LATENCY_S, **settings)
+    await link.open()
+    return link
+
+
+async def written(port):
+    await asyncio.to_thread(port.written.wait, LONG_S)

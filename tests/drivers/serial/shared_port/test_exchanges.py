@@ -1,0 +1,150 @@
+"""Questions and answers stay in step, whatever comes late, unasked or not at all."""
+
+import asyncio
+import time
+
+import pytest
+import serial
+
+from drivers.serial.port import FRAME_LIMIT, NoAnswer
+from drivers.serial.shared_port import SharedSerialPort
+from drivers.wire_trace import Direction, WireTrace
+from hexacell.errors import DeviceError
+from tests.drivers.serial.shared_port.fake_port import LONG_S, SOON_S, WORST_LATENCY_S, FakePort, opened
+
+
+async def test_an_answer_comes_back_whole_and_from_one_thread(fake):
+    port = fake(FakePort(lambda _: [(0.0, b"+1."), (0.01, b"234"), (0.02, b"\r")]))
+    link = await opened()
+    assert await link.exchange(b"?\r", b"\r", LONG_S) == b"+1.234\r"
+    assert await link.exchange(b"?\r", b"\r", LONG_S) == b"+1.234\r"
+    await link.close()
+    assert port.threads == {"serial fake_0"}
+    assert not port.is_open
+
+
+async def test_what_came_is_told_when_no_answer_does(fake):
+    fake(FakePort(lambda _: [(0.0, b"+1.2")]))
+    link = await opened()
+    with pytest.raises(NoAnswer, match=r"no answer within 0\.05 s") as caught:
+        await link.exchange(b"?\r", b"\r", SOON_S)
+    assert caught.value.received == b"+1.2"
+    await link.close()
+
+
+@pytest.mark.parametrize("sent", [True, False])
+async def test_a_write_that_took_too_long_is_judged_by_its_answer(fake, sent):
+    """A busy machine may be late to notice that it has sent; the port is not lost by that."""
+    port = fake(FakePort())
+    real = port.write
+
+    def write(request):
+        if sent:
+            real(request)
+        raise serial.SerialTimeoutException("Write timeout")
+
+    port.write = write
+    link = await opened()
+    if sent:
+        assert await link.exchange(b"?\r", b"\r", LONG_S) == b"+1.234\r"
+    else:
+        with pytest.raises(NoAnswer):
+            await link.exchange(b"?\r", b"\r", SOON_S)
+    assert port.is_open
+    await link.close()
+
+
+async def test_a_late_answer_is_never_the_answer_to_the_next_question(fake):
+    answers = iter([[(3 * SOON_S, b"late\r")], [(0.0, b"second\r")], [(0.0, b"third\r")]])
+    fake(FakePort(lambda _: next(answers)))
+    link = await opened()
+    with pytest.raises(NoAnswer):
+        await link.exchange(b"1\r", b"\r", SOON_S)
+    assert await link.exchange(b"2\r", b"\r", LONG_S) == b"second\r"
+    assert link.take_strays() == b"late\r"
+    assert await link.exchange(b"3\r", b"\r", LONG_S) == b"third\r"
+    await link.close()
+
+
+async def test_nothing_is_asked_until_a_late_answer_has_had_its_time(fake):
+    port = fake(FakePort(lambda request: [] if request == b"1\r" else [(0.0, b"b\r")]))
+    link = await opened()
+    with pytest.raises(NoAnswer):
+        await link.exchange(b"1\r", b"\r", SOON_S)
+    began = time.monotonic()
+    await link.exchange(b"2\r", b"\r", LONG_S)
+    assert time.monotonic() - began > WORST_LATENCY_S - 2 * SOON_S
+    assert port.asked == [b"1\r", b"2\r"]
+    await link.close()
+
+
+async def test_what_nobody_asked_for_is_put_aside(fake):
+    port = fake(FakePort(lambda _: [(0.0, b"answer\r")]))
+    link = await opened()
+    port.due = [(0.0, b"SY276.1\r"), (time.monotonic() + SOON_S, b"more\r")]
+    assert await link.exchange(b"?\r", b"\r", LONG_S) == b"answer\r"
+    assert link.take_strays() == b"SY276.1\rmore\r"
+    assert link.take_strays() == b""
+    await link.close()
+
+
+async def test_a_second_frame_behind_the_answer_does_not_answer_the_next_question(fake):
+    answers = iter([b"one\rkey\r", b"two\r"])
+    fake(FakePort(lambda _: [(0.0, next(answers))]))
+    link = await opened()
+    assert await link.exchange(b"?\r", b"\r", LONG_S) == b"one\r"
+    assert await link.exchange(b"?\r", b"\r", LONG_S) == b"two\r"
+    assert link.take_strays() == b"key\r"
+    await link.close()
+
+
+async def test_a_distrusted_frame_is_followed_by_silence(fake):
+    answers = iter([[(0.0, b"gar\r"), (0.02, b"bage\r")], [(0.0, b"two\r")]])
+    fake(FakePort(lambda _: next(answers)))
+    link = await opened()
+    assert await link.exchange(b"?\r", b"\r", LONG_S) == b"gar\r"
+    link.require_silence()
+    assert await link.exchange(b"?\r", b"\r", LONG_S) == b"two\r"
+    await link.close()
+
+
+async def test_a_flood_without_an_end_is_cut_off(fake):
+    fake(FakePort(lambda _: [(0.0, b"x" * (FRAME_LIMIT + 1))]))
+    link = await opened()
+    with pytest.raises(NoAnswer) as caught:
+        await link.exchange(b"?\r", b"\r", LONG_S)
+    assert len(caught.value.received) == FRAME_LIMIT + 1
+    await link.close()
+
+
+async def test_a_device_that_never_falls_silent_is_refused(fake):
+    port = fake(FakePort())
+    link = await opened()
+    now = time.monotonic()
+    port.due = [(now + number * SOON_S, b"+1.234\r") for number in range(100)]
+    await asyncio.sleep(SOON_S)
+    with pytest.raises(DeviceError, match="keeps sending unasked"):
+        await link.exchange(b"?\r", b"\r", LONG_S)
+    assert port.asked == []
+    await link.close()
+
+
+async def test_only_our_own_question_back_is_no_answer():
+    link = await opened("loop://")
+    with pytest.raises(NoAnswer) as caught:
+        await link.exchange(b"?\r", b"\r", SOON_S)
+    assert caught.value.received == b"?\r"
+    await link.close()
+
+
+async def test_every_byte_is_traced(fake):
+    trace = WireTrace()
+    fake(FakePort(lambda _: [(0.0, b"?\r+1.234\r")]))
+    link = SharedSerialPort("fake", trace=trace)
+    await link.open()
+    await link.exchange(b"?\r", b"\r", LONG_S)
+    await link.close()
+    assert [(each.line, each.direction, each.data) for each in trace.entries()] == [
+        ("fake", Direction.SENT, b"?\r"),
+        ("fake", Direction.RECEIVED, b"?\r+1.234\r"),
+    ]

@@ -1,0 +1,122 @@
+"""Every failure of a port in plain words, and a port that comes back."""
+
+import errno
+import os
+import termios
+
+import pytest
+import serial
+
+from drivers.serial.errors import cannot_open
+from drivers.serial.shared_port import SharedSerialPort
+from hexacell.errors import DeviceError, ExitCode
+from tests.drivers.serial.shared_port.fake_port import LONG_S, FakePort, opened
+
+
+async def test_an_absent_port_is_told_with_the_gauge_and_what_to_do(links):
+    link = links.acquire("/dev/absent-port", "x", {})
+    with pytest.raises(DeviceError) as caught:
+        await link.open()
+    text = "gauge x: port /dev/absent-port is absent. Plug it in or correct port in the cell file"
+    assert str(caught.value) == text
+    assert caught.value.exit_code is ExitCode.HARDWARE
+
+
+async def test_a_refused_connection_is_told():
+    link = SharedSerialPort("socket://127.0.0.1:1")
+    with pytest.raises(DeviceError, match="cannot be opened"):
+        await link.open()
+    await link.close()
+
+
+@pytest.mark.parametrize(
+    ("number", "words"),
+    [
+        (errno.ENOENT, "is absent"),
+        (errno.EACCES, "may not be opened by this user"),
+        (errno.EBUSY, "is in use"),
+        (errno.EAGAIN, "is in use"),
+        (errno.EIO, "cannot be opened"),
+    ],
+)
+def test_the_cause_is_told_in_words(number, words):
+    error = cannot_open("gauge x", "/dev/ttyUSB0", serial.SerialException(number, "reason"))
+    assert words in str(error)
+    assert error.action
+
+
+async def test_a_port_in_use_is_told():
+    near, far = os.openpty()
+    url = os.ttyname(far)
+    one, two = await opened(url, exclusive=True), SharedSerialPort(url, exclusive=True)
+    with pytest.raises(DeviceError, match="is in use"):
+        await two.open()
+    await one.close()
+    await two.close()
+    os.close(near)
+    os.close(far)
+
+
+async def test_a_pseudo_terminal_that_refuses_parity_is_told():
+    near, far = os.openpty()
+    for again in range(2):
+        link = SharedSerialPort(os.ttyname(far), bytesize=7, parity="E", stopbits=2)
+        if again:  # the open that pyserial 196 is about, and nobody resets the speed here
+            with pytest.raises(DeviceError, match="cannot be opened"):
+                await link.open()
+        else:
+            await link.open()
+        await link.close()
+    os.close(near)
+    os.close(far)
+
+
+@pytest.mark.parametrize(
+    "broken",
+    [
+        serial.SerialException("device reports readiness to read but returned no data"),
+        serial.SerialTimeoutException("Write timeout"),
+        OSError(errno.EIO, "Input/output error"),
+        termios.error(errno.EIO, "Input/output error"),
+    ],
+)
+async def test_a_port_that_breaks_is_lost_until_it_is_opened_again(fake, broken):
+    port = fake(FakePort())
+    link = await opened()
+    port.broken = broken
+    with pytest.raises(DeviceError, match="was lost") as caught:
+        await link.exchange(b"?\r", b"\r", LONG_S)
+    assert caught.value.action is not None
+    assert not port.is_open
+    port.broken = None
+    with pytest.raises(DeviceError, match="was lost"):
+        await link.exchange(b"?\r", b"\r", LONG_S)
+    assert link.session == 1
+    assert await link.open() == 2
+    assert await link.exchange(b"?\r", b"\r", LONG_S) == b"+1.234\r"
+    await link.close()
+
+
+async def test_opening_an_open_port_is_no_new_session(fake):
+    port = fake(FakePort())
+    link = await opened()
+    port.due = [(0.0, b"SY276.1\r")]
+    assert await link.open() == 1
+    assert link.take_strays() == b"SY276.1\r"
+    await link.close()
+
+
+async def test_opening_finds_out_that_an_open_port_has_died_unnoticed(fake):
+    port = fake(FakePort())
+    link = await opened()
+    port.broken = OSError(errno.EIO, "Input/output error")
+    monitor = port.close
+
+    def replug():
+        monitor()
+        port.broken = None
+
+    port.close = replug
+    assert await link.open() == 2
+    assert await link.exchange(b"?\r", b"\r", LONG_S) == b"+1.234\r"
+    await link.close()

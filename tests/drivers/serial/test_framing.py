@@ -1,0 +1,38 @@
+from hypothesis import given
+from hypothesis import strategies as st
+
+from drivers.serial.port import cut_frame
+
+plain = st.binary(max_size=20).filter(lambda data: not set(data) & set(b"\r\n"))
+ends = st.sampled_from([b"", b"\r", b"\n", b"\r\n"])
+
+
+def test_no_frame_until_it_is_whole():
+    assert cut_frame(b"", b"?\r", b"\r") is None
+    assert cut_frame(b"+1.23", b"?\r", b"\r") is None
+    assert cut_frame(b"?", b"?\r", b"\r") is None
+
+
+def test_the_echo_of_the_question_is_no_answer():
+    assert cut_frame(b"?\r", b"?\r", b"\r") is None
+    assert cut_frame(b"?\r+1.234\r", b"?\r", b"\r") == (b"+1.234\r", b"")
+    assert cut_frame(b"R\r\n+1, MM\r\n", b"R\r", b"\r\n") == (b"+1, MM\r\n", b"")
+
+
+def test_what_follows_the_frame_is_kept_apart():
+    assert cut_frame(b"\n+1.234\r\n+2.345\r", b"?\r", b"\r") == (b"+1.234\r", b"\n+2.345\r")
+
+
+@given(ends, st.booleans(), ends, plain.filter(bool), st.binary(max_size=20))
+def test_a_frame_is_found_behind_line_ends_and_echo(before, echoed, between, frame, rest):
+    echo = b"?\r" if echoed else b""
+    received = before + echo + between + frame + b"\r" + rest
+    assert cut_frame(received, b"?\r", b"\r") == (frame + b"\r", rest)
+
+
+@given(st.binary(max_size=60))
+def test_nothing_is_invented(noise):
+    cut = cut_frame(noise, b"?\r", b"\r")
+    if cut is not None:
+        assert noise.endswith(cut[0] + cut[1])
+        assert cut[0].count(b"\r") == 1

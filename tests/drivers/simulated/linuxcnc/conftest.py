@@ -1,0 +1,179 @@
+"""A machine that moves on a straight line in time, behind a simulated controller."""
+
+from __future__ import annotations
+
+import socket
+import threading
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import astuple
+
+import pytest
+
+from drivers.controllers.linuxcnc.controller import LinuxcncrshController
+from drivers.controllers.linuxcnc.settings import Timeouts
+from drivers.simulated.linuxcnc.machine import KinematicsFailure
+from drivers.simulated.linuxcnc.server import HOST, SimulatedController
+from hexacell.cell.devices import ControllerSettings
+from hexacell.errors import FileError
+from hexacell.kinematics.pose import Pose
+
+QUICK = Timeouts(poll=0.005, arrival=0.05, switch=0.05)
+
+PATIENCE_S = 20.0  # a machine under load is no controller that fails
+
+
+class FakeMachine:
+    """Joints are the pose's coordinates plus ``geometry``, which is read when it is switched on."""
+
+    def __init__(self) -> None:
+        self.duration_s = 0.01
+        self.config: float | None = 0.0
+        self.jump_mm = 0.0
+        self.deaf_to = 0
+        self.events: list[str] = []
+        self._geometry = 0.0
+        self._joints = (0.0,) * 6
+        self._stop = threading.Event()
+        self._lock = threading.Lock()
+
+    def move(self, pose: Pose) -> None:
+        if pose.z > 1000.0:
+            raise KinematicsFailure
+        self._stop.clear()
+        self.events.append("move")
+        start, begun = self._joints, time.monotonic()
+        target = [value + self._geometry for value in astuple(pose)]
+        share = 0.0
+        while share < 1.0 and not self._stop.wait(0.001):
+            share = min(1.0, (time.monotonic() - begun) / self.duration_s)
+            with self._lock:
+                self._joints = tuple(a + share * (b - a) for a, b in zip(start, target, strict=True))
+
+    def stop(self) -> None:
+        if self.deaf_to > 0:
+            self.deaf_to -= 1
+        else:
+            self._stop.set()
+
+    def wait_until(self, condition: Callable[[FakeMachine], bool]) -> None:
+        give_up = time.monotonic() + 5.0
+        while not condition(self):
+            assert time.monotonic() < give_up
+            time.sleep(0.001)
+
+    def wait_for(self, event: str) -> None:
+        self.wait_until(lambda machine: event in machine.events)
+
+    def pose(self) -> Pose:
+        return Pose(*(joint - self._geometry for joint in self.joints()))
+
+    def joints(self) -> tuple[float, ...]:
+        with self._lock:
+            return self._joints
+
+    def switch_on(self) -> None:
+        if self.config is None:
+            raise FileError("has no geometry", subject="machine.ini")
+        self.events.append("on")
+        self._geometry = self.config
+        self._joints = (self._joints[0] + self.jump_mm, *self._joints[1:])
+
+    def switch_off(self) -> None:
+        self.events.append("off")
+
+    def home(self) -> None:
+        self._stop.clear()
+        self.events.append("home")
+        self._stop.wait(self.duration_s)
+
+
+class RawClient:
+    """Says one line at a time and reads what comes until nothing has come for a moment."""
+
+    def __init__(self, port: int) -> None:
+        self._socket = socket.create_connection((HOST, port), timeout=PATIENCE_S)
+        self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+
+    def say(self, line: str, answer: bytes) -> None:
+        """Expect ``answer`` and not a byte more or less."""
+        self.send(line)
+        assert self.hear(len(answer)) == answer
+
+    def send(self, line: str) -> None:
+        self._socket.sendall(line.encode() + b"\r\n")
+
+    def hear(self, count: int) -> bytes:
+        heard = b""
+        while len(heard) < count and (data := self._socket.recv(count - len(heard))):
+            heard += data
+        return heard
+
+    def expect_silence(self) -> None:
+        self._socket.settimeout(0.03)
+        with pytest.raises(TimeoutError):
+            self._socket.recv(1)
+        self._socket.settimeout(PATIENCE_S)
+
+    def expect_end(self) -> None:
+        assert self._socket.recv(1) == b""
+
+    def greet(self) -> None:
+        self.say("hello EMC test 1.0", b"HELLO ACK EMCNETSVR 1.1\r\n")
+        self.say("set echo off", b"set echo off\r\n")
+        self.say("set verbose on", b"SET VERBOSE ACK\n\r")
+        self.say("set enable EMCTOO", b"SET ENABLE ACK\n\r")
+
+    def make_ready(self) -> None:
+        self.greet()
+        self.say("set set_wait done", b"SET SET_WAIT ACK\n\r")
+        self.say("set estop off", b"SET ESTOP ACK\n\r")
+        self.say("set machine on", b"SET MACHINE ACK\n\r")
+        self.say("set home -1", b"SET HOME ACK\n\r")
+        for _ in range(500):
+            self.send("get joint_homed")
+            if b"NO" not in self.hear(len("JOINT_HOMED NO NO NO NO NO NO\r\n")):
+                break
+        self.hear(len("YES" * 6) - len("NO" * 6))
+        self.say("set mode mdi", b"SET MODE ACK\n\r")
+
+    def close(self) -> None:
+        self._socket.close()
+
+
+@pytest.fixture
+def machine() -> FakeMachine:
+    """The machine behind ``simulated``."""
+    return FakeMachine()
+
+
+@pytest.fixture
+def simulated(machine: FakeMachine) -> Iterator[SimulatedController]:
+    """A simulated controller on a free port."""
+    with SimulatedController(machine) as server:
+        yield server
+
+
+@pytest.fixture
+def client(simulated: SimulatedController) -> Iterator[Callable[[], RawClient]]:
+    """Makes raw clients."""
+    clients = []
+
+    def connect() -> RawClient:
+        clients.append(RawClient(simulated.port))
+        return clients[-1]
+
+    yield connect
+    for made in clients:
+        made.close()
+
+
+@pytest.fixture
+def driver(simulated: SimulatedController) -> Callable[..., LinuxcncrshController]:
+    """Makes drivers for ``simulated``; keywords are controller settings."""
+
+    def make(patience: Timeouts = QUICK, **settings: object) -> LinuxcncrshController:
+        values = {"config": "machine.ini", "port": simulated.port, **settings}
+        return LinuxcncrshController(ControllerSettings.model_validate(values), patience=patience)
+
+    return make

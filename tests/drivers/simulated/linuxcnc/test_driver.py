@@ -1,0 +1,248 @@
+"""The driver and the simulated controller over a real socket: they must agree, faults included."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+
+import pytest
+
+from drivers.controllers.errors import AnswerOverdue, ConnectionLost, MotionInterrupted, MoveRefused
+from drivers.controllers.linuxcnc.settings import Timeouts
+from drivers.simulated.linuxcnc.faults import Fault
+from drivers.simulated.linuxcnc.server import SimulatedController
+from drivers.simulated.linuxcnc.state import Wait
+from hexacell.errors import DeviceError
+from hexacell.kinematics.pose import Pose
+
+TARGET = Pose(100.0, -200.0, 550.0, 12.5, -3.0, 8.0)
+HOME = Pose(0.0, 0.0, 0.0)
+LONG_S = 30.0
+
+
+@pytest.fixture
+async def ready(driver):
+    """A driver that has prepared the machine."""
+    made = driver()
+    await made.open()
+    await made.prepare()
+    yield made
+    await made.close()
+
+
+async def begin(ready, machine):
+    """A move that would last for ever, under way."""
+    machine.duration_s = LONG_S
+    machine.events.clear()
+    moving = asyncio.create_task(ready.move(TARGET))
+    await asyncio.to_thread(machine.wait_for, "move")
+    return moving
+
+
+async def test_from_emergency_stop_to_a_pose(driver, machine):
+    controller = driver()
+    try:
+        assert (await controller.open()).description == "EMCNETSVR 1.1, simulated.ini"
+        assert machine.events == []
+        await controller.prepare()
+        assert machine.events == ["on", "home"]
+        await controller.move(TARGET)
+        assert await controller.pose() == TARGET
+        assert await controller.joint_positions() == TARGET.as_tuple()
+        await controller.prepare()
+        assert machine.events == ["on", "home", "move"]
+    finally:
+        await controller.close()
+
+
+async def test_an_unprepared_machine_says_why_it_does_not_move(driver):
+    controller = driver()
+    await controller.open()
+    with pytest.raises(MoveRefused, match="it is in emergency stop"):
+        await controller.move(TARGET)
+    await controller.close()
+
+
+async def test_out_of_reach_and_on(ready):
+    with pytest.raises(MoveRefused, match="Linear move on line 0 fails kinematicsInverse"):
+        await ready.move(Pose(0.0, 0.0, 5000.0))
+    await ready.move(TARGET)
+    assert await ready.pose() == TARGET
+
+
+async def test_stopping_in_mid_move_is_quick_and_in_place(ready, machine):
+    moving = await begin(ready, machine)
+    begun = time.monotonic()
+    await ready.stop()
+    with pytest.raises(MotionInterrupted, match="it was told to"):
+        await moving
+    assert time.monotonic() - begun < 2.0
+    stood = await ready.pose()
+    assert 0.0 <= stood.x < 90.0
+    machine.duration_s = 0.01
+    await ready.move(TARGET)
+    assert await ready.pose() == TARGET
+
+
+async def test_stopping_at_once(ready, machine):
+    """The abort may overtake the move that it is meant for."""
+    machine.duration_s = LONG_S
+    moving = asyncio.create_task(ready.move(TARGET))
+    await asyncio.sleep(0)
+    await ready.stop()
+    with pytest.raises(MotionInterrupted):
+        await moving
+
+
+async def test_stopping_a_machine_that_does_not_hear_at_first(ready, machine):
+    moving = await begin(ready, machine)
+    machine.deaf_to = 2
+    await ready.stop()
+    with pytest.raises(MotionInterrupted):
+        await moving
+    assert machine.deaf_to == 0
+
+
+async def test_a_cancelled_move_stands_still_and_the_next_one_is_its_own(ready, machine):
+    moving = await begin(ready, machine)
+    moving.cancel()
+    with pytest.raises(asyncio.CancelledError):
+        await moving
+    stood = await ready.pose()
+    assert stood == await ready.pose()
+    assert stood.x < 90.0
+    machine.duration_s = 0.01
+    await ready.move(TARGET)
+
+
+async def test_a_move_that_takes_too_long(driver, machine):
+    controller = driver(move_timeout_s=0.05)
+    await controller.open()
+    await controller.prepare()
+    machine.duration_s = LONG_S
+    with pytest.raises(MotionInterrupted, match=r"still moving after 0\.05 s"):
+        await controller.move(TARGET)
+    machine.duration_s = 0.01
+    await controller.move(HOME)
+    await controller.close()
+
+
+async def test_stopping_while_homing(driver, machine):
+    machine.duration_s = LONG_S
+    controller = driver()
+    await controller.open()
+    preparing = asyncio.create_task(controller.prepare())
+    await asyncio.to_thread(machine.wait_for, "home")
+    await controller.stop()
+    with pytest.raises(MotionInterrupted, match="was stopped before it was ready"):
+        await preparing
+    machine.duration_s = 0.01
+    await controller.prepare()
+    await controller.move(TARGET)
+    await controller.close()
+
+
+async def test_an_unreachable_pose_while_another_client_waits_for_no_completion(ready, simulated):
+    """``set_wait received`` is global in 2.9: NAK becomes ACK, and only the position tells."""
+    simulated.control.answers = Wait.RECEIVED
+    with pytest.raises(MotionInterrupted, match="fails kinematicsInverse"):
+        await ready.move(Pose(0.0, 0.0, 5000.0))
+    await ready.prepare()
+    with pytest.raises(MoveRefused):
+        await ready.move(Pose(0.0, 0.0, 5000.0))
+
+
+async def test_another_client_takes_control_and_gives_it_back(ready, driver):
+    other = driver()
+    await other.open()
+    with pytest.raises(MoveRefused, match="another client has taken control"):
+        await ready.move(TARGET)
+    await ready.prepare()
+    await ready.move(TARGET)
+    await other.close()
+
+
+async def test_reloading_reads_the_config_and_moves_no_slider(ready, machine):
+    await ready.move(TARGET)
+    machine.config = 2.5
+    await ready.reload()
+    assert await ready.joint_positions() == TARGET.as_tuple()
+    assert (await ready.pose()).x == TARGET.x - 2.5
+    await ready.move(TARGET)
+    assert (await ready.joint_positions())[0] == TARGET.x + 2.5
+
+
+async def test_a_config_that_cannot_be_used(ready, machine):
+    machine.config = None
+    with pytest.raises(DeviceError, match=r"does not switch on: machine\.ini: has no geometry"):
+        await ready.reload()
+
+
+async def test_a_slider_that_jumps_when_the_machine_comes_on(ready, machine):
+    machine.jump_mm = 6.8
+    with pytest.raises(DeviceError, match=r"moved joint 1 by 6\.800 mm"):
+        await ready.reload()
+
+
+async def test_a_silent_controller(driver, simulated):
+    controller = driver(Timeouts(answer=0.3))
+    await controller.open()
+    simulated.faults.inject(Fault.SILENT)
+    with pytest.raises(AnswerOverdue, match="did not answer 'get abs_act_pos'"):
+        await controller.pose()
+    simulated.faults.clear(Fault.SILENT)
+    assert await controller.pose() == HOME
+    await controller.close()
+
+
+async def test_a_refused_password(driver, simulated):
+    simulated.faults.inject(Fault.REFUSES_PASSWORD)
+    with pytest.raises(DeviceError, match="refuses the connect password"):
+        await driver().open()
+
+
+async def test_a_refused_move(ready, simulated):
+    simulated.faults.inject(Fault.REFUSES_MOVE, times=1)
+    with pytest.raises(MoveRefused, match="joint 3 following error"):
+        await ready.move(TARGET)
+    await ready.move(TARGET)
+
+
+async def test_an_acknowledged_move_that_does_not_take_place(ready, simulated):
+    simulated.faults.inject(Fault.STAYS_PUT, times=1)
+    with pytest.raises(MotionInterrupted, match=r"stopped at X0\.000 .* on the way to X100\.000"):
+        await ready.move(TARGET)
+    await ready.move(TARGET)
+
+
+async def test_a_connection_dropped_in_mid_move(ready, simulated, machine):
+    machine.duration_s = LONG_S
+    simulated.faults.inject(Fault.DROPS_CONNECTION, times=1)
+    with pytest.raises(ConnectionLost, match="closed the connection"):
+        await ready.move(TARGET)
+    stood = await ready.pose()
+    assert stood == await ready.pose()
+    assert stood.x < 90.0
+
+
+async def test_an_emergency_stop_in_mid_move(ready, simulated, machine):
+    machine.duration_s = LONG_S
+    simulated.faults.inject(Fault.EMERGENCY_STOP, times=1)
+    with pytest.raises(MotionInterrupted, match="it is in emergency stop"):
+        await ready.move(TARGET)
+    machine.duration_s = 0.01
+    await ready.prepare()
+    await ready.move(TARGET)
+
+
+async def test_a_controller_that_goes_away(ready, simulated):
+    await asyncio.to_thread(simulated.close)
+    with pytest.raises(ConnectionLost, match="cannot be reached: Connection refused"):
+        await ready.pose()
+    with pytest.raises(DeviceError, match="could not be stopped: it cannot be reached"):
+        await ready.stop()
+
+
+async def test_one_taken_port_leaves_nothing_behind(simulated, machine):
+    with pytest.raises(OSError, match="in use"):
+        SimulatedController(machine, port=simulated.port)

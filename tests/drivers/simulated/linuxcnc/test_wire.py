@@ -1,0 +1,312 @@
+"""The simulated controller against traces of LinuxCNC 2.9.0~pre1: the same bytes."""
+
+from __future__ import annotations
+
+import pytest
+
+from drivers.simulated.linuxcnc.faults import Fault
+
+NOBODY = [
+    ("get estop", b"ESTOP ON\r\n"),
+    ("set estop off", b"SET NAK\r\n"),
+    ("hello wrong me 1.0", b"HELLO NAK\r\n"),
+    ("hello EMC", b"HELLO NAK\r\n"),
+    ("hello EMC client 1.0", b"HELLO ACK EMCNETSVR 1.1\r\n"),
+    ("set enable WRONG", b"set enable WRONG\r\nSET ENABLE NAK\n\r"),
+    ("get enable", b"get enable\r\nENABLE OFF\r\n"),
+    ("set enable EMCTOO", b"set enable EMCTOO\r\n"),
+    ("set echo off", b"set echo off\r\n"),
+    ("get echo", b"ECHO OFF\r\n"),
+    ("set verbose on", b"SET VERBOSE ACK\n\r"),
+    ("get enable", b"ENABLE ON\r\n"),
+]
+GREETED = [
+    ("get foo", b"GET FOO NAK\r\n\r\n"),
+    ("get", b"GET NAK\r\n"),
+    ("get mdi", b"GET MDI NAK\r\n\r\n"),
+    ("set", b"SET NAK\n\r"),
+    ("set foo bar", b"SET FOO NAK\n\r"),
+    ("set mode", b"SET MODE NAK\n\r"),
+    ("set machine banana", b"SET MACHINE NAK\n\r"),
+    ("set set_wait banana", b"SET SET_WAIT NAK\n\r"),
+    ("set machine on", b"SET MACHINE ACK\n\r"),
+    ("get machine", b"MACHINE OFF\r\n"),
+    ("get error", b"ERROR OK\r\n"),
+    ("get set_wait", b"SET_WAIT RECEIVED\r\n"),
+    ("set set_wait done", b"SET SET_WAIT ACK\n\r"),
+    ("get set_wait", b"SET_WAIT DONE\r\n"),
+    ("set wait_mode done", b"SET WAIT_MODE NAK\n\r"),
+    ("set mode mdi", b"SET MODE NAK\n\r"),
+    ("set home -1", b"SET HOME NAK\n\r"),
+    ("set abort", b"SET ABORT NAK\n\r"),
+    ("set estop off", b"SET ESTOP ACK\n\r"),
+    ("get estop", b"ESTOP OFF\r\n"),
+    ("set mode mdi", b"SET MODE NAK\n\r"),
+    ("SET Machine ON", b"SET MACHINE ACK\n\r"),
+    ("get machine", b"MACHINE ON\r\n"),
+    ("get joint_homed", b"JOINT_HOMED NO NO NO NO NO NO\r\n"),
+    ("set mode mdi", b"SET MODE ACK\n\r"),
+    ("get mode", b"MODE MANUAL\r\n"),
+    ("set mdi G0 X10", b"SET MDI NAK\n\r"),
+    ("get error", b"ERROR all joints must be homed before going into coordinated mode\r\n"),
+    ("get error", b"ERROR Can't issue MDI command when not homed\r\n"),
+    ("get error", b"ERROR OK\r\n"),
+    ("set set_wait received", b"SET SET_WAIT ACK\n\r"),
+    ("set mdi G0 X10", b"SET MDI ACK\n\r"),
+    ("get error", b"ERROR Can't issue MDI command when not homed\r\n"),
+    ("set enable off", b"SET ENABLE ACK\n\r"),
+    ("set machine off", b"SET MACHINE NAK\n\r"),
+]
+READY = [
+    ("get mode", b"MODE MDI\r\n"),
+    ("set mdi G0 X10.5 Y20 Z560 A5 B-4 C3", b"SET MDI ACK\n\r"),
+    ("get joint_pos", b"JOINT_POS 10.500000 20.000000 560.000000 5.000000 -4.000000 3.000000\r\n"),
+    ("get abs_act_pos", b"ABS_ACT_POS 10.500000 20.000000 560.000000 5.000000 -4.000000 3.000000\r\n"),
+    ("set mdi g0 z 500", b"SET MDI ACK\n\r"),
+    ("get abs_act_pos", b"ABS_ACT_POS 10.500000 20.000000 500.000000 5.000000 -4.000000 3.000000\r\n"),
+    ("set mdi G0 Z9000", b"SET MDI NAK\n\r"),
+    ("get error", b"ERROR Linear move on line 0 fails kinematicsInverse\r\n"),
+    ("get error", b"ERROR invalid params in linear command\r\n"),
+    ("get error", b"ERROR OK\r\n"),
+    ("set mdi G0 X1 Y", b"SET MDI NAK\n\r"),
+    ("get error", b"ERROR No characters found in reading real value\r\n"),
+    ("set mdi G0 X1 X2", b"SET MDI NAK\n\r"),
+    ("get error", b"ERROR Multiple x words on one line\r\n"),
+    ("set mdi G999", b"SET MDI NAK\n\r"),
+    ("get error", b"ERROR G-code out of range\r\n"),
+    ("set mdi G21 G90", b"SET MDI ACK\n\r"),
+    ("set home -1", b"SET HOME ACK\n\r"),
+    ("get error", b"ERROR can't do that (EMC_JOINT_HOME:123) in MDI mode\r\n"),
+    ("set mode manual", b"SET MODE ACK\n\r"),
+    ("set mdi G0 X1", b"SET MDI NAK\n\r"),
+    ("get error", b"ERROR Must be in MDI mode to issue MDI command\r\n"),
+    ("get teleop_enable", b"TELEOP_ENABLE YES\r\n"),
+    ("set home -1", b"SET HOME ACK\n\r"),
+    ("get error", b"ERROR must be in joint mode to home\r\n"),
+    ("set teleop_enable off", b"SET TELEOP_ENABLE ACK\n\r"),
+    ("set home -1", b"SET HOME ACK\n\r"),
+    ("get error", b"ERROR OK\r\n"),
+    ("get pos_offset", b"POS_OFFSET 0.000000 0.000000 0.000000 0.000000 0.000000 0.000000\r\n"),
+    ("get program_units", b"PROGRAM_UNITS MM\r\n"),
+]
+
+
+def test_before_and_during_the_greeting(client):
+    me = client()
+    for line, answer in NOBODY:
+        me.say(line, answer)
+
+
+def test_in_emergency_stop_and_before_homing(client):
+    me = client()
+    me.greet()
+    for line, answer in GREETED:
+        me.say(line, answer)
+
+
+def test_ready_to_move(client):
+    me = client()
+    me.make_ready()
+    for line, answer in READY:
+        me.say(line, answer)
+
+
+def test_an_unknown_first_word_gets_no_answer(client):
+    me = client()
+    me.greet()
+    me.send("foo bar")
+    me.send("")
+    me.expect_silence()
+    me.say("get echo", b"ECHO OFF\r\n")
+
+
+def test_success_is_silent_until_verbose_is_on(client):
+    me = client()
+    me.say("hello EMC test 1.0", b"HELLO ACK EMCNETSVR 1.1\r\n")
+    me.say("set echo off", b"set echo off\r\n")
+    me.send("set enable EMCTOO")
+    me.expect_silence()
+    me.say("get enable", b"ENABLE ON\r\n")
+
+
+def test_quitting_ends_the_connection(client):
+    me = client()
+    me.send("quit")
+    me.expect_end()
+
+
+def test_a_line_longer_than_the_buffer_is_fatal(client):
+    me = client()
+    me.send("x" * 255)
+    me.send("get estop")
+    assert me.hear(10) == b"ESTOP ON\r\n"
+    me.send("x" * 256)
+    me.expect_end()
+
+
+def test_one_client_commands_at_a_time(client):
+    first, second = client(), client()
+    first.make_ready()
+    second.greet()
+    first.say("get enable", b"ENABLE OFF\r\n")
+    first.say("set mode manual", b"SET MODE NAK\n\r")
+    first.say("set enable EMCTOO", b"SET ENABLE ACK\n\r")
+    second.say("set abort", b"SET ABORT NAK\n\r")
+
+
+@pytest.mark.parametrize(
+    ("order", "answer", "machine_is"),
+    [
+        ("set abort", b"SET ABORT ACK\n\r", b"MACHINE ON\r\n"),
+        ("set machine off", b"SET MACHINE ACK\n\r", b"MACHINE OFF\r\n"),
+        ("set estop on", b"SET ESTOP ACK\n\r", b"MACHINE OFF\r\n"),
+    ],
+)
+def test_a_move_that_another_client_ends_is_acknowledged_all_the_same(
+    client, machine, order, answer, machine_is
+):
+    first, second = client(), client()
+    first.make_ready()
+    machine.duration_s = 30.0
+    first.send("set mdi G0 X100")
+    machine.wait_for("move")
+    second.greet()
+    second.say(order, answer)
+    assert first.hear(13) == b"SET MDI ACK\n\r"
+    assert machine.pose().x < 99.0
+    first.say("get machine", machine_is)
+    first.say("get joint_homed", b"JOINT_HOMED YES YES YES YES YES YES\r\n")
+
+
+def test_a_move_is_acknowledged_on_receipt_unless_told_otherwise(client, machine):
+    me = client()
+    me.make_ready()
+    me.say("set set_wait received", b"SET SET_WAIT ACK\n\r")
+    machine.duration_s = 30.0
+    me.say("set mdi G0 X100", b"SET MDI ACK\n\r")
+    assert machine.pose().x < 99.0
+
+
+def test_an_abort_drops_the_moves_that_wait(client, machine):
+    me = client()
+    me.make_ready()
+    me.say("set set_wait received", b"SET SET_WAIT ACK\n\r")
+    machine.duration_s = 30.0
+    me.say("set mdi G0 X100", b"SET MDI ACK\n\r")
+    me.say("set mdi G0 X200", b"SET MDI ACK\n\r")
+    machine.wait_for("move")
+    me.say("set abort", b"SET ABORT ACK\n\r")
+    machine.duration_s = 0.01
+    me.say("set set_wait done", b"SET SET_WAIT ACK\n\r")
+    me.say("set mdi G0 X300", b"SET MDI ACK\n\r")
+    assert machine.events.count("move") == 2
+    assert machine.pose().x == 300.0
+
+
+def test_a_machine_goes_on_when_the_client_goes(client, machine):
+    first, second = client(), client()
+    first.make_ready()
+    machine.duration_s = 0.1
+    first.send("set mdi G0 X100")
+    machine.wait_for("move")
+    first.close()
+    second.greet()
+    machine.wait_until(lambda machine: machine.pose().x == 100.0)
+    second.say("get joint_pos", b"JOINT_POS 100.000000 0.000000 0.000000 0.000000 0.000000 0.000000\r\n")
+
+
+def test_switching_on_reads_the_config_again(client, machine):
+    me = client()
+    me.make_ready()
+    me.say("set mdi G0 X10", b"SET MDI ACK\n\r")
+    machine.config = 2.0
+    me.say("set machine on", b"SET MACHINE ACK\n\r")
+    assert machine.pose().x == 10.0
+    me.say("set machine off", b"SET MACHINE ACK\n\r")
+    me.say("set machine on", b"SET MACHINE ACK\n\r")
+    assert machine.pose().x == 8.0
+    assert machine.joints()[0] == 10.0
+    assert machine.events == ["on", "home", "move", "off", "on"]
+
+
+def test_a_config_that_cannot_be_used_keeps_the_machine_off(client, machine):
+    me = client()
+    me.greet()
+    machine.config = None
+    me.say("set estop off", b"SET ESTOP ACK\n\r")
+    me.say("set machine on", b"SET MACHINE ACK\n\r")
+    me.say("get machine", b"MACHINE OFF\r\n")
+    me.say("get error", b"ERROR machine.ini: has no geometry\r\n")
+
+
+def test_homing_that_is_aborted_leaves_it_unhomed(client, machine):
+    me = client()
+    me.greet()
+    machine.duration_s = 30.0
+    me.say("set estop off", b"SET ESTOP ACK\n\r")
+    me.say("set machine on", b"SET MACHINE ACK\n\r")
+    me.say("set home -1", b"SET HOME ACK\n\r")
+    machine.wait_for("home")
+    me.say("set abort", b"SET ABORT ACK\n\r")
+    me.say("get joint_homed", b"JOINT_HOMED NO NO NO NO NO NO\r\n")
+
+
+def test_silence(client, simulated):
+    me = client()
+    simulated.faults.inject(Fault.SILENT, times=1)
+    me.send("get estop")
+    me.expect_silence()
+    me.say("get estop", b"ESTOP ON\r\n")
+
+
+def test_a_refused_password(client, simulated):
+    me = client()
+    simulated.faults.inject(Fault.REFUSES_PASSWORD)
+    me.say("hello EMC test 1.0", b"HELLO NAK\r\n")
+    simulated.faults.clear(Fault.REFUSES_PASSWORD)
+    me.say("hello EMC test 1.0", b"HELLO ACK EMCNETSVR 1.1\r\n")
+
+
+def test_faults_of_moves_strike_as_often_as_told(client, simulated, machine):
+    me = client()
+    me.make_ready()
+    simulated.faults.inject(Fault.REFUSES_MOVE, times=1)
+    me.say("set mdi G0 X1", b"SET MDI NAK\n\r")
+    me.say("get error", b"ERROR joint 3 following error\r\n")
+    simulated.faults.inject(Fault.STAYS_PUT, times=1)
+    me.say("set mdi G0 X1", b"SET MDI ACK\n\r")
+    assert machine.pose().x == 0.0
+    me.say("set mdi G0 X1", b"SET MDI ACK\n\r")
+    assert machine.pose().x == 1.0
+
+
+def test_an_emergency_stop_in_the_middle_of_a_move(client, simulated, machine):
+    me = client()
+    me.make_ready()
+    machine.duration_s = 30.0
+    simulated.faults.inject(Fault.EMERGENCY_STOP, times=1)
+    me.say("set mdi G0 X100", b"SET MDI ACK\n\r")
+    me.say("get estop", b"ESTOP ON\r\n")
+    assert 0.0 < machine.pose().x < 99.0
+
+
+def test_a_connection_dropped_in_the_middle_of_a_move(client, simulated, machine):
+    me = client()
+    me.make_ready()
+    machine.duration_s = 30.0
+    simulated.faults.inject(Fault.DROPS_CONNECTION, times=1)
+    me.send("set mdi G0 X100")
+    me.expect_end()
+    assert machine.events[-1] == "move"
+
+
+def test_closing_ends_a_move_and_may_be_repeated(client, simulated, machine):
+    me = client()
+    me.make_ready()
+    machine.duration_s = 30.0
+    me.send("set mdi G0 X100")
+    machine.wait_for("move")
+    machine.deaf_to = 2
+    simulated.close()
+    simulated.close()
+    assert machine.pose().x < 99.0

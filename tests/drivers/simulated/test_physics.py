@@ -1,0 +1,290 @@
+"""The hidden truth: the ball follows the true geometry, and who looks sees it through noise."""
+
+from __future__ import annotations
+
+import threading
+from typing import Any
+
+import numpy as np
+import pytest
+
+from hexacell.errors import ReachError
+from hexacell.kinematics.pose import Pose
+
+# Away from the first point, and back, and tilted: nothing special.
+POSES = [
+    Pose(10.0, -5.0, 545.0),
+    Pose(0.0, 0.0, 550.0, 8.0, -6.0, 4.0),
+    Pose(-12.0, 8.0, 560.0, -10.0, 3.0, -5.0),
+    Pose(0.0, 0.0, 550.0),
+]
+FAR = Pose(100.0, 100.0, 550.0)
+
+
+def go(twin: Any, pose: Pose) -> None:
+    twin.machine.move(pose)
+    twin.clock.time_s += 10.0
+
+
+def there_and_back(twin: Any, start: Any) -> None:
+    for path in ([start, start + 1.0], [start + 1.0, start]):
+        twin.world.travel(np.stack(path))
+        twin.clock.time_s += 10.0
+
+
+def test_the_ball_is_where_the_true_geometry_puts_it(make_twin) -> None:
+    twin = make_twin(station_reach_mm=1e6)
+    reference, seen = twin.ball_at(Pose(0.0, 0.0, 550.0)), twin.seen()
+    for pose in POSES:
+        go(twin, pose)
+        assert twin.seen() - seen == pytest.approx(twin.ball_at(pose) - reference, abs=1e-6)
+
+
+def test_it_is_not_where_the_controller_believes(make_twin) -> None:
+    """Without errors of geometry there would be nothing to calibrate, and nothing to test with."""
+    twin = make_twin(station_reach_mm=1e6)
+    before = twin.seen()
+    go(twin, POSES[1])
+    assert np.linalg.norm(twin.seen() - before) > 1.0
+
+
+def test_the_sliders_go_where_the_controllers_geometry_puts_them(twin) -> None:
+    for pose in POSES:
+        go(twin, pose)
+        assert twin.world.sliders() == pytest.approx(twin.joints_for(pose), abs=1e-9)
+
+
+def test_the_way_there_does_not_matter(make_twin) -> None:
+    one, other = make_twin(station_reach_mm=1e6), make_twin(station_reach_mm=1e6)
+    go(one, POSES[2])
+    for pose in (POSES[1], POSES[0], POSES[2]):
+        go(other, pose)
+    assert one.seen() == pytest.approx(other.seen(), abs=1e-6)
+
+
+def test_how_often_it_is_looked_at_does_not_matter(make_twin) -> None:
+    one, other = make_twin(station_reach_mm=1e6), make_twin(station_reach_mm=1e6)
+    for twin, looks in ((one, 1), (other, 200)):
+        motion = twin.world.travel(np.linspace(twin.world.sliders(), twin.joints_for(FAR), 25))
+        for _ in range(looks):
+            twin.clock.time_s += motion.duration_s / looks
+            twin.seen()
+        twin.clock.time_s += 1.0
+    assert one.seen() == pytest.approx(other.seen(), abs=1e-6)
+
+
+def test_a_move_takes_the_time_of_its_longest_slider(make_twin) -> None:
+    twin = make_twin(motion__speed_mm_s=50.0, motion__minimum_s=0.2)
+    here = twin.world.sliders()
+    motion = twin.world.travel(np.stack([here, here + np.array([0.0, 0.0, -30.0, 0.0, 0.0, 10.0])]))
+    assert motion.duration_s == pytest.approx(0.6)
+    twin.clock.time_s += 10.0
+    here = twin.world.sliders()
+    assert twin.world.travel(np.stack([here, here + 0.001])).duration_s == 0.2
+
+
+def test_on_the_way_sliders_and_ball_are_in_between(make_twin) -> None:
+    twin = make_twin(station_reach_mm=1e6)
+    start, seen = twin.world.sliders(), twin.seen()
+    end = start + 20.0  # all of them alike: the platform goes along the rails
+    motion = twin.world.travel(np.stack([start, end]))
+    twin.clock.time_s += motion.duration_s / 2.0
+    assert twin.world.progress() == pytest.approx(0.5)
+    assert twin.world.sliders() == pytest.approx(start + 10.0)
+    assert twin.seen() - seen == pytest.approx([10.0, 0.0, 0.0], abs=1e-6)
+
+
+def test_stopped_it_stays_in_place(make_twin) -> None:
+    twin = make_twin(station_reach_mm=1e6)
+    start, seen = twin.world.sliders(), twin.seen()
+    motion = twin.world.travel(np.stack([start, start + 20.0]))
+    twin.clock.time_s += motion.duration_s / 2.0
+    twin.world.stop()
+    for _ in range(3):
+        assert twin.world.progress() == pytest.approx(0.5)
+        assert twin.world.sliders() == pytest.approx(start + 10.0)
+        assert twin.seen() - seen == pytest.approx([10.0, 0.0, 0.0], abs=1e-6)
+        twin.clock.time_s += motion.duration_s
+        twin.world.stop()
+
+
+def test_stopping_what_stands_changes_nothing(twin) -> None:
+    go(twin, POSES[0])
+    before = twin.world.sliders()
+    twin.world.stop()
+    assert twin.world.progress() == 1.0
+    assert np.array_equal(twin.world.sliders(), before)
+
+
+def test_after_a_stop_the_next_way_begins_in_place(twin) -> None:
+    start = twin.world.sliders()
+    motion = twin.world.travel(np.stack([start, start + 20.0]))
+    twin.clock.time_s += motion.duration_s / 2.0
+    twin.world.stop()
+    back = twin.world.travel(np.stack([start + 10.0, start]))
+    assert twin.world.sliders() == pytest.approx(start + 10.0)
+    twin.clock.time_s += back.duration_s
+    assert twin.world.sliders() == pytest.approx(start)
+
+
+def test_noise_is_drawn_at_every_stop_and_stays_until_the_next(make_twin) -> None:
+    twin = make_twin(gauges__noise_mm=0.01, encoders__noise_mm=0.01, station_reach_mm=1e6)
+    gauges, sliders = [], []
+    start = twin.world._motion.path[0]
+    for _ in range(60):
+        there_and_back(twin, start)
+        seen = twin.seen()
+        assert np.array_equal(twin.seen(), seen)
+        assert np.array_equal(twin.world.sliders(), twin.world.sliders())
+        gauges.append(seen)
+        sliders.append(twin.world.sliders() - start)
+    for scatter in (np.array(gauges) - np.mean(gauges, axis=0), np.array(sliders)):
+        # 180 and 360 numbers: their standard deviation is known to 5 %.
+        assert np.std(scatter) == pytest.approx(0.01, rel=0.25)
+        assert np.all(np.std(scatter, axis=0) > 0.004)
+
+
+def test_flicker_is_drawn_at_every_reading(make_twin) -> None:
+    twin = make_twin(gauges__flicker_mm=0.002, encoders__flicker_mm=0.002)
+    gauges = np.array([twin.seen() for _ in range(60)])
+    sliders = np.array([twin.world.sliders() for _ in range(60)])
+    for readings in (gauges, sliders):
+        assert np.std(readings - readings.mean(axis=0)) == pytest.approx(0.002, rel=0.25)
+
+
+def test_the_same_seed_gives_the_same_world(make_twin) -> None:
+    noisy = {"gauges__noise_mm": 0.01, "gauges__flicker_mm": 0.001, "motion__ringing_mm": 0.2}
+    one, same, other = (make_twin(seed=seed, **noisy) for seed in (5, 5, 6))
+    for twin in (one, same, other):
+        go(twin, POSES[0])
+    assert np.array_equal(one.seen(), same.seen())
+    assert not np.array_equal(one.seen(), other.seen())
+
+
+def test_on_arrival_the_ball_swings_and_the_swing_decays(make_twin) -> None:
+    twin = make_twin(motion__ringing_mm=0.2, motion__ringing_s=0.15)
+    quiet = make_twin()
+    for each in (twin, quiet):
+        each.machine.move(POSES[0])
+    offset = np.linalg.norm(twin.seen() - quiet.seen() - _placing(twin, quiet))
+    assert offset == pytest.approx(0.2, abs=1e-9)
+    swings = []
+    for _ in range(200):
+        twin.clock.time_s += 0.01
+        quiet.clock.time_s += 0.01
+        swings.append(np.linalg.norm(twin.seen() - quiet.seen() - _placing(twin, quiet)))
+    envelope = 0.2 * np.exp(-0.01 * np.arange(1, 201) / 0.15)
+    assert np.all(np.array(swings) <= envelope + 1e-9)
+    assert max(swings[:10]) > 0.1
+    assert swings[-1] < 1e-5
+
+
+def _placing(one: Any, other: Any) -> Any:
+    return other.world._station - one.world._station
+
+
+def test_sliders_do_not_swing(make_twin) -> None:
+    twin = make_twin(motion__ringing_mm=0.5)
+    twin.machine.move(POSES[0])
+    assert twin.world.sliders() == pytest.approx(twin.joints_for(POSES[0]), abs=1e-9)
+
+
+def test_a_machine_may_not_repeat(make_twin) -> None:
+    twin = make_twin(motion__repeatability_mm=0.5, station_reach_mm=1e6)
+    start = twin.world.sliders()
+    stops = []
+    for _ in range(40):
+        there_and_back(twin, start)
+        stops.append(twin.world.sliders() - start)
+    assert np.std(stops) == pytest.approx(0.5, rel=0.25)
+
+
+def test_gauges_are_put_near_the_ball(make_twin) -> None:
+    placings = np.array([make_twin(seed=seed).seen() for seed in range(40)])
+    assert np.abs(placings).max() < 2.0
+    assert np.std(placings) == pytest.approx(0.4, rel=0.3)
+
+
+def test_gauges_stay_while_the_ball_is_within_reach(make_twin) -> None:
+    twin = make_twin(station_reach_mm=30.0)
+    before = twin.seen()
+    go(twin, Pose(20.0, 0.0, 550.0))
+    assert np.linalg.norm(twin.seen() - before) == pytest.approx(20.0, abs=3.0)
+    go(twin, Pose(0.0, 0.0, 550.0))
+    assert twin.seen() == pytest.approx(before, abs=1e-6)
+
+
+def test_beyond_reach_they_are_carried_to_the_ball(make_twin) -> None:
+    twin = make_twin(station_reach_mm=30.0)
+    go(twin, Pose(60.0, 0.0, 550.0))
+    assert np.abs(twin.seen()).max() < 2.0
+
+
+def test_they_are_not_carried_while_the_robot_moves(make_twin) -> None:
+    twin = make_twin(station_reach_mm=30.0)
+    before = twin.seen()
+    start = twin.world.sliders()
+    motion = twin.world.travel(np.stack([start, start + 50.0, start]))
+    twin.clock.time_s += motion.duration_s / 2.0
+    assert twin.seen() - before == pytest.approx([50.0, 0.0, 0.0], abs=1e-6)
+    twin.clock.time_s += motion.duration_s
+    assert twin.seen() == pytest.approx(before, abs=1e-6)
+
+
+def test_a_triad_may_stand_askew(make_twin) -> None:
+    straight, askew = (
+        make_twin(gauges__misalignment_deg=angle, station_reach_mm=1e6) for angle in (0.0, 2.0)
+    )
+    moved = []
+    for twin in (straight, askew):
+        before = twin.seen()
+        go(twin, Pose(20.0, 0.0, 550.0))
+        moved.append(twin.seen() - before)
+    assert np.linalg.norm(moved[1]) == pytest.approx(np.linalg.norm(moved[0]))
+    assert 0.05 < np.linalg.norm(moved[1] - moved[0]) < 3.0
+
+
+def test_a_world_that_cannot_stand_there_is_refused(make_twin, bundled_cell) -> None:
+    truth = bundled_cell.settings.simulation.geometry
+    short = [length / 3.0 for length in truth.l]
+    with pytest.raises(ReachError, match=r"cannot stand at X0\.000"):
+        make_twin(geometry__l=short)
+
+
+def test_driven_where_nobody_knows_it_comes_back(make_twin) -> None:
+    """Sliders that tear the platform apart: afterwards everything is as before."""
+    twin = make_twin(station_reach_mm=1e6)
+    start, seen = twin.world.sliders(), twin.seen()
+    apart = start + np.repeat([-400.0, 400.0], 3)
+    motion = twin.world.travel(np.linspace(start, apart, 25))
+    twin.clock.time_s += motion.duration_s + 1.0
+    assert np.isfinite(twin.seen()).all()
+    motion = twin.world.travel(np.linspace(apart, start, 25))
+    twin.clock.time_s += motion.duration_s + 1.0
+    assert twin.seen() == pytest.approx(seen, abs=1e-6)
+
+
+def test_many_may_look_at_once(make_twin) -> None:
+    twin = make_twin(station_reach_mm=1e6)
+    motion = twin.world.travel(np.linspace(twin.world.sliders(), twin.joints_for(POSES[2]), 25))
+    failures: list[BaseException] = []
+
+    def look(axis: str) -> None:
+        try:
+            for _ in range(20):
+                twin.world.displacement(axis)
+                twin.world.sliders()
+                twin.clock.time_s += motion.duration_s / 50.0
+        except BaseException as error:  # told to the test
+            failures.append(error)
+
+    lookers = [threading.Thread(target=look, args=(axis,)) for axis in "xyz"]
+    for looker in lookers:
+        looker.start()
+    for looker in lookers:
+        looker.join()
+    assert failures == []
+    twin.clock.time_s += motion.duration_s
+    quiet = make_twin(station_reach_mm=1e6)
+    go(quiet, POSES[2])
+    assert twin.seen() == pytest.approx(quiet.seen(), abs=1e-6)

@@ -1,0 +1,211 @@
+"""The simulated robot under its controller: it goes where its config says, not where it truly is."""
+
+from __future__ import annotations
+
+import threading
+from typing import Any
+
+import numpy as np
+import pytest
+
+from drivers.simulated.linuxcnc.machine import KinematicsFailure
+from drivers.simulated.robot import STEPS
+from hexacell.controller_config.toml_format import NativeToml
+from hexacell.errors import FileError
+from hexacell.kinematics.geometry import Geometry
+from hexacell.kinematics.pose import Pose
+
+TILTED = Pose(5.0, -3.0, 548.0, 6.0, -4.0, 2.0)
+
+
+def rewrite(twin: Any, geometry: Geometry) -> None:
+    text = twin.config.read_text()
+    twin.config.write_text(NativeToml().rewrite(text, geometry))
+
+
+def test_a_move_ends_at_its_target(twin) -> None:
+    twin.machine.move(TILTED)
+    assert twin.machine.pose().as_tuple() == pytest.approx(TILTED.as_tuple(), abs=1e-9)
+    assert twin.machine.joints() == pytest.approx(twin.joints_for(TILTED), abs=1e-9)
+    assert twin.world.sliders() == pytest.approx(twin.joints_for(TILTED), abs=1e-9)
+
+
+def test_a_move_lasts_until_the_sliders_stand(make_twin) -> None:
+    twin = make_twin(motion__minimum_s=2.5)
+    begun = twin.clock.now()
+    twin.machine.move(TILTED)
+    assert twin.clock.now() - begun == 2.5
+    assert twin.world.progress() == 1.0
+
+
+def test_its_pose_on_the_way_is_on_the_way(twin) -> None:
+    seen: list[Pose] = []
+
+    def look() -> None:
+        twin.clock.time_s += 0.15  # half of the shortest move
+        seen.append(twin.machine.pose())
+
+    twin.clock.on_wait = look
+    twin.machine.move(Pose(4.0, 0.0, 550.0, 0.0, 0.0, 2.0))
+    assert seen[0].as_tuple() == pytest.approx((2.0, 0.0, 550.0, 0.0, 0.0, 1.0), abs=1e-6)
+
+
+def test_it_goes_straight(twin) -> None:
+    """At every piece of the line the sliders are where the geometry puts them for that pose."""
+    paths: list[Any] = []
+    real = twin.world.travel
+
+    def travel(path: Any) -> Any:
+        paths.append(path)
+        return real(path)
+
+    twin.world.travel = travel
+    target = Pose(30.0, -20.0, 540.0)
+    twin.machine.move(target)
+    (path,) = paths
+    assert path.shape == (STEPS + 1, 6)
+    middle = Pose(15.0, -10.0, 545.0)
+    assert path[STEPS // 2] == pytest.approx(twin.joints_for(middle), abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    "pose", [Pose(0.0, 0.0, 2000.0), Pose(0.0, 900.0, 550.0), Pose(0.0, 0.0, 550.0, 179.0, 0.0, 0.0)]
+)
+def test_a_pose_out_of_reach_is_refused_and_nothing_moves(twin, pose: Pose) -> None:
+    twin.machine.move(TILTED)
+    before, time_s = twin.world.sliders(), twin.clock.now()
+    with pytest.raises(KinematicsFailure, match="kinematicsInverse"):
+        twin.machine.move(pose)
+    assert twin.clock.now() == time_s
+    assert np.array_equal(twin.world.sliders(), before)
+    assert twin.machine.pose().as_tuple() == pytest.approx(TILTED.as_tuple(), abs=1e-9)
+
+
+def test_after_a_refusal_it_still_moves(twin) -> None:
+    with pytest.raises(KinematicsFailure):
+        twin.machine.move(Pose(0.0, 0.0, 2000.0))
+    twin.machine.move(TILTED)
+    assert twin.world.sliders() == pytest.approx(twin.joints_for(TILTED), abs=1e-9)
+
+
+def stop_half_way(twin: Any) -> None:
+    def stop() -> None:
+        twin.clock.time_s += 0.15
+        twin.machine.stop()
+
+    twin.clock.on_wait = stop
+
+
+def test_it_stops_in_place(twin) -> None:
+    stop_half_way(twin)
+    twin.machine.move(Pose(4.0, 0.0, 550.0))
+    there = Pose(2.0, 0.0, 550.0)
+    twin.clock.time_s += 10.0
+    assert twin.machine.pose().as_tuple() == pytest.approx(there.as_tuple(), abs=1e-6)
+    assert twin.world.sliders() == pytest.approx(twin.joints_for(there), abs=1e-3)
+
+
+def test_after_a_stop_it_goes_on_from_there(twin) -> None:
+    stop_half_way(twin)
+    twin.machine.move(Pose(4.0, 0.0, 550.0))
+    twin.clock.on_wait = lambda: None
+    twin.machine.move(TILTED)
+    assert twin.world.sliders() == pytest.approx(twin.joints_for(TILTED), abs=1e-9)
+
+
+def test_a_stop_while_the_way_is_being_computed_is_not_lost(twin, monkeypatch) -> None:
+    real = twin.machine._joints
+
+    def interrupted(poses: Any) -> Any:
+        twin.machine.stop()
+        return real(poses)
+
+    monkeypatch.setattr(twin.machine, "_joints", interrupted)
+    before = twin.world.sliders()
+    twin.machine.move(TILTED)
+    monkeypatch.undo()
+    twin.clock.time_s += 10.0
+    assert np.array_equal(twin.world.sliders(), before)
+    assert twin.machine.pose().as_tuple() == pytest.approx((0.0, 0.0, 550.0, 0.0, 0.0, 0.0), abs=1e-9)
+
+
+def test_stopping_what_stands_does_not_stop_the_next_move(twin) -> None:
+    twin.machine.stop()
+    twin.machine.stop()
+    twin.machine.move(TILTED)
+    assert twin.world.sliders() == pytest.approx(twin.joints_for(TILTED), abs=1e-9)
+
+
+def test_a_stop_from_another_thread_ends_the_wait(make_twin) -> None:
+    twin = make_twin(motion__minimum_s=1000.0)
+    waiting = threading.Event()
+    released = threading.Event()
+
+    def wait(seconds: float, until: threading.Event | None = None) -> bool:
+        assert until is not None
+        waiting.set()
+        assert until.wait(5.0)
+        released.set()
+        return True
+
+    twin.clock.wait = wait
+    mover = threading.Thread(target=twin.machine.move, args=(TILTED,))
+    mover.start()
+    assert waiting.wait(5.0)
+    twin.machine.stop()
+    mover.join(5.0)
+    assert released.is_set()
+    assert not mover.is_alive()
+
+
+def test_switched_on_it_reads_its_geometry_and_the_sliders_stay(twin) -> None:
+    twin.machine.move(TILTED)
+    sliders, seen = twin.world.sliders(), twin.seen()
+    rewrite(twin, twin.truth)
+    assert twin.machine.pose().as_tuple() == pytest.approx(TILTED.as_tuple(), abs=1e-9)
+    twin.machine.switch_on()
+    assert np.array_equal(twin.world.sliders(), sliders)
+    assert np.array_equal(twin.seen(), seen)
+    believed = twin.machine.pose()
+    assert believed.position == pytest.approx(twin.ball_at(TILTED), abs=1e-6)
+    assert twin.machine.joints() == pytest.approx(sliders, abs=1e-8)
+
+
+def test_with_the_true_geometry_it_goes_where_it_is_sent(make_twin) -> None:
+    twin = make_twin(station_reach_mm=1e6)
+    rewrite(twin, twin.truth)
+    twin.machine.switch_on()
+    twin.machine.move(Pose(0.0, 0.0, 550.0))
+    before = twin.seen()
+    for pose in (Pose(0.0, 0.0, 550.0, 10.0, -5.0, 8.0), Pose(0.0, 0.0, 550.0, -8.0, 12.0, 0.0)):
+        twin.machine.move(pose)
+        assert twin.seen() == pytest.approx(before, abs=1e-6)
+
+
+def test_switching_off_moves_nothing(twin) -> None:
+    twin.machine.move(TILTED)
+    before = twin.world.sliders()
+    twin.machine.switch_off()
+    twin.machine.home()
+    assert np.array_equal(twin.world.sliders(), before)
+
+
+def test_a_config_that_cannot_be_read_leaves_the_old_geometry(twin) -> None:
+    kept = twin.config.read_text()
+    twin.config.write_text("[geometry]\n")
+    with pytest.raises(FileError, match="has no S"):
+        twin.machine.switch_on()
+    twin.config.write_text(kept)
+    twin.machine.move(TILTED)
+    assert twin.world.sliders() == pytest.approx(twin.joints_for(TILTED), abs=1e-9)
+
+
+def test_a_geometry_that_cannot_hold_the_sliders_is_refused(twin) -> None:
+    shrunk = Geometry(twin.truth.S, twin.truth.B, twin.truth.l / 3.0)
+    kept = twin.config.read_text()
+    rewrite(twin, shrunk)
+    with pytest.raises(FileError, match="sliders cannot stand so"):
+        twin.machine.switch_on()
+    twin.config.write_text(kept)
+    twin.machine.move(TILTED)
+    assert twin.world.sliders() == pytest.approx(twin.joints_for(TILTED), abs=1e-9)

@@ -1,0 +1,151 @@
+"""The stop line: pressed is pressed, and what cannot be told is pressed too."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+import serial
+
+from drivers.stop_input.stop_input import ContactLine, StopContact, StopFile, stop_line
+from hexacell.cell.model import GuardSettings
+from hexacell.errors import DeviceError, FileError
+
+
+class Port:
+    """A serial port with modem lines, as pyserial has it; a contact joins outputs and inputs."""
+
+    def __init__(self) -> None:
+        self.dtr = self.rts = False
+        self.contact_closed = True
+        self.broken: OSError | None = None
+        self.is_open = False
+
+    def open(self) -> None:
+        if self.broken:
+            raise self.broken
+        self.is_open = True
+
+    def close(self) -> None:
+        self.is_open = False
+
+    def _through(self, output: bool) -> bool:
+        if self.broken:
+            raise self.broken
+        return self.contact_closed and output
+
+    @property
+    def dsr(self) -> bool:
+        return self._through(self.dtr)
+
+    @property
+    def cts(self) -> bool:
+        return self._through(self.rts)
+
+
+@pytest.fixture
+def port(monkeypatch: pytest.MonkeyPatch) -> Port:
+    made = Port()
+    monkeypatch.setattr(serial, "serial_for_url", lambda url, do_not_open: made)
+    return made
+
+
+async def test_without_one_nothing_is_forbidden() -> None:
+    line = stop_line(GuardSettings(), Path())
+    assert await line.open() is None
+    assert await line.active_reason() is None
+    await line.close()
+
+
+async def test_a_file_forbids_while_it_exists(tmp_path: Path) -> None:
+    line = stop_line(GuardSettings(stop_file="stop"), tmp_path)
+    assert await line.open() is None, "a file is no device"
+    assert await line.active_reason() is None
+    (tmp_path / "stop").touch()
+    assert await line.active_reason() == f"{tmp_path}/stop exists"
+    (tmp_path / "stop").unlink()
+    assert await line.active_reason() is None
+
+
+async def test_a_link_that_leads_nowhere_is_a_file_too(tmp_path: Path) -> None:
+    (tmp_path / "stop").symlink_to("nowhere")
+    assert StopFile(tmp_path / "stop").active_reason() is not None
+
+
+async def test_a_file_that_cannot_be_looked_for_forbids(tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    assert "cannot be looked at" in (StopFile(tmp_path / "file" / "stop").active_reason() or "")
+
+
+@pytest.mark.parametrize("contact", ["dsr", "cts"])
+async def test_a_contact_forbids_while_it_is_open(port: Port, contact: Any) -> None:
+    settings = GuardSettings(stop_port="/dev/ttyS9", stop_contact=contact)
+    line = stop_line(settings, Path())
+    identity = await line.open()
+    assert identity is not None
+    assert identity.description == f"{contact.upper()} of /dev/ttyS9"
+    assert await line.active_reason() is None
+    port.contact_closed = False
+    assert "of /dev/ttyS9 is open" in (await line.active_reason() or "")
+    port.contact_closed = True
+    assert await line.active_reason() is None
+    await line.close()
+    assert not port.is_open
+
+
+async def test_an_adapter_that_was_pulled_out_forbids(port: Port) -> None:
+    line = stop_line(GuardSettings(stop_port="/dev/ttyS9"), Path())
+    await line.open()
+    port.broken = OSError(5, "Input/output error")
+    assert "was lost" in (await line.active_reason() or "")
+    await line.close()
+    await line.close()
+
+
+async def test_before_it_is_open_and_after_it_is_closed_it_forbids(port: Port) -> None:
+    contact = StopContact("/dev/ttyS9", "dsr")
+    assert "is not open" in (contact.active_reason() or "")
+    contact.open()
+    contact.close()
+    assert "is not open" in (contact.active_reason() or "")
+
+
+async def test_a_port_that_is_absent_is_refused(tmp_path: Path) -> None:
+    line = stop_line(GuardSettings(stop_port=str(tmp_path / "nothing")), Path())
+    with pytest.raises(DeviceError, match=r"stop line: port .*nothing is absent"):
+        await line.open()
+
+
+async def test_a_port_that_means_nothing_is_refused() -> None:
+    line = stop_line(GuardSettings(stop_port="nonsense://x"), Path())
+    with pytest.raises(FileError, match="stop line"):
+        await line.open()
+
+
+async def test_a_port_without_modem_lines_is_refused_or_forbids() -> None:
+    """A pseudo-terminal carries none: nobody could ever press it, so it must not pass for a contact."""
+    import os
+
+    near, far = os.openpty()
+    line = ContactLine([StopContact(os.ttyname(far), "dsr")])
+    try:
+        try:
+            await line.open()
+        except DeviceError:
+            return
+        assert await line.active_reason() is not None
+    finally:
+        await line.close()
+        os.close(near)
+        os.close(far)
+
+
+async def test_each_of_several_forbids(port: Port, tmp_path: Path) -> None:
+    line = stop_line(GuardSettings(stop_file="stop", stop_port="/dev/ttyS9"), tmp_path)
+    await line.open()
+    port.contact_closed = False
+    (tmp_path / "stop").touch()
+    words = await line.active_reason() or ""
+    assert "stop exists" in words
+    assert "is open" in words

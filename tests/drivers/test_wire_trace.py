@@ -1,0 +1,33 @@
+from drivers.wire_trace import Direction, TraceEntry, WireTrace
+
+
+def entry(data, time_s=1.5):
+    return TraceEntry(time_s, "/dev/ttyUSB0", Direction.SENT, data)
+
+
+def test_an_entry_reads_as_one_line():
+    received = TraceEntry(12.3456789, "/dev/ttyUSB0", Direction.RECEIVED, b"+1.2\r")
+    assert str(received) == "12.345679 /dev/ttyUSB0 < 2b 31 2e 32 0d  +1.2."
+
+
+def test_the_latest_bytes_are_kept_and_the_rest_is_counted():
+    trace = WireTrace(capacity=10)
+    for number in range(5):
+        trace(entry(b"abcd", number))
+    assert [kept.time_s for kept in trace.entries()] == [3, 4]
+    assert trace.forgotten == 3
+    assert trace.text().splitlines()[0] == "# 3 earlier entries were forgotten"
+    assert len(trace.text().splitlines()) == 3
+
+
+def test_nothing_forgotten_is_not_mentioned():
+    trace = WireTrace()
+    trace(entry(b"?\r"))
+    assert trace.text() == "1.500000 /dev/ttyUSB0 > 3f 0d  ?.\n"
+
+
+def test_more_than_fits_at_once_is_not_kept():
+    trace = WireTrace(capacity=3)
+    trace(entry(b"abcd"))
+    assert trace.entries() == ()
+    assert trace.forgotten == 1

@@ -1,0 +1,116 @@
+"""The gates: what must hold before a geometry may enter a controller, and who may overrule them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from hexacell.acceptance.gates import gates
+from hexacell.identification.problem.problem import Tolerances
+from hexacell.identification.solver.levenberg_marquardt import Termination
+from hexacell.kinematics.geometry import PARAMETER_NAMES, Geometry
+
+TOLERANCES = Tolerances(S_mm=7.0, B_mm=7.0, l_mm=7.0)
+
+
+@pytest.fixture
+def judged(identified, paper):
+    """The gates by name, of an identification that may be spoiled first."""
+
+    def judge(found=identified, tolerances=TOLERANCES, largest_change_mm=15.0, before=paper.nominal):
+        found_gates = gates(
+            found, paper.nominal, tolerances, largest_change_mm=largest_change_mm, before=before
+        )
+        return {gate.name: gate for gate in found_gates}
+
+    return judge
+
+
+@pytest.fixture
+def shifted(identified, paper):
+    """The identification with some parameters at given distances from the drawing, mm."""
+
+    def shift(**errors):
+        vector = identified.geometry.vector()
+        for name, error in errors.items():
+            row = PARAMETER_NAMES.index(name)
+            vector[row] = paper.nominal.vector()[row] + error
+        return replace(identified, geometry=Geometry.from_vector(vector))
+
+    return shift
+
+
+def test_a_good_identification_passes_every_gate(judged):
+    assert {name: gate.passed for name, gate in judged().items()} == {
+        "converged": True,
+        "determined": True,
+        "within tolerance": True,
+        "small change": True,
+    }
+
+
+def test_only_the_two_that_are_matters_of_judgement_may_be_overruled(judged):
+    assert {name for name, gate in judged().items() if gate.needs_person} == {"determined", "small change"}
+
+
+def test_a_solver_that_did_not_end_at_a_solution(judged, identified):
+    gate = judged(replace(identified, termination=Termination.ITERATIONS))["converged"]
+    assert not gate.passed
+    assert gate.sentence == "The solver ended because the largest number of iterations was used."
+
+
+def test_parameters_that_the_data_left_open_are_named(judged, identified):
+    covariance = identified.covariance.copy()
+    for name in ("S4z", "l3"):
+        row = PARAMETER_NAMES.index(name)
+        covariance[row, row] = identified.prior_sigma[row] ** 2
+    gate = judged(replace(identified, covariance=covariance))["determined"]
+    assert not gate.passed
+    assert gate.sentence == "Not determined by these data: S4z, l3."
+
+
+def test_a_rod_far_outside_its_tolerance_is_refused_by_name_and_sign(judged, shifted):
+    """A good residual is no proof: a user of another machine found rods 13 mm too short."""
+    gate = judged(shifted(l3=-13.0, S1y=9.5), largest_change_mm=100.0)["within tolerance"]
+    assert not gate.passed
+    assert gate.sentence == "Beyond the drawing's tolerance: S1y (+9.50 mm), l3 (-13.00 mm)."
+
+
+def test_outside_by_less_than_is_certain_is_not_outside(judged, shifted, identified):
+    sigma = identified.sigma[PARAMETER_NAMES.index("B6x")]
+    assert judged(shifted(B6x=7.0 + 2.9 * sigma))["within tolerance"].passed
+    assert not judged(shifted(B6x=7.0 + 3.1 * sigma))["within tolerance"].passed
+
+
+def test_the_ball_may_sit_elsewhere_where_that_is_allowed(judged, identified, paper):
+    """As the paper's own did: 30 mm in z."""
+    moved = replace(identified, geometry=paper.calibrated)
+    assert not judged(moved, largest_change_mm=50.0)["within tolerance"].passed
+    allowed = replace(TOLERANCES, ball_mm=40.0)
+    assert judged(moved, tolerances=allowed, largest_change_mm=50.0)["within tolerance"].passed
+    too_little = replace(TOLERANCES, ball_mm=15.0)
+    assert not judged(moved, tolerances=too_little, largest_change_mm=50.0)["within tolerance"].passed
+
+
+def test_one_joint_is_not_excused_by_the_ball(judged, shifted):
+    found = shifted(B4z=25.0)
+    assert not judged(found, tolerances=replace(TOLERANCES, ball_mm=40.0))["within tolerance"].passed
+
+
+def test_the_change_is_from_what_the_controller_has_now(judged, identified, paper):
+    change = identified.geometry.largest_difference(paper.nominal)
+    assert judged(largest_change_mm=change + 0.01)["small change"].passed
+    gate = judged(largest_change_mm=5.0)["small change"]
+    assert not gate.passed
+    assert gate.sentence == f"The largest change is {change:.2f} mm (limit without a person 5 mm)."
+    assert judged(largest_change_mm=1.0, before=identified.geometry)["small change"].passed
+
+
+def test_numbers_that_are_none_pass_no_gate_on_numbers(judged, identified):
+    vector = identified.geometry.vector()
+    vector[3 * 7] = np.nan
+    broken = judged(replace(identified, geometry=Geometry.from_vector(vector)))
+    assert not broken["within tolerance"].passed
+    assert not broken["small change"].passed

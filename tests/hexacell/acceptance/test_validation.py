@@ -1,0 +1,82 @@
+"""The verdict on held-out poses: better, within limits, and never without evidence."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from hexacell.acceptance.validation import DeviationStatistics, Verdict, validate
+
+LIMITS = {"mean_mm": 0.05, "largest_mm": 0.15}
+BEFORE = DeviationStatistics(3.41, 6.0, 10)
+positive = st.floats(0.0, 100.0)
+spreads = st.builds(DeviationStatistics, positive, positive, st.integers(1, 50))
+
+
+def test_a_spread_is_of_distances_not_of_coordinates():
+    spread = DeviationStatistics.of([[3.0, 4.0, 0.0], [0.0, 0.0, -1.0]])
+    assert spread == DeviationStatistics(mean_mm=3.0, largest_mm=5.0, poses=2)
+
+
+@given(st.lists(st.tuples(*[st.floats(-10, 10)] * 3), min_size=1, max_size=20))
+def test_the_mean_never_exceeds_the_largest(deviations):
+    spread = DeviationStatistics.of(deviations)
+    assert spread is not None
+    assert spread.mean_mm <= spread.largest_mm * (1 + 1e-12)
+    assert spread.poses == len(deviations)
+
+
+@pytest.mark.parametrize("nothing", [[], np.empty((0, 3))])
+def test_no_deviations_are_no_spread(nothing):
+    assert DeviationStatistics.of(nothing) is None
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "verdict"),
+    [
+        (BEFORE, DeviationStatistics(0.012, 0.03, 10), Verdict.PASS),
+        (BEFORE, DeviationStatistics(0.05, 0.15, 10), Verdict.PASS),  # a limit may be reached
+        (BEFORE, DeviationStatistics(0.0501, 0.06, 10), Verdict.OUT_OF_LIMITS),
+        (BEFORE, DeviationStatistics(0.03, 0.1501, 10), Verdict.OUT_OF_LIMITS),
+        (BEFORE, DeviationStatistics(3.42, 6.0, 10), Verdict.WORSE),
+        (
+            DeviationStatistics(0.01, 0.02, 10),
+            DeviationStatistics(0.02, 0.03, 10),
+            Verdict.WORSE,
+        ),  # although within limits
+        (DeviationStatistics(0.01, 0.02, 10), DeviationStatistics(0.01, 0.02, 10), Verdict.PASS),
+        (None, DeviationStatistics(0.012, 0.03, 10), Verdict.NOT_EVALUATED),
+        (BEFORE, None, Verdict.NOT_EVALUATED),
+        (None, None, Verdict.NOT_EVALUATED),
+    ],
+)
+def test_verdicts(before, after, verdict):
+    assert validate(before, after, **LIMITS) is verdict
+
+
+@given(st.none() | spreads, st.none() | spreads)
+def test_a_pass_has_evidence_is_no_worse_and_within_both_limits(before, after):
+    if validate(before, after, **LIMITS) is Verdict.PASS:
+        assert before is not None
+        assert after is not None
+        assert after.mean_mm <= before.mean_mm
+        assert after.mean_mm <= LIMITS["mean_mm"]
+        assert after.largest_mm <= LIMITS["largest_mm"]
+
+
+@pytest.mark.parametrize("broken", [np.nan, np.inf, -np.inf])
+def test_numbers_that_are_none_are_no_evidence(broken):
+    spread = DeviationStatistics.of([[0.01, 0.0, 0.0], [0.0, broken, 0.0]])
+    assert validate(BEFORE, spread, **LIMITS) is Verdict.NOT_EVALUATED
+    assert validate(spread, DeviationStatistics(0.01, 0.02, 1), **LIMITS) is Verdict.NOT_EVALUATED
+
+
+def test_verdicts_read_as_words():
+    assert [str(verdict) for verdict in Verdict] == [
+        "pass",
+        "out of limits",
+        "worse than before",
+        "not evaluated",
+    ]

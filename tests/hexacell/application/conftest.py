@@ -1,0 +1,217 @@
+"""Small cells that are calibrated for real: simulated devices, real drivers, real files."""
+
+from __future__ import annotations
+
+import asyncio
+import shutil
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from drivers.simulated import robot as machine_module
+from drivers.simulated.cell import SimulatedCell
+from hexacell.application.calibration_run import RunRequest, calibrate
+from hexacell.campaign import feasibility
+from hexacell.cell.bundled import bundled_config
+from hexacell.cell.loader import Cell, dump, load_cell
+from hexacell.cell.model import CellSettings
+from hexacell.cell.recovery import Action
+from hexacell.controller_config.toml_format import NativeToml
+from hexacell.kinematics.mechanisms.hexaglide import Hexaglide
+from hexacell.kinematics.pose import Pose
+from hexacell.runs.run_folder import RunFolder
+from procedures.calibration import workflow as calibration_module
+from procedures.calibration.workflow import Mode
+from procedures.engine.engine import Listener
+from procedures.engine.operator import UnattendedOperator
+from procedures.journal.journal import Journal, read_journal
+from procedures.run import events
+
+SMALL: dict[str, Any] = {
+    "identification.points": ((100.0, -100.0, 500.0), (-100.0, 100.0, 500.0)),
+    "identification.orientations": 9,
+    "verification.orientations": 3,
+    "noise.encoder_mm": 0.001,
+    "noise.gauge_mm": 0.001,
+    "acceptance.mean_deviation_mm": 0.2,
+    "acceptance.max_deviation_mm": 0.4,
+    "timing.clock_factor": 500.0,
+    "encoders.timeout_s": 10.0,
+    "encoders.heartbeat_ms": 10_000,
+    "simulation.gauges.noise_mm": 0.001,
+    "simulation.gauges.flicker_mm": 0.0002,
+    "simulation.encoders.noise_mm": 0.001,
+    "simulation.encoders.flicker_mm": 0.0002,
+    "simulation.motion.ringing_mm": 0.05,
+}
+"""Quick and precise: as few poses as identify it."""
+
+
+def changed(section: Any, changes: dict[str, Any]) -> Any:
+    """A section of the cell file with other values at some dotted keys."""
+    for key, value in changes.items():
+        head, _, rest = key.partition(".")
+        inner = changed(getattr(section, head), {rest: value}) if rest else value
+        section = section.model_copy(update={head: inner})
+    return section
+
+
+MakeCell = Callable[..., Cell]
+
+
+def maker(folder: Path) -> MakeCell:
+    def make(**changes: Any) -> Cell:
+        source = bundled_config("simulated-hexaglide")
+        cell = load_cell(source)
+        changes = SMALL | {key.replace("__", "."): value for key, value in changes.items()}
+        patient = tuple(gauge.model_copy(update={"timeout_s": 10.0}) for gauge in cell.settings.gauges)
+        settings: CellSettings = changed(cell.settings, {"gauges": patient} | changes)
+        path = folder / "cell.toml"
+        path.write_text(dump(settings))
+        if not (folder / settings.controller.config).exists():
+            shutil.copy(cell.config_path, folder)
+        return load_cell(path)
+
+    return make
+
+
+@pytest.fixture
+def make_cell(tmp_path: Path) -> MakeCell:
+    return maker(tmp_path)
+
+
+@contextmanager
+def few_candidates() -> Iterator[None]:
+    """Choose among few poses: what is chosen is not under test here."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(calibration_module, "CANDIDATES", 64)
+        patch.setattr(calibration_module, "HELD_OUT_CANDIDATES", 128)
+        patch.setattr(feasibility, "CANDIDATES", 8)
+        patch.setattr(feasibility, "DRAWN", 4)
+        patch.setattr(machine_module, "STEPS", 8)
+        yield
+
+
+@pytest.fixture(autouse=True)
+def quick_choices() -> Iterator[None]:
+    with few_candidates():
+        yield
+
+
+@dataclass(frozen=True)
+class Finished:
+    """A calibration from beginning to end, and what was there before."""
+
+    cell: Cell
+    folder: RunFolder
+    ended: events.Ended
+    told: tuple[events.Event, ...]
+    config_before: bytes
+
+    def order(self, **changes: Any) -> RunRequest:
+        return order_of(self.cell, self.folder, **changes)
+
+    @property
+    def history(self) -> tuple[events.Event, ...]:
+        return read_journal(self.folder.journal)
+
+    def until(self, *kinds: type[Any], count: int = 1) -> tuple[events.Event, ...]:
+        """The history up to and with the ``count``-th event of these kinds."""
+        places = [place for place, event in enumerate(self.history) if isinstance(event, kinds)]
+        return self.history[: places[count - 1] + 1]
+
+
+@pytest.fixture(scope="session")
+def finished(tmp_path_factory: pytest.TempPathFactory) -> Finished:
+    folder = tmp_path_factory.mktemp("finished")
+    cell = maker(folder)()
+    before = cell.config_path.read_bytes()
+    run = RunFolder(folder / "run")
+    told: list[events.Event] = []
+    with few_candidates():
+        ended = asyncio.run(calibrate(order_of(cell, run), [lambda event, _: told.append(event)]))
+    return Finished(cell, run, ended, tuple(told), before)
+
+
+def order_of(cell: Cell, folder: RunFolder, /, **changes: Any) -> RunRequest:
+    order = RunRequest(cell, folder, Mode.OPTIMISE, UnattendedOperator(), unattended=True)
+    return replace(order, **changes)
+
+
+@dataclass
+class Site:
+    """A cell whose devices are served by the test, so that it may see and harm them."""
+
+    cell: Cell
+    folder: RunFolder
+    simulated: SimulatedCell
+
+    @property
+    def config(self) -> bytes:
+        return self.cell.config_path.read_bytes()
+
+    def order(self, **changes: Any) -> RunRequest:
+        cell = replace(self.cell, settings=self.simulated.settings)
+        return order_of(cell, self.folder, **changes)
+
+    async def calibrate(self, *listeners: Listener, **changes: Any) -> events.Ended:
+        return await calibrate(self.order(**changes), listeners)
+
+    def happened(self, kind: type[Any]) -> list[Any]:
+        return [event for event in read_journal(self.folder.journal) if isinstance(event, kind)]
+
+    def write(self, history: Sequence[events.Event], moved_from: Finished) -> None:
+        """A run folder in which all this has happened already, somewhere else."""
+        self.folder.create(self.cell)
+        with Journal(self.folder.journal) as journal:
+            for event in history:
+                if isinstance(event, events.RunStarted):
+                    event = event.model_copy(update={"cell_text": self.cell.text})  # noqa: PLW2901
+                journal.append(event)
+        moved = str(moved_from.folder.path.parent), str(self.folder.path.parent)
+        self.folder.proposal.write_text(moved_from.folder.proposal.read_text().replace(*moved))
+
+
+@pytest.fixture
+def make_site(make_cell: MakeCell, tmp_path: Path) -> Iterator[Callable[..., Site]]:
+    served: list[SimulatedCell] = []
+
+    def make(**changes: Any) -> Site:
+        cell = make_cell(**changes)
+        assert cell.settings.simulation is not None
+        simulated = SimulatedCell(
+            cell.settings,
+            cell.settings.simulation,
+            Hexaglide(),
+            NativeToml(),
+            cell.config_path,
+            other_processes=False,
+        )
+        served.append(simulated)
+        return Site(cell, RunFolder(tmp_path / "run"), simulated)
+
+    yield make
+    for simulated in served:
+        simulated.close()
+
+
+class Approver:
+    """A person who lets everything happen."""
+
+    async def place_gauges(self, point: int, pose: Pose) -> None:
+        pass
+
+    async def approve(self, gates: Sequence[events.GateOutcome], change: str) -> str | None:
+        return "a tester"
+
+    async def decide(self, problem: str, choices: Sequence[Action]) -> Action:
+        return Action.ABORT
+
+
+@pytest.fixture
+def approver() -> Approver:
+    return Approver()

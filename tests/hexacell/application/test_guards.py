@@ -1,0 +1,117 @@
+"""Guards of the whole program: simulated devices, real drivers, and what the journal says."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+from drivers.simulated.fault_schedule import FaultKind
+from hexacell.application.calibration_run import preflight
+from hexacell.cell.recovery import UnattendedRecovery
+from hexacell.cell.simulation import SimulatedFault
+from hexacell.errors import ExitCode, HexacellError
+from procedures.calibration.workflow import Mode
+from procedures.run import events
+from procedures.run.trips import Guard, GuardTripped
+
+GIVES_UP = UnattendedRecovery(**dict.fromkeys(UnattendedRecovery.model_fields, ("abort",)))
+SLOW: dict[str, Any] = {
+    "recovery__unattended": GIVES_UP,
+    "timing__clock_factor": 20.0,
+    "simulation__motion__minimum_s": 20.0,
+    "encoders__timeout_s": 0.5,
+}
+"""A move lasts a second on the wall, so that something can happen in it."""
+
+IN_A_SET, TO_A_POINT = "P1/o02/move", "P1/o01/move"
+FAULTS = [
+    (FaultKind.STOP_LINE, "", IN_A_SET, {Guard.STOP_LINE}),
+    (FaultKind.STOP_LINE, "", TO_A_POINT, {Guard.STOP_LINE}),
+    (FaultKind.EMERGENCY_STOP, "controller", IN_A_SET, {Guard.CONTROLLER}),
+    (FaultKind.FOLLOWING_ERROR, "controller", TO_A_POINT, {Guard.FOLLOWING}),
+    (FaultKind.AT_END, "x", IN_A_SET, {Guard.GAUGE_END}),
+    (FaultKind.OFF_PLATE, "z", IN_A_SET, {Guard.PLATE, Guard.GAUGE_END}),
+    (FaultKind.UNPLUGGED, "x", IN_A_SET, {Guard.DEVICE, Guard.STALE}),
+    (FaultKind.ALARM, "encoder 3", TO_A_POINT, {Guard.ENCODERS}),
+    (FaultKind.UNPLUGGED, "encoder 5", IN_A_SET, {Guard.ENCODERS, Guard.STALE}),
+    (FaultKind.UNPLUGGED, "controller", IN_A_SET, {Guard.DEVICE, Guard.STALE}),
+]
+
+
+def striking(site: Any, key: str, kind: FaultKind, device: str) -> Callable[..., None]:
+    """A listener that has something go wrong in the middle of a move."""
+
+    def listener(event: events.Event, _: object) -> None:
+        if isinstance(event, events.StepBegun) and event.step.key == key:
+            schedule = site.simulated.schedule
+            fault = {"kind": kind.value, "device": device, "at_move": schedule.moves + 1, "after_s": 5.0}
+            schedule.plan(SimulatedFault.model_validate(fault))
+
+    return listener
+
+
+@pytest.mark.parametrize(("kind", "device", "key", "guards"), FAULTS)
+async def test_what_happens_on_a_move_stops_it(make_site, kind, device, key, guards) -> None:
+    site = make_site(**SLOW, guards__stale_s=0.4)
+    before = site.config
+    with pytest.raises(GuardTripped) as tripped:
+        await site.calibrate(striking(site, key, kind, device))
+    assert tripped.value.trip.guard in guards
+    assert tripped.value.exit_code is ExitCode.HARDWARE
+    assert site.config == before
+    told, interrupted = site.happened(events.Tripped), site.happened(events.Interrupted)
+    assert [event.guard for event in told] == [tripped.value.trip.guard]
+    assert interrupted[-1].reason == str(tripped.value)
+    # The first point is where the robot stands already: it may be there before it is stopped.
+    assert key in [event.step.key for event in site.happened(events.StepBegun)][-3:]
+    (struck,) = site.simulated.schedule.struck
+    if device == "controller" and kind is FaultKind.UNPLUGGED:
+        assert "could not be stopped" in str(tripped.value)
+        assert str(tripped.value).endswith("Press the emergency stop")
+    else:
+        assert site.simulated.world.still_since_s < struck.at_s + 20.0, "a second on the wall"
+
+
+@pytest.mark.slow
+async def test_a_cable_that_was_put_back_lets_it_go_on(make_site) -> None:
+    site = make_site(**SLOW, guards__stale_s=0.4)
+    with pytest.raises(GuardTripped):
+        await site.calibrate(striking(site, IN_A_SET, FaultKind.UNPLUGGED, "x"))
+    site.simulated.faults.clear(FaultKind.UNPLUGGED, "x")
+
+    class Enough(Exception):
+        pass
+
+    def enough(event: events.Event, _: object) -> None:
+        if isinstance(event, events.RecordTaken) and event.orientation == 2:
+            raise Enough
+
+    with pytest.raises(Enough):
+        await site.calibrate(enough, resume=True)
+
+
+async def test_a_stop_file_of_the_cell_keeps_it_from_beginning(make_cell) -> None:
+    cell = make_cell(guards__stop_file="stop")
+    (cell.path.parent / "stop").touch()
+    with pytest.raises(GuardTripped, match=r"stop line: motion is forbidden: .*stop exists\. Release it"):
+        await preflight(cell, Mode.OPTIMISE, unattended=True)
+    (cell.path.parent / "stop").unlink()
+    await preflight(cell, Mode.OPTIMISE, unattended=True)
+
+
+async def test_a_disk_without_room_keeps_it_from_beginning(make_cell) -> None:
+    cell = make_cell(guards__free_disk_mb=1e12)
+    with pytest.raises(HexacellError, match=r"MB are free where the run is kept, less than 1e\+12 MB"):
+        await preflight(cell, Mode.OPTIMISE, unattended=True)
+
+
+async def test_the_cell_file_may_say_what_goes_wrong_and_when(make_cell, make_site) -> None:
+    fault = SimulatedFault.model_validate(
+        {"kind": "stop line", "at_move": 2, "after_s": 5.0, "lasts_s": 1e6}
+    )
+    site = make_site(**SLOW, simulation__faults=(fault,))
+    with pytest.raises(GuardTripped, match="motion is forbidden"):
+        await site.calibrate()
+    assert [event.step.key for event in site.happened(events.StepBegun)][-1] == IN_A_SET

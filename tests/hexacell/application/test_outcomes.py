@@ -1,0 +1,201 @@
+"""What may go wrong at the end, over real wires: the controller's config is right all the same."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+import pytest
+
+from drivers.simulated.gauges.faults import InjectedGaugeFault
+from drivers.simulated.linuxcnc.faults import Fault
+from hexacell.acceptance.validation import Verdict
+from hexacell.controller_config.change import ConfigChange
+from hexacell.errors import AnswerNeeded, DeviceError, ExitCode, FileError, LimitError, WriteBackUndone
+from hexacell.kinematics.geometry import Geometry
+from procedures.run import events
+from procedures.run.steps import Phase
+
+DOUBTFUL = events.GateOutcome(name="small", passed=False, sentence="It is 20 mm.", needs_person=True)
+FORBIDDEN = events.GateOutcome(name="within tolerance", passed=False, sentence="Beyond: l3 (-13.00 mm).")
+
+
+def at(kind: type[Any], action: Callable[[], Any]) -> Any:
+    """A listener that does something once, at the first event of a kind."""
+    done: list[bool] = []
+
+    def listener(event: events.Event, _: object) -> None:
+        if isinstance(event, kind) and not done:
+            done.append(True)
+            action()
+
+    return listener
+
+
+@pytest.fixture
+def proposed(finished, make_site) -> Callable[..., Any]:
+    """A site whose run has come to its proposal, with these gates or those that it had."""
+
+    def make(gates: Sequence[events.GateOutcome] | None = None, **changes: Any) -> Any:
+        site = make_site(**changes)
+        history = list(finished.until(events.Proposed))
+        if gates is not None:
+            history[-1] = events.Proposed(gates=tuple(gates))
+        site.write(history, finished)
+        return site
+
+    return make
+
+
+async def test_it_goes_on_from_the_proposal(proposed, finished) -> None:
+    site = proposed()
+    assert (await site.calibrate(resume=True)).exit_code == ExitCode.DONE
+    assert site.config == finished.cell.config_path.read_bytes()
+
+
+async def test_a_gate_that_forbids(proposed, finished) -> None:
+    site = proposed([FORBIDDEN])
+    with pytest.raises(LimitError, match="refused: Beyond: l3") as refusal:
+        await site.calibrate(resume=True)
+    assert refusal.value.exit_code is ExitCode.OUT_OF_LIMITS
+    assert site.config == finished.config_before
+
+
+async def test_a_gate_that_needs_a_person_and_nobody_there(proposed, finished) -> None:
+    site = proposed([DOUBTFUL])
+    with pytest.raises(AnswerNeeded, match="It is 20 mm") as refusal:
+        await site.calibrate(resume=True)
+    assert refusal.value.exit_code is ExitCode.ANSWER_NEEDED
+    assert site.config == finished.config_before
+    assert (
+        ConfigChange.load(site.folder.proposal).text_after.encode()
+        == finished.cell.config_path.read_bytes()
+    )
+
+
+async def test_a_gate_that_needs_a_person_who_is_there(proposed, approver) -> None:
+    site = proposed([DOUBTFUL])
+    assert (await site.calibrate(resume=True, operator=approver)).exit_code == ExitCode.DONE
+    assert site.happened(events.Committed) == [events.Committed(approved_by="a tester")]
+
+
+def bend(site: Any, millimetres: float) -> None:
+    """Somebody leans on the machine: its true geometry is another from now on."""
+    world = site.simulated.world
+    bent = world._truth.vector() + millimetres * np.sin(np.arange(42.0))
+    with world._lock:
+        world._truth = Geometry.from_vector(bent)
+        world._joints = world._joints + np.nan  # so that the platform is moved along at once
+
+
+async def test_worse_than_before_is_rolled_back_bit_for_bit(proposed, finished) -> None:
+    site = proposed()
+    ended = await site.calibrate(at(events.Committed, lambda: bend(site, 6.0)), resume=True)
+    assert ended.exit_code == ExitCode.OUT_OF_LIMITS
+    assert ended.line.endswith("rolled back, the controller is as it was")
+    assert site.happened(events.ResultValidated)[0].verdict is Verdict.WORSE
+    assert site.config == finished.config_before
+    assert site.simulated.machine._geometry.geometry.largest_difference(_drawing(site)) == 0.0
+
+
+def _drawing(site: Any) -> Geometry:
+    nominal = site.cell.settings.robot.nominal
+    return Geometry(nominal.S, nominal.B, nominal.l)
+
+
+async def test_better_but_not_good_enough_is_rolled_back_too(proposed, finished) -> None:
+    site = proposed()
+    ended = await site.calibrate(at(events.Committed, lambda: bend(site, 0.7)), resume=True)
+    assert ended.exit_code == ExitCode.OUT_OF_LIMITS
+    assert site.happened(events.ResultValidated)[0].verdict is Verdict.OUT_OF_LIMITS
+    assert site.config == finished.config_before
+
+
+async def test_a_controller_that_does_not_take_the_reload(proposed, finished, tmp_path) -> None:
+    first_time = tmp_path / "tried"
+    once = f"test -e {first_time} || {{ touch {first_time}; exit 1; }}"
+    site = proposed(controller__reload_command=("sh", "-c", once))
+    with pytest.raises(WriteBackUndone, match=r"its config is as it was$") as undone:
+        await site.calibrate(resume=True)
+    assert undone.value.exit_code is ExitCode.WRITE_BACK_UNDONE
+    assert site.config == finished.config_before
+    assert site.simulated.controller.control.on
+    assert site.simulated.machine._geometry.geometry.largest_difference(_drawing(site)) == 0.0
+    assert not site.happened(events.Committed)
+
+
+async def test_a_controller_that_never_reloads_must_be_started_anew(proposed, finished) -> None:
+    site = proposed(controller__reload_command=("false",))
+    with pytest.raises(WriteBackUndone, match="Start the controller anew before it moves"):
+        await site.calibrate(resume=True)
+    assert site.config == finished.config_before
+
+
+async def test_a_config_that_somebody_changed_is_left_alone(proposed) -> None:
+    site = proposed()
+    edited = site.config + b"# somebody was here\n"
+    site.cell.config_path.write_bytes(edited)
+    with pytest.raises(FileError, match="changed since the run began") as refusal:
+        await site.calibrate(resume=True)
+    assert refusal.value.exit_code is ExitCode.USAGE
+    assert site.config == edited
+
+
+async def test_a_config_that_somebody_changes_meanwhile_is_left_alone(proposed) -> None:
+    site = proposed()
+    edited = site.config + b"# somebody was here\n"
+    edit = at(events.StepBegun, lambda: site.cell.config_path.write_bytes(edited))
+    with pytest.raises(FileError, match="changed since the run began"):
+        await site.calibrate(edit, resume=True)
+    assert site.config == edited
+
+
+async def test_a_gauge_set_to_inches_stops_it(make_site) -> None:
+    site = make_site()
+    fault = at(events.RecordTaken, lambda: site.simulated.gauges.inject("z", InjectedGaugeFault.INCH))
+    with pytest.raises(DeviceError, match=r"gauge z: answers in inch\. Press its in/mm key") as refusal:
+        await site.calibrate(fault)
+    assert refusal.value.exit_code is ExitCode.HARDWARE
+    (interrupted,) = site.happened(events.Interrupted)
+    assert interrupted.exit_code == ExitCode.HARDWARE
+    assert "answers in inch" in interrupted.reason
+    assert b"z" in site.folder.wire.read_bytes()
+
+
+async def test_two_gauges_that_fail_at_once_are_both_named(make_site) -> None:
+    site = make_site()
+
+    def press_both_keys() -> None:
+        for name in "xz":
+            site.simulated.gauges.inject(name, InjectedGaugeFault.INCH)
+
+    with pytest.raises(DeviceError, match=r"(?s)gauge x: .*gauge z: "):
+        await site.calibrate(at(events.RecordTaken, press_both_keys))
+    (interrupted,) = site.happened(events.Interrupted)
+    assert interrupted.exit_code == ExitCode.HARDWARE
+
+
+async def test_an_emergency_stop_stops_it(make_site) -> None:
+    site = make_site()
+    fault = at(events.RecordTaken, lambda: site.simulated.controller.faults.inject(Fault.EMERGENCY_STOP, 1))
+    with pytest.raises(DeviceError, match="controller") as refusal:
+        await site.calibrate(fault)
+    assert refusal.value.exit_code is ExitCode.HARDWARE
+    arrived = [event.orientation for event in site.happened(events.Arrived)]
+    assert arrived in ([1], [1, 2]), "the move in which it struck may just have ended"
+
+
+async def test_a_gauge_carried_away_while_measuring_is_no_record(make_site) -> None:
+    """Its plunger at an end: the record is refused, the run goes on, and the drift tells at the end."""
+    site = make_site(acceptance__drift_mm=0.05)
+
+    def push() -> None:
+        site.simulated.world._station += np.array([0.0, 8.0, 0.0])
+
+    with pytest.raises((LimitError, DeviceError)):
+        await site.calibrate(at(events.RecordTaken, push))
+    refused = site.happened(events.RecordRejected)
+    assert refused
+    assert {event.at.phase for event in refused} == {Phase.IDENTIFY}
+    assert all("gauge y" in event.reason for event in refused)

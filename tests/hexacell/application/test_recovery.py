@@ -1,0 +1,99 @@
+"""Devices pulled out and put back over real wires, with nobody there: the run goes on by itself."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from drivers.simulated.fault_schedule import FaultKind
+from hexacell.cell.recovery import Action
+from hexacell.errors import DeviceError, ExitCode
+from procedures.devices.reconnection import DeviceReplaced
+from procedures.run import events
+
+UNPLUGGED = FaultKind.UNPLUGGED
+
+
+def pulled_out(site: Any, kind: FaultKind, device: str, step: str) -> Any:
+    """A listener that breaks a device when a step begins and puts it right after its first failure."""
+    struck: list[bool] = []
+
+    def listener(event: events.Event, _: object) -> None:
+        if isinstance(event, events.StepBegun) and event.step.key == step and not struck:
+            struck.append(True)
+            site.simulated.faults.inject(kind, device)
+        if isinstance(event, events.Failed):
+            site.simulated.faults.clear(kind, device)
+
+    return listener
+
+
+@pytest.fixture
+def at_second_point(finished, make_site) -> Any:
+    site = make_site()
+    site.write(finished.until(events.SetClosed), finished)
+    return site
+
+
+@pytest.mark.parametrize(
+    ("kind", "device", "step", "voids"),
+    [
+        (UNPLUGGED, "x", "P2/o03/sample", True),
+        pytest.param(UNPLUGGED, "z", "P2/o03/move", True, marks=pytest.mark.slow),
+        pytest.param(UNPLUGGED, "encoder 3", "P2/o03/sample", True, marks=pytest.mark.slow),
+    ],
+)
+async def test_a_device_that_comes_back(at_second_point, kind, device, step, voids) -> None:
+    site = at_second_point
+    ended = await site.calibrate(pulled_out(site, kind, device, step), resume=True)
+    assert ended.exit_code == ExitCode.DONE, ended.line
+    failures = site.happened(events.Failed)
+    assert failures
+    assert all(failure.action is not Action.ABORT for failure in failures)
+    voided = [str(event.at) for event in site.happened(events.SetInvalidated)]
+    assert ("P2" in voided) == voids, "what was opened again has lost its zero"
+
+
+async def test_a_device_that_stays_away(at_second_point) -> None:
+    site = at_second_point
+    site.simulated.faults.check(UNPLUGGED, "y")
+
+    def pull(event: events.Event, _: object) -> None:
+        if isinstance(event, events.StepBegun) and event.step.key == "P2/o03/sample":
+            site.simulated.faults.inject(UNPLUGGED, "y")
+
+    with pytest.raises(DeviceError, match="gauge y"):
+        await site.calibrate(pull, resume=True)
+    attempts = [failure.attempt for failure in site.happened(events.Failed)]
+    assert attempts == [1, 2, 3]
+
+
+async def test_a_robot_that_cannot_be_stopped_is_left_to_people(at_second_point) -> None:
+    """Whatever the ladder says: nobody knows whether it still moves. Plugged in again, the run goes on."""
+    site = at_second_point
+
+    def pull(event: events.Event, _: object) -> None:
+        if isinstance(event, events.StepBegun) and event.step.key == "P2/o03/move":
+            site.simulated.faults.inject(UNPLUGGED, "controller")
+
+    with pytest.raises(DeviceError, match="controller"):
+        await site.calibrate(pull, resume=True)
+    assert not site.happened(events.Failed)
+    site.simulated.faults.clear(UNPLUGGED, "controller")
+    assert (await site.calibrate(resume=True)).exit_code == ExitCode.DONE
+
+
+async def test_another_device_than_the_run_was_begun_with_is_refused(finished, make_site) -> None:
+    site = make_site()
+    history = list(finished.until(events.SetClosed))
+    devices = [
+        device.model_copy(update={"serial_number": "4711"}) if device.protocol == "cia406" else device
+        for device in history[0].devices
+    ]
+    history[0] = history[0].model_copy(update={"devices": tuple(devices)})
+    site.write(history, finished)
+    with pytest.raises(DeviceReplaced, match="serial number 4711") as refusal:
+        await site.calibrate(resume=True)
+    assert refusal.value.exit_code is ExitCode.HARDWARE
+    assert site.happened(events.StepBegun) == [e for e in history if isinstance(e, events.StepBegun)]

@@ -1,0 +1,97 @@
+"""Plans of small cells, and campaigns that carry them out on the paper's robot without hardware."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from hexacell.campaign.decisions import CampaignState, Decision, Finished, FinishPoint
+from hexacell.campaign.planner import Plan
+from hexacell.cell.bundled import bundled_config
+from hexacell.cell.loader import load_cell
+from hexacell.kinematics.geometry import Geometry
+from hexacell.measurements.records import MeasurementSet
+from hexacell.robot_model import config_format, make_robot
+from hexacell.virtual_robot.virtual_robot import VirtualRobot
+
+FEW = 64
+TWO_POINTS = ((100.0, -100.0, 500.0), (-100.0, 100.0, 500.0))
+MakePlan = Callable[..., Plan]
+
+
+def make(**changes: Any) -> Plan:
+    """The plan of the demo's cell with changes, ``section__key=value``, that chooses among few poses."""
+    cell = load_cell(bundled_config("simulated-hexaglide"))
+    settings = cell.settings
+    listed = changes.pop("listed", None)
+    for name, value in changes.items():
+        section, _, key = name.partition("__")
+        inner = getattr(settings, section).model_copy(update={key: value})
+        settings = settings.model_copy(update={section: inner})
+    controller = config_format(settings).read(cell.config_path)
+    return Plan(settings, make_robot(settings, controller), listed, FEW)
+
+
+@dataclass(frozen=True)
+class Taken:
+    """A decision, and the situation that it was made in."""
+
+    situation: CampaignState
+    decision: Decision
+
+
+@dataclass(eq=False)
+class Campaign:
+    """Whatever the plan decides, carried out; noise of 0.01 mm on all that is read."""
+
+    plan: Plan
+    truth: Geometry
+    seed: int = 5
+
+    def run(self, most: int = 200) -> list[Taken]:
+        random = np.random.default_rng(self.seed)
+        built, situation, zero = VirtualRobot(self.plan.robot, self.truth), CampaignState(), None
+        taken: list[Taken] = []
+        while len(taken) < most:
+            decision = self.plan.decide(situation)
+            taken.append(Taken(situation, decision))
+            if isinstance(decision, Finished):
+                break
+            if isinstance(decision, FinishPoint):
+                done = situation.done | {decision.point}
+                situation, zero = CampaignState(situation.measurements, done=done), None
+                continue
+            label = (decision.point, decision.orientation)
+            record, shown = built.measured(label, decision.pose, zero, random)
+            zero = shown if zero is None else zero
+            measurements = MeasurementSet((*situation.measurements.records, record))
+            situation = replace(
+                situation, measurements=measurements, point=decision.point, present=decision.pose
+            )
+        return taken
+
+
+@pytest.fixture(scope="session")
+def make_plan() -> MakePlan:
+    return make
+
+
+@pytest.fixture(scope="session")
+def carry_out(paper: Any) -> Callable[..., list[Taken]]:
+    return lambda plan, **options: Campaign(plan, paper.actual).run(**options)
+
+
+@pytest.fixture(scope="session")
+def two_points() -> Plan:
+    return make(identification__points=TWO_POINTS, identification__orientations=8)
+
+
+@pytest.fixture(scope="session")
+def campaign(two_points: Plan, carry_out: Any) -> list[Taken]:
+    """Both points measured as planned."""
+    taken: list[Taken] = carry_out(two_points)
+    return taken

@@ -1,0 +1,78 @@
+"""What a plan will give: the plan itself on simulated robots, each time the same."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from hexacell.campaign.dry_run import dry_run
+from hexacell.robot_model import make_robot
+from hexacell.virtual_robot.virtual_robot import drawn_robots
+
+TWO_POINTS = ((100.0, -100.0, 500.0), (-100.0, 100.0, 500.0))
+SMALL = {
+    "identification__points": TWO_POINTS,
+    "identification__orientations": 8,
+    "identification__seed": 2,  # whose first robot can be measured
+}
+
+
+@pytest.fixture(scope="module")
+def foretold(make_plan):
+    return dry_run(make_plan(**SMALL), robots=1)
+
+
+def test_it_is_what_a_campaign_then_gives(foretold, campaign, two_points):
+    outlook = two_points.outlook(campaign[-1].situation)
+    assert foretold.robots == 1
+    assert foretold.points == 2
+    assert 12 <= foretold.records <= 16
+    assert foretold.outside == 0
+    assert outlook.now_mm / 4.0 < foretold.worst_sigma_mm < 4.0 * outlook.now_mm
+
+
+def test_it_is_the_same_every_time(foretold, make_plan):
+    assert dry_run(make_plan(**SMALL), robots=1) == foretold
+
+
+def test_minutes_are_of_everything_that_is_measured(foretold, make_plan):
+    """On the way to held-out poses there are no stops."""
+    plan = make_plan(**SMALL)
+    timing = plan.settings.timing
+    held_out = 2 * (2 * 6 + 2) * (timing.move_s + timing.window_s) / 60.0
+    assert foretold.minutes == pytest.approx(plan.budget.pace.minutes(foretold.records, 2) + held_out)
+
+
+def test_robots_that_cannot_be_measured_do_not_count(make_plan):
+    plan = make_plan(**SMALL, tolerances__S_mm=200.0)
+    found = dry_run(plan, robots=2)
+    assert found.robots == 0
+    assert found.drawn == 6
+    assert found.worst_sigma_mm is None
+
+
+def test_robots_are_within_the_tolerances_and_fill_them(make_plan):
+    plan = make_plan(tolerances__l_mm=2.0)
+    drawing = plan.robot.drawing.vector()
+    errors = np.array([robot.vector() - drawing for robot in drawn_robots(plan.robot, 64, seed=3)])
+    assert np.abs(errors[:, -6:]).max() <= 2.0
+    assert np.abs(errors).max() <= 7.0
+    assert np.abs(errors[:, -6:]).max() > 1.9
+    assert np.abs(errors).max() > 6.9
+
+
+def test_a_common_offset_of_the_ball_is_common(make_plan):
+    plan = make_plan(tolerances__ball_mm=30.0, tolerances__B_mm=0.001)
+    B = np.array([robot.B - plan.robot.drawing.B for robot in drawn_robots(plan.robot, 16, seed=3)])
+    assert np.ptp(B, axis=1).max() < 0.01
+    assert np.abs(B).max() > 20.0
+
+
+def test_a_robot_calibrated_before_is_near_what_its_controller_has(make_plan, paper):
+    plan = make_plan()
+    controller = type(plan.robot.controller)(paper.actual.S, paper.actual.B, paper.actual.l)
+    format_of = type("Held", (), {"geometry": controller, "branch": paper.branch})()
+    robot = make_robot(plan.settings, format_of)
+    centre = robot.knowledge().controller.vector()
+    errors = np.array([one.vector() - centre for one in drawn_robots(robot, 16, seed=3)])
+    assert 0.5 < np.abs(errors).max() <= 0.7

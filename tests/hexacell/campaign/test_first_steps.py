@@ -1,0 +1,78 @@
+"""The first steps away from a reference, when next to nothing is known of the robot."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from hexacell.campaign.decisions import CampaignState, MeasurePose
+from hexacell.campaign.recursive_estimator import OnlineEstimator
+from hexacell.identification.estimator import estimate_online
+from hexacell.kinematics.pose import Pose
+from hexacell.measurements.records import MeasurementSet
+from hexacell.virtual_robot.random_robots import random_robot
+from hexacell.virtual_robot.virtual_robot import VirtualRobot
+
+TRAVEL_MM = 5.0
+ERROR_MM = 7.0
+
+
+@pytest.fixture(scope="module")
+def plan(make_plan):
+    return make_plan()
+
+
+def robot_number(plan, number):
+    return random_robot(
+        plan.robot.mechanism, plan.robot.drawing, ERROR_MM, np.random.default_rng([4, number])
+    )
+
+
+def measured(plan, truth, poses):
+    """The records of some poses at the first point, without noise."""
+    built, random, zero = VirtualRobot(plan.robot, truth), np.random.default_rng(0), None
+    records = []
+    for number, pose in enumerate(poses, start=1):
+        record, shown = built.measured((1, number), pose, zero, random)
+        zero = shown if zero is None else zero
+        records.append(record)
+    return MeasurementSet(tuple(records))
+
+
+def test_no_robot_within_the_tolerances_leaves_the_travel_on_its_first_step(plan):
+    """Where straight propagation is trusted, as it is later, one in forty does."""
+    reference = plan.reference_pose(1)
+    opened = CampaignState(measured(plan, robot_number(plan, 1), [reference]), 1, present=reference)
+    first = plan.decide(opened)
+    assert isinstance(first, MeasurePose)
+    margin, moved = plan.robot.limits.singularity_margin, []
+    for number in range(1, 301):
+        built = VirtualRobot(plan.robot, robot_number(plan, number))
+        poses, stands = built.actual_poses(plan.chooser.held([reference, first.pose]))
+        if built.margin(plan.chooser.held([reference])) >= margin:
+            assert stands.all()
+            moved.append(np.abs(poses.positions[1] - poses.positions[0]).max())
+    assert len(moved) > 200
+    assert max(moved) < TRAVEL_MM
+    assert np.median(moved) > 0.05  # or it would tell nothing
+
+
+@pytest.mark.parametrize(
+    ("number", "small_turn"),
+    [
+        (699, Pose(-0.0139, 0.0166, 550.0, -0.26843, -0.1552, -0.49723)),
+        (43, Pose(0.0009, -0.1307, 550.0443, -0.29766, -0.29233, -0.10608)),
+    ],
+)
+def test_a_search_that_comes_next_to_a_singularity_is_begun_elsewhere(plan, number, small_turn):
+    """Robots of a thousand, by their number: between them and the drawing both records pass one."""
+    measurements = measured(plan, robot_number(plan, number), [plan.reference_pose(1), small_turn])
+    assert np.abs(measurements.records[1].deviation).max() > 2.0
+    assert not estimate_online(plan.robot.problem(measurements)).converged
+    found = OnlineEstimator(plan.robot).known(measurements).estimate
+    assert found is not None
+    assert found.converged
+    assert found.chi2 < 10.0
+    again = OnlineEstimator(plan.robot).known(measurements).estimate
+    assert again is not None
+    np.testing.assert_array_equal(found.free, again.free)

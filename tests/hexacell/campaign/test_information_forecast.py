@@ -1,0 +1,115 @@
+"""What sets of records would tell, and the error at the task poses, against the estimator itself."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from hexacell.campaign.decisions import CampaignState
+from hexacell.campaign.information_forecast import add_information, covariance_update
+from hexacell.identification.diagnostics.pose_accuracy import predicted_accuracy
+from hexacell.identification.estimator import estimate_online
+from hexacell.kinematics.rotations import Array
+from hexacell.measurements.records import MeasurementSet
+from hexacell.virtual_robot.virtual_robot import VirtualRobot
+
+TWO_POINTS = ((100.0, -100.0, 500.0), (-100.0, 100.0, 500.0))
+
+
+@pytest.fixture(scope="module")
+def plan(make_plan):
+    return make_plan(
+        identification__points=TWO_POINTS,
+        identification__orientations=8,
+        stations__alignment_deg=0.0,
+        noise__gauge_scale=0.0,
+    )
+
+
+def test_a_set_tells_what_the_estimator_then_knows(plan):
+    """The robot as drawn visits the sets; its records give the covariance that was foretold."""
+    knowledge = plan.robot.knowledge()
+    built = VirtualRobot(plan.robot, knowledge.estimate)
+    random = np.random.default_rng(0)
+    records = []
+    for point, poses in enumerate(plan.prospect.sets, start=1):
+        zero = None
+        for row in range(len(poses)):
+            command = plan.robot.to_command(poses.pose(row))
+            record, shown = built.measured((point, row + 1), command, zero, random)
+            zero = shown if zero is None else zero
+            records.append(record)
+    found = estimate_online(plan.robot.problem(MeasurementSet(tuple(records))))
+    seen = plan.prospect.seen_by(knowledge)
+    foretold = add_information(knowledge.covariance, seen.information(1, 8) + seen.information(2, 8))
+    np.testing.assert_allclose(
+        np.sqrt(np.diag(found.free_covariance)), np.sqrt(np.diag(foretold)), rtol=0.02
+    )
+
+
+def test_more_records_tell_more_and_one_nothing(plan):
+    seen = plan.prospect.seen_by(plan.robot.knowledge())
+    traces = [np.trace(seen.information(1, count)) for count in range(9)]
+    assert traces[0] == traces[1] == 0.0
+    assert (np.diff(traces[1:]) > 0.0).all()
+    np.testing.assert_array_equal(seen.information(1, 99), seen.information(1, 8))
+    assert np.linalg.eigvalsh(seen.information(2, 8)).min() > -1e-6 * traces[-1]
+
+
+def test_sets_begin_at_the_point_untilted_and_keep_to_the_limits(plan):
+    for point, poses in zip(TWO_POINTS, plan.prospect.sets, strict=True):
+        assert len(poses) == 8
+        np.testing.assert_allclose(poses.rotations[0], np.eye(3), atol=1e-12)
+        np.testing.assert_allclose(poses.positions, np.broadcast_to(point, (8, 3)), atol=1e-9)
+        assert poses.tilts().max() <= plan.robot.limits.tilt + 1e-9
+
+
+def test_a_point_that_cannot_be_reached_has_no_set(make_plan):
+    plan = make_plan(identification__points=(TWO_POINTS[0], (0.0, 0.0, 1500.0)))
+    assert len(plan.prospect.sets[1]) == 0
+    seen = plan.prospect.seen_by(plan.robot.knowledge())
+    assert not seen.information(2, 8).any()
+
+
+def test_updating_one_by_one_or_at_once_is_the_same():
+    random = np.random.default_rng(0)
+    covariance = np.diag(random.uniform(1.0, 9.0, 5))
+    records = [(random.standard_normal((3, 5)), np.diag(random.uniform(0.1, 1.0, 3))) for _ in range(4)]
+    one_by_one: Array = covariance
+    for jacobian, noise in records:
+        one_by_one = covariance_update(one_by_one, jacobian, noise)
+    told = np.sum([jacobian.T @ np.linalg.inv(noise) @ jacobian for jacobian, noise in records], axis=0)
+    np.testing.assert_allclose(one_by_one, add_information(covariance, told), atol=1e-12)
+
+
+def test_the_error_at_the_task_is_that_of_the_assessment(campaign, two_points):
+    situation = campaign[-1].situation
+    known = two_points.known(situation)
+    accuracy = predicted_accuracy(
+        known.estimate,
+        known.knowledge.controller,
+        two_points.robot.branch,
+        task=two_points.task.poses,
+        workspace=two_points.task.workspace,
+    )
+    assert accuracy is not None
+    assert accuracy.reachable.all()
+    outlook = two_points.outlook(situation)
+    assert outlook is not None
+    assert outlook.now_mm == pytest.approx(accuracy.after.position_largest_mm, rel=0.02)
+
+
+def test_without_task_poses_the_workspace_is_the_task(make_plan):
+    plan = make_plan(task__poses=())
+    assert len(plan.task.poses) > 20
+    outlook = plan.outlook(CampaignState())
+    assert outlook is not None
+    assert outlook.now_mm > 1.0
+
+
+def test_task_poses_out_of_reach_leave_nothing_to_predict(make_plan, campaign):
+    plan = make_plan(task__poses=((0.0, 0.0, 3000.0, 0.0, 0.0, 0.0),), identification__points=TWO_POINTS)
+    assert plan.outlook(CampaignState()) is None
+    visit = plan.decide(campaign[3].situation)
+    assert visit.outlook is None
+    assert visit.gain > 0.0

@@ -1,0 +1,257 @@
+"""The plan: which point, which pose, and when to stop; on the records so far and nothing else."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from hexacell.campaign.decisions import CampaignState, Finished, FinishPoint, MeasurePose, StartPoint
+from hexacell.campaign.planner import REFUSALS, Plan
+from hexacell.controller_config.interface import ControllerGeometry
+from hexacell.errors import IdentifiabilityError
+from hexacell.measurements.records import MeasurementSet
+from hexacell.robot_model import make_robot
+
+TWO_POINTS = ((100.0, -100.0, 500.0), (-100.0, 100.0, 500.0))
+
+
+def summary(taken):
+    """Each decision in a few letters."""
+    words = []
+    for one in taken:
+        match one.decision:
+            case StartPoint(point=point):
+                words.append(f"R{point}")
+            case MeasurePose(point=point, orientation=orientation):
+                words.append(f"V{point}.{orientation}")
+            case FinishPoint(point=point):
+                words.append(f"C{point}")
+            case Finished():
+                words.append("end")
+    return words
+
+
+def outlooks_of(taken):
+    """What was foretold at each visit."""
+    outlooks = [one.decision.outlook for one in taken if isinstance(one.decision, MeasurePose)]
+    assert None not in outlooks
+    return [outlook for outlook in outlooks if outlook is not None]
+
+
+def records_of(taken):
+    return taken[-1].situation.measurements
+
+
+def test_points_in_order_each_with_all_its_orientations(campaign):
+    visits = [[f"V{point}.{n}" for n in range(2, 9)] for point in (1, 2)]
+    assert summary(campaign) == ["R1", *visits[0], "C1", "R2", *visits[1], "C2", "end"]
+    assert campaign[-1].decision == Finished("all 2 points are measured")
+
+
+def test_a_reference_is_the_cells_point_untilted(campaign):
+    opening = campaign[0].decision
+    assert opening.pose.as_tuple() == (*TWO_POINTS[0], 0.0, 0.0, 0.0)
+    assert np.isfinite(opening.joints).all()
+
+
+def test_visits_keep_the_ball_inside_and_are_as_expected(campaign):
+    wrong = []
+    for one, following in pairwise(campaign):
+        if isinstance(one.decision, MeasurePose):
+            visit, record = one.decision, following.situation.measurements.records[-1]
+            assert (np.abs(visit.deviation) + 3.0 * np.array(visit.sigma)).max() <= 0.9 * 5.0 + 1e-9
+            assert np.abs(np.subtract(record.joints, visit.joints)).max() < 0.06
+            wrong.append(np.abs(np.subtract(record.deviation, visit.deviation)) / visit.sigma)
+    assert np.max(wrong) < 5.0
+    assert np.median(wrong) < 1.5
+
+
+def test_nothing_but_the_situation_decides(campaign, make_plan):
+    """Another plan, without memory of what it decided before, decides the same to the last bit."""
+    for one in (campaign[3], campaign[12], campaign[6]):
+        fresh = make_plan(identification__points=TWO_POINTS, identification__orientations=8)
+        assert fresh.decide(one.situation) == one.decision
+
+
+def test_what_each_record_leaves_is_as_foretold(campaign):
+    """The predicted error after a record, and what then is predicted before the next one."""
+    outlooks = outlooks_of(campaign)
+    for before, after in pairwise(outlooks[3:7]):
+        assert after.now_mm == pytest.approx(before.next_mm, rel=0.1)
+    assert outlooks[-1].now_mm < 0.1 * outlooks[0].now_mm
+    assert [outlook.records for outlook in outlooks] == [*range(15, 8, -1), *range(7, 0, -1)]
+    assert all(outlook.end_mm <= outlook.next_mm <= outlook.now_mm for outlook in outlooks)
+    assert outlooks[-1].end_mm == outlooks[-1].next_mm
+    assert 1.0 < outlooks[-1].end_mm / outlooks[0].end_mm < 10.0  # so few records grow late
+
+
+def test_poses_and_expectations_are_in_the_controllers_frames(campaign, two_points, paper):
+    """A config whose base is turned upside down about the rails gets the same robot, turned."""
+    turned = np.diag([1.0, -1.0, -1.0])
+    geometry = type(paper.nominal)(paper.nominal.S @ turned, paper.nominal.B, paper.nominal.l)
+    robot = make_robot(two_points.settings, ControllerGeometry(geometry, paper.branch))
+    points = tuple(tuple((turned @ np.array(point)).tolist()) for point in TWO_POINTS)
+    identification = two_points.settings.identification.model_copy(update={"points": points})
+    settings = two_points.settings.model_copy(update={"identification": identification})
+    plan = Plan(settings, robot, None, two_points.candidates)
+    opening = plan.decide(CampaignState())
+    assert isinstance(opening, StartPoint)
+    assert opening.pose.as_tuple()[:3] == points[0]
+
+
+@pytest.mark.parametrize("refusals", [0, REFUSALS, REFUSALS + 1])
+def test_refusals_bring_another_pose_until_the_point_is_given_up(campaign, two_points, refusals):
+    one = campaign[3]
+    decision = two_points.decide(replace(one.situation, refusals=refusals))
+    if refusals > REFUSALS:
+        assert decision == FinishPoint(1, "the ball left the gauges' travel 4 times")
+    else:
+        assert isinstance(decision, MeasurePose)
+        assert (decision.pose == one.decision.pose) == (refusals == 0)
+
+
+def test_a_point_that_offers_nothing_is_closed_with_the_reason(campaign, make_plan):
+    plan = make_plan(identification__points=TWO_POINTS, limits__gauge_travel_mm=0.02)
+    decision = plan.decide(campaign[2].situation)
+    assert isinstance(decision, FinishPoint)
+    assert "inside the gauges' travel" in decision.reason
+
+
+def test_records_of_another_robot_are_refused(campaign, two_points):
+    situation = campaign[5].situation
+    strange = tuple(
+        replace(record, joints=tuple(q + 300.0 for q in record.joints))
+        for record in situation.measurements.records
+    )
+    with pytest.raises(IdentifiabilityError):
+        two_points.decide(replace(situation, measurements=MeasurementSet(strange)))
+
+
+def test_a_budget_of_records_ends_it(make_plan, carry_out):
+    plan = make_plan(
+        identification__points=TWO_POINTS,
+        identification__orientations=8,
+        identification__budget_records=11,
+    )
+    taken = carry_out(plan)
+    assert len(records_of(taken)) == 11
+    assert summary(taken)[-2:] == ["C2", "end"]
+    assert taken[-1].decision == Finished("the budget of 11 records is used")
+    assert [outlook.records for outlook in outlooks_of(taken)] == [*range(10, 3, -1), 2, 1]
+
+
+def test_a_record_alone_at_a_point_is_not_begun(make_plan, campaign):
+    plan = make_plan(
+        identification__points=TWO_POINTS,
+        identification__orientations=8,
+        identification__budget_records=9,
+    )
+    between = next(one.situation for one in campaign if summary([one]) == ["R2"])
+    assert plan.decide(between) == Finished("the budget of 9 records is used")
+
+
+def test_a_budget_of_minutes_counts_the_gauges_way(make_plan, carry_out):
+    plan = make_plan(
+        identification__points=TWO_POINTS,
+        identification__orientations=8,
+        identification__budget_minutes=16.0,
+        identification__minutes_per_station=5.0,
+        identification__seconds_per_record=30.0,
+        stations__placement="by-hand",
+    )
+    taken = carry_out(plan)
+    # Two stations, ten records and two closings: 10 + 12 half minutes.
+    assert len(records_of(taken)) == 10
+    assert taken[-1].decision == Finished("the budget of 16 minutes is used")
+
+
+def test_it_stops_when_the_target_is_reached(make_plan, carry_out, campaign):
+    errors = outlooks_of(campaign)
+    target = 0.5 * (errors[-3].now_mm + errors[-2].now_mm)
+    plan = make_plan(
+        identification__points=TWO_POINTS,
+        identification__orientations=8,
+        identification__target_mm=target,
+    )
+    taken = carry_out(plan)
+    assert len(records_of(taken)) == 14
+    assert isinstance(taken[-1].decision, Finished)
+    assert taken[-1].decision.reason.startswith("the predicted error at the task poses is ")
+
+
+def test_a_target_is_not_reached_before_the_records_can_identify(make_plan, carry_out):
+    plan = make_plan(
+        identification__points=TWO_POINTS,
+        identification__orientations=8,
+        identification__target_mm=1000.0,
+    )
+    assert len(records_of(carry_out(plan))) == 14  # 3 x 12 equations for 35 parameters
+
+
+def test_it_stops_where_nothing_is_worth_measuring(make_plan, carry_out, campaign):
+    gains = [outlook.now_mm - outlook.next_mm for outlook in outlooks_of(campaign)]
+    plan = make_plan(
+        identification__points=TWO_POINTS,
+        identification__orientations=8,
+        identification__least_gain_mm=1.1 * min(gains[-4:]),
+    )
+    taken = carry_out(plan)
+    assert len(records_of(taken)) < 16
+    closed = [one.decision for one in taken if isinstance(one.decision, FinishPoint)]
+    assert any("would gain" in decision.reason for decision in closed)
+
+
+def test_nothing_is_begun_that_is_not_worth_it(make_plan):
+    plan = make_plan(identification__least_gain_mm=1000.0)
+    assert plan.decide(CampaignState()) == Finished("no record would gain 1000 mm at the task poses")
+
+
+def test_points_are_chosen_by_what_they_tell_for_their_time(make_plan, carry_out):
+    """Beside a good point one that repeats it tells little, though it comes next in the file."""
+
+    def plan(choose_points):
+        return make_plan(
+            identification__points=(
+                (100.0, -100.0, 500.0),
+                (100.0, -99.0, 500.0),
+                (-100.0, 100.0, 500.0),
+            ),
+            identification__orientations=8,
+            identification__choose_points=choose_points,
+            identification__budget_records=16,
+            limits__tilt_deg=20.0,  # so that what one point can tell is soon told
+        )
+
+    taken, in_order = (carry_out(plan(choose_points)) for choose_points in (True, False))
+    begun = [one.decision.point for one in taken if isinstance(one.decision, StartPoint)]
+    assert 3 in begun[:2]
+    assert len(records_of(taken)) == 16
+    worst = [plan(False).outlook(end[-1].situation).now_mm for end in (taken, in_order)]
+    assert worst[0] < worst[1]
+
+
+def test_dear_stations_are_left_later(make_plan, carry_out):
+    def plan(minutes):
+        return make_plan(
+            identification__choose_points=True,
+            identification__minutes_per_station=minutes,
+            stations__placement="by-hand",
+        )
+
+    taken = carry_out(plan(0.0), most=10)
+    left = next(one for one in taken if isinstance(one.decision, FinishPoint))
+    assert "tells more in the same time" in left.decision.reason
+    assert isinstance(plan(60.0).decide(left.situation), MeasurePose)
+
+
+def test_nothing_is_lent_before_the_robot_is_known_well_enough(campaign, make_plan):
+    """Two records leave the orientation open by degrees: with such a geometry it would be led astray."""
+    plan = make_plan(identification__points=TWO_POINTS, identification__orientations=8)
+    by_records = {len(one.situation.measurements): one.situation for one in campaign}
+    assert not plan.may_lend(CampaignState())
+    assert not plan.may_lend(by_records[2])
+    assert plan.may_lend(by_records[8])
+    assert plan.may_lend(campaign[-1].situation)

@@ -1,0 +1,143 @@
+"""A fixed list of poses: read, visited in its order where that is safe, the others left waiting."""
+
+from __future__ import annotations
+
+import csv
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from hexacell.campaign.decisions import CampaignState, Finished, FinishPoint, MeasurePose, StartPoint
+from hexacell.campaign.planner import REFUSALS
+from hexacell.campaign.pose_list import PoseList, pose_list_of
+from hexacell.cell.bundled import bundled_config
+from hexacell.cell.loader import load_cell
+from hexacell.errors import FileError
+from hexacell.kinematics.pose import Pose
+
+TWO_POINTS = ((100.0, -100.0, 500.0), (-100.0, 100.0, 500.0))
+
+
+@pytest.fixture(scope="module")
+def visited(campaign):
+    """The poses of a campaign, which are safe on its robot in their order."""
+    records = campaign[-1].situation.measurements.records
+    return tuple(tuple(r.pose for r in records if r.point == point) for point in (1, 2))
+
+
+@pytest.fixture
+def plan_of(make_plan):
+    def of(poses):
+        listed = PoseList(Path("list.csv"), poses)
+        return make_plan(identification__points=TWO_POINTS, listed=listed)
+
+    return of
+
+
+def poses_of(taken, point):
+    return [
+        one.decision.pose
+        for one in taken
+        if isinstance(one.decision, MeasurePose | StartPoint) and one.decision.point == point
+    ]
+
+
+def test_a_list_that_is_safe_is_visited_in_its_order(plan_of, visited, carry_out):
+    taken = carry_out(plan_of(visited))
+    assert len(taken[-1].situation.measurements) >= 15
+    for point in (1, 2):
+        there = poses_of(taken, point)
+        in_order = [pose for pose in visited[point - 1] if any(_near(pose, other) for other in there)]
+        assert len(in_order) == len(there)
+        assert _near(there[0], visited[point - 1][0])
+    assert isinstance(taken[-1].decision, Finished)
+
+
+def test_what_is_not_safe_yet_waits(plan_of, visited, carry_out):
+    """The widest pose listed first comes later, when enough is known."""
+    reference, *others = visited[0]
+    backwards = ((reference, *reversed(others)), visited[1])
+    taken = carry_out(plan_of(backwards))
+    there = poses_of(taken, 1)
+    assert len(there) >= 5
+    assert not _near(there[1], others[-1])
+
+
+def test_a_refused_pose_is_passed_over(plan_of, campaign, visited):
+    plan = plan_of(visited)
+    situation = campaign[6].situation
+    first = plan.decide(situation)
+    second = plan.decide(replace(situation, refusals=1))
+    assert isinstance(first, MeasurePose)
+    if isinstance(second, MeasurePose):
+        assert not _near(first.pose, second.pose)
+    given_up = plan.decide(replace(situation, refusals=REFUSALS + 1))
+    assert isinstance(given_up, FinishPoint)
+
+
+def test_poses_beyond_the_travel_are_never_visited(plan_of, visited, carry_out):
+    steep = tuple(Pose(*TWO_POINTS[0], tilt, 0.0, 0.0) for tilt in (0.0, 30.0, -30.0))
+    plan = plan_of((steep, steep))
+    taken = carry_out(plan)
+    closed = next(one.decision for one in taken if isinstance(one.decision, FinishPoint))
+    assert "none of the poses left in the list" in closed.reason
+
+
+def test_the_first_pose_of_a_point_is_its_reference(plan_of, visited):
+    moved = (Pose(101.0, -99.0, 501.0, 1.0), *visited[0][1:])
+    opening = plan_of((moved, visited[1])).decide(CampaignState())
+    assert isinstance(opening, StartPoint)
+    assert opening.pose == moved[0]
+
+
+def _near(one, other):
+    return max(abs(a - b) for a, b in zip(one.as_tuple(), other.as_tuple(), strict=True)) < 1e-6
+
+
+@pytest.fixture
+def cell(tmp_path):
+    source = load_cell(bundled_config("simulated-hexaglide"))
+    plan = source.settings.identification.model_copy(update={"points": TWO_POINTS, "poses": "list.csv"})
+    return replace(
+        source,
+        path=tmp_path / "cell.toml",
+        settings=source.settings.model_copy(update={"identification": plan}),
+    )
+
+
+def write(cell, rows):
+    with (cell.path.parent / "list.csv").open("w") as stream:
+        csv.writer(stream).writerows([["point", "orientation", *"xyzabc", "remark"], *rows])
+
+
+def row(point, orientation, a=0.0):
+    return [point, orientation, *TWO_POINTS[0], a, 0, 0, "as it was"]
+
+
+def test_a_list_is_read_beside_its_cell_file(cell):
+    write(cell, [row(1, 1), row(2, 5), row(1, 2, 3.5), row(2, 7, -2.0)])
+    listed = pose_list_of(cell)
+    assert listed is not None
+    assert len(listed) == 4
+    assert [pose.a for pose in listed.at(1)] == [0.0, 3.5]
+    assert [pose.a for pose in listed.at(2)] == [0.0, -2.0]
+
+
+def test_no_list_no_poses(cell):
+    plan = cell.settings.identification.model_copy(update={"poses": None})
+    assert (
+        pose_list_of(replace(cell, settings=cell.settings.model_copy(update={"identification": plan})))
+        is None
+    )
+
+
+def test_a_list_that_is_not_there(cell):
+    with pytest.raises(FileError, match=r"list\.csv: cannot be read"):
+        pose_list_of(cell)
+
+
+def test_columns_of_poses_are_enough_and_needed(cell):
+    (cell.path.parent / "list.csv").write_text("point,orientation,x,y,z,a,b\n1,1,0,0,550,0,0\n")
+    with pytest.raises(FileError, match=r"list\.csv:1: columns are missing: c\. .*x,y,z,a,b,c$"):
+        pose_list_of(cell)

@@ -1,0 +1,88 @@
+"""The chain of estimates: quick where it continues, the same where it is computed again."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from hexacell.campaign import recursive_estimator
+from hexacell.campaign.recursive_estimator import OnlineEstimator, update_estimate
+from hexacell.errors import LimitError
+from hexacell.identification.estimator import estimate_online
+from hexacell.measurements.records import MeasurementSet
+
+
+@pytest.fixture
+def records(campaign):
+    return campaign[-1].situation.measurements.records
+
+
+def estimates(robot, *sets):
+    tracker = OnlineEstimator(robot)
+    return [tracker.known(MeasurementSet(tuple(records))).estimate for records in sets]
+
+
+def test_before_the_first_record_the_drawing_is_all(two_points):
+    known = OnlineEstimator(two_points.robot).known(MeasurementSet(()))
+    assert known.estimate is None
+    np.testing.assert_array_equal(known.knowledge.covariance, two_points.robot.prior.covariance)
+    with pytest.raises(LimitError):
+        known.station(1)
+
+
+def test_what_was_asked_before_changes_nothing(two_points, records):
+    """Record by record, at once, after others, after too many: the same to the last bit."""
+    robot = two_points.robot
+    one_by_one = estimates(robot, *[records[:count] for count in range(1, 11)])[-1]
+    at_once = estimates(robot, records[:10])[-1]
+    after_others = estimates(robot, records[8:], records[:10])[-1]
+    after_more = estimates(robot, records, records[:10])[-1]
+    for other in (at_once, after_others, after_more):
+        np.testing.assert_array_equal(other.free, one_by_one.free)
+        np.testing.assert_array_equal(other.free_covariance, one_by_one.free_covariance)
+
+
+def test_it_is_the_estimate_from_the_drawing(two_points, records):
+    chained = estimates(two_points.robot, records)[0]
+    anew = estimate_online(two_points.robot.problem(MeasurementSet(records)))
+    sigma = np.sqrt(np.diag(anew.free_covariance))
+    assert np.abs((chained.free - anew.free) / sigma).max() < 1e-3
+    np.testing.assert_allclose(np.sqrt(np.diag(chained.free_covariance)), sigma, rtol=1e-3)
+
+
+def test_the_same_records_are_not_fitted_twice(two_points, records, monkeypatch):
+    fitted = []
+
+    def counting(problem, before):
+        fitted.append(problem.records)
+        return update_estimate(problem, before)
+
+    monkeypatch.setattr(recursive_estimator, "continued", counting)
+    tracker = OnlineEstimator(two_points.robot)
+    for count in (3, 3, 4, 5, 5):
+        tracker.known(MeasurementSet(records[:count]))
+    assert fitted == [1, 2, 3, 4, 5]
+
+
+def test_an_estimate_that_went_astray_is_begun_anew(two_points, records):
+    """Continued from far away it would end far away, and its cost says so."""
+    problem = two_points.robot.problem(MeasurementSet(records))
+    good = estimate_online(problem)
+    before = estimate_online(two_points.robot.problem(MeasurementSet(records[:-1])))
+    worse = replace(before, free=before.free + 40.0 * np.sign(np.sin(np.arange(len(before.free)))))
+    found = recursive_estimator.update_estimate(problem, worse)
+    assert recursive_estimator.cost(found) <= recursive_estimator.cost(good) * (1.0 + 1e-6)
+
+
+def test_the_station_is_where_the_gauges_were_zeroed(two_points, records, paper):
+    known = OnlineEstimator(two_points.robot).known(MeasurementSet(records))
+    found = known.estimate
+    assert found is not None
+    rows = np.flatnonzero(found.problem.labels[:, 0] == 2)
+    zeroed = found.poses.positions[rows] - found.problem.deviations[rows]
+    station = known.station(2)
+    assert np.abs(station.reference - zeroed.mean(axis=0)).max() < 0.05
+    with pytest.raises(LimitError):
+        known.station(3)

@@ -1,0 +1,49 @@
+"""Configs that travel with the package."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from hexacell.cell import bundled
+from hexacell.errors import UsageError
+
+
+@pytest.fixture
+def installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A wheel's folder of configs."""
+    (tmp_path / "linuxcnc-hexaglide").mkdir()
+    (tmp_path / "simulated-hexaglide.toml").touch()
+    (tmp_path / ".hidden").touch()
+    monkeypatch.setattr(bundled, "_IN_THE_WHEEL", tmp_path)
+    return tmp_path
+
+
+def test_the_promised_configs_are_there() -> None:
+    found = {path.name for path in bundled.bundled_configs()}
+    assert {"simulated-hexaglide.toml", "paper-experiment.toml"} <= found
+
+
+def test_a_wheel_has_its_own(installed: Path) -> None:
+    assert bundled.bundled_configs() == (
+        installed / "linuxcnc-hexaglide",
+        installed / "simulated-hexaglide.toml",
+    )
+
+
+@pytest.mark.parametrize("name", ["simulated-hexaglide", "simulated-hexaglide.toml"])
+def test_a_config_by_name(installed: Path, name: str) -> None:
+    assert bundled.bundled_config(name) == installed / "simulated-hexaglide.toml"
+
+
+@pytest.mark.usefixtures("installed")
+def test_an_unknown_config_gets_the_nearest() -> None:
+    with pytest.raises(UsageError, match=r"'simulated-hexaglid' .* Did you mean 'simulated-hexaglide'"):
+        bundled.bundled_config("simulated-hexaglid")
+
+
+@pytest.mark.usefixtures("installed")
+def test_a_config_like_no_other_gets_them_all() -> None:
+    with pytest.raises(UsageError, match="There are: linuxcnc-hexaglide, simulated-hexaglide"):
+        bundled.bundled_config("12")

@@ -1,0 +1,107 @@
+"""Orientations to choose from, and commands that really lead the controller to the joints meant."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from hexacell.experiment_design.candidates import orientations, reachable, within_limits
+from hexacell.kinematics.pose import Pose, PoseBatch
+
+TILT = float(np.radians(45.0))
+
+
+def as_vectors(poses: PoseBatch) -> np.ndarray:
+    return np.hstack([poses.positions, Rotation.from_matrix(poses.rotations).as_rotvec()])
+
+
+def test_orientations_are_the_same_for_the_same_seed_and_others_for_another():
+    first, again, other = (orientations(64, TILT, seed) for seed in (7, 7, 8))
+    np.testing.assert_array_equal(first, again)
+    assert np.abs(first - other).max() > 0.1
+
+
+@pytest.mark.parametrize("tilt", [0.05, 0.3, TILT])
+def test_orientations_are_rotations_that_fill_the_tilts_allowed(tilt):
+    turns = orientations(256, tilt, seed=1)
+    np.testing.assert_allclose(
+        turns @ np.swapaxes(turns, -1, -2), np.eye(3)[None].repeat(256, 0), atol=1e-12
+    )
+    np.testing.assert_allclose(np.linalg.det(turns), 1.0)
+    tilts = np.arccos(np.clip(turns[:, 2, 2], -1.0, 1.0))
+    assert tilts.max() <= tilt + 1e-9
+    # Small ones for the beginning, large ones for later, and tilts to every side.
+    assert (tilts < 0.1 * tilt).sum() >= 20
+    assert (tilts > 0.8 * tilt).sum() >= 20
+    headings = np.arctan2(turns[:, 1, 2], turns[:, 0, 2])
+    assert np.histogram(headings, bins=8, range=(-np.pi, np.pi))[0].min() >= 16
+
+
+@pytest.fixture(scope="module")
+def found(know, much):
+    """Candidates at the first point once the robot is known."""
+    return reachable(know(much), PoseBatch.at([0.0, 0.0, 550.0], orientations(256, TILT, seed=3)))
+
+
+def test_candidates_are_where_the_estimated_robot_stands(found, much, legs):
+    assert len(found) > 100
+    estimated = legs(much.geometry)
+    for target, joints in zip(as_vectors(found.targets), found.joints, strict=True):
+        assert np.abs(estimated.errors(target, joints)).max() < 1e-9
+
+
+def test_commands_lead_the_controllers_own_inverse_to_the_joints(found, paper, legs, vector_of):
+    controller = legs(paper.nominal)
+    for row, joints in enumerate(found.joints):
+        command = vector_of(found.commands.pose(row))  # as it is sent: six numbers
+        np.testing.assert_allclose(controller.joints(command), joints, atol=1e-6)
+
+
+def test_candidates_are_clear_of_singularities_on_both_sides(found, much, paper, legs):
+    for poses, geometry in ((found.targets, much.geometry), (found.commands, paper.nominal)):
+        for vector, joints in zip(as_vectors(poses), found.joints, strict=True):
+            assert legs(geometry).margin(joints, vector) > 0.05 - 1e-4
+
+
+def test_candidates_keep_to_tilt_and_joint_limits(found):
+    assert found.targets.tilts().max() <= TILT
+    assert np.abs(found.joints).max() <= 800.0
+
+
+def test_some_poses_of_the_estimated_robot_have_no_command(know, much):
+    """The unmodified controller cannot lead everywhere; what it cannot is left out."""
+    targets = PoseBatch.at([0.0, 0.0, 550.0], orientations(256, TILT, seed=3))
+    through_nominal = reachable(know(much), targets)
+    through_itself = reachable(know(much, controller=much.geometry), targets)
+    assert len(through_nominal) < len(through_itself)
+    np.testing.assert_allclose(
+        through_itself.commands.positions, through_itself.targets.positions, atol=1e-8
+    )
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        {"tilt": 0.1},
+        {"joint_min_mm": -480.0},
+        {"joint_max_mm": 480.0},
+        {"singularity_margin": 0.12},
+    ],
+)
+def test_every_limit_counts(know, much, limits, found, change):
+    tighter = know(much, limits=replace(limits, **change))
+    fewer = reachable(tighter, PoseBatch.at([0.0, 0.0, 550.0], orientations(256, TILT, seed=3)))
+    assert 0 < len(fewer) < len(found)
+
+
+def test_nowhere_to_go_is_no_error(know, much):
+    assert len(reachable(know(much), PoseBatch.at([0.0, 0.0, 900.0], orientations(16, TILT, seed=3)))) == 0
+
+
+def test_an_unreachable_pose_is_outside_the_limits(limits, hexaglide, paper):
+    poses = PoseBatch.of([Pose(0, 0, 550), Pose(0, 0, 900), Pose(0, 0, 550, 50), Pose(330, 0, 550)])
+    joints = hexaglide.inverse(paper.nominal, paper.branch, poses)
+    np.testing.assert_array_equal(within_limits(limits, poses, joints), [True, False, False, False])

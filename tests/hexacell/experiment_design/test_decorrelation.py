@@ -1,0 +1,102 @@
+"""The measurement that parts two parameters, against what it does once it is made."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from hexacell.experiment_design.decorrelation import partings
+from hexacell.identification.belief import Limits, RobotBelief
+from hexacell.identification.diagnostics.correlations import strongly_correlated
+from hexacell.identification.estimator import identify
+from hexacell.measurements.records import MeasurementSet, Record
+
+LIMITS = Limits(5.0, np.radians(45.0), -800.0, 800.0, 0.05)
+SEED = 2
+DEGREES = 30.0
+
+
+@pytest.fixture(scope="module")
+def measured(visit):
+    """Without noise, so that the estimate stays where it is when a record is added."""
+    return visit(seed=SEED, degrees=DEGREES).measured()
+
+
+@pytest.fixture(scope="module")
+def found(measured, make_problem):
+    return identify(make_problem(measured))
+
+
+@pytest.fixture(scope="module")
+def knowledge(found, paper, hexaglide):
+    return RobotBelief(
+        hexaglide,
+        paper.nominal,
+        paper.branch,
+        found.free,
+        found.free_covariance,
+        found.problem.noise,
+        LIMITS,
+    )
+
+
+def correlation_of(found, pair):
+    everything = strongly_correlated(found, above=-1.0)
+    return next(
+        other.correlation
+        for other in everything
+        if (other.first, other.second) == (pair.first, pair.second)
+    )
+
+
+def test_the_measurement_does_to_the_correlation_what_was_told(
+    found, knowledge, measured, visit, reach, paper, make_problem
+):
+    pairs = strongly_correlated(found)[:6]
+    tried = [
+        (pair, part) for pair, part in zip(pairs, partings(knowledge, found, pairs), strict=True) if part
+    ]
+    assert len(tried) >= 2
+    exact = visit(seed=SEED, degrees=DEGREES)
+    for pair, part in tried:
+        joints, pose = reach(paper.actual, paper.nominal, part.command)
+        reference = exact.balls[exact.labels.index((part.point, 1))]
+        record = Record(part.point, 99, part.command, tuple(joints), tuple(pose[:3] - reference))
+        more = identify(make_problem(MeasurementSet((*measured.records, record))))
+        assert more.records == 56
+        assert correlation_of(more, pair) == pytest.approx(part.correlation, abs=2e-5)
+        assert 1.0 - abs(correlation_of(more, pair)) > 1.05 * (1.0 - abs(pair.correlation))
+
+
+def test_the_ball_stays_where_the_gauges_are(found, knowledge, visit, reach, paper):
+    exact = visit(seed=SEED, degrees=DEGREES)
+    pairs = strongly_correlated(found)[:6]
+    for part in filter(None, partings(knowledge, found, pairs)):
+        _, pose = reach(paper.actual, paper.nominal, part.command)
+        reference = exact.balls[exact.labels.index((part.point, 1))]
+        assert np.abs(pose[:3] - reference).max() < 1.0
+
+
+def test_limits_are_kept(found, knowledge):
+    narrow = replace(knowledge, limits=replace(LIMITS, tilt=np.radians(15.0)))
+    pairs = strongly_correlated(found)[:6]
+    parts = [part for part in partings(narrow, found, pairs) if part]
+    assert all(abs(part.degrees) < 15.0 for part in parts if part.axis != "z")
+
+
+def test_gauges_with_next_to_no_travel_leave_nothing_to_measure(found, knowledge):
+    blind = replace(knowledge, limits=replace(LIMITS, gauge_travel_mm=1e-6))
+    pairs = strongly_correlated(found)[:3]
+    assert partings(blind, found, pairs) == (None, None, None)
+
+
+def test_where_nothing_is_in_reach_there_is_none(found, knowledge):
+    stuck = replace(knowledge, limits=replace(LIMITS, joint_min_mm=0.0, joint_max_mm=1.0))
+    pairs = strongly_correlated(found)[:1]
+    assert partings(stuck, found, pairs) == (None,)
+
+
+def test_without_pairs_nothing_is_tried(found, knowledge):
+    assert partings(knowledge, found, ()) == ()

@@ -1,0 +1,297 @@
+"""The pose measured next: informative, and inside the travel whatever the robot turns out to be."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from hexacell.errors import ExitCode, LimitError
+from hexacell.experiment_design import pose_selection
+from hexacell.experiment_design.candidates import orientations
+from hexacell.experiment_design.gauge_zero import station
+from hexacell.experiment_design.pose_selection import ROUND_ABOUT, select_pose
+from hexacell.experiment_design.predicted_records import SAFETY_SIGMAS, TRAVEL_SHARE
+from hexacell.identification.estimator import estimate_online
+from hexacell.kinematics.geometry import Geometry
+from hexacell.kinematics.pose import Pose, PoseBatch
+from hexacell.measurements.records import MeasurementSet, Record
+
+TRAVEL_MM = 5.0
+TILT = float(np.radians(45.0))
+TURNS = orientations(256, TILT, seed=11)
+
+
+def station_of(know, estimate, point):
+    rows = np.flatnonzero(estimate.problem.labels[:, 0] == point)
+    problem = estimate.problem
+    return station(know(estimate), estimate.poses[rows], problem.joints[rows], problem.deviations[rows])
+
+
+@pytest.fixture(scope="module", params=["little", "much"])
+def stage(request, know):
+    """An estimate, the station at the first point, and what is chosen there."""
+    estimate = request.getfixturevalue(request.param)
+    at = station_of(know, estimate, 1)
+    return estimate, at, select_pose(know(estimate), at, TURNS)
+
+
+def stands(legs, geometry, joints, near):
+    """Where a machine (position and rotation vector) stands at joints, by the test's root finder."""
+    pose = legs(geometry).closed(joints, near)
+    assert pose is not None
+    return pose
+
+
+def aimed_at(legs, estimate, choice, at):
+    start = np.concatenate([at.reference, Rotation.from_matrix(choice.command.rotation).as_rotvec()])
+    return stands(legs, estimate.geometry, choice.joints, start)
+
+
+# --- what is chosen ---
+
+
+def test_the_prediction_keeps_the_travel_with_three_sigma(stage):
+    _, _, choice = stage
+    assert (np.abs(choice.deviation) + SAFETY_SIGMAS * choice.sigma <= TRAVEL_SHARE * TRAVEL_MM).all()
+    assert (choice.sigma > 0.0).all()
+    assert TRAVEL_SHARE < 1.0
+    assert SAFETY_SIGMAS >= 3.0
+
+
+def test_the_command_leads_the_controllers_own_inverse_to_the_joints(stage, paper, legs, vector_of):
+    _, _, choice = stage
+    np.testing.assert_allclose(
+        legs(paper.nominal).joints(vector_of(choice.command)), choice.joints, atol=1e-6
+    )
+
+
+def test_the_estimated_robot_then_has_its_ball_where_the_gauges_were_zeroed(stage, legs):
+    """Not at the nominal point: the real one is millimetres away."""
+    estimate, at, choice = stage
+    pose = aimed_at(legs, estimate, choice, at)
+    np.testing.assert_allclose(pose[:3], at.reference + choice.deviation, atol=1e-6)
+    assert np.linalg.norm(at.reference - [0.0, 0.0, 550.0]) > 0.5
+
+
+def test_reach_tilt_and_margin_are_kept(stage, paper, legs, vector_of):
+    estimate, at, choice = stage
+    assert np.abs(choice.joints).max() <= 800.0
+    pose = aimed_at(legs, estimate, choice, at)
+    assert np.arccos(Rotation.from_rotvec(pose[3:]).as_matrix()[2, 2]) <= TILT + 1e-9
+    assert legs(estimate.geometry).margin(choice.joints, pose) > 0.05 - 1e-4
+    assert legs(paper.nominal).margin(choice.joints, vector_of(choice.command)) > 0.05 - 1e-4
+
+
+def test_whatever_the_robot_turns_out_to_be_the_ball_stays_inside_the_travel(stage, legs, hexaglide):
+    """Many robots as likely as the estimate says, each moved from its own reference to the pose."""
+    estimate, at, choice = stage
+    random = np.random.default_rng(0)
+    robots = random.multivariate_normal(estimate.free, estimate.free_covariance, size=120)
+    problem = estimate.problem
+    reference_row = 0
+    assert problem.labels[reference_row].tolist() == [1, 1]
+    from_where = np.concatenate(
+        [
+            estimate.poses.positions[reference_row],
+            Rotation.from_matrix(estimate.poses.rotations[reference_row]).as_rotvec(),
+        ]
+    )
+    goes_to = aimed_at(legs, estimate, choice, at)
+    deviations = []
+    for free in robots:
+        robot = Geometry.from_vector(hexaglide.convention.basis() @ free)
+        reference = stands(legs, robot, problem.joints[reference_row], from_where)
+        deviations.append(stands(legs, robot, choice.joints, goes_to)[:3] - reference[:3])
+    spread = np.std(deviations, axis=0)
+    assert (np.abs(deviations) < TRAVEL_MM).all()
+    # The prediction also knows the noise, and of the reference what all its records say.
+    assert (spread < 1.5 * choice.sigma + 0.02).all()
+
+
+def test_what_is_gained_is_what_the_record_then_takes_from_the_uncertainty(
+    stage, know, paper, reach, make_problem, noisy, visit
+):
+    """Measured, and the estimate made again: the entropy falls by about the gain that was told."""
+    estimate, _, choice = stage
+    joints, pose = reach(paper.actual, paper.nominal, choice.command)
+    few = visit(points=1, orientations=4, degrees=2.0, seed=5)
+    many = visit(seed=2)
+    exact, measured = (few, few.measured(0.01, 5)) if estimate.records == 4 else (many, noisy)
+    seen = pose[:3] - exact.balls[0]
+    record = Record(1, 99, choice.command, tuple(joints.tolist()), tuple(seen.tolist()))
+    after = estimate_online(make_problem(MeasurementSet((*measured.records, record))))
+
+    def entropy(covariance):
+        return 0.5 * np.linalg.slogdet(covariance)[1]
+
+    fallen = entropy(estimate.free_covariance) - entropy(after.free_covariance)
+    assert choice.gain > 0.0
+    assert fallen == pytest.approx(choice.gain, rel=0.3, abs=0.2)
+
+
+def test_no_other_orientation_that_fits_gains_more(know, much):
+    at = station_of(know, much, 1)
+    best = select_pose(know(much), at, TURNS)
+    for rows in (slice(0, 64), slice(64, 128), slice(128, 256)):
+        assert select_pose(know(much), at, TURNS[rows]).gain <= ROUND_ABOUT * best.gain
+
+
+def test_amplitudes_grow_with_what_is_known(know, little, much):
+    def turned(estimate):
+        at = station_of(know, estimate, 1)
+        choice = select_pose(know(estimate), at, TURNS)
+        turn = Rotation.from_matrix(choice.command.rotation @ estimate.poses.rotations[0].T)
+        return np.degrees(turn.magnitude())
+
+    assert turned(little) < 30.0
+    assert turned(much) > max(30.0, 1.5 * turned(little))
+
+
+def test_the_choice_is_the_same_every_time(know, much):
+    first, again = (select_pose(know(much), station_of(know, much, 2), TURNS) for _ in range(2))
+    assert first.command == again.command
+
+
+# --- the way there ---
+
+
+@pytest.mark.parametrize("present", [0, 2])
+def test_the_way_from_the_present_pose_is_clear_and_inside_the_travel(
+    know, much, paper, legs, vector_of, present
+):
+    """From a pose of the first point, over the stops, looked at more closely than the choice does."""
+    at = station_of(know, much, 1)
+    start = much.problem.commands.poses[[present]]
+    choice = select_pose(know(much), at, TURNS, start)
+    line = [np.array(pose.as_tuple()) for pose in (start.pose(0), *choice.stops, choice.command)]
+    real = much.poses[[present]]
+    near = np.concatenate([real.positions[0], Rotation.from_matrix(real.rotations[0]).as_rotvec()])
+    for begin, end in pairwise(line):
+        for share in np.linspace(0.0, 1.0, 40):
+            command = vector_of(Pose(*((1.0 - share) * begin + share * end).tolist()))
+            joints = legs(paper.nominal).joints(command)
+            near = stands(legs, much.geometry, joints, near)
+            assert np.abs(joints).max() <= 800.0
+            assert legs(paper.nominal).margin(joints, command) > 0.024
+            assert legs(much.geometry).margin(joints, near) > 0.024
+            assert np.abs(near[:3] - at.reference).max() < TRAVEL_MM + 0.1
+
+
+def test_an_orientation_without_a_clear_way_is_not_chosen(know, much):
+    """From beyond a singularity no way leads back: nothing is left to choose."""
+    at = station_of(know, much, 1)
+    beyond = PoseBatch.of([Pose(0, 0, 550, 0, 0, 100)])
+    with pytest.raises(LimitError, match="inside the gauges' travel"):
+        select_pose(know(much), at, TURNS, beyond)
+
+
+def test_stops_must_be_worth_the_moves_that_they_take(know, much, monkeypatch):
+    """From a tilted pose: which orientation is chosen depends on what a way round may cost."""
+    at, start = station_of(know, much, 1), much.problem.commands.poses[[2]]
+
+    def chosen(least):
+        monkeypatch.setattr(pose_selection, "ROUND_ABOUT", least)
+        return select_pose(know(much), at, TURNS, start)
+
+    free, dear, usual = chosen(1.0), chosen(100.0), chosen(ROUND_ABOUT)
+    assert free.stops
+    assert not dear.stops
+    assert free.gain > dear.gain
+    assert usual.gain >= (ROUND_ABOUT if usual.stops else 1.0) * dear.gain
+
+
+def test_what_a_record_will_depend_on_is_how_it_moves_with_the_parameters(stage, legs, hexaglide):
+    """By central differences of the test's own forward kinematics."""
+    estimate, at, choice = stage
+    goes_to = aimed_at(legs, estimate, choice, at)
+
+    def ball(free):
+        return stands(
+            legs, Geometry.from_vector(hexaglide.convention.basis() @ free), choice.joints, goes_to
+        )[:3]
+
+    steps = 1e-3 * np.eye(len(estimate.free))
+    moved = [(ball(estimate.free + step) - ball(estimate.free - step)) / 2e-3 for step in steps]
+    np.testing.assert_allclose(choice.change, np.transpose(moved) - at.jacobian, atol=1e-4)
+    by_encoders = choice.noise - at.covariance - 0.01**2 * np.eye(3)
+    assert (np.linalg.eigvalsh(by_encoders) > 0.0).all()
+
+
+# --- nothing to choose ---
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"tilt": 1e-6}, "no orientation is within reach"),
+        ({"joint_max_mm": -100.0}, "no orientation is within reach"),
+        ({"singularity_margin": 0.9}, "no orientation is within reach"),
+        ({"gauge_travel_mm": 1e-3}, "no orientation surely keeps the ball inside"),
+    ],
+)
+def test_nothing_left_to_choose_says_why(know, much, limits, change, message):
+    at = station_of(know, much, 1)
+    knowledge = replace(know(much), limits=replace(limits, **change))
+    with pytest.raises(LimitError, match=message) as caught:
+        select_pose(knowledge, at, TURNS)
+    assert caught.value.exit_code is ExitCode.OUT_OF_LIMITS
+
+
+# --- the station ---
+
+
+def test_a_stations_reference_is_where_the_ball_was_when_zeroed(know, paper, visit):
+    """By exact records and the true geometry, all of them say the same place."""
+    exact = visit(seed=2)
+    rows = slice(11, 22)
+    measured = exact.measured()
+    at = station(
+        know(paper.actual),
+        PoseBatch(exact.balls[rows], exact.rotations[rows]),
+        exact.joints[rows],
+        measured.deviations[rows],
+    )
+    np.testing.assert_allclose(at.reference, exact.balls[11], atol=1e-9)
+    np.testing.assert_allclose(at.orientation, exact.rotations[11])
+
+
+def test_a_reference_is_the_better_known_the_more_records_say_where_it_was(know, paper, visit):
+    exact = visit(seed=2)
+    measured = exact.measured()
+    traces = []
+    for count in (1, 3, 8):
+        at = station(
+            know(paper.actual),
+            PoseBatch(exact.balls[:count], exact.rotations[:count]),
+            exact.joints[:count],
+            measured.deviations[:count],
+        )
+        np.testing.assert_allclose(at.covariance, at.covariance.T, rtol=1e-9)
+        traces.append(np.trace(at.covariance))
+    assert traces[0] > traces[1] > traces[2] > 0.0
+
+
+def test_a_references_derivative_is_how_it_moves_with_the_parameters(know, paper, legs, visit, hexaglide):
+    exact, rows = visit(seed=2), slice(0, 4)
+    deviations = exact.measured().deviations[rows]
+
+    def at(free):
+        geometry = Geometry.from_vector(hexaglide.convention.basis() @ free)
+        near = np.hstack([exact.balls[rows], Rotation.from_matrix(exact.rotations[rows]).as_rotvec()])
+        found = np.array(
+            [stands(legs, geometry, q, pose) for q, pose in zip(exact.joints[rows], near, strict=True)]
+        )
+        poses = PoseBatch(found[:, :3], Rotation.from_rotvec(found[:, 3:]).as_matrix())
+        return station(know(paper.actual), poses, exact.joints[rows], deviations)
+
+    free = hexaglide.convention.free_parameters(paper.actual)
+    jacobian = at(free).jacobian
+    # The weights are held at the given geometry, as they are in the estimate.
+    for n in range(0, 35, 4):
+        step = 1e-3 * np.eye(35)[n]
+        moved = (at(free + step).reference - at(free - step).reference) / 2e-3
+        np.testing.assert_allclose(jacobian[:, n], moved, atol=2e-2 * max(1.0, np.abs(moved).max()))

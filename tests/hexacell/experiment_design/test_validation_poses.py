@@ -1,0 +1,162 @@
+"""Poses that judge: commanded through the uncorrected controller, safe, apart, with clear ways."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from hexacell.errors import LimitError
+from hexacell.experiment_design.candidates import orientations
+from hexacell.experiment_design.validation_poses import choose_held_out
+from hexacell.kinematics.geometry import Geometry
+from hexacell.kinematics.pose import Pose, PoseBatch
+from hexacell.motion.path_check import is_clear
+
+TRAVEL_MM = 5.0
+COUNT = 6
+CORNER = np.array([100.0, 100.0, 550.0])
+TURNS = orientations(512, float(np.radians(45.0)), seed=2)
+
+
+@pytest.fixture(scope="module", params=["P6", "corner"])
+def point(request, paper):
+    return paper.points[5] if request.param == "P6" else CORNER
+
+
+@pytest.fixture(scope="module")
+def chosen(know, much, point):
+    return choose_held_out(know(much), point, COUNT, TURNS)
+
+
+def test_the_first_is_untilted_and_all_are_at_the_point(chosen, point):
+    assert len(chosen) == COUNT
+    np.testing.assert_array_equal(chosen.rotations[0], np.eye(3))
+    np.testing.assert_array_equal(chosen.positions, np.broadcast_to(point, (COUNT, 3)))
+
+
+def test_the_uncorrected_robot_keeps_the_ball_inside_the_travel(chosen, paper, reach):
+    """The true one, through its unmodified controller: what the gauges will really see."""
+    balls = []
+    for row in range(COUNT):
+        end = reach(paper.actual, paper.nominal, chosen.pose(row))
+        assert end is not None
+        balls.append(end[1][:3])
+    deviations = np.array(balls) - balls[0]
+    assert np.abs(deviations).max() < TRAVEL_MM
+    assert np.abs(deviations).max() > 0.5  # and it has something to judge
+
+
+def test_they_are_apart_from_each_other(chosen):
+    """As commanded, which is about as they really stand."""
+    turns = Rotation.from_matrix(chosen.rotations)
+    apart = [(turns[i] * turns[j].inv()).magnitude() for i in range(COUNT) for j in range(i)]
+    assert np.degrees(min(apart)) > 2.0
+    assert np.degrees(max(apart)) > 10.0
+
+
+def test_they_are_away_from_the_orientations_used(chosen, know, much, point, paper, reach):
+    """Where the platform really stood when the geometry was identified: the truth's orientations."""
+    used = much.poses.rotations
+    away = choose_held_out(know(much), point, COUNT, TURNS, used)
+    np.testing.assert_array_equal(away.rotations[0], np.eye(3))
+
+    def nearest(poses):
+        stands = [reach(paper.actual, paper.nominal, poses.pose(row))[1][3:] for row in range(1, COUNT)]
+        turns = Rotation.from_rotvec(np.array(stands))
+        return min((turn * Rotation.from_matrix(used).inv()).magnitude().min() for turn in turns)
+
+    assert np.degrees(nearest(away)) > 3.0
+    assert nearest(away) > 1.2 * nearest(chosen)
+
+
+def test_an_orientation_used_already_is_the_last_to_be_taken(know, paper, limits):
+    exactly = know(paper.nominal, limits=replace(limits, singularity_margin=0.02))
+    centre = np.array([0.0, 0.0, 550.0])
+    turns = PoseBatch.of([Pose(0, 0, 0, tilt) for tilt in (8.0, 16.0, -12.0)]).rotations
+    without = choose_held_out(exactly, centre, 2, turns)
+    assert without.pose(1).a == pytest.approx(16.0)
+    away = choose_held_out(exactly, centre, 2, turns, used=turns[1:2])
+    assert away.pose(1).a == pytest.approx(-12.0)
+
+
+def test_the_corrected_robot_can_take_them_too(chosen, much, legs):
+    corrected = legs(much.geometry)
+    for position, rotation in zip(chosen.positions, chosen.rotations, strict=True):
+        vector = np.concatenate([position, Rotation.from_matrix(rotation).as_rotvec()])
+        joints = corrected.joints(vector)
+        assert np.abs(joints).max() <= 800.0
+        assert corrected.margin(joints, vector) > 0.05 - 1e-4
+
+
+def test_ways_from_one_to_the_next_and_back_to_the_first_are_clear(chosen, know, much):
+    rows = list(range(COUNT))
+    for start, end in [*pairwise(rows), (COUNT - 1, 0)]:
+        assert is_clear(know(much), chosen[[start]], chosen[[end]])
+
+
+def test_what_lies_beyond_a_singularity_is_not_taken_though_it_would_be_farthest(know, paper, limits):
+    """Tilted by 51 deg the platform has margin again, in another assembly mode."""
+    exactly = know(paper.nominal, limits=replace(limits, singularity_margin=0.02, tilt=1.4))
+    centre = np.array([0.0, 0.0, 550.0])
+    turns = PoseBatch.of([Pose(0, 0, 0, tilt) for tilt in (5.0, 10.0, 20.0, 35.0, 51.0, -75.0)]).rotations
+    taken = choose_held_out(exactly, centre, 5, turns)
+    np.testing.assert_allclose(sorted(pose_tilts(taken)), [0.0, 5.0, 10.0, 20.0, 35.0], atol=1e-9)
+    with pytest.raises(LimitError, match="only 5 orientations"):
+        choose_held_out(exactly, centre, 6, turns)
+
+
+def pose_tilts(poses):
+    return [poses.pose(row).a for row in range(len(poses))]
+
+
+def test_the_choice_is_the_same_every_time(know, much, point, chosen):
+    again = choose_held_out(know(much), point, COUNT, TURNS)
+    np.testing.assert_array_equal(again.rotations, chosen.rotations)
+
+
+def test_the_less_is_known_the_less_is_tilted(know, little, much, point):
+    def largest(estimate):
+        poses = choose_held_out(know(estimate), point, 3, TURNS)
+        return Rotation.from_matrix(poses.rotations).magnitude().max()
+
+    assert largest(little) < largest(much)
+
+
+def test_a_point_out_of_reach_is_refused_and_named(know, much):
+    with pytest.raises(LimitError, match=r"untilted platform cannot stand at X0\.000 Y0\.000 Z900\.000"):
+        choose_held_out(know(much), np.array([0.0, 0.0, 900.0]), COUNT, TURNS)
+
+
+def test_a_point_the_corrected_robot_cannot_reach_is_refused(know, much, paper):
+    """Its legs are far shorter than the controller believes."""
+    short = Geometry(paper.nominal.S, paper.nominal.B, paper.nominal.l - 150.0)
+    with pytest.raises(LimitError, match="untilted platform cannot stand"):
+        choose_held_out(know(short), np.array([0.0, 0.0, 620.0]), COUNT, TURNS)
+
+
+def test_a_robot_that_cannot_be_followed_there_is_refused(know, paper):
+    """Its legs are too short for the joint variables that the controller would go to."""
+    short = Geometry(paper.nominal.S, paper.nominal.B, paper.nominal.l - 150.0)
+    with pytest.raises(LimitError, match="cannot be told"):
+        choose_held_out(know(short), np.array([0.0, 0.0, 450.0]), COUNT, TURNS)
+
+
+def test_too_few_safe_orientations_are_counted(know, much, limits):
+    tight = replace(know(much), limits=replace(limits, gauge_travel_mm=0.2))
+    with pytest.raises(LimitError, match=r"only \d+ orientations .* inside the travel"):
+        choose_held_out(tight, CORNER, 40, TURNS[:128])
+
+
+def test_equal_orientations_do_not_count_twice(know, much):
+    same = np.repeat(Rotation.from_rotvec([0.02, 0.0, 0.0]).as_matrix()[None], 8, axis=0)
+    with pytest.raises(LimitError, match="only 2 orientations"):
+        choose_held_out(know(much), CORNER, 3, same)
+    assert len(choose_held_out(know(much), CORNER, 2, same)) == 2
+
+
+def test_poses_are_batches_of_the_point_given(know, much):
+    assert isinstance(choose_held_out(know(much), CORNER, 2, TURNS), PoseBatch)

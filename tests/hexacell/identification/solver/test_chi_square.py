@@ -1,0 +1,108 @@
+"""The chi-square test of the residuals, and what it says."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from hexacell.identification.estimator import identify
+from hexacell.identification.problem.problem import Noise
+from hexacell.identification.solver.chi_square import ChiSquareTest, ChiSquareVerdict, goodness
+from hexacell.identification.solver.linearized_solution import LinearizedSolution
+
+
+def test_probability_is_the_table_s():
+    assert ChiSquareTest(18.307, 10.0).probability == pytest.approx(0.05, abs=1e-5)
+    assert ChiSquareTest(124.342, 100.0).probability == pytest.approx(0.05, abs=1e-5)
+
+
+def test_chi_square_is_the_identification_s_and_expects_its_degrees_of_freedom(identified):
+    tested = goodness(LinearizedSolution.at(identified))
+    assert tested.chi2 == pytest.approx(identified.chi2, rel=1e-9)
+    assert tested.expected == pytest.approx(identified.dof, abs=1e-4)
+
+
+def test_probabilities_of_repeated_measurements_are_spread_evenly(repeated):
+    """Kolmogorov's distance from the uniform distribution, at the level 0.001."""
+    found = np.sort([goodness(LinearizedSolution.at(one)).probability for one in repeated])
+    steps = np.arange(len(found) + 1) / len(found)
+    distance = max(np.abs(found - steps[1:]).max(), np.abs(found - steps[:-1]).max())
+    assert distance < 1.95 / np.sqrt(len(found))
+    assert all(
+        goodness(LinearizedSolution.at(one)).agreement is ChiSquareVerdict.AGREES for one in repeated
+    )
+
+
+@pytest.mark.parametrize("stations", [Noise(0.01, 0.01), Noise(0.01, 0.01, np.radians(0.3), 0.002)])
+def test_parameters_that_the_prior_holds_take_up_less(visit, make_problem, stations):
+    """Against the trace of the dense matrix that takes the records to their residuals."""
+    measured = visit(points=2, orientations=9, degrees=3.0).measured(0.01)
+    found = identify(make_problem(measured, noise=stations))
+    assert found.undetermined
+    model = LinearizedSolution.at(found)
+    weights, held = model.weights(), model.active_prior()
+    n, p = found.records, len(found.free)
+    local = _station_columns(found.problem)
+    design = np.concatenate([model.jacobian.reshape(3 * n, p), local], axis=1)
+    root = np.linalg.cholesky(np.linalg.inv(weights))
+    whitened = np.linalg.solve(root, design.reshape(n, 3, -1)).reshape(3 * n, -1)
+    prior = np.zeros((design.shape[1],) * 2)
+    prior[:p, :p] = held
+    prior[p:, p:] = np.diag(_station_precision(found.problem))
+    # Residuals of records and of the stations' priors; the parameters' prior is no datum.
+    normal = np.linalg.inv(whitened.T @ whitened + prior)
+    expected = 3 * n - np.sum(normal * (whitened.T @ whitened)) - np.sum(normal[p:, p:] * prior[p:, p:])
+    expected += np.count_nonzero(_station_precision(found.problem))
+    assert goodness(model).expected == pytest.approx(expected, abs=1e-3)
+    assert expected > found.dof + 3.0
+
+
+def _station_columns(problem):
+    """Derivatives (3n, ...) of the records by each station's constant and turn, and by the scale."""
+    n, m = problem.records, problem.points
+    place = np.searchsorted(problem.first_rows, np.arange(n), side="right") - 1
+    constant, turn, scale = np.zeros((n, 3, m, 3)), np.zeros((n, 3, m, 3)), np.zeros((n, 3, 3))
+    for row, (dx, dy, dz) in enumerate(problem.deviations):
+        constant[row, :, place[row]] = np.eye(3)
+        turn[row, :, place[row]] = [[0, dz, -dy], [-dz, 0, dx], [dy, -dx, 0]]
+        scale[row] = -np.diag([dx, dy, dz])
+    parts = [constant.reshape(3 * n, -1)]
+    if problem.noise.alignment:
+        parts += [turn.reshape(3 * n, -1), scale.reshape(3 * n, -1)]
+    return np.concatenate(parts, axis=1)
+
+
+def _station_precision(problem):
+    m, noise = problem.points, problem.noise
+    if not noise.alignment:
+        return np.zeros(3 * m)
+    return np.concatenate(
+        [np.zeros(3 * m), np.full(3 * m, noise.alignment**-2), np.full(3, noise.gauge_scale**-2)]
+    )
+
+
+def test_more_noise_than_stated_is_said_with_its_factor(visit, make_problem):
+    found = identify(make_problem(visit(seed=2).measured(0.03, seed=5)))
+    tested = goodness(LinearizedSolution.at(found))
+    assert tested.agreement is ChiSquareVerdict.TOO_LARGE
+    assert 2.5 < tested.ratio < 3.5
+    assert f"{tested.ratio:.1f} times the stated noise" in tested.sentence
+
+
+def test_less_noise_than_stated_is_said_too(visit, make_problem):
+    found = identify(make_problem(visit(seed=2).measured(0.003, seed=5)))
+    tested = goodness(LinearizedSolution.at(found))
+    assert tested.agreement is ChiSquareVerdict.TOO_SMALL
+    assert "only 0." in tested.sentence
+
+
+def test_a_percent_too_much_noise_is_no_disagreement_however_certain():
+    tested = ChiSquareTest(chi2=1.02e6, expected=1e6)
+    assert tested.probability < 1e-20
+    assert tested.agreement is ChiSquareVerdict.AGREES
+
+
+def test_without_more_records_than_unknowns_nothing_is_proven():
+    tested = ChiSquareTest(chi2=0.0, expected=1e-9)
+    assert tested.agreement is ChiSquareVerdict.NOT_EVALUATED
+    assert "prove nothing" in tested.sentence

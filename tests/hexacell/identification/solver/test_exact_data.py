@@ -1,0 +1,112 @@
+"""Data without noise give the machine exactly, through singularities on the way and all."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from hexacell.identification.estimator import identify
+from hexacell.identification.problem.problem import Noise, Tolerances
+from hexacell.identification.solver import levenberg_marquardt
+from hexacell.identification.solver.levenberg_marquardt import Termination
+from hexacell.kinematics.geometry import Geometry
+from hexacell.study import reference_solvers
+
+EXACT_MM = 1e-6
+SEEDS = range(5)
+
+
+def assert_exact(found, true, records):
+    assert found.converged
+    assert found.geometry.largest_difference(true) < EXACT_MM
+    assert found.records == records
+    assert found.outliers == ()
+    assert found.residual_rms_mm < EXACT_MM
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_the_papers_robot_from_five_points_of_eleven_orientations(paper, visit, make_problem, seed):
+    found = identify(make_problem(visit(seed=seed).measured()))
+    assert_exact(found, paper.actual, records=55)
+    assert found.points == 5
+    assert found.dof == 3 * (55 - 5) - 35
+
+
+def test_the_papers_own_solvers_end_at_the_same_place(visit, make_problem):
+    problem = make_problem(visit(seed=2).measured())
+    ours = identify(problem).geometry
+    assert reference_solvers.gauss_newton(problem).largest_difference(ours) < EXACT_MM
+    assert reference_solvers.least_squares_without_jacobian(problem).largest_difference(ours) < EXACT_MM
+
+
+def test_some_of_these_data_need_the_way_round_a_singularity(visit, make_problem):
+    """Without the detour the search stops where a record comes next to one; with it, it never does."""
+    ends = []
+    for seed in SEEDS:
+        problem = make_problem(visit(seed=seed).measured())
+        ends.append(
+            levenberg_marquardt.solve(
+                problem,
+                np.linalg.inv(problem.prior.covariance),
+                free=problem.mechanism.convention.free_parameters(problem.prior.centre),
+                poses=problem.start,
+            )
+        )
+    blocked = [end for end in ends if end.termination is Termination.SINGULAR]
+    assert blocked
+    assert len(blocked) < len(ends)
+    for end in blocked:
+        assert 0 < end.singular.sum() < 5
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_other_robots_within_the_tolerances(hexaglide, paper, visit, make_problem, seed):
+    errors = np.random.default_rng(seed).uniform(-7.0, 7.0, 35)
+    true = Geometry.from_vector(paper.nominal.vector() + hexaglide.convention.basis() @ errors)
+    found = identify(make_problem(visit(true, seed=seed).measured()))
+    assert_exact(found, true, records=55)
+
+
+def test_the_real_robot_whose_ball_was_30_mm_away(paper, visit, make_problem):
+    problem = make_problem(
+        visit(paper.calibrated, seed=1).measured(), tolerances=Tolerances(7.0, 7.0, 7.0, ball_mm=40.0)
+    )
+    assert_exact(identify(problem), paper.calibrated, records=55)
+
+
+def test_a_robot_that_is_as_drawn(paper, visit, make_problem):
+    assert_exact(identify(make_problem(visit(paper.nominal).measured())), paper.nominal, records=55)
+
+
+@pytest.mark.parametrize(("points", "orientations"), [(2, 11), (3, 8), (5, 5), (5, 4)])
+def test_few_records_are_enough_where_they_are_exact(paper, visit, make_problem, points, orientations):
+    exact = visit(points=points, orientations=orientations, seed=1)
+    found = identify(make_problem(exact.measured(), noise=Noise(1e-4, 1e-4)))
+    assert_exact(found, paper.actual, records=points * orientations)
+
+
+def test_the_order_of_records_does_not_matter(visit, make_problem):
+    measured = visit(seed=2).measured(0.01, seed=3)
+    order = np.random.default_rng(0).permutation(len(measured))
+    shuffled = type(measured)(tuple(measured.records[row] for row in order))
+    there, here = identify(make_problem(shuffled)), identify(make_problem(measured))
+    assert there.geometry.largest_difference(here.geometry) < EXACT_MM
+    assert there.chi2 == pytest.approx(here.chi2)
+    np.testing.assert_allclose(there.covariance, here.covariance, atol=1e-8)
+
+
+def test_where_the_gauges_were_zeroed_does_not_matter(visit, make_problem):
+    """A constant at each point is nobody's to know."""
+    measured = visit(seed=2).measured(0.01, seed=3)
+    offsets = np.random.default_rng(0).uniform(-4.0, 4.0, (5, 3))
+    from dataclasses import replace
+
+    moved = type(measured)(
+        tuple(
+            replace(record, deviation=tuple(np.add(record.deviation, offsets[record.point - 1]).tolist()))
+            for record in measured.records
+        )
+    )
+    there, here = identify(make_problem(moved)), identify(make_problem(measured))
+    assert there.geometry.largest_difference(here.geometry) < EXACT_MM
+    assert there.chi2 == pytest.approx(here.chi2)

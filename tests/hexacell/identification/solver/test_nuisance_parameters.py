@@ -1,0 +1,83 @@
+"""Stations are set up by hand: turned a little against the base, with gauges a little off scale."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+from scipy.stats import chi2
+
+from hexacell.identification.estimator import identify
+from hexacell.identification.problem.problem import Noise
+from hexacell.measurements.records import MeasurementSet
+
+ALIGNMENT = float(np.radians(0.3))
+SCALE = 0.002
+STATED = Noise(0.01, 0.01, alignment=ALIGNMENT, gauge_scale=SCALE)
+
+
+@pytest.fixture(scope="module")
+def set_up(visit):
+    """Measurements with stations turned by 0.3 deg and gauges off by 0.2 %, one sigma each."""
+    exact = visit(seed=2)
+
+    def measured(seed: int) -> MeasurementSet:
+        random = np.random.default_rng(1000 + seed)
+        turns = Rotation.from_rotvec(ALIGNMENT * random.standard_normal((5, 3))).as_matrix()
+        scale = 1.0 + SCALE * random.standard_normal(3)
+        really = exact.measured()
+        seen = [
+            replace(
+                record,
+                joints=tuple(np.add(record.joints, 0.01 * random.standard_normal(6)).tolist()),
+                deviation=tuple(
+                    (
+                        scale * (turns[record.point - 1] @ record.deviation)
+                        + 0.01 * random.standard_normal(3)
+                    ).tolist()
+                ),
+            )
+            for record in really.records
+        ]
+        return MeasurementSet(tuple(seen))
+
+    return measured
+
+
+def test_errors_scatter_as_the_covariance_says_with_stations_set_up_badly(paper, set_up, make_problem):
+    count = 12
+    errors, chi_squares = [], []
+    for seed in range(count):
+        found = identify(make_problem(set_up(seed), noise=STATED))
+        assert found.outliers == ()
+        error = found.free - found.problem.mechanism.convention.free_parameters(paper.actual)
+        errors.append(error @ np.linalg.solve(found.free_covariance, error))
+        chi_squares.append(found.chi2)
+    for values, degrees in ((errors, 35 * count), (chi_squares, 115 * count)):
+        low, high = chi2.interval(1.0 - 1e-4, degrees)
+        assert low < sum(values) < high
+
+
+def test_not_knowing_of_it_costs_accuracy_and_shows(paper, set_up, make_problem):
+    knowing = identify(make_problem(set_up(0), noise=STATED))
+    unaware = identify(make_problem(set_up(0), noise=Noise(0.01, 0.01)))
+    assert unaware.chi2 > 10 * unaware.dof
+    ours, theirs = (found.geometry.largest_difference(paper.actual) for found in (knowing, unaware))
+    assert ours < 0.5 * theirs
+
+
+def test_well_made_stations_lose_little_by_the_doubt(noisy, make_problem, identified):
+    doubting = identify(make_problem(noisy, noise=STATED))
+    assert doubting.sigma.max() > identified.sigma.max()
+    assert doubting.outliers == ()
+
+
+def test_a_station_that_is_surely_straight_is_the_limit_of_one_that_hardly_turns(
+    noisy, make_problem, identified
+):
+    hardly = identify(make_problem(noisy, noise=Noise(0.01, 0.01, alignment=1e-9, gauge_scale=1e-9)))
+    assert hardly.geometry.largest_difference(identified.geometry) < 1e-5
+    np.testing.assert_allclose(hardly.sigma, identified.sigma, rtol=1e-4)
+    assert hardly.chi2 == pytest.approx(identified.chi2, rel=1e-4)

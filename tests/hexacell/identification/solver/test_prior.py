@@ -1,0 +1,102 @@
+"""The drawing's tolerances: a hold where the data are silent, and no bias where they speak."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from hexacell.identification.estimator import estimate_online, identify
+from hexacell.identification.problem.problem import Prior, Tolerances
+from hexacell.kinematics.geometry import PARAMETER_NAMES
+
+
+def test_the_prior_has_the_moments_of_errors_within_the_tolerances(hexaglide, paper):
+    prior = Prior.of(hexaglide, paper.nominal, Tolerances(S_mm=3.0, B_mm=6.0, l_mm=1.5))
+    names = hexaglide.convention.free_names()
+    widths = {"S": 3.0, "B": 6.0, "l": 1.5}
+    expected = np.diag([widths[name[0]] ** 2 / 3.0 for name in names])
+    np.testing.assert_allclose(prior.covariance, expected)
+    np.testing.assert_array_equal(prior.centre.vector(), paper.nominal.vector())
+
+
+def test_the_balls_mounting_moves_all_platform_joints_together(hexaglide, paper):
+    prior = Prior.of(hexaglide, paper.nominal, Tolerances(7.0, 7.0, 7.0, ball_mm=30.0))
+    names = hexaglide.convention.free_names()
+    for n, one in enumerate(names):
+        for m, other in enumerate(names):
+            together = one[0] == other[0] == "B" and one[-1] == other[-1]
+            own = 49.0 / 3.0 if n == m else 0.0
+            assert prior.covariance[n, m] == pytest.approx(own + (300.0 if together else 0.0))
+
+
+def test_where_the_data_speak_they_speak_alone(paper, visit, make_problem):
+    """Exact data: whatever of the prior is left in pulls the estimate away from the truth."""
+    problem = make_problem(visit(seed=2).measured())
+    assert estimate_online(problem).geometry.largest_difference(paper.actual) > 1e-3
+    assert identify(problem).geometry.largest_difference(paper.actual) < 1e-6
+
+
+def test_a_drawing_elsewhere_gives_the_same_result(hexaglide, paper, visit, make_problem):
+    measured = visit(seed=2).measured(0.01, seed=4)
+    errors = np.random.default_rng(1).uniform(-3.0, 3.0, 35)
+    other = type(paper.nominal).from_vector(paper.nominal.vector() + hexaglide.convention.basis() @ errors)
+    here, there = (identify(make_problem(measured, drawing=drawing)) for drawing in (paper.nominal, other))
+    assert here.geometry.largest_difference(there.geometry) < 1e-5
+
+
+@pytest.fixture(scope="module")
+def small_tilts(visit, make_problem):
+    return identify(make_problem(visit(degrees=3.0, seed=1).measured(0.01, seed=1)))
+
+
+def test_what_small_tilts_leave_open_is_named(small_tilts):
+    assert small_tilts.converged
+    assert len(small_tilts.undetermined) >= 5
+    told = dict(zip(PARAMETER_NAMES, small_tilts.sigma / 7.0 * np.sqrt(3.0), strict=True))
+    for name in small_tilts.undetermined:
+        assert told[name] > 0.5
+    determined = (
+        set(PARAMETER_NAMES)
+        - set(small_tilts.undetermined)
+        - set(small_tilts.problem.mechanism.convention.zero)
+    )
+    assert all(told[name] <= 0.5 for name in determined)
+
+
+def test_what_small_tilts_leave_open_stays_near_the_drawing(small_tilts, paper, hexaglide):
+    """And what is told of it holds: errors within a few of its sigmas, sigmas within the prior's."""
+    free = hexaglide.convention.free_part
+    error = small_tilts.free - free(paper.actual)
+    plausible = error @ np.linalg.solve(small_tilts.free_covariance, error)
+    assert plausible < 35 + 5 * np.sqrt(70)
+    assert (small_tilts.sigma <= small_tilts.prior_sigma + 1e-9).all()
+    assert np.abs(small_tilts.free - free(paper.nominal)).max() < 15.0
+
+
+def test_the_more_records_the_less_is_left_open(visit, make_problem):
+    exact = visit(seed=2)
+    measured = exact.measured(0.01, seed=1)
+    sigmas = []
+    for count in (1, 3, 6, 11):
+        rows = tuple(record for record in measured.records if record.orientation <= count)
+        sigmas.append(np.trace(estimate_online(make_problem(type(measured)(rows))).free_covariance))
+    assert sigmas == sorted(sigmas, reverse=True)
+
+
+def test_tracking_begins_with_nothing_at_all(paper, visit, make_problem):
+    """After the first record nothing is known but the drawing, and that is what is said."""
+    measured = visit(seed=2).measured()
+    first = type(measured)(measured.records[:1])
+    estimate = estimate_online(make_problem(first))
+    assert estimate.converged
+    np.testing.assert_allclose(estimate.geometry.vector(), paper.nominal.vector(), atol=1e-9)
+    np.testing.assert_allclose(estimate.sigma, estimate.prior_sigma, rtol=1e-9)
+
+
+def test_tracking_goes_on_from_the_former_estimate(visit, make_problem):
+    problem = make_problem(visit(seed=2).measured(0.01, seed=1))
+    cold = estimate_online(problem)
+    warm = estimate_online(problem, free=cold.free, poses=cold.poses)
+    assert warm.geometry.largest_difference(cold.geometry) < 1e-6
+    assert warm.iterations <= 2
+    assert warm.iterations < cold.iterations

@@ -1,0 +1,97 @@
+"""What the identification says of its own accuracy, against many repetitions of one measurement."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.stats import chi2
+
+from hexacell.identification.estimator import identify
+from hexacell.identification.problem.problem import Noise
+from hexacell.kinematics.geometry import PARAMETER_NAMES
+from hexacell.study import reference_solvers
+
+
+@pytest.fixture(scope="session")
+def truth(hexaglide, paper):
+    return hexaglide.convention.free_parameters(paper.actual)
+
+
+def within(total, degrees, alarm=1e-4):
+    """Whether a sum of squares of standard normal numbers is plausible on both sides."""
+    low, high = chi2.interval(1.0 - alarm, degrees)
+    return low < total < high
+
+
+def test_errors_scatter_as_the_covariance_says(repeated, truth):
+    total = 0.0
+    for found in repeated:
+        error = found.free - truth
+        total += error @ np.linalg.solve(found.free_covariance, error)
+    assert within(total, len(repeated) * len(truth))
+
+
+def test_no_parameter_is_more_certain_than_it_says(repeated, truth):
+    errors = np.array([found.free - truth for found in repeated])
+    told = np.sqrt(np.diag(repeated[0].free_covariance))
+    low, high = np.sqrt(chi2.interval(1.0 - 1e-4, len(repeated)) / np.array(len(repeated)))
+    ratio = np.sqrt(np.mean(errors**2, axis=0)) / told
+    assert low < ratio.min()
+    assert ratio.max() < high
+
+
+def test_chi_square_is_that_of_the_degrees_of_freedom(repeated):
+    assert {found.dof for found in repeated} == {115}
+    assert within(sum(found.chi2 for found in repeated), 115 * len(repeated))
+
+
+def test_clean_records_are_never_left_out(repeated):
+    assert [found.outliers for found in repeated] == [()] * len(repeated)
+    assert {found.records for found in repeated} == {55}
+    assert all(found.converged for found in repeated)
+    assert {found.undetermined for found in repeated} == {()}
+
+
+@pytest.mark.parametrize("factor", [0.2, 5.0])
+def test_a_wrong_statement_of_the_noise_shows_in_chi_square_and_leaves_nothing_out(
+    noisy, make_problem, factor
+):
+    found = identify(make_problem(noisy, noise=Noise(0.01 * factor, 0.01 * factor)))
+    assert found.outliers == ()
+    assert within(found.chi2 * factor**2, found.dof)
+    assert not within(found.chi2, found.dof)
+
+
+def test_weights_do_better_than_the_papers_ordinary_least_squares(visit, make_problem, truth):
+    """On the same data; method.md measured a factor of two."""
+    exact = visit(seed=2)
+    weighted, ordinary = [], []
+    for seed in range(5):
+        problem = make_problem(exact.measured(0.01, seed))
+        plain = problem.mechanism.convention.free_parameters(reference_solvers.gauss_newton(problem))
+        ordinary.append(np.abs(plain - truth).max())
+        weighted.append(np.abs(identify(problem).free - truth).max())
+    assert np.mean(weighted) < 0.7 * np.mean(ordinary)
+
+
+def test_the_full_covariance_follows_from_the_free_one(identified, hexaglide):
+    convention = hexaglide.convention
+    assert identified.covariance.shape == (42, 42)
+    np.testing.assert_array_equal(identified.covariance, identified.covariance.T)
+    assert np.linalg.eigvalsh(identified.free_covariance).min() > 0.0
+    for row, name in enumerate(PARAMETER_NAMES):
+        if name in convention.zero:
+            assert not identified.covariance[row].any()
+            assert identified.sigma[row] == 0.0
+        else:
+            assert identified.sigma[row] > 0.0
+    same = [PARAMETER_NAMES.index(name) for name in ("B2z", "B3z", "B5z")]
+    np.testing.assert_array_equal(identified.sigma[same], identified.sigma[same[0]])
+    np.testing.assert_array_equal(identified.covariance[same[0]], identified.covariance[same[1]])
+
+
+def test_noise_where_it_matters_is_what_costs_accuracy(noisy, make_problem):
+    """Encoder noise goes through the machine, gauge noise does not: both must count."""
+    both = identify(make_problem(noisy)).sigma.max()
+    for noise in (Noise(0.001, 0.01), Noise(0.01, 0.001)):
+        assert identify(make_problem(noisy, noise=noise)).sigma.max() < 0.95 * both

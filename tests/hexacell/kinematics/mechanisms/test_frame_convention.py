@@ -1,0 +1,148 @@
+"""The frame convention: 35 of 42 numbers, by rule, whatever frames a geometry comes in."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from hexacell.kinematics.geometry import PARAMETER_NAMES, Geometry
+from hexacell.kinematics.mechanism import FrameTransform
+from hexacell.kinematics.pose import PoseBatch
+from hexacell.kinematics.sensitivity import pose_sensitivity
+
+CONVENTION_MM = 1e-9
+place = st.floats(-500.0, 500.0)
+turn = st.floats(-np.pi, np.pi)
+
+
+@st.composite
+def frame_changes(draw):
+    """Everything that leaves a Hexaglide itself alone: its rails stay along x."""
+    return FrameTransform(
+        base=Rotation.from_rotvec([draw(turn), 0.0, 0.0]).as_matrix(),
+        origin=np.array(draw(st.tuples(place, place, place))),
+        platform=Rotation.from_rotvec(draw(st.tuples(turn, turn, turn))).as_matrix(),
+    )
+
+
+@st.composite
+def geometries(draw):
+    """Machines near the paper's, in frames of no convention."""
+    numbers = st.lists(st.floats(-7.0, 7.0), min_size=42, max_size=42)
+    return np.array(draw(numbers))
+
+
+def obeys_the_rules(geometry: Geometry) -> bool:
+    S, B = geometry.S, geometry.B
+    zeros = [*S[1], S[2, 2]]
+    equals = [B[1, 2] - B[2, 2], B[1, 2] - B[4, 2], B[1, 1] - B[4, 1]]
+    return not np.any(zeros) and not np.any(equals)
+
+
+def test_the_papers_tables_obey_the_convention(hexaglide, paper):
+    for geometry in (paper.nominal, paper.actual, paper.calibrated):
+        assert obeys_the_rules(geometry)
+        same, _ = hexaglide.normalize_frames(geometry)
+        np.testing.assert_allclose(same.vector(), geometry.vector(), atol=CONVENTION_MM)
+
+
+@given(geometries())
+def test_every_geometry_can_be_brought_to_the_convention(hexaglide, paper, errors):
+    free_form = Geometry.from_vector(paper.nominal.vector() + errors)
+    found, change = hexaglide.normalize_frames(free_form)
+    assert obeys_the_rules(found)
+    assert found.S[2, 1] > 0.0
+    assert found.B[4, 0] > found.B[1, 0]
+    np.testing.assert_allclose(change.geometry(free_form).vector(), found.vector(), atol=CONVENTION_MM)
+    # A change of frames is a motion along the rails' axes and a rotation of the platform's.
+    for matrix in (change.base, change.platform):
+        np.testing.assert_allclose(matrix @ matrix.T, np.eye(3), atol=1e-12)
+        assert np.linalg.det(matrix) == pytest.approx(1.0)
+    np.testing.assert_allclose(change.base[0], [1, 0, 0], atol=1e-15)
+
+
+@given(geometries(), frame_changes())
+def test_frames_do_not_matter(hexaglide, paper, errors, change):
+    geometry, _ = hexaglide.normalize_frames(Geometry.from_vector(paper.nominal.vector() + errors))
+    back, _ = hexaglide.normalize_frames(change.geometry(geometry))
+    np.testing.assert_allclose(back.vector(), geometry.vector(), atol=CONVENTION_MM)
+
+
+@given(frame_changes())
+def test_the_same_machine_stands_in_other_frames_at_the_same_joint_variables(hexaglide, paper, change):
+    poses = PoseBatch.at([10.0, -50.0, 540.0], Rotation.from_rotvec([[0.2, -0.1, 0.3]]).as_matrix())
+    joints = hexaglide.inverse(paper.actual, paper.branch, poses)
+    moved = hexaglide.constraints(change.geometry(paper.actual), change.poses(poses), joints)
+    np.testing.assert_allclose(moved, 0.0, atol=1e-9)
+
+
+@given(frame_changes())
+def test_the_way_back(paper, change):
+    there_and_back = change.inverse().geometry(change.geometry(paper.actual))
+    np.testing.assert_allclose(there_and_back.vector(), paper.actual.vector(), atol=CONVENTION_MM)
+    pose = PoseBatch.at([1.0, 2.0, 3.0], Rotation.from_rotvec([[0.2, -0.1, 0.3]]).as_matrix())
+    back = change.inverse().poses(change.poses(pose))
+    np.testing.assert_allclose(back.positions, pose.positions, atol=CONVENTION_MM)
+    np.testing.assert_allclose(back.rotations, pose.rotations, atol=1e-12)
+
+
+@given(frame_changes())
+def test_differences_of_ball_positions_turn_with_the_base_and_know_no_origin(change):
+    positions = np.array([[1.0, 2.0, 3.0], [-4.0, 5.0, 6.5], [0.0, 0.1, -7.0]])
+    moved = change.poses(PoseBatch(positions, np.broadcast_to(np.eye(3), (3, 3, 3)))).positions
+    np.testing.assert_allclose(
+        change.deviations(positions - positions[0]), moved - moved[0], atol=CONVENTION_MM
+    )
+
+
+@given(frame_changes())
+def test_a_geometry_in_other_frames_predicts_the_same_differences(hexaglide, paper, legs, visit, change):
+    """Forward kinematics of the machine in moved frames, by the test's own root finder."""
+    seen = visit(seed=2)
+    rows = [0, 1, 2]
+    moved = legs(change.geometry(paper.actual))
+    guesses = change.poses(PoseBatch(seen.balls[rows], np.array([seen.rotations[row] for row in rows])))
+    balls = []
+    for row, guess in zip(rows, range(3), strict=True):
+        turned = Rotation.from_matrix(guesses.rotations[guess]).as_rotvec()
+        near = np.concatenate([guesses.positions[guess] + [0.5, -0.3, 0.2], turned])
+        balls.append(moved.closed(seen.joints[row], near)[:3])
+    differences = np.array(balls) - balls[0]
+    np.testing.assert_allclose(differences, change.deviations(seen.balls[rows] - seen.balls[0]), atol=1e-7)
+
+
+def test_the_free_parameters_are_35_and_named(hexaglide):
+    free = hexaglide.convention.free_names()
+    assert len(free) == 35
+    fixed = set(PARAMETER_NAMES) - set(free)
+    assert fixed == {"S2x", "S2y", "S2z", "S3z", "B3z", "B5z", "B5y"}
+
+
+def test_the_basis_spreads_free_parameters_over_all(hexaglide):
+    basis, free = hexaglide.convention.basis(), hexaglide.convention.free_names()
+    assert basis.shape == (42, 35)
+    geometry = Geometry.from_vector(basis @ np.arange(1.0, 36.0))
+    assert obeys_the_rules(geometry)
+    np.testing.assert_array_equal(hexaglide.convention.free_parameters(geometry), np.arange(1.0, 36.0))
+    for column, name in enumerate(free):
+        stands_for = {PARAMETER_NAMES[row] for row in np.flatnonzero(basis[:, column])}
+        expected = {"B2z": {"B2z", "B3z", "B5z"}, "B2y": {"B2y", "B5y"}}.get(name, {name})
+        assert stands_for == expected
+
+
+@pytest.mark.parametrize(("built", "rank"), [("nominal", 35), ("actual", 36)])
+def test_a_rank_would_not_find_the_convention(hexaglide, paper, visit, built, rank):
+    """With errors in the geometry, roll shows in the gauges' own alignment: the data see it too."""
+    seen = visit(getattr(paper, built), seed=2)
+    poses = PoseBatch(seen.balls, seen.rotations)
+    by_parameters = pose_sensitivity(hexaglide, getattr(paper, built), poses, seen.joints).parameters[:, :3]
+    of_points = by_parameters.reshape(5, 11, 3, 42)
+    differences = (of_points - of_points.mean(axis=1, keepdims=True)).reshape(-1, 42)
+
+    visible = np.linalg.svd(differences, compute_uv=False)
+    assert (visible > 1e-9 * visible[0]).sum() == rank
+    free = np.linalg.svd(differences @ hexaglide.convention.basis(), compute_uv=False)
+    assert free[-1] > 1e-4 * free[0]

@@ -1,0 +1,126 @@
+"""The Hexaglide's leg equation: what closes, how it changes, and its inverse on every branch."""
+
+from __future__ import annotations
+
+from itertools import product
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from hexacell.kinematics.pose import Pose, PoseBatch
+
+STEP = 1e-30  # complex steps need no compromise between rounding and truncation
+degrees = st.floats(-30.0, 30.0)
+poses = st.builds(
+    Pose, st.floats(-100, 100), st.floats(-200, 100), st.floats(450, 600), degrees, degrees, degrees
+)
+BRANCHES = list(product((-1, 1), repeat=6))
+
+
+def leg_errors(S, B, l, joints, position, turn, rotation):  # noqa: E741 - the paper's symbol
+    """(|S + q e - P - (1 + [turn]x) R B|^2 - l^2) / 2l of each leg, of complex numbers."""
+    x, y, z = turn
+    small_turn = np.eye(3) + np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    leg = S + np.outer(joints, [1, 0, 0]) - position - B @ (small_turn @ rotation).T
+    return (np.sum(leg * leg, axis=1) - l * l) / (2 * l)
+
+
+def by_complex_step(numbers, name, place):
+    stepped = {key: np.asarray(value, dtype=complex).copy() for key, value in numbers.items()}
+    stepped[name][place] += 1j * STEP
+    return leg_errors(**stepped).imag / STEP
+
+
+def state(geometry, pose, joints):
+    return {
+        "S": geometry.S,
+        "B": geometry.B,
+        "l": geometry.l,
+        "joints": joints,
+        "position": pose.position,
+        "turn": np.zeros(3),
+        "rotation": pose.rotation,
+    }
+
+
+# Off the surface of closed poses too: a solver linearises there.
+@given(poses, st.floats(-5.0, 5.0))
+def test_derivatives_are_those_of_the_leg_equation(hexaglide, paper, legs, vector_of, pose, off_mm):
+    geometry = paper.actual
+    joints = legs(paper.nominal).joints(vector_of(pose)) + off_mm
+    if np.isnan(joints).any():
+        return
+    numbers = state(geometry, pose, joints)
+    found = hexaglide.derivatives(geometry, PoseBatch.of([pose]), joints[None])
+
+    np.testing.assert_allclose(
+        hexaglide.constraints(geometry, PoseBatch.of([pose]), joints[None])[0],
+        leg_errors(**numbers),
+        atol=1e-11,
+    )
+    for axis in range(3):
+        np.testing.assert_allclose(
+            found.pose[0, :, axis], by_complex_step(numbers, "position", (axis,)), atol=1e-12
+        )
+        np.testing.assert_allclose(
+            found.pose[0, :, 3 + axis], by_complex_step(numbers, "turn", (axis,)), atol=1e-10
+        )
+    for leg in range(6):
+        own = np.arange(6) == leg
+        derivatives = [by_complex_step(numbers, "joints", (leg,))]
+        derivatives += [by_complex_step(numbers, name, (leg, axis)) for name in "SB" for axis in range(3)]
+        derivatives += [by_complex_step(numbers, "l", (leg,))]
+        told = [found.joints[0, leg], *found.parameters[0, leg]]
+        np.testing.assert_allclose(np.array(derivatives)[:, own].ravel(), told, atol=1e-12)
+        # That leg's numbers move no other leg, so nothing is missing from the compact form.
+        np.testing.assert_array_equal(np.array(derivatives)[:, ~own], 0.0)
+
+
+def test_a_constraint_is_the_legs_error_in_millimetres(hexaglide, paper, legs, vector_of):
+    pose = Pose(20, -30, 540, 10, -15, 5)
+    joints = legs(paper.nominal).joints(vector_of(pose)) + np.array([0.1, -0.1, 0.05, -0.05, 0.02, 0])
+    error = hexaglide.constraints(paper.nominal, PoseBatch.of([pose]), joints[None])[0]
+    np.testing.assert_allclose(error, legs(paper.nominal).errors(vector_of(pose), joints), atol=2e-5)
+    assert error[5] == pytest.approx(0.0, abs=1e-12)
+    assert np.abs(error[:5]).min() > 1e-3
+
+
+@given(poses)
+def test_inverse_is_the_closed_form(hexaglide, paper, legs, vector_of, pose):
+    expected = legs(paper.actual).joints(vector_of(pose))
+    found = hexaglide.inverse(paper.actual, paper.branch, PoseBatch.of([pose]))[0]
+    np.testing.assert_allclose(found, expected, atol=1e-9)  # NaN where NaN is expected
+
+
+@given(poses, st.sampled_from(BRANCHES))
+def test_every_branch_closes_the_legs_and_is_recognised(hexaglide, paper, pose, branch):
+    at = PoseBatch.of([pose])
+    joints = hexaglide.inverse(paper.nominal, branch, at)
+    if np.isnan(joints).any():
+        return
+    np.testing.assert_allclose(hexaglide.constraints(paper.nominal, at, joints), 0.0, atol=1e-10)
+    np.testing.assert_array_equal(hexaglide.branch(paper.nominal, at, joints), [branch])
+
+
+def test_the_branch_says_on_which_side_of_its_platform_joint_a_slider_is(hexaglide, paper):
+    at = PoseBatch.of([Pose(0, 0, 550)])
+    joints = hexaglide.inverse(paper.nominal, paper.branch, at)[0]
+    platform_joints = paper.nominal.B[:, 0]
+    assert (joints[:3] < platform_joints[:3]).all()
+    assert (joints[3:] > platform_joints[3:]).all()
+
+
+def test_only_the_leg_that_cannot_reach_is_missing(hexaglide, paper):
+    lengths = paper.nominal.l.copy()
+    lengths[3] = 300.0
+    short = type(paper.nominal)(paper.nominal.S, paper.nominal.B, lengths)
+    joints = hexaglide.inverse(short, paper.branch, PoseBatch.of([Pose(0, 0, 550), Pose(0, 0, 300)]))
+    np.testing.assert_array_equal(np.isnan(joints), [[0, 0, 0, 1, 0, 0], [0] * 6])
+
+
+def test_a_leg_may_stand_exactly_upright(hexaglide, paper):
+    geometry = type(paper.nominal)(np.zeros((6, 3)), np.zeros((6, 3)), np.full(6, 500.0))
+    joints = hexaglide.inverse(geometry, paper.branch, PoseBatch.of([Pose(7, 300, 400)]))
+    np.testing.assert_array_equal(joints, [[7.0] * 6])

@@ -1,0 +1,74 @@
+"""Poses at the edges, and as arrays."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from hexacell.kinematics.pose import Pose, PoseBatch
+
+length = st.floats(-1e3, 1e3)
+angle = st.floats(-89.0, 89.0)
+poses = st.builds(Pose, length, length, length, angle, angle, angle)
+
+
+@given(poses)
+def test_a_pose_survives_the_way_through_matrices(pose):
+    back = Pose.of(pose.position, pose.rotation)
+    np.testing.assert_allclose(back.as_tuple(), pose.as_tuple(), rtol=0, atol=1e-9)
+
+
+@given(poses)
+def test_angles_are_degrees_about_fixed_axes(pose):
+    expected = Rotation.from_euler("xyz", [pose.a, pose.b, pose.c], degrees=True).as_matrix()
+    np.testing.assert_allclose(pose.rotation, expected, atol=1e-14)
+    np.testing.assert_array_equal(pose.position, [pose.x, pose.y, pose.z])
+
+
+def test_a_pose_reads_as_a_controllers_block():
+    assert str(Pose(10, 20, 560, 5, -4, 3)) == "X10.000 Y20.000 Z560.000 A5.000 B-4.000 C3.000"
+
+
+@given(st.lists(poses, max_size=4))
+def test_many_poses_are_the_same_poses(several):
+    arrays = PoseBatch.of(several)
+    assert len(arrays) == len(several)
+    assert arrays.positions.shape == (len(several), 3)
+    assert arrays.rotations.shape == (len(several), 3, 3)
+    for row, pose in enumerate(several):
+        np.testing.assert_allclose(arrays.pose(row).as_tuple(), pose.as_tuple(), rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("rows", "expected"),
+    [
+        (slice(1, None), [1, 2]),
+        ([2, 0], [2, 0]),
+        (np.array([True, False, True]), [0, 2]),
+        (np.array([1]), [1]),
+    ],
+)
+def test_rows_are_taken_from_positions_and_rotations_alike(rows, expected):
+    all_of_them = [Pose(0, 0, 1, 10), Pose(0, 0, 2, 20), Pose(0, 0, 3, 30)]
+    taken = PoseBatch.of(all_of_them)[rows]
+    assert [taken.pose(row).z for row in range(len(taken))] == [all_of_them[n].z for n in expected]
+    assert [round(taken.pose(row).a) for row in range(len(taken))] == [all_of_them[n].a for n in expected]
+
+
+def test_one_position_in_several_orientations():
+    turned = PoseBatch.of([Pose(0, 0, 0, 10), Pose(0, 0, 0, 0, 20)]).rotations
+    there = PoseBatch.at([1, 2, 3], turned)
+    np.testing.assert_array_equal(there.positions, [[1, 2, 3], [1, 2, 3]])
+    np.testing.assert_array_equal(there.rotations, turned)
+
+
+def test_tilt_is_the_angle_between_the_z_axes_and_knows_no_turn_about_them():
+    tilts = PoseBatch.of(
+        [Pose(0, 0, 0), Pose(0, 0, 0, 30, 0, 70), Pose(0, 0, 0, 0, -40), Pose(0, 0, 0, 60, 60)]
+    )
+    np.testing.assert_allclose(
+        np.degrees(tilts.tilts()), [0.0, 30.0, 40.0, np.degrees(np.arccos(0.25))], atol=1e-6
+    )

@@ -1,0 +1,208 @@
+"""Measurement files: exact both ways, and plain about every mistake."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from hexacell.errors import FileError
+from hexacell.kinematics.pose import Pose
+from hexacell.measurements.csv_file import read_measurements, write_measurements
+from hexacell.measurements.records import MeasurementSet, Record
+
+HEADER = "point,orientation,x,y,z,a,b,c,q1,q2,q3,q4,q5,q6,dx,dy,dz"
+NUMBERS = "0,0,550,0,0,0,-489.7,-485.2,-476.4,476.4,485.2,489.7,0,0,0"
+ROWS = [f"1,1,{NUMBERS}", f"1,2,{NUMBERS}", f"4,1,{NUMBERS}", f"4,2,{NUMBERS}"]
+GOOD = "\n".join([HEADER, *ROWS]) + "\n"
+
+finite = st.floats(allow_nan=False, allow_infinity=False)
+counts = st.integers(1, 1_000_000)
+records = st.builds(
+    Record,
+    point=counts,
+    orientation=counts,
+    pose=st.builds(Pose, finite, finite, finite, finite, finite, finite),
+    joints=st.tuples(*[finite] * 6),
+    deviation=st.tuples(finite, finite, finite),
+)
+measurement_sets = st.lists(records, max_size=8, unique_by=lambda r: (r.point, r.orientation)).map(
+    lambda rows: MeasurementSet(tuple(rows))
+)
+
+
+@pytest.fixture(scope="module")
+def csv_path(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("measurements") / "measurements.csv"
+
+
+@pytest.fixture(scope="module")
+def read(csv_path: Path) -> Callable[..., MeasurementSet]:
+    def read_text(text: str, *, allow_partial: bool = False) -> MeasurementSet:
+        csv_path.write_bytes(text.encode())
+        return read_measurements(csv_path, allow_partial=allow_partial)
+
+    return read_text
+
+
+def test_what_a_file_gives(read):
+    first = read(GOOD).records[0]
+    assert first == Record(
+        1, 1, Pose(0, 0, 550), (-489.7, -485.2, -476.4, 476.4, 485.2, 489.7), (0.0, 0.0, 0.0)
+    )
+
+
+@given(measurements=measurement_sets)
+def test_written_sets_read_back_exactly(csv_path, measurements):
+    write_measurements(csv_path, measurements)
+    assert read_measurements(csv_path, allow_partial=True) == measurements
+
+
+def test_header_is_the_documented_one(csv_path):
+    write_measurements(csv_path, MeasurementSet(()))
+    assert csv_path.read_bytes() == HEADER.encode() + b"\n"
+
+
+def test_numpy_numbers_are_written_as_numbers(csv_path):
+    pose = Pose.of(np.array([0.1, 0.2, 550.0]), np.eye(3))
+    joints, deviation = np.full(6, 0.1), np.full(3, 1 / 3)
+    rows = [Record(1, n, pose, tuple(joints), tuple(deviation)) for n in (1, 2)]
+    write_measurements(csv_path, MeasurementSet(tuple(rows)))
+    assert read_measurements(csv_path).records == tuple(rows)
+
+
+def test_writing_where_no_folder_is_says_so(tmp_path):
+    with pytest.raises(FileError, match="cannot be written"):
+        write_measurements(tmp_path / "absent" / "m.csv", MeasurementSet(()))
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        GOOD.replace("\n", "\r\n"),
+        "\ufeff" + GOOD,
+        GOOD + "\n\n  \n",
+        GOOD + "," * 16 + "\n",
+        GOOD.rstrip("\n"),
+        GOOD.replace(",", " , "),
+        GOOD.replace("550", '"550.0"'),
+    ],
+    ids=["crlf", "bom", "blank lines", "blank cells", "no last line end", "blanks", "quotes"],
+)
+def test_what_other_programs_make_of_it_reads_the_same(read, text):
+    assert read(text) == read(GOOD)
+
+
+def test_columns_in_another_order_and_further_ones(read, csv_path):
+    with csv_path.open("w", newline="") as stream:
+        rows = csv.writer(stream)
+        for line in GOOD.splitlines():
+            cells = line.split(",")
+            rows.writerow(['said "ok", nan', *reversed(cells), "_"])
+    assert read_measurements(csv_path) == read(GOOD)
+
+
+# The text in the good file, what replaces it, what must be said, and in which line.
+MISTAKES = [
+    (HEADER, HEADER.replace("q3,", ""), "columns are missing: q3", 1),
+    (HEADER, HEADER.replace("point,", "Point,"), "columns are missing: point", 1),
+    (HEADER, HEADER.replace("dx,dy", "dx,dx"), "columns are missing: dy", 1),
+    (HEADER, HEADER + ",q1", "columns stand twice: q1", 1),
+    (HEADER + "\n", "", "columns are missing: point, orientation, x", 1),
+    (GOOD, GOOD.replace(",", ";"), "separated by semicolons, not by commas", 1),
+    (GOOD, GOOD.replace(",", "\t"), "separated by tabs, not by commas", 1),
+    (GOOD, HEADER + "\n", "no measurements in it", None),
+    (GOOD, "", "is empty", 1),
+    (GOOD, "\n\n", "is empty", 1),
+    (GOOD, "\0", "columns are missing", 1),
+    (ROWS[1], f"1,2,{NUMBERS},0", "18 cells, the header 17; is the decimal sign a comma", 3),
+    (ROWS[1], "1,2,0", "3 cells, the header 17", 3),
+    (ROWS[1], ROWS[1].replace("550", "nan"), 'z is "nan", but must be a finite number', 3),
+    (ROWS[1], ROWS[1].replace("550", "-Infinity"), 'z is "-Infinity", but must be a finite number', 3),
+    (ROWS[1], ROWS[1].replace("550", "1e999"), 'z is "1e999", but must be a finite number', 3),
+    (ROWS[1], ROWS[1].replace("550", "5_50"), 'z is "5_50", but must be a finite number', 3),
+    (ROWS[1], ROWS[1].replace("550", "high"), 'z is "high", but must be a finite number', 3),
+    (ROWS[1], ROWS[1].replace("489.7,0", "489.7,"), "dx is empty, but must be a finite number", 3),
+    (ROWS[1], f"1.0,2,{NUMBERS}", 'point is "1.0", but must be a whole number from 1', 3),
+    (ROWS[1], f"0,2,{NUMBERS}", 'point is "0", but must be a whole number from 1', 3),
+    (ROWS[1], f"1,-2,{NUMBERS}", 'orientation is "-2", but must be a whole number from 1', 3),
+    (ROWS[1], f"1,{'9' * 30},{NUMBERS}", "but must be a whole number from 1", 3),
+    (ROWS[1], f"1,{'9' * 5000},{NUMBERS}", "but must be a whole number from 1", 3),
+    (ROWS[1], ROWS[0], "point 1, orientation 1 stands here and in line 2", 3),
+    (ROWS[3] + "\n", "", "point 4 has one row", 4),
+    (ROWS[1], f'1,2,"0"5{NUMBERS[1:]}', "not valid CSV", 3),
+    (ROWS[3], f'4,2,"{NUMBERS}', "not valid CSV", 5),
+    (ROWS[1], "a" * 200_000, "not valid CSV", 3),
+]
+
+
+@pytest.mark.parametrize(("old", "new", "message", "line"), MISTAKES)
+def test_every_mistake_is_named_with_its_line(read, csv_path, *, old, new, message, line):
+    with pytest.raises(FileError, match=message) as refused:
+        read(GOOD.replace(old, new, 1))
+    assert refused.value.subject == str(csv_path)
+    assert refused.value.line == line
+    assert refused.value.action
+
+
+@pytest.mark.parametrize("raw", [GOOD.encode("utf-16"), GOOD.encode() + b"\xe4\n"])
+def test_other_encodings_are_refused(csv_path, raw):
+    csv_path.write_bytes(raw)
+    with pytest.raises(FileError, match="UTF-8") as refused:
+        read_measurements(csv_path)
+    assert refused.value.line == (1 if raw.startswith(b"\xff") else 6)
+
+
+def test_absent_file_is_refused(tmp_path):
+    with pytest.raises(FileError, match="not exist"):
+        read_measurements(tmp_path / "absent.csv")
+
+
+@pytest.mark.parametrize("text", ["", "\n", "\ufeff", HEADER, HEADER + "\n"])
+def test_a_calibration_not_yet_begun_is_a_valid_start(read, text):
+    assert read(text, allow_partial=True) == MeasurementSet(())
+
+
+def test_a_point_just_opened_may_have_one_row(read):
+    assert len(read(f"{HEADER}\n{ROWS[0]}\n", allow_partial=True)) == 1
+
+
+def test_other_mistakes_count_in_partial_files_too(read):
+    with pytest.raises(FileError, match="stands here"):
+        read(f"{HEADER}\n{ROWS[0]}\n{ROWS[0]}\n", allow_partial=True)
+
+
+pieces = st.sampled_from(
+    [",", "\n", '"', ";", "\r", "nan", "1e999", "-", "point", "\0", "\u0661", "_", " "]
+)
+
+
+@given(
+    edits=st.lists(st.tuples(st.integers(0, len(GOOD)), st.integers(0, 9), st.text() | pieces), max_size=3)
+)
+def test_spoilt_files_give_plain_errors_or_sound_records(read, edits):
+    text = GOOD
+    for start, length, piece in edits:
+        text = text[:start] + piece + text[start + length :]
+    try:
+        measurements = read(text)
+    except FileError as error:
+        assert error.action  # noqa: PT017 - reading may also succeed
+        return
+    for array in (measurements.joints, measurements.deviations, measurements.positions):
+        assert np.isfinite(array).all()
+    assert (measurements.labels >= 1).all()
+
+
+def test_ten_thousand_rows_are_no_burden(read, csv_path):
+    rows = [
+        Record(n // 20 + 1, n % 20 + 1, Pose(0, 0, n / 7), (n / 3,) * 6, (0,) * 3) for n in range(10_000)
+    ]
+    measurements = MeasurementSet(tuple(rows))
+    write_measurements(csv_path, measurements)
+    assert read_measurements(csv_path) == measurements

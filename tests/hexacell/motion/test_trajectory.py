@@ -1,0 +1,119 @@
+"""Where the real robot goes while its controller follows straight lines."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from hexacell.experiment_design.candidates import orientations
+from hexacell.kinematics.forward import assembly_mode, continue_solution, forward_kinematics
+from hexacell.kinematics.pose import Pose, PoseBatch
+from hexacell.kinematics.sensitivity import pose_jacobian
+from hexacell.motion import trajectory as module
+from hexacell.motion.trajectory import LineBatch, trace_path
+
+START = PoseBatch.of([Pose(0, 0, 550)])
+TURNS = orientations(64, np.radians(60.0), seed=3)
+
+
+@pytest.fixture
+def commanded(hexaglide, paper):
+    """Lines from the first point to many orientations that the controller can reach, and their joints."""
+    ends = PoseBatch.at([10.0, -20.0, 540.0], TURNS)
+    ways = LineBatch.over((START, ends))
+    joints = hexaglide.inverse(paper.nominal, paper.branch, ways.flat()).reshape(*ways.shape, 6)
+    rows = np.flatnonzero(np.isfinite(joints).all(axis=(0, 2)))
+    return ways.lines(rows), joints[:, rows]
+
+
+@pytest.fixture
+def here(hexaglide, paper, commanded):
+    _, joints = commanded
+    return continue_solution(
+        hexaglide,
+        paper.actual,
+        joints[0, :1],
+        start=START,
+        start_geometry=paper.nominal,
+        start_joints=joints[0, :1],
+    ).poses
+
+
+def stepwise(hexaglide, geometry, ways, joints, here, row, fineness=8):
+    """One line in much smaller steps, one after the other; nothing once the mode is lost."""
+    mode = assembly_mode(pose_jacobian(hexaglide, geometry, here, joints[0, [row]]))
+    pose, found = here, []
+    for piece in range(len(joints) - 1):
+        for share in np.arange(1, fineness + 1) / fineness:
+            now = (1.0 - share) * joints[piece, [row]] + share * joints[piece + 1, [row]]
+            reached = forward_kinematics(hexaglide, geometry, now, pose, mode=mode)
+            if not reached.found[0]:
+                return None
+            pose = reached.poses
+        found.append(pose.positions[0])
+    return np.array(found)
+
+
+def test_all_at_once_is_as_one_after_the_other(hexaglide, paper, commanded, here):
+    ways, joints = commanded
+    went = trace_path(hexaglide, paper.actual, ways, joints, here)
+    agreeing = 0
+    for row in range(joints.shape[1]):
+        slowly = stepwise(hexaglide, paper.actual, ways, joints, here, row)
+        if went.found[row]:
+            assert slowly is not None
+            np.testing.assert_allclose(went.actual.positions[1:, row], slowly, atol=1e-3)
+            agreeing += 1
+        else:
+            assert slowly is None
+    assert agreeing > 20
+    assert agreeing < joints.shape[1]  # some lines lead into a singularity
+
+
+def test_what_is_in_doubt_is_followed_step_by_step_or_given_up(
+    hexaglide, paper, commanded, here, monkeypatch
+):
+    ways, joints = commanded
+    sure = trace_path(hexaglide, paper.actual, ways, joints, here)
+    monkeypatch.setattr(module._Robot, "confirmed", lambda *_: False)
+    monkeypatch.setattr(module, "JUMP_MM", 0.0)
+    doubted = trace_path(hexaglide, paper.actual, ways, joints, here)
+    np.testing.assert_array_equal(doubted.found, sure.found)
+    np.testing.assert_allclose(
+        doubted.actual.positions[:, sure.found], sure.actual.positions[:, sure.found], atol=1e-3
+    )
+    assert not trace_path(hexaglide, paper.actual, ways, joints, here, thorough=False).found.any()
+
+
+def test_a_leap_to_another_solution_is_not_a_way(hexaglide, paper, commanded, here, monkeypatch):
+    """Poses of another assembly mode amid a line, as a search that was led astray would find them."""
+    ways, joints = commanded
+    sure = trace_path(hexaglide, paper.actual, ways, joints, here)
+    honest = module._Robot.found
+    asked = []
+
+    def astray(robot, joints, start):
+        poses, found = honest(robot, joints, start)
+        asked.append(len(joints))
+        if len(asked) == 1:
+            turned = poses.rotations.copy()
+            turned[5:] = turned[5:] @ PoseBatch.of([Pose(0, 0, 0, 0, 0, 120)]).rotations[0]
+            return LineBatch(poses.positions + np.array([0.0, 0.0, 1.0]), turned), found
+        return poses, found
+
+    monkeypatch.setattr(module._Robot, "found", astray)
+    mended = trace_path(hexaglide, paper.actual, ways, joints, here)
+    assert len(asked) > 1
+    np.testing.assert_array_equal(mended.found, sure.found)
+    np.testing.assert_allclose(
+        mended.actual.positions[:, sure.found], sure.actual.positions[:, sure.found], atol=1e-3
+    )
+
+
+def test_from_stop_to_stop():
+    stop, end = PoseBatch.of([Pose(0, 0, 560, 10)]), PoseBatch.of([Pose(10, 0, 550, 0, 10, 0)])
+    way = LineBatch.over((START, stop, end), times=2)
+    pieces = way.shape[0] - 1
+    assert pieces == 4 * module.PIECES_BETWEEN_STOPS
+    passed = [way.flat().pose(row).as_tuple() for row in (0, pieces // 2, pieces)]
+    np.testing.assert_allclose(passed, [p.pose(0).as_tuple() for p in (START, stop, end)], atol=1e-9)

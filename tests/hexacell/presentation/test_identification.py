@@ -1,0 +1,97 @@
+"""What ``hexacell fit`` prints: the verdict first, nothing wider than a terminal, nothing left out."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import pytest
+
+from hexacell.cell.bundled import bundled_config
+from hexacell.cli.app import main
+from hexacell.errors import ExitCode
+from hexacell.kinematics.geometry import PARAMETER_NAMES
+from hexacell.measurements.csv_file import write_measurements
+from hexacell.measurements.records import MeasurementSet
+
+KEYS = (
+    "converged termination iterations records points residual_rms_mm chi2 dof geometry sigma covariance "
+    "undetermined outliers frame findings goodness noise repeatability correlated accuracy refused "
+    "beyond_tolerance"
+)
+
+
+@pytest.fixture(scope="module")
+def clean(visit):
+    return visit(seed=2).measured(0.01, seed=1)
+
+
+@pytest.fixture
+def fit(tmp_path, capsys):
+    def run(measurements, *options):
+        file = tmp_path / "measured.csv"
+        write_measurements(file, measurements)
+        code = main(
+            ["fit", str(bundled_config("simulated-hexaglide")), "--measurements", str(file), *options]
+        )
+        assert code == ExitCode.DONE
+        return capsys.readouterr()
+
+    return run
+
+
+def test_the_verdict_comes_first_and_the_table_after(fit, clean):
+    words = fit(clean).out
+    assert words.startswith(
+        "Good: the records determine every parameter, and agree with the stated noise.\n"
+    )
+    places = [
+        words.index(part)
+        for part in ("Predicted error at 6 task poses", "drawing  identified", "Noise, mm")
+    ]
+    assert places == sorted(places)
+
+
+def test_every_free_parameter_has_its_line_and_says_how_far_it_moved(fit, clean):
+    lines = fit(clean).out.splitlines()
+    named = [line.split()[0] for line in lines if line.endswith("sigma") and "moved" in line]
+    fixed = {"S2x", "S2y", "S2z", "S3z"}
+    assert named == [name for name in PARAMETER_NAMES if name not in fixed]
+    (leg,) = (line for line in lines if line.startswith("l1 "))
+    _, old, new, change, sigma, _, times, _ = leg.split()
+    assert float(new) - float(old) == pytest.approx(float(change), abs=2e-3)
+    assert float(times) == pytest.approx(abs(float(change)) / float(sigma), rel=0.02)
+
+
+@pytest.mark.parametrize(
+    ("how", "noise_mm"),
+    [({"seed": 2}, 0.01), ({"seed": 2}, 0.05), ({"points": 2, "orientations": 9, "degrees": 3.0}, 0.01)],
+)
+def test_nothing_is_wider_than_eighty_columns(fit, visit, how, noise_mm):
+    words = fit(visit(**how).measured(noise_mm)).out
+    assert max(map(len, words.splitlines())) <= 80
+
+
+def test_what_the_data_do_not_say_is_said(fit, visit):
+    words = fit(visit(points=2, orientations=9, degrees=3.0).measured(0.01)).out
+    assert words.startswith("Incomplete: ")
+    assert words.count("not determined by these data") > 10
+
+
+def test_a_second_visit_gives_a_repeatability(fit, clean):
+    assert "Repeatability: not evaluated, no pose was measured twice." in fit(clean).out
+    again = replace(clean.records[1], orientation=99)
+    words = " ".join(fit(MeasurementSet((*clean.records, again))).out.split())
+    assert "Repeatability: on returning to 1 pose the ball scatters by x 0.0000" in words
+    assert "(1 degree of freedom)" in words
+
+
+def test_pairs_are_named_and_the_rest_counted(fit, clean):
+    words = " ".join(fit(clean).out.split())
+    assert "leg 2 length and leg 3 length cannot be told apart from these poses (+0.9" in words
+
+
+def test_json_is_one_document_with_the_keys_programs_rely_on(fit, clean):
+    captured = fit(clean, "--json")
+    document = json.loads(captured.out)
+    assert list(document) == KEYS.split()

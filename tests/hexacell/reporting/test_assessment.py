@@ -1,0 +1,267 @@
+"""What is said of an identification: assembled for a cell, put into sentences and into JSON."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from hexacell.cell.bundled import bundled_config
+from hexacell.cell.loader import load_cell
+from hexacell.cell.model import TaskSettings
+from hexacell.controller_config.interface import ControllerGeometry
+from hexacell.identification.estimator import identify
+from hexacell.identification.solver.levenberg_marquardt import Termination
+from hexacell.identification.solver.result import DataFault, DataFaultKind, Outlier
+from hexacell.kinematics.geometry import Geometry
+from hexacell.kinematics.mechanism import FrameTransform
+from hexacell.kinematics.pose import Pose, PoseBatch
+from hexacell.measurements.records import MeasurementSet
+from hexacell.reporting.assessment import assess
+from hexacell.reporting.documents import assessment_document, identification_document
+from hexacell.reporting.findings import findings, pair_sentences
+from hexacell.robot_model import make_robot
+
+AGAIN = 100
+"""Added to the orientation's number at a second visit."""
+
+
+@pytest.fixture(scope="module")
+def settings():
+    return load_cell(bundled_config("simulated-hexaglide")).settings
+
+
+@pytest.fixture(scope="module")
+def robot(settings, paper):
+    return make_robot(settings, ControllerGeometry(paper.nominal, paper.branch))
+
+
+@pytest.fixture(scope="module")
+def assessed_of(settings, robot):
+    def both(measurements, robot=robot, settings=settings):
+        found = identify(robot.problem(measurements), find_outliers=False)
+        return found, assess(settings, robot, measurements, found)
+
+    return both
+
+
+@pytest.fixture(scope="module")
+def good(visit, assessed_of):
+    return assessed_of(visit(seed=2).measured(0.01, seed=1))
+
+
+def visited_twice(measurements, scatter_mm, seed=0):
+    """Every pose once more, the ball elsewhere by some scatter that the encoders do not see."""
+    random = np.random.default_rng(seed)
+    again = [
+        replace(
+            record,
+            orientation=record.orientation + AGAIN,
+            deviation=tuple((record.deviation + scatter_mm * random.standard_normal(3)).tolist()),
+        )
+        for record in measurements.records
+    ]
+    return MeasurementSet((*measurements.records, *again))
+
+
+def test_a_good_result_says_so_first_and_then_what_it_is_worth(good):
+    found, assessed = good
+    verdict, promise, *more = findings(found, assessed)
+    assert verdict.startswith("Good: the records determine every parameter")
+    assert "At 6 task poses the robot now errs by 19 mm (rms)" in promise
+    assert f"by {assessed.accuracy.after.position_rms_mm:.2g} mm (one sigma)" in promise
+    assert more == []
+
+
+def test_far_too_much_noise_makes_it_doubtful_and_names_the_levels(visit, assessed_of):
+    verdict, *more = findings(*assessed_of(visit(seed=2).measured(0.03, seed=1)))
+    assert verdict.startswith("Doubtful: the residuals are ")
+    assert "times the stated noise" in verdict
+    assert any("encoders 0.0" in sentence and "gauges 0.0" in sentence for sentence in more)
+
+
+def test_with_more_noise_the_error_to_be_expected_grows_too(visit, assessed_of, good):
+    _, loud = assessed_of(visit(seed=2).measured(0.03, seed=1))
+    _, quiet = good
+    ratio = loud.accuracy.after.position_rms_mm / quiet.accuracy.after.position_rms_mm
+    assert ratio == pytest.approx(loud.goodness.ratio, rel=0.1)
+
+
+def test_parameters_left_open_make_it_incomplete(visit, assessed_of):
+    found, assessed = assessed_of(visit(points=2, orientations=9, degrees=3.0).measured(0.01))
+    verdict = findings(found, assessed)[0]
+    assert verdict.startswith("Incomplete: ")
+    assert "of 35 parameters are not determined by these data" in verdict
+
+
+def test_a_few_open_parameters_are_named_in_words(good, monkeypatch):
+    found, assessed = good
+    monkeypatch.setattr(type(found), "undetermined", ("B2z", "B3z", "B5z", "l3"))
+    assert "B2/B3/B5 z, leg 3 length are not determined" in findings(found, assessed)[0]
+
+
+def test_a_search_without_an_end_is_no_result(good):
+    found, assessed = good
+    stuck = replace(found, termination=Termination.STUCK)
+    assert findings(stuck, assessed)[0] == f"No result: the solver ended because {Termination.STUCK.value}."
+
+
+def test_where_repeatability_dominates_recalibrating_will_not_help(visit, assessed_of, robot, paper):
+    """A controller whose geometry is right to hundredths, on a machine with play of 0.3 mm."""
+    nearly = Geometry.from_vector(
+        paper.actual.vector() + 0.01 * np.random.default_rng(3).standard_normal(42)
+    )
+    nearly = robot.mechanism.normalize_frames(nearly)[0]
+    known = replace(
+        robot, drawing=nearly, controller=nearly, change=robot.mechanism.normalize_frames(nearly)[1]
+    )
+    measured = visited_twice(visit(commanding=nearly, seed=2).measured(0.01), scatter_mm=0.3)
+    found, assessed = assessed_of(measured, known)
+    assert assessed.repeatability.degrees_of_freedom == 55
+    assert assessed.repeatability.distance_mm == pytest.approx(0.3 * np.sqrt(3 / 2), rel=0.2)
+    assert assessed.accuracy.removable_mm < 0.3
+    assert findings(found, assessed)[0].startswith("Recalibrating will not help: the machine comes back")
+    assert assessment_document(found, assessed)["repeatability"]["recalibrating_helps"] is False
+
+
+def test_play_beside_a_large_error_is_named_but_calibrating_helps(visit, assessed_of):
+    found, assessed = assessed_of(visited_twice(visit(seed=2).measured(0.01), scatter_mm=0.3))
+    assert not assessed.does_not_repeat
+    sentences = findings(found, assessed)
+    assert not sentences[0].startswith("Recalibrating")
+    assert any(sentence.startswith("On returning to a pose the ball is 0.") for sentence in sentences)
+
+
+def test_a_machine_that_repeats_is_not_accused(visit, assessed_of):
+    found, assessed = assessed_of(visited_twice(visit(seed=2).measured(0.01), scatter_mm=0.01))
+    assert not any("return" in sentence for sentence in findings(found, assessed))
+    assert assessment_document(found, assessed)["repeatability"]["recalibrating_helps"] is True
+
+
+def test_records_left_out_are_named_and_not_held_against_repeatability(good, settings, robot, visit):
+    found, _ = good
+    twice = visited_twice(visit(seed=2).measured(0.01, seed=1), scatter_mm=0.0)
+    wrong = replace(twice.records[-1], deviation=(25.4, 0.0, 0.0))
+    measured = MeasurementSet((*twice.records[:-1], wrong))
+    left = replace(found, outliers=(Outlier(wrong.point, wrong.orientation, 1e6),))
+    assessed = assess(settings, robot, measured, left)
+    assert assessed.repeatability is not None
+    assert assessed.repeatability.distance_mm < 1e-9
+    assert any(
+        f"point {wrong.point} orientation {wrong.orientation}" in s for s in findings(left, assessed)
+    )
+
+
+def test_an_anomaly_speaks_for_itself(good):
+    found, assessed = good
+    gross = DataFault(
+        DataFaultKind.GROSS_ERROR, 2, 7, "y", "gauge y is 0.2 mm off at point 2", "Measure it again"
+    )
+    spoilt = replace(found, outliers=(Outlier(2, 7, 400.0),), anomalies=(gross,))
+    assert findings(spoilt, assessed)[-1] == "gauge y is 0.2 mm off at point 2. Measure it again."
+
+
+def test_task_poses_out_of_reach_are_numbered_as_in_the_cell_file(visit, assessed_of, settings):
+    poses = ((0.0, 0.0, 550.0, 0.0, 0.0, 0.0), (0.0, 900.0, 550.0, 0.0, 0.0, 0.0))
+    task = settings.model_copy(update={"task": TaskSettings(poses=poses)})
+    found, assessed = assessed_of(visit(seed=2).measured(0.01, seed=1), settings=task)
+    assert "Task poses that the robot cannot take are left out: 2." in findings(found, assessed)
+    document = assessment_document(found, assessed)["accuracy"]
+    assert document["reachable"] == [True, False]
+    assert document["poses"][1]["y"] == pytest.approx(900.0)
+    assert len(document["after"]["position_mm"]) == 1
+
+
+def test_without_task_poses_the_accuracy_is_that_across_the_workspace(visit, assessed_of, settings):
+    bare = settings.model_copy(update={"task": TaskSettings()})
+    found, assessed = assessed_of(visit(seed=2).measured(0.01, seed=1), settings=bare)
+    assert not assessed.task_named
+    assert len(assessed.accuracy.poses) > 20
+    assert "poses across the workspace" in findings(found, assessed)[1]
+
+
+def seen_from(change, settings):
+    """A cell's task and points in other frames."""
+    task = change.poses(PoseBatch.of(Pose(*pose) for pose in settings.task.poses))
+    points = change.poses(PoseBatch.of(Pose(*point) for point in settings.identification.points))
+    places = tuple(tuple(point) for point in points.positions.tolist())
+    return settings.model_copy(
+        update={
+            "task": TaskSettings(poses=tuple(task.pose(row).as_tuple() for row in range(len(task)))),
+            "identification": settings.identification.model_copy(update={"points": places}),
+        }
+    )
+
+
+def test_the_frames_of_the_controller_s_config_do_not_matter(good, visit, assessed_of, settings, paper):
+    """The same machine and records, all told in frames that are rolled, shifted and turned."""
+    change = FrameTransform(
+        base=Rotation.from_rotvec([0.3, 0.0, 0.0]).as_matrix(),
+        origin=np.array([40.0, -25.0, 10.0]),
+        platform=Rotation.from_rotvec([0.1, -0.2, 0.1]).as_matrix(),
+    )
+    measured = visit(seed=2).measured(0.01, seed=1)
+    commands = change.poses(measured.poses)
+    told = MeasurementSet(
+        tuple(
+            replace(
+                record, pose=commands.pose(row), deviation=tuple((change.base @ record.deviation).tolist())
+            )
+            for row, record in enumerate(measured.records)
+        )
+    )
+    elsewhere = seen_from(change, settings)
+    controller = ControllerGeometry(change.geometry(paper.nominal), paper.branch)
+    _, assessed = assessed_of(told, make_robot(elsewhere, controller), elsewhere)
+    _, before = good
+    for name in ("before", "after"):
+        mine, other = getattr(assessed.accuracy, name), getattr(before.accuracy, name)
+        np.testing.assert_allclose(mine.distances_mm, other.distances_mm, rtol=1e-4)
+        np.testing.assert_allclose(mine.angles, other.angles, rtol=1e-4)
+    for pose, (x, y, z, *_) in zip(assessed.task, elsewhere.task.poses, strict=True):
+        np.testing.assert_allclose(pose.position, [x, y, z])
+    parts = [pair for pair in zip(assessed.partings, before.partings, strict=True) if pair[1]]
+    assert parts
+    for here, there in parts:
+        assert here is not None
+        assert there is not None
+        expected = change.poses(PoseBatch.of([there.command])).pose(0)
+        np.testing.assert_allclose(here.command.as_tuple(), expected.as_tuple(), atol=1e-3)
+
+
+def test_pairs_are_named_with_the_measurement_that_parts_them(good):
+    found, assessed = good
+    assert assessed.correlated[0].first == "l2"
+    sentences = pair_sentences(found, assessed)
+    assert sentences
+    assert all("cannot be told apart from these poses" in sentence for sentence in sentences)
+    assert sentences[0].startswith("leg 2 length and leg 3 length cannot be told apart")
+    named = [part for part in assessed.partings if part]
+    for part in named:
+        way = "turn" if part.axis == "z" else "tilt"
+        words = f"{way} {part.degrees:+.0f} deg about {part.axis} at point {part.point}"
+        assert any(words in sentence for sentence in sentences)
+
+
+def test_the_document_is_json_and_adds_to_what_was_there(good):
+    found, assessed = good
+    first, second = identification_document(found), assessment_document(found, assessed)
+    assert not set(first) & set(second)
+    document = json.loads(json.dumps(first | second, allow_nan=False))
+    assert document["findings"] == list(findings(found, assessed))
+    assert document["goodness"]["agreement"] == "agrees"
+    assert document["goodness"]["expected_chi2"] == pytest.approx(document["dof"], abs=0.1)
+    assert document["noise"]["encoder_mm"]["stated"] == 0.01
+    assert document["noise"]["told_apart"] is True
+    assert document["repeatability"] is None
+    pair = document["correlated"][0]
+    assert pair["parameters"] == ["l2", "l3"]
+    assert set(pair) == {"parameters", "correlation", "measure"}
+    measures = [one["measure"] for one in document["correlated"] if one["measure"]]
+    assert measures
+    assert set(measures[0]) == {"point", "axis", "angle_deg", "pose", "correlation"}
+    assert set(measures[0]["pose"]) == set("xyzabc")
+    assert len(document["accuracy"]["before"]["position_mm"]) == 6

@@ -1,0 +1,120 @@
+"""Run folders: one a run, none written twice, and found again by name."""
+
+from __future__ import annotations
+
+import json
+from datetime import UTC, datetime
+from pathlib import Path
+
+import pytest
+
+from hexacell.cell.bundled import bundled_config
+from hexacell.cell.loader import Cell, load_cell
+from hexacell.errors import ExitCode, FileError, UsageError
+from hexacell.runs import run_folder
+from hexacell.runs.run_folder import RunFolder, find_run, new_run, runs_folder
+
+
+@pytest.fixture
+def cell(tmp_path: Path) -> Cell:
+    path = tmp_path / "cell.toml"
+    path.write_text(bundled_config("simulated-hexaglide").read_text())
+    return load_cell(path)
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> RunFolder:
+    return RunFolder(tmp_path / "run")
+
+
+class Noon(datetime):
+    """A clock that stands at noon."""
+
+    @classmethod
+    def now(cls, tz=None):
+        return datetime(2026, 11, 20, 12, 0, 0, tzinfo=UTC).astimezone(tz)
+
+
+def test_runs_are_kept_beside_the_cell_file(cell: Cell) -> None:
+    assert runs_folder(cell) == cell.path.parent / "runs" / "simulated-hexaglide"
+
+
+def test_a_run_is_named_after_its_beginning(cell: Cell, monkeypatch) -> None:
+    monkeypatch.setattr(run_folder, "datetime", Noon)
+    assert new_run(cell).path == runs_folder(cell) / "2026-11-20T120000Z"
+
+
+def test_naming_a_run_makes_nothing(cell: Cell) -> None:
+    new_run(cell)
+    assert not runs_folder(cell).exists()
+
+
+def test_runs_of_the_same_second_get_folders_of_their_own(cell: Cell, monkeypatch) -> None:
+    monkeypatch.setattr(run_folder, "datetime", Noon)
+    names = []
+    for _ in range(3):
+        run = new_run(cell)
+        run.create(cell)
+        names.append(run.path.name)
+    assert names == ["2026-11-20T120000Z", "2026-11-20T120000Z-2", "2026-11-20T120000Z-3"]
+    assert sorted(names) == names
+
+
+def test_a_run_keeps_the_cell_file_as_it_was(cell: Cell, folder: RunFolder) -> None:
+    folder.create(cell)
+    assert (folder.path / "cell.toml").read_bytes() == cell.text.encode()
+
+
+def test_a_folder_that_holds_a_run_takes_no_other(cell: Cell, folder: RunFolder) -> None:
+    folder.create(cell)
+    folder.journal.write_text("something happened\n")
+    (folder.path / "cell.toml").write_text("as it was")
+    with pytest.raises(UsageError, match=r"holds a run already.*Resume") as refusal:
+        folder.create(cell)
+    assert refusal.value.exit_code is ExitCode.USAGE
+    assert folder.journal.read_text() == "something happened\n"
+    assert (folder.path / "cell.toml").read_text() == "as it was"
+
+
+def test_a_folder_that_cannot_be_made_is_said(cell: Cell, tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    with pytest.raises(FileError):
+        RunFolder(tmp_path / "file" / "run").create(cell)
+
+
+def test_results_are_json(cell: Cell, folder: RunFolder) -> None:
+    folder.create(cell)
+    document = {"converged": True, "sigma": [0.1, 1e-300], "name": "é"}
+    folder.write_result(document)
+    assert json.loads(folder.result.read_text()) == document
+
+
+def test_every_part_of_a_run_has_a_wire_trace_of_its_own(cell: Cell, folder: RunFolder) -> None:
+    folder.create(cell)
+    for name in ("wire", "wire-2", "wire-3"):
+        path = folder.new_wire()
+        assert path == folder.path / name
+        path.touch()
+
+
+def test_files_of_a_run_do_not_collide(folder: RunFolder) -> None:
+    paths = {folder.journal, folder.measurements, folder.result, folder.proposal, folder.wire}
+    assert len(paths) == 5
+    assert {path.parent for path in paths} == {folder.path}
+
+
+def test_a_run_is_found_by_its_folder_or_its_name(cell: Cell) -> None:
+    run = new_run(cell)
+    run.create(cell)
+    run.journal.touch()
+    assert find_run(cell, run.path.name) == run
+    assert find_run(cell, str(run.path)) == run
+
+
+def test_a_folder_without_a_journal_is_no_run(cell: Cell) -> None:
+    run = new_run(cell)
+    run.create(cell)
+    for named in (run.path.name, str(run.path), "", "nonsense"):
+        with pytest.raises(UsageError, match="there is no run") as refusal:
+            find_run(cell, named)
+        assert str(runs_folder(cell)) in str(refusal.value)

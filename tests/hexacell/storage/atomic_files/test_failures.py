@@ -1,0 +1,129 @@
+"""What cannot be written or read is told in plain words, and left as it was."""
+
+import errno
+import os
+import resource
+from pathlib import Path
+
+import pytest
+
+from hexacell.errors import ExitCode, FileError
+from hexacell.storage import atomic_files
+from tests.hexacell.storage.atomic_files.ownership import names
+
+
+def test_a_read_only_folder_is_told(ordinary_folder: Path) -> None:
+    path = ordinary_folder / "controller.toml"
+    path.write_bytes(b"old")
+    ordinary_folder.chmod(0o500)
+    with pytest.raises(FileError, match="is as it was: permission denied") as caught:
+        atomic_files.write_atomically(path, b"new")
+    assert caught.value.subject == str(path)
+    assert caught.value.exit_code is ExitCode.USAGE
+    assert path.read_bytes() == b"old"
+
+
+def test_a_write_protected_file_is_left_alone(ordinary_folder: Path) -> None:
+    path = ordinary_folder / "controller.toml"
+    path.write_bytes(b"old")
+    path.chmod(0o444)
+    with pytest.raises(FileError, match="permission denied"):
+        atomic_files.write_atomically(path, b"new")
+    assert path.read_bytes() == b"old"
+    assert names(ordinary_folder) == [path.name]
+
+
+def test_an_unreadable_file_is_told(ordinary_folder: Path) -> None:
+    path = ordinary_folder / "controller.toml"
+    path.write_bytes(b"old")
+    path.chmod(0o000)
+    with pytest.raises(FileError, match="cannot be read: permission denied"):
+        atomic_files.read_bytes(path)
+
+
+def test_a_write_that_the_kernel_cuts_short_leaves_nothing(path: Path, tmp_path: Path) -> None:
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (10_000, hard))
+    try:
+        with pytest.raises(FileError, match="cannot be written and is as it was"):
+            atomic_files.write_atomically(path, b"x" * 100_000)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    assert path.read_bytes() == b"old"
+    assert names(tmp_path) == [path.name]
+
+
+@pytest.mark.parametrize(
+    ("code", "words"),
+    [
+        (errno.ENOSPC, "the disk is full. Free some space"),
+        (errno.EDQUOT, "quota"),
+        (errno.EROFS, "read-only"),
+        (errno.EIO, "the disk reports an error"),
+        (errno.EBUSY, "mount point"),
+        (errno.EXDEV, os.strerror(errno.EXDEV)),
+    ],
+)
+@pytest.mark.parametrize("name", ["replace", "fchmod"])
+def test_failures_are_told_in_plain_words(
+    path: Path, monkeypatch: pytest.MonkeyPatch, name: str, code: int, words: str
+) -> None:
+    def fail(*_: object) -> None:
+        raise OSError(code, os.strerror(code))
+
+    monkeypatch.setattr(os, name, fail)
+    with pytest.raises(FileError, match="is as it was") as caught:
+        atomic_files.write_atomically(path, b"new")
+    assert words in str(caught.value)
+    assert path.read_bytes() == b"old"
+    assert names(path.parent) == [path.name]
+
+
+def test_a_folder_that_does_not_reach_the_disk_is_told(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def fail(folder: Path) -> None:
+        assert folder == path.parent
+        raise OSError(errno.EIO, "x")
+
+    monkeypatch.setattr(atomic_files, "sync_folder", fail)
+    with pytest.raises(FileError, match="was replaced, but perhaps not for good"):
+        atomic_files.write_atomically(path, b"new")
+    assert path.read_bytes() == b"new"
+
+
+@pytest.mark.parametrize(("code", "fails"), [(errno.EINVAL, False), (errno.EIO, True)])
+def test_file_systems_that_cannot_sync_folders_are_accepted(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, code: int, fails: bool
+) -> None:
+    def fsync(_: int) -> None:
+        raise OSError(code, "x")
+
+    monkeypatch.setattr(os, "fsync", fsync)
+    if fails:
+        with pytest.raises(OSError, match="x"):
+            atomic_files.sync_folder(tmp_path)
+    else:
+        atomic_files.sync_folder(tmp_path)
+
+
+def test_an_interrupt_leaves_no_temporary_file(
+    path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def interrupt(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(os, "replace", interrupt)
+    with pytest.raises(KeyboardInterrupt):
+        atomic_files.write_atomically(path, b"new")
+    assert names(tmp_path) == [path.name]
+
+
+def test_pipes_folders_and_absent_files_are_refused_at_once(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe")
+    for name, words in (("pipe", "not a file"), (".", "not a file"), ("absent", "does not exist")):
+        with pytest.raises(FileError, match=words):
+            atomic_files.read_bytes(tmp_path / name)
+    for name in ("pipe", "."):
+        with pytest.raises(FileError, match="not a file"):
+            atomic_files.write_atomically(tmp_path / name, b"new")
+    with pytest.raises(FileError, match="does not exist"):
+        atomic_files.write_atomically(tmp_path / "no" / "folder", b"new")

@@ -1,0 +1,61 @@
+"""The paper's way, eq. 5 to 13: all pairs, ordinary least squares."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from hexacell.errors import ConvergenceError
+from hexacell.identification.problem.problem import Noise
+from hexacell.identification.solver import levenberg_marquardt
+from hexacell.identification.solver.levenberg_marquardt import FINE
+from hexacell.study import reference_solvers
+
+
+@pytest.fixture(scope="module")
+def problem(noisy, make_problem):
+    return make_problem(noisy)
+
+
+def test_the_error_vector_has_all_the_papers_rows(visit, make_problem):
+    """Eq. 8: 3 m k (k-1) / 2."""
+    problem = make_problem(visit(points=3, orientations=5, seed=2).measured())
+    assert len(reference_solvers.error_vector(problem, problem.start.positions)) == 3 * 3 * 5 * 4 // 2
+
+
+def test_pairs_are_of_one_point_and_each_once(visit, make_problem):
+    problem = make_problem(visit(points=3, orientations=5, seed=2).measured())
+    pairs = [
+        tuple(pair) for pair in reference_solvers.pairs(problem.subset(problem.labels[:, 1] <= 4)).tolist()
+    ]
+    assert len(set(pairs)) == len(pairs) == 3 * 6
+    for first, second in pairs:
+        assert first < second
+        assert first // 4 == second // 4
+
+
+def test_the_pairwise_minimum_is_the_unweighted_centred_one(noisy, make_problem, problem):
+    """With no noise on the encoders all weights are equal, and centring is subtracting the mean."""
+    unweighted = make_problem(noisy, noise=Noise(encoder_mm=0.0, gauge_mm=0.01))
+    parameters = len(problem.prior.covariance)
+    centred = levenberg_marquardt.solve(
+        unweighted,
+        np.zeros((parameters, parameters)),
+        free=unweighted.mechanism.convention.free_parameters(unweighted.prior.centre),
+        poses=unweighted.start,
+        manner=FINE,
+    )
+    assert centred.termination.converged
+    pairwise = problem.mechanism.convention.free_parameters(reference_solvers.gauss_newton(problem))
+    np.testing.assert_allclose(centred.free, pairwise, rtol=0, atol=1e-6)
+
+
+def test_gauss_newton_says_where_it_got_lost(visit, make_problem):
+    """From errors of millimetres it may step over a singularity; the paper asks for a good start."""
+    with pytest.raises(ConvergenceError, match="assembly mode"):
+        reference_solvers.gauss_newton(make_problem(visit(seed=0).measured()))
+
+
+def test_gauss_newton_says_when_its_steps_are_used_up(problem):
+    with pytest.raises(ConvergenceError, match="in 2 steps"):
+        reference_solvers.gauss_newton(problem, steps=2)

@@ -1,0 +1,147 @@
+"""The robot of a cell: the drawing and the limits of its file, the geometry and frames of its config."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from hexacell.cell.loader import load_cell
+from hexacell.controller_config.interface import ControllerGeometry
+from hexacell.errors import ReachError
+from hexacell.identification.estimator import estimate_online, identify
+from hexacell.identification.problem.problem import Tolerances
+from hexacell.kinematics.geometry import Geometry
+from hexacell.kinematics.inverse import inverse_kinematics
+from hexacell.kinematics.mechanism import FrameTransform
+from hexacell.kinematics.pose import Pose, PoseBatch
+from hexacell.measurements.records import MeasurementSet, Record
+from hexacell.robot_model import make_robot, robot_of
+
+CELL = Path(__file__).parents[2] / "configs" / "simulated-hexaglide.toml"
+TO_FLOOR = FrameTransform(
+    base=Rotation.from_rotvec([-0.7, 0.0, 0.0]).as_matrix(),
+    origin=np.array([50.0, 200.0, -900.0]),
+    platform=Rotation.from_rotvec([0.3, 0.1, -0.5]).as_matrix(),
+)
+"""From the paper's frames to those of a config with its origin on the floor and its base rolled."""
+angle = st.floats(-20.0, 20.0)
+poses = st.builds(Pose, st.floats(-80, 80), st.floats(-80, 80), st.floats(500, 580), angle, angle, angle)
+
+
+@pytest.fixture(scope="module")
+def cell():
+    return load_cell(CELL)
+
+
+@pytest.fixture(scope="module")
+def robot(cell):
+    return robot_of(cell)
+
+
+@pytest.fixture(scope="module")
+def on_floor(cell, paper):
+    """The same robot, its controller's config in other frames."""
+    return make_robot(cell.settings, ControllerGeometry(TO_FLOOR.geometry(paper.nominal), paper.branch))
+
+
+def test_the_bundled_cell_is_the_papers_simulated_robot(robot, paper):
+    for geometry in (robot.drawing, robot.controller, robot.prior.centre):
+        np.testing.assert_array_equal(geometry.vector(), paper.nominal.vector())
+    assert robot.branch == paper.branch
+    assert robot.tolerances == Tolerances(7.0, 7.0, 7.0)
+    assert (robot.noise.encoder_mm, robot.noise.gauge_mm) == (0.01, 0.01)
+
+
+def test_limits_are_in_millimetres_and_radians(robot):
+    assert robot.limits.gauge_travel_mm == 5.0
+    assert robot.limits.tilt == pytest.approx(np.pi / 4)
+    assert (robot.limits.joint_min_mm, robot.limits.joint_max_mm) == (-800.0, 800.0)
+    assert robot.limits.singularity_margin == 0.03
+
+
+@given(poses)
+def test_a_command_brings_the_controllers_own_robot_to_the_pose(on_floor, hexaglide, paper, pose):
+    command = PoseBatch.of([on_floor.to_command(pose)])
+    np.testing.assert_allclose(
+        inverse_kinematics(hexaglide, on_floor.controller, paper.branch, command),
+        inverse_kinematics(hexaglide, paper.nominal, paper.branch, PoseBatch.of([pose])),
+        atol=1e-9,
+    )
+
+
+def test_a_geometry_returns_to_the_configs_frames(on_floor, hexaglide, paper):
+    written = on_floor.for_controller(paper.actual)
+    np.testing.assert_allclose(written.vector(), TO_FLOOR.geometry(paper.actual).vector(), atol=1e-9)
+    same = on_floor.for_controller(hexaglide.normalize_frames(on_floor.controller)[0])
+    np.testing.assert_allclose(same.vector(), on_floor.controller.vector(), atol=1e-9)
+
+
+def test_frames_survive_a_calibration(cell, on_floor, paper):
+    """After the write-back the config is in the frames it had, so commands keep their meaning."""
+    calibrated = make_robot(
+        cell.settings, ControllerGeometry(on_floor.for_controller(paper.actual), paper.branch)
+    )
+    for before, after in (
+        (on_floor.change.base, calibrated.change.base),
+        (on_floor.change.origin, calibrated.change.origin),
+        (on_floor.change.platform, calibrated.change.platform),
+    ):
+        np.testing.assert_allclose(after, before, atol=1e-9)
+
+
+def test_records_in_the_configs_frames_are_identified(on_floor, paper, visit):
+    exact = visit(seed=2).measured()
+    commands, deviations = TO_FLOOR.poses(exact.poses), TO_FLOOR.deviations(exact.deviations)
+    records = tuple(
+        Record(r.point, r.orientation, commands.pose(row), r.joints, tuple(deviations[row].tolist()))
+        for row, r in enumerate(exact.records)
+    )
+    found = identify(on_floor.problem(MeasurementSet(records)))
+    assert found.converged
+    assert found.geometry.largest_difference(paper.actual) < 0.5  # stations may be turned: less is known
+    written = on_floor.for_controller(found.geometry)
+    assert written.largest_difference(TO_FLOOR.geometry(found.geometry)) < 1e-9
+
+
+def test_before_measuring_the_drawing_is_known_and_its_tolerances(robot, on_floor, paper):
+    for known in (robot.knowledge(), on_floor.knowledge()):
+        np.testing.assert_allclose(known.estimate.vector(), paper.nominal.vector(), atol=1e-9)
+        np.testing.assert_allclose(known.controller.vector(), paper.nominal.vector(), atol=1e-9)
+        np.testing.assert_allclose(np.diag(known.covariance), 49.0 / 3.0)
+
+
+def test_after_measuring_what_was_identified_is_known(robot, noisy):
+    estimate = estimate_online(robot.problem(noisy))
+    known = robot.knowledge(estimate)
+    assert known.estimate.largest_difference(estimate.geometry) == 0.0
+    np.testing.assert_array_equal(known.covariance, estimate.free_covariance)
+    assert known.controller.largest_difference(robot.controller) < 1e-9
+
+
+def test_a_pose_within_reach_is_no_error(robot):
+    robot.require_reach("task 1", Pose(0, 0, 550, 10, -10, 20))
+
+
+@pytest.mark.parametrize(
+    ("pose", "message"),
+    [
+        (Pose(0, 0, 899), r"leg 1 cannot reach the pose X0\.000 Y0\.000 Z899\.000"),
+        (Pose(390, 0, 550), r"^task 1: q4 would be \d+\.\d mm, outside -800 to 800$"),
+        (Pose(0, 0, 550, 46.0), r"^task 1: the singularity margin is 0\.00\d, below 0\.03$"),
+    ],
+)
+def test_a_pose_out_of_reach_says_why(robot, pose, message):
+    with pytest.raises(ReachError, match=message):
+        robot.require_reach("task 1", pose)
+
+
+def test_reach_is_the_controllers_not_the_drawings(cell, paper):
+    short = Geometry(paper.nominal.S, paper.nominal.B, np.full(6, 450.0))
+    robot = make_robot(cell.settings, ControllerGeometry(short, paper.branch))
+    with pytest.raises(ReachError, match="leg 1"):
+        robot.require_reach("task 1", Pose(0, 0, 600))

@@ -1,0 +1,116 @@
+"""From wherever the robot stands: the goal, a way round, or a plain refusal; never an unchecked move."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from hexacell.kinematics.pose import Pose, PoseBatch
+from hexacell.motion import route_search as route_module
+from procedures.calibration import path_planning
+from procedures.calibration.path_planning import NoSafePath
+from procedures.engine.recovery_policy import RecoveryPolicy
+from procedures.journal.journal import read_journal
+from procedures.run import events
+from procedures.run.state import fold
+from procedures.run.steps import Move
+
+ELSEWHERE = (-60.0, 80.0, 520.0, 12.0, -8.0, 5.0)
+INTERRUPTED = events.Interrupted(reason="a power cut", exit_code=130)
+
+
+def found_at(pose: Any) -> events.Event:
+    return events.Located(pose=pose)
+
+
+def spy(monkeypatch: pytest.MonkeyPatch, *blocked: tuple[float, ...]) -> list[tuple[Any, Any, Any]]:
+    """Writes down every line that is checked; those to some poses are not clear."""
+    asked: list[tuple[Any, Any, Any]] = []
+
+    def is_clear(_: Any, start: PoseBatch, end: PoseBatch, reference: Any = None) -> bool:
+        asked.append((start.pose(0), end.pose(0), reference))
+        return not any(end.pose(0).as_tuple() == pytest.approx(pose) for pose in blocked)
+
+    monkeypatch.setattr(route_module, "is_clear", is_clear)
+    return asked
+
+
+def test_a_run_begins_with_asking_where_the_robot_stands(make_rig) -> None:
+    rig = make_rig()
+    beginning = [rig.started()]
+    assert rig.calibration.next_step(fold(beginning)).key == "locate"
+    step = rig.calibration.next_step(fold([*beginning, found_at(ELSEWHERE)]))
+    assert step.key == "P1/o01/move"
+
+
+def test_where_the_straight_line_is_not_clear_it_goes_round_and_asks_again(make_rig, monkeypatch) -> None:
+    rig = make_rig()
+    point = rig.cell.settings.identification.points[0]
+    blocked = (*point, 0.0, 0.0, 0.0)
+    asked = spy(monkeypatch, blocked)
+    state = fold([rig.started(), found_at(ELSEWHERE)])
+    with pytest.raises(NoSafePath, match="it was not moved"):
+        rig.calibration.next_step(state)
+    asked.clear()
+
+    def only_from_level(_: Any, start: PoseBatch, end: PoseBatch, reference: Any = None) -> bool:
+        return end.pose(0).as_tuple() != pytest.approx(blocked) or start.pose(0).a == pytest.approx(0.0)
+
+    monkeypatch.setattr(route_module, "is_clear", only_from_level)
+    step = rig.calibration.next_step(state)
+    assert isinstance(step, Move)
+    assert (step.key, step.pose) == ("P1/o00/move", (*ELSEWHERE[:3], 0.0, 0.0, 0.0))
+    passed = events.Arrived(at=step.at, orientation=0, pose=step.pose)
+    after = fold([rig.started(), found_at(ELSEWHERE), passed])
+    assert after.standing is None
+    assert rig.calibration.next_step(after).key == "P1/o01/move"
+
+
+def test_back_to_a_reference_the_ball_stays_inside_the_travel(recording, make_rig, monkeypatch) -> None:
+    sampled = recording.until(events.RecordTaken, count=5)
+    here = sampled[-1].pose
+    asked = spy(monkeypatch)
+    step = make_rig().calibration.next_step(fold([*sampled, INTERRUPTED, found_at(here)]))
+    assert step.key == "P1/o01/move"
+    ((start, end, reference),) = asked
+    assert start.as_tuple() == pytest.approx(here)
+    assert end == Pose(*sampled[-1].pose[:3]) or end.a == pytest.approx(0.0)
+    assert reference is not None
+
+
+def test_a_robot_that_was_carried_off_comes_back_by_a_line_within_the_limits(
+    recording, make_rig, monkeypatch
+) -> None:
+    """The gauges' travel cannot hold for a ball that is outside already."""
+    sampled = recording.until(events.RecordTaken, count=5)
+    asked = spy(monkeypatch)
+    step = make_rig().calibration.next_step(fold([*sampled, INTERRUPTED, found_at(ELSEWHERE)]))
+    assert step.key == "P1/o01/move"
+    assert [reference for *_, reference in asked] == [None]
+
+
+def test_poses_that_were_visited_are_ways_round(recording, make_rig, monkeypatch) -> None:
+    sampled = recording.until(events.RecordTaken, count=4)
+    state = fold([*sampled, INTERRUPTED, found_at(sampled[-1].pose)])
+    second = next(s for s in state.samples(sampled[-1].at.phase) if s.orientation == 2)
+
+    def over_the_second(_: Any, start: PoseBatch, end: PoseBatch, reference: Any = None) -> bool:
+        here, there = start.pose(0).as_tuple(), end.pose(0).as_tuple()
+        return second.pose in (pytest.approx(here), pytest.approx(there))
+
+    monkeypatch.setattr(route_module, "is_clear", over_the_second)
+    step = make_rig().calibration.next_step(state)
+    assert (step.key, step.pose) == ("P1/o02/move", second.pose)
+
+
+async def test_with_no_way_nothing_moves(make_rig, monkeypatch) -> None:
+    rig = make_rig()
+    monkeypatch.setattr(path_planning, "route", lambda *_: None)
+    policy = RecoveryPolicy.of(rig.cell.settings.recovery, attended=False)
+    with pytest.raises(NoSafePath):
+        await rig.run(policy=policy)
+    assert not any(entry.startswith("move") for entry in rig.controller.log)
+    assert [e.failure.value for e in read_journal(rig.folder.journal) if isinstance(e, events.Failed)] == [
+        "no_way"
+    ]

@@ -1,0 +1,97 @@
+"""A run measures what the plan decides: it stops where that stops, in the order that it chooses."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from hexacell.campaign.pose_list import PoseList
+from hexacell.kinematics.pose import Pose
+from procedures.calibration.workflow import Calibration, expected_records
+from procedures.run import events
+from procedures.run.state import fold
+from procedures.run.steps import CloseSet, Expectation, Move, Phase
+
+
+def moves(recording):
+    """Moves of the recorded run that were chosen, each with what had happened before."""
+    for place, event in enumerate(recording.history):
+        if isinstance(event, events.StepBegun) and isinstance(event.step, Move) and event.step.expected:
+            yield event.step, recording.history[:place]
+
+
+def test_every_chosen_move_foretells_what_it_and_going_on_would_gain(recording) -> None:
+    forecasts = [step.expected.forecast for step, _ in moves(recording) if step.expected]
+    assert [forecast.records for forecast in forecasts if forecast] == [*range(17, 9, -1), *range(8, 0, -1)]
+    assert all(f and f.end_mm <= f.next_mm <= f.now_mm and f.minutes > 0.0 for f in forecasts)
+
+
+def test_a_journal_from_before_forecasts_is_read(recording) -> None:
+    step, _ = next(iter(moves(recording)))
+    told = json.loads(step.expected.model_dump_json())
+    del told["forecast"]
+    old = Expectation.model_validate_json(json.dumps(told))
+    assert old.forecast is None
+    assert old.gain == step.expected.gain
+
+
+def test_with_the_target_reached_the_set_is_closed_and_the_geometry_identified(
+    recording, make_rig, story
+) -> None:
+    step, before = [*moves(recording)][-2]
+    now = step.expected.forecast.now_mm
+    assert make_rig(identification__target_mm=0.99 * now).calibration.next_step(fold(before)) is not None
+    rig = make_rig(identification__target_mm=1.01 * now)
+    back = rig.calibration.next_step(fold(before))
+    assert isinstance(back, Move)
+    assert back.expected is None
+    assert back.orientation < step.orientation
+    at_reference = [*before, story(point=2).arrived(1)]
+    closing = rig.calibration.next_step(fold(at_reference))
+    assert closing == CloseSet(at=step.at)
+    assert rig.calibration.next_step(fold([*at_reference, story(point=2).closed()])).key == "identify"
+
+
+def test_a_budget_ends_it_between_points(make_rig, story) -> None:
+    rig = make_rig(identification__budget_records=10)
+    assert rig.calibration.next_step(fold(story().whole(9))).key == "identify"
+    assert expected_records(rig.cell.settings, rig.calibration.mode) == 10 + 2 + 2 * 2 * 4
+
+
+def test_chosen_points_keep_their_numbers(make_rig) -> None:
+    """Of two points of which one hardly tells anything, the other is first, wherever it stands."""
+    far, near = (100.0, -100.0, 500.0), (-100.0, 100.0, 500.0)
+    openings = set()
+    for points in ((far, near), (near, far)):
+        rig = make_rig(identification__points=points, identification__choose_points=True)
+        step = rig.calibration.next_step(fold([]))
+        assert isinstance(step, Move)
+        assert step.pose[:3] == points[step.at.point - 1]
+        openings.add(step.pose)
+    assert len(openings) == 1
+
+
+def test_listed_poses_are_run(make_rig, story) -> None:
+    rig = make_rig()
+    here = tuple(tuple(Pose(*point, n) for n in (0.5, 0.9, 1.2)) for point in ((1.0, 2.0, 500.0),) * 2)
+    listed = PoseList(Path("list.csv"), here)
+    calibration = Calibration(rig.cell.settings, rig.calibration.robot, rig.calibration.mode, listed)
+    step = calibration.next_step(fold([]))
+    assert isinstance(step, Move)
+    assert step.pose == here[0][0].as_tuple()
+    assert expected_records(rig.cell.settings, rig.calibration.mode, listed) == 6 + 2 + 2 * 2 * 4
+    back = calibration.next_step(fold(story().whole(3)[:-2]))
+    assert isinstance(back, Move)
+    assert back.orientation < 3
+    assert back.expected is None
+
+
+@pytest.mark.parametrize("order", [(1, 2), (2, 1)])
+def test_records_stay_in_the_order_in_which_sets_were_measured(make_rig, story, order) -> None:
+    happened = [event for point in order for event in story(point=point).whole(2)]
+    situation = make_rig().calibration._situation(fold(happened), None)
+    assert situation.measurements.points.tolist() == [point for point in order for _ in range(2)]
+    assert situation.done == {1, 2}
+    assert fold(happened).samples(Phase.IDENTIFY)[0].at.point == 1

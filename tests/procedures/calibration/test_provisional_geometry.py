@@ -1,0 +1,193 @@
+"""A provisional geometry: lent between two points, and never left behind."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from hexacell.controller_config.toml_format import NativeToml
+from hexacell.errors import DeviceError, ExitCode, FileError, HexacellError, Interruption
+from hexacell.kinematics.geometry import Geometry
+from procedures.journal.journal import Journal, read_journal
+from procedures.run import events
+from procedures.run.commands import Abort
+from procedures.run.state import fold
+from procedures.run.steps import Compute
+
+
+class PowerCut(BaseException):
+    """Nothing after it is written down."""
+
+
+@pytest.fixture
+def rig(recording, replayed) -> Any:
+    """The first point is measured: what may be lent is lent now."""
+    return replayed(recording.until(events.SetClosed, count=1), identification__provisional=True)
+
+
+def at(kind: type[Any], action: Any, count: int = 1) -> Any:
+    """A listener that does something at the ``count``-th event of a kind."""
+    heard: list[events.Event] = []
+
+    def listener(event: events.Event, _: Any) -> None:
+        if isinstance(event, kind):
+            heard.append(event)
+            if len(heard) == count:
+                action()
+
+    return listener
+
+
+def began(kind: str, action: Any) -> Any:
+    def listener(event: events.Event, _: Any) -> None:
+        if isinstance(event, events.StepBegun) and event.step == Compute(kind=kind):
+            action()
+
+    return listener
+
+
+def kinds(rig: Any) -> list[str]:
+    wanted = {"lent", "taken back", "identified", "committed", "interrupted", "ended"}
+    return [event.kind for event in read_journal(rig.folder.journal) if event.kind in wanted]
+
+
+def cut_power() -> None:
+    raise PowerCut
+
+
+async def test_it_is_lent_after_the_first_point_and_taken_back_before_anything_is_judged(rig) -> None:
+    before = rig.config
+    configs: dict[str, bytes] = {}
+
+    def look(event: events.Event, _: Any) -> None:
+        configs.setdefault(event.kind, rig.config)
+
+    ended = await rig.run(look)
+    assert ended.exit_code == ExitCode.DONE
+    before_that, *now = kinds(rig)
+    assert before_that == "interrupted", "the first point was measured by a run that ended without a word"
+    assert now == ["lent", "taken back", "identified", "committed", "ended"]
+    assert configs["lent"] != before
+    assert configs["taken back"] == configs["proposed"] == before
+    closed = [e.kind for e in read_journal(rig.folder.journal) if e.kind in {"closed", "lent"}]
+    assert closed[:3] == ["closed", "lent", "closed"]
+
+
+async def test_what_is_lent_is_nearer_to_the_truth(rig) -> None:
+    lent: list[Geometry] = []
+
+    def look() -> None:
+        lent.append(NativeToml().read(rig.cell.config_path).geometry)
+        rig.engine.command(Abort())
+
+    with pytest.raises(Interruption):
+        await rig.run(at(events.ProvisionalApplied, look))
+    truth = rig.world._truth
+    mechanism = rig.calibration.robot.mechanism
+    free = [
+        mechanism.convention.free_parameters(mechanism.normalize_frames(geometry)[0])
+        for geometry in (rig.calibration.robot.controller, lent[0], truth)
+    ]
+    drawn, better = (float(np.linalg.norm(one - free[2])) for one in free[:2])
+    assert better < 0.9 * drawn
+
+
+def test_without_leave_nothing_is_lent(recording) -> None:
+    assert "lent" not in {event.kind for event in recording.history}
+
+
+async def require_finished(rig: Any) -> None:
+    ended = await rig.run()
+    assert ended.exit_code == ExitCode.DONE
+    lent = [
+        e.geometry for e in read_journal(rig.folder.journal) if isinstance(e, events.ProvisionalApplied)
+    ]
+    assert lent.count(lent[0]) == len(lent)
+    assert kinds(rig)[-3:] == ["identified", "committed", "ended"]
+    assert "taken back" in kinds(rig)
+    state = fold(read_journal(rig.folder.journal))
+    assert [len(measured.samples) for measured in state.sets.values()] == [9, 9, 3, 3, 3, 3]
+
+
+async def test_an_abort_where_the_robot_stands_level_takes_it_back(rig) -> None:
+    before = rig.config
+    with pytest.raises(Interruption):
+        await rig.run(at(events.SetClosed, lambda: rig.engine.command(Abort())))
+    assert rig.config == before
+    await require_finished(rig)
+
+
+@pytest.mark.parametrize("count", [2, 5])
+async def test_an_abort_in_the_middle_of_a_set_leaves_it_until_the_run_goes_on(rig, count) -> None:
+    before = rig.config
+    with pytest.raises(Interruption):
+        await rig.run(at(events.RecordTaken, lambda: rig.engine.command(Abort()), count))
+    assert rig.config != before
+    await require_finished(rig)
+
+
+@pytest.mark.parametrize("step", ["lend", "take back"])
+async def test_a_power_cut_while_it_is_written_is_put_right(rig, step) -> None:
+    before = rig.config
+    with pytest.raises(PowerCut):
+        await rig.run(began(step, cut_power))
+    ended = await rig.run()
+    assert ended.exit_code == ExitCode.DONE
+    assert kinds(rig)[-3:] == ["identified", "committed", "ended"]
+    assert rig.config != before
+
+
+async def test_a_power_cut_after_the_file_was_replaced_is_put_right(rig, monkeypatch) -> None:
+    before = rig.config
+
+    kept: list[bytes] = []
+
+    async def dies() -> None:
+        kept.extend([rig.folder.journal.read_bytes(), rig.config])
+        raise PowerCut
+
+    with monkeypatch.context() as patch:
+        patch.setattr(rig.performer.devices.controller, "reload", dies)
+        with pytest.raises(PowerCut):
+            await rig.run()
+    journal, config, *_ = kept
+    rig.folder.journal.write_bytes(journal)
+    rig.cell.config_path.write_bytes(config)
+    assert config != before, "the file was replaced, and nobody had time to say so"
+    assert "lent" not in kinds(rig)
+    ended = await rig.run()
+    assert ended.exit_code == ExitCode.DONE
+
+
+async def test_a_controller_that_does_not_take_it_leaves_the_config_as_it_was(rig) -> None:
+    before = rig.config
+    rig.controller.failures["reload"] = DeviceError("cannot be read", subject="controller")
+    with pytest.raises(HexacellError, match="did not take the provisional geometry"):
+        await rig.run()
+    assert rig.config == before
+
+
+@pytest.mark.parametrize("comes_back", [True, False])
+async def test_what_was_lent_and_cannot_be_noted_is_taken_back_or_said(
+    rig, monkeypatch, comes_back: bool
+) -> None:
+    before, append = rig.config, Journal.append
+
+    def full(self: Journal, event: events.Event) -> None:
+        if isinstance(event, events.ProvisionalApplied):
+            if not comes_back:
+                rig.controller.failures["reload"] = DeviceError("is deaf", subject="controller")
+            raise FileError("the disk is full", subject=self.path)
+        append(self, event)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Journal, "append", full)
+        with pytest.raises(HexacellError, match="the disk is full") as failure:
+            await rig.run()
+    said = "the controller has a provisional geometry, which could be neither noted nor taken back"
+    assert (said in str(failure.value)) is not comes_back
+    assert rig.config == before
+    rig.controller.failures.clear()
+    await require_finished(rig)

@@ -1,0 +1,159 @@
+"""Back to a set's reference: straight where that is safe, else over poses that were visited."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from hexacell.campaign.planner import REFUSALS
+from hexacell.errors import IdentifiabilityError
+from hexacell.kinematics.forward import continue_solution
+from hexacell.kinematics.inverse import inverse_kinematics
+from hexacell.kinematics.pose import Pose, PoseBatch
+from hexacell.motion import route_search as route_module
+from hexacell.motion.trajectory import interpolate_line
+from procedures.calibration import path_planning
+from procedures.calibration import workflow as module
+from procedures.run import events
+from procedures.run.state import fold
+from procedures.run.steps import Move, Phase
+
+ORIENTATIONS = 9
+
+
+class Ways:
+    """Stands in for the check of straight lines: only those to some orientations are clear."""
+
+    def __init__(
+        self, monkeypatch: pytest.MonkeyPatch, *clear_to: int, stops: tuple[Pose, ...] = ()
+    ) -> None:
+        self.clear_to = clear_to
+        self.stops = stops
+        monkeypatch.setattr(module.Calibration, "_known", lambda *_: (None, self))
+        monkeypatch.setattr(path_planning, "is_clear", self._is_clear)
+        monkeypatch.setattr(path_planning, "PathPlanner", self._departure)
+        self.reference = np.zeros(3)
+
+    def _departure(self, _: Any, start: Any, home: Any, reference: Any) -> Any:
+        def to(end: Any) -> Any:
+            clear = self._is_clear(_, start, end, reference)
+            return [SimpleNamespace(stops=self.stops) if clear else None]
+
+        assert home is None
+        return SimpleNamespace(to=to)
+
+    def _is_clear(self, _: Any, present: Any, target: Any, reference: Any) -> bool:
+        assert reference is self.reference
+        # A story's poses differ in their angle a: orientation less one, in degrees.
+        return round(target.pose(0).a) + 1 in self.clear_to
+
+
+@pytest.mark.parametrize(
+    ("clear_to", "way"),
+    [((1,), [1]), ((4, 1), [1]), ((4,), [4, 3, 2, 1]), ((), [8, 7, 6, 5, 4, 3, 2, 1]), ((6, 5, 2), [2, 1])],
+)
+def test_the_way_back_is_safe(make_rig, story, monkeypatch, clear_to, way) -> None:
+    Ways(monkeypatch, *clear_to)
+    calibration, happened = make_rig().calibration, story().whole(ORIENTATIONS)[:-2]
+    visited: list[int] = []
+    while isinstance(step := calibration.next_step(fold(happened)), Move):
+        visited.append(step.orientation)
+        happened.append(story().arrived(step.orientation, step.pose))
+    assert visited == way
+    assert step.key == "P1/close"
+
+
+def test_a_way_back_over_stops_is_gone_stop_by_stop(make_rig, story, monkeypatch) -> None:
+    stop = Pose(100.0, -100.0, 500.0, 4.0, 1.0, 0.0)
+    Ways(monkeypatch, 1, stops=(stop,))
+    calibration, happened = make_rig().calibration, story().whole(ORIENTATIONS)[:-2]
+    step = calibration.next_step(fold(happened))
+    assert isinstance(step, Move)
+    assert step.key == "P1/o00/move"
+    assert step.pose == pytest.approx(stop.as_tuple())
+    step = calibration.next_step(fold([*happened, story().arrived(0, step.pose)]))
+    assert step.key == "P1/o01/move"
+
+
+def test_at_a_stop_it_is_not_decided_anew(make_rig, story, monkeypatch) -> None:
+    """From the stop alone nothing leads on, and back to where it came from would go on for ever."""
+    stop = Pose(100.0, -100.0, 500.0, 4.0, 1.0, 0.0)
+    stands_in = Ways(monkeypatch, 1, stops=(stop,))
+    calibration, happened = make_rig().calibration, story().whole(ORIENTATIONS)[:-2]
+    to_stop = calibration.next_step(fold(happened))
+    assert isinstance(to_stop, Move)
+    asked: list[float] = []
+
+    def from_the_last_record_only(_: Any, start: Any, home: Any, reference: Any) -> Any:
+        asked.append(start.pose(0).a)
+        return stands_in._departure(_, start, home, reference)
+
+    monkeypatch.setattr(path_planning, "PathPlanner", from_the_last_record_only)
+    monkeypatch.setattr(path_planning, "is_clear", lambda *_: False)
+    monkeypatch.setattr(route_module, "is_clear", lambda *_: False)
+    step = calibration.next_step(fold([*happened, story().arrived(0, to_stop.pose)]))
+    assert step.key == "P1/o01/move"
+    assert asked == pytest.approx([ORIENTATIONS - 1.0])
+
+
+def test_the_way_back_leads_over_stops_that_were_passed_where_nothing_is_safe(
+    make_rig, story, monkeypatch
+) -> None:
+    Ways(monkeypatch)
+    stop = (100.0, -100.0, 500.0, 4.0, 1.0, 0.0)
+    s = story()
+    led = [s.arrived(0, stop), s.arrived(3), s.sampled(3)]
+    step = make_rig().calibration.next_step(
+        fold([*s.whole(2)[:-2], *led, *[s.refused(4)] * (REFUSALS + 1)])
+    )
+    assert isinstance(step, Move)
+    assert (step.key, step.pose) == ("P1/o00/move", stop)
+
+
+def test_the_way_back_from_a_refused_pose_begins_at_the_last_record(make_rig, story, monkeypatch) -> None:
+    Ways(monkeypatch)
+    refusals = [story().arrived(5), story().refused(5)] * (REFUSALS + 1)
+    step = make_rig().calibration.next_step(fold([*story().whole(4)[:-2], *refusals]))
+    assert step.key == "P1/o04/move"
+
+
+def test_nothing_known_leads_back_one_by_one(make_rig, story, monkeypatch) -> None:
+    def unknown(*_: Any) -> Any:
+        raise IdentifiabilityError("the records cannot be followed")
+
+    monkeypatch.setattr(module.Calibration, "_known", unknown)
+    step = make_rig().calibration.next_step(fold(story().whole(ORIENTATIONS)[:-2]))
+    assert step.key == f"P1/o{ORIENTATIONS - 1:02d}/move"
+
+
+def test_the_ball_stays_inside_the_travel_on_every_way(recording, make_rig) -> None:
+    """Judged by the truth, which the procedure does not know."""
+    rig = make_rig()
+    robot, truth = rig.calibration.robot, rig.world._truth
+    settings = rig.cell.settings
+    here: dict[Any, PoseBatch] = {}
+    reference: dict[Any, Any] = {}
+    farthest = 0.0
+    for event in recording.history:
+        if not isinstance(event, events.Arrived) or event.at.phase is not Phase.IDENTIFY:
+            continue
+        there = PoseBatch.of([Pose(*event.pose)])
+        way = interpolate_line(here.get(event.at, there), there)
+        joints = inverse_kinematics(robot.mechanism, robot.controller, robot.branch, way)
+        really = continue_solution(
+            robot.mechanism,
+            truth,
+            joints,
+            start=way,
+            start_geometry=robot.controller,
+            start_joints=joints,
+        )
+        assert really.found.all()
+        balls = really.poses.positions
+        farthest = max(farthest, np.abs(balls - reference.setdefault(event.at, balls[0])).max())
+        here[event.at] = there
+    # The estimate that the ways were checked with was a little wrong itself.
+    assert 1.0 < farthest < 1.1 * settings.limits.gauge_travel_mm

@@ -1,0 +1,214 @@
+"""Settled means seen: by readings that agree, for as long as the cell file says."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from drivers.gauges.errors import GaugeAtEnd, GaugeSilent, GaugeUnsteady
+from hexacell.cell.devices import TimingSettings
+from hexacell.errors import DeviceError, ExitCode, SeveralErrors
+from procedures.devices.settling import LEAST_WINDOWS, read_all, settle
+
+TIMING = TimingSettings(
+    window_s=0.6, interval_s=0.1, readings=5, spread_gauge_mm=0.06, spread_encoder_mm=0.05, give_up_s=20.0
+)
+
+
+def unsteady(name: str) -> GaugeUnsteady:
+    return GaugeUnsteady("readings do not agree", subject=f"gauge {name}")
+
+
+def at_end(name: str) -> GaugeAtEnd:
+    return GaugeAtEnd("is at an end of its travel", subject=f"gauge {name}")
+
+
+async def test_what_stands_still_is_settled_after_one_window(bench) -> None:
+    settled = await settle(bench.devices, TIMING, bench.clock)
+    times = [look.at_s for look in settled.window]
+    assert len(times) >= TIMING.readings
+    assert times[-1] - times[0] >= TIMING.window_s
+    assert bench.clock.now() < 2 * TIMING.window_s
+
+
+async def test_a_window_has_readings_enough_however_slow_they_come(bench) -> None:
+    timing = TIMING.model_copy(update={"interval_s": 5.0})
+    settled = await settle(bench.devices, timing, bench.clock)
+    assert len(settled.window) == timing.readings
+
+
+async def test_a_window_lasts_long_enough_however_fast_they_come(bench) -> None:
+    timing = TIMING.model_copy(update={"interval_s": 0.01})
+    settled = await settle(bench.devices, timing, bench.clock)
+    assert settled.window[-1].at_s - settled.window[0].at_s >= timing.window_s
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2])
+async def test_ringing_is_waited_for(bench, axis: int) -> None:
+    def ringing() -> float:
+        t = bench.clock.now()
+        return 1.5 + 0.5 * math.exp(-t / 0.5) * math.cos(2.0 * math.pi * 1.3 * t)
+
+    bench.gauges[axis].shown = ringing
+    settled = await settle(bench.devices, TIMING, bench.clock)
+    # Its swing is within the limit from here on at the earliest: 2 * 0.5 * exp(-t / 0.5) = 0.06.
+    assert settled.window[-1].at_s > 0.5 * math.log(1.0 / 0.06)
+    assert settled.gauge_spread()[axis] <= TIMING.spread_gauge_mm
+    assert settled.gauge_means()[axis] == pytest.approx(1.5, abs=TIMING.spread_gauge_mm)
+
+
+async def test_a_jump_empties_nothing_but_is_waited_out(bench) -> None:
+    """Readings from before a jump are no part of the window that counts."""
+    bench.gauges[0].shown = lambda: 0.0 if bench.clock.now() < 0.45 else 1.0
+    settled = await settle(bench.devices, TIMING, bench.clock)
+    assert {look.gauge_values()[0] for look in settled.window} == {1.0}
+
+
+async def test_means_and_ranges_are_those_of_the_window(bench) -> None:
+    bench.gauges[1].shown = iter(np.tile([0.01, 0.03], 50).tolist()).__next__
+    bench.encoders.shown = lambda: (1.0, 2.0, 3.0, 4.0, 5.0, 6.0)
+    settled = await settle(bench.devices, TIMING, bench.clock)
+    values = [look.gauges[1].value_mm for look in settled.window]
+    assert settled.gauge_means()[1] == pytest.approx(np.mean(values))
+    assert settled.gauge_spread() == pytest.approx([0.0, 0.02, 0.0])
+    assert settled.joint_means().tolist() == [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]
+    assert settled.joint_spread().tolist() == [0.0] * 6
+
+
+@pytest.mark.parametrize("name", ["x", "y", "z"])
+async def test_a_gauge_that_never_settles_is_named(bench, name: str) -> None:
+    bench.gauges["xyz".index(name)].shown = lambda: math.sin(3.0 * bench.clock.now())
+    with pytest.raises(DeviceError, match=rf"within 20 s: gauge {name} by \d\.\d+ mm\. Look") as refusal:
+        await settle(bench.devices, TIMING, bench.clock)
+    assert refusal.value.exit_code is ExitCode.HARDWARE
+    assert 20.0 < bench.clock.now() < 21.0
+
+
+async def test_a_slider_that_never_settles_is_named(bench) -> None:
+    bench.encoders.shown = lambda: (0.0, 0.0, 0.0, bench.clock.now(), 0.0, 0.0)
+    with pytest.raises(DeviceError, match=r"slider 4 by 0\.600 mm"):
+        await settle(bench.devices, TIMING, bench.clock)
+
+
+async def test_all_that_moves_is_named(bench) -> None:
+    bench.gauges[0].shown = bench.gauges[2].shown = lambda: math.sin(3.0 * bench.clock.now())
+    bench.encoders.shown = lambda: (0.0, -bench.clock.now(), 0.0, 0.0, 0.0, 0.0)
+    with pytest.raises(DeviceError, match=r"gauge x by .*, gauge z by .*, slider 2 by"):
+        await settle(bench.devices, TIMING, bench.clock)
+
+
+async def test_limits_are_ranges_and_included(bench) -> None:
+    values = iter(np.tile([0.0, TIMING.spread_gauge_mm], 200).tolist())
+    bench.gauges[0].shown = values.__next__
+    assert (await settle(bench.devices, TIMING, bench.clock)).gauge_spread()[0] == TIMING.spread_gauge_mm
+
+
+async def test_an_unsteady_gauge_has_not_settled_yet(bench) -> None:
+    bench.gauges[1].failures = [unsteady("y") for _ in range(30)]
+    settled = await settle(bench.devices, TIMING, bench.clock)
+    assert settled.window[0].at_s >= 30 * TIMING.interval_s - 1e-9
+
+
+async def test_readings_from_before_an_unsteady_one_do_not_count(bench) -> None:
+    looks = 0
+
+    def shown() -> float:
+        nonlocal looks
+        looks += 1
+        if looks == 4:  # at 0.3 s
+            bench.gauges[2].failures.append(unsteady("z"))
+        return 0.0
+
+    bench.gauges[1].shown = shown
+    settled = await settle(bench.devices, TIMING, bench.clock)
+    assert settled.window[0].at_s > 0.35
+
+
+async def test_several_unsteady_gauges_have_not_settled_yet(bench) -> None:
+    for gauge in bench.gauges:
+        gauge.failures = [unsteady(gauge.name)] * 3
+    await settle(bench.devices, TIMING, bench.clock)
+
+
+async def test_a_swing_that_touches_an_end_has_not_settled_yet(bench) -> None:
+    bench.gauges[0].failures = [unsteady("x")] * 3
+    bench.gauges[1].failures = [at_end("y")] * 3
+    await settle(bench.devices, TIMING, bench.clock)
+
+
+async def test_a_gauge_that_stays_unsteady_is_named(bench) -> None:
+    bench.gauges[2].failures = [unsteady("z")] * 1000
+    with pytest.raises(DeviceError, match="within 20 s: gauge z: readings do not agree"):
+        await settle(bench.devices, TIMING, bench.clock)
+    assert bench.clock.now() < 21.0
+
+
+async def test_an_end_of_the_travel_is_said_at_once(bench) -> None:
+    bench.gauges[0].shown = lambda: 9.0
+    with pytest.raises(GaugeAtEnd):
+        await settle(bench.devices, TIMING, bench.clock)
+    assert bench.clock.now() == 0.0
+
+
+async def test_two_ends_of_the_travel_are_both_said(bench) -> None:
+    bench.gauges[0].shown = bench.gauges[2].shown = lambda: -9.0
+    with pytest.raises(SeveralErrors) as refusal:
+        await settle(bench.devices, TIMING, bench.clock)
+    assert [error.subject for error in refusal.value.errors] == ["gauge x", "gauge z"]
+
+
+async def test_other_failures_are_not_waited_out(bench) -> None:
+    bench.gauges[0].failures = [GaugeSilent("does not answer", subject="gauge x")]
+    with pytest.raises(GaugeSilent):
+        await settle(bench.devices, TIMING, bench.clock)
+    bench.gauges[0].failures = [GaugeSilent("does not answer", subject="gauge x")]
+    bench.gauges[1].failures = [unsteady("y")]
+    with pytest.raises(SeveralErrors):
+        await settle(bench.devices, TIMING, bench.clock)
+
+
+async def test_a_silent_encoder_bus_is_not_waited_out(bench) -> None:
+    bench.encoders.failure = DeviceError("no round", subject="encoders")
+    with pytest.raises(DeviceError, match="encoders: no round"):
+        await settle(bench.devices, TIMING, bench.clock)
+
+
+async def test_time_alone_does_not_end_it(bench) -> None:
+    """Readings that take long, or a machine that stalls, are no vibration."""
+
+    def slow() -> float:
+        bench.clock.time_s += 25.0
+        return 0.0
+
+    bench.gauges[0].shown = slow
+    settled = await settle(bench.devices, TIMING, bench.clock)
+    assert bench.clock.now() > TIMING.give_up_s
+    assert len(settled.window) == TIMING.readings
+
+
+async def test_slow_readings_that_never_agree_end_too(bench) -> None:
+    def slow() -> float:
+        bench.clock.time_s += 25.0
+        return float(bench.clock.now()) / 1000.0
+
+    bench.gauges[0].shown = slow
+    with pytest.raises(DeviceError, match="gauge x by"):
+        await settle(bench.devices, TIMING, bench.clock)
+    assert bench.gauges[0].reads == LEAST_WINDOWS * TIMING.readings
+
+
+async def test_a_window_longer_than_the_patience_is_said(bench) -> None:
+    timing = TIMING.model_copy(update={"window_s": 30.0})
+    with pytest.raises(DeviceError, match="window of readings is longer"):
+        await settle(bench.devices, timing, bench.clock)
+
+
+async def test_a_glance_keeps_what_was_answered(bench) -> None:
+    bench.gauges[1].shown = lambda: -1.25
+    bench.encoders.shown = lambda: (0.001, 0.0, 0.0, 0.0, 0.0, -2.5)
+    look = await read_all(bench.devices, bench.clock)
+    assert [reading.raw for reading in look.gauges] == ["+0.000", "-1.250", "+0.000"]
+    assert look.encoders.counts == (1, 0, 0, 0, 0, -2500)
+    assert look.joints().tolist() == [0.001, 0.0, 0.0, 0.0, 0.0, -2.5]

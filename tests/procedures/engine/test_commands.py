@@ -1,0 +1,380 @@
+"""Commands to a running engine: which break a step off, which wait for its end, what each leaves behind."""
+
+from __future__ import annotations
+
+import asyncio
+import threading
+from collections.abc import AsyncIterator, Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from hexacell.cell.recovery import Action
+from hexacell.errors import ExitCode, Interruption
+from procedures.engine.engine import Engine
+from procedures.engine.operator import QuestionBroker
+from procedures.journal.journal import Journal, read_journal
+from procedures.run import events
+from procedures.run.commands import Abort, Answer, CommandQueue, MeasureAgain, Pause, Resume, Stop, Undo
+from procedures.run.state import RunState, fold
+from procedures.run.status import Status
+from procedures.run.steps import Move, Phase, Sample, SetKey, Step
+
+P1 = SetKey(phase=Phase.IDENTIFY, point=1)
+READING = events.Reading(
+    gauges_mm=(0.0,) * 3, spread_mm=(0.0,) * 3, joints_mm=(0.0,) * 6, answers=(), counts=()
+)
+
+
+def pose(orientation: int) -> Any:
+    return (1.0, 2.0, 3.0, float(orientation), 0.0, 0.0)
+
+
+class Script:
+    """A set of three records; any step may be held up until it is let go, or cancelled."""
+
+    def __init__(self, devices: Any) -> None:
+        self.devices = devices
+        self.calibration = self
+        self.hold: str | None = None
+        self.held = asyncio.Event()
+        self.let_go = asyncio.Event()
+        self.begun: list[str] = []
+
+    def next_step(self, state: RunState) -> Step | None:
+        orientation = state.set(P1).next_orientation
+        if orientation > 3:
+            return None
+        kind = Sample if state.standing == (P1, orientation) else Move
+        return kind(at=P1, orientation=orientation, pose=pose(orientation))
+
+    async def prepare(self) -> None:
+        await self.devices.controller.prepare()
+
+    async def perform(self, step: Any, state: RunState) -> events.Event:
+        self.begun.append(step.key)
+        if step.key == self.hold:
+            self.held.set()
+            await self.let_go.wait()
+        if isinstance(step, Move):
+            return events.Arrived(at=P1, orientation=step.orientation, pose=step.pose)
+        return events.RecordTaken(
+            at=P1, orientation=step.orientation, pose=step.pose, reading=READING, deviation_mm=(0.0,) * 3
+        )
+
+
+@pytest.fixture
+def journal(tmp_path: Path) -> Iterator[Journal]:
+    with Journal(tmp_path / "journal.jsonl") as opened:
+        yield opened
+
+
+class Stage:
+    """An engine that runs a script up to where it is held."""
+
+    def __init__(self, devices: Any, journal: Journal) -> None:
+        self.script = Script(devices)
+        self.journal = journal
+        self.engine = Engine(self.script, journal, [self._hear])  # type: ignore[arg-type]
+        self.statuses: list[Status] = []
+        self.engine.watch(self.statuses.append)
+        self._waiting: list[tuple[type[Any], asyncio.Event]] = []
+        self.running: asyncio.Task[events.Ended] | None = None
+
+    def _hear(self, event: events.Event, _: RunState) -> None:
+        for kind, happened in self._waiting:
+            if isinstance(event, kind):
+                happened.set()
+
+    async def until(self, kind: type[Any]) -> None:
+        happened = asyncio.Event()
+        self._waiting.append((kind, happened))
+        await happened.wait()
+
+    async def held_at(self, key: str | None) -> None:
+        self.script.hold = key
+        self.running = asyncio.create_task(self.engine.run())
+        if key:
+            await self.script.held.wait()
+
+    async def over(self) -> events.Ended:
+        assert self.running
+        self.script.let_go.set()
+        return await self.running
+
+    @property
+    def kinds(self) -> list[str]:
+        return [event.kind for event in self.journal.events if not isinstance(event, events.StepBegun)]
+
+
+@pytest.fixture
+async def stage(bench, journal) -> AsyncIterator[Stage]:
+    made = Stage(bench.devices, journal)
+    yield made
+    if made.running and not made.running.done():
+        made.running.cancel()
+        await asyncio.wait([made.running])
+
+
+async def test_a_pause_after_the_record_waits_for_the_record(stage: Stage, bench) -> None:
+    await stage.held_at("P1/o02/move")
+    stage.engine.command(Pause())
+    await asyncio.sleep(0)
+    stage.script.let_go.set()
+    await stage.until(events.Paused)
+    assert stage.kinds[-3:] == ["arrived", "sampled", "paused"]
+    assert stage.engine.status is Status.PAUSED
+    assert "stop" not in bench.controller.log
+    stage.engine.command(Resume())
+    await stage.over()
+    assert stage.script.begun == [f"P1/o0{n}/{what}" for n in (1, 2, 3) for what in ("move", "sample")]
+    assert stage.statuses == [
+        *(Status.RUNNING, Status.PAUSING, Status.PAUSED, Status.RUNNING, Status.ENDED),
+    ]
+
+
+@pytest.mark.parametrize("key", ["P1/o02/move", "P1/o02/sample"])
+async def test_a_pause_at_once_stops_motion_and_the_step_is_decided_again(stage, bench, key: str) -> None:
+    await stage.held_at(key)
+    stage.engine.command(Pause(at_once=True))
+    await stage.until(events.Paused)
+    assert bench.controller.log == ["prepare", "stop"]
+    assert stage.engine.state.position_unknown
+    assert stage.engine.state.set(P1).reference_unverified
+    begun = len(stage.script.begun)
+    for _ in range(5):
+        await asyncio.sleep(0)
+    assert len(stage.script.begun) == begun, "nothing moves while it rests"
+    stage.engine.command(Resume())
+    await stage.over()
+    assert stage.script.begun[begun] == "P1/o02/move"
+    assert bench.controller.log == ["prepare", "stop", "prepare"]
+
+
+async def test_a_pause_may_be_taken_back_before_it_begins(stage: Stage) -> None:
+    await stage.held_at("P1/o02/move")
+    for command in (Pause(), Resume()):
+        stage.engine.command(command)
+    await stage.over()
+    assert "paused" not in stage.kinds
+
+
+async def test_undo_means_the_record_that_was_there_when_it_was_said(stage: Stage) -> None:
+    """Not the one that is being taken meanwhile."""
+    await stage.held_at("P1/o03/sample")
+    stage.engine.command(Undo())
+    await stage.over()
+    assert events.RecordDiscarded(at=P1, orientation=2) in stage.journal.events
+    taken = [sample.orientation for sample in fold(stage.journal.events).set(P1).samples]
+    assert taken == [1, 3, 2]
+
+
+async def test_undone_twice_two_records_go(stage: Stage) -> None:
+    await stage.held_at("P1/o03/move")
+    for _ in range(2):
+        stage.engine.command(Undo())
+    await stage.over()
+    undone = [
+        event
+        for event in stage.journal.events
+        if isinstance(event, events.RecordDiscarded | events.SetInvalidated)
+    ]
+    assert undone[0] == events.RecordDiscarded(at=P1, orientation=2)
+    assert undone[1] == events.SetInvalidated(at=P1, reason="a person asked for it")
+    assert len(fold(stage.journal.events).set(P1).samples) == 3
+
+
+async def test_what_is_undone_stays_in_the_journal(stage: Stage) -> None:
+    await stage.held_at("P1/o03/move")
+    stage.engine.command(Undo())
+    await stage.over()
+    sampled = [event.orientation for event in stage.journal.events if isinstance(event, events.RecordTaken)]
+    assert sampled == [1, 2, 2, 3]
+
+
+@pytest.mark.parametrize(
+    ("command", "event"),
+    [
+        (MeasureAgain(P1, 2), events.RecordDiscarded(at=P1, orientation=2)),
+        (MeasureAgain(P1, 1), events.SetInvalidated(at=P1, reason="a person asked for it")),
+        (MeasureAgain(P1), events.SetInvalidated(at=P1, reason="a person asked for it")),
+    ],
+)
+async def test_measured_again(stage: Stage, command: MeasureAgain, event: events.Event) -> None:
+    await stage.held_at("P1/o03/sample")
+    stage.engine.command(command)
+    await stage.over()
+    assert event in stage.journal.events
+    orientations = [sample.orientation for sample in fold(stage.journal.events).set(P1).samples]
+    assert sorted(orientations) == [1, 2, 3]
+
+
+async def test_records_may_be_undone_while_it_rests(stage: Stage) -> None:
+    await stage.held_at("P1/o02/sample")
+    stage.engine.command(Pause())
+    await asyncio.sleep(0)
+    stage.script.let_go.set()
+    await stage.until(events.Paused)
+    stage.engine.command(Undo())
+    await stage.until(events.RecordDiscarded)
+    assert stage.engine.status is Status.PAUSED
+    stage.engine.command(Resume())
+    await stage.over()
+
+
+@pytest.mark.parametrize(
+    ("command", "words"),
+    [
+        (Resume(), "the run does not rest"),
+        (Answer("yes"), "no question is open that this would answer"),
+        (Undo(), "there is no record to undo in the set that is being measured"),
+        (MeasureAgain(P1, 7), "P1 has no such record"),
+    ],
+)
+async def test_what_cannot_be_obeyed_is_said_and_changes_nothing(stage, command: Any, words: str) -> None:
+    await stage.held_at("P1/o01/sample")
+    stage.engine.command(command)
+    ended = await stage.over()
+    declined = events.CommandRejected(command=type(command).__name__, reason=words)
+    assert [event for event in stage.journal.events if isinstance(event, events.CommandRejected)] == [
+        declined
+    ]
+    assert ended.exit_code == ExitCode.OUT_OF_LIMITS, "nothing was judged in this script"
+
+
+async def test_a_stop_lets_the_step_end(stage: Stage, bench) -> None:
+    await stage.held_at("P1/o02/sample")
+    stage.engine.command(Stop("a stop was asked for"))
+    await asyncio.sleep(0)
+    await asyncio.sleep(0)
+    assert stage.engine.status is Status.STOPPING
+    with pytest.raises(Interruption) as ended:
+        await stage.over()
+    assert ended.value.exit_code is ExitCode.INTERRUPTED
+    assert stage.kinds[-2:] == ["sampled", "interrupted"]
+    assert stage.journal.events[-1] == events.Interrupted(reason="a stop was asked for", exit_code=130)
+    assert bench.controller.log == ["prepare", "stop"]
+
+
+async def test_an_abort_ends_in_the_middle_of_a_step_and_in_place(stage: Stage, bench) -> None:
+    await stage.held_at("P1/o02/move")
+    stage.engine.command(Abort())
+    with pytest.raises(Interruption):
+        await stage.running  # type: ignore[misc]  # the step is never let go
+    assert stage.journal.events[-1] == events.Interrupted(reason="aborted", exit_code=130)
+    assert stage.journal.events[-2].kind == "begun"
+    assert bench.controller.log == ["prepare", "stop"]
+
+
+async def test_a_stop_then_an_abort_ends_at_once(stage: Stage) -> None:
+    await stage.held_at("P1/o02/move")
+    stage.engine.command(Stop())
+    stage.engine.command(Abort())
+    with pytest.raises(Interruption):
+        await stage.running  # type: ignore[misc]
+
+
+@pytest.mark.parametrize("command", [Stop(), Abort()])
+async def test_a_run_that_rests_ends_at_once(stage: Stage, command: Any) -> None:
+    await stage.held_at("P1/o02/move")
+    stage.engine.command(Pause(at_once=True))
+    await stage.until(events.Paused)
+    stage.engine.command(command)
+    with pytest.raises(Interruption):
+        await stage.running  # type: ignore[misc]
+    assert stage.kinds[-2:] == ["paused", "interrupted"]
+
+
+async def test_commands_given_before_it_runs_are_heeded(stage: Stage) -> None:
+    stage.engine.command(Stop("before"))
+    with pytest.raises(Interruption, match="before"):
+        await stage.engine.run()
+    assert stage.script.begun == []
+
+
+async def test_a_command_from_another_thread_wakes_the_engine(stage: Stage) -> None:
+    await stage.held_at("P1/o02/move")
+    thread = threading.Thread(target=stage.engine.command, args=(Abort("from a thread"),))
+    thread.start()
+    with pytest.raises(Interruption, match="from a thread"):
+        await stage.running  # type: ignore[misc]
+    thread.join()
+
+
+async def test_an_inbox_hands_out_in_order_and_waits() -> None:
+    inbox = CommandQueue()
+    inbox.put(Pause())
+    inbox.put(Resume())
+    assert [await inbox.next(), await inbox.next()] == [Pause(), Resume()]
+    waiting = asyncio.create_task(inbox.next())
+    with inbox.attended():
+        await asyncio.sleep(0)
+        assert not waiting.done()
+        inbox.put(Undo())
+        assert await waiting == Undo()
+    assert (inbox.is_attended, inbox.is_over) == (False, True)
+
+
+class Silent:
+    """A face that shows questions and answers them by command."""
+
+    async def place_gauges(self, *_: Any) -> None:
+        await asyncio.Event().wait()
+
+    async def approve(self, *_: Any) -> str | None:
+        await asyncio.Event().wait()
+        return None
+
+    async def decide(self, *_: Any) -> Action:
+        await asyncio.Event().wait()
+        return Action.ABORT
+
+
+Meanwhile = Callable[[events.Event, RunState], None]
+
+
+def when_asked(rig: Any, *commands: Any) -> Meanwhile:
+    """Gives commands as soon as a question is open."""
+
+    def listener(event: events.Event, _: RunState) -> None:
+        if isinstance(event, events.RunStarted | events.Interrupted | events.StepBegun):
+            rig.engine.watch(
+                lambda status: (
+                    [rig.engine.command(c) for c in commands]
+                    if status is Status.AWAITING_OPERATOR
+                    else None
+                )
+            )
+
+    return listener
+
+
+async def test_a_question_may_be_answered_by_command(recording, replayed) -> None:
+    rig = replayed(recording.until(events.Proposed)[:-1], acceptance__approval="ask")
+    object.__setattr__(rig.performer, "operator", Silent())
+    ended = await rig.run(when_asked(rig, Answer("a name")))
+    assert ended.exit_code == ExitCode.DONE
+    assert events.Committed(approved_by="a name") in read_journal(rig.folder.journal)
+
+
+@pytest.mark.parametrize("command", [Stop(), Abort()])
+async def test_a_question_keeps_nobody_from_leaving(recording, replayed, command) -> None:
+    rig = replayed(recording.until(events.Proposed)[:-1], acceptance__approval="ask")
+    object.__setattr__(rig.performer, "operator", Silent())
+    with pytest.raises(Interruption):
+        await rig.run(when_asked(rig, command))
+    assert rig.config == recording.config_before
+
+
+async def test_a_desk_takes_only_answers_that_there_are() -> None:
+    desk = QuestionBroker(Silent())
+    assert not desk.answer("retry"), "nothing is asked"
+    asking = asyncio.create_task(desk.decide("It broke.", (Action.RETRY, Action.ABORT)))
+    await asyncio.sleep(0)
+    assert desk.open
+    assert desk.open.choices == ("retry", "abort")
+    assert not desk.answer("redo-set")
+    assert desk.answer("retry")
+    assert await asking is Action.RETRY
+    assert desk.open is None

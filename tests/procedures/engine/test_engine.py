@@ -1,0 +1,353 @@
+"""The engine: written down before it is done, and after; whatever stops it, motion stops in place."""
+
+from __future__ import annotations
+
+import asyncio
+import errno
+import os
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from hexacell.acceptance.validation import Verdict
+from hexacell.errors import (
+    AnswerNeeded,
+    DeviceError,
+    ExitCode,
+    FileError,
+    HexacellError,
+    LimitError,
+    SeveralErrors,
+    WriteBackUndone,
+)
+from procedures.engine.engine import Engine
+from procedures.journal.journal import Journal, read_journal
+from procedures.run import events
+from procedures.run.state import RunState, fold
+from procedures.run.steps import Move, Phase, SetKey, Step
+
+P1 = SetKey(phase=Phase.IDENTIFY, point=1)
+POSE = (1.0, 2.0, 3.0, 0.0, 0.0, 0.0)
+MOVES: list[Step] = [Move(at=P1, orientation=n, pose=POSE) for n in (1, 2, 3)]
+
+
+class Script:
+    """A procedure of given steps; a performer that does nothing but say so, or fail."""
+
+    def __init__(self, devices: Any, steps: list[Step]) -> None:
+        self.devices = devices
+        self.calibration = self
+        self.steps = steps
+        self.done: list[str] = []
+        self.failure: BaseException | None = None
+        self.blocked = asyncio.Event()
+        self.blocks = False
+
+    def next_step(self, state: RunState) -> Step | None:
+        assert isinstance(state, RunState)
+        return self.steps[len(self.done)] if len(self.done) < len(self.steps) else None
+
+    async def prepare(self) -> None:
+        await self.devices.controller.prepare()
+
+    async def perform(self, step: Any, state: RunState) -> events.Event:
+        if self.failure and len(self.done) == 1:
+            raise self.failure
+        if self.blocks and len(self.done) == 1:
+            self.blocked.set()
+            await asyncio.Event().wait()
+        self.done.append(step.key)
+        return events.Arrived(at=step.at, orientation=step.orientation, pose=step.pose)
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    return tmp_path / "journal.jsonl"
+
+
+@pytest.fixture
+def journal(path: Path) -> Iterator[Journal]:
+    with Journal(path) as opened:
+        yield opened
+
+
+@pytest.fixture
+def script(bench) -> Script:
+    return Script(bench.devices, list(MOVES))
+
+
+async def test_a_step_is_written_down_then_done_then_its_event(script, journal, path) -> None:
+    seen: list[tuple[int, int]] = []
+    real = script.perform
+
+    async def perform(step: Any, state: RunState) -> events.Event:
+        seen.append((len(script.done), len(read_journal(path))))
+        assert read_journal(path)[-1] == events.StepBegun(step=step)
+        event: events.Event = await real(step, state)
+        return event
+
+    script.perform = perform
+    await Engine(script, journal).run()
+    assert seen == [(0, 1), (1, 3), (2, 5)]
+    kinds = [event.kind for event in read_journal(path)]
+    assert kinds == ["begun", "arrived"] * 3 + ["ended"]
+
+
+async def test_the_controller_is_prepared_before_the_first_step(script, journal, bench) -> None:
+    logged: list[list[str]] = []
+    await Engine(script, journal, [lambda event, state: logged.append(list(bench.controller.log))]).run()
+    assert logged[0] == ["prepare"]
+    assert bench.controller.log == ["prepare"]
+
+
+async def test_listeners_hear_of_what_is_on_the_disk_already(script, journal, path) -> None:
+    heard: list[events.Event] = []
+
+    def listener(event: events.Event, state: RunState) -> None:
+        heard.append(event)
+        assert read_journal(path)[-1] == event
+        assert state == fold(read_journal(path))
+
+    engine = Engine(script, journal, [listener, listener])
+    await engine.run()
+    assert heard[::2] == heard[1::2] == list(journal.events)
+
+
+async def test_the_state_is_the_fold_of_the_journal(script, journal) -> None:
+    engine = Engine(script, journal)
+    await engine.run()
+    assert engine.state == fold(journal.events)
+    assert Engine(script, journal).state == engine.state
+
+
+@pytest.mark.parametrize(
+    ("error", "code"),
+    [
+        (DeviceError("does not answer", subject="gauge x"), ExitCode.HARDWARE),
+        (LimitError("drifted"), ExitCode.OUT_OF_LIMITS),
+        (AnswerNeeded("nobody is there"), ExitCode.ANSWER_NEEDED),
+        (WriteBackUndone("undone"), ExitCode.WRITE_BACK_UNDONE),
+        (FileError("changed"), ExitCode.USAGE),
+        (SeveralErrors("two", [LimitError("drifted"), DeviceError("dead")]), ExitCode.HARDWARE),
+    ],
+)
+async def test_an_error_stops_motion_and_is_written_down(
+    script, journal, bench, error: HexacellError, code: ExitCode
+) -> None:
+    script.failure = error
+    with pytest.raises(type(error)) as raised:
+        await Engine(script, journal).run()
+    assert raised.value is error
+    assert bench.controller.log == ["prepare", "stop"]
+    assert journal.events[-1] == events.Interrupted(reason=str(error), exit_code=int(code))
+    assert journal.events[-2] == events.StepBegun(step=MOVES[1])
+
+
+async def test_motion_stops_before_the_journal_is_written(script, journal, bench) -> None:
+    script.failure = DeviceError("dead")
+    log: list[str] = []
+
+    def listener(event: events.Event, _: RunState) -> None:
+        if isinstance(event, events.Interrupted):
+            log.extend(bench.controller.log)
+
+    with pytest.raises(DeviceError):
+        await Engine(script, journal, [listener]).run()
+    assert log == ["prepare", "stop"]
+
+
+async def test_cancelling_stops_motion_and_is_written_down(script, journal, bench) -> None:
+    script.blocks = True
+    task = asyncio.create_task(Engine(script, journal).run())
+    await script.blocked.wait()
+    task.cancel()
+    with pytest.raises(asyncio.CancelledError):
+        await task
+    assert bench.controller.log == ["prepare", "stop"]
+    assert journal.events[-1] == events.Interrupted(reason="CancelledError", exit_code=130)
+
+
+async def test_cancelling_again_and_again_does_not_keep_it_from_stopping(script, journal, bench) -> None:
+    script.blocks = True
+    stopped: list[bool] = []
+
+    async def slow_stop() -> None:
+        for _ in range(5):
+            await asyncio.sleep(0)
+            task.cancel()
+        stopped.append(True)
+
+    bench.controller.stop = slow_stop
+    task = asyncio.create_task(Engine(script, journal).run())
+    await script.blocked.wait()
+    task.cancel()
+    with pytest.raises(asyncio.CancelledError):
+        await task
+    assert stopped == [True]
+    assert journal.events[-1] == events.Interrupted(reason="CancelledError", exit_code=130)
+
+
+async def test_a_programming_error_stops_motion_too(script, journal, bench) -> None:
+    script.failure = ZeroDivisionError("division by zero")
+    with pytest.raises(ZeroDivisionError):
+        await Engine(script, journal).run()
+    assert bench.controller.log == ["prepare", "stop"]
+    assert journal.events[-1] == events.Interrupted(reason="division by zero", exit_code=1)
+
+
+async def test_an_error_while_deciding_stops_motion_too(script, journal, bench) -> None:
+    def undecided(_: RunState) -> Step | None:
+        raise LimitError("the gauges cannot be zeroed")
+
+    script.next_step = undecided
+    with pytest.raises(LimitError):
+        await Engine(script, journal).run()
+    assert bench.controller.log == ["prepare", "stop"]
+    assert [event.kind for event in journal.events] == ["interrupted"]
+
+
+async def test_a_controller_that_cannot_be_prepared_ends_the_run_at_once(script, journal, bench) -> None:
+    bench.controller.failures["prepare"] = DeviceError("is in emergency stop", subject="controller")
+    with pytest.raises(DeviceError, match="emergency"):
+        await Engine(script, journal).run()
+    assert script.done == []
+    assert bench.controller.log == ["prepare", "stop"]
+    assert [event.kind for event in journal.events] == ["interrupted"]
+
+
+async def test_the_first_error_counts_where_stopping_fails_too(script, journal, bench) -> None:
+    script.failure = DeviceError("does not answer", subject="gauge x")
+    bench.controller.failures["stop"] = DeviceError("connection lost", subject="controller")
+    with pytest.raises(DeviceError, match="gauge x"):
+        await Engine(script, journal).run()
+    assert isinstance(journal.events[-1], events.Interrupted)
+
+
+async def test_a_full_disk_stops_motion(script, journal, bench, path, monkeypatch) -> None:
+    def full(*_: Any) -> int:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    before: list[bytes] = []
+    real = script.perform
+
+    async def perform(step: Any, state: RunState) -> events.Event:
+        if step == MOVES[1]:
+            before.append(path.read_bytes())
+            monkeypatch.setattr(os, "write", full)
+        event: events.Event = await real(step, state)
+        return event
+
+    script.perform = perform
+    with pytest.raises(FileError, match="disk is full"):
+        await Engine(script, journal).run()
+    monkeypatch.undo()
+    assert bench.controller.log == ["prepare", "stop"]
+    assert path.read_bytes() == before[0]
+
+
+async def test_a_listener_that_fails_stops_motion(script, journal, bench) -> None:
+    def listener(event: events.Event, _: RunState) -> None:
+        if isinstance(event, events.Arrived):
+            raise BrokenPipeError
+
+    with pytest.raises(BrokenPipeError):
+        await Engine(script, journal, [listener]).run()
+    assert bench.controller.log == ["prepare", "stop"]
+
+
+JUDGED = {
+    verdict: events.ResultValidated(verdict=verdict, line=f"so it is: {verdict}") for verdict in Verdict
+}
+
+
+@pytest.mark.parametrize(
+    ("happened", "code", "line"),
+    [
+        ([JUDGED[Verdict.PASS]], 0, "so it is: pass"),
+        ([JUDGED[Verdict.OUT_OF_LIMITS]], 1, "so it is: out of limits"),
+        ([JUDGED[Verdict.NOT_EVALUATED]], 1, "so it is: not evaluated"),
+        (
+            [JUDGED[Verdict.WORSE], events.RolledBack()],
+            1,
+            "so it is: worse than before; rolled back, the controller is as it was",
+        ),
+        ([], 1, "nothing was judged"),
+    ],
+)
+async def test_how_it_ends(bench, journal, happened: Any, code: int, line: str) -> None:
+    engine = Engine(Script(bench.devices, []), journal)  # type: ignore[arg-type]
+    for event in happened:
+        engine.tell(event)
+    ended = await engine.run()
+    assert ended == events.Ended(exit_code=code, line=line)
+    assert journal.events[-1] == ended
+
+
+async def test_a_run_that_is_over_is_not_ended_twice(script, journal) -> None:
+    script.steps = []
+    first = await Engine(script, journal).run()
+    assert await Engine(script, journal).run() == first
+    assert [event.kind for event in journal.events] == ["ended"]
+
+
+def test_open_sets_that_cannot_go_on_are_voided_and_the_others_doubted(script, journal, story) -> None:
+    done, begun, zeroed, held = story(point=1), story(point=2), story(point=3), story(Phase.BEFORE, 1)
+    interrupted = events.Interrupted(reason="a power cut", exit_code=130)
+    in_vain = [*held.whole(2)[:-1], held.refused()]
+    for event in [*done.whole(2), *in_vain, *zeroed.whole(2)[:-2], *begun.whole(1)[:2], interrupted]:
+        journal.append(event)
+    engine = Engine(script, journal)
+    engine.reopen_sets()
+    voided = [event.at for event in journal.events if isinstance(event, events.SetInvalidated)]
+    assert sorted(map(str, voided)) == ["P2", "before-V1"]
+    assert {str(key): value.reference_unverified for key, value in engine.state.sets.items()} == {
+        "P1": False,
+        "P3": True,
+    }
+    engine.reopen_sets()
+    assert engine.state.voided == 2
+
+
+def test_nothing_is_voided_in_a_new_run(script, journal) -> None:
+    Engine(script, journal).reopen_sets()
+    assert journal.events == ()
+
+
+def test_after_a_kill_nobody_knows_where_the_robot_stands(script, journal, story) -> None:
+    """A killed run leaves no word; the pose it had arrived at is not believed any more."""
+    journal.append(story().arrived())
+    engine = Engine(script, journal)
+    assert engine.state.standing is not None
+    engine.reopen_sets()
+    assert engine.state.standing is None
+    assert isinstance(journal.events[-1], events.Interrupted)
+
+
+@pytest.mark.parametrize("comes_back", [True, False])
+async def test_a_commit_that_cannot_be_noted_is_taken_back_or_said(
+    recording, replayed, monkeypatch, comes_back: bool
+) -> None:
+    rig = replayed(recording.until(events.Proposed))
+    append = Journal.append
+
+    def full(self: Journal, event: events.Event) -> None:
+        if isinstance(event, events.Committed):
+            if not comes_back:
+                rig.controller.failures["reload"] = DeviceError("is deaf", subject="controller")
+            raise FileError("the disk is full", subject=self.path)
+        append(self, event)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Journal, "append", full)
+        with pytest.raises(HexacellError, match="the disk is full") as failure:
+            await rig.run()
+    assert rig.config == recording.config_before
+    assert rig.controller.log.count("reload") == 2, "the geometry that it read is taken from it"
+    if not comes_back:
+        assert "the controller has the new geometry, which could be neither noted nor taken" in str(
+            failure.value
+        )
+    assert (await rig.run()).exit_code == ExitCode.DONE
+    assert rig.config == recording.config_after

@@ -1,0 +1,174 @@
+"""A run that was interrupted anywhere goes on: nothing lost, nothing trusted that nobody has seen again."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections.abc import Sequence
+from typing import Any
+
+import pytest
+
+from hexacell.controller_config.change import ConfigChange
+from hexacell.controller_config.write_back import commit
+from hexacell.errors import ExitCode
+from hexacell.kinematics.pose import Pose
+from procedures.engine import step_executor
+from procedures.journal.journal import read_journal
+from procedures.run import events
+from procedures.run.state import RunState, fold
+
+INTERRUPTED = events.Interrupted(reason="a power cut", exit_code=130)
+
+
+PLACES: dict[str, tuple[type[Any], int]] = {
+    "in the first set": (events.RecordTaken, 5),
+    "at the second point": (events.Arrived, 11),
+    "with everything measured": (events.SetClosed, 2),
+    "with the geometry identified": (events.Identified, 1),
+    "at a held-out point": (events.RecordTaken, 20),
+    "with the geometry proposed": (events.Proposed, 1),
+    "with the geometry written": (events.Committed, 1),
+    "at a held-out point afterwards": (events.RecordTaken, 26),
+    "with everything verified": (events.SetClosed, 6),
+    "with the verdict given": (events.ResultValidated, 1),
+}
+KILLED = {"in the first set", "at a held-out point afterwards"}
+"""Here the process ended without a word; in the other places it could still write one."""
+
+
+@pytest.mark.parametrize("place", PLACES)
+async def test_it_goes_on_from_anywhere(recording, replayed, place: str) -> None:
+    kind, count = PLACES[place]
+    done = recording.until(kind, count=count)
+    rig = replayed(done if place in KILLED else [*done, INTERRUPTED])
+    first = read_journal(rig.folder.journal)
+    ended = await rig.run()
+
+    history = read_journal(rig.folder.journal)
+    assert ended.exit_code == ExitCode.DONE
+    assert history[: len(first)] == first, "nothing that was recorded is lost"
+    before, after = fold(first), fold(history)
+    seen = {
+        event.at
+        for event in history
+        if isinstance(event, events.SetInvalidated | events.ReferenceConfirmed)
+    }
+    assert seen == {key for key, measured in before.sets.items() if not measured.closed}
+    kept = {key: measured for key, measured in before.sets.items() if measured.closed}
+    assert {key: after.sets[key] for key in kept} == kept
+    require_whole_sets(history)
+
+
+def require_whole_sets(history: Sequence[events.Event]) -> None:
+    """Every set is closed, its records are there once, and none was taken while its zero was in doubt."""
+    state = fold(history)
+    assert [len(measured.samples) for measured in state.sets.values()] == [9, 9, 3, 3, 3, 3]
+    for measured in state.sets.values():
+        assert measured.closed
+        taken = [sample.orientation for sample in measured.samples]
+        assert sorted(taken) == list(range(1, len(taken) + 1))
+    doubted: set[Any] = set()
+    for event in history:
+        match event:
+            case events.Interrupted():
+                doubted = set(state.sets)
+            case events.ReferenceConfirmed() | events.SetInvalidated():
+                doubted -= {event.at}
+            case events.RecordTaken(orientation=1):
+                doubted -= {event.at}
+            case events.RecordTaken() | events.SetClosed():
+                assert event.at not in doubted
+
+
+def cancelling(number: int) -> tuple[Any, list[asyncio.Task[Any]]]:
+    """A listener that cancels a task, put into the list later, at the ``number``-th event it hears."""
+    tasks: list[asyncio.Task[Any]] = []
+    heard = 0
+
+    def listener(event: events.Event, _: RunState) -> None:
+        nonlocal heard
+        heard += 1
+        if heard == number:
+            tasks[0].cancel()
+
+    return listener, tasks
+
+
+async def cancelled_at(rig: Any, number: int) -> None:
+    listener, tasks = cancelling(number)
+    tasks.append(asyncio.create_task(rig.run(listener)))
+    with pytest.raises(asyncio.CancelledError):
+        await tasks[0]
+
+
+@pytest.mark.parametrize("number", [1, 6, 22, 25, 28])
+async def test_cancelled_after_any_event_it_goes_on(recording, replayed, number: int) -> None:
+    rig = replayed(recording.until(events.SetClosed, count=3))
+    begun = len(read_journal(rig.folder.journal))
+    await cancelled_at(rig, number)
+    first = read_journal(rig.folder.journal)
+    assert first[-1] == events.Interrupted(reason="CancelledError", exit_code=130)
+    assert len(first) - begun in {number + 1, number + 2}, "a step that was being done may have ended"
+    assert rig.controller.log[-1] == "stop"
+
+    assert (await rig.run()).exit_code == ExitCode.DONE
+    history = read_journal(rig.folder.journal)
+    assert history[: len(first)] == first
+    require_whole_sets(history)
+
+
+async def test_interrupted_over_and_over_it_still_arrives(recording, replayed) -> None:
+    rig = replayed(recording.until(events.SetClosed, count=1))
+    for number in (3, 8, 12):
+        await cancelled_at(rig, number)
+    assert (await rig.run()).exit_code == ExitCode.DONE
+    require_whole_sets(read_journal(rig.folder.journal))
+
+
+async def test_motion_is_never_repeated(recording, replayed) -> None:
+    """A move that had begun is decided again from where things stand, not done because it was noted."""
+    sampled = recording.until(events.RecordTaken, count=5)
+    begun = recording.history[len(sampled)]
+    assert begun.step.key == "P1/o06/move"
+    rig = replayed([*sampled, begun, INTERRUPTED])
+    await cancelled_at(rig, 8)
+    x, y, z = rig.cell.settings.identification.points[0]
+    assert rig.controller.log[1:3] == ["pose", f"move {Pose(x, y, z)}"]
+
+
+async def test_cancelled_while_writing_it_ends_what_it_writes(recording, replayed, monkeypatch) -> None:
+    rig = replayed(recording.until(events.Proposed))
+    running = asyncio.create_task(rig.run())
+
+    def slow_commit(*order: Any) -> Any:
+        running.get_loop().call_soon_threadsafe(running.cancel)
+        time.sleep(0.1)
+        return commit(*order)
+
+    monkeypatch.setattr(step_executor, "commit", slow_commit)
+    with pytest.raises(asyncio.CancelledError):
+        await running
+    assert rig.config == recording.config_after
+    monkeypatch.undo()
+    assert (await rig.run()).exit_code == ExitCode.DONE
+    assert rig.config == recording.config_after
+
+
+async def test_killed_between_writing_and_noting_it_is_not_written_twice(recording, replayed) -> None:
+    rig = replayed(recording.until(events.Proposed))
+    commit(ConfigChange.load(rig.folder.proposal), rig.folder.path)
+    assert rig.config == recording.config_after
+    assert (await rig.run()).exit_code == ExitCode.DONE
+    assert rig.config == recording.config_after
+    backup = rig.folder.path / "config-before"
+    assert backup.read_bytes() == recording.config_before
+
+
+async def test_the_robot_is_not_believed_to_stand_where_it_was(recording, replayed) -> None:
+    placed = recording.until(events.GaugesPlaced)
+    rig = replayed(placed)
+    await cancelled_at(rig, 10)
+    again = read_journal(rig.folder.journal)[len(placed) :]
+    keys = [event.step.key for event in again if isinstance(event, events.StepBegun)]
+    assert keys[:4] == ["locate", "P1/o01/move", "P1/place", "P1/o01/sample"]

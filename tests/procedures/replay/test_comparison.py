@@ -1,0 +1,96 @@
+"""Two events side by side: numbers within rounding are the same, everything else is exact."""
+
+from __future__ import annotations
+
+import math
+import zlib
+from typing import Any
+
+import pytest
+
+from procedures.journal.line_format import decode
+from procedures.replay.comparison import Aspect, Change, Difference, changes, is_prose
+from procedures.run import events
+from procedures.run.steps import Phase, SetKey
+
+KEY = SetKey(phase=Phase.BEFORE, point=2)
+
+
+def identified(**result: Any) -> events.Identified:
+    return events.Identified(result=result, held_out=())
+
+
+@pytest.mark.parametrize(
+    ("recorded", "replayed"),
+    [
+        (1.0, 1.0 + 9e-10),
+        (-0.0, 0.0),
+        (1e6, 1e6 + 9e-4),
+        (math.nan, math.nan),
+        (math.inf, math.inf),
+        (0.0, 0),
+        ([1.0, [2.0]], [1.0, [2.0 + 1e-12]]),
+        ({"a": {"b": 1.0}}, {"a": {"b": 1.0, "new": 5}}),
+        ("word", "word"),
+        (None, None),
+    ],
+)
+def test_what_is_the_same(recorded: Any, replayed: Any) -> None:
+    assert changes(identified(x=recorded), identified(x=replayed), 1e-9) == []
+
+
+@pytest.mark.parametrize(
+    ("recorded", "replayed", "field"),
+    [
+        (1.0, 1.0 + 2e-9, "result.x"),
+        (1.0, math.nan, "result.x"),
+        (math.inf, -math.inf, "result.x"),
+        (1.0, math.inf, "result.x"),
+        (1.0, None, "result.x"),
+        (None, 1.0, "result.x"),
+        (1, 2, "result.x"),
+        (True, False, "result.x"),
+        ("word", "Word", "result.x"),
+        ([1.0], [1.0, 2.0], "result.x"),
+        ([1.0, 2.0], [1.0, 2.5], "result.x[1]"),
+        ({"a": {"b": [0.0, [3.0]]}}, {"a": {"b": [0.0, [4.0]]}}, "result.x.a.b[1][0]"),
+        ({"gone": 1.0}, {}, "result.x.gone"),
+    ],
+)
+def test_what_differs_is_named(recorded: Any, replayed: Any, field: str) -> None:
+    [change] = changes(identified(x=recorded), identified(x=replayed), 1e-9)
+    assert change.field == field
+
+
+def test_a_field_that_the_recorded_event_does_not_know_is_no_difference() -> None:
+    body = b'{"kind":"closed","at":{"phase":"before-V","point":2},"drift_mm":[0.0,0.0,0.0]}'
+    line = b'{"n":2,"at":"2026-11-20T10:30:00.000Z","event":%b}' % body
+    entry = decode(checked(line), 2)
+    assert entry is not None
+    reading = events.Reading(
+        gauges_mm=(0.0,) * 3, spread_mm=(0.0,) * 3, joints_mm=(0.0,) * 6, answers=(), counts=()
+    )
+    again = events.SetClosed(at=KEY, drift_mm=(0.0, 0.0, 0.0), reading=reading)
+    assert changes(entry.event, again, 1e-9) == []
+    assert changes(again, again.model_copy(update={"reading": None}), 1e-9) != []
+
+
+def checked(body: bytes) -> bytes:
+    return body[:-1] + b',"crc":"%08x"}\n' % zlib.crc32(body)
+
+
+def test_prose_is_told_from_the_rest() -> None:
+    gates = [events.GateOutcome(name="n", passed=True, sentence=words) for words in ("One.", "Two.")]
+    first, second = (events.Proposed(gates=(gate,)) for gate in gates)
+    [change] = changes(first, second, 1e-9)
+    assert change == Change("gates[0].sentence", "One.", "Two.")
+    assert is_prose(change)
+    assert not is_prose(Change("reading.line_up", 1, 2))
+
+
+def test_a_difference_in_words_is_short_and_says_where() -> None:
+    change = Change("held_out[0][0][0]", "x" * 500, 2.0)
+    words = str(Difference(7, "identify", Aspect.RESULT, change))
+    assert words.startswith("line 7, identify: held_out[0][0][0]: recorded xxx")
+    assert words.endswith("..., replayed 2.0")
+    assert len(words) < 160

@@ -1,0 +1,340 @@
+"""A journal goes through the procedure again: what was recorded comes out, and nothing else passes."""
+
+from __future__ import annotations
+
+import asyncio
+import itertools
+import random
+import time
+from collections.abc import Callable, Sequence
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from drivers.gauges.errors import GaugeAtEnd
+from hexacell.acceptance.validation import Verdict
+from hexacell.errors import HexacellError, LimitError
+from hexacell.robot_model import robot_of
+from procedures.calibration.workflow import Calibration, Mode
+from procedures.journal.journal import read_journal
+from procedures.journal.line_format import Entry
+from procedures.replay.comparison import Aspect
+from procedures.replay.recorded_devices import (
+    Playback,
+    RecordedClock,
+    RecordedOperator,
+    RecordedPerformer,
+    recorded_devices,
+)
+from procedures.replay.replayer import Replayer, ReplayReport, Scope
+from procedures.run import events
+from procedures.run.state import RunState
+from procedures.run.steps import Phase, SetKey
+
+Replay = Callable[..., ReplayReport]
+
+
+def numbered(history: Sequence[events.Event]) -> list[Entry]:
+    when = datetime(2026, 11, 20, tzinfo=UTC)
+    return [Entry(number, when, float(number), event) for number, event in enumerate(history, 1)]
+
+
+def through(
+    rig: Any, history: Sequence[events.Event], folder: Path, scope: Scope = Scope.ALL
+) -> ReplayReport:
+    """A history through the procedure of a rig's cell, whose config is as it was at the beginning."""
+    folder.mkdir()
+    tape = Playback(rig.cell.settings.timing.window_s)
+    calibration = Calibration(rig.cell.settings, robot_of(rig.cell), rig.mode)
+    performer = RecordedPerformer(
+        rig.cell,
+        calibration,
+        recorded_devices(rig.cell.settings, tape),
+        RecordedClock(tape),
+        RecordedOperator(tape),
+        type(rig.folder)(folder),
+    )
+    replayer = Replayer(performer, tape, folder / "journal.jsonl", scope)
+    return asyncio.run(replayer.replay(numbered(history)))
+
+
+@pytest.fixture
+def replay(make_rig, recording, tmp_path: Path) -> Replay:
+    """Replays a history of the recorded cell, or of a rig, on a fresh copy of the cell's config."""
+
+    def run(history: Sequence[events.Event], rig: Any = None, scope: Scope = Scope.ALL) -> ReplayReport:
+        rig = rig or make_rig()
+        rig.cell.config_path.write_bytes(recording.config_before)
+        folder = tmp_path / f"again-{len(list(tmp_path.iterdir()))}"
+        return through(rig, history, folder, scope)
+
+    return run
+
+
+def test_a_run_comes_out_as_it_was_recorded(recording, replay) -> None:
+    tally = replay(recording.history)
+    begun = [event for event in recording.history if isinstance(event, events.StepBegun)]
+    assert tally.differences == []
+    assert tally.decisions == len(begun)
+    assert tally.results == len(begun) + 1, "every step has its result, and so has the run"
+    assert tally.taken == 1, "only the beginning is taken as it stands"
+
+
+def test_a_check_comes_out_as_it_was_recorded(make_rig, replay) -> None:
+    rig = make_rig(Mode.CHECK)
+    asyncio.run(rig.run())
+    tally = replay(read_journal(rig.folder.journal), rig)
+    assert tally.differences == []
+    assert tally.results > 10
+
+
+def after(happened: Callable[[events.Event], bool], action: Callable[[], object], count: int = 1) -> Any:
+    """A listener that does something after the ``count``-th event of a kind."""
+    seen = []
+
+    def listener(event: events.Event, _: RunState) -> None:
+        if happened(event):
+            seen.append(event)
+            if len(seen) == count:
+                action()
+
+    return listener
+
+
+def begun(key: str) -> Callable[[events.Event], bool]:
+    return lambda event: isinstance(event, events.StepBegun) and event.step.key == key
+
+
+def refusal(event: events.Event) -> bool:
+    return isinstance(event, events.RecordRejected)
+
+
+def test_refused_records_come_out_as_they_were(make_rig, replay) -> None:
+    """One whose plungers were at their ends, and one farther away than the travel allows."""
+    rig = make_rig()
+    shown = rig.gauges[1].shown
+
+    def at_ends() -> None:
+        for gauge in rig.gauges[:2]:
+            gauge.failures.append(GaugeAtEnd("is at an end of its travel", subject=f"gauge {gauge.name}"))
+
+    listeners = [
+        after(begun("P1/o03/sample"), at_ends),
+        after(begun("P1/o05/sample"), lambda: setattr(rig.gauges[1], "shown", lambda: 6.1)),
+        after(refusal, lambda: setattr(rig.gauges[1], "shown", shown), count=2),
+    ]
+    asyncio.run(stopped(rig, begun("P1/close"), listeners))
+    history = read_journal(rig.folder.journal)
+    readings = [event.reading for event in history if isinstance(event, events.RecordRejected)]
+    assert [reading is None for reading in readings] == [True, False]
+    tally = replay(history, rig)
+    assert tally.differences == []
+
+
+async def stopped(
+    rig: Any, when: Callable[[events.Event], bool], listeners: Sequence[Any] = (), count: int = 1
+) -> None:
+    """A run that a person stops after the ``count``-th event of a kind."""
+    running: list[asyncio.Task[Any]] = []
+
+    def stop() -> None:
+        running[0].cancel()
+
+    running.append(asyncio.create_task(rig.run(*listeners, after(when, stop, count))))
+    with pytest.raises(asyncio.CancelledError):
+        await running[0]
+
+
+def anything(_: events.Event) -> bool:
+    return True
+
+
+def test_a_run_that_was_stopped_over_and_over_comes_out_as_it_was(recording, replayed, replay) -> None:
+    rig = replayed(recording.until(events.SetClosed, count=1))
+
+    async def history() -> None:
+        for number in (3, 8, 12):
+            await stopped(rig, anything, count=number)
+        await stopped(rig, lambda event: isinstance(event, events.Identified))
+
+    asyncio.run(history())
+    told = read_journal(rig.folder.journal)
+    assert sum(isinstance(event, events.Interrupted) for event in told) >= 4
+    assert replay(told, rig).differences == []
+
+
+NUMBERS = range(1, 40)
+
+
+@pytest.mark.parametrize(
+    "number", [pytest.param(n, marks=[] if n % 8 == 5 else pytest.mark.slow) for n in NUMBERS]
+)
+def test_a_check_stopped_after_any_event_comes_out_as_it_was(make_rig, replay, number: int) -> None:
+    rig = make_rig(Mode.CHECK)
+
+    async def history() -> None:
+        await stopped(rig, anything, count=number)
+        await rig.run()
+
+    asyncio.run(history())
+    tally = replay(read_journal(rig.folder.journal), rig)
+    assert tally.differences == []
+
+
+def test_killed_without_a_word_it_comes_out_as_it_was(recording, replay) -> None:
+    for kind in (events.StepBegun, events.RecordTaken, events.Committed):
+        tally = replay(recording.until(kind, count=1))
+        assert tally.differences == []
+
+
+def test_what_could_not_be_identified_fails_again_in_the_same_words(make_rig, replay) -> None:
+    rig = make_rig(identification__orientations=3)
+    with pytest.raises(HexacellError, match="12 equations for 35 parameters"):
+        asyncio.run(rig.run())
+    history = read_journal(rig.folder.journal)
+    tally = replay(history, rig, Scope.RESULTS)
+    assert tally.differences == []
+    tally = replay(changed(history, events.Interrupted, {"reason": "something else"}), rig, Scope.RESULTS)
+    [difference] = tally.differences
+    assert difference.aspect is Aspect.WORDS
+
+
+def test_what_a_person_answered_is_answered_again(recording, replayed, replay) -> None:
+    rig = replayed(recording.until(events.Proposed), acceptance__approval="ask")
+    rig.operator.name = None
+    with pytest.raises(LimitError, match="declined"):
+        asyncio.run(rig.run())
+    rig.operator.name = "somebody else"
+    asyncio.run(stopped(rig, lambda event: isinstance(event, events.Committed)))
+    history = read_journal(rig.folder.journal)
+    assert "somebody else" in {
+        event.approved_by for event in history if isinstance(event, events.Committed)
+    }
+    tally = replay(history, rig, Scope.RESULTS)
+    assert tally.differences == []
+
+
+def changed(history: Sequence[events.Event], kind: type[Any], changes: dict[str, Any], nth: int = 1) -> Any:
+    """A history in which the ``nth`` event of a kind has other values at dotted keys."""
+    places = [place for place, event in enumerate(history) if isinstance(event, kind)]
+    place = places[nth - 1]
+    return [*history[:place], edited(history[place], changes), *history[place + 1 :]]
+
+
+def edited(section: Any, changes: dict[str, Any]) -> Any:
+    for key, value in changes.items():
+        head, _, rest = key.partition(".")
+        inner = edited(getattr(section, head), {rest: value}) if rest else value
+        section = section.model_copy(update={head: inner})
+    return section
+
+
+MANIPULATIONS: dict[str, tuple[type[Any], dict[str, Any], int, Scope, str]] = {
+    "a deviation": (
+        events.RecordTaken,
+        {"deviation_mm": (0.0, 1e-8, 0.0)},
+        1,
+        Scope.RESULTS,
+        "deviation_mm[1]",
+    ),
+    "a pose": (events.RecordTaken, {"pose": (1.0,) * 6}, 3, Scope.RESULTS, "pose[0]"),
+    "an orientation": (events.RecordTaken, {"orientation": 9}, 3, Scope.RESULTS, "orientation"),
+    "a gauge": (events.RecordTaken, {"reading.gauges_mm": (0.0,) * 3}, 3, Scope.RESULTS, "deviation_mm[0]"),
+    "a slider": (
+        events.RecordTaken,
+        {"reading.joints_mm": (0.0,) * 6},
+        3,
+        Scope.RESULTS,
+        "reading.joints_mm",
+    ),
+    "an arrival": (events.Arrived, {"pose": (1.0,) * 6}, 2, Scope.RESULTS, "pose[0]"),
+    "a drift": (events.SetClosed, {"drift_mm": (1.0,) * 3}, 2, Scope.RESULTS, "drift_mm[0]"),
+    "a decision": (events.StepBegun, {"step.pose": (1.0,) * 6}, 10, Scope.DECISIONS, "pose[0]"),
+    "a held-out pose": (
+        events.Identified,
+        {"held_out": (((0.0,) * 6,) * 3,) * 2},
+        1,
+        Scope.IDENTIFICATION,
+        "held_out[0][0][0]",
+    ),
+    "the covariance": (
+        events.Identified,
+        {"result": {"covariance": [[0.5]]}},
+        1,
+        Scope.IDENTIFICATION,
+        "result.covariance",
+    ),
+    "a gate": (events.Proposed, {"gates": ()}, 1, Scope.RESULTS, "gates"),
+    "the verdict": (events.ResultValidated, {"verdict": Verdict.WORSE}, 1, Scope.RESULTS, "verdict"),
+    "the end": (events.Ended, {"exit_code": 1}, 1, Scope.ALL, "exit_code"),
+}
+
+
+@pytest.mark.parametrize("what", MANIPULATIONS)
+def test_what_was_changed_afterwards_is_found_in_its_line(recording, replay, what: str) -> None:
+    kind, changes, nth, scope, field = MANIPULATIONS[what]
+    history = changed(recording.history, kind, changes, nth)
+    line = next(
+        n for n, pair in enumerate(zip(history, recording.history, strict=True), 1) if pair[0] != pair[1]
+    )
+    tally = replay(history[:line], scope=scope)
+    first = tally.differences[0]
+    assert (first.line, first.change.field) == (line, field)
+    assert first.aspect is (Aspect.DECISION if scope is Scope.DECISIONS else Aspect.RESULT)
+    assert f"line {line}, " in str(first)
+
+
+def test_one_difference_makes_no_other(recording, replay) -> None:
+    history = changed(recording.history, events.Arrived, {"pose": (100.0, -100.0, 500.0, 1.0, 0.0, 0.0)}, 2)
+    [line] = (n for n, event in enumerate(history, 1) if event != recording.history[n - 1])
+    assert {difference.line for difference in replay(history, scope=Scope.RESULTS).differences} == {line}
+
+
+def test_other_words_are_told_apart(recording, replay) -> None:
+    tally = replay(
+        changed(recording.history, events.ResultValidated, {"line": "all is well"}), scope=Scope.RESULTS
+    )
+    [difference] = tally.differences
+    assert difference.aspect is Aspect.WORDS
+    assert difference.change.field == "line"
+
+
+def test_a_run_that_ended_too_early_is_found(recording, replay) -> None:
+    early = [*recording.until(events.SetClosed), recording.history[-1]]
+    [difference] = replay(early).differences
+    assert difference.aspect is Aspect.DECISION
+    assert (difference.change.recorded, difference.change.replayed) == ("ended", "P2/o01/move")
+
+
+def test_what_nobody_knows_is_taken_as_it_stands(recording, replay) -> None:
+    """Events that come from outside are no outcomes, whenever they come."""
+    told = list(recording.until(events.RecordTaken, count=2))
+    told.insert(-1, events.SetInvalidated(at=SetKey(phase=Phase.AFTER, point=9), reason="a visitor"))
+    tally = replay(told)
+    assert tally.differences == []
+    assert tally.taken == 2
+
+
+def test_nothing_is_decided_by_the_time_or_by_chance(recording, replay, monkeypatch) -> None:
+    hours = itertools.count(0, -977)
+    monkeypatch.setattr(time, "time", lambda: 3600.0 * next(hours))
+    monkeypatch.setattr(random, "random", lambda: pytest.fail("chance"))
+    np.random.seed(next(hours) % 1000)  # noqa: NPY002 - the one that everybody shares is meant
+    assert replay(recording.history[:60], scope=Scope.DECISIONS).differences == []
+
+
+def test_an_error_of_the_program_is_found_again(recording, replay, monkeypatch) -> None:
+    """For bug reports: what broke the run breaks its replay."""
+
+    def broken(*_: object) -> None:
+        raise ZeroDivisionError("by nothing")
+
+    monkeypatch.setattr(Calibration, "identification", broken)
+    history = [*recording.until(events.Identified)[:-1]]
+    stopped_by_it = events.Interrupted(reason="by nothing", exit_code=1)
+    assert replay([*history, stopped_by_it], scope=Scope.RESULTS).differences == []
+    [difference] = replay(recording.until(events.Identified), scope=Scope.IDENTIFICATION).differences
+    assert difference.change.replayed == "failed: ZeroDivisionError('by nothing')"

@@ -1,0 +1,54 @@
+"""Some things are done to their end, whoever cancels."""
+
+from __future__ import annotations
+
+import asyncio
+
+import pytest
+
+from hexacell.errors import DeviceError
+from procedures.run.cancellation import shielded
+
+
+async def work(turns: int, done: list[int]) -> int:
+    for _ in range(turns):
+        await asyncio.sleep(0)
+    done.append(turns)
+    return turns
+
+
+async def test_a_result_is_handed_on() -> None:
+    assert await shielded(work(3, [])) == 3
+
+
+async def test_an_error_is_handed_on() -> None:
+    async def fail() -> None:
+        raise DeviceError("broken")
+
+    with pytest.raises(DeviceError, match="broken"):
+        await shielded(fail())
+
+
+@pytest.mark.parametrize("times", [1, 2, 4])
+async def test_cancelled_it_ends_first(times: int) -> None:
+    done: list[int] = []
+    task = asyncio.create_task(shielded(work(8, done)))
+    for _ in range(times):
+        await asyncio.sleep(0)
+        task.cancel()
+    assert done == []
+    with pytest.raises(asyncio.CancelledError):
+        await task
+    assert done == [8]
+
+
+async def test_an_error_is_not_lost_behind_a_cancellation() -> None:
+    async def fail() -> None:
+        await asyncio.sleep(0.01)
+        raise DeviceError("broken")
+
+    task = asyncio.create_task(shielded(fail()))
+    await asyncio.sleep(0)
+    task.cancel()
+    with pytest.raises(DeviceError):
+        await task

@@ -1,0 +1,185 @@
+"""Where a run stands is a fold over what happened, event by event."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from hexacell.acceptance.validation import Verdict
+from procedures.run import events
+from procedures.run.state import RunState, apply, fold
+from procedures.run.steps import CloseSet, Phase, SetKey
+
+P1 = SetKey(phase=Phase.IDENTIFY, point=1)
+
+
+def test_nothing_happened() -> None:
+    assert fold([]) == RunState()
+
+
+def test_a_fold_goes_one_event_at_a_time(recording) -> None:
+    state = RunState()
+    for place, event in enumerate(recording.history, 1):
+        state = apply(state, event)
+        if place % 10 == 0:
+            assert fold(recording.history[:place]) == state
+    assert fold(recording.history) == state
+
+
+def test_former_states_stay_as_they_were(story) -> None:
+    first = fold([story().arrived(), story().placed()])
+    apply(first, story().sampled())
+    apply(first, story().voided())
+    assert first == fold([story().arrived(), story().placed()])
+
+
+def test_a_step_that_began_has_not_happened() -> None:
+    assert fold([events.StepBegun(step=CloseSet(at=P1))]) == RunState()
+
+
+def test_arriving_says_where_the_robot_stands(story) -> None:
+    state = fold([story().arrived(3)])
+    assert state.standing == (P1, 3)
+    assert state.target == story().arrived(3).pose
+
+
+def test_placing_belongs_to_its_set(story) -> None:
+    state = fold([story(point=2).placed()])
+    assert state.set(SetKey(phase=Phase.IDENTIFY, point=2)).placed
+    assert not state.set(P1).placed
+
+
+def test_samples_are_kept_in_the_order_taken(story) -> None:
+    told = [story().sampled(1), story().sampled(2, (0.5, 0.0, -0.25))]
+    state = fold(told)
+    assert state.set(P1).samples == tuple(told)
+    assert not state.set(P1).closed
+
+
+def test_a_refusal_counts_and_leaves_the_robot_nowhere(story) -> None:
+    state = fold([story().arrived(2), story().refused(), story().arrived(2), story().refused()])
+    assert state.set(P1).refusals == 2
+    assert state.refusals(Phase.IDENTIFY) == 2
+    assert state.refusals(Phase.AFTER) == 0
+    assert state.standing is None
+    assert state.target == story().arrived(2).pose
+
+
+def test_closing_records_the_drift(story) -> None:
+    state = fold([story().sampled(), story().closed()])
+    assert state.set(P1).drift_mm == (0.0, 0.0, 0.0)
+    assert state.set(P1).closed
+
+
+def test_a_voided_set_is_gone_and_counted(story) -> None:
+    kept = story(point=2)
+    state = fold([*kept.whole(2), *story().whole(2)[:-2], story().voided()])
+    assert list(state.sets) == [kept.key]
+    assert state.standing is None
+    assert state.voided == 1
+
+
+def test_records_are_in_the_order_of_their_points(story) -> None:
+    told = [*story(point=2).whole(3), *story(Phase.BEFORE, 1).whole(2), *story(point=1).whole(2)]
+    state = fold(told)
+    labels = [(record.point, record.orientation) for record in state.measurements().records]
+    assert labels == [(1, 1), (1, 2), (2, 1), (2, 2), (2, 3)]
+
+
+def test_a_record_has_what_was_commanded_and_measured(story) -> None:
+    sampled = story().sampled(2, (0.5, -0.5, 0.125))
+    record = fold([story().sampled(), sampled]).measurements().records[1]
+    assert record.pose.as_tuple() == sampled.pose
+    assert record.joints == sampled.reading.joints_mm
+    assert record.deviation == (0.5, -0.5, 0.125)
+
+
+def test_held_out_deviations_leave_references_out(story) -> None:
+    one, two = story(Phase.AFTER, 1), story(Phase.AFTER, 2)
+    told = [
+        one.sampled(1),
+        one.sampled(2, (1.0, 0.0, 0.0)),
+        two.sampled(1),
+        two.sampled(2, (0.0, 2.0, 0.0)),
+    ]
+    state = fold(told)
+    assert state.held_out(Phase.AFTER) == [(1.0, 0.0, 0.0), (0.0, 2.0, 0.0)]
+    assert state.held_out(Phase.BEFORE) == []
+
+
+@pytest.mark.parametrize(
+    ("event", "attribute"),
+    [
+        (events.Identified(result={"converged": True}, held_out=()), "identified"),
+        (events.Proposed(gates=()), "proposed"),
+        (events.Committed(approved_by="a tester"), "committed"),
+        (events.ResultValidated(verdict=Verdict.PASS, line="pass"), "judged"),
+        (events.Ended(exit_code=0, line="pass"), "ended"),
+    ],
+)
+def test_milestones_are_kept_whole(event: Any, attribute: str) -> None:
+    state = fold([event])
+    assert getattr(state, attribute) == event
+    assert getattr(RunState(), attribute) is None
+
+
+def test_the_beginning_is_kept(recording) -> None:
+    assert fold(recording.history).started == recording.history[0]
+
+
+@pytest.mark.parametrize(
+    "event",
+    [
+        events.Committed(approved_by="a tester"),
+        events.RolledBack(),
+        events.Interrupted(reason="power cut", exit_code=130),
+    ],
+)
+def test_after_these_nobody_knows_what_pose_the_robot_holds(event: Any, story) -> None:
+    assert fold([story().arrived(2), event]).standing is None
+
+
+WORSE = events.ResultValidated(verdict=Verdict.WORSE, line="worse")
+
+
+def test_rolled_back_after_a_verdict_is_remembered() -> None:
+    assert fold([WORSE, events.RolledBack()]).rolled_back
+    assert not RunState().rolled_back
+
+
+def test_rolled_back_without_a_verdict_the_proposal_waits_again(story) -> None:
+    after = story(Phase.AFTER)
+    state = fold([events.Committed(approved_by="a tester"), *after.whole(2), events.RolledBack()])
+    assert (state.committed, state.rolled_back, state.sets) == (None, False, {})
+
+
+STOP = (1.0, 2.0, 500.0, 3.0, 0.0, 0.0)
+OTHER_STOP = (4.0, 5.0, 500.0, 6.0, 0.0, 0.0)
+
+
+def trail_of(*told: events.Event) -> list[int]:
+    return [orientation for orientation, _ in fold(told).path_from_reference]
+
+
+def test_the_trail_leads_back_to_the_reference(story) -> None:
+    s = story()
+    assert trail_of() == []
+    assert trail_of(s.arrived(1), s.arrived(2), s.arrived(0, STOP), s.arrived(3)) == [1, 2, 0, 3]
+
+
+def test_a_trail_has_no_loops(story) -> None:
+    s = story()
+    there = [s.arrived(1), s.arrived(0, STOP), s.arrived(2), s.arrived(0, OTHER_STOP), s.arrived(3)]
+    assert trail_of(*there, s.arrived(0, STOP)) == [1, 0]
+    assert trail_of(*there, s.arrived(1)) == [1]
+    assert trail_of(*there, s.arrived(2), s.arrived(4)) == [1, 0, 2, 4]
+
+
+def test_who_was_found_elsewhere_did_not_come_by_the_trail(story) -> None:
+    s = story()
+    lost = events.Interrupted(reason="a power cut", exit_code=130)
+    there = [s.arrived(1), s.arrived(2), s.arrived(3), lost]
+    assert trail_of(*there, events.Located(pose=STOP), s.arrived(4)) == []
+    assert trail_of(*there, events.Located(pose=STOP), s.arrived(2)) == [1, 2]
+    assert trail_of(*there, events.Located(pose=s.arrived(3).pose), s.arrived(4)) == [1, 2, 3, 4]

@@ -1,0 +1,192 @@
+"""Steps and events are data: stable names, and the same after a way through JSON."""
+
+from __future__ import annotations
+
+import inspect
+from typing import Any, get_args
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from pydantic import TypeAdapter, ValidationError
+
+from hexacell.acceptance.validation import Verdict
+from hexacell.cell.fields import GeometryValues
+from hexacell.cell.recovery import Action, FailureKind
+from procedures.journal.journal import Journal, read_journal
+from procedures.run import events, steps
+from procedures.run.steps import (
+    CloseSet,
+    Compute,
+    Expectation,
+    Locate,
+    Move,
+    Phase,
+    Place,
+    Revisit,
+    Sample,
+    SetKey,
+    Step,
+)
+from procedures.run.trips import Guard
+
+POSE = (1.0, 2.0, 3.0, 4.0, 5.0, 6.0)
+P2 = SetKey(phase=Phase.IDENTIFY, point=2)
+
+
+@pytest.mark.parametrize(
+    ("step", "key"),
+    [
+        (Move(at=P2, orientation=7, pose=POSE), "P2/o07/move"),
+        (Place(at=P2, pose=POSE), "P2/place"),
+        (Sample(at=P2, orientation=7, pose=POSE), "P2/o07/sample"),
+        (Sample(at=P2, orientation=11, pose=POSE), "P2/o11/sample"),
+        (CloseSet(at=P2), "P2/close"),
+        (Sample(at=SetKey(phase=Phase.BEFORE, point=1), orientation=2, pose=POSE), "before-V1/o02/sample"),
+        (Move(at=SetKey(phase=Phase.AFTER, point=12), orientation=1, pose=POSE), "after-V12/o01/move"),
+        (Compute(kind="identify"), "identify"),
+        (Compute(kind="roll back"), "roll back"),
+    ],
+)
+def test_keys_are_stable(step: Any, key: str) -> None:
+    assert step.key == key
+
+
+def test_a_move_knows_its_target() -> None:
+    assert Move(at=P2, orientation=1, pose=POSE).target.as_tuple() == POSE
+
+
+def test_steps_do_not_change() -> None:
+    with pytest.raises(ValidationError, match="frozen"):
+        setattr(CloseSet(at=P2), "at", P2)  # noqa: B010 - not even so
+
+
+def test_unknown_keys_are_refused() -> None:
+    with pytest.raises(ValidationError):
+        TypeAdapter(Step).validate_python({"kind": "close", "at": {"phase": "P", "point": 1}, "why": 1})
+
+
+number = st.floats(allow_nan=False, allow_infinity=False)
+three = st.tuples(number, number, number)
+six = st.tuples(*[number] * 6)
+text = st.text(max_size=12)
+count = st.integers(1, 99)
+set_key = st.builds(SetKey, phase=st.sampled_from(Phase), point=count)
+expectation = st.builds(Expectation, deviation_mm=three, sigma_mm=three, gain=number)
+some_step: st.SearchStrategy[Any] = st.one_of(
+    st.builds(Move, at=set_key, orientation=count, pose=six, expected=st.none() | expectation),
+    st.builds(Locate),
+    st.builds(Place, at=set_key, pose=six),
+    st.builds(Sample, at=set_key, orientation=count, pose=six),
+    st.builds(Revisit, at=set_key),
+    st.builds(CloseSet, at=set_key),
+    st.builds(Compute, kind=st.sampled_from(["identify", "propose", "commit", "judge", "roll back"])),
+)
+reading = st.builds(
+    events.Reading,
+    gauges_mm=three,
+    spread_mm=three,
+    joints_mm=six,
+    answers=st.lists(st.tuples(text, text, text), max_size=2).map(tuple),
+    counts=st.lists(st.tuples(*[st.integers()] * 6), max_size=2).map(tuple),
+)
+geometry = st.builds(
+    GeometryValues,
+    S=st.tuples(*[three] * 6),
+    B=st.tuples(*[three] * 6),
+    l=st.tuples(*[st.floats(1, 1e4)] * 6),
+)
+gate = st.builds(
+    events.GateOutcome, name=text, passed=st.booleans(), sentence=text, needs_person=st.booleans()
+)
+some_event: st.SearchStrategy[Any] = st.one_of(
+    st.builds(
+        events.RunStarted,
+        software=text,
+        cell=text,
+        cell_text=text,
+        mode=st.sampled_from(["check", "optimise"]),
+        config=text,
+        config_sha256=text,
+        controller=geometry,
+        branch=st.tuples(*[st.sampled_from([-1, 1])] * 6),
+        devices=st.lists(
+            st.builds(events.Identity, name=text, protocol=text, description=text), max_size=2
+        ).map(tuple),
+    ),
+    st.builds(events.StepBegun, step=some_step),
+    st.builds(events.Arrived, at=set_key, orientation=count, pose=six),
+    st.builds(events.Located, pose=six),
+    st.builds(events.GaugesPlaced, at=set_key),
+    st.builds(
+        events.RecordTaken, at=set_key, orientation=count, pose=six, reading=reading, deviation_mm=three
+    ),
+    st.builds(events.RecordRejected, at=set_key, orientation=count, reason=text),
+    st.builds(events.RecordDiscarded, at=set_key, orientation=count),
+    st.builds(events.ReferenceConfirmed, at=set_key, change_mm=three),
+    st.builds(events.SetClosed, at=set_key, drift_mm=three),
+    st.builds(events.SetInvalidated, at=set_key, reason=text),
+    st.builds(
+        events.Identified,
+        result=st.dictionaries(text, st.none() | st.booleans() | number | st.lists(number), max_size=3),
+        held_out=st.lists(st.lists(six, max_size=2).map(tuple), max_size=2).map(tuple),
+    ),
+    st.builds(events.Proposed, gates=st.lists(gate, max_size=3).map(tuple)),
+    st.builds(events.Committed, approved_by=text),
+    st.builds(events.ResultValidated, verdict=st.sampled_from(Verdict), line=text),
+    st.builds(events.RolledBack),
+    st.builds(events.Paused, at_once=st.booleans()),
+    st.builds(events.Resumed),
+    st.builds(
+        events.Failed,
+        step=st.none() | some_step,
+        failure=st.sampled_from(FailureKind),
+        attempt=count,
+        reason=text,
+        action=st.sampled_from(Action),
+        asked=st.booleans(),
+    ),
+    st.builds(events.CommandRejected, command=text, reason=text),
+    st.builds(events.Tripped, guard=st.sampled_from(Guard), device=text, problem=text, action=text),
+    st.builds(events.Interrupted, reason=text, exit_code=st.integers(0, 255)),
+    st.builds(events.Ended, exit_code=st.integers(0, 255), line=text),
+)
+
+
+@given(some_step)
+def test_steps_survive_json(step: Any) -> None:
+    adapter: TypeAdapter[Step] = TypeAdapter(Step)
+    assert adapter.validate_json(adapter.dump_json(step)) == step
+
+
+@settings(max_examples=25)  # each forces every event to the disk
+@given(history=st.lists(some_event, max_size=4))
+def test_events_survive_the_journal(history: list[events.Event], tmp_path_factory: Any) -> None:
+    path = tmp_path_factory.mktemp("journal") / "journal.jsonl"
+    with Journal(path) as journal:
+        for event in history:
+            journal.append(event)
+    assert read_journal(path) == tuple(history)
+
+
+def test_every_kind_of_event_is_in_the_union_and_under_test() -> None:
+    kinds = {
+        kind
+        for _, kind in inspect.getmembers(events, inspect.isclass)
+        if issubclass(kind, steps.Frozen)
+        and "kind" in kind.model_fields
+        and kind.__module__ == "procedures.run.events"
+    }
+    in_union = set(get_args(get_args(events.Event)[0]))
+    names = [kind.model_fields["kind"].default for kind in in_union]
+    assert kinds == in_union
+    assert len(set(names)) == len(names)
+    assert set(names) == set(KINDS)
+
+
+KINDS = (
+    *("started", "begun", "arrived", "placed", "sampled", "refused", "closed", "voided", "identified"),
+    *("lent", "taken back", "proposed", "committed", "judged", "rolled back", "interrupted", "ended"),
+    *("located", "undone", "confirmed", "paused", "resumed", "failed", "declined", "tripped"),
+)
+"""Journals on disk say these words: they must never change."""

@@ -11,13 +11,12 @@ import termios
 from collections.abc import Callable, Coroutine, Sequence
 from typing import Any, TextIO, TypeVar
 
-from hexacell.cell.recovery import Action
 from hexacell.cli.console import Console
 from hexacell.errors import AnswerNeeded
-from hexacell.kinematics.pose import Pose
+from hexacell.presentation.questions import question_text
 from procedures.run import events
 from procedures.run.commands import Abort, Command, CommandQueue, MeasureAgain, Pause, Resume, Undo
-from procedures.run.events import GateOutcome
+from procedures.run.questions import Question, QuestionKind
 from procedures.run.state import RunState
 from procedures.run.steps import SetKey
 
@@ -27,6 +26,9 @@ HELP = (
     "Letters, each with Enter: p pause after this record, P at once, r resume,\n"
     "u undo the last record, m measure this point again, a abort."
 )
+
+APPROVER = "a person at the terminal"
+"""Who approves a change, as the journal has it."""
 
 
 class KeyboardCommands:
@@ -91,43 +93,22 @@ class TerminalOperator:
         self.before: Callable[[], None] = lambda: None
         self.afterwards: Callable[[], None] = lambda: None
 
-    async def place_gauges(self, point: int, pose: Pose) -> None:
-        """Ask for the gauges to be put around the ball.
+    async def ask(self, question: Question) -> str | None:
+        """Show the question and read lines until one is an answer.
 
         Raises:
             AnswerNeeded: the terminal's input has ended.
         """
-        await self._answer(
-            f"\nPoint {point}: the robot stands at {pose}.\n"
-            "Put the three gauges around the ball, plungers in the middle of their travel.\n"
-            "Press Enter when they stand. "
-        )
-
-    async def approve(self, gates: Sequence[GateOutcome], change: str) -> str | None:
-        """Show the change and ask whether it may be written.
-
-        Raises:
-            AnswerNeeded: the terminal's input has ended.
-        """
-        conditions = "".join(f"{'ok' if gate.passed else 'NO'}  {gate.sentence}\n" for gate in gates)
-        question = "Write this into the controller's config? Type yes: "
-        answer = await self._answer(f"\n{change}\n{conditions}{question}")
-        return "a person at the terminal" if answer.strip().lower() == "yes" else None
-
-    async def decide(self, problem: str, choices: Sequence[Action]) -> Action:
-        """Tell what failed and ask how to go on, until the answer is one of the choices.
-
-        Raises:
-            AnswerNeeded: the terminal's input has ended.
-        """
-        words = ", ".join(choice.value for choice in choices)
-        question = f"\n{problem}\nHow to go on ({words})? "
+        text = question_text(question)
         while True:
-            answer = (await self._answer(question)).strip().lower().replace(" ", "-")
-            found = [choice for choice in choices if answer and choice.value.startswith(answer)]
-            if len(found) == 1:
-                return found[0]
-            question = f"Type one of {words}: "
+            typed = (await self._answer(text)).strip().lower()
+            if question.kind is QuestionKind.APPROVE_CHANGE:
+                return APPROVER if typed == "yes" else None
+            if question.default is not None:
+                return question.default
+            if (chosen := _choice(typed, question.choices)) is not None:
+                return chosen
+            text = f"Type one of {', '.join(question.choices)}: "
 
     async def _answer(self, question: str) -> str:
         self.before()
@@ -145,6 +126,13 @@ class TerminalOperator:
             self._console.ask("\n")
             raise AnswerNeeded("the question was left without an answer", action="Run it at a terminal")
         return line
+
+
+def _choice(typed: str, choices: Sequence[str]) -> str | None:
+    """The one choice that begins with what was typed."""
+    typed = typed.replace(" ", "-")
+    found = [choice for choice in choices if typed and choice.startswith(typed)]
+    return found[0] if len(found) == 1 else None
 
 
 async def _line(terminal: TextIO) -> str:

@@ -18,6 +18,7 @@ from procedures.journal.journal import Journal
 from procedures.run import events
 from procedures.run.cancellation import shielded
 from procedures.run.commands import Command, CommandQueue, MeasureAgain, Undo
+from procedures.run.questions import Question, ask_recovery
 from procedures.run.result import ending, exit_code
 from procedures.run.state import RunState, apply, fold
 from procedures.run.status import Status
@@ -68,6 +69,11 @@ class Engine:
     def status(self) -> Status:
         """What the engine is doing now."""
         return self._attention.situation.status
+
+    @property
+    def question(self) -> Question | None:
+        """The question that waits for an :class:`~procedures.run.commands.Answer`, if one does."""
+        return self._desk.open
 
     def watch(self, watcher: Callable[[Status], None]) -> None:
         """Have somebody hear of every new status."""
@@ -245,8 +251,9 @@ class Engine:
         if failure.action is not Action.ASK:
             return failure
         try:
-            asking = self._desk.decide(failure.reason, choices(failure))
-            action = await self._attention.run_cancellable(asking)
+            question = ask_recovery(failure.reason, choices(failure))
+            answer = await self._attention.run_cancellable(self._desk.ask(question))
+            action = Action(str(answer))
         except AnswerNeeded:
             return None
         except StepCancelled:

@@ -33,6 +33,7 @@ from procedures.engine.operator import Operator
 from procedures.guards.guards import Guards
 from procedures.run import events
 from procedures.run.cancellation import in_thread
+from procedures.run.questions import ask_approval, ask_placement
 from procedures.run.state import RunState
 from procedures.run.steps import CloseSet, Compute, Locate, Move, Phase, Place, Revisit, Sample, Step
 from procedures.run.trips import GuardTripped
@@ -109,7 +110,8 @@ class StepExecutor:
 
     async def _place(self, step: Place) -> events.Event:
         if self.cell.settings.stations.placement == "by-hand":
-            await self.guards.stand(lambda: self.operator.place_gauges(step.at.point, Pose(*step.pose)))
+            question = ask_placement(step.at.point, Pose(*step.pose))
+            await self.guards.stand(lambda: self.operator.ask(question))
         return events.GaugesPlaced(at=step.at)
 
     async def _sample(self, step: Sample, state: RunState) -> events.Event:
@@ -261,7 +263,7 @@ class StepExecutor:
         automatic = self.cell.settings.acceptance.approval == "automatic"
         if automatic and all(gate.passed for gate in conditions):
             return "the cell file: within its limits"
-        name = await self.operator.approve(conditions, proposal.diff)
+        name = await self.operator.ask(ask_approval(conditions, proposal.diff))
         if name is None:
             raise LimitError("the new geometry was declined; nothing was applied")
         return name

@@ -6,7 +6,7 @@ A recorded robot does not move, so nothing can happen to it: its guards look awa
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TypeVar
@@ -14,7 +14,6 @@ from typing import TypeVar
 from drivers.gauges.errors import GaugeAtEnd
 from drivers.interfaces import ControllerStatus, DeviceIdentity, EncoderSample, GaugeReading
 from hexacell.cell.model import CellSettings
-from hexacell.cell.recovery import Action
 from hexacell.clock import CellClock
 from hexacell.errors import DeviceError
 from hexacell.kinematics.pose import Pose
@@ -25,6 +24,7 @@ from procedures.engine.step_executor import StepExecutor
 from procedures.guards.guards import Guards
 from procedures.guards.supervision import Supervised
 from procedures.run import events
+from procedures.run.questions import Question
 from procedures.run.state import RunState
 from procedures.run.steps import Move
 
@@ -195,19 +195,11 @@ class RecordedOperator:
 
     tape: Playback
 
-    async def place_gauges(self, point: int, pose: Pose) -> None:
-        """They stand."""
-
-    async def approve(self, gates: Sequence[events.GateOutcome], change: str) -> str | None:
-        """Who approved, if anybody did."""
-        del gates, change
-        outcome = self.tape.outcome
-        return outcome.approved_by if isinstance(outcome, events.Committed) else None
-
-    async def decide(self, problem: str, choices: Sequence[Action]) -> Action:
-        """Nothing: what followed a failure stands in the journal."""
-        del problem, choices
-        return Action.ABORT
+    async def ask(self, question: Question) -> str | None:
+        """Who approved a change, if anybody did; a question about a failure is never asked here."""
+        if isinstance(self.tape.outcome, events.Committed):
+            return self.tape.outcome.approved_by
+        return question.default
 
 
 class RecordedThermometers(Thermometers):

@@ -38,9 +38,9 @@ class MeasureAgain:
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """The answer to the open question, of the type that the question's coroutine gives."""
+    """The answer to the open question (:class:`procedures.run.questions.Question`)."""
 
-    value: object = None
+    value: str | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -16,6 +16,7 @@ from hexacell.errors import HexacellError
 from hexacell.kinematics.pose import Pose
 from procedures.devices.device_set import Devices, MountedGauge
 from procedures.run import events
+from procedures.run.questions import GaugePlacement, PendingChange, Question, StepFailure
 
 HALF_TRAVEL_MM = 6.25
 
@@ -157,16 +158,17 @@ class Approver:
         self.problems: list[str] = []
         self.decisions: list[Action] = []
 
-    async def place_gauges(self, point: int, pose: Pose) -> None:
-        self.placed.append(point)
-
-    async def approve(self, gates: Sequence[events.GateOutcome], change: str) -> str | None:
-        self.asked.append((gates, change))
-        return self.name
-
-    async def decide(self, problem: str, choices: Sequence[Action]) -> Action:
-        self.problems.append(problem)
-        return self.decisions.pop(0) if self.decisions else Action.ABORT
+    async def ask(self, question: Question) -> str | None:
+        match question.subject:
+            case GaugePlacement(point=point):
+                self.placed.append(point)
+                return question.default
+            case PendingChange(gates=gates, diff=diff):
+                self.asked.append((gates, diff))
+                return self.name
+            case StepFailure(problem=problem):
+                self.problems.append(problem)
+                return self.decisions.pop(0) if self.decisions else Action.ABORT
 
 
 @dataclass

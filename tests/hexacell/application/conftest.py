@@ -19,10 +19,8 @@ from hexacell.campaign import feasibility
 from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import Cell, dump, load_cell
 from hexacell.cell.model import CellSettings
-from hexacell.cell.recovery import Action
 from hexacell.controller_config.toml_format import NativeToml
 from hexacell.kinematics.mechanisms.hexaglide import Hexaglide
-from hexacell.kinematics.pose import Pose
 from hexacell.runs.run_folder import RunFolder
 from procedures.calibration import workflow as calibration_module
 from procedures.calibration.workflow import Mode
@@ -30,6 +28,7 @@ from procedures.engine.engine import Listener
 from procedures.engine.operator import UnattendedOperator
 from procedures.journal.journal import Journal, read_journal
 from procedures.run import events
+from procedures.run.questions import Question
 
 SMALL: dict[str, Any] = {
     "identification.points": ((100.0, -100.0, 500.0), (-100.0, 100.0, 500.0)),
@@ -202,14 +201,8 @@ def make_site(make_cell: MakeCell, tmp_path: Path) -> Iterator[Callable[..., Sit
 class Approver:
     """A person who lets everything happen."""
 
-    async def place_gauges(self, point: int, pose: Pose) -> None:
-        pass
-
-    async def approve(self, gates: Sequence[events.GateOutcome], change: str) -> str | None:
-        return "a tester"
-
-    async def decide(self, problem: str, choices: Sequence[Action]) -> Action:
-        return Action.ABORT
+    async def ask(self, question: Question) -> str | None:
+        return question.default or (question.choices or ("a tester",))[-1]
 
 
 @pytest.fixture

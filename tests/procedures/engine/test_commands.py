@@ -12,11 +12,20 @@ import pytest
 
 from hexacell.cell.recovery import Action
 from hexacell.errors import ExitCode, Interruption
+from hexacell.kinematics.pose import Pose
 from procedures.engine.engine import Engine
 from procedures.engine.operator import QuestionBroker
 from procedures.journal.journal import Journal, read_journal
 from procedures.run import events
 from procedures.run.commands import Abort, Answer, CommandQueue, MeasureAgain, Pause, Resume, Stop, Undo
+from procedures.run.questions import (
+    GaugePlacement,
+    Question,
+    QuestionKind,
+    ask_approval,
+    ask_placement,
+    ask_recovery,
+)
 from procedures.run.state import RunState, fold
 from procedures.run.status import Status
 from procedures.run.steps import Move, Phase, Sample, SetKey, Step
@@ -319,16 +328,9 @@ async def test_an_inbox_hands_out_in_order_and_waits() -> None:
 class Silent:
     """A face that shows questions and answers them by command."""
 
-    async def place_gauges(self, *_: Any) -> None:
+    async def ask(self, question: Question) -> str | None:
         await asyncio.Event().wait()
-
-    async def approve(self, *_: Any) -> str | None:
-        await asyncio.Event().wait()
-        return None
-
-    async def decide(self, *_: Any) -> Action:
-        await asyncio.Event().wait()
-        return Action.ABORT
+        return question.default
 
 
 Meanwhile = Callable[[events.Event, RunState], None]
@@ -367,14 +369,35 @@ async def test_a_question_keeps_nobody_from_leaving(recording, replayed, command
     assert rig.config == recording.config_before
 
 
-async def test_a_desk_takes_only_answers_that_there_are() -> None:
-    desk = QuestionBroker(Silent())
-    assert not desk.answer("retry"), "nothing is asked"
-    asking = asyncio.create_task(desk.decide("It broke.", (Action.RETRY, Action.ABORT)))
+async def test_a_broker_takes_only_answers_that_there_are() -> None:
+    broker = QuestionBroker(Silent())
+    assert not broker.answer("retry"), "nothing is asked"
+    asking = asyncio.create_task(broker.ask(ask_recovery("It broke.", (Action.RETRY, Action.ABORT))))
     await asyncio.sleep(0)
-    assert desk.open
-    assert desk.open.choices == ("retry", "abort")
-    assert not desk.answer("redo-set")
-    assert desk.answer("retry")
-    assert await asking is Action.RETRY
-    assert desk.open is None
+    assert broker.open
+    assert (broker.open.kind, broker.open.text) == (QuestionKind.CHOOSE_RECOVERY, "It broke.")
+    assert broker.open.choices == ("retry", "abort")
+    assert not broker.answer("redo-set")
+    assert not broker.answer(None), "a choice must be made"
+    assert broker.answer("retry")
+    assert not broker.answer("abort"), "it is answered"
+    assert await asking == "retry"
+    assert broker.open is None
+
+
+async def test_an_empty_answer_is_the_default() -> None:
+    broker = QuestionBroker(Silent())
+    asking = asyncio.create_task(broker.ask(ask_placement(2, Pose(1.0, 2.0, 3.0))))
+    await asyncio.sleep(0)
+    assert broker.open
+    assert broker.open.subject == GaugePlacement(2, Pose(1.0, 2.0, 3.0))
+    assert broker.answer(None)
+    assert await asking == "placed"
+
+
+async def test_an_approval_may_be_declined_from_any_face() -> None:
+    broker = QuestionBroker(Silent())
+    asking = asyncio.create_task(broker.ask(ask_approval([], "diff")))
+    await asyncio.sleep(0)
+    assert broker.answer(None)
+    assert await asking is None

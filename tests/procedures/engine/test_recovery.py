@@ -299,7 +299,7 @@ class TestATechnicianIsThere:
             await asyncio.Event().wait()
             return Action.ABORT
 
-        rig.operator.decide = never
+        rig.operator.ask = never
         silent = failing(KEY, lambda: rig.gauges[1].failures.append(SILENT))
         running = asyncio.create_task(until_closed(rig, silent, policy=ATTENDED))
         await asked.wait()
@@ -321,7 +321,7 @@ class TestATechnicianIsThere:
             await asyncio.Event().wait()
             return Action.RETRY
 
-        rig.operator.decide = leave
+        rig.operator.ask = leave
         silent = failing(KEY, lambda: rig.gauges[1].failures.append(SILENT))
         with pytest.raises(Interruption):
             await rig.run(silent, policy=ATTENDED)

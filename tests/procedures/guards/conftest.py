@@ -21,6 +21,7 @@ from drivers.interfaces import ControllerStatus, EncoderSample, GaugeReading
 from hexacell.cell.model import GuardSettings
 from hexacell.errors import DeviceError
 from procedures.run import events
+from procedures.run.questions import Question
 from procedures.run.state import RunState, apply
 from procedures.run.steps import Step
 
@@ -88,7 +89,7 @@ class Scene:
         self.controller = self.rig.controller
         self.controller.move, self.controller.stop = self.move, self.stop
         self.controller.status, self.controller.prepare = self.status, self.prepare
-        self.controller.reload, self.rig.operator.place_gauges = self.reload, self.place_gauges
+        self.controller.reload, self.rig.operator.ask = self.reload, self.ask
         self.rig.bench.encoders.read = self.round
         for gauge in self.rig.gauges:
             gauge.shown = self._shown(gauge.name, gauge.shown)
@@ -124,8 +125,9 @@ class Scene:
         await self.rig.clock.sleep(1.0)
         self.rig.machine.switch_on()
 
-    async def place_gauges(self, point: int, pose: Any) -> None:
+    async def ask(self, question: Question) -> str | None:
         await self.rig.clock.sleep(2.0)
+        return question.default
 
     async def status(self) -> ControllerStatus:
         await self._answer("controller", STATUS_S)

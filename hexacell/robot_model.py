@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -42,14 +43,16 @@ class Robot:
     tolerances: Tolerances
     noise: Noise
     limits: Limits
-    change: FrameTransform
-    lent: tuple[Geometry, ...] = ()
-    lending: bool = False
+    frames: FrameTransform
+    provisional: tuple[Geometry, ...] = ()
+    uses_provisional: bool = False
 
     @cached_property
     def commanding(self) -> Geometry:
         """What the controller commands with now, in the frame convention."""
-        return self.lent[-1] if self.lending else self.mechanism.normalize_frames(self.controller)[0]
+        if self.uses_provisional:
+            return self.provisional[-1]
+        return self.mechanism.normalize_frames(self.controller)[0]
 
     @cached_property
     def prior(self) -> Prior:
@@ -65,10 +68,10 @@ class Robot:
             branch=self.branch,
             prior=self.prior,
             noise=self.noise,
-            lent=self.lent,
+            lent=self.provisional,
         )
 
-    def knowledge(self, identified: Identification | None = None) -> RobotBelief:
+    def belief(self, identified: Identification | None = None) -> RobotBelief:
         """What is known of the robot: by an identification, or by its drawing alone."""
         prior = self.prior
         free = self.mechanism.convention.free_parameters(prior.centre)
@@ -81,11 +84,15 @@ class Robot:
 
     def for_controller(self, geometry: Geometry) -> Geometry:
         """A geometry of the convention in the frames of the controller's config."""
-        return self.change.inverse().geometry(geometry)
+        return self.frames.inverse().geometry(geometry)
+
+    def from_commands(self, commands: Iterable[Pose]) -> PoseBatch:
+        """Poses (n) commanded in the controller's frames, in the convention's frames."""
+        return self.frames.poses(PoseBatch.of(commands))
 
     def to_command(self, pose: Pose) -> Pose:
-        """A pose of the convention's frames as the controller takes it."""
-        return self.change.inverse().poses(PoseBatch.of([pose])).pose(0)
+        """A pose in the convention's frames, in the controller's frames."""
+        return self.frames.inverse().poses(PoseBatch.of([pose])).pose(0)
 
     def require_reach(self, name: str, pose: Pose) -> None:
         """Raise where the controller cannot take a pose within the limits.
@@ -149,5 +156,5 @@ def make_robot(settings: CellSettings, controller: ControllerGeometry) -> Robot:
             limits.joint_max_mm,
             limits.singularity_margin,
         ),
-        change=mechanism.normalize_frames(controller.geometry)[1],
+        frames=mechanism.normalize_frames(controller.geometry)[1],
     )

@@ -16,7 +16,7 @@ MOVES_LENT = 1.9
 class TimeModel:
     """How long things take: minutes to bring the gauges to a point, seconds to move and settle."""
 
-    station_minutes: float
+    point_minutes: float
     record_seconds: float
 
     @classmethod
@@ -30,7 +30,7 @@ class TimeModel:
 
     def minutes(self, records: int, stations: int) -> float:
         """Of some records at some points; at its end each point's reference is read once more."""
-        return stations * self.station_minutes + (records + stations) * self.record_seconds / 60.0
+        return stations * self.point_minutes + (records + stations) * self.record_seconds / 60.0
 
 
 def _moves_a_record(settings: CellSettings) -> float:
@@ -46,7 +46,7 @@ class Budget:
 
     records: int | None
     minutes: float | None
-    pace: TimeModel
+    time_model: TimeModel
 
     @classmethod
     def of(cls, settings: CellSettings) -> Budget:
@@ -54,16 +54,16 @@ class Budget:
         plan = settings.identification
         return cls(plan.budget_records, plan.budget_minutes, TimeModel.of(settings))
 
-    def left(self, records: int, stations: int) -> float:
+    def records_left(self, records: int, stations: int) -> float:
         """How many more records can be paid after some records at some points; infinite if all."""
         left = math.inf if self.records is None else float(self.records - records)
         if self.minutes is not None:
-            seconds = 60.0 * (self.minutes - self.pace.minutes(records, stations))
-            left = min(left, math.floor(seconds / self.pace.record_seconds + 1e-9))
+            seconds = 60.0 * (self.minutes - self.time_model.minutes(records, stations))
+            left = min(left, math.floor(seconds / self.time_model.record_seconds + 1e-9))
         return max(left, 0.0)
 
     @property
-    def words(self) -> str:
+    def description(self) -> str:
         """The limits for people."""
         limits = []
         if self.records is not None:

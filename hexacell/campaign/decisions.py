@@ -34,7 +34,7 @@ class CampaignState:
         return int((self.measurements.points == point).sum())
 
     @property
-    def stations(self) -> int:
+    def begun_points(self) -> int:
         """How many points have been begun, the present one included."""
         begun = set(self.measurements.points.tolist())
         return len(begun if self.point is None else begun | {self.point})
@@ -102,7 +102,7 @@ class MeasurePose:
     deviation: Three
     sigma: Three
     gain: float
-    outlook: Forecast | None
+    forecast: Forecast | None
     via: tuple[Pose, ...] = ()
 
 

@@ -74,14 +74,14 @@ class _Ended:
 def _carried_out(plan: Plan, truth: Geometry, number: int) -> _Ended | None:
     random = np.random.default_rng([plan.settings.identification.seed, number])
     try:
-        situation, outside = _Campaign(plan, VirtualRobot(plan.robot, truth), random).carried_out()
-        estimate, outlook = plan.known(situation).estimate, plan.outlook(situation)
+        state, outside = _Campaign(plan, VirtualRobot(plan.robot, truth), random).carried_out()
+        estimate, outlook = plan.estimate(state).identification, plan.forecast(state)
     except HexacellError:
         return None
     if estimate is None or not is_determined(estimate.problem):
         return None
     worst = None if outlook is None else outlook.now_mm
-    return _Ended(situation.stations, len(situation.measurements), outside, worst)
+    return _Ended(state.begun_points, len(state.measurements), outside, worst)
 
 
 def _summary(plan: Plan, drawn: int, ended: list[_Ended]) -> DryRunResult:
@@ -100,7 +100,7 @@ def _summary(plan: Plan, drawn: int, ended: list[_Ended]) -> DryRunResult:
         records=records,
         outside=sum(one.outside for one in ended),
         worst_sigma_mm=median(errors) if errors else None,
-        minutes=plan.budget.pace.minutes(records, points) + 2.0 * judging,
+        minutes=plan.budget.time_model.minutes(records, points) + 2.0 * judging,
     )
 
 
@@ -118,39 +118,39 @@ class _Campaign:
         Raises:
             HexacellError: a decision could not be made.
         """
-        situation, outside = CampaignState(), 0
+        state, outside = CampaignState(), 0
         for now in self._steps():
-            situation, outside = now, outside + (now.refusals > situation.refusals)
-        return situation, outside
+            state, outside = now, outside + (now.refusals > state.refusals)
+        return state, outside
 
     def _steps(self) -> Iterator[CampaignState]:
-        situation = CampaignState()
+        state = CampaignState()
         zero: Array | None = None
-        while not isinstance(decision := self.plan.decide(situation), Finished):
-            reference = None if situation.point is None else self.plan.reference_pose(situation.point)
-            if isinstance(decision, FinishPoint) and situation.present != reference:
+        while not isinstance(decision := self.plan.decide(state), Finished):
+            reference = None if state.point is None else self.plan.reference_pose(state.point)
+            if isinstance(decision, FinishPoint) and state.present != reference:
                 # Sets are closed at their reference, and another way may lead on from there.
-                situation = replace(situation, present=reference)
+                state = replace(state, present=reference)
             elif isinstance(decision, FinishPoint):
-                done = situation.done | {decision.point}
-                situation, zero = CampaignState(situation.measurements, done=done), None
+                done = state.done | {decision.point}
+                state, zero = CampaignState(state.measurements, done=done), None
             else:
                 label = (decision.point, decision.orientation)
                 record, shown = self.built.measured(label, decision.pose, zero, self.random)
                 zero = shown if zero is None else zero
-                situation = self._after(situation, record, decision.pose)
-            yield situation
+                state = self._after(state, record, decision.pose)
+            yield state
 
-    def _after(self, situation: CampaignState, record: Record, command: Pose) -> CampaignState:
+    def _after(self, state: CampaignState, record: Record, command: Pose) -> CampaignState:
         outside = np.abs(record.deviation).max() > self.plan.robot.limits.gauge_travel_mm
         if outside:
-            return replace(situation, present=command, refusals=situation.refusals + 1)
-        records = (*situation.measurements.records, record)
-        same = situation.point == record.point
+            return replace(state, present=command, refusals=state.refusals + 1)
+        records = (*state.measurements.records, record)
+        same = state.point == record.point
         return CampaignState(
             MeasurementSet(records),
             record.point,
-            situation.done,
+            state.done,
             command,
-            situation.refusals if same else 0,
+            state.refusals if same else 0,
         )

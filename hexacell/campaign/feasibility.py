@@ -11,11 +11,11 @@ import numpy as np
 from hexacell.campaign.decisions import CampaignState
 from hexacell.campaign.planner import Plan
 from hexacell.errors import HexacellError, LimitError, ReachError, UsageError
-from hexacell.experiment_design.gauge_zero import GaugeZero, station
+from hexacell.experiment_design.gauge_zero import GaugeZero, estimate_gauge_zero
 from hexacell.identification.belief import RobotBelief
 from hexacell.identification.solver.result import UNDETERMINED_RATIO
 from hexacell.kinematics.pose import Pose, PoseBatch
-from hexacell.motion.path_check import beginning, is_clear
+from hexacell.motion.path_check import is_clear, start_state
 from hexacell.virtual_robot.virtual_robot import VirtualRobot, drawn_robots
 
 DRAWN = 32
@@ -34,13 +34,13 @@ UNDETERMINED_SHARE = 0.25
 def reach_failures(plan: Plan) -> Iterator[HexacellError]:
     """Poses named by the cell, points or a list, that the controller cannot take within the limits."""
     for point in plan.points:
-        yield from refusals(plan, f"identification point {point}", plan.reference_pose(point))
+        yield from pose_failures(plan, f"identification point {point}", plan.reference_pose(point))
         for number, pose in enumerate(plan.poses_at(point)[1:], start=2):
             name = f"point {point}, pose {number} of the list"
-            yield from [*refusals(plan, name, pose), *_out_of_travel(plan, name, point, pose)]
+            yield from [*pose_failures(plan, name, pose), *_out_of_travel(plan, name, point, pose)]
 
 
-def refusals(plan: Plan, name: str, pose: Pose) -> Iterator[HexacellError]:
+def pose_failures(plan: Plan, name: str, pose: Pose) -> Iterator[HexacellError]:
     """Why the controller cannot take a pose, if it cannot."""
     try:
         plan.robot.require_reach(name, pose)
@@ -74,7 +74,7 @@ def too_few_records(plan: Plan) -> Iterator[HexacellError]:
     whole = sum(plan.records_at(point) - 1 for point in plan.points)
     if 3 * whole >= unknowns:
         yield UsageError(
-            f"the budget of {plan.budget.words} allows {sum(planned.values())} records at "
+            f"the budget of {plan.budget.description} allows {sum(planned.values())} records at "
             f"{len(planned)} points, {equations} equations for {unknowns} parameters",
             subject="[identification]",
             action=f"Allow {_records_needed(plan, unknowns)} records at least",
@@ -82,7 +82,9 @@ def too_few_records(plan: Plan) -> Iterator[HexacellError]:
         return
     points, size = len(plan.points), plan.settings.identification.orientations
     needed = 1 - (-unknowns // (3 * points))
-    what = f"{points} points with {size} orientations" if plan.listed is None else str(plan.listed.path)
+    what = (
+        f"{points} points with {size} orientations" if plan.pose_list is None else str(plan.pose_list.path)
+    )
     yield UsageError(
         f"{what} give {equations} equations for {unknowns} parameters",
         subject="[identification]",
@@ -118,7 +120,7 @@ def plan_failures(plan: Plan) -> Iterator[list[HexacellError]]:
 
 def unreachable_share(plan: Plan) -> dict[int, float]:
     """At each point the share of robots within the tolerances that cannot stand there."""
-    references = plan.chooser.held([plan.reference_pose(point) for point in plan.points])
+    references = plan.robot.from_commands([plan.reference_pose(point) for point in plan.points])
     robots = drawn_robots(plan.robot, DRAWN, plan.settings.identification.seed)
     stands = np.array([VirtualRobot(plan.robot, truth).actual_poses(references)[1] for truth in robots])
     lost = 1.0 - stands.mean(axis=0)
@@ -138,16 +140,16 @@ def _points_lost(plan: Plan) -> Iterator[HexacellError]:
 
 def _ways(plan: Plan) -> Iterator[HexacellError]:
     """Straight lines between points, and between the poses of a list, that may have to be gone."""
-    knowledge = plan.robot.knowledge()
-    poses = {point: plan.chooser.held([plan.reference_pose(point)]) for point in plan.points}
+    belief = plan.robot.belief()
+    poses = {point: plan.robot.from_commands([plan.reference_pose(point)]) for point in plan.points}
     any_order = plan.settings.identification.choose_points
     for start, end in combinations(plan.points, 2) if any_order else pairwise(plan.points):
-        if not is_clear(knowledge, poses[start], poses[end]):
+        if not is_clear(belief, poses[start], poses[end]):
             yield _no_way(f"identification points {start} and {end}")
-    for point in plan.points if plan.listed is not None else ():
-        listed = plan.chooser.held(plan.poses_at(point))
+    for point in plan.points if plan.pose_list is not None else ():
+        listed = plan.robot.from_commands(plan.poses_at(point))
         for row in range(1, len(listed)):
-            if not is_clear(knowledge, listed[[row - 1]], listed[[row]]):
+            if not is_clear(belief, listed[[row - 1]], listed[[row]]):
                 yield _no_way(f"point {point}, poses {row} and {row + 1} of the list")
 
 
@@ -162,7 +164,7 @@ def _no_way(between: str) -> ReachError:
 def _no_orientation(plan: Plan) -> Iterator[list[HexacellError]]:
     """Points at which nothing can be measured safely: the first as things are, the others later on."""
     plan = replace(plan, candidates=min(plan.candidates, CANDIDATES))
-    first_known = plan.robot.knowledge()
+    first_known = plan.robot.belief()
     later_known = plan.predicted_belief()
     refused: dict[int, HexacellError | None] = {}
     for point in plan.points:
@@ -177,11 +179,11 @@ def _no_orientation(plan: Plan) -> Iterator[list[HexacellError]]:
             yield [error for error in [_refusal(plan, later_known, point)] if error]
 
 
-def _refusal(plan: Plan, knowledge: RobotBelief, point: int) -> HexacellError | None:
+def _refusal(plan: Plan, belief: RobotBelief, point: int) -> HexacellError | None:
     """Why no record can follow a point's reference, with the robot known so well."""
     try:
-        at = _zeroed(plan, knowledge, point)
-        plan.chooser.choose(knowledge, at, CampaignState(point=point, present=plan.reference_pose(point)))
+        at = _zeroed(plan, belief, point)
+        plan.chooser.choose(belief, at, CampaignState(point=point, present=plan.reference_pose(point)))
     except LimitError as error:
         travel = plan.settings.limits.gauge_travel_mm
         return UsageError(
@@ -193,14 +195,14 @@ def _refusal(plan: Plan, knowledge: RobotBelief, point: int) -> HexacellError | 
     return None
 
 
-def _zeroed(plan: Plan, knowledge: RobotBelief, point: int) -> GaugeZero:
+def _zeroed(plan: Plan, belief: RobotBelief, point: int) -> GaugeZero:
     """Where the gauges are after the reference was measured, by the estimate as it is."""
-    command = plan.chooser.held([plan.reference_pose(point)])
-    really = beginning(knowledge, command).actual
+    command = plan.robot.from_commands([plan.reference_pose(point)])
+    really = start_state(belief, command).actual
     if really is None:
         raise LimitError("the robot as drawn cannot stand where the controller would send it")
-    joints = knowledge.mechanism.inverse(knowledge.controller, knowledge.branch, command)
-    return station(knowledge, really, joints, np.zeros((1, 3)))
+    joints = belief.mechanism.inverse(belief.controller, belief.branch, command)
+    return estimate_gauge_zero(belief, really, joints, np.zeros((1, 3)))
 
 
 def _undetermined(plan: Plan) -> Iterator[HexacellError]:

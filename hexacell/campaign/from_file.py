@@ -10,8 +10,8 @@ from hexacell.errors import UsageError
 from hexacell.measurements.records import MeasurementSet
 
 
-def situation_of(plan: Plan, measurements: MeasurementSet, *, refusals: int = 0) -> CampaignState:
-    """The situation after the last record: the gauges stand at its point, all others are done.
+def state_of_records(plan: Plan, measurements: MeasurementSet, *, refusals: int = 0) -> CampaignState:
+    """The state after the last record: the gauges stand at its point, all others are done.
 
     Raises:
         UsageError: a record is of a point that the plan does not have.
@@ -29,17 +29,15 @@ def situation_of(plan: Plan, measurements: MeasurementSet, *, refusals: int = 0)
     return CampaignState(measurements, last.point, others, last.pose, refusals)
 
 
-def decide(plan: Plan, situation: CampaignState) -> StartPoint | MeasurePose | Finished:
+def decide(plan: Plan, state: CampaignState) -> StartPoint | MeasurePose | Finished:
     """What to measure now; a point that is done is left for the next one.
 
     Raises:
         HexacellError: the records cannot be understood.
     """
-    decision = plan.decide(situation)
+    decision = plan.decide(state)
     if isinstance(decision, FinishPoint):
-        leaving = replace(
-            situation, point=None, done=situation.done | {decision.point}, present=None, refusals=0
-        )
+        leaving = replace(state, point=None, done=state.done | {decision.point}, present=None, refusals=0)
         decision = plan.decide(leaving)
     if isinstance(decision, FinishPoint):  # between points there is none to close
         raise TypeError(decision)

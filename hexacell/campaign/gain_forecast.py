@@ -50,26 +50,26 @@ class Forecaster:
     sizes: Mapping[int, int]
     budget: Budget
     task: Task
-    prospect: PlannedSets
+    planned_sets: PlannedSets
 
-    def worst(self, known: OnlineEstimate) -> float | None:
+    def worst_error(self, known: OnlineEstimate) -> float | None:
         """The error at the worst task pose now, 1 sigma, mm."""
-        error = self.task.error(known.knowledge)
-        return None if error is None else error.worst(known.knowledge.covariance)
+        error = self.task.error(known.belief)
+        return None if error is None else error.worst(known.belief.covariance)
 
-    def outlook(
-        self, situation: CampaignState, known: OnlineEstimate, choice: SelectedPose | None = None
+    def forecast(
+        self, state: CampaignState, known: OnlineEstimate, choice: SelectedPose | None = None
     ) -> Forecast | None:
         """What a record chosen, and then going on to the end, would do; none without task poses."""
-        error = self.task.error(known.knowledge)
+        error = self.task.error(known.belief)
         if error is None:
             return None
-        now = error.worst(known.knowledge.covariance)
-        following = now if choice is None else error.worst(_after(known.knowledge, choice))
-        planned = self.planned(situation)
-        covariance = self.predicted_belief(known.knowledge, situation).covariance
+        now = error.worst(known.belief.covariance)
+        following = now if choice is None else error.worst(_after(known.belief, choice))
+        planned = self.planned(state)
+        covariance = self.predicted_belief(known.belief, state).covariance
         records = sum(planned.values())
-        stations = len(set(planned) - {situation.point})
+        stations = len(set(planned) - {state.point})
         # The sets foretold may tell less than the record that was really chosen.
         end = following if choice and records == 1 else min(error.worst(covariance), following)
         return Forecast(
@@ -77,76 +77,80 @@ class Forecaster:
             next_mm=following,
             end_mm=end,
             records=records,
-            minutes=self.budget.pace.minutes(records, stations),
+            minutes=self.budget.time_model.minutes(records, stations),
         )
 
-    def planned(self, situation: CampaignState) -> dict[int, int]:
+    def planned(self, state: CampaignState) -> dict[int, int]:
         """How many more records each point will get, as far as the budget goes."""
         planned: dict[int, int] = {}
-        spent, stations = len(situation.measurements), situation.stations
-        for point in self._points_left(situation):
-            begun = situation.point == point
-            affordable = self.budget.left(spent, stations if begun else stations + 1)
-            more = int(min(self.sizes[point] - situation.records_at(point), affordable))
+        spent, stations = len(state.measurements), state.begun_points
+        for point in self._points_left(state):
+            begun = state.point == point
+            affordable = self.budget.records_left(spent, stations if begun else stations + 1)
+            more = int(min(self.sizes[point] - state.records_at(point), affordable))
             if more < (1 if begun else 2):
                 continue
             planned[point] = more
             spent, stations = spent + more, stations + (not begun)
         return planned
 
-    def worth(self, situation: CampaignState, known: OnlineEstimate, points: Sequence[int]) -> PointRanking:
+    def rank_points(
+        self, state: CampaignState, known: OnlineEstimate, points: Sequence[int]
+    ) -> PointRanking:
         """Some points compared: what records there would tell, and in what time."""
-        error = self.task.error(known.knowledge)
+        error = self.task.error(known.belief)
         if error is None:
             return PointRanking(dict.fromkeys(points, math.inf), points[0])
-        now, seen = known.knowledge.covariance, self.prospect.seen_by(known.knowledge)
-        options = {point: self._options(situation, now, seen, error, point) for point in points}
+        now, seen = known.belief.covariance, self.planned_sets.information_under(known.belief)
+        options = {point: self._options(state, now, seen, error, point) for point in points}
         gains = {point: max((o.gain_mm for o in found), default=0.0) for point, found in options.items()}
         rates = {point: max((o.rate for o in found), default=-math.inf) for point, found in options.items()}
         return PointRanking(gains, max(points, key=rates.__getitem__))
 
     def _options(
-        self, situation: CampaignState, now: Array, seen: PlannedInformation, error: TaskError, point: int
+        self, state: CampaignState, now: Array, seen: PlannedInformation, error: TaskError, point: int
     ) -> list[_Option]:
         """What different numbers of records at a point would do."""
-        before, begun = situation.records_at(point), situation.point == point
-        affordable = self.budget.left(len(situation.measurements), situation.stations + (0 if begun else 1))
+        before, begun = state.records_at(point), state.point == point
+        affordable = self.budget.records_left(
+            len(state.measurements), state.begun_points + (0 if begun else 1)
+        )
         most = int(min(self.sizes[point] - before, affordable))
         sizes = sorted({min(size, most) for size in (1, *SIZES)} - ({0} if begun else {0, 1}))
         found = []
         for size in sizes:
-            then = add_information(now, _told(seen, situation, point, size))
+            then = add_information(now, _told(seen, state, point, size))
             found.append(
                 _Option(
                     gain_mm=(error.worst(now) - error.worst(then)) / size,
                     rate=(error.mean_square(now) - error.mean_square(then))
-                    / self.budget.pace.minutes(size, 0 if begun else 1),
+                    / self.budget.time_model.minutes(size, 0 if begun else 1),
                 )
             )
         return found
 
-    def predicted_belief(self, knowledge: RobotBelief, situation: CampaignState) -> RobotBelief:
+    def predicted_belief(self, belief: RobotBelief, state: CampaignState) -> RobotBelief:
         """What will be known once everything that is still planned is measured."""
-        planned = self.planned(situation).items()
+        planned = self.planned(state).items()
         if not planned:
-            return knowledge
-        seen = self.prospect.seen_by(knowledge)
-        told = [_told(seen, situation, point, more) for point, more in planned]
-        return replace(knowledge, covariance=add_information(knowledge.covariance, np.sum(told, axis=0)))
+            return belief
+        seen = self.planned_sets.information_under(belief)
+        told = [_told(seen, state, point, more) for point, more in planned]
+        return replace(belief, covariance=add_information(belief.covariance, np.sum(told, axis=0)))
 
-    def _points_left(self, situation: CampaignState) -> list[int]:
-        left = [p for p in self.sizes if p not in situation.done and p != situation.point]
-        return left if situation.point is None else [situation.point, *left]
+    def _points_left(self, state: CampaignState) -> list[int]:
+        left = [p for p in self.sizes if p not in state.done and p != state.point]
+        return left if state.point is None else [state.point, *left]
 
 
-def _after(knowledge: RobotBelief, choice: SelectedPose) -> Array:
+def _after(belief: RobotBelief, choice: SelectedPose) -> Array:
     """The covariance (p, p), mm^2, after the chosen record."""
-    return covariance_update(knowledge.covariance, choice.change, choice.noise)
+    return covariance_update(belief.covariance, choice.jacobian, choice.covariance)
 
 
-def _told(seen: PlannedInformation, situation: CampaignState, point: int, records: int) -> Array:
+def _told(seen: PlannedInformation, state: CampaignState, point: int, records: int) -> Array:
     """What more records at a point would tell; those it has count for its constant only."""
-    before = situation.records_at(point)
+    before = state.records_at(point)
     told = seen.information(point, before + records)
     return told - seen.information(point, before) if before else told
 

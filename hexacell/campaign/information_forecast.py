@@ -38,24 +38,24 @@ class PlannedSets:
     sets: tuple[PoseBatch, ...]
 
     @classmethod
-    def spread(cls, drawn: RobotBelief, points: Array, records: int, seed: int) -> PlannedSets:
+    def select(cls, drawn: RobotBelief, points: Array, records: int, seed: int) -> PlannedSets:
         """Sets of so many ``records`` at ball positions (m, 3), mm; empty where the robot cannot go."""
         turns = candidates.orientations(CANDIDATES, drawn.limits.tilt, seed)
         turns = np.concatenate([np.eye(3)[None], turns])
         return cls(tuple(_spread(drawn, PoseBatch.at(point, turns), records) for point in points))
 
-    def seen_by(self, knowledge: RobotBelief) -> PlannedInformation:
+    def information_under(self, belief: RobotBelief) -> PlannedInformation:
         """The sets as the present estimate sees them; what it cannot reach is left out."""
         poses = PoseBatch(
             np.concatenate([poses.positions for poses in self.sets]),
             np.concatenate([poses.rotations for poses in self.sets]),
         )
-        joints = knowledge.mechanism.inverse(knowledge.estimate, knowledge.branch, poses)
+        joints = belief.mechanism.inverse(belief.estimate, belief.branch, poses)
         rows = np.flatnonzero(np.isfinite(joints).all(axis=-1))
-        jacobian, by_joints = position_derivatives(knowledge, ReachableTargets(poses[rows], joints[rows]))
+        jacobian, by_joints = position_derivatives(belief, ReachableTargets(poses[rows], joints[rows]))
         sizes = np.cumsum([len(poses) for poses in self.sets])
         return PlannedInformation(
-            jacobian, record_weights(by_joints, knowledge.noise), np.searchsorted(rows, [0, *sizes])
+            jacobian, record_weights(by_joints, belief.noise), np.searchsorted(rows, [0, *sizes])
         )
 
 

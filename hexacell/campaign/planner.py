@@ -25,7 +25,7 @@ from hexacell.campaign.decisions import (
 )
 from hexacell.campaign.gain_forecast import Forecaster
 from hexacell.campaign.information_forecast import PlannedSets
-from hexacell.campaign.pose_chooser import Chooser
+from hexacell.campaign.pose_chooser import PoseChooser
 from hexacell.campaign.pose_list import PoseList
 from hexacell.campaign.recursive_estimator import OnlineEstimate, OnlineEstimator
 from hexacell.campaign.task_accuracy import Task
@@ -62,60 +62,62 @@ class Plan:
 
     settings: CellSettings
     robot: Robot
-    listed: PoseList | None = None
+    pose_list: PoseList | None = None
     candidates: int = CANDIDATES
-    foretelling: bool = True
+    with_forecast: bool = True
 
-    def decide(self, situation: CampaignState) -> Decision:
+    def decide(self, state: CampaignState) -> Decision:
         """What to do now.
 
         Raises:
             HexacellError: the records cannot be understood.
         """
-        if situation.point is None:
-            return self._between_points(situation)
-        if not situation.records_at(situation.point):
-            return self._reference(situation.point)
-        return self._at_point(situation, situation.point)
+        if state.point is None:
+            return self._between_points(state)
+        if not state.records_at(state.point):
+            return self._reference(state.point)
+        return self._at_point(state, state.point)
 
-    def known(self, situation: CampaignState) -> OnlineEstimate:
+    def estimate(self, state: CampaignState) -> OnlineEstimate:
         """What the records so far say of the robot.
 
         Raises:
             IdentifiabilityError: they do not belong to it.
         """
-        return self._tracker.known(situation.measurements)
+        return self._tracker.estimate(state.measurements)
 
-    def may_lend(self, situation: CampaignState) -> bool:
+    def allows_provisional(self, state: CampaignState) -> bool:
         """Whether the robot is known well enough for the controller to command with the estimate."""
-        found = self.known(situation)
-        if found.estimate is None:
+        found = self.estimate(state)
+        if found.identification is None:
             return False
-        stand = ReachableTargets(found.estimate.poses[[-1]], found.estimate.problem.joints[[-1]])
-        return orientation_sigma(found.knowledge, stand) <= LENT_TURN
+        stand = ReachableTargets(
+            found.identification.poses[[-1]], found.identification.problem.joints[[-1]]
+        )
+        return orientation_sigma(found.belief, stand) <= LENT_TURN
 
-    def outlook(self, situation: CampaignState) -> Forecast | None:
+    def forecast(self, state: CampaignState) -> Forecast | None:
         """What going on would gain; none where there are no task poses."""
-        return self._forecaster.outlook(situation, self.known(situation))
+        return self._forecaster.forecast(state, self.estimate(state))
 
-    def planned(self, situation: CampaignState) -> dict[int, int]:
+    def planned(self, state: CampaignState) -> dict[int, int]:
         """How many more records each point will get, as far as the budget goes."""
-        return self._forecaster.planned(situation)
+        return self._forecaster.planned(state)
 
     def predicted_belief(self) -> RobotBelief:
         """What will be known at the end, if the robot is as drawn."""
-        return self._forecaster.predicted_belief(self.robot.knowledge(), CampaignState())
+        return self._forecaster.predicted_belief(self.robot.belief(), CampaignState())
 
     def poses_at(self, point: int) -> tuple[Pose, ...]:
         """Those poses of a point that are given beforehand, its reference first; chosen ones are not."""
-        if self.listed is not None:
-            return self.listed.at(point)
+        if self.pose_list is not None:
+            return self.pose_list.at(point)
         return (Pose(*self.settings.identification.points[point - 1]),)
 
     def records_at(self, point: int) -> int:
         """How many records a point gets at most, its reference included."""
-        if self.listed is not None:
-            return len(self.listed.at(point))
+        if self.pose_list is not None:
+            return len(self.pose_list.at(point))
         return self.settings.identification.orientations
 
     def reference_pose(self, point: int) -> Pose:
@@ -128,9 +130,9 @@ class Plan:
         return range(1, len(self.settings.identification.points) + 1)
 
     @cached_property
-    def chooser(self) -> Chooser:
+    def chooser(self) -> PoseChooser:
         """Which pose is next at a point."""
-        return Chooser(self.settings, self.robot, self.listed, self.task, self.candidates)
+        return PoseChooser(self.settings, self.robot, self.pose_list, self.task, self.candidates)
 
     @cached_property
     def budget(self) -> Budget:
@@ -143,13 +145,13 @@ class Plan:
         return Task.of(self.settings, self.robot)
 
     @cached_property
-    def prospect(self) -> PlannedSets:
+    def planned_sets(self) -> PlannedSets:
         """What whole points would tell."""
-        if self.listed is not None:
-            return PlannedSets(tuple(map(self.chooser.held, self.listed.poses)))
+        if self.pose_list is not None:
+            return PlannedSets(tuple(map(self.robot.from_commands, self.pose_list.poses)))
         plan = self.settings.identification
-        balls = self.chooser.held(Pose(*point) for point in plan.points).positions
-        return PlannedSets.spread(self.robot.knowledge(), balls, plan.orientations, plan.seed)
+        balls = self.robot.from_commands(Pose(*point) for point in plan.points).positions
+        return PlannedSets.select(self.robot.belief(), balls, plan.orientations, plan.seed)
 
     @cached_property
     def _tracker(self) -> OnlineEstimator:
@@ -158,22 +160,22 @@ class Plan:
     @cached_property
     def _forecaster(self) -> Forecaster:
         sizes = {point: self.records_at(point) for point in self.points}
-        return Forecaster(sizes, self.budget, self.task, self.prospect)
+        return Forecaster(sizes, self.budget, self.task, self.planned_sets)
 
-    def _between_points(self, situation: CampaignState) -> Decision:
-        left = [point for point in self.points if point not in situation.done]
-        if all(situation.records_at(point) >= self.records_at(point) for point in self.points):
+    def _between_points(self, state: CampaignState) -> Decision:
+        left = [point for point in self.points if point not in state.done]
+        if all(state.records_at(point) >= self.records_at(point) for point in self.points):
             return Finished(f"all {len(self.points)} points are measured")
-        if reason := self._budget_used(situation, 1, 2) or self._target_reached(situation):
+        if reason := self._budget_used(state, 1, 2) or self._target_reached(state):
             return Finished(reason)
         if not left:
             return Finished(f"all {len(self.points)} points are measured as far as they could be")
-        left = [point for point in left if self._can_stand_at(situation, point)]
+        left = [point for point in left if self._can_stand_at(state, point)]
         if not left:
             return Finished("the robot cannot stand safely at the points that are left")
         plan = self.settings.identification
         if plan.least_gain_mm or plan.choose_points:
-            worth = self._forecaster.worth(situation, self.known(situation), left)
+            worth = self._forecaster.rank_points(state, self.estimate(state), left)
             left = [point for point in left if worth.gains_mm[point] >= plan.least_gain_mm]
             if plan.choose_points and worth.best in left:
                 left = [worth.best]
@@ -181,83 +183,83 @@ class Plan:
             return Finished(f"no record would gain {plan.least_gain_mm:g} mm at the task poses")
         return self._reference(left[0])
 
-    def _at_point(self, situation: CampaignState, point: int) -> Decision:
-        if reason := self._reason_to_leave(situation, point):
+    def _at_point(self, state: CampaignState, point: int) -> Decision:
+        if reason := self._reason_to_leave(state, point):
             return FinishPoint(point, reason)
         try:
-            visit = self._visit(situation, point)
+            visit = self._visit(state, point)
         except LimitError as error:
             return FinishPoint(point, error.problem)
         least = self.settings.identification.least_gain_mm
-        if visit.outlook is not None and visit.outlook.now_mm - visit.outlook.next_mm < least:
+        if visit.forecast is not None and visit.forecast.now_mm - visit.forecast.next_mm < least:
             return FinishPoint(point, f"no record here would gain {least:g} mm at the task poses")
         return visit
 
-    def _reason_to_leave(self, situation: CampaignState, point: int) -> str | None:
+    def _reason_to_leave(self, state: CampaignState, point: int) -> str | None:
         """Why nothing more is to be measured at the present point, whatever pose could be chosen."""
-        if situation.records_at(point) >= self.records_at(point):
+        if state.records_at(point) >= self.records_at(point):
             return f"all its {self.records_at(point)} orientations are measured"
-        if situation.refusals > REFUSALS:
-            return f"the ball left the gauges' travel {situation.refusals} times"
+        if state.refusals > REFUSALS:
+            return f"the ball left the gauges' travel {state.refusals} times"
         return (
-            self._budget_used(situation, 0, 1)
-            or self._target_reached(situation)
-            or self._better_elsewhere(situation, point)
+            self._budget_used(state, 0, 1)
+            or self._target_reached(state)
+            or self._better_elsewhere(state, point)
         )
 
-    def _budget_used(self, situation: CampaignState, stations: int, records: int) -> str | None:
+    def _budget_used(self, state: CampaignState, stations: int, records: int) -> str | None:
         """The reason to stop where some more points and records cannot be paid."""
-        left = self.budget.left(len(situation.measurements), situation.stations + stations)
-        return None if left >= records else f"the budget of {self.budget.words} is used"
+        left = self.budget.records_left(len(state.measurements), state.begun_points + stations)
+        return None if left >= records else f"the budget of {self.budget.description} is used"
 
-    def _target_reached(self, situation: CampaignState) -> str | None:
+    def _target_reached(self, state: CampaignState) -> str | None:
         """The reason to stop that the accuracy gives, if it is reached."""
         target = self.settings.identification.target_mm
-        if target is None or not len(situation.measurements):
+        if target is None or not len(state.measurements):
             return None
-        known = self.known(situation)
-        if known.estimate is None or not is_determined(known.estimate.problem):
+        known = self.estimate(state)
+        if known.identification is None or not is_determined(known.identification.problem):
             return None
-        worst = self._forecaster.worst(known)
+        worst = self._forecaster.worst_error(known)
         if worst is None or worst > target:
             return None
         return f"the predicted error at the task poses is {worst:.3f} mm, within {target:g}"
 
-    def _better_elsewhere(self, situation: CampaignState, point: int) -> str | None:
+    def _better_elsewhere(self, state: CampaignState, point: int) -> str | None:
         """The reason to leave that another point gives, if points are to be chosen."""
-        left = [other for other in self.points if other not in situation.done and other != point]
+        left = [other for other in self.points if other not in state.done and other != point]
         if not self.settings.identification.choose_points or not left:
             return None
-        worth = self._forecaster.worth(situation, self.known(situation), [point, *left])
+        worth = self._forecaster.rank_points(state, self.estimate(state), [point, *left])
         return None if worth.best == point else f"point {worth.best} tells more in the same time"
 
-    def _visit(self, situation: CampaignState, point: int) -> MeasurePose:
-        known = self.known(situation)
-        choice, via = self.chooser.choose_with_path(known.knowledge, known.station(point), situation)
-        base = self.robot.change.base.T
+    def _visit(self, state: CampaignState, point: int) -> MeasurePose:
+        known = self.estimate(state)
+        choice, via = self.chooser.choose_with_path(known.belief, known.gauge_zero(point), state)
+        base = self.robot.frames.base.T
         covariance = base @ np.diag(choice.sigma**2) @ base.T
         return MeasurePose(
             point=point,
-            orientation=situation.records_at(point) + 1,
+            orientation=state.records_at(point) + 1,
             pose=self.robot.to_command(choice.command),
             joints=joints_of(choice.joints),
             deviation=_three(base @ choice.deviation),
             sigma=_three(np.sqrt(np.diag(covariance))),
             gain=choice.gain,
-            outlook=self._forecaster.outlook(situation, known, choice) if self.foretelling else None,
+            forecast=self._forecaster.forecast(state, known, choice) if self.with_forecast else None,
             via=via,
         )
 
-    def _can_stand_at(self, situation: CampaignState, point: int) -> bool:
+    def _can_stand_at(self, state: CampaignState, point: int) -> bool:
         """Whether the robot, as it is known by now, stands at a point clear of singularities."""
-        if not len(situation.measurements):
+        if not len(state.measurements):
             return True  # by the drawing it does: that was seen in preflight
-        reference = self.chooser.held([self.reference_pose(point)])
+        reference = self.robot.from_commands([self.reference_pose(point)])
         try:
-            knowledge = self.known(situation).knowledge
+            belief = self.estimate(state).belief
         except IdentifiabilityError:
             return True  # what is wrong with the records is said where the geometry is identified
-        return is_clear(knowledge, reference, reference)
+        return is_clear(belief, reference, reference)
 
     def _reference(self, point: int) -> StartPoint:
         pose = self.reference_pose(point)

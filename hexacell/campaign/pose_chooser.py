@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
 
 from hexacell.campaign.decisions import CampaignState
-from hexacell.campaign.pose_list import PoseList, not_among, same
+from hexacell.campaign.pose_list import PoseList, is_same_pose, without_visited
 from hexacell.campaign.task_accuracy import Task
 from hexacell.cell.model import CellSettings
 from hexacell.errors import LimitError
@@ -21,7 +20,7 @@ from hexacell.experiment_design.pose_selection import SelectedPose, select_from_
 from hexacell.experiment_design.travel_monte_carlo import orientation_sigma
 from hexacell.identification.belief import RobotBelief
 from hexacell.kinematics.pose import Pose, PoseBatch
-from hexacell.motion.route_search import route
+from hexacell.motion.route_search import find_route
 from hexacell.robot_model import Robot
 
 WELL_KNOWN = np.radians(0.5)
@@ -32,7 +31,7 @@ SMALL_SHARE = 0.1
 
 
 @dataclass(frozen=True, eq=False)
-class Chooser:
+class PoseChooser:
     """Chooses for one cell.
 
     Attributes:
@@ -43,12 +42,12 @@ class Chooser:
 
     settings: CellSettings
     robot: Robot
-    listed: PoseList | None
+    pose_list: PoseList | None
     task: Task
     candidates: int
 
     def choose_with_path(
-        self, knowledge: RobotBelief, at: GaugeZero, situation: CampaignState
+        self, belief: RobotBelief, at: GaugeZero, state: CampaignState
     ) -> tuple[SelectedPose, tuple[Pose, ...]]:
         """As :meth:`select_pose`, and the poses to pass on the way from where the robot is now.
 
@@ -57,23 +56,23 @@ class Chooser:
         Raises:
             LimitError: there is none within the limits.
         """
-        choice, start = self._choose(knowledge, at, situation)
-        if situation.present is None:
+        choice, start = self._choose(belief, at, state)
+        if state.present is None:
             return choice, ()
-        visited = _visited(situation)
+        visited = _visited(state)
         stops = [self._as_visited(visited, self.robot.to_command(stop)) for stop in choice.stops]
         way = [*visited[start : start + 1], *stops]
-        if situation.present in way:  # as a rule, and the way is checked already
-            return choice, tuple(way[way.index(situation.present) + 1 :])
+        if state.present in way:  # as a rule, and the way is checked already
+            return choice, tuple(way[way.index(state.present) + 1 :])
         between = [*stops, *visited]
-        held = [self.held([pose]) for pose in between]
-        present, goal = self.held([situation.present]), PoseBatch.of([choice.command])
-        rows = route(knowledge, present, goal, held, at.reference)
+        held = [self.robot.from_commands([pose]) for pose in between]
+        present, goal = self.robot.from_commands([state.present]), PoseBatch.of([choice.command])
+        rows = find_route(belief, present, goal, held, at.reference)
         if rows is None:
             raise LimitError("no safe straight line leads on from here")
         return choice, tuple(between[row] for row in rows)
 
-    def choose(self, knowledge: RobotBelief, at: GaugeZero, situation: CampaignState) -> SelectedPose:
+    def choose(self, belief: RobotBelief, at: GaugeZero, state: CampaignState) -> SelectedPose:
         """The pose to measure next, in the mechanism's frame convention.
 
         It can be reached from the pose of the last record, or else from the reference, wherever the
@@ -82,60 +81,56 @@ class Chooser:
         Raises:
             LimitError: there is none within the limits.
         """
-        return self._choose(knowledge, at, situation)[0]
+        return self._choose(belief, at, state)[0]
 
-    def _choose(
-        self, knowledge: RobotBelief, at: GaugeZero, situation: CampaignState
-    ) -> tuple[SelectedPose, int]:
+    def _choose(self, belief: RobotBelief, at: GaugeZero, state: CampaignState) -> tuple[SelectedPose, int]:
         """The choice, and which of the poses visited here its way starts from."""
-        last = max(0, len(_visited(situation)) - 1)
+        last = max(0, len(_visited(state)) - 1)
         # The last resort is for when so little is known that nearly all turns are too large.
         *tries, resort = dict.fromkeys([(last, 1.0), (0, 1.0), (0, SMALL_SHARE)])
         for start, share in tries:
             with suppress(LimitError):
-                return self._chosen(knowledge, at, situation, start, share), start
+                return self._chosen(belief, at, state, start, share), start
         start, share = resort
-        return self._chosen(knowledge, at, situation, start, share), start
+        return self._chosen(belief, at, state, start, share), start
 
     def _chosen(
-        self, knowledge: RobotBelief, at: GaugeZero, situation: CampaignState, start: int, share: float
+        self, belief: RobotBelief, at: GaugeZero, state: CampaignState, start: int, share: float
     ) -> SelectedPose:
-        visited = self.held(_visited(situation))
+        visited = self.robot.from_commands(_visited(state))
         begin = visited[start : start + 1] if len(visited) else None
         home = visited[:1] if start else None
-        if self.listed is not None:
-            waiting = self.held(not_among(self.listed.at(situation.point or 0)[1:], _visited(situation)))
-            passed_over = situation.refusals
-            return select_from_list(knowledge, at, waiting, begin, home=home, passed_over=passed_over)
-        tilt = share * knowledge.limits.tilt
-        is_known = orientation_sigma(knowledge, at.stand) <= WELL_KNOWN
+        if self.pose_list is not None:
+            waiting = self.robot.from_commands(
+                without_visited(self.pose_list.at(state.point or 0)[1:], _visited(state))
+            )
+            passed_over = state.refusals
+            return select_from_list(belief, at, waiting, begin, home=home, passed_over=passed_over)
+        tilt = share * belief.limits.tilt
+        is_known = orientation_sigma(belief, at.target) <= WELL_KNOWN
         amplitudes = Amplitudes.MOSTLY_LARGE if is_known else Amplitudes.ALL_SCALES
-        turns = candidates.orientations(self.candidates, tilt, self._seed(situation), amplitudes)
-        return select_pose(knowledge, at, turns, begin, self._goal(knowledge), home)
-
-    def held(self, poses: Iterable[Pose]) -> PoseBatch:
-        """Commanded poses in the convention's frames."""
-        return self.robot.change.poses(PoseBatch.of(poses))
+        turns = candidates.orientations(self.candidates, tilt, self._seed(state), amplitudes)
+        return select_pose(belief, at, turns, begin, self._goal(belief), home)
 
     @staticmethod
     def _as_visited(visited: list[Pose], stop: Pose) -> Pose:
         """The reference as it was visited, to the last bit, where that is one of the stops."""
-        return visited[0] if visited and same(visited[0], stop) else stop
+        return visited[0] if visited and is_same_pose(visited[0], stop) else stop
 
-    def _goal(self, knowledge: RobotBelief) -> Criterion:
+    def _goal(self, belief: RobotBelief) -> Criterion:
         criterion = CriterionName(self.settings.identification.criterion)
         if criterion is CriterionName.PARAMETERS:
-            return Criterion(knowledge.basis.T @ knowledge.basis)
-        error = self.task.error(knowledge) if criterion is CriterionName.TASK else None
+            return Criterion(belief.basis.T @ belief.basis)
+        error = self.task.error(belief) if criterion is CriterionName.TASK else None
         return D_OPTIMAL if error is None else Criterion(error.weight())
 
-    def _seed(self, situation: CampaignState) -> int:
+    def _seed(self, state: CampaignState) -> int:
         """Other candidates for every record and every attempt, and the same when done again."""
-        point = situation.point or 0
-        attempt = situation.records_at(point) + 100 * situation.refusals
+        point = state.point or 0
+        attempt = state.records_at(point) + 100 * state.refusals
         return self.settings.identification.seed + 1000 * point + attempt
 
 
-def _visited(situation: CampaignState) -> list[Pose]:
+def _visited(state: CampaignState) -> list[Pose]:
     """The poses of the present point's records, in the controller's frames, the reference first."""
-    return [record.pose for record in situation.measurements.records if record.point == situation.point]
+    return [record.pose for record in state.measurements.records if record.point == state.point]

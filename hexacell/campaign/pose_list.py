@@ -68,11 +68,11 @@ def pose_list_of(cell: Cell) -> PoseList | None:
     return PoseList(path, tuple(map(tuple, at_points)))
 
 
-def not_among(poses: tuple[Pose, ...], visited: list[Pose]) -> tuple[Pose, ...]:
+def without_visited(poses: tuple[Pose, ...], visited: list[Pose]) -> tuple[Pose, ...]:
     """The poses that were not visited yet."""
-    return tuple(pose for pose in poses if not any(same(pose, other) for other in visited))
+    return tuple(pose for pose in poses if not any(is_same_pose(pose, other) for other in visited))
 
 
-def same(one: Pose, other: Pose) -> bool:
+def is_same_pose(one: Pose, other: Pose) -> bool:
     """Whether two poses are one, but for rounding."""
     return bool(np.abs(np.subtract(one.as_tuple(), other.as_tuple())).max() < SAME_MM_DEG)

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hexacell.errors import LimitError
-from hexacell.experiment_design.gauge_zero import GaugeZero, station
+from hexacell.experiment_design.gauge_zero import GaugeZero, estimate_gauge_zero
 from hexacell.identification.belief import RobotBelief
 from hexacell.identification.estimator import estimate_online
 from hexacell.identification.problem.data_requirements import is_determined
@@ -36,21 +36,23 @@ FEW_RESIDUALS = 30.0
 class OnlineEstimate:
     """What the records so far say of the robot; ``estimate`` is none before the first."""
 
-    knowledge: RobotBelief
-    estimate: Identification | None
+    belief: RobotBelief
+    identification: Identification | None
 
-    def station(self, point: int) -> GaugeZero:
+    def gauge_zero(self, point: int) -> GaugeZero:
         """Where a point's gauges were zeroed.
 
         Raises:
             LimitError: the records do not say so.
         """
-        found = self.estimate
+        found = self.identification
         if found is None or point not in found.problem.labels[:, 0]:
             raise LimitError("the records of this point say nothing about where the ball is")
         records = found.problem
         rows = np.flatnonzero(records.labels[:, 0] == point)
-        return station(self.knowledge, found.poses[rows], records.joints[rows], records.deviations[rows])
+        return estimate_gauge_zero(
+            self.belief, found.poses[rows], records.joints[rows], records.deviations[rows]
+        )
 
 
 class OnlineEstimator:
@@ -61,7 +63,7 @@ class OnlineEstimator:
         self._records: tuple[Record, ...] = ()
         self._last: Identification | None = None
 
-    def known(self, measurements: MeasurementSet) -> OnlineEstimate:
+    def estimate(self, measurements: MeasurementSet) -> OnlineEstimate:
         """What some records say, in their order.
 
         Raises:
@@ -74,7 +76,7 @@ class OnlineEstimator:
             problem = self._robot.problem(MeasurementSet(records[:count]))
             self._last = update_estimate(problem, self._last)
             self._records = records[:count]
-        return OnlineEstimate(self._robot.knowledge(self._last), self._last)
+        return OnlineEstimate(self._robot.belief(self._last), self._last)
 
 
 def update_estimate(problem: Problem, before: Identification | None) -> Identification:

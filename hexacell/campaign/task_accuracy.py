@@ -59,25 +59,25 @@ class Task:
     def of(cls, settings: CellSettings, robot: Robot) -> Task:
         """The task of a cell."""
         points = PoseBatch.of(Pose(*point) for point in settings.identification.points)
-        workspace = workspace_poses(robot.knowledge(), robot.change.poses(points).positions)
-        named = robot.change.poses(PoseBatch.of(Pose(*pose) for pose in settings.task.poses))
+        workspace = workspace_poses(robot.belief(), robot.frames.poses(points).positions)
+        named = robot.from_commands(Pose(*pose) for pose in settings.task.poses)
         poses = named if len(named) else workspace
         return cls(poses, workspace if len(workspace) else poses)
 
-    def error(self, knowledge: RobotBelief) -> TaskError | None:
+    def error(self, belief: RobotBelief) -> TaskError | None:
         """How it depends on the parameters; none if the estimated robot can take no task pose."""
-        task, by_task = _derivatives(knowledge, self.poses)
-        workspace, by_workspace = _derivatives(knowledge, self.workspace)
+        task, by_task = _derivatives(belief, self.poses)
+        workspace, by_workspace = _derivatives(belief, self.workspace)
         if not len(task) or not len(workspace):
             return None
-        fit = FrameFit(workspace, float(np.mean(np.linalg.norm(knowledge.estimate.B, axis=-1))))
+        fit = FrameFit(workspace, float(np.mean(np.linalg.norm(belief.estimate.B, axis=-1))))
         return TaskError(fit.remove_frame_motion(task, by_task, by_workspace)[:, :3])
 
 
-def _derivatives(knowledge: RobotBelief, poses: PoseBatch) -> tuple[PoseBatch, Array]:
+def _derivatives(belief: RobotBelief, poses: PoseBatch) -> tuple[PoseBatch, Array]:
     """The poses that the estimated robot reaches, and theirs (n, 6, p) by the free parameters."""
-    joints = knowledge.mechanism.inverse(knowledge.estimate, knowledge.branch, poses)
+    joints = belief.mechanism.inverse(belief.estimate, belief.branch, poses)
     rows = np.flatnonzero(np.isfinite(joints).all(axis=-1))
     reached = poses[rows]
-    sensitivity = pose_sensitivity(knowledge.mechanism, knowledge.estimate, reached, joints[rows])
-    return reached, sensitivity.parameters @ knowledge.basis
+    sensitivity = pose_sensitivity(belief.mechanism, belief.estimate, reached, joints[rows])
+    return reached, sensitivity.parameters @ belief.basis

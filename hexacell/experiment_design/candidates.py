@@ -107,71 +107,71 @@ def _amplitudes(evenly: Array, scale: Array, amplitudes: Amplitudes) -> Array:
 
 
 def reachable_targets(
-    knowledge: RobotBelief, targets: PoseBatch, mode: Array | None = None
+    belief: RobotBelief, targets: PoseBatch, mode: Array | None = None
 ) -> ReachableTargets:
     """Those of the poses that the estimated robot takes within its limits.
 
     On an assembly ``mode`` (1,), where one is named: to another no way leads.
     """
-    joints = knowledge.mechanism.inverse(knowledge.estimate, knowledge.branch, targets)
-    rows = np.flatnonzero(within_limits(knowledge.limits, targets, joints))
+    joints = belief.mechanism.inverse(belief.estimate, belief.branch, targets)
+    rows = np.flatnonzero(within_limits(belief.limits, targets, joints))
     targets, joints = targets[rows], joints[rows]
-    margin = knowledge.limits.singularity_margin
-    arguments = (knowledge.mechanism, knowledge.estimate, targets, joints)
+    margin = belief.limits.singularity_margin
+    arguments = (belief.mechanism, belief.estimate, targets, joints)
     clear, modes = margin_and_mode(*arguments, margin)
     if mode is not None:
         clear &= modes == mode
     return ReachableTargets(targets, joints)[clear]
 
 
-def commands_for(knowledge: RobotBelief, stands: ReachableTargets) -> tuple[PoseBatch, Mask]:
+def commands_for(belief: RobotBelief, stands: ReachableTargets) -> tuple[PoseBatch, Mask]:
     """The commands (n) that lead the controller to the joint variables of n poses, and which do.
 
     None does where the controller's own geometry cannot hold these joint variables, or only next to
     a singularity or in another assembly mode.
     """
     found = continue_solution(
-        knowledge.mechanism,
-        knowledge.controller,
+        belief.mechanism,
+        belief.controller,
         stands.joints,
         start=stands.targets,
-        start_geometry=knowledge.estimate,
+        start_geometry=belief.estimate,
         start_joints=stands.joints,
         tries=COMMAND_TRIES,
     )
-    back = knowledge.mechanism.inverse(knowledge.controller, knowledge.branch, found.poses)
+    back = belief.mechanism.inverse(belief.controller, belief.branch, found.poses)
     agrees = np.abs(np.nan_to_num(back, nan=np.inf) - stands.joints).max(axis=-1, initial=0.0) < 1e-6
-    margin = knowledge.limits.singularity_margin
+    margin = belief.limits.singularity_margin
     held: Mask = agrees & has_singularity_margin(
-        knowledge.mechanism, knowledge.controller, found.poses, stands.joints, margin
+        belief.mechanism, belief.controller, found.poses, stands.joints, margin
     )
     held &= found.found
     return found.poses, held
 
 
-def outcomes_of(knowledge: RobotBelief, commands: PoseBatch) -> tuple[ReachableTargets, NDArray[np.intp]]:
+def outcomes_of(belief: RobotBelief, commands: PoseBatch) -> tuple[ReachableTargets, NDArray[np.intp]]:
     """Where commands lead the estimated robot, and the rows of those that do so within its limits."""
-    joints = knowledge.mechanism.inverse(knowledge.controller, knowledge.branch, commands)
-    rows = np.flatnonzero(within_limits(knowledge.limits, commands, joints))
+    joints = belief.mechanism.inverse(belief.controller, belief.branch, commands)
+    rows = np.flatnonzero(within_limits(belief.limits, commands, joints))
     found = continue_solution(
-        knowledge.mechanism,
-        knowledge.estimate,
+        belief.mechanism,
+        belief.estimate,
         joints[rows],
         start=commands[rows],
-        start_geometry=knowledge.controller,
+        start_geometry=belief.controller,
         start_joints=joints[rows],
     )
-    margin = knowledge.limits.singularity_margin
+    margin = belief.limits.singularity_margin
     clear = found.found & has_singularity_margin(
-        knowledge.mechanism, knowledge.estimate, found.poses, joints[rows], margin
+        belief.mechanism, belief.estimate, found.poses, joints[rows], margin
     )
     return ReachableTargets(found.poses[clear], joints[rows[clear]]), rows[clear]
 
 
-def reachable(knowledge: RobotBelief, targets: PoseBatch) -> Candidates:
+def reachable(belief: RobotBelief, targets: PoseBatch) -> Candidates:
     """Those of the poses that the estimated robot reaches within its limits, with their commands."""
-    stands = reachable_targets(knowledge, targets)
-    commands, held = commands_for(knowledge, stands)
+    stands = reachable_targets(belief, targets)
+    commands, held = commands_for(belief, stands)
     return Candidates(stands.targets, stands.joints, commands)[held]
 
 

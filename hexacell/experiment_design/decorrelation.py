@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hexacell.experiment_design.candidates import Candidates, ReachableTargets, reachable
-from hexacell.experiment_design.gauge_zero import GaugeZero, station
+from hexacell.experiment_design.gauge_zero import GaugeZero, estimate_gauge_zero
 from hexacell.experiment_design.predicted_records import SAFETY_SIGMAS, TRAVEL_SHARE, predict_records
 from hexacell.identification.belief import RobotBelief
 from hexacell.identification.diagnostics.correlations import CorrelatedPair
@@ -54,15 +54,15 @@ class DecorrelatingPose:
         return float(np.degrees(self.angle))
 
 
-def partings(
-    knowledge: RobotBelief, found: Identification, pairs: Sequence[CorrelatedPair]
+def decorrelating_poses(
+    belief: RobotBelief, found: Identification, pairs: Sequence[CorrelatedPair]
 ) -> tuple[DecorrelatingPose | None, ...]:
     """For each pair the record that lowers its correlation most; none where no record does.
 
     Records are within the limits and surely inside the gauges' travel.
     """
     names = found.problem.mechanism.convention.free_names()
-    trials = list(_trials(knowledge, found)) if pairs else []
+    trials = list(_trials(belief, found)) if pairs else []
     return tuple(_best(trials, (names.index(pair.first), names.index(pair.second)), pair) for pair in pairs)
 
 
@@ -89,17 +89,17 @@ class _Trials:
         return DecorrelatingPose(self.point, "xyz"[axis], float(turn[axis]), command, correlation)
 
 
-def _trials(knowledge: RobotBelief, found: Identification) -> Iterator[_Trials]:
+def _trials(belief: RobotBelief, found: Identification) -> Iterator[_Trials]:
     """What could be measured at each point, or at some of very many."""
     problem = found.problem
     ends = np.append(problem.first_rows[1:], problem.records)
     step = -(-problem.points // MOST_POINTS)
     for first, end in list(zip(problem.first_rows, ends, strict=True))[::step]:
         rows = slice(int(first), int(end))
-        at = station(knowledge, found.poses[rows], problem.joints[rows], problem.deviations[rows])
-        candidates = reachable(knowledge, PoseBatch.at(at.reference, _turns()))
+        at = estimate_gauge_zero(belief, found.poses[rows], problem.joints[rows], problem.deviations[rows])
+        candidates = reachable(belief, PoseBatch.at(at.reference, _turns()))
         if len(candidates):
-            yield _tried(knowledge, at, int(problem.labels[first, 0]), candidates)
+            yield _tried(belief, at, int(problem.labels[first, 0]), candidates)
 
 
 def _turns() -> Array:
@@ -108,13 +108,13 @@ def _turns() -> Array:
     return rotations.from_vector((angles[:, None, None] * np.eye(3)).reshape(-1, 3))
 
 
-def _tried(knowledge: RobotBelief, at: GaugeZero, point: int, candidates: Candidates) -> _Trials:
-    offered = predict_records(knowledge, at, ReachableTargets(candidates.targets, candidates.joints))
-    inside = SAFETY_SIGMAS * offered.sigma.max(axis=-1) <= TRAVEL_SHARE * knowledge.limits.gauge_travel_mm
-    crossing = offered.change @ knowledge.covariance
-    spread = crossing @ np.swapaxes(offered.change, -1, -2) + offered.noise
+def _tried(belief: RobotBelief, at: GaugeZero, point: int, candidates: Candidates) -> _Trials:
+    offered = predict_records(belief, at, ReachableTargets(candidates.targets, candidates.joints))
+    inside = SAFETY_SIGMAS * offered.sigma.max(axis=-1) <= TRAVEL_SHARE * belief.limits.gauge_travel_mm
+    crossing = offered.jacobian @ belief.covariance
+    spread = crossing @ np.swapaxes(offered.jacobian, -1, -2) + offered.covariance
     factors = np.linalg.solve(np.linalg.cholesky(spread), crossing)
-    return _Trials(point, candidates[inside], factors[inside], knowledge.covariance)
+    return _Trials(point, candidates[inside], factors[inside], belief.covariance)
 
 
 def _best(

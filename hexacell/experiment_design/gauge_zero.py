@@ -35,30 +35,30 @@ class GaugeZero:
     covariance: Array
 
     @property
-    def stand(self) -> ReachableTargets:
+    def target(self) -> ReachableTargets:
         """The reference, one of one."""
         return ReachableTargets(PoseBatch.at(self.reference, self.orientation[None]), self.joints[None])
 
-    def command(self, knowledge: RobotBelief) -> PoseBatch:
+    def command(self, belief: RobotBelief) -> PoseBatch:
         """The command, one of one, that led to the reference."""
-        return commands_for(knowledge, self.stand)[0]
+        return commands_for(belief, self.target)[0]
 
-    def mode(self, knowledge: RobotBelief) -> Array:
+    def mode(self, belief: RobotBelief) -> Array:
         """The assembly mode (1,) of the estimated robot at the reference."""
-        stand = self.stand
-        return assembly_mode(
-            pose_jacobian(knowledge.mechanism, knowledge.estimate, stand.targets, stand.joints)
-        )
+        stand = self.target
+        return assembly_mode(pose_jacobian(belief.mechanism, belief.estimate, stand.targets, stand.joints))
 
 
-def station(knowledge: RobotBelief, poses: PoseBatch, joints: Array, deviations: Array) -> GaugeZero:
+def estimate_gauge_zero(
+    belief: RobotBelief, poses: PoseBatch, joints: Array, deviations: Array
+) -> GaugeZero:
     """The station of a point's records so far (n): their poses under the estimate, the first at zero.
 
     Raises:
         LimitError: all of them stand at a singularity, where nothing can be said.
     """
-    jacobian, by_joints = position_derivatives(knowledge, ReachableTargets(poses, joints))
-    weights = record_weights(by_joints, knowledge.noise)
+    jacobian, by_joints = position_derivatives(belief, ReachableTargets(poses, joints))
+    weights = record_weights(by_joints, belief.noise)
     try:
         covariance = np.linalg.inv(weights.sum(axis=0))
     except np.linalg.LinAlgError:
@@ -68,9 +68,9 @@ def station(knowledge: RobotBelief, poses: PoseBatch, joints: Array, deviations:
     return GaugeZero(reference, poses.rotations[0], joints[0], mean, covariance)
 
 
-def position_derivatives(knowledge: RobotBelief, stands: ReachableTargets) -> tuple[Array, Array]:
+def position_derivatives(belief: RobotBelief, stands: ReachableTargets) -> tuple[Array, Array]:
     """Of the ball's position at n poses: (n, 3, p) by the free parameters, (n, 3, 6) by the joints."""
     by_parameters, by_joints = position_sensitivity(
-        knowledge.mechanism, knowledge.estimate, stands.targets, stands.joints
+        belief.mechanism, belief.estimate, stands.targets, stands.joints
     )
-    return by_parameters @ knowledge.basis, by_joints
+    return by_parameters @ belief.basis, by_joints

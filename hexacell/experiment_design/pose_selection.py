@@ -60,13 +60,13 @@ class SelectedPose:
     deviation: Array
     sigma: Array
     gain: float
-    change: Array
-    noise: Array
+    jacobian: Array
+    covariance: Array
     stops: tuple[Pose, ...] = ()
 
 
 def select_pose(
-    knowledge: RobotBelief,
+    belief: RobotBelief,
     at: GaugeZero,
     turns: Array,
     start: PoseBatch | None = None,
@@ -84,23 +84,23 @@ def select_pose(
         LimitError: none of them is reachable within the limits and surely inside the travel.
     """
     targets = PoseBatch.at(at.reference, turns @ at.orientation)
-    offered = predict_records(knowledge, at, reachable_targets(knowledge, targets, at.mode(knowledge)))
+    offered = predict_records(belief, at, reachable_targets(belief, targets, at.mode(belief)))
     if not len(offered):
         raise LimitError("no orientation is within reach, joint range, tilt limit and singularity margin")
-    worth = goal.gain(knowledge.covariance, offered.change, offered.noise)
-    rows = np.flatnonzero(offered.within(TRAVEL_SHARE * knowledge.limits.gauge_travel_mm))
-    leave = PathPlanner(knowledge, at.command(knowledge) if start is None else start, home, at.reference)
+    worth = goal.gain(belief.covariance, offered.jacobian, offered.covariance)
+    rows = np.flatnonzero(offered.within(TRAVEL_SHARE * belief.limits.gauge_travel_mm))
+    leave = PathPlanner(belief, at.command(belief) if start is None else start, home, at.reference)
     for some in _in_portions(rows[np.argsort(-worth[rows], kind="stable")][:MOST], COMMANDED):
-        commands, held = commands_for(knowledge, offered.actual_poses[some])
+        commands, held = commands_for(belief, offered.targets[some])
         for few in _in_portions(np.flatnonzero(held), AT_ONCE):
             tried = some[few]
-            if choice := _first_safe(knowledge, at, offered[tried], commands[few], worth[tried], leave):
+            if choice := _first_safe(belief, at, offered[tried], commands[few], worth[tried], leave):
                 return choice
     raise LimitError("no orientation surely keeps the ball inside the gauges' travel")
 
 
 def select_from_list(
-    knowledge: RobotBelief,
+    belief: RobotBelief,
     at: GaugeZero,
     commands: PoseBatch,
     start: PoseBatch | None = None,
@@ -113,13 +113,13 @@ def select_from_list(
     Raises:
         LimitError: none of them does.
     """
-    stands, rows = outcomes_of(knowledge, commands)
-    offered = predict_records(knowledge, at, stands)
-    inside = offered.within(TRAVEL_SHARE * knowledge.limits.gauge_travel_mm)
+    stands, rows = outcomes_of(belief, commands)
+    offered = predict_records(belief, at, stands)
+    inside = offered.within(TRAVEL_SHARE * belief.limits.gauge_travel_mm)
     kept = np.flatnonzero(inside)[passed_over:]
-    leave = PathPlanner(knowledge, at.command(knowledge) if start is None else start, home, at.reference)
+    leave = PathPlanner(belief, at.command(belief) if start is None else start, home, at.reference)
     alike = np.full(len(kept), np.inf)
-    choice = _first_safe(knowledge, at, offered[kept], commands[rows[kept]], alike, leave)
+    choice = _first_safe(belief, at, offered[kept], commands[rows[kept]], alike, leave)
     if choice is None:
         raise LimitError(
             "none of the poses left in the list surely keeps the ball inside the gauges' travel"
@@ -128,7 +128,7 @@ def select_from_list(
 
 
 def _first_safe(
-    knowledge: RobotBelief,
+    belief: RobotBelief,
     at: GaugeZero,
     offered: PredictedRecords,
     commands: PoseBatch,
@@ -142,11 +142,11 @@ def _first_safe(
     """
     if not len(offered):
         return None
-    ways, every = leave.ways(commands), _safe(knowledge, at, offered)
+    ways, every = leave.ways(commands), _safe(belief, at, offered)
 
     def first(manner: SelectionOptions, rows: Rows) -> tuple[int, Path] | None:
         found = zip(rows.tolist(), manner(rows), strict=True)
-        return next(((row, way) for row, way in found if way and _stays_inside(knowledge, at, way)), None)
+        return next(((row, way) for row, way in found if way and _stays_inside(belief, at, way)), None)
 
     best = first(ways.straight, every)
     better = every
@@ -157,50 +157,50 @@ def _first_safe(
     if best is None:
         return None
     row, way = best
-    return _choice(knowledge, offered[np.array([row])], commands.pose(row), way.stops)
+    return _choice(belief, offered[np.array([row])], commands.pose(row), way.stops)
 
 
-def _safe(knowledge: RobotBelief, at: GaugeZero, offered: PredictedRecords) -> Rows:
+def _safe(belief: RobotBelief, at: GaugeZero, offered: PredictedRecords) -> Rows:
     """Which of some poses keep the ball inside; asked together they cost less than each on its way."""
-    safe = _near(knowledge, at, offered)
+    safe = _near(belief, at, offered)
     if not safe.all():
-        safe[~safe] = _surely_inside(knowledge, at, offered.actual_poses[~safe])
+        safe[~safe] = _surely_inside(belief, at, offered.targets[~safe])
     return np.flatnonzero(safe)
 
 
-def _stays_inside(knowledge: RobotBelief, at: GaugeZero, way: Path) -> bool:
+def _stays_inside(belief: RobotBelief, at: GaugeZero, way: Path) -> bool:
     """Whether the ball surely does on a way.
 
     Every other pose is looked at; from one to the next little changes.
     """
     stands = ReachableTargets(way.poses[slice(None, None, -2)], way.joints[::-2])
-    near = _near(knowledge, at, predict_records(knowledge, at, stands))
-    return bool(near.all() or _surely_inside(knowledge, at, stands[~near]).all())
+    near = _near(belief, at, predict_records(belief, at, stands))
+    return bool(near.all() or _surely_inside(belief, at, stands[~near]).all())
 
 
-def _near(knowledge: RobotBelief, at: GaugeZero, offered: PredictedRecords) -> Mask:
+def _near(belief: RobotBelief, at: GaugeZero, offered: PredictedRecords) -> Mask:
     """Which poses need no closer look: straight propagation says near, and holds nearby."""
-    is_known = travel_monte_carlo.orientation_sigma(knowledge, at.stand) <= travel_monte_carlo.LITTLE_KNOWN
-    near: Mask = offered.within(NEAR_SHARE * knowledge.limits.gauge_travel_mm) & is_known
+    is_known = travel_monte_carlo.orientation_sigma(belief, at.target) <= travel_monte_carlo.LITTLE_KNOWN
+    near: Mask = offered.within(NEAR_SHARE * belief.limits.gauge_travel_mm) & is_known
     return near
 
 
-def _surely_inside(knowledge: RobotBelief, at: GaugeZero, stands: ReachableTargets) -> Mask:
+def _surely_inside(belief: RobotBelief, at: GaugeZero, stands: ReachableTargets) -> Mask:
     """Which poses keep the ball inside the travel where straight error propagation may not hold."""
-    return travel_monte_carlo.stays_in_travel(knowledge, at.joints, at.stand.targets, stands)
+    return travel_monte_carlo.stays_in_travel(belief, at.joints, at.target.targets, stands)
 
 
 def _choice(
-    knowledge: RobotBelief, one: PredictedRecords, command: Pose, stops: tuple[Pose, ...]
+    belief: RobotBelief, one: PredictedRecords, command: Pose, stops: tuple[Pose, ...]
 ) -> SelectedPose:
     return SelectedPose(
         command=command,
-        joints=one.actual_poses.joints[0],
+        joints=one.targets.joints[0],
         deviation=one.deviation[0],
         sigma=one.sigma[0],
-        gain=float(D_OPTIMAL.gain(knowledge.covariance, one.change, one.noise)[0]),
-        change=one.change[0],
-        noise=one.noise[0],
+        gain=float(D_OPTIMAL.gain(belief.covariance, one.jacobian, one.covariance)[0]),
+        jacobian=one.jacobian[0],
+        covariance=one.covariance[0],
         stops=stops,
     )
 

@@ -29,20 +29,20 @@ class PredictedRecords:
         deviation: expected (n, 3), mm, and its ``sigma`` (n, 3), mm.
     """
 
-    actual_poses: ReachableTargets
-    change: Array
-    noise: Array
+    targets: ReachableTargets
+    jacobian: Array
+    covariance: Array
     deviation: Array
     sigma: Array
 
     def __len__(self) -> int:
-        return len(self.actual_poses)
+        return len(self.targets)
 
     def __getitem__(self, rows: Mask | NDArray[np.intp]) -> PredictedRecords:
         return PredictedRecords(
-            self.actual_poses[rows],
-            self.change[rows],
-            self.noise[rows],
+            self.targets[rows],
+            self.jacobian[rows],
+            self.covariance[rows],
             self.deviation[rows],
             self.sigma[rows],
         )
@@ -54,11 +54,11 @@ class PredictedRecords:
         return within
 
 
-def predict_records(knowledge: RobotBelief, at: GaugeZero, stands: ReachableTargets) -> PredictedRecords:
+def predict_records(belief: RobotBelief, at: GaugeZero, stands: ReachableTargets) -> PredictedRecords:
     """The records of some poses, by straight error propagation."""
-    jacobian, by_joints = position_derivatives(knowledge, stands)
-    noise = record_covariance(by_joints, knowledge.noise) + at.covariance
+    jacobian, by_joints = position_derivatives(belief, stands)
+    noise = record_covariance(by_joints, belief.noise) + at.covariance
     change = jacobian - at.jacobian
-    spread = change @ knowledge.covariance @ np.swapaxes(change, -1, -2) + noise
+    spread = change @ belief.covariance @ np.swapaxes(change, -1, -2) + noise
     sigma = np.sqrt(np.diagonal(spread, axis1=-2, axis2=-1))
     return PredictedRecords(stands, change, noise, stands.targets.positions - at.reference, sigma)

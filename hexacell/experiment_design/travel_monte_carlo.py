@@ -45,7 +45,7 @@ known, the heavier the tails are."""
 
 
 def stays_in_travel(
-    knowledge: RobotBelief, reference_joints: Array, reference: PoseBatch, stands: ReachableTargets
+    belief: RobotBelief, reference_joints: Array, reference: PoseBatch, stands: ReachableTargets
 ) -> Mask:
     """Which of n poses keep the ball inside the travel on every robot that may be the true one.
 
@@ -58,30 +58,30 @@ def stays_in_travel(
         np.concatenate([reference.rotations, stands.targets.rotations]),
     )
     # The reference is where the records of its point say it was, which is not quite where it closes.
-    poses = forward_kinematics(knowledge.mechanism, knowledge.estimate, joints, poses).poses
-    known = pose_sensitivity(knowledge.mechanism, knowledge.estimate, poses, joints)
-    turn = _turn_sigma(knowledge, known)
+    poses = forward_kinematics(belief.mechanism, belief.estimate, joints, poses).poses
+    known = pose_sensitivity(belief.mechanism, belief.estimate, poses, joints)
+    turn = _turn_sigma(belief, known)
     if turn > LITTLE_KNOWN:
-        return _nearly_all_near(_drawn(knowledge, MANY_ROBOTS, joints, poses, known), knowledge)
-    drawn = _drawn(knowledge, ROBOTS, joints, poses, known)
+        return _nearly_all_near(_drawn(belief, MANY_ROBOTS, joints, poses, known), belief)
+    drawn = _drawn(belief, ROBOTS, joints, poses, known)
     stays: Mask = np.all(drawn.found, axis=0)
-    travel = knowledge.limits.gauge_travel_mm / (1.0 + turn / HALF_AT)
+    travel = belief.limits.gauge_travel_mm / (1.0 + turn / HALF_AT)
     stays &= _all_inside(drawn.deviations, travel)
     return stays
 
 
-def orientation_sigma(knowledge: RobotBelief, stands: ReachableTargets) -> float:
+def orientation_sigma(belief: RobotBelief, stands: ReachableTargets) -> float:
     """How surely the platform's orientation is known at the first of some poses: one sigma, rad.
 
     About the base axis about which it is known least.
     """
-    known = pose_sensitivity(knowledge.mechanism, knowledge.estimate, stands.targets, stands.joints)
-    return _turn_sigma(knowledge, known)
+    known = pose_sensitivity(belief.mechanism, belief.estimate, stands.targets, stands.joints)
+    return _turn_sigma(belief, known)
 
 
-def _turn_sigma(knowledge: RobotBelief, known: Sensitivity) -> float:
-    turned = known.parameters[0, 3:] @ knowledge.basis
-    return float(np.sqrt(np.einsum("ip,pq,iq->i", turned, knowledge.covariance, turned).max()))
+def _turn_sigma(belief: RobotBelief, known: Sensitivity) -> float:
+    turned = known.parameters[0, 3:] @ belief.basis
+    return float(np.sqrt(np.einsum("ip,pq,iq->i", turned, belief.covariance, turned).max()))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -96,18 +96,16 @@ class _Drawn:
     deviations: Array
 
 
-def _drawn(
-    knowledge: RobotBelief, robots: int, joints: Array, poses: PoseBatch, known: Sensitivity
-) -> _Drawn:
+def _drawn(belief: RobotBelief, robots: int, joints: Array, poses: PoseBatch, known: Sensitivity) -> _Drawn:
     """Where robots drawn from what is known stand; the first of the poses is the reference."""
-    root = np.linalg.cholesky(knowledge.covariance)
-    changes = _draws(robots, len(knowledge.free)) @ root.T @ knowledge.basis.T
+    root = np.linalg.cholesky(belief.covariance)
+    changes = _draws(robots, len(belief.free)) @ root.T @ belief.basis.T
     count = len(joints)
     steps = np.einsum("nip,rp->rni", known.parameters, changes).reshape(-1, 6)
     again = np.tile(np.arange(count), robots)
-    geometries = GeometryBatch.from_vectors((knowledge.estimate.vector() + changes).repeat(count, axis=0))
+    geometries = GeometryBatch.from_vectors((belief.estimate.vector() + changes).repeat(count, axis=0))
     result = forward_kinematics(
-        knowledge.mechanism,
+        belief.mechanism,
         geometries,
         joints[again],
         apply_twist(poses[again], steps),
@@ -117,29 +115,29 @@ def _drawn(
     first = np.arange(robots) * count
     # One that would stand next to a singularity there is refused before anything moves.
     stands = found[:, 0] & has_singularity_margin(
-        knowledge.mechanism,
+        belief.mechanism,
         geometries[first],
         result.poses[first],
         joints[np.zeros(robots, dtype=int)],
-        knowledge.limits.singularity_margin,
+        belief.limits.singularity_margin,
     )
     found &= has_singularity_margin(
-        knowledge.mechanism,
+        belief.mechanism,
         geometries,
         result.poses,
         joints[again],
-        DRAWN_MARGIN_SHARE * knowledge.limits.singularity_margin,
+        DRAWN_MARGIN_SHARE * belief.limits.singularity_margin,
     ).reshape(robots, count)
     positions = result.poses.positions.reshape(robots, count, 3)[stands]
     return _Drawn(found[stands, 1:], positions[:, 1:] - positions[:, :1])
 
 
-def _nearly_all_near(drawn: _Drawn, knowledge: RobotBelief) -> Mask:
+def _nearly_all_near(drawn: _Drawn, belief: RobotBelief) -> Mask:
     """Which of the poses all robots but the worst take without straying far."""
     if len(drawn.found) < FEWEST:
         return np.zeros(drawn.found.shape[1], dtype=bool)
     farthest = np.where(drawn.found, np.abs(drawn.deviations).max(axis=-1), np.inf)
-    near: Mask = np.sort(farthest, axis=0)[-2] <= NEARLY_ALL_SHARE * knowledge.limits.gauge_travel_mm
+    near: Mask = np.sort(farthest, axis=0)[-2] <= NEARLY_ALL_SHARE * belief.limits.gauge_travel_mm
     return near
 
 

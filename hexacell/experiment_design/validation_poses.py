@@ -26,8 +26,8 @@ SAFETY_SIGMAS = 3.0
 tilts too small would judge too kindly."""
 
 
-def choose_held_out(
-    knowledge: RobotBelief, point: Array, count: int, orientations: Array, used: Array | None = None
+def select_validation_poses(
+    belief: RobotBelief, point: Array, count: int, orientations: Array, used: Array | None = None
 ) -> PoseBatch:
     """``count`` poses at a point (3,), mm, the first of them untilted.
 
@@ -40,16 +40,16 @@ def choose_held_out(
         LimitError: too few of them do.
     """
     poses = PoseBatch.at(point, np.concatenate([np.eye(3)[None], orientations]))
-    joints = knowledge.mechanism.inverse(knowledge.controller, knowledge.branch, poses)
-    usable = np.flatnonzero(within_limits(knowledge.limits, poses, joints) & _after(knowledge, poses))
+    joints = belief.mechanism.inverse(belief.controller, belief.branch, poses)
+    usable = np.flatnonzero(within_limits(belief.limits, poses, joints) & _after(belief, poses))
     if not len(usable) or usable[0] != 0:
         raise LimitError(f"the untilted platform cannot stand at {poses.pose(0)} within the limits")
-    really, inside = _inside_travel(knowledge, poses[usable], joints[usable])
+    really, inside = _inside_travel(belief, poses[usable], joints[usable])
     if not inside[0]:
         raise LimitError(f"where the robot really goes for {poses.pose(0)} cannot be told")
     kept = poses[usable[inside]]
     stands = really.rotations[inside]
-    taken = _farthest_apart(knowledge, kept, stands, _nearest(stands, used), count)
+    taken = _farthest_apart(belief, kept, stands, _nearest(stands, used), count)
     if len(taken) < count:
         raise LimitError(
             f"only {len(taken)} orientations at {poses.pose(0)} keep the ball inside the travel"
@@ -57,33 +57,33 @@ def choose_held_out(
     return kept[taken]
 
 
-def _after(knowledge: RobotBelief, poses: PoseBatch) -> Mask:
+def _after(belief: RobotBelief, poses: PoseBatch) -> Mask:
     """Which poses the estimated geometry can take within the limits."""
-    joints = knowledge.mechanism.inverse(knowledge.estimate, knowledge.branch, poses)
-    fits = within_limits(knowledge.limits, poses, joints)
+    joints = belief.mechanism.inverse(belief.estimate, belief.branch, poses)
+    fits = within_limits(belief.limits, poses, joints)
     rows = np.flatnonzero(fits)
-    margin = singularity_margin(knowledge.mechanism, knowledge.estimate, poses[rows], joints[rows])
-    fits[rows] &= margin >= knowledge.limits.singularity_margin
+    margin = singularity_margin(belief.mechanism, belief.estimate, poses[rows], joints[rows])
+    fits[rows] &= margin >= belief.limits.singularity_margin
     return fits
 
 
-def _inside_travel(knowledge: RobotBelief, poses: PoseBatch, joints: Array) -> tuple[PoseBatch, Mask]:
+def _inside_travel(belief: RobotBelief, poses: PoseBatch, joints: Array) -> tuple[PoseBatch, Mask]:
     """Where the uncorrected robot goes; is it surely inside the travel of gauges zeroed at the first."""
     really = continue_solution(
-        knowledge.mechanism,
-        knowledge.estimate,
+        belief.mechanism,
+        belief.estimate,
         joints,
         start=poses,
-        start_geometry=knowledge.controller,
+        start_geometry=belief.controller,
         start_joints=joints,
     )
-    sensitivity = pose_sensitivity(knowledge.mechanism, knowledge.estimate, really.poses, joints)
-    jacobian = sensitivity.parameters[:, :3] @ knowledge.basis
+    sensitivity = pose_sensitivity(belief.mechanism, belief.estimate, really.poses, joints)
+    jacobian = sensitivity.parameters[:, :3] @ belief.basis
     change = jacobian - jacobian[0]
-    spread = change @ knowledge.covariance @ np.swapaxes(change, -1, -2)
-    sigma = np.sqrt(np.diagonal(spread, axis1=-2, axis2=-1) + 2.0 * knowledge.noise.gauge_mm**2)
+    spread = change @ belief.covariance @ np.swapaxes(change, -1, -2)
+    sigma = np.sqrt(np.diagonal(spread, axis1=-2, axis2=-1) + 2.0 * belief.noise.gauge_mm**2)
     deviation = really.poses.positions - really.poses.positions[0]
-    limit = TRAVEL_SHARE * knowledge.limits.gauge_travel_mm
+    limit = TRAVEL_SHARE * belief.limits.gauge_travel_mm
     inside: Mask = (np.abs(deviation) + SAFETY_SIGMAS * sigma <= limit).all(axis=-1)
     inside &= really.found
     inside[0] = really.found[0]
@@ -104,7 +104,7 @@ def _angles(stands: Array, other: Array) -> Array:
 
 
 def _farthest_apart(
-    knowledge: RobotBelief, poses: PoseBatch, stands: Array, apart: Array, count: int
+    belief: RobotBelief, poses: PoseBatch, stands: Array, apart: Array, count: int
 ) -> list[int]:
     """Rows of poses from the first on, each next one farthest from those taken, a clear way ahead.
 
@@ -116,7 +116,7 @@ def _farthest_apart(
     while len(taken) < count:
         apart = np.minimum(apart, _angles(stands, stands[taken[-1]]))
         best = int(np.argmax(apart))
-        while apart[best] > 0.0 and not _ways_clear(knowledge, poses, (taken[-1], best, 0)):
+        while apart[best] > 0.0 and not _ways_clear(belief, poses, (taken[-1], best, 0)):
             apart[best] = 0.0
             best = int(np.argmax(apart))
         if apart[best] <= 0.0:
@@ -125,22 +125,20 @@ def _farthest_apart(
     return taken
 
 
-def _ways_clear(knowledge: RobotBelief, poses: PoseBatch, rows: tuple[int, ...]) -> bool:
-    reference = _zeroed(knowledge, poses[[0]])
-    return all(
-        is_clear(knowledge, poses[[start]], poses[[end]], reference) for start, end in pairwise(rows)
-    )
+def _ways_clear(belief: RobotBelief, poses: PoseBatch, rows: tuple[int, ...]) -> bool:
+    reference = _zeroed(belief, poses[[0]])
+    return all(is_clear(belief, poses[[start]], poses[[end]], reference) for start, end in pairwise(rows))
 
 
-def _zeroed(knowledge: RobotBelief, first: PoseBatch) -> Array:
+def _zeroed(belief: RobotBelief, first: PoseBatch) -> Array:
     """Where the uncorrected robot really takes the ball (3,), mm, for the pose that zeroes the gauges."""
-    joints = knowledge.mechanism.inverse(knowledge.controller, knowledge.branch, first)
+    joints = belief.mechanism.inverse(belief.controller, belief.branch, first)
     really = continue_solution(
-        knowledge.mechanism,
-        knowledge.estimate,
+        belief.mechanism,
+        belief.estimate,
         joints,
         start=first,
-        start_geometry=knowledge.controller,
+        start_geometry=belief.controller,
         start_joints=joints,
     )
     ball: Array = really.poses.positions[0]

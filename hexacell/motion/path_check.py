@@ -36,27 +36,25 @@ class StartState:
     actual: PoseBatch | None
 
 
-def beginning(knowledge: RobotBelief, command: PoseBatch) -> StartState:
+def start_state(belief: RobotBelief, command: PoseBatch) -> StartState:
     """Where the estimated robot is, being told to be at a command (1)."""
-    joints = knowledge.mechanism.inverse(knowledge.controller, knowledge.branch, command)
+    joints = belief.mechanism.inverse(belief.controller, belief.branch, command)
     if np.isnan(joints).any():
         return StartState(command, None)
     found = continue_solution(
-        knowledge.mechanism,
-        knowledge.estimate,
+        belief.mechanism,
+        belief.estimate,
         joints,
         start=command,
-        start_geometry=knowledge.controller,
+        start_geometry=belief.controller,
         start_joints=joints,
     )
     return StartState(command, found.poses if found.found[0] else None)
 
 
-def is_clear(
-    knowledge: RobotBelief, start: PoseBatch, end: PoseBatch, reference: Array | None = None
-) -> bool:
+def is_clear(belief: RobotBelief, start: PoseBatch, end: PoseBatch, reference: Array | None = None) -> bool:
     """Whether the straight line between two commands keeps to the limits; see :func:`check_lines`."""
-    return bool(check_lines(knowledge, beginning(knowledge, start), end, reference).clear[0])
+    return bool(check_lines(belief, start_state(belief, start), end, reference).is_clear[0])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -75,17 +73,17 @@ class CheckedLines:
     commands: LineBatch
     joints: Array
     actual: LineBatch
-    open: Mask
+    is_open: Mask
     farthest: Array
-    clear: Mask
+    is_clear: Mask
 
-    def way(self, row: int) -> tuple[PoseBatch, Array]:
+    def traced(self, row: int) -> tuple[PoseBatch, Array]:
         """The poses on one of the lines after its beginning, and their joint variables."""
         return self.actual.lines(np.array([row])).flat()[1:], self.joints[1:, row]
 
 
 def check_lines(
-    knowledge: RobotBelief,
+    belief: RobotBelief,
     start: StartState,
     ends: PoseBatch,
     reference: Array | None = None,
@@ -99,16 +97,16 @@ def check_lines(
     and by the estimated one. With the gauges at a ``reference`` (3,), mm, the ball stays inside their
     travel. One line in fifty is wrongly not clear unless the search is ``thorough``.
     """
-    limits = knowledge.limits
-    closely = LineBatch.over((start.command, *stops, ends), FINER)
-    sliders = knowledge.mechanism.inverse(knowledge.controller, knowledge.branch, closely.flat())
+    limits = belief.limits
+    closely = LineBatch.through((start.command, *stops, ends), FINER)
+    sliders = belief.mechanism.inverse(belief.controller, belief.branch, closely.flat())
     sliders = sliders.reshape(*closely.shape, 6)
     in_range = (sliders >= limits.joint_min_mm) & (sliders <= limits.joint_max_mm)
     rows = np.flatnonzero(in_range.all(axis=(0, 2)))
     commands, joints = closely[::FINER], sliders[::FINER]
-    rows = rows[_clear_of_singularities(knowledge, knowledge.controller, commands, joints, rows)]
-    really, rows = _followed(knowledge, start, commands, joints, rows, thorough=thorough)
-    rows = rows[_clear_of_singularities(knowledge, knowledge.estimate, really, joints, rows)]
+    rows = rows[_clear_of_singularities(belief, belief.controller, commands, joints, rows)]
+    really, rows = _followed(belief, start, commands, joints, rows, thorough=thorough)
+    rows = rows[_clear_of_singularities(belief, belief.estimate, really, joints, rows)]
     is_open, farthest = np.zeros(len(ends), dtype=bool), np.zeros(len(ends))
     is_open[rows] = True
     if reference is not None:
@@ -118,20 +116,20 @@ def check_lines(
 
 
 def _clear_of_singularities(
-    knowledge: RobotBelief, geometry: Geometry, ways: LineBatch, joints: Array, rows: NDArray[np.intp]
+    belief: RobotBelief, geometry: Geometry, ways: LineBatch, joints: Array, rows: NDArray[np.intp]
 ) -> Mask:
     """Which of some lines a robot with this geometry goes clear of singularities."""
-    arguments = (knowledge.mechanism, geometry, ways.lines(rows).flat(), joints[:, rows].reshape(-1, 6))
+    arguments = (belief.mechanism, geometry, ways.lines(rows).flat(), joints[:, rows].reshape(-1, 6))
     shape = (len(joints), len(rows))
     # Between two of the poses looked at a singularity may lie unseen; beyond it the mode is another.
-    least = MARGIN_SHARE * knowledge.limits.singularity_margin
+    least = MARGIN_SHARE * belief.limits.singularity_margin
     keeps, mode = (found.reshape(shape) for found in margin_and_mode(*arguments, least))
     clear: Mask = np.all(keeps & (mode == mode[:1]), axis=0)
     return clear
 
 
 def _followed(
-    knowledge: RobotBelief,
+    belief: RobotBelief,
     start: StartState,
     ways: LineBatch,
     joints: Array,
@@ -143,8 +141,8 @@ def _followed(
     if start.actual is None or not len(rows):
         return ways, rows[:0]
     went = trace_path(
-        knowledge.mechanism,
-        knowledge.estimate,
+        belief.mechanism,
+        belief.estimate,
         ways.lines(rows),
         joints[:, rows],
         start.actual,

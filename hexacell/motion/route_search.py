@@ -10,11 +10,11 @@ import numpy as np
 from hexacell.identification.belief import RobotBelief
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array
-from hexacell.motion.path_check import beginning, is_clear
+from hexacell.motion.path_check import is_clear, start_state
 
 
-def route(
-    knowledge: RobotBelief,
+def find_route(
+    belief: RobotBelief,
     start: PoseBatch,
     goal: PoseBatch,
     via: Sequence[PoseBatch],
@@ -27,14 +27,14 @@ def route(
     """
 
     def clear(one: PoseBatch, other: PoseBatch) -> bool:
-        return is_clear(knowledge, one, other, reference)
+        return is_clear(belief, one, other, reference)
 
     return _fewest(start, goal, via, clear)
 
 
-def ball_at(knowledge: RobotBelief, command: PoseBatch) -> Array | None:
+def ball_position(belief: RobotBelief, command: PoseBatch) -> Array | None:
     """Where the estimate says the ball is (3,), mm, at a commanded pose; nothing if it cannot say."""
-    really = beginning(knowledge, command).actual
+    really = start_state(belief, command).actual
     return None if really is None else np.asarray(really.positions[0])
 
 

@@ -54,19 +54,21 @@ class LineBatch:
     rotations: Array
 
     @classmethod
-    def of(cls, poses: PoseBatch, count: int) -> LineBatch:
+    def from_poses(cls, poses: PoseBatch, count: int) -> LineBatch:
         """Of poses that come piece by piece."""
         return cls(poses.positions.reshape(-1, count, 3), poses.rotations.reshape(-1, count, 3, 3))
 
     @classmethod
-    def over(cls, stops: Sequence[PoseBatch], times: int = 1) -> LineBatch:
+    def through(cls, stops: Sequence[PoseBatch], times: int = 1) -> LineBatch:
         """From stop to stop, of which there are one or n at a time, by straight lines.
 
         In so many ``times`` the pieces that these lines have as a rule.
         """
         pieces = times * (PIECES if len(stops) == 2 else PIECES_BETWEEN_STOPS)
         count = len(stops[-1])
-        parts = [cls.of(interpolate_line(here, there, pieces), count) for here, there in pairwise(stops)]
+        parts = [
+            cls.from_poses(interpolate_line(here, there, pieces), count) for here, there in pairwise(stops)
+        ]
         return cls(
             np.concatenate([parts[0].positions[:1], *(part.positions[1:] for part in parts)]),
             np.concatenate([parts[0].rotations[:1], *(part.rotations[1:] for part in parts)]),
@@ -126,7 +128,7 @@ def trace_path(
     """
     jacobian = pose_jacobian(mechanism, geometry, here, joints[0, :1])
     robot = _Robot(mechanism, geometry, assembly_mode(jacobian))
-    begin = _carried(commands[:1], commands, LineBatch.of(here, 1))
+    begin = _carried(commands[:1], commands, LineBatch.from_poses(here, 1))
     found, reached = robot.found(joints, begin)
     sure: Mask = np.all(reached, axis=0)
     jumping = np.flatnonzero(sure & _jumps(commands, found))
@@ -161,7 +163,7 @@ class _Robot:
             mode=self.mode.repeat(shape[0] * shape[1]),
             close_mm=CLOSE_MM,
         )
-        return LineBatch.of(result.poses, shape[1]), result.found.reshape(shape)
+        return LineBatch.from_poses(result.poses, shape[1]), result.found.reshape(shape)
 
     def confirmed(self, joints: Array, commands: LineBatch, poses: LineBatch) -> Mask:
         """On which lines (n,) each pose is found from the one before."""
@@ -194,7 +196,7 @@ def _step_by_step(
 ) -> tuple[LineBatch, Mask]:
     really = LineBatch(commands.positions.copy(), commands.rotations.copy())
     rows = np.arange(joints.shape[1])
-    start = LineBatch.of(here[np.zeros(len(rows), dtype=int)], len(rows))
+    start = LineBatch.from_poses(here[np.zeros(len(rows), dtype=int)], len(rows))
     for piece in range(len(joints)):
         found, went = robot.found(joints[[piece]][:, rows], start)
         # What cannot be followed is not led on: it would cost more than all the others.

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from hexacell.identification.belief import RobotBelief
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.rotations import Array
-from hexacell.motion.path_check import CheckedLines, StartState, beginning, check_lines
+from hexacell.motion.path_check import CheckedLines, StartState, check_lines, start_state
 from hexacell.motion.trajectory import PIECES
 
 Rows = NDArray[np.intp]
@@ -66,7 +66,7 @@ class PathPlanner:
         reference: where the ball was when the gauges were zeroed (3,), mm.
     """
 
-    knowledge: RobotBelief
+    belief: RobotBelief
     start: PoseBatch
     home: PoseBatch | None
     reference: Array
@@ -82,14 +82,14 @@ class PathPlanner:
     @cached_property
     def beginning(self) -> StartState:
         """Where it leaves from."""
-        return beginning(self.knowledge, self.start)
+        return start_state(self.belief, self.start)
 
     @cached_property
     def from_home(self) -> PathPlanner | None:
         """Leaving the reference."""
         if self.home is None:
             return None
-        return PathPlanner(self.knowledge, self.home, None, self.reference)
+        return PathPlanner(self.belief, self.home, None, self.reference)
 
     @cached_property
     def back(self) -> Path | None:
@@ -110,7 +110,7 @@ class PathOptions:
 
     def via_waypoints(self, rows: Rows) -> Iterator[Path | None]:
         """Ways over stops; of straight ones that are not open nothing says where to give way."""
-        leading = np.flatnonzero(self._ahead.open[rows])
+        leading = np.flatnonzero(self._ahead.is_open[rows])
         if not len(leading):
             return iter([None] * len(rows))
         stops = tuple(self._giving_way(piece, rows[leading]) for piece in STOPS_AT)
@@ -145,9 +145,7 @@ class PathOptions:
 
     def _look_ahead(self, ends: PoseBatch, stops: tuple[PoseBatch, ...] = ()) -> CheckedLines:
         leave, thorough = self.departure, len(self.ends) == 1
-        return check_lines(
-            leave.knowledge, leave.beginning, ends, leave.reference, stops, thorough=thorough
-        )
+        return check_lines(leave.belief, leave.beginning, ends, leave.reference, stops, thorough=thorough)
 
     def _giving_way(self, piece: int, rows: Rows) -> PoseBatch:
         """Commands on some lines after so many pieces, less what the ball is off the reference there."""
@@ -159,8 +157,8 @@ class PathOptions:
 def _passages(ahead: CheckedLines, stops: tuple[PoseBatch, ...], rows: Rows) -> Iterator[Path | None]:
     """Some of n ways over n stops each; none where there is none, or the row is negative."""
     for row in rows.tolist():
-        if row < 0 or not ahead.clear[row]:
+        if row < 0 or not ahead.is_clear[row]:
             yield None
         else:
             over = tuple(stop.pose(row) for stop in stops)
-            yield Path(over, *ahead.way(row), float(ahead.farthest[row]))
+            yield Path(over, *ahead.traced(row), float(ahead.farthest[row]))

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from hexacell.cell.model import CellSettings
-from hexacell.experiment_design.decorrelation import DecorrelatingPose, partings
+from hexacell.experiment_design.decorrelation import DecorrelatingPose, decorrelating_poses
 from hexacell.experiment_design.workspace import workspace_poses
 from hexacell.identification.diagnostics.correlations import CorrelatedPair, strongly_correlated
 from hexacell.identification.diagnostics.pose_accuracy import Accuracy, predicted_accuracy
@@ -100,7 +100,7 @@ def _partings(
 ) -> tuple[DecorrelatingPose | None, ...]:
     return tuple(
         part and replace(part, command=robot.to_command(part.command))
-        for part in partings(robot.knowledge(found), found, pairs)
+        for part in decorrelating_poses(robot.belief(found), found, pairs)
     )
 
 
@@ -108,14 +108,14 @@ def _accuracy(
     settings: CellSettings, robot: Robot, found: Identification
 ) -> tuple[PoseBatch, Accuracy | None]:
     """The task poses in the convention's frames, and the accuracy there."""
-    knowledge = robot.knowledge(found)
+    belief = robot.belief(found)
     points = PoseBatch.of(Pose(*point) for point in settings.identification.points)
-    workspace = workspace_poses(knowledge, robot.change.poses(points).positions)
-    task = robot.change.poses(PoseBatch.of(Pose(*pose) for pose in settings.task.poses))
+    workspace = workspace_poses(belief, robot.frames.poses(points).positions)
+    task = robot.from_commands(Pose(*pose) for pose in settings.task.poses)
     task = task if len(task) else workspace
     accuracy = predicted_accuracy(
         found,
-        knowledge.controller,
+        belief.controller,
         robot.branch,
         task=task,
         workspace=workspace if len(workspace) else task,

@@ -18,7 +18,7 @@ from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.rotations import Array
 from hexacell.measurements.records import MeasurementSet, Record
-from hexacell.motion.route_search import route
+from hexacell.motion.route_search import find_route
 from hexacell.motion.waypoint_planner import PathPlanner
 from hexacell.robot_model import Robot
 from hexacell.virtual_robot.virtual_robot import StudiedMachine
@@ -44,12 +44,12 @@ class AdaptiveCampaign:
     largest_mm: float = 0.0
     reason: str = ""
     machine: StudiedMachine = field(init=False)
-    situation: CampaignState = field(init=False)
+    state: CampaignState = field(init=False)
 
     def __post_init__(self) -> None:
         self.machine = StudiedMachine(self.robot, self.truth)
-        self.situation = CampaignState()
-        self._plan = Plan(self.settings, self.robot, foretelling=False)
+        self.state = CampaignState()
+        self._plan = Plan(self.settings, self.robot, with_forecast=False)
         self._zero: Array = np.zeros(3)
         self._standing: Pose | None = None
         self._trail: list[Pose] = []
@@ -57,7 +57,7 @@ class AdaptiveCampaign:
     @property
     def measurements(self) -> MeasurementSet:
         """The records taken so far."""
-        return self.situation.measurements
+        return self.state.measurements
 
     def carry_out(self) -> None:
         """Measure all that the plan asks for.
@@ -74,7 +74,7 @@ class AdaptiveCampaign:
         Raises:
             HexacellError: it cannot be done.
         """
-        match self._plan.decide(self.situation):
+        match self._plan.decide(self.state):
             case StartPoint() as opening:
                 self._open(opening)
             case MeasurePose() as visit:
@@ -101,9 +101,7 @@ class AdaptiveCampaign:
         self.largest_mm = max(self.largest_mm, away)
         if away > self.robot.limits.gauge_travel_mm:
             self.outside += 1
-            self.situation = replace(
-                self.situation, present=visit.pose, refusals=self.situation.refusals + 1
-            )
+            self.state = replace(self.state, present=visit.pose, refusals=self.state.refusals + 1)
         else:
             self._take(visit.point, visit.orientation, visit.pose)
 
@@ -113,26 +111,24 @@ class AdaptiveCampaign:
         shown = self.machine.ball - self._zero + noise.gauge_mm * self.random.standard_normal(3)
         x, y, z = (float(value) for value in shown)
         record = Record(point, orientation, pose, joints_of(joints), (x, y, z))
-        records = (*self.situation.measurements.records, record)
-        self.situation = replace(
-            self.situation, measurements=MeasurementSet(records), point=point, present=pose
-        )
+        records = (*self.state.measurements.records, record)
+        self.state = replace(self.state, measurements=MeasurementSet(records), point=point, present=pose)
 
     def _close(self, point: int) -> None:
-        reference = self._plan.known(self.situation).station(point).reference
+        reference = self._plan.estimate(self.state).gauge_zero(point).reference
         self._back(reference)
-        done = self.situation.done | {point}
-        self.situation = CampaignState(self.situation.measurements, done=done)
-        if self.lend and not self.robot.lending and self._plan.may_lend(self.situation):
+        done = self.state.done | {point}
+        self.state = CampaignState(self.state.measurements, done=done)
+        if self.lend and not self.robot.uses_provisional and self._plan.allows_provisional(self.state):
             self._lend()
 
     def _lend(self) -> None:
-        known = self._plan.known(self.situation)
-        geometry = known.knowledge.estimate
+        known = self._plan.estimate(self.state)
+        geometry = known.belief.estimate
         self.machine.load(geometry)
         self._standing = self.robot.to_command(self.machine.believed)
-        self.robot = replace(self.robot, lent=(geometry,), lending=True)
-        self._plan = Plan(self.settings, self.robot, foretelling=False)
+        self.robot = replace(self.robot, provisional=(geometry,), uses_provisional=True)
+        self._plan = Plan(self.settings, self.robot, with_forecast=False)
 
     def _onward(self, goal: Pose) -> None:
         """To another point by lines that the estimate finds clear, over untilted poses if need be."""
@@ -140,8 +136,8 @@ class AdaptiveCampaign:
             return
         level = [replace(pose, a=0.0, b=0.0, c=0.0) for pose in (self._standing, goal)]
         held = [self._held(pose) for pose in level]
-        knowledge = self._plan.known(self.situation).knowledge
-        way = route(knowledge, self._held(self._standing), self._held(goal), held)
+        belief = self._plan.estimate(self.state).belief
+        way = find_route(belief, self._held(self._standing), self._held(goal), held)
         if way is None:
             raise LimitError(f"no safe way leads from {self._standing} to {goal}")
         for row in way:
@@ -150,9 +146,9 @@ class AdaptiveCampaign:
     def _back(self, reference: Array) -> None:
         """To the point's reference as straight as is safe, or else the way that the robot came."""
         start, *trail = reversed(self._trail)
-        knowledge = self._plan.known(self.situation).knowledge
+        belief = self._plan.estimate(self.state).belief
         home = self._held(self._trail[0])
-        (way,) = PathPlanner(knowledge, self._held(start), None, reference).to(home)
+        (way,) = PathPlanner(belief, self._held(start), None, reference).to(home)
         stops = trail if way is None else [self.robot.to_command(pose) for pose in way.stops]
         for pose in (*stops, self._trail[0]):
             self._go(pose)
@@ -165,4 +161,4 @@ class AdaptiveCampaign:
         self._trail = [*self._trail[:passed], pose]
 
     def _held(self, pose: Pose) -> PoseBatch:
-        return self.robot.change.poses(PoseBatch.of([pose]))
+        return self.robot.from_commands([pose])

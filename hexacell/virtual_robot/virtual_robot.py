@@ -36,7 +36,7 @@ def drawn_robots(robot: Robot, count: int, seed: int) -> list[Geometry]:
     names = convention.free_names()
     widths = tolerances.widths()[[PARAMETER_NAMES.index(name) for name in names]]
     of_ball = np.array([[name[0] == "B" and name[-1] == axis for name in names] for axis in "xyz"])
-    centre = convention.free_parameters(robot.knowledge().controller)
+    centre = convention.free_parameters(robot.belief().controller)
     as_drawn = np.abs(centre - convention.free_parameters(robot.prior.centre)).max() < AS_DRAWN_MM
     share = 1.0 if as_drawn else WORN
     drawn = []
@@ -71,14 +71,14 @@ class VirtualRobot:
         return float(margin[0]) if found[0] else 0.0
 
     def _gone(self, commands: PoseBatch) -> tuple[PoseBatch, Mask, Array]:
-        robot, knowledge = self.robot, self.robot.knowledge()
-        joints = robot.mechanism.inverse(knowledge.controller, robot.branch, commands)
+        robot, belief = self.robot, self.robot.belief()
+        joints = robot.mechanism.inverse(belief.controller, robot.branch, commands)
         really = continue_solution(
             robot.mechanism,
             self.truth,
             joints,
             start=commands,
-            start_geometry=knowledge.controller,
+            start_geometry=belief.controller,
             start_joints=joints,
         )
         margin = singularity_margin(robot.mechanism, self.truth, really.poses, joints)
@@ -95,12 +95,12 @@ class VirtualRobot:
             ReachError: it cannot stand there.
         """
         robot = self.robot
-        commands = robot.change.poses(PoseBatch.of([command]))
+        commands = robot.from_commands([command])
         poses, stands = self.actual_poses(commands)
         if not stands[0]:
             raise ReachError(f"this robot cannot stand at {command}")
-        joints = robot.mechanism.inverse(robot.knowledge().controller, robot.branch, commands)[0]
-        shown = robot.change.base.T @ poses.positions[0]
+        joints = robot.mechanism.inverse(robot.belief().controller, robot.branch, commands)[0]
+        shown = robot.frames.base.T @ poses.positions[0]
         shown = shown + robot.noise.gauge_mm * random.standard_normal(3)
         q1, q2, q3, q4, q5, q6 = (
             float(q) for q in joints + robot.noise.encoder_mm * random.standard_normal(6)
@@ -193,7 +193,11 @@ class StudiedMachine:
     def _travel(self, way: PoseBatch) -> None:
         joints = self._joints(way)
         went = trace_path(
-            self._robot.mechanism, self._truth, LineBatch.of(way, 1), joints[:, None], self._standing
+            self._robot.mechanism,
+            self._truth,
+            LineBatch.from_poses(way, 1),
+            joints[:, None],
+            self._standing,
         )
         if not went.found[0]:
             raise LimitError("the way leads into a singularity")

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hexacell.campaign.pose_list import same
+from hexacell.campaign.pose_list import is_same_pose
 from hexacell.errors import HexacellError, LimitError
 from hexacell.experiment_design.gauge_zero import GaugeZero
 from hexacell.identification.belief import RobotBelief
@@ -16,7 +16,7 @@ from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.rotations import Array
 from hexacell.motion.path_check import is_clear
-from hexacell.motion.route_search import ball_at, route
+from hexacell.motion.route_search import ball_position, find_route
 from hexacell.motion.waypoint_planner import PathPlanner
 from hexacell.robot_model import Robot
 from procedures.run.state import RunState
@@ -51,21 +51,21 @@ class RunPathPlanner:
         via = self._between(state, goal)
         poses = [self._held(pose) for _, pose in via]
         start, end = self._held(state.target), self._held(goal.pose)
-        knowledge = self._knowledge(state)
-        if reference is not None and not _inside(knowledge, start, reference):
+        belief = self._belief(state)
+        if reference is not None and not _inside(belief, start, reference):
             reference = None
-        way = route(knowledge, start, end, poses, reference)
+        way = find_route(belief, start, end, poses, reference)
         if way:
             orientation, pose = via[way[0]]
             return Move(at=goal.at, orientation=orientation, pose=pose)
         if way is None:
-            return self._led(knowledge, state.target, goal, reference)
+            return self._led(belief, state.target, goal, reference)
         return goal
 
-    def _led(self, knowledge: RobotBelief, here: SixNumbers, goal: Move, reference: Array | None) -> Move:
+    def _led(self, belief: RobotBelief, here: SixNumbers, goal: Move, reference: Array | None) -> Move:
         """The first stop on the way to a goal to which no straight lines lead."""
         if reference is not None:
-            (way,) = PathPlanner(knowledge, self._held(here), None, reference).to(self._held(goal.pose))
+            (way,) = PathPlanner(belief, self._held(here), None, reference).to(self._held(goal.pose))
             if way is not None:
                 return self._stop(goal, way.stops[0])
         raise _no_way(here, goal)
@@ -97,17 +97,17 @@ class RunPathPlanner:
 
         Decided anew, it might lead back there, and from there to the stop again.
         """
-        here, home, (knowledge, reference) = trail[-1][1], moves[0], (known[0], known[1].reference)
+        here, home, (belief, reference) = trail[-1][1], moves[0], (known[0], known[1].reference)
         begun = next(pose for orientation, pose in reversed(trail) if orientation)
-        (way,) = PathPlanner(knowledge, self._held(begun), None, reference).to(self._held(home.pose))
+        (way,) = PathPlanner(belief, self._held(begun), None, reference).to(self._held(home.pose))
         line = [] if way is None else [Pose(*begun), *map(self.robot.to_command, way.stops)]
-        passed = next((row for row, pose in enumerate(line) if same(pose, Pose(*here))), None)
+        passed = next((row for row, pose in enumerate(line) if is_same_pose(pose, Pose(*here))), None)
         if passed is not None:
             stops = line[passed + 1 :]
             return Move(at=home.at, orientation=0, pose=stops[0].as_tuple()) if stops else home
         start = self._held(here)
         nearest_first = (home, *moves[1:-1])
-        straight = (m for m in nearest_first if is_clear(knowledge, start, self._held(m.pose), reference))
+        straight = (m for m in nearest_first if is_clear(belief, start, self._held(m.pose), reference))
         return next(straight, moves[-1])
 
     def _stop(self, goal: Move, command: Pose) -> Move:
@@ -116,7 +116,7 @@ class RunPathPlanner:
 
     def ball_at(self, state: RunState, pose: SixNumbers) -> Array | None:
         """Where the ball really is (3,), mm, at a commanded pose, by what is known now."""
-        return ball_at(self._knowledge(state), self._held(pose))
+        return ball_position(self._belief(state), self._held(pose))
 
     def _between(self, state: RunState, goal: Move) -> list[tuple[int, SixNumbers]]:
         """Poses that a way round may lead over, with their orientations; 0 where nothing is measured."""
@@ -126,31 +126,31 @@ class RunPathPlanner:
         return [*((0, pose) for pose in level), *visited]
 
     def _held(self, pose: SixNumbers) -> PoseBatch:
-        return self.robot.change.poses(PoseBatch.of([Pose(*pose)]))
+        return self.robot.from_commands([Pose(*pose)])
 
-    def _knowledge(self, state: RunState) -> RobotBelief:
+    def _belief(self, state: RunState) -> RobotBelief:
         """What is known by now; with the identified geometry in the controller, that one commands."""
         found = state.identified.result.get("geometry") if state.identified else None
         if found is None:
             return self._by_records(state)
         geometry = Geometry(**found)
         free = self.robot.mechanism.convention.free_parameters(geometry)
-        known = replace(self.robot.knowledge(), free=np.asarray(free))
+        known = replace(self.robot.belief(), free=np.asarray(free))
         return replace(known, controller=geometry) if state.committed else known
 
     def _by_records(self, state: RunState) -> RobotBelief:
         measurements = state.measurements()
         if not len(measurements):
-            return self.robot.knowledge()
+            return self.robot.belief()
         try:
-            return self.robot.knowledge(estimate_online(self.robot.problem(measurements)))
+            return self.robot.belief(estimate_online(self.robot.problem(measurements)))
         except HexacellError:
-            return self.robot.knowledge()
+            return self.robot.belief()
 
 
-def _inside(knowledge: RobotBelief, pose: PoseBatch, reference: Array) -> bool:
-    ball = ball_at(knowledge, pose)
-    return ball is not None and bool(np.abs(ball - reference).max() <= knowledge.limits.gauge_travel_mm)
+def _inside(belief: RobotBelief, pose: PoseBatch, reference: Array) -> bool:
+    ball = ball_position(belief, pose)
+    return ball is not None and bool(np.abs(ball - reference).max() <= belief.limits.gauge_travel_mm)
 
 
 def _untilted(pose: SixNumbers) -> SixNumbers:

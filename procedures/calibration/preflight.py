@@ -51,7 +51,7 @@ def _nobody_to_place_gauges() -> AnswerNeeded:
 
 def _held_out_failures(calibration: Calibration) -> Iterator[HexacellError]:
     for number, point in enumerate(calibration.settings.verification.points, start=1):
-        yield from feasibility.refusals(calibration.plan, f"verification point {number}", Pose(*point))
+        yield from feasibility.pose_failures(calibration.plan, f"verification point {number}", Pose(*point))
 
 
 async def device_failures(devices: Devices) -> list[HexacellError]:

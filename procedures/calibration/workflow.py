@@ -20,7 +20,7 @@ from hexacell.cell.model import CellSettings
 from hexacell.errors import HexacellError, LimitError
 from hexacell.experiment_design import candidates
 from hexacell.experiment_design.gauge_zero import GaugeZero
-from hexacell.experiment_design.validation_poses import choose_held_out
+from hexacell.experiment_design.validation_poses import select_validation_poses
 from hexacell.identification.belief import RobotBelief
 from hexacell.identification.estimator import identify
 from hexacell.identification.solver.result import Identification
@@ -94,7 +94,7 @@ class Calibration:
             return None
         if state.config_write_pending:
             return Compute(kind="take back")
-        if state.lent is not None and not self.robot.lent:
+        if state.lent is not None and not self.robot.provisional:
             return self._with_lent(state.lent, lending=state.lending).next_step(state)
         return self._checking(state) if self.mode is Mode.CHECK else self._optimising(state)
 
@@ -128,11 +128,11 @@ class Calibration:
         """
         if state.lent is not None:
             return geometry_of(state.lent)
-        return self.plan.known(self._situation(state, None)).knowledge.estimate
+        return self.plan.estimate(self._situation(state, None)).belief.estimate
 
     def _with_lent(self, lent: events.ProvisionalApplied, *, lending: bool) -> Calibration:
         if lending not in self._lent:
-            robot = replace(self.robot, lent=(geometry_of(lent),), lending=lending)
+            robot = replace(self.robot, provisional=(geometry_of(lent),), uses_provisional=lending)
             self._lent[lending] = replace(self, robot=robot)
         return self._lent[lending]
 
@@ -148,13 +148,13 @@ class Calibration:
             LimitError: a point has too few that keep the ball inside the travel.
         """
         verification = self.settings.verification
-        knowledge = self.robot.knowledge(identified)
+        belief = self.robot.belief(identified)
         used = None if identified is None else identified.poses.rotations
-        turns = candidates.orientations(HELD_OUT_CANDIDATES, knowledge.limits.tilt, verification.seed)
+        turns = candidates.orientations(HELD_OUT_CANDIDATES, belief.limits.tilt, verification.seed)
         chosen = []
         for point in verification.points:
-            position = self.robot.change.poses(PoseBatch.of([Pose(*point)])).positions[0]
-            poses = choose_held_out(knowledge, position, verification.orientations, turns, used)
+            position = self.robot.from_commands([Pose(*point)]).positions[0]
+            poses = select_validation_poses(belief, position, verification.orientations, turns, used)
             chosen.append(
                 tuple(self.robot.to_command(poses.pose(row)).as_tuple() for row in range(len(poses)))
             )
@@ -215,7 +215,7 @@ class Calibration:
         allowed = self.settings.identification.provisional and not state.lending
         if not allowed or not any(measured.closed for measured in state.sets.values()):
             return False
-        return self.plan.may_lend(self._situation(state, None))
+        return self.plan.allows_provisional(self._situation(state, None))
 
     def _in_set(self, state: RunState, key: SetKey) -> Step | None:
         """What is to be done in a set that is begun before anything new is planned there."""
@@ -334,8 +334,8 @@ class Calibration:
         Raises:
             LimitError: it cannot say so.
         """
-        known = self.plan.known(self._situation(state, key))
-        return known.knowledge, known.station(key.point)
+        known = self.plan.estimate(self._situation(state, key))
+        return known.belief, known.gauge_zero(key.point)
 
     def _present(self, state: RunState, samples: tuple[RecordTaken, ...]) -> Pose | None:
         """The pose that the robot holds, that of a refused record included."""
@@ -345,7 +345,7 @@ class Calibration:
 
     def _held(self, pose: SixNumbers) -> PoseBatch:
         """A commanded pose in the convention's frames."""
-        return self.robot.change.poses(PoseBatch.of([Pose(*pose)]))
+        return self.robot.from_commands([Pose(*pose)])
 
 
 def geometry_of(lent: events.ProvisionalApplied) -> Geometry:
@@ -369,7 +369,7 @@ def _require_zero(key: SetKey, measured: SetState) -> None:
 
 
 def _expectation(visit: MeasurePose) -> Expectation:
-    outlook = visit.outlook
+    outlook = visit.forecast
     return Expectation(
         deviation_mm=visit.deviation,
         sigma_mm=visit.sigma,

@@ -23,7 +23,7 @@ from hexacell.cell.loader import Cell, load_cell
 from hexacell.errors import HexacellError
 from hexacell.identification.estimator import identify
 from hexacell.kinematics.geometry import Geometry
-from hexacell.kinematics.pose import Pose, PoseBatch
+from hexacell.kinematics.pose import Pose
 from hexacell.measurements.records import MeasurementSet
 from hexacell.robot_model import Robot, robot_of
 from hexacell.study.simulated_campaign import AdaptiveCampaign
@@ -89,7 +89,7 @@ def can_stand_everywhere(cell: Cell, robot: Robot, truth: Geometry) -> bool:
     machine = StudiedMachine(robot, truth)
     try:
         for point in cell.settings.identification.points:
-            machine.go(robot.change.poses(PoseBatch.of([Pose(*point)])).pose(0))
+            machine.go(robot.from_commands([Pose(*point)]).pose(0))
     except HexacellError:
         return False
     return machine.smallest_margin >= robot.limits.singularity_margin
@@ -182,13 +182,13 @@ def costs_of(number: int) -> dict[int, float]:
     costs: dict[int, float] = {}
     plan = Plan(cell.settings, robot)
     while campaign.step():
-        situation: CampaignState = campaign.situation
-        if situation.point is None or len(situation.measurements) in costs:
+        state: CampaignState = campaign.state
+        if state.point is None or len(state.measurements) in costs:
             continue
-        if situation.records_at(situation.point) < cell.settings.identification.orientations:
+        if state.records_at(state.point) < cell.settings.identification.orientations:
             begun = time.process_time()
-            plan.decide(situation)
-            costs[len(situation.measurements)] = time.process_time() - begun
+            plan.decide(state)
+            costs[len(state.measurements)] = time.process_time() - begun
     return costs
 
 

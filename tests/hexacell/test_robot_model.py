@@ -87,9 +87,9 @@ def test_frames_survive_a_calibration(cell, on_floor, paper):
         cell.settings, ControllerGeometry(on_floor.for_controller(paper.actual), paper.branch)
     )
     for before, after in (
-        (on_floor.change.base, calibrated.change.base),
-        (on_floor.change.origin, calibrated.change.origin),
-        (on_floor.change.platform, calibrated.change.platform),
+        (on_floor.frames.base, calibrated.frames.base),
+        (on_floor.frames.origin, calibrated.frames.origin),
+        (on_floor.frames.platform, calibrated.frames.platform),
     ):
         np.testing.assert_allclose(after, before, atol=1e-9)
 
@@ -109,7 +109,7 @@ def test_records_in_the_configs_frames_are_identified(on_floor, paper, visit):
 
 
 def test_before_measuring_the_drawing_is_known_and_its_tolerances(robot, on_floor, paper):
-    for known in (robot.knowledge(), on_floor.knowledge()):
+    for known in (robot.belief(), on_floor.belief()):
         np.testing.assert_allclose(known.estimate.vector(), paper.nominal.vector(), atol=1e-9)
         np.testing.assert_allclose(known.controller.vector(), paper.nominal.vector(), atol=1e-9)
         np.testing.assert_allclose(np.diag(known.covariance), 49.0 / 3.0)
@@ -117,7 +117,7 @@ def test_before_measuring_the_drawing_is_known_and_its_tolerances(robot, on_floo
 
 def test_after_measuring_what_was_identified_is_known(robot, noisy):
     estimate = estimate_online(robot.problem(noisy))
-    known = robot.knowledge(estimate)
+    known = robot.belief(estimate)
     assert known.estimate.largest_difference(estimate.geometry) == 0.0
     np.testing.assert_array_equal(known.covariance, estimate.free_covariance)
     assert known.controller.largest_difference(robot.controller) < 1e-9

@@ -6,7 +6,7 @@ import argparse
 from typing import Any
 
 from hexacell.campaign.decisions import Finished, Forecast, MeasurePose, StartPoint
-from hexacell.campaign.from_file import decide, situation_of
+from hexacell.campaign.from_file import decide, state_of_records
 from hexacell.campaign.planner import Plan
 from hexacell.campaign.pose_list import pose_list_of
 from hexacell.cell.loader import load_cell
@@ -24,9 +24,9 @@ def main(options: argparse.Namespace) -> ExitCode:
     cell = load_cell(options.cell)
     plan = Plan(cell.settings, robot_of(cell), pose_list_of(cell))
     measurements = read_measurements(options.measurements, allow_partial=True)
-    situation = situation_of(plan, measurements, refusals=options.refused)
-    decision = decide(plan, situation)
-    outlook = decision.outlook if isinstance(decision, MeasurePose) else plan.outlook(situation)
+    state = state_of_records(plan, measurements, refusals=options.refused)
+    decision = decide(plan, state)
+    outlook = decision.forecast if isinstance(decision, MeasurePose) else plan.forecast(state)
     console.document(next_document(decision, outlook))
     if not options.json:
         console.say(wrapped(visit_words(decision)))

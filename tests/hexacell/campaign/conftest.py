@@ -38,9 +38,9 @@ def make(**changes: Any) -> Plan:
 
 @dataclass(frozen=True)
 class Taken:
-    """A decision, and the situation that it was made in."""
+    """A decision, and the state that it was made in."""
 
-    situation: CampaignState
+    state: CampaignState
     decision: Decision
 
 
@@ -54,24 +54,22 @@ class Campaign:
 
     def run(self, most: int = 200) -> list[Taken]:
         random = np.random.default_rng(self.seed)
-        built, situation, zero = VirtualRobot(self.plan.robot, self.truth), CampaignState(), None
+        built, state, zero = VirtualRobot(self.plan.robot, self.truth), CampaignState(), None
         taken: list[Taken] = []
         while len(taken) < most:
-            decision = self.plan.decide(situation)
-            taken.append(Taken(situation, decision))
+            decision = self.plan.decide(state)
+            taken.append(Taken(state, decision))
             if isinstance(decision, Finished):
                 break
             if isinstance(decision, FinishPoint):
-                done = situation.done | {decision.point}
-                situation, zero = CampaignState(situation.measurements, done=done), None
+                done = state.done | {decision.point}
+                state, zero = CampaignState(state.measurements, done=done), None
                 continue
             label = (decision.point, decision.orientation)
             record, shown = built.measured(label, decision.pose, zero, random)
             zero = shown if zero is None else zero
-            measurements = MeasurementSet((*situation.measurements.records, record))
-            situation = replace(
-                situation, measurements=measurements, point=decision.point, present=decision.pose
-            )
+            measurements = MeasurementSet((*state.measurements.records, record))
+            state = replace(state, measurements=measurements, point=decision.point, present=decision.pose)
         return taken
 
 

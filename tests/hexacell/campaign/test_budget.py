@@ -10,34 +10,34 @@ from hexacell.campaign.budget import Budget, TimeModel
 
 
 def test_minutes_count_stations_records_and_closings():
-    pace = TimeModel(station_minutes=5.0, record_seconds=30.0)
+    pace = TimeModel(point_minutes=5.0, record_seconds=30.0)
     assert pace.minutes(10, 2) == pytest.approx(2 * 5.0 + 12 * 0.5)
 
 
 def test_without_a_limit_all_can_be_paid():
-    assert Budget(None, None, TimeModel(5.0, 30.0)).left(1000, 100) == math.inf
+    assert Budget(None, None, TimeModel(5.0, 30.0)).records_left(1000, 100) == math.inf
 
 
 @pytest.mark.parametrize(("records", "stations", "left"), [(0, 0, 20), (19, 2, 1), (20, 2, 0), (30, 3, 0)])
 def test_records_are_counted(records, stations, left):
-    assert Budget(20, None, TimeModel(5.0, 30.0)).left(records, stations) == left
+    assert Budget(20, None, TimeModel(5.0, 30.0)).records_left(records, stations) == left
 
 
 @pytest.mark.parametrize(("records", "stations", "left"), [(0, 1, 29), (29, 1, 0), (0, 2, 18), (0, 5, 0)])
 def test_minutes_are_what_is_left_after_stations_and_closings(records, stations, left):
-    assert Budget(None, 20.0, TimeModel(5.0, 30.0)).left(records, stations) == left
+    assert Budget(None, 20.0, TimeModel(5.0, 30.0)).records_left(records, stations) == left
 
 
 def test_the_tighter_limit_holds():
-    assert Budget(10, 20.0, TimeModel(5.0, 30.0)).left(0, 1) == 10
-    assert Budget(100, 20.0, TimeModel(5.0, 30.0)).left(0, 1) == 29
-    assert Budget(100, 20.0, TimeModel(5.0, 30.0)).words == "100 records or 20 minutes"
+    assert Budget(10, 20.0, TimeModel(5.0, 30.0)).records_left(0, 1) == 10
+    assert Budget(100, 20.0, TimeModel(5.0, 30.0)).records_left(0, 1) == 29
+    assert Budget(100, 20.0, TimeModel(5.0, 30.0)).description == "100 records or 20 minutes"
 
 
 def test_a_cells_pace(make_plan):
     by_hand = {"stations__placement": "by-hand", "identification__minutes_per_station": 7.0}
-    assert TimeModel.of(make_plan(**by_hand).settings).station_minutes == 7.0
-    assert TimeModel.of(make_plan().settings).station_minutes == 0.0, "fixed gauges are not carried"
+    assert TimeModel.of(make_plan(**by_hand).settings).point_minutes == 7.0
+    assert TimeModel.of(make_plan().settings).point_minutes == 0.0, "fixed gauges are not carried"
     timing = {"timing__move_s": 2.0, "timing__window_s": 1.0}
     seconds = [
         TimeModel.of(make_plan(**timing, **others).settings).record_seconds

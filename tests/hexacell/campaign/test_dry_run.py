@@ -23,7 +23,7 @@ def foretold(make_plan):
 
 
 def test_it_is_what_a_campaign_then_gives(foretold, campaign, two_points):
-    outlook = two_points.outlook(campaign[-1].situation)
+    outlook = two_points.forecast(campaign[-1].state)
     assert foretold.robots == 1
     assert foretold.points == 2
     assert 12 <= foretold.records <= 16
@@ -40,7 +40,7 @@ def test_minutes_are_of_everything_that_is_measured(foretold, make_plan):
     plan = make_plan(**SMALL)
     timing = plan.settings.timing
     held_out = 2 * (2 * 6 + 2) * (timing.move_s + timing.window_s) / 60.0
-    assert foretold.minutes == pytest.approx(plan.budget.pace.minutes(foretold.records, 2) + held_out)
+    assert foretold.minutes == pytest.approx(plan.budget.time_model.minutes(foretold.records, 2) + held_out)
 
 
 def test_robots_that_cannot_be_measured_do_not_count(make_plan):
@@ -73,6 +73,6 @@ def test_a_robot_calibrated_before_is_near_what_its_controller_has(make_plan, pa
     controller = type(plan.robot.controller)(paper.actual.S, paper.actual.B, paper.actual.l)
     format_of = type("Held", (), {"geometry": controller, "branch": paper.branch})()
     robot = make_robot(plan.settings, format_of)
-    centre = robot.knowledge().controller.vector()
+    centre = robot.belief().controller.vector()
     errors = np.array([one.vector() - centre for one in drawn_robots(robot, 16, seed=3)])
     assert 0.5 < np.abs(errors).max() <= 0.7

@@ -48,8 +48,8 @@ def test_no_robot_within_the_tolerances_leaves_the_travel_on_its_first_step(plan
     margin, moved = plan.robot.limits.singularity_margin, []
     for number in range(1, 301):
         built = VirtualRobot(plan.robot, robot_number(plan, number))
-        poses, stands = built.actual_poses(plan.chooser.held([reference, first.pose]))
-        if built.margin(plan.chooser.held([reference])) >= margin:
+        poses, stands = built.actual_poses(plan.robot.from_commands([reference, first.pose]))
+        if built.margin(plan.robot.from_commands([reference])) >= margin:
             assert stands.all()
             moved.append(np.abs(poses.positions[1] - poses.positions[0]).max())
     assert len(moved) > 200
@@ -69,10 +69,10 @@ def test_a_search_that_comes_next_to_a_singularity_is_begun_elsewhere(plan, numb
     measurements = measured(plan, robot_number(plan, number), [plan.reference_pose(1), small_turn])
     assert np.abs(measurements.records[1].deviation).max() > 2.0
     assert not estimate_online(plan.robot.problem(measurements)).converged
-    found = OnlineEstimator(plan.robot).known(measurements).estimate
+    found = OnlineEstimator(plan.robot).estimate(measurements).identification
     assert found is not None
     assert found.converged
     assert found.chi2 < 10.0
-    again = OnlineEstimator(plan.robot).known(measurements).estimate
+    again = OnlineEstimator(plan.robot).estimate(measurements).identification
     assert again is not None
     np.testing.assert_array_equal(found.free, again.free)

@@ -28,11 +28,11 @@ def plan(make_plan):
 
 def test_a_set_tells_what_the_estimator_then_knows(plan):
     """The robot as drawn visits the sets; its records give the covariance that was foretold."""
-    knowledge = plan.robot.knowledge()
-    built = VirtualRobot(plan.robot, knowledge.estimate)
+    belief = plan.robot.belief()
+    built = VirtualRobot(plan.robot, belief.estimate)
     random = np.random.default_rng(0)
     records = []
-    for point, poses in enumerate(plan.prospect.sets, start=1):
+    for point, poses in enumerate(plan.planned_sets.sets, start=1):
         zero = None
         for row in range(len(poses)):
             command = plan.robot.to_command(poses.pose(row))
@@ -40,15 +40,15 @@ def test_a_set_tells_what_the_estimator_then_knows(plan):
             zero = shown if zero is None else zero
             records.append(record)
     found = estimate_online(plan.robot.problem(MeasurementSet(tuple(records))))
-    seen = plan.prospect.seen_by(knowledge)
-    foretold = add_information(knowledge.covariance, seen.information(1, 8) + seen.information(2, 8))
+    seen = plan.planned_sets.information_under(belief)
+    foretold = add_information(belief.covariance, seen.information(1, 8) + seen.information(2, 8))
     np.testing.assert_allclose(
         np.sqrt(np.diag(found.free_covariance)), np.sqrt(np.diag(foretold)), rtol=0.02
     )
 
 
 def test_more_records_tell_more_and_one_nothing(plan):
-    seen = plan.prospect.seen_by(plan.robot.knowledge())
+    seen = plan.planned_sets.information_under(plan.robot.belief())
     traces = [np.trace(seen.information(1, count)) for count in range(9)]
     assert traces[0] == traces[1] == 0.0
     assert (np.diff(traces[1:]) > 0.0).all()
@@ -57,7 +57,7 @@ def test_more_records_tell_more_and_one_nothing(plan):
 
 
 def test_sets_begin_at_the_point_untilted_and_keep_to_the_limits(plan):
-    for point, poses in zip(TWO_POINTS, plan.prospect.sets, strict=True):
+    for point, poses in zip(TWO_POINTS, plan.planned_sets.sets, strict=True):
         assert len(poses) == 8
         np.testing.assert_allclose(poses.rotations[0], np.eye(3), atol=1e-12)
         np.testing.assert_allclose(poses.positions, np.broadcast_to(point, (8, 3)), atol=1e-9)
@@ -66,8 +66,8 @@ def test_sets_begin_at_the_point_untilted_and_keep_to_the_limits(plan):
 
 def test_a_point_that_cannot_be_reached_has_no_set(make_plan):
     plan = make_plan(identification__points=(TWO_POINTS[0], (0.0, 0.0, 1500.0)))
-    assert len(plan.prospect.sets[1]) == 0
-    seen = plan.prospect.seen_by(plan.robot.knowledge())
+    assert len(plan.planned_sets.sets[1]) == 0
+    seen = plan.planned_sets.information_under(plan.robot.belief())
     assert not seen.information(2, 8).any()
 
 
@@ -83,18 +83,18 @@ def test_updating_one_by_one_or_at_once_is_the_same():
 
 
 def test_the_error_at_the_task_is_that_of_the_assessment(campaign, two_points):
-    situation = campaign[-1].situation
-    known = two_points.known(situation)
+    state = campaign[-1].state
+    known = two_points.estimate(state)
     accuracy = predicted_accuracy(
-        known.estimate,
-        known.knowledge.controller,
+        known.identification,
+        known.belief.controller,
         two_points.robot.branch,
         task=two_points.task.poses,
         workspace=two_points.task.workspace,
     )
     assert accuracy is not None
     assert accuracy.reachable.all()
-    outlook = two_points.outlook(situation)
+    outlook = two_points.forecast(state)
     assert outlook is not None
     assert outlook.now_mm == pytest.approx(accuracy.after.position_largest_mm, rel=0.02)
 
@@ -102,14 +102,14 @@ def test_the_error_at_the_task_is_that_of_the_assessment(campaign, two_points):
 def test_without_task_poses_the_workspace_is_the_task(make_plan):
     plan = make_plan(task__poses=())
     assert len(plan.task.poses) > 20
-    outlook = plan.outlook(CampaignState())
+    outlook = plan.forecast(CampaignState())
     assert outlook is not None
     assert outlook.now_mm > 1.0
 
 
 def test_task_poses_out_of_reach_leave_nothing_to_predict(make_plan, campaign):
     plan = make_plan(task__poses=((0.0, 0.0, 3000.0, 0.0, 0.0, 0.0),), identification__points=TWO_POINTS)
-    assert plan.outlook(CampaignState()) is None
-    visit = plan.decide(campaign[3].situation)
-    assert visit.outlook is None
+    assert plan.forecast(CampaignState()) is None
+    visit = plan.decide(campaign[3].state)
+    assert visit.forecast is None
     assert visit.gain > 0.0

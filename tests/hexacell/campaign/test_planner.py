@@ -36,13 +36,13 @@ def summary(taken):
 
 def outlooks_of(taken):
     """What was foretold at each visit."""
-    outlooks = [one.decision.outlook for one in taken if isinstance(one.decision, MeasurePose)]
+    outlooks = [one.decision.forecast for one in taken if isinstance(one.decision, MeasurePose)]
     assert None not in outlooks
     return [outlook for outlook in outlooks if outlook is not None]
 
 
 def records_of(taken):
-    return taken[-1].situation.measurements
+    return taken[-1].state.measurements
 
 
 def test_points_in_order_each_with_all_its_orientations(campaign):
@@ -61,7 +61,7 @@ def test_visits_keep_the_ball_inside_and_are_as_expected(campaign):
     wrong = []
     for one, following in pairwise(campaign):
         if isinstance(one.decision, MeasurePose):
-            visit, record = one.decision, following.situation.measurements.records[-1]
+            visit, record = one.decision, following.state.measurements.records[-1]
             assert (np.abs(visit.deviation) + 3.0 * np.array(visit.sigma)).max() <= 0.9 * 5.0 + 1e-9
             assert np.abs(np.subtract(record.joints, visit.joints)).max() < 0.06
             wrong.append(np.abs(np.subtract(record.deviation, visit.deviation)) / visit.sigma)
@@ -73,7 +73,7 @@ def test_nothing_but_the_situation_decides(campaign, make_plan):
     """Another plan, without memory of what it decided before, decides the same to the last bit."""
     for one in (campaign[3], campaign[12], campaign[6]):
         fresh = make_plan(identification__points=TWO_POINTS, identification__orientations=8)
-        assert fresh.decide(one.situation) == one.decision
+        assert fresh.decide(one.state) == one.decision
 
 
 def test_what_each_record_leaves_is_as_foretold(campaign):
@@ -105,7 +105,7 @@ def test_poses_and_expectations_are_in_the_controllers_frames(campaign, two_poin
 @pytest.mark.parametrize("refusals", [0, REFUSALS, REFUSALS + 1])
 def test_refusals_bring_another_pose_until_the_point_is_given_up(campaign, two_points, refusals):
     one = campaign[3]
-    decision = two_points.decide(replace(one.situation, refusals=refusals))
+    decision = two_points.decide(replace(one.state, refusals=refusals))
     if refusals > REFUSALS:
         assert decision == FinishPoint(1, "the ball left the gauges' travel 4 times")
     else:
@@ -115,19 +115,19 @@ def test_refusals_bring_another_pose_until_the_point_is_given_up(campaign, two_p
 
 def test_a_point_that_offers_nothing_is_closed_with_the_reason(campaign, make_plan):
     plan = make_plan(identification__points=TWO_POINTS, limits__gauge_travel_mm=0.02)
-    decision = plan.decide(campaign[2].situation)
+    decision = plan.decide(campaign[2].state)
     assert isinstance(decision, FinishPoint)
     assert "inside the gauges' travel" in decision.reason
 
 
 def test_records_of_another_robot_are_refused(campaign, two_points):
-    situation = campaign[5].situation
+    state = campaign[5].state
     strange = tuple(
         replace(record, joints=tuple(q + 300.0 for q in record.joints))
-        for record in situation.measurements.records
+        for record in state.measurements.records
     )
     with pytest.raises(IdentifiabilityError):
-        two_points.decide(replace(situation, measurements=MeasurementSet(strange)))
+        two_points.decide(replace(state, measurements=MeasurementSet(strange)))
 
 
 def test_a_budget_of_records_ends_it(make_plan, carry_out):
@@ -149,7 +149,7 @@ def test_a_record_alone_at_a_point_is_not_begun(make_plan, campaign):
         identification__orientations=8,
         identification__budget_records=9,
     )
-    between = next(one.situation for one in campaign if summary([one]) == ["R2"])
+    between = next(one.state for one in campaign if summary([one]) == ["R2"])
     assert plan.decide(between) == Finished("the budget of 9 records is used")
 
 
@@ -229,7 +229,7 @@ def test_points_are_chosen_by_what_they_tell_for_their_time(make_plan, carry_out
     begun = [one.decision.point for one in taken if isinstance(one.decision, StartPoint)]
     assert 3 in begun[:2]
     assert len(records_of(taken)) == 16
-    worst = [plan(False).outlook(end[-1].situation).now_mm for end in (taken, in_order)]
+    worst = [plan(False).forecast(end[-1].state).now_mm for end in (taken, in_order)]
     assert worst[0] < worst[1]
 
 
@@ -244,14 +244,14 @@ def test_dear_stations_are_left_later(make_plan, carry_out):
     taken = carry_out(plan(0.0), most=10)
     left = next(one for one in taken if isinstance(one.decision, FinishPoint))
     assert "tells more in the same time" in left.decision.reason
-    assert isinstance(plan(60.0).decide(left.situation), MeasurePose)
+    assert isinstance(plan(60.0).decide(left.state), MeasurePose)
 
 
 def test_nothing_is_lent_before_the_robot_is_known_well_enough(campaign, make_plan):
     """Two records leave the orientation open by degrees: with such a geometry it would be led astray."""
     plan = make_plan(identification__points=TWO_POINTS, identification__orientations=8)
-    by_records = {len(one.situation.measurements): one.situation for one in campaign}
-    assert not plan.may_lend(CampaignState())
-    assert not plan.may_lend(by_records[2])
-    assert plan.may_lend(by_records[8])
-    assert plan.may_lend(campaign[-1].situation)
+    by_records = {len(one.state.measurements): one.state for one in campaign}
+    assert not plan.allows_provisional(CampaignState())
+    assert not plan.allows_provisional(by_records[2])
+    assert plan.allows_provisional(by_records[8])
+    assert plan.allows_provisional(campaign[-1].state)

@@ -22,7 +22,7 @@ TWO_POINTS = ((100.0, -100.0, 500.0), (-100.0, 100.0, 500.0))
 @pytest.fixture(scope="module")
 def visited(campaign):
     """The poses of a campaign, which are safe on its robot in their order."""
-    records = campaign[-1].situation.measurements.records
+    records = campaign[-1].state.measurements.records
     return tuple(tuple(r.pose for r in records if r.point == point) for point in (1, 2))
 
 
@@ -45,7 +45,7 @@ def poses_of(taken, point):
 
 def test_a_list_that_is_safe_is_visited_in_its_order(plan_of, visited, carry_out):
     taken = carry_out(plan_of(visited))
-    assert len(taken[-1].situation.measurements) >= 15
+    assert len(taken[-1].state.measurements) >= 15
     for point in (1, 2):
         there = poses_of(taken, point)
         in_order = [pose for pose in visited[point - 1] if any(_near(pose, other) for other in there)]
@@ -66,13 +66,13 @@ def test_what_is_not_safe_yet_waits(plan_of, visited, carry_out):
 
 def test_a_refused_pose_is_passed_over(plan_of, campaign, visited):
     plan = plan_of(visited)
-    situation = campaign[6].situation
-    first = plan.decide(situation)
-    second = plan.decide(replace(situation, refusals=1))
+    state = campaign[6].state
+    first = plan.decide(state)
+    second = plan.decide(replace(state, refusals=1))
     assert isinstance(first, MeasurePose)
     if isinstance(second, MeasurePose):
         assert not _near(first.pose, second.pose)
-    given_up = plan.decide(replace(situation, refusals=REFUSALS + 1))
+    given_up = plan.decide(replace(state, refusals=REFUSALS + 1))
     assert isinstance(given_up, FinishPoint)
 
 

@@ -16,20 +16,20 @@ from hexacell.measurements.records import MeasurementSet
 
 @pytest.fixture
 def records(campaign):
-    return campaign[-1].situation.measurements.records
+    return campaign[-1].state.measurements.records
 
 
 def estimates(robot, *sets):
     tracker = OnlineEstimator(robot)
-    return [tracker.known(MeasurementSet(tuple(records))).estimate for records in sets]
+    return [tracker.estimate(MeasurementSet(tuple(records))).identification for records in sets]
 
 
 def test_before_the_first_record_the_drawing_is_all(two_points):
-    known = OnlineEstimator(two_points.robot).known(MeasurementSet(()))
-    assert known.estimate is None
-    np.testing.assert_array_equal(known.knowledge.covariance, two_points.robot.prior.covariance)
+    known = OnlineEstimator(two_points.robot).estimate(MeasurementSet(()))
+    assert known.identification is None
+    np.testing.assert_array_equal(known.belief.covariance, two_points.robot.prior.covariance)
     with pytest.raises(LimitError):
-        known.station(1)
+        known.gauge_zero(1)
 
 
 def test_what_was_asked_before_changes_nothing(two_points, records):
@@ -59,10 +59,10 @@ def test_the_same_records_are_not_fitted_twice(two_points, records, monkeypatch)
         fitted.append(problem.records)
         return update_estimate(problem, before)
 
-    monkeypatch.setattr(recursive_estimator, "continued", counting)
+    monkeypatch.setattr(recursive_estimator, "update_estimate", counting)
     tracker = OnlineEstimator(two_points.robot)
     for count in (3, 3, 4, 5, 5):
-        tracker.known(MeasurementSet(records[:count]))
+        tracker.estimate(MeasurementSet(records[:count]))
     assert fitted == [1, 2, 3, 4, 5]
 
 
@@ -77,12 +77,12 @@ def test_an_estimate_that_went_astray_is_begun_anew(two_points, records):
 
 
 def test_the_station_is_where_the_gauges_were_zeroed(two_points, records, paper):
-    known = OnlineEstimator(two_points.robot).known(MeasurementSet(records))
-    found = known.estimate
+    known = OnlineEstimator(two_points.robot).estimate(MeasurementSet(records))
+    found = known.identification
     assert found is not None
     rows = np.flatnonzero(found.problem.labels[:, 0] == 2)
     zeroed = found.poses.positions[rows] - found.problem.deviations[rows]
-    station = known.station(2)
+    station = known.gauge_zero(2)
     assert np.abs(station.reference - zeroed.mean(axis=0)).max() < 0.05
     with pytest.raises(LimitError):
-        known.station(3)
+        known.gauge_zero(3)

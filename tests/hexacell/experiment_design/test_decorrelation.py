@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hexacell.experiment_design.decorrelation import partings
+from hexacell.experiment_design.decorrelation import decorrelating_poses
 from hexacell.identification.belief import Limits, RobotBelief
 from hexacell.identification.diagnostics.correlations import strongly_correlated
 from hexacell.identification.estimator import identify
@@ -30,7 +30,7 @@ def found(measured, make_problem):
 
 
 @pytest.fixture(scope="module")
-def knowledge(found, paper, hexaglide):
+def belief(found, paper, hexaglide):
     return RobotBelief(
         hexaglide,
         paper.nominal,
@@ -52,11 +52,13 @@ def correlation_of(found, pair):
 
 
 def test_the_measurement_does_to_the_correlation_what_was_told(
-    found, knowledge, measured, visit, reach, paper, make_problem
+    found, belief, measured, visit, reach, paper, make_problem
 ):
     pairs = strongly_correlated(found)[:6]
     tried = [
-        (pair, part) for pair, part in zip(pairs, partings(knowledge, found, pairs), strict=True) if part
+        (pair, part)
+        for pair, part in zip(pairs, decorrelating_poses(belief, found, pairs), strict=True)
+        if part
     ]
     assert len(tried) >= 2
     exact = visit(seed=SEED, degrees=DEGREES)
@@ -70,33 +72,33 @@ def test_the_measurement_does_to_the_correlation_what_was_told(
         assert 1.0 - abs(correlation_of(more, pair)) > 1.05 * (1.0 - abs(pair.correlation))
 
 
-def test_the_ball_stays_where_the_gauges_are(found, knowledge, visit, reach, paper):
+def test_the_ball_stays_where_the_gauges_are(found, belief, visit, reach, paper):
     exact = visit(seed=SEED, degrees=DEGREES)
     pairs = strongly_correlated(found)[:6]
-    for part in filter(None, partings(knowledge, found, pairs)):
+    for part in filter(None, decorrelating_poses(belief, found, pairs)):
         _, pose = reach(paper.actual, paper.nominal, part.command)
         reference = exact.balls[exact.labels.index((part.point, 1))]
         assert np.abs(pose[:3] - reference).max() < 1.0
 
 
-def test_limits_are_kept(found, knowledge):
-    narrow = replace(knowledge, limits=replace(LIMITS, tilt=np.radians(15.0)))
+def test_limits_are_kept(found, belief):
+    narrow = replace(belief, limits=replace(LIMITS, tilt=np.radians(15.0)))
     pairs = strongly_correlated(found)[:6]
-    parts = [part for part in partings(narrow, found, pairs) if part]
+    parts = [part for part in decorrelating_poses(narrow, found, pairs) if part]
     assert all(abs(part.degrees) < 15.0 for part in parts if part.axis != "z")
 
 
-def test_gauges_with_next_to_no_travel_leave_nothing_to_measure(found, knowledge):
-    blind = replace(knowledge, limits=replace(LIMITS, gauge_travel_mm=1e-6))
+def test_gauges_with_next_to_no_travel_leave_nothing_to_measure(found, belief):
+    blind = replace(belief, limits=replace(LIMITS, gauge_travel_mm=1e-6))
     pairs = strongly_correlated(found)[:3]
-    assert partings(blind, found, pairs) == (None, None, None)
+    assert decorrelating_poses(blind, found, pairs) == (None, None, None)
 
 
-def test_where_nothing_is_in_reach_there_is_none(found, knowledge):
-    stuck = replace(knowledge, limits=replace(LIMITS, joint_min_mm=0.0, joint_max_mm=1.0))
+def test_where_nothing_is_in_reach_there_is_none(found, belief):
+    stuck = replace(belief, limits=replace(LIMITS, joint_min_mm=0.0, joint_max_mm=1.0))
     pairs = strongly_correlated(found)[:1]
-    assert partings(stuck, found, pairs) == (None,)
+    assert decorrelating_poses(stuck, found, pairs) == (None,)
 
 
-def test_without_pairs_nothing_is_tried(found, knowledge):
-    assert partings(knowledge, found, ()) == ()
+def test_without_pairs_nothing_is_tried(found, belief):
+    assert decorrelating_poses(belief, found, ()) == ()

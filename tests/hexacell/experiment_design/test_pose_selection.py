@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from hexacell.errors import ExitCode, LimitError
 from hexacell.experiment_design import pose_selection
 from hexacell.experiment_design.candidates import orientations
-from hexacell.experiment_design.gauge_zero import station
+from hexacell.experiment_design.gauge_zero import estimate_gauge_zero
 from hexacell.experiment_design.pose_selection import ROUND_ABOUT, select_pose
 from hexacell.experiment_design.predicted_records import SAFETY_SIGMAS, TRAVEL_SHARE
 from hexacell.identification.estimator import estimate_online
@@ -28,7 +28,9 @@ TURNS = orientations(256, TILT, seed=11)
 def station_of(know, estimate, point):
     rows = np.flatnonzero(estimate.problem.labels[:, 0] == point)
     problem = estimate.problem
-    return station(know(estimate), estimate.poses[rows], problem.joints[rows], problem.deviations[rows])
+    return estimate_gauge_zero(
+        know(estimate), estimate.poses[rows], problem.joints[rows], problem.deviations[rows]
+    )
 
 
 @pytest.fixture(scope="module", params=["little", "much"])
@@ -216,8 +218,8 @@ def test_what_a_record_will_depend_on_is_how_it_moves_with_the_parameters(stage,
 
     steps = 1e-3 * np.eye(len(estimate.free))
     moved = [(ball(estimate.free + step) - ball(estimate.free - step)) / 2e-3 for step in steps]
-    np.testing.assert_allclose(choice.change, np.transpose(moved) - at.jacobian, atol=1e-4)
-    by_encoders = choice.noise - at.covariance - 0.01**2 * np.eye(3)
+    np.testing.assert_allclose(choice.jacobian, np.transpose(moved) - at.jacobian, atol=1e-4)
+    by_encoders = choice.covariance - at.covariance - 0.01**2 * np.eye(3)
     assert (np.linalg.eigvalsh(by_encoders) > 0.0).all()
 
 
@@ -235,9 +237,9 @@ def test_what_a_record_will_depend_on_is_how_it_moves_with_the_parameters(stage,
 )
 def test_nothing_left_to_choose_says_why(know, much, limits, change, message):
     at = station_of(know, much, 1)
-    knowledge = replace(know(much), limits=replace(limits, **change))
+    belief = replace(know(much), limits=replace(limits, **change))
     with pytest.raises(LimitError, match=message) as caught:
-        select_pose(knowledge, at, TURNS)
+        select_pose(belief, at, TURNS)
     assert caught.value.exit_code is ExitCode.OUT_OF_LIMITS
 
 
@@ -249,7 +251,7 @@ def test_a_stations_reference_is_where_the_ball_was_when_zeroed(know, paper, vis
     exact = visit(seed=2)
     rows = slice(11, 22)
     measured = exact.measured()
-    at = station(
+    at = estimate_gauge_zero(
         know(paper.actual),
         PoseBatch(exact.balls[rows], exact.rotations[rows]),
         exact.joints[rows],
@@ -264,7 +266,7 @@ def test_a_reference_is_the_better_known_the_more_records_say_where_it_was(know,
     measured = exact.measured()
     traces = []
     for count in (1, 3, 8):
-        at = station(
+        at = estimate_gauge_zero(
             know(paper.actual),
             PoseBatch(exact.balls[:count], exact.rotations[:count]),
             exact.joints[:count],
@@ -286,7 +288,7 @@ def test_a_references_derivative_is_how_it_moves_with_the_parameters(know, paper
             [stands(legs, geometry, q, pose) for q, pose in zip(exact.joints[rows], near, strict=True)]
         )
         poses = PoseBatch(found[:, :3], Rotation.from_rotvec(found[:, 3:]).as_matrix())
-        return station(know(paper.actual), poses, exact.joints[rows], deviations)
+        return estimate_gauge_zero(know(paper.actual), poses, exact.joints[rows], deviations)
 
     free = hexaglide.convention.free_parameters(paper.actual)
     jacobian = at(free).jacobian

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from hexacell.errors import LimitError
 from hexacell.experiment_design.candidates import orientations
-from hexacell.experiment_design.validation_poses import choose_held_out
+from hexacell.experiment_design.validation_poses import select_validation_poses
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.motion.path_check import is_clear
@@ -29,7 +29,7 @@ def point(request, paper):
 
 @pytest.fixture(scope="module")
 def chosen(know, much, point):
-    return choose_held_out(know(much), point, COUNT, TURNS)
+    return select_validation_poses(know(much), point, COUNT, TURNS)
 
 
 def test_the_first_is_untilted_and_all_are_at_the_point(chosen, point):
@@ -61,7 +61,7 @@ def test_they_are_apart_from_each_other(chosen):
 def test_they_are_away_from_the_orientations_used(chosen, know, much, point, paper, reach):
     """Where the platform really stood when the geometry was identified: the truth's orientations."""
     used = much.poses.rotations
-    away = choose_held_out(know(much), point, COUNT, TURNS, used)
+    away = select_validation_poses(know(much), point, COUNT, TURNS, used)
     np.testing.assert_array_equal(away.rotations[0], np.eye(3))
 
     def nearest(poses):
@@ -77,9 +77,9 @@ def test_an_orientation_used_already_is_the_last_to_be_taken(know, paper, limits
     exactly = know(paper.nominal, limits=replace(limits, singularity_margin=0.02))
     centre = np.array([0.0, 0.0, 550.0])
     turns = PoseBatch.of([Pose(0, 0, 0, tilt) for tilt in (8.0, 16.0, -12.0)]).rotations
-    without = choose_held_out(exactly, centre, 2, turns)
+    without = select_validation_poses(exactly, centre, 2, turns)
     assert without.pose(1).a == pytest.approx(16.0)
-    away = choose_held_out(exactly, centre, 2, turns, used=turns[1:2])
+    away = select_validation_poses(exactly, centre, 2, turns, used=turns[1:2])
     assert away.pose(1).a == pytest.approx(-12.0)
 
 
@@ -103,10 +103,10 @@ def test_what_lies_beyond_a_singularity_is_not_taken_though_it_would_be_farthest
     exactly = know(paper.nominal, limits=replace(limits, singularity_margin=0.02, tilt=1.4))
     centre = np.array([0.0, 0.0, 550.0])
     turns = PoseBatch.of([Pose(0, 0, 0, tilt) for tilt in (5.0, 10.0, 20.0, 35.0, 51.0, -75.0)]).rotations
-    taken = choose_held_out(exactly, centre, 5, turns)
+    taken = select_validation_poses(exactly, centre, 5, turns)
     np.testing.assert_allclose(sorted(pose_tilts(taken)), [0.0, 5.0, 10.0, 20.0, 35.0], atol=1e-9)
     with pytest.raises(LimitError, match="only 5 orientations"):
-        choose_held_out(exactly, centre, 6, turns)
+        select_validation_poses(exactly, centre, 6, turns)
 
 
 def pose_tilts(poses):
@@ -114,13 +114,13 @@ def pose_tilts(poses):
 
 
 def test_the_choice_is_the_same_every_time(know, much, point, chosen):
-    again = choose_held_out(know(much), point, COUNT, TURNS)
+    again = select_validation_poses(know(much), point, COUNT, TURNS)
     np.testing.assert_array_equal(again.rotations, chosen.rotations)
 
 
 def test_the_less_is_known_the_less_is_tilted(know, little, much, point):
     def largest(estimate):
-        poses = choose_held_out(know(estimate), point, 3, TURNS)
+        poses = select_validation_poses(know(estimate), point, 3, TURNS)
         return Rotation.from_matrix(poses.rotations).magnitude().max()
 
     assert largest(little) < largest(much)
@@ -128,35 +128,35 @@ def test_the_less_is_known_the_less_is_tilted(know, little, much, point):
 
 def test_a_point_out_of_reach_is_refused_and_named(know, much):
     with pytest.raises(LimitError, match=r"untilted platform cannot stand at X0\.000 Y0\.000 Z900\.000"):
-        choose_held_out(know(much), np.array([0.0, 0.0, 900.0]), COUNT, TURNS)
+        select_validation_poses(know(much), np.array([0.0, 0.0, 900.0]), COUNT, TURNS)
 
 
 def test_a_point_the_corrected_robot_cannot_reach_is_refused(know, much, paper):
     """Its legs are far shorter than the controller believes."""
     short = Geometry(paper.nominal.S, paper.nominal.B, paper.nominal.l - 150.0)
     with pytest.raises(LimitError, match="untilted platform cannot stand"):
-        choose_held_out(know(short), np.array([0.0, 0.0, 620.0]), COUNT, TURNS)
+        select_validation_poses(know(short), np.array([0.0, 0.0, 620.0]), COUNT, TURNS)
 
 
 def test_a_robot_that_cannot_be_followed_there_is_refused(know, paper):
     """Its legs are too short for the joint variables that the controller would go to."""
     short = Geometry(paper.nominal.S, paper.nominal.B, paper.nominal.l - 150.0)
     with pytest.raises(LimitError, match="cannot be told"):
-        choose_held_out(know(short), np.array([0.0, 0.0, 450.0]), COUNT, TURNS)
+        select_validation_poses(know(short), np.array([0.0, 0.0, 450.0]), COUNT, TURNS)
 
 
 def test_too_few_safe_orientations_are_counted(know, much, limits):
     tight = replace(know(much), limits=replace(limits, gauge_travel_mm=0.2))
     with pytest.raises(LimitError, match=r"only \d+ orientations .* inside the travel"):
-        choose_held_out(tight, CORNER, 40, TURNS[:128])
+        select_validation_poses(tight, CORNER, 40, TURNS[:128])
 
 
 def test_equal_orientations_do_not_count_twice(know, much):
     same = np.repeat(Rotation.from_rotvec([0.02, 0.0, 0.0]).as_matrix()[None], 8, axis=0)
     with pytest.raises(LimitError, match="only 2 orientations"):
-        choose_held_out(know(much), CORNER, 3, same)
-    assert len(choose_held_out(know(much), CORNER, 2, same)) == 2
+        select_validation_poses(know(much), CORNER, 3, same)
+    assert len(select_validation_poses(know(much), CORNER, 2, same)) == 2
 
 
 def test_poses_are_batches_of_the_point_given(know, much):
-    assert isinstance(choose_held_out(know(much), CORNER, 2, TURNS), PoseBatch)
+    assert isinstance(select_validation_poses(know(much), CORNER, 2, TURNS), PoseBatch)

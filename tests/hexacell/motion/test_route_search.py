@@ -13,7 +13,7 @@ from hexacell.cell.loader import load_cell
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.motion import route_search as module
 from hexacell.motion.path_check import is_clear
-from hexacell.motion.route_search import ball_at, route
+from hexacell.motion.route_search import ball_position, find_route
 from hexacell.robot_model import robot_of
 
 
@@ -55,40 +55,40 @@ START, GOAL = at(0.0), at(9.0)
 def test_the_fewest_lines(monkeypatch: pytest.MonkeyPatch, clear: Any, way: list[int] | None) -> None:
     lines = Lines(monkeypatch, *clear)
     nothing: Any = None
-    assert route(nothing, START, GOAL, VIA) == way
+    assert find_route(nothing, START, GOAL, VIA) == way
     assert len(lines.asked) == len(set(lines.asked)), "no line is checked twice"
 
 
 def test_a_straight_line_costs_one_check(monkeypatch: pytest.MonkeyPatch) -> None:
     lines = Lines(monkeypatch, (0, 9))
     nothing: Any = None
-    route(nothing, START, GOAL, VIA)
+    find_route(nothing, START, GOAL, VIA)
     assert lines.asked == [(0, 9)]
 
 
 @pytest.fixture(scope="module")
-def knowledge() -> Any:
-    return robot_of(load_cell(bundled_config("simulated-hexaglide"))).knowledge()
+def belief() -> Any:
+    return robot_of(load_cell(bundled_config("simulated-hexaglide"))).belief()
 
 
-def test_a_way_over_untilted_poses_on_the_real_robot(knowledge: Any) -> None:
+def test_a_way_over_untilted_poses_on_the_real_robot(belief: Any) -> None:
     """Far and tilted the other way: each line that is taken is clear for the mathematics too."""
     start, goal = (
         PoseBatch.of([Pose(100.0, -100.0, 500.0, 25.0, 20.0, 0.0)]),
         PoseBatch.of([Pose(-100.0, 100.0, 500.0)]),
     )
     via = [PoseBatch.of([Pose(100.0, -100.0, 500.0)]), goal]
-    way = route(knowledge, start, goal, via)
+    way = find_route(belief, start, goal, via)
     assert way is not None
     stops = [start, *(via[row] for row in way), goal]
-    assert all(is_clear(knowledge, here, there) for here, there in pairwise(stops))
+    assert all(is_clear(belief, here, there) for here, there in pairwise(stops))
 
 
-def test_no_way_leads_out_of_reach(knowledge: Any) -> None:
-    assert route(knowledge, at(0.0), PoseBatch.of([Pose(0.0, 0.0, 2000.0)]), []) is None
+def test_no_way_leads_out_of_reach(belief: Any) -> None:
+    assert find_route(belief, at(0.0), PoseBatch.of([Pose(0.0, 0.0, 2000.0)]), []) is None
 
 
-def test_a_robot_as_drawn_takes_the_ball_where_it_is_told(knowledge: Any) -> None:
-    ball = ball_at(knowledge, PoseBatch.of([Pose(10.0, -20.0, 550.0, 5.0, 0.0, 0.0)]))
+def test_a_robot_as_drawn_takes_the_ball_where_it_is_told(belief: Any) -> None:
+    ball = ball_position(belief, PoseBatch.of([Pose(10.0, -20.0, 550.0, 5.0, 0.0, 0.0)]))
     assert ball is not None
     assert np.abs(ball - [10.0, -20.0, 550.0]).max() < 1e-6

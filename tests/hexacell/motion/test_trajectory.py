@@ -20,7 +20,7 @@ TURNS = orientations(64, np.radians(60.0), seed=3)
 def commanded(hexaglide, paper):
     """Lines from the first point to many orientations that the controller can reach, and their joints."""
     ends = PoseBatch.at([10.0, -20.0, 540.0], TURNS)
-    ways = LineBatch.over((START, ends))
+    ways = LineBatch.through((START, ends))
     joints = hexaglide.inverse(paper.nominal, paper.branch, ways.flat()).reshape(*ways.shape, 6)
     rows = np.flatnonzero(np.isfinite(joints).all(axis=(0, 2)))
     return ways.lines(rows), joints[:, rows]
@@ -112,7 +112,7 @@ def test_a_leap_to_another_solution_is_not_a_way(hexaglide, paper, commanded, he
 
 def test_from_stop_to_stop():
     stop, end = PoseBatch.of([Pose(0, 0, 560, 10)]), PoseBatch.of([Pose(10, 0, 550, 0, 10, 0)])
-    way = LineBatch.over((START, stop, end), times=2)
+    way = LineBatch.through((START, stop, end), times=2)
     pieces = way.shape[0] - 1
     assert pieces == 4 * module.PIECES_BETWEEN_STOPS
     passed = [way.flat().pose(row).as_tuple() for row in (0, pieces // 2, pieces)]

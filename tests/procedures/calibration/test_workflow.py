@@ -17,7 +17,7 @@ from hexacell.campaign.decisions import MeasurePose
 from hexacell.campaign.planner import REFUSALS
 from hexacell.errors import LimitError
 from hexacell.kinematics.pose import Pose
-from hexacell.motion.route_search import route
+from hexacell.motion.route_search import find_route
 from procedures.calibration.path_planning import RunPathPlanner
 from procedures.calibration.workflow import Calibration, Mode, expected_records
 from procedures.run import events
@@ -202,7 +202,7 @@ class Choices:
             deviation=(0.0,) * 3,
             sigma=(0.1,) * 3,
             gain=1.0,
-            outlook=None,
+            forecast=None,
         )
 
 
@@ -324,9 +324,9 @@ def test_the_way_after_a_refusal_begins_where_the_robot_is(recording, make_rig, 
     """Not at the last record: the refused pose is where the straight lines start that are checked."""
     starts: list[Any] = []
 
-    def spy(knowledge: Any, start: Any, *others: Any) -> Any:
+    def spy(belief: Any, start: Any, *others: Any) -> Any:
         starts.append(start.pose(0).as_tuple())
-        return route(knowledge, start, *others)
+        return find_route(belief, start, *others)
 
     monkeypatch.setattr(pose_chooser, "route", spy)
     sampled = recording.until(events.RecordTaken, count=4)

@@ -91,6 +91,14 @@ async def calibrate(
                 )
 
 
+def is_unverified(folder: RunFolder) -> bool:
+    """Whether a run, as far as its journal can be read, left a written geometry without a verdict."""
+    try:
+        return fold(read_journal(folder.journal)).is_unverified
+    except HexacellError:
+        return False
+
+
 def _require_own_geometry(cell: Cell) -> None:
     """Refuse to begin while the controller has what an interrupted run lent it.
 

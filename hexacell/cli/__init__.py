@@ -1,1 +1,1 @@
-"""The command line: parse, show, ask; no logic of its own."""
+"""The command line: parses arguments, prints, reads keys; decides and words nothing itself."""

@@ -1,4 +1,4 @@
-"""The command line's entry: find the command, run it, and turn every error into words and a code."""
+"""Entry of the command line: runs a command and turns every error into a message and an exit code."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from hexacell.errors import ExitCode, HexacellError, SeveralErrors
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run one command; the result is the process's exit code."""
-    # Before numpy is there to read it: our matrices are small, and threads get into each other's way.
+    """Run one command and return the process's exit code."""
+    # Before numpy is imported, which reads it: the matrices are small, threads only slow them down.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     typed = sys.argv[1:] if arguments is None else list(arguments)
     parser = make_parser()
@@ -34,7 +34,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         code = error.worst if isinstance(error, SeveralErrors) else error.exit_code
         return _failed(str(error), code, console)
     except Exception as error:
-        # A mistake of this program: Python shows where, and a reader of JSON is not left without.
+        # A bug: Python prints the traceback, and a reader of JSON still gets a document.
         console.document({"error": repr(error), "exit_code": int(ExitCode.OUT_OF_LIMITS)})
         raise
 

@@ -1,4 +1,4 @@
-"""Words for people: on stdout, or on stderr where stdout carries a JSON document."""
+"""Output of a command: text on stdout, or on stderr where stdout carries a JSON document."""
 
 from __future__ import annotations
 
@@ -11,24 +11,24 @@ from typing import Any, TextIO
 
 @dataclass(frozen=True, slots=True)
 class Console:
-    """Where words go. Whether anybody still reads them never decides how a command ends."""
+    """The process's output streams. A reader that has gone away never changes how a command ends."""
 
     wants_json: bool = False
 
-    def say(self, words: str = "") -> None:
-        """One line, or several, for a person."""
-        _write(sys.stderr if self.wants_json else sys.stdout, words + "\n")
+    def print(self, text: str = "") -> None:
+        """One or more lines of text."""
+        _write(sys.stderr if self.wants_json else sys.stdout, text + "\n")
 
-    def error(self, words: str) -> None:
-        """What went wrong, on stderr."""
-        _write(sys.stderr, words + "\n")
+    def error(self, text: str) -> None:
+        """An error message, on stderr."""
+        _write(sys.stderr, text + "\n")
 
-    def ask(self, question: str) -> None:
-        """A question, on stderr; the answer is typed on the same line."""
-        _write(sys.stderr, question)
+    def prompt(self, text: str) -> None:
+        """A question, on stderr and without a line feed; the answer is typed on the same line."""
+        _write(sys.stderr, text)
 
     def document(self, document: dict[str, Any]) -> None:
-        """The one JSON document, where it is wanted."""
+        """The command's one JSON document; nothing without ``--json``."""
         if self.wants_json:
             _write(sys.stdout, json.dumps(document) + "\n")
 
@@ -40,7 +40,7 @@ def _write(stream: TextIO | None, text: str) -> None:
         stream.write(text)
         stream.flush()
     except BrokenPipeError:
-        # The reader has gone. What is still buffered must go somewhere when Python ends.
-        nowhere = os.open(os.devnull, os.O_WRONLY)
-        os.dup2(nowhere, stream.fileno())
-        os.close(nowhere)
+        # Python flushes the rest of the buffer when it ends, which must not fail again.
+        null = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(null, stream.fileno())
+        os.close(null)

@@ -1,4 +1,4 @@
-"""What can be typed. Only the standard library is imported here, so that ``--help`` is instant."""
+"""Arguments of all commands. Only the standard library is imported, so that ``--help`` is instant."""
 
 from __future__ import annotations
 
@@ -18,23 +18,23 @@ EXIT_CODES = """exit codes:
 
 
 class Parser(argparse.ArgumentParser):
-    """A parser that raises instead of leaving, so that every mistake is told in the same way.
+    """A parser that raises instead of exiting, so that every error is reported in the same form.
 
-    Options are never abbreviated: an abbreviation that works today may mean two options tomorrow.
+    Options cannot be abbreviated: an abbreviation that works today may be ambiguous tomorrow.
     """
 
     def __init__(self, **settings: Any) -> None:  # noqa: ANN401 - argparse's own settings
         super().__init__(allow_abbrev=False, **settings)
 
     def error(self, message: str) -> NoReturn:
-        """Raise ``UsageError`` with the words that argparse found."""
+        """Raise ``UsageError`` with argparse's message."""
         raise UsageError(message, action=f"Try `{self.prog} --help`")
 
 
 def make_parser() -> Parser:
     """The parser of all commands; ``options.module`` names the command's module.
 
-    What it is given to parse makes it raise ``UsageError``.
+    Its ``parse_args`` raises ``UsageError``.
     """
     parser = Parser(
         prog="hexacell",
@@ -44,7 +44,7 @@ def make_parser() -> Parser:
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     parser.add_argument("--version", action="version", version=f"hexacell {__version__}")
-    # argparse aligns what stands below by this name, so it must not be much shorter than those.
+    # argparse aligns the commands below with the metavar, which must be about as long as they are.
     commands = parser.add_subparsers(
         title="commands", prog="hexacell", metavar="COMMAND ...", required=True
     )
@@ -59,13 +59,15 @@ def make_parser() -> Parser:
     return parser
 
 
-def _add(commands: Any, name: str, words: str) -> Parser:  # noqa: ANN401 - argparse's own type is private
-    parser: Parser = commands.add_parser(name, help=words, description=words[0].upper() + words[1:] + ".")
+def _add(commands: Any, name: str, summary: str) -> Parser:  # noqa: ANN401 - argparse's own type is private
+    parser: Parser = commands.add_parser(
+        name, help=summary, description=summary[0].upper() + summary[1:] + "."
+    )
     return parser
 
 
-def _command(commands: Any, name: str, words: str) -> Parser:  # noqa: ANN401
-    parser = _add(commands, name, words)
+def _command(commands: Any, name: str, summary: str) -> Parser:  # noqa: ANN401
+    parser = _add(commands, name, summary)
     parser.set_defaults(module=name)
     return parser
 
@@ -76,7 +78,7 @@ def _add_cell(parser: Parser) -> None:
 
 def _add_json(parser: Parser) -> None:
     parser.add_argument(
-        "--json", action="store_true", help="one JSON document on stdout; words go to stderr"
+        "--json", action="store_true", help="one JSON document on stdout; text goes to stderr"
     )
 
 
@@ -93,20 +95,20 @@ def _demo(commands: Any) -> None:  # noqa: ANN401
         type=Path,
         default=Path("hexacell-demo"),
         metavar="FOLDER",
-        help="where to work; a former demo there is replaced (default: %(default)s)",
+        help="where to work; an earlier demo there is replaced (default: %(default)s)",
     )
     _add_json(parser)
 
 
 def _run(commands: Any) -> None:  # noqa: ANN401
-    parser = _command(commands, "run", "measure, identify, verify, propose and write back")
+    parser = _command(commands, "run", "measure, identify, propose, write back and verify")
     _add_cell(parser)
-    parser.add_argument("--resume", metavar="RUN", help="go on with an interrupted run: its folder or name")
-    parser.add_argument("--unattended", action="store_true", help="nobody is there to place or approve")
+    parser.add_argument("--resume", metavar="RUN", help="resume an interrupted run: its folder or name")
+    parser.add_argument("--unattended", action="store_true", help="no person can place gauges or approve")
     parser.add_argument(
         "--mode",
         choices=("check", "optimise"),
-        help="check: measure held-out poses, touch nothing (default if unattended); "
+        help="check: measure held-out poses, change nothing (default if unattended); "
         "optimise: calibrate and write back (default otherwise)",
     )
     _add_json(parser)
@@ -115,7 +117,7 @@ def _run(commands: Any) -> None:  # noqa: ANN401
 def _preflight(commands: Any) -> None:  # noqa: ANN401
     parser = _command(commands, "preflight", "check everything that must hold before motion; moves nothing")
     _add_cell(parser)
-    parser.add_argument("--unattended", action="store_true", help="also that nobody is needed")
+    parser.add_argument("--unattended", action="store_true", help="check also that no person is needed")
     _add_json(parser)
 
 
@@ -126,12 +128,12 @@ def _simulate(commands: Any) -> None:  # noqa: ANN401
         "--output",
         type=Path,
         metavar="FILE",
-        help="write the cell file that `run` accepts there instead of stdout",
+        help="write the cell file for `run` there instead of to stdout",
     )
 
 
 def _next(commands: Any) -> None:  # noqa: ANN401
-    parser = _command(commands, "next", "say which pose is worth measuring next")
+    parser = _command(commands, "next", "print the pose worth measuring next")
     _add_cell(parser)
     parser.add_argument(
         "--measurements", type=Path, required=True, metavar="FILE", help="the records so far (CSV)"
@@ -141,7 +143,7 @@ def _next(commands: Any) -> None:  # noqa: ANN401
         type=_count,
         default=0,
         metavar="N",
-        help="how many poses at the present point could not be measured: another is proposed",
+        help="how many poses at this point could not be measured; proposes another",
     )
     _add_json(parser)
 
@@ -163,30 +165,30 @@ def _fit(commands: Any) -> None:  # noqa: ANN401
 
 
 def _replay(commands: Any) -> None:  # noqa: ANN401
-    parser = _command(commands, "replay", "decide and compute a recorded run again, and compare")
+    parser = _command(commands, "replay", "repeat a recorded run's decisions and results, and compare")
     parser.add_argument("run", type=Path, metavar="RUN", help="a run folder, or a journal")
     parser.add_argument(
         "--only",
         choices=("decisions", "results", "identification"),
-        help="do only these again, and take everything else as recorded",
+        help="repeat only these, and take everything else as recorded",
     )
     parser.add_argument(
         "--tolerance",
         type=float,
         metavar="T",
-        help="of every number, in its own unit, above 1 relative (default: 1e-9)",
+        help="allowed difference of a number, relative above 1 (default: 1e-9)",
     )
     _add_json(parser)
 
 
 def _cell(commands: Any) -> None:  # noqa: ANN401
-    parser = _command(commands, "cell", "check, explain or show a cell file")
+    parser = _command(commands, "cell", "validate or show a cell file, or print its schema")
     actions = parser.add_subparsers(title="actions", metavar="ACTION", required=True, dest="action")
-    validate = _add(actions, "validate", "say whether it is in order; every mistake with its line")
+    validate = _add(actions, "validate", "check it; every mistake with its line")
     _add_cell(validate)
     _add_json(validate)
     schema = _add(actions, "schema", "print the JSON Schema of cell files, for editors and other programs")
     _add_json(schema)
-    show = _add(actions, "show", "print it with defaults filled in, and where each value is from")
+    show = _add(actions, "show", "print it with defaults filled in, and the origin of each value")
     _add_cell(show)
     _add_json(show)

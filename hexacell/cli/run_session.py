@@ -1,98 +1,68 @@
-"""Running the engine from the command line, shared by ``demo`` and ``run``."""
+"""One run from the command line, shared by ``demo`` and ``run``: progress, signals, keys, outcome."""
 
 from __future__ import annotations
 
-import shlex
 import sys
-from typing import Any
 
-from hexacell.application.calibration_run import RunRequest, calibrate
+from hexacell.application.calibration_run import RunRequest, calibrate, is_unverified
 from hexacell.campaign.pose_list import pose_list_of
 from hexacell.cli.console import Console
 from hexacell.cli.progress import RunProgress
-from hexacell.cli.signals import Signals
+from hexacell.cli.signal_commands import SignalCommands
 from hexacell.cli.terminal import HELP, KeyboardCommands, TerminalOperator
 from hexacell.errors import ExitCode, HexacellError
-from procedures.calibration.workflow import Mode, expected_records
-from procedures.journal.journal import read_journal
+from hexacell.presentation.documents import run_document
+from hexacell.presentation.run import UNVERIFIED, clock_notice, closing_lines, resume_hint
+from procedures.calibration.workflow import expected_records
 from procedures.run import events
 from procedures.run.commands import CommandQueue
-from procedures.run.state import fold
 
 
-def execute_run(order: RunRequest, console: Console) -> events.Ended:
-    """Run to the end with a progress bar.
+def run_to_end(request: RunRequest, console: Console) -> ExitCode:
+    """Carry out a run with a progress bar and print its outcome.
 
-    Ctrl-C, SIGTERM or SIGHUP ends it after the step that is being done, Ctrl-C once more at once.
+    Ctrl-C, SIGTERM or SIGHUP ends it after the step in progress, a second Ctrl-C at once.
 
     Raises:
-        HexacellError: it could not begin, could not go on, or somebody stopped it.
+        HexacellError: it could not begin, could not continue, or was stopped.
     """
-    factor = order.cell.settings.timing.clock_factor
+    factor = request.cell.settings.timing.clock_factor
     if factor != 1.0:
-        console.say(f"The cell's clock runs {factor:g} times as fast as the one on the wall.")
-    listed = pose_list_of(order.cell)
-    progress = RunProgress(console, expected_records(order.cell.settings, order.mode, listed))
-    signals = Signals(console)
+        console.print(clock_notice(factor))
+    ended = execute_run(request, console)
+    console.document(run_document(request, ended))
+    for line in closing_lines(request, ended):
+        console.print(line)
+    return ExitCode(ended.exit_code)
+
+
+def execute_run(request: RunRequest, console: Console) -> events.Ended:
+    """Run the engine to its end; see :func:`run_to_end`."""
+    listed = pose_list_of(request.cell)
+    progress = RunProgress(console, expected_records(request.cell.settings, request.mode, listed))
+    signals = SignalCommands(console)
     try:
         with progress:
-            return signals.run(_with_keys(order, console, progress, signals.inbox))
+            return signals.run(_calibrate(request, console, progress, signals.inbox))
     except HexacellError:
-        _say_how_to_go_on(order, console, has_begun=progress.has_begun)
+        _print_how_to_resume(request, console, has_started=progress.has_started)
         raise
 
 
-async def _with_keys(
-    order: RunRequest, console: Console, progress: RunProgress, inbox: CommandQueue
+async def _calibrate(
+    request: RunRequest, console: Console, progress: RunProgress, inbox: CommandQueue
 ) -> events.Ended:
-    """Calibrate; a person who is asked at a terminal may also type there what is to happen."""
-    if not isinstance(order.operator, TerminalOperator):
-        return await calibrate(order, [progress], inbox)
+    """Calibrate; a person at a terminal may also type commands."""
+    if not isinstance(request.operator, TerminalOperator):
+        return await calibrate(request, [progress], inbox)
     keys = KeyboardCommands(console, inbox, sys.stdin)
-    order.operator.before, order.operator.afterwards = progress.make_room, keys.listen
-    console.say(HELP)
-    return await keys.run_cancellable(calibrate(order, [progress, keys], inbox))
+    request.operator.before_question, request.operator.after_question = progress.hide, keys.listen
+    console.print(HELP)
+    return await keys.listen_during(calibrate(request, [progress, keys], inbox))
 
 
-def _say_how_to_go_on(order: RunRequest, console: Console, *, has_begun: bool) -> None:
-    if has_begun:
-        console.say(f"Stopped; what was measured is kept. To go on:\n  {resume_command(order)}")
-    if (has_begun or order.resume) and _is_unverified(order):
-        console.error(
-            "The controller's config holds the new geometry, which is not verified yet: going on "
-            "verifies it, or puts the old one back."
-        )
-
-
-def _is_unverified(order: RunRequest) -> bool:
-    try:
-        return fold(read_journal(order.folder.journal)).is_unverified
-    except HexacellError:
-        return False
-
-
-def resume_command(order: RunRequest) -> str:
-    """What to type to go on with a run, by somebody at a terminal."""
-    mode = ["--mode", "check"] if order.mode is Mode.CHECK else []
-    words = ["hexacell", "run", str(order.cell.path), "--resume", str(order.folder.path), *mode]
-    return shlex.join(words)
-
-
-def run_document(order: RunRequest, ended: events.Ended) -> dict[str, Any]:
-    """What ``run --json`` and ``demo --json`` print."""
-    measurements = order.folder.measurements
-    return {
-        "exit_code": ended.exit_code,
-        "line": ended.line,
-        "run": str(order.folder.path),
-        "measurements": str(measurements) if measurements.is_file() else None,
-        "config": str(order.cell.config_path),
-    }
-
-
-def finish(order: RunRequest, ended: events.Ended, console: Console) -> ExitCode:
-    """Say how it ended and where everything is."""
-    console.document(run_document(order, ended))
-    console.say(f"Everything about this run is in {order.folder.path}")
-    console.say(ended.line)
-    return ExitCode(ended.exit_code)
+def _print_how_to_resume(request: RunRequest, console: Console, *, has_started: bool) -> None:
+    if has_started:
+        console.print(resume_hint(request))
+    if (has_started or request.resume) and is_unverified(request.folder):
+        console.error(UNVERIFIED)

@@ -1,19 +1,16 @@
-"""What a person may type at a plain terminal while a run goes on: one letter and Enter.
-
-The person at a plain terminal, asked line by line.
-"""
+"""A person at a plain terminal, who answers questions line by line and types commands as letters."""
 
 from __future__ import annotations
 
 import asyncio
 import sys
 import termios
-from collections.abc import Callable, Coroutine, Sequence
+from collections.abc import Callable, Coroutine
 from typing import Any, TextIO, TypeVar
 
 from hexacell.cli.console import Console
 from hexacell.errors import AnswerNeeded
-from hexacell.presentation.questions import question_text
+from hexacell.presentation.questions import matching_choice, question_text, repeated_text
 from procedures.run import events
 from procedures.run.commands import Abort, Command, CommandQueue, MeasureAgain, Pause, Resume, Undo
 from procedures.run.questions import Question, QuestionKind
@@ -31,8 +28,13 @@ APPROVER = "a person at the terminal"
 """Who approves a change, as the journal has it."""
 
 
+def is_interactive() -> bool:
+    """Whether stdin is a terminal, at which a person can answer."""
+    return sys.stdin is not None and sys.stdin.isatty()
+
+
 class KeyboardCommands:
-    """Turns typed letters into commands, and is a listener of the engine to know what they refer to."""
+    """Turns typed letters into commands; listens to the engine to know which set they refer to."""
 
     def __init__(self, console: Console, inbox: CommandQueue, terminal: TextIO) -> None:
         self._console = console
@@ -41,12 +43,12 @@ class KeyboardCommands:
         self._at: SetKey | None = None
 
     def __call__(self, event: events.Event, _: RunState) -> None:
-        """Follow where the run is."""
+        """Keep the set that is being measured."""
         if isinstance(event, events.Arrived):
             self._at = event.at
 
-    async def run_cancellable(self, work: Coroutine[Any, Any, Result]) -> Result:
-        """Do some work, heeding what is typed."""
+    async def listen_during(self, work: Coroutine[Any, Any, Result]) -> Result:
+        """Do some work and turn what is typed meanwhile into commands."""
         self.listen()
         try:
             return await work
@@ -54,19 +56,19 @@ class KeyboardCommands:
             asyncio.get_running_loop().remove_reader(self._terminal)
 
     def listen(self) -> None:
-        """Take what is typed from now on, until somebody else does."""
-        asyncio.get_running_loop().add_reader(self._terminal, self._typed)
+        """Read what is typed from now on, until another reader of the terminal is installed."""
+        asyncio.get_running_loop().add_reader(self._terminal, self._read)
 
-    def _typed(self) -> None:
+    def _read(self) -> None:
         line = self._terminal.readline()
-        if not line:  # the terminal's input has ended, and would be reported for ever
+        if not line:  # end of input, which would be reported again and again
             asyncio.get_running_loop().remove_reader(self._terminal)
             return
         make = self._commands().get(line.strip())
         if make is not None:
             self._inbox.put(make())
         elif line.strip():
-            self._console.say(HELP)
+            self._console.print(HELP)
 
     def _commands(self) -> dict[str, Callable[[], Command]]:
         at = self._at
@@ -80,18 +82,18 @@ class KeyboardCommands:
         }
 
 
-def somebody_is_there() -> bool:
-    """Whether stdin is a terminal, at which somebody can answer."""
-    return sys.stdin is not None and sys.stdin.isatty()
-
-
 class TerminalOperator:
-    """Asks on the terminal that stdin is; ``before`` and ``afterwards`` are called around a question."""
+    """Asks the person at stdin.
+
+    Attributes:
+        before_question: called before a question is shown.
+        after_question: called once it is answered or given up.
+    """
 
     def __init__(self, console: Console) -> None:
         self._console = console
-        self.before: Callable[[], None] = lambda: None
-        self.afterwards: Callable[[], None] = lambda: None
+        self.before_question: Callable[[], None] = lambda: None
+        self.after_question: Callable[[], None] = lambda: None
 
     async def ask(self, question: Question) -> str | None:
         """Show the question and read lines until one is an answer.
@@ -101,42 +103,35 @@ class TerminalOperator:
         """
         text = question_text(question)
         while True:
-            typed = (await self._answer(text)).strip().lower()
+            typed = await self._answer(text)
             if question.kind is QuestionKind.APPROVE_CHANGE:
-                return APPROVER if typed == "yes" else None
+                return APPROVER if typed.strip().lower() == "yes" else None
             if question.default is not None:
                 return question.default
-            if (chosen := _choice(typed, question.choices)) is not None:
+            if (chosen := matching_choice(typed, question)) is not None:
                 return chosen
-            text = f"Type one of {', '.join(question.choices)}: "
+            text = repeated_text(question)
 
     async def _answer(self, question: str) -> str:
-        self.before()
-        # An Enter too many, pressed before, must not answer what was not asked yet.
+        self.before_question()
+        # An Enter pressed too often, before this question, must not answer it.
         termios.tcflush(sys.stdin, termios.TCIFLUSH)
-        self._console.ask(question)
+        self._console.prompt(question)
         try:
             line = await _line(sys.stdin)
         except asyncio.CancelledError:
-            self._console.ask("\n")
+            self._console.prompt("\n")
             raise
         finally:
-            self.afterwards()
+            self.after_question()
         if not line:
-            self._console.ask("\n")
+            self._console.prompt("\n")
             raise AnswerNeeded("the question was left without an answer", action="Run it at a terminal")
         return line
 
 
-def _choice(typed: str, choices: Sequence[str]) -> str | None:
-    """The one choice that begins with what was typed."""
-    typed = typed.replace(" ", "-")
-    found = [choice for choice in choices if typed and choice.startswith(typed)]
-    return found[0] if len(found) == 1 else None
-
-
 async def _line(terminal: TextIO) -> str:
-    """The next line; waited for without a thread, which Ctrl-C would have to wait for."""
+    """The next line; no thread waits for it, since Ctrl-C would have to wait for that thread."""
     loop = asyncio.get_running_loop()
     typed = asyncio.Event()
     loop.add_reader(terminal, typed.set)

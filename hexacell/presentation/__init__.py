@@ -1,1 +1,1 @@
-"""What is said to people about events, results and devices, for every face."""
+"""What users read about events, questions, results and devices: text from typed data, printed nowhere."""

@@ -1,11 +1,11 @@
-"""Devices for people."""
+"""Text for devices."""
 
 from __future__ import annotations
 
 from procedures.run.events import Identity
 
 
-def device_words(identity: Identity) -> str:
-    """Who answered, and how."""
+def device_line(identity: Identity) -> str:
+    """Which device answered, with its protocol and serial number."""
     serial = f", serial number {identity.serial_number}" if identity.serial_number else ""
     return f"{identity.name}, {identity.protocol}{serial}: {identity.description}"

@@ -1,14 +1,20 @@
-"""The plan for people: what to measure next, and what going on would gain."""
+"""Text for the plan: what to measure next, and what the remaining records gain."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 
+from hexacell.application.planning import NextPose, PlanTrial
 from hexacell.campaign.decisions import Finished, Forecast, MeasurePose, StartPoint
-from hexacell.campaign.dry_run import DryRunResult
+from procedures.run.steps import RunForecast
 
 
-def visit_words(decision: StartPoint | MeasurePose | Finished) -> str:
+def next_pose_text(proposed: NextPose) -> tuple[str, str]:
+    """What to do now, and what the remaining records gain."""
+    return decision_text(proposed.decision), forecast_text(proposed.forecast)
+
+
+def decision_text(decision: StartPoint | MeasurePose | Finished) -> str:
     """What to do now."""
     match decision:
         case Finished(reason=reason):
@@ -20,56 +26,66 @@ def visit_words(decision: StartPoint | MeasurePose | Finished) -> str:
                 f"{axis} {value:+.3f} +- {sigma:.3f}"
                 for axis, value, sigma in zip("xyz", decision.deviation, decision.sigma, strict=True)
             )
-            way = "".join(f"go over {pose}, " for pose in decision.via)
+            waypoints = "".join(f"pass through {pose}, " for pose in decision.via)
             return (
-                f"Point {decision.point}, orientation {decision.orientation}: {way}go to {decision.pose}. "
-                f"The gauges should show {expected} mm (one sigma)."
+                f"Point {decision.point}, orientation {decision.orientation}: {waypoints}"
+                f"go to {decision.pose}. The gauges should show {expected} mm (one sigma)."
             )
 
 
-def outlook_words(outlook: Forecast | None) -> str:
-    """How accurate the robot would be now, and what going on would change."""
-    if outlook is None:
+def forecast_text(forecast: Forecast | None) -> str:
+    """The predicted error now, and what the remaining records gain."""
+    if forecast is None:
         return "The robot can take none of the task poses, so no accuracy is predicted."
-    now = f"Predicted error at the task poses {outlook.now_mm:.3f} mm (one sigma, the worst)"
-    if not outlook.records:
+    now = f"Predicted error at the worst task pose {forecast.now_mm:.3f} mm (one sigma)"
+    if not forecast.records:
         return f"{now}."
     return (
-        f"{now}; going on gains {outlook.gain_mm:.3f} mm in {outlook.records} records, about "
-        f"{minutes_words(outlook.minutes)}."
+        f"{now}; continuing gains {forecast.gain_mm:.3f} mm in {forecast.records} records, about "
+        f"{duration(forecast.minutes)}."
     )
 
 
-def foretold_words(
-    foretold: DryRunResult, lost: Mapping[int, float], *, target_mm: float | None
-) -> Iterator[str]:
-    """What a plan will give, and for which robots it will not work."""
-    if not foretold.robots:
+def run_forecast_line(forecast: RunForecast) -> str:
+    """The predicted error after the record that was forecast, and what the remaining records gain."""
+    line = f"  predicted error at the task {forecast.next_mm:.3f} mm"
+    left = forecast.records - 1
+    if left < 1:
+        return line
+    gain = forecast.next_mm - forecast.end_mm
+    minutes = duration(forecast.minutes * left / forecast.records)
+    return f"{line}; continuing gains {gain:.3f} mm in {minutes}"
+
+
+def plan_trial_lines(trial: PlanTrial) -> Iterator[str]:
+    """What a plan is expected to give, and for which robots it fails."""
+    result, target_mm = trial.result, trial.target_mm
+    if not result.robots:
         yield (
-            f"None of {foretold.drawn} robots drawn within the tolerances could be calibrated like this: "
-            "the run may have to be given up."
+            f"None of {result.drawn} robots drawn within the tolerances could be calibrated with this "
+            "plan: a run may fail."
         )
-    elif foretold.worst_sigma_mm is None:
-        yield f"{outlook_words(None)} There will be about {foretold.records} records."
+    elif result.worst_sigma_mm is None:
+        yield f"{forecast_text(None)} There will be about {result.records} records."
     else:
         yield (
-            f"{foretold.records} records at {foretold.points} points will give about "
-            f"{foretold.worst_sigma_mm:.3f} mm at the worst of your task poses (one sigma), in about "
-            f"{minutes_words(foretold.minutes)}."
+            f"{result.records} records at {result.points} points will give about "
+            f"{result.worst_sigma_mm:.3f} mm at the worst of your task poses (one sigma), in about "
+            f"{duration(result.minutes)}."
         )
-        if target_mm is not None and foretold.worst_sigma_mm > target_mm:
+        if target_mm is not None and result.worst_sigma_mm > target_mm:
             yield f"That is not the target of {target_mm:g} mm: allow more records, points or tilt."
-    if 0 < foretold.robots < foretold.drawn:
-        failed = foretold.drawn - foretold.robots
-        yield f"{failed} of {foretold.drawn} simulated robots could not be calibrated like this."
-    for point, share in lost.items():
+    if 0 < result.robots < result.drawn:
+        failed = result.drawn - result.robots
+        yield f"{failed} of {result.drawn} simulated robots could not be calibrated with this plan."
+    for point, share in trial.unreachable.items():
         if share > 0.0:
             yield (
-                f"Point {point}: {share:.0%} of the robots within the tolerances cannot stand there; "
-                "if yours is one of them, the run will leave it out or stop."
+                f"Point {point}: {share:.0%} of the robots within the tolerances cannot reach it; "
+                "if yours is one of them, the run leaves it out or stops."
             )
 
 
-def minutes_words(minutes: float) -> str:
-    """A duration, no more exact than it is known."""
+def duration(minutes: float) -> str:
+    """A duration, rounded to what is known of it."""
     return f"{60.0 * minutes:.0f} seconds" if minutes < 1.5 else f"{minutes:.0f} minutes"

@@ -1,34 +1,17 @@
-"""What a replay found, for people and for programs."""
+"""Text for a replay: what differs from the recording, the verdict last."""
 
 from __future__ import annotations
-
-from typing import Any
 
 from hexacell.application.replay_run import Replay
 from hexacell.presentation.layout import wrapped
 from procedures.replay.comparison import Aspect, Difference
 
 LISTED = 10
+"""How many differences are printed."""
 
 
-def replay_document(replayed: Replay) -> dict[str, Any]:
-    """What ``replay --json`` prints."""
-    tally = replayed.tally
-    return {
-        "same": replayed.is_same,
-        "journal": str(replayed.journal),
-        "events": replayed.events,
-        "decisions": tally.decisions,
-        "results": tally.results,
-        "taken": tally.taken,
-        "recorded_by": replayed.recorded_by,
-        "replayed_by": replayed.replayed_by,
-        "differences": [_difference(replayed, difference) for difference in tally.differences],
-    }
-
-
-def replay_words(replayed: Replay) -> str:
-    """The same in a few lines, the verdict last."""
+def replay_report(replayed: Replay) -> str:
+    """The differences, those that count first, and the verdict."""
     found = sorted(replayed.tally.differences, key=lambda one: not replayed.counts(one))
     lines = [wrapped(_line(replayed, difference), indent=4) for difference in found[:LISTED]]
     if len(found) > LISTED:
@@ -38,18 +21,6 @@ def replay_words(replayed: Replay) -> str:
             wrapped(f"{replayed.recorded_by} recorded it: {replayed.replayed_by} may decide otherwise.")
         )
     return "\n".join([*lines, _verdict(replayed)])
-
-
-def _difference(replayed: Replay, difference: Difference) -> dict[str, Any]:
-    return {
-        "line": difference.line,
-        "place": difference.place,
-        "aspect": difference.aspect.value,
-        "counts": replayed.counts(difference),
-        "field": difference.change.field,
-        "recorded": difference.change.recorded,
-        "replayed": difference.change.replayed,
-    }
 
 
 def _line(replayed: Replay, difference: Difference) -> str:

@@ -28,7 +28,7 @@ def test_validate_with_json(typed_here, cell_folder):
     outcome = typed_here("cell", "validate", cell_folder.cell, "--json")
     assert outcome.code == 0
     assert outcome.document == {"valid": True, "name": "simulated-hexaglide"}
-    assert "in order" in outcome.err
+    assert "valid" in outcome.err
 
 
 def test_schema_describes_the_cells_that_come_with_it(typed_here):

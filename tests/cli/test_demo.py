@@ -89,7 +89,7 @@ def test_the_mean_deviation_falls_by_more_than_99_percent(demo):
 
 
 def test_it_says_that_its_clock_is_fast(demo):
-    assert "The cell's clock runs 50 times as fast as the one on the wall." in demo.outcome.err
+    assert "The simulated cell's clock runs 50 times as fast as real time." in demo.outcome.err
 
 
 def test_what_it_says_on_the_way_fits_a_terminal(demo):

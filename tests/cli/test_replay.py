@@ -82,4 +82,4 @@ def test_what_cannot_be_read_is_told(typed_here, demo, tmp_path):
     assert "journal.jsonl:2: this line of the journal is damaged" in outcome.err
     outcome = typed_here("replay", tmp_path, "--tolerance", "nan")
     assert outcome.code == 2
-    assert "a tolerance of nan is none" in outcome.err
+    assert "--tolerance nan is no tolerance" in outcome.err

@@ -216,10 +216,10 @@ class TestAPersonAtTheTerminal:
     def test_carries_the_gauges_from_point_to_point(self, quick_cell, start, terminal):
         quick_cell.edit(BY_HAND)
         process = start_at(terminal, start, "run", quick_cell.cell, "--mode", "check")
-        terminal.read_until("Press Enter when they stand. ")
+        terminal.read_until("Press Enter when they are in place. ")
         terminal.type("\n\n")  # an Enter too many must not answer the next question
-        second = terminal.read_until("Press Enter when they stand. ")
-        assert "Point 2: the robot stands at X100.000 Y100.000 Z550.000" in second
+        second = terminal.read_until("Press Enter when they are in place. ")
+        assert "Point 2: the robot is at X100.000 Y100.000 Z550.000" in second
         time.sleep(0.3)
         [run] = quick_cell.runs()
         placed = [e for e in read_journal(run / "journal.jsonl") if isinstance(e, events.GaugesPlaced)]
@@ -233,7 +233,7 @@ class TestAPersonAtTheTerminal:
     def test_pauses_undoes_and_resumes_by_letters(self, quick_cell, start, terminal):
         quick_cell.edit(BY_HAND)
         process = start_at(terminal, start, "run", quick_cell.cell, "--mode", "check")
-        terminal.read_until("Press Enter when they stand. ")
+        terminal.read_until("Press Enter when they are in place. ")
         terminal.type("\n")
         terminal.type("p\n")
         process.wait_for("paused\n", lambda: process.out)
@@ -242,7 +242,7 @@ class TestAPersonAtTheTerminal:
         assert process.out.count("Letters, each with Enter") == 2, (
             "at the beginning, and for what means none"
         )
-        terminal.read_until("Press Enter when they stand. ")
+        terminal.read_until("Press Enter when they are in place. ")
         process.popen.send_signal(signal.SIGTERM)
         assert ended(process, terminal) == 130
         [run] = quick_cell.runs()
@@ -253,13 +253,13 @@ class TestAPersonAtTheTerminal:
     def test_is_asked_how_to_go_on_after_a_fault(self, quick_cell, start, terminal):
         quick_cell.edit(BY_HAND, ("[acceptance]", "[acceptance]\ndrift_mm = 0.00001"))
         process = start_at(terminal, start, "run", quick_cell.cell, "--mode", "check")
-        terminal.read_until("Press Enter when they stand. ")
+        terminal.read_until("Press Enter when they are in place. ")
         terminal.type("\n")
         terminal.read_until("How to go on (retry, measure-again, redo-set, abort)? ")
         terminal.type("re\n")
         terminal.read_until("Type one of retry, measure-again, redo-set, abort: ")
         terminal.type("redo\n")
-        terminal.read_until("Press Enter when they stand. ")
+        terminal.read_until("Press Enter when they are in place. ")
         terminal.type("\n")
         terminal.read_until("How to go on (retry, measure-again, redo-set, abort)? ")
         terminal.type("abort\n")

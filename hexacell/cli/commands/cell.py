@@ -1,4 +1,4 @@
-"""``hexacell cell validate|schema|show``."""
+"""``hexacell cell validate|schema|show``: checks or prints a cell file."""
 
 from __future__ import annotations
 
@@ -13,21 +13,21 @@ from hexacell.robot_model import robot_of
 
 
 def main(options: argparse.Namespace) -> ExitCode:
-    """Check, explain or show a cell file."""
+    """Validate a cell file, print its schema, or show it with defaults."""
     console = Console(options.json)
     if options.action == "schema":
         console.document(schema())
         if not options.json:
-            console.say(json.dumps(schema(), indent=2))
+            console.print(json.dumps(schema(), indent=2))
         return ExitCode.DONE
     cell = load_cell(options.cell)
     if options.action == "show":
         console.document(cell.settings.model_dump(mode="json"))
         if not options.json:
-            console.say(describe(cell).rstrip("\n"))
+            console.print(describe(cell).rstrip("\n"))
         return ExitCode.DONE
     robot_of(cell)
     require_drivers(cell.settings)
     console.document({"valid": True, "name": cell.settings.name})
-    console.say(f"{options.cell}: in order, and so is its controller config {cell.config_path}")
+    console.print(f"{options.cell}: valid, and so is its controller config {cell.config_path}")
     return ExitCode.DONE

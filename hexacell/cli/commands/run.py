@@ -7,8 +7,8 @@ import argparse
 from hexacell.application.calibration_run import RunRequest
 from hexacell.cell.loader import load_cell
 from hexacell.cli.console import Console
-from hexacell.cli.run_session import execute_run, finish
-from hexacell.cli.terminal import TerminalOperator, somebody_is_there
+from hexacell.cli.run_session import run_to_end
+from hexacell.cli.terminal import TerminalOperator, is_interactive
 from hexacell.errors import ExitCode
 from hexacell.runs.run_folder import find_run, new_run
 from procedures.calibration.workflow import Mode
@@ -19,8 +19,8 @@ def main(options: argparse.Namespace) -> ExitCode:
     """Calibrate, or check."""
     console = Console(options.json)
     cell = load_cell(options.cell)
-    attended = somebody_is_there() and not options.unattended
-    order = RunRequest(
+    attended = is_interactive() and not options.unattended
+    request = RunRequest(
         cell=cell,
         folder=find_run(cell, options.resume) if options.resume else new_run(cell),
         mode=_mode(options),
@@ -28,7 +28,7 @@ def main(options: argparse.Namespace) -> ExitCode:
         unattended=not attended,
         resume=options.resume is not None,
     )
-    return finish(order, execute_run(order, console), console)
+    return run_to_end(request, console)
 
 
 def _mode(options: argparse.Namespace) -> Mode:

@@ -1,4 +1,4 @@
-"""``hexacell simulate``: a simulated cell for other processes."""
+"""``hexacell simulate``: serves a simulated cell to other processes."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from hexacell.storage.atomic_files import write_atomically
 
 
 def main(options: argparse.Namespace) -> ExitCode:
-    """Serve until interrupted; stdout gets the cell file that reaches it."""
+    """Serve until interrupted; stdout gets a cell file with the addresses of the served devices."""
     cell = load_cell(options.cell)
     if cell.settings.simulation is None:
         raise UsageError("there is no [simulation] in it: this is a real cell", subject=cell.path)
-    with _held_back() as stops, device_addresses(cell, other_processes=True) as settings:
+    with _blocked_signals() as stops, device_addresses(cell, other_processes=True) as settings:
         controller = settings.controller.model_copy(update={"config": str(cell.config_path.resolve())})
         text = dump(settings.model_copy(update={"controller": controller}))
         if options.output is None:
@@ -32,10 +32,10 @@ def main(options: argparse.Namespace) -> ExitCode:
 
 
 @contextmanager
-def _held_back() -> Iterator[set[signal.Signals]]:
-    """Block the signals that end it, in every thread to come, until they are waited for.
+def _blocked_signals() -> Iterator[set[signal.Signals]]:
+    """Block the signals that end it in this thread and those it starts; ``sigwait`` receives them.
 
-    A signal that comes to one of the simulated devices' threads would not wake the main one.
+    Otherwise a thread of a simulated device may take the signal, and the main thread waits on.
     """
     stops = {signal.SIGINT, signal.SIGTERM}
     if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:  # as nohup has it
@@ -44,6 +44,6 @@ def _held_back() -> Iterator[set[signal.Signals]]:
     try:
         yield stops
     finally:
-        while again := signal.sigpending() & stops:
-            signal.sigwait(again)
+        while pending := signal.sigpending() & stops:
+            signal.sigwait(pending)
         signal.pthread_sigmask(signal.SIG_SETMASK, before)

@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+import pytest
+
 from hexacell.cell.recovery import Action
 from hexacell.kinematics.pose import Pose
-from hexacell.presentation.questions import question_text
+from hexacell.presentation.questions import matching_choice, question_text, repeated_text
 from procedures.run.events import GateOutcome
 from procedures.run.questions import ask_approval, ask_placement, ask_recovery
+
+CHOICES = (Action.RETRY, Action.MEASURE_AGAIN, Action.REDO_SET, Action.ABORT)
+FAILURE = ask_recovery("It broke.", CHOICES)
 
 
 def test_placing_gauges_names_the_point_and_the_pose() -> None:
     text = question_text(ask_placement(3, Pose(1.0, 2.0, 3.0)))
-    assert text.startswith("\nPoint 3: the robot stands at X1.000 ")
-    assert text.endswith("Press Enter when they stand. ")
+    assert text.startswith("\nPoint 3: the robot is at X1.000 ")
+    assert text.endswith("Press Enter when they are in place. ")
 
 
 def test_an_approval_shows_the_change_then_every_gate() -> None:
@@ -27,5 +32,20 @@ def test_an_approval_shows_the_change_then_every_gate() -> None:
 
 
 def test_a_failure_names_the_choices() -> None:
-    text = question_text(ask_recovery("It broke.", (Action.RETRY, Action.REDO_SET)))
-    assert text == "\nIt broke.\nHow to go on (retry, redo-set)? "
+    assert question_text(FAILURE) == "\nIt broke.\nHow to go on (retry, measure-again, redo-set, abort)? "
+    assert repeated_text(FAILURE) == "Type one of retry, measure-again, redo-set, abort: "
+
+
+@pytest.mark.parametrize(
+    ("typed", "choice"),
+    [
+        ("redo\n", "redo-set"),
+        ("Measure again\n", "measure-again"),
+        ("a", "abort"),
+        ("re", None),
+        ("\n", None),
+        ("leave", None),
+    ],
+)
+def test_the_only_choice_that_begins_so_is_meant(typed: str, choice: str | None) -> None:
+    assert matching_choice(typed, FAILURE) == choice

@@ -13,7 +13,7 @@ import pytest
 
 from hexacell.cli import app
 from hexacell.cli.console import Console
-from hexacell.cli.signals import ENDS, Signals
+from hexacell.cli.signal_commands import ENDING_SIGNALS, SignalCommands
 from hexacell.errors import Interruption
 from procedures.run.cancellation import shielded
 from procedures.run.commands import Abort, Command, Stop
@@ -21,14 +21,14 @@ from procedures.run.commands import Abort, Command, Stop
 
 @pytest.fixture(autouse=True)
 def handlers_are_put_back() -> Iterator[None]:
-    before = [signal.getsignal(number) for number in ENDS]
+    before = [signal.getsignal(number) for number in ENDING_SIGNALS]
     yield
-    assert [signal.getsignal(number) for number in ENDS] == before
+    assert [signal.getsignal(number) for number in ENDING_SIGNALS] == before
 
 
 @pytest.fixture
-def signals() -> Signals:
-    return Signals(Console())
+def signals() -> SignalCommands:
+    return SignalCommands(Console())
 
 
 def send(*numbers: signal.Signals) -> None:
@@ -36,7 +36,7 @@ def send(*numbers: signal.Signals) -> None:
         os.kill(os.getpid(), number)
 
 
-async def commands_after(signals: Signals, *numbers: signal.Signals) -> list[Command]:
+async def commands_after(signals: SignalCommands, *numbers: signal.Signals) -> list[Command]:
     """What an engine finds in its inbox."""
     with signals.inbox.attended():
         send(*numbers)
@@ -44,7 +44,7 @@ async def commands_after(signals: Signals, *numbers: signal.Signals) -> list[Com
 
 
 STOP, ABORT = Stop("interrupted"), Abort("interrupted")
-INT, TERM, HUP = ENDS[0], ENDS[1], ENDS[2]
+INT, TERM, HUP = ENDING_SIGNALS
 
 
 @pytest.mark.parametrize(

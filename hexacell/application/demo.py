@@ -1,0 +1,69 @@
+"""The demo: a run on a fresh copy of a simulated cell, in a folder of its own."""
+
+from __future__ import annotations
+
+import shutil
+from contextlib import ExitStack
+from pathlib import Path
+
+from hexacell.application.calibration_run import RunRequest
+from hexacell.cell.bundled import CONTROLLER, bundled_config
+from hexacell.cell.loader import load_cell
+from hexacell.errors import FileError, UsageError
+from hexacell.runs.run_folder import RunFolder
+from hexacell.storage.atomic_files import create_folder_durably, os_error_to_file_error, write_atomically
+from hexacell.storage.cell_lock import config_lock, lock_path
+from procedures.calibration.workflow import Mode
+from procedures.engine.operator import UnattendedOperator
+
+MARKER = ".hexacell-demo"
+"""Name of the file that marks a folder as a demo's, which the next demo may replace."""
+
+
+def prepare_demo(folder: Path, config_name: str) -> RunRequest:
+    """Copy a bundled cell into ``folder`` and request a calibration of it.
+
+    Raises:
+        UsageError: there is no such cell, or it has no simulation.
+        FileError: the folder is not empty and not an earlier demo's.
+        CellBusy: a demo is running in it.
+    """
+    cell = load_cell(_copy_cell(_require_simulation(bundled_config(config_name)), folder))
+    return RunRequest(cell, RunFolder(folder / "run"), Mode.OPTIMISE, UnattendedOperator(), unattended=True)
+
+
+def _require_simulation(cell_file: Path) -> Path:
+    if load_cell(cell_file).settings.simulation is None:
+        raise UsageError("there is no [simulation] in it: this is a real cell", subject=cell_file)
+    return cell_file
+
+
+def _copy_cell(cell_file: Path, folder: Path) -> Path:
+    """Replace what an earlier demo left in ``folder`` by a copy of the cell."""
+    if folder.is_dir() and any(folder.iterdir()):
+        if not (folder / MARKER).is_file():
+            raise FileError(
+                "this folder is not empty, and no earlier demo's",
+                subject=folder,
+                action="Choose another with --folder",
+            )
+        _clear(folder)
+    create_folder_durably(folder)
+    write_atomically(folder / MARKER, b"made by hexacell demo, which replaces this folder\n")
+    for source in cell_file.parent.glob(f"{cell_file.stem}*.toml"):
+        write_atomically(folder / source.name, source.read_bytes())
+    return folder / cell_file.name
+
+
+def _clear(folder: Path) -> None:
+    """Remove all but the marker, which is kept so that a removal that fails can be repeated."""
+    configs = list(folder.glob(f"*{CONTROLLER}"))
+    kept = {folder / MARKER, *(folder / lock_path(config).name for config in configs)}
+    with ExitStack() as locks:
+        for config in configs:
+            locks.enter_context(config_lock(config))
+        try:
+            for item in set(folder.iterdir()) - kept:
+                shutil.rmtree(item) if item.is_dir() and not item.is_symlink() else item.unlink()
+        except OSError as error:
+            raise os_error_to_file_error("the earlier demo cannot be removed", folder, error) from error

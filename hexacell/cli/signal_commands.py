@@ -1,0 +1,83 @@
+"""Signals while an engine runs: commands to it, never an exception in the middle of a step."""
+
+from __future__ import annotations
+
+import asyncio
+import signal
+from collections.abc import Callable, Coroutine, Iterator
+from contextlib import contextmanager
+from types import FrameType
+from typing import Any, TypeVar
+
+from hexacell.cli.console import Console
+from hexacell.cli.signals import STOP_SIGNALS, in_main_thread
+from hexacell.errors import Interruption
+from procedures.run.commands import Abort, CommandQueue, Stop
+
+Result = TypeVar("Result")
+
+ENDING_SIGNALS = (signal.SIGINT, *STOP_SIGNALS)
+
+
+class SignalCommands:
+    """Turns signals into commands: the first is a clean stop, a second Ctrl-C stops motion at once."""
+
+    def __init__(self, console: Console) -> None:
+        self.inbox = CommandQueue()
+        self._console = console
+        self._stop_requested = False
+
+    def run(self, work: Coroutine[Any, Any, Result]) -> Result:
+        """``asyncio.run`` with signals turned into commands.
+
+        Before an engine reads the inbox, a signal cancels the work, which then cleans up. After the
+        engine has ended, a signal has no effect.
+
+        Raises:
+            Interruption: a signal cancelled the work.
+        """
+        try:
+            return asyncio.run(self._with_handlers(work))
+        except asyncio.CancelledError:
+            raise Interruption("interrupted") from None
+
+    async def _with_handlers(self, work: Coroutine[Any, Any, Result]) -> Result:
+        loop, task = asyncio.get_running_loop(), asyncio.ensure_future(work)
+
+        def handle(number: int, _: FrameType | None) -> None:
+            loop.call_soon_threadsafe(self._handle, signal.Signals(number), task)
+
+        with _handled(handle):
+            return await task
+
+    def _handle(self, number: signal.Signals, task: asyncio.Task[Any]) -> None:
+        if self.inbox.is_over:
+            return
+        if not self.inbox.is_attended:
+            task.cancel()
+        elif self._stop_requested and number is signal.SIGINT:
+            self.inbox.put(Abort("interrupted"))
+        else:
+            self._stop(number)
+
+    def _stop(self, number: signal.Signals) -> None:
+        self._stop_requested = True
+        self.inbox.put(Stop("interrupted"))
+        if number is signal.SIGINT:
+            self._console.print("Stopping after this step; Ctrl-C again stops motion at once.")
+
+
+@contextmanager
+def _handled(handler: Callable[[int, FrameType | None], object]) -> Iterator[None]:
+    """Handle the signals that end a program, except ignored ones, as in a script's background job."""
+    before: dict[signal.Signals, Any] = {}
+    if in_main_thread():
+        now = {number: signal.getsignal(number) for number in ENDING_SIGNALS}
+        before = {number: former for number, former in now.items() if former is not signal.SIG_IGN}
+    for number in before:
+        signal.signal(number, handler)
+    try:
+        yield
+    finally:
+        for number, former in before.items():
+            signal.signal(number, former)

@@ -1,0 +1,125 @@
+"""The JSON documents that commands print for programs (``docs/interface.md``)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from hexacell.application.calibration_run import RunRequest
+from hexacell.application.planning import NextPose, PlanTrial
+from hexacell.application.replay_run import Replay
+from hexacell.campaign.decisions import Finished, Forecast, MeasurePose, StartPoint
+from hexacell.kinematics.pose import Pose
+from procedures.replay.comparison import Difference
+from procedures.run import events
+
+
+def next_document(proposed: NextPose) -> dict[str, Any]:
+    """What ``next --json`` prints."""
+    decision, forecast = proposed.decision, proposed.forecast
+    now = None if forecast is None else forecast.now_mm
+    if isinstance(decision, Finished):
+        return {"done": True, "reason": decision.reason, "present_worst_sigma_mm": now}
+    return {
+        "done": False,
+        "point": decision.point,
+        **_expected_record(decision),
+        "pose": _pose(decision.pose),
+        "joint_targets": list(decision.joints),
+        "present_worst_sigma_mm": now,
+        "predicted_worst_sigma_mm": None if forecast is None else forecast.next_mm,
+        "going_on": None if forecast is None else _remainder(forecast),
+    }
+
+
+def _expected_record(decision: StartPoint | MeasurePose) -> dict[str, Any]:
+    if isinstance(decision, StartPoint):
+        zero = [0.0, 0.0, 0.0]
+        return {
+            "orientation": 1,
+            "reference": True,
+            "predicted_deviation": zero,
+            "sigma": zero,
+            "gain": 0.0,
+            "via": [],
+        }
+    return {
+        "orientation": decision.orientation,
+        "reference": False,
+        "predicted_deviation": list(decision.deviation),
+        "sigma": list(decision.sigma),
+        "gain": decision.gain,
+        "via": [_pose(pose) for pose in decision.via],
+    }
+
+
+def _remainder(forecast: Forecast) -> dict[str, Any]:
+    return {
+        "records": forecast.records,
+        "minutes": forecast.minutes,
+        "worst_sigma_mm": forecast.end_mm,
+        "gain_mm": forecast.gain_mm,
+    }
+
+
+def preflight_document(devices: Sequence[events.Identity], trial: PlanTrial) -> dict[str, Any]:
+    """What ``preflight --json`` prints."""
+    result = trial.result
+    return {
+        "ready": True,
+        "devices": [identity.model_dump() for identity in devices],
+        "expected": {
+            "drawn": result.drawn,
+            "robots": result.robots,
+            "points": result.points,
+            "records": result.records,
+            "outside": result.outside,
+            "worst_sigma_mm": result.worst_sigma_mm,
+            "minutes": result.minutes,
+            "lost": {str(point): share for point, share in trial.unreachable.items()},
+        },
+    }
+
+
+def run_document(request: RunRequest, ended: events.Ended) -> dict[str, Any]:
+    """What ``run --json`` and ``demo --json`` print."""
+    measurements = request.folder.measurements
+    return {
+        "exit_code": ended.exit_code,
+        "line": ended.line,
+        "run": str(request.folder.path),
+        "measurements": str(measurements) if measurements.is_file() else None,
+        "config": str(request.cell.config_path),
+    }
+
+
+def replay_document(replayed: Replay) -> dict[str, Any]:
+    """What ``replay --json`` prints."""
+    tally = replayed.tally
+    return {
+        "same": replayed.is_same,
+        "journal": str(replayed.journal),
+        "events": replayed.events,
+        "decisions": tally.decisions,
+        "results": tally.results,
+        "taken": tally.taken,
+        "recorded_by": replayed.recorded_by,
+        "replayed_by": replayed.replayed_by,
+        "differences": [_difference(replayed, difference) for difference in tally.differences],
+    }
+
+
+def _difference(replayed: Replay, difference: Difference) -> dict[str, Any]:
+    return {
+        "line": difference.line,
+        "place": difference.place,
+        "aspect": difference.aspect.value,
+        "counts": replayed.counts(difference),
+        "field": difference.change.field,
+        "recorded": difference.change.recorded,
+        "replayed": difference.change.replayed,
+    }
+
+
+def _pose(pose: Pose) -> dict[str, float]:
+    return dict(zip("xyzabc", pose.as_tuple(), strict=True))

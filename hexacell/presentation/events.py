@@ -1,0 +1,118 @@
+"""Text for the events of a run: what the run does now, and what just happened."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hexacell.presentation.planning import run_forecast_line
+from procedures.run import events
+from procedures.run.state import RunState
+from procedures.run.steps import Compute, Move, Phase, RunForecast, SetKey
+
+SET_NAMES = {
+    Phase.IDENTIFY: "point {}",
+    Phase.BEFORE: "held-out point {}, before",
+    Phase.AFTER: "held-out point {}, after",
+}
+COMPUTATIONS = {
+    "lend": "loading a provisional geometry",
+    "take back": "restoring the controller's geometry",
+    "identify": "identifying the geometry",
+    "propose": "preparing the new config",
+    "commit": "writing the config and reloading it",
+    "judge": "evaluating the held-out points",
+    "roll back": "restoring the old config",
+}
+CONFIG_CHANGES = {
+    "lent": "the controller uses a provisional geometry while the points are measured",
+    "taken back": "the controller uses its own geometry again",
+    "rolled back": "the old geometry is back in the controller",
+}
+
+
+class EventFormatter:
+    """Turns the events of one run, in their order, into lines of text."""
+
+    def __init__(self) -> None:
+        self._forecast: RunForecast | None = None
+
+    def lines(self, event: events.Event, state: RunState) -> list[str]:
+        """Text of an event; ``state`` includes the event. Empty where there is nothing to report."""
+        text = event_text(event, state)
+        return [line for line in (text, self._forecast_line(event)) if line]
+
+    def _forecast_line(self, event: events.Event) -> str | None:
+        """The predicted error, once the set whose last move predicted it is closed."""
+        match event:
+            case events.StepBegun(step=Move(expected=expected)) if expected is not None:
+                self._forecast = expected.forecast
+            case events.SetClosed(at=SetKey(phase=Phase.IDENTIFY)) if self._forecast is not None:
+                return run_forecast_line(self._forecast)
+        return None
+
+
+def set_name(key: SetKey) -> str:
+    """Display name of a set: ``point 2``, ``held-out point 1, before``."""
+    return SET_NAMES[key.phase].format(key.point)
+
+
+def activity(event: events.Event) -> str | None:
+    """A few words on what the run does from this event on; nothing where that does not change."""
+    match event:
+        case events.StepBegun(step=Move() as step):
+            return f"{set_name(step.at)}, orientation {step.orientation}{_forecast_range(step)}"
+        case events.StepBegun(step=Compute() as step):
+            return COMPUTATIONS[step.kind]
+        case _:
+            return None
+
+
+def _forecast_range(step: Move) -> str:
+    """The predicted error now and at the end of the plan."""
+    forecast = step.expected and step.expected.forecast
+    return f": {forecast.now_mm:.3f} -> {forecast.end_mm:.3f} mm" if forecast else ""
+
+
+def event_text(event: events.Event, state: RunState) -> str | None:
+    """What an event reports, if anything."""
+    match event:
+        case events.SetClosed():
+            return set_summary(event, state)
+        case events.SetInvalidated():
+            return f"{set_name(event.at)} is measured again: {event.reason}"
+        case events.RecordRejected():
+            return f"{set_name(event.at)}, orientation {event.orientation} left out: {event.reason}"
+        case events.Committed():
+            return f"written to the controller, approved by {event.approved_by}"
+        case events.ProvisionalApplied() | events.ProvisionalReverted() | events.RolledBack():
+            return CONFIG_CHANGES[event.kind]
+        case _:
+            return _interruption_text(event)
+
+
+def _interruption_text(event: events.Event) -> str | None:
+    """What an interruption, a failure or a command reports."""
+    match event:
+        case events.ReferenceConfirmed():
+            return f"{set_name(event.at)} continues: its reference is unchanged"
+        case events.RecordDiscarded():
+            return f"{set_name(event.at)}, orientation {event.orientation} is measured again"
+        case events.Failed():
+            return f"{event.reason}\n  attempt {event.attempt}: {event.action.value}"
+        case events.CommandRejected():
+            return f"{event.command}: {event.reason}"
+        case events.Paused() | events.Resumed():
+            return event.kind
+        case _:
+            return None
+
+
+def set_summary(closed: events.SetClosed, state: RunState) -> str:
+    """One line about a closed set, at most 80 columns wide."""
+    samples = state.set(closed.at).samples
+    largest = max(float(np.abs(sample.deviation_mm).max()) for sample in samples)
+    drift = float(np.abs(closed.drift_mm).max())
+    return (
+        f"{set_name(closed.at):24} {len(samples):2} records, "
+        f"largest deviation {largest:.3f} mm, drift {drift:.3f} mm"
+    )

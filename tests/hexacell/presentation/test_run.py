@@ -1,0 +1,44 @@
+"""Text for a run: how to resume it is a command that can be typed."""
+
+from __future__ import annotations
+
+import shlex
+
+import pytest
+
+from hexacell.application.calibration_run import RunRequest
+from hexacell.cell.bundled import bundled_config
+from hexacell.cell.loader import load_cell
+from hexacell.cli.parser import make_parser
+from hexacell.presentation.run import closing_lines, resume_command, resume_hint
+from hexacell.runs.run_folder import RunFolder
+from procedures.calibration.workflow import Mode
+from procedures.engine.operator import UnattendedOperator
+from procedures.run import events
+
+
+@pytest.fixture
+def request_of(tmp_path):
+    def make(mode: Mode) -> RunRequest:
+        cell = load_cell(bundled_config("simulated-hexaglide"))
+        return RunRequest(cell, RunFolder(tmp_path / "a run"), mode, UnattendedOperator())
+
+    return make
+
+
+@pytest.mark.parametrize("mode", Mode)
+def test_the_resume_command_parses_to_the_same_request(request_of, mode):
+    request = request_of(mode)
+    program, *arguments = shlex.split(resume_command(request))
+    options = make_parser().parse_args(arguments)
+    assert program == "hexacell"
+    assert (options.cell, options.resume) == (request.cell.path, str(request.folder.path))
+    assert options.mode == ("check" if mode is Mode.CHECK else None)
+    assert resume_hint(request).splitlines()[1].strip() == resume_command(request)
+
+
+def test_the_result_is_the_last_line(request_of):
+    request = request_of(Mode.OPTIMISE)
+    where, line = closing_lines(request, events.Ended(exit_code=0, line="all well"))
+    assert where.endswith(str(request.folder.path))
+    assert line == "all well"

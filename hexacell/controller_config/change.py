@@ -8,7 +8,7 @@ from __future__ import annotations
 import difflib
 import io
 from pathlib import Path
-from typing import Literal, Self
+from typing import ClassVar, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
 
@@ -23,6 +23,9 @@ class Document(BaseModel):
     """A frozen record; written atomically, checked when read."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
+
+    noun: ClassVar[str]
+    """What error messages call it."""
 
     version: Literal[1] = 1
 
@@ -42,7 +45,7 @@ class Document(BaseModel):
         except ValidationError as error:
             first = error.errors(include_url=False)[0]
             where = ".".join(str(key) for key in first["loc"]) or "the whole"
-            problem = f"this is no {cls.__name__.lower()}: {where}: {first['msg']}"
+            problem = f"this is no {cls.noun}: {where}: {first['msg']}"
             raise FileError(problem, subject=path, action="Restore the file") from error
 
 
@@ -52,6 +55,8 @@ class ConfigChange(Document):
     It holds all that a person must see and all that a commit needs, so that what is written is what
     was approved, whatever happens to the program in between.
     """
+
+    noun: ClassVar[str] = "proposal"
 
     path: Path
     format: str

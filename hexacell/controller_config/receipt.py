@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import ClassVar
 
 from hexacell.controller_config.change import ConfigChange, Document
 from hexacell.errors import FileError
@@ -19,6 +20,8 @@ class Receipt(Document):
 
     ``backup_folder`` is where the receipt was found; a run folder may be moved.
     """
+
+    noun: ClassVar[str] = "receipt"
 
     path: Path
     format: str

@@ -136,11 +136,11 @@ class Log:
         if device == "nobody":
             raise UsageError("there is no such device")
 
-    def strike(self, kind: FaultKind, device: str = "") -> None:
-        self.told.append(("strike", device, self.clock.now()))
+    def inject(self, kind: FaultKind, device: str = "") -> None:
+        self.told.append(("inject", device, self.clock.now()))
 
-    def lift(self, kind: FaultKind, device: str = "") -> None:
-        self.told.append(("lift", device, self.clock.now()))
+    def clear(self, kind: FaultKind, device: str = "") -> None:
+        self.told.append(("clear", device, self.clock.now()))
 
     def wait_for(self, count: int) -> list[tuple[str, str]]:
         give_up = time.monotonic() + PATIENCE_S
@@ -153,12 +153,12 @@ def fault(device: str, **values: Any) -> SimulatedFault:
     return SimulatedFault.model_validate({"kind": "silent", "device": device, **values})
 
 
-def test_faults_strike_and_end_in_their_order() -> None:
+def test_faults_are_injected_and_cleared_in_their_order() -> None:
     clock = CellClock(100.0)
     log: Any = Log(clock)
     planned = [fault("b", after_s=4.0), fault("a", after_s=1.0, lasts_s=5.0)]
     with FaultSchedule(log, clock, planned) as schedule:
-        assert log.wait_for(3) == [("strike", "a"), ("strike", "b"), ("lift", "a")]
+        assert log.wait_for(3) == [("inject", "a"), ("inject", "b"), ("clear", "a")]
         assert [struck.fault.device for struck in schedule.struck] == ["a", "b"]
     for (_, _, at_s), due_s in zip(log.told, (1.0, 4.0, 6.0), strict=True):
         assert at_s >= due_s
@@ -171,11 +171,11 @@ def test_a_fault_waits_for_its_move() -> None:
         schedule.move_begun()
         assert log.told == []
         schedule.move_begun()
-        assert log.wait_for(1) == [("strike", "x")]
+        assert log.wait_for(1) == [("inject", "x")]
         schedule.move_begun()
         schedule.plan(fault("y", at_move=schedule.moves + 1))
         schedule.move_begun()
-        assert log.wait_for(2) == [("strike", "x"), ("strike", "y")]
+        assert log.wait_for(2) == [("inject", "x"), ("inject", "y")]
 
 
 def test_what_is_planned_is_checked_at_once() -> None:

@@ -140,7 +140,7 @@ class Scene:
         positions = tuple(float(value) + self.slip_mm for value in self.rig.world.sliders())
         return EncoderSample(tuple(round(1000 * value) for value in positions), positions)
 
-    async def pressed(self) -> str | None:
+    async def active_reason(self) -> str | None:
         return self.forbidden
 
     async def open(self) -> None:

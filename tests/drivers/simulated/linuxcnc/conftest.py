@@ -109,6 +109,14 @@ class RawClient:
             heard += data
         return heard
 
+    def ask(self, line: str) -> bytes:
+        """The line that answers."""
+        self.send(line)
+        answer = b""
+        while not answer.endswith(b"\n"):
+            answer += self.hear(1)
+        return answer
+
     def expect_silence(self) -> None:
         self._socket.settimeout(0.03)
         with pytest.raises(TimeoutError):
@@ -130,11 +138,8 @@ class RawClient:
         self.say("set estop off", b"SET ESTOP ACK\n\r")
         self.say("set machine on", b"SET MACHINE ACK\n\r")
         self.say("set home -1", b"SET HOME ACK\n\r")
-        for _ in range(500):
-            self.send("get joint_homed")
-            if b"NO" not in self.hear(len("JOINT_HOMED NO NO NO NO NO NO\r\n")):
-                break
-        self.hear(len("YES" * 6) - len("NO" * 6))
+        while b"NO" in self.ask("get joint_homed"):
+            time.sleep(0.001)  # homing goes on
         self.say("set mode mdi", b"SET MODE ACK\n\r")
 
     def close(self) -> None:

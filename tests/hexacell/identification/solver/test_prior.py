@@ -65,7 +65,7 @@ def test_what_small_tilts_leave_open_is_named(small_tilts):
 
 def test_what_small_tilts_leave_open_stays_near_the_drawing(small_tilts, paper, hexaglide):
     """And what is told of it holds: errors within a few of its sigmas, sigmas within the prior's."""
-    free = hexaglide.convention.free_part
+    free = hexaglide.convention.free_parameters
     error = small_tilts.free - free(paper.actual)
     plausible = error @ np.linalg.solve(small_tilts.free_covariance, error)
     assert plausible < 35 + 5 * np.sqrt(70)

@@ -1,10 +1,10 @@
-"""The identification: what ``fit`` does, and everything else the program asks of the estimator."""
+"""The identification of a geometry from records: with screening of the data, or online while measuring."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from hexacell.identification.data_faults.rejection import ScreenedFit, fit_unscreened, screen
+from hexacell.identification.data_faults.rejection import fit_unscreened, screen
 from hexacell.identification.problem.data_requirements import (
     require_enough_records,
     require_rotation_diversity,
@@ -12,25 +12,27 @@ from hexacell.identification.problem.data_requirements import (
 from hexacell.identification.problem.problem import Problem
 from hexacell.identification.solver import nuisance_parameters, singular_records
 from hexacell.identification.solver.levenberg_marquardt import COARSE, Solution, SolverOptions
-from hexacell.identification.solver.result import Identification
+from hexacell.identification.solver.result import DataFault, Identification
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array
 
 
 def identify(problem: Problem, *, find_outliers: bool = True) -> Identification:
-    """The geometry that explains the records, from the drawing on.
+    """Identify the geometry from all records, without those that have a data fault.
+
+    With ``find_outliers`` false no record is tested.
 
     Raises:
-        IdentifiabilityError: the records cannot determine the parameters, or gauges were misread
-            (:class:`~hexacell.identification.solver.result.GaugeFaultError`).
+        IdentifiabilityError: the records cannot determine the parameters.
+        GaugeFaultError: gauges were misread.
     """
     require_enough_records(problem)
     require_rotation_diversity(problem)
-    cleaned = screen(problem) if find_outliers else fit_unscreened(problem)
-    require_enough_records(cleaned.fit.problem)
-    found = cleaned.fit
-    return _result(found.problem, found.solution, found.covariance, cleaned)
+    screened = screen(problem) if find_outliers else fit_unscreened(problem)
+    fit = screened.fit
+    require_enough_records(fit.problem)
+    return _result(fit.problem, fit.solution, fit.covariance, screened.data_faults)
 
 
 def estimate_online(
@@ -40,10 +42,10 @@ def estimate_online(
     poses: PoseBatch | None = None,
     manner: SolverOptions = COARSE,
 ) -> Identification:
-    """The estimate while measuring: prior in full, nothing refused.
+    """Estimate the geometry from the records so far, with the full prior and without any check.
 
-    The search begins at ``free`` (p,), mm, with ``poses`` that close it at the problem's records, or
-    else at the drawing.
+    The solver starts at ``free`` (p,), mm, with ``poses`` that close it at the problem's records, or
+    at the problem's initial parameters.
     """
     precision = np.linalg.inv(problem.prior.covariance)
     if free is None or poses is None:
@@ -56,7 +58,7 @@ def estimate_online(
 
 
 def _result(
-    problem: Problem, solution: Solution, covariance: Array, cleaned: ScreenedFit | None = None
+    problem: Problem, solution: Solution, covariance: Array, data_faults: tuple[DataFault, ...] = ()
 ) -> Identification:
     basis = problem.basis
     covariance = 0.5 * (covariance + covariance.T)  # an inverse is symmetric to rounding only
@@ -76,7 +78,6 @@ def _result(
         dof=3 * (problem.records - problem.points) - len(solution.free),
         iterations=solution.iterations,
         termination=solution.termination,
-        outliers=cleaned.outliers if cleaned else (),
-        anomalies=cleaned.anomalies if cleaned else (),
         frame=problem.mechanism.convention.name,
+        data_faults=data_faults,
     )

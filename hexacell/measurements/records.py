@@ -17,6 +17,8 @@ from hexacell.kinematics.rotations import Array
 Scalar = TypeVar("Scalar", bound=np.generic)
 Joints = tuple[float, float, float, float, float, float]
 Deviation = tuple[float, float, float]
+RecordId = tuple[int, int]
+"""Point and orientation of a record, as the user counts them."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -78,7 +78,7 @@ def assess(
     """Check an identification of some measurements, and predict what it is good for."""
     model = LinearizedSolution.at(found)
     pairs = strongly_correlated(found)
-    left_out = {(outlier.point, outlier.orientation) for outlier in found.outliers}
+    left_out = {record for record, _ in found.left_out}
     fitting = goodness(model)
     task, accuracy = _accuracy(settings, robot, found)
     return Assessment(

@@ -13,9 +13,10 @@ from hexacell.experiment_design.decorrelation import DecorrelatingPose
 from hexacell.identification.diagnostics.pose_accuracy import PoseErrors
 from hexacell.identification.diagnostics.variance_components import NoiseLevels
 from hexacell.identification.solver.chi_square import ChiSquareTest
-from hexacell.identification.solver.result import Identification, Outlier
+from hexacell.identification.solver.result import DataFault, DataFaultKind, Identification
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.pose import Pose
+from hexacell.measurements.records import RecordId
 from hexacell.reporting.assessment import Assessment
 from hexacell.reporting.findings import findings
 
@@ -40,18 +41,20 @@ def identification_document(found: Identification) -> dict[str, Any]:
         "sigma": geometry_values(Geometry.from_vector(found.sigma)),
         "covariance": found.covariance.tolist(),
         "undetermined": list(found.undetermined),
-        "outliers": [_outlier(outlier) for outlier in found.outliers],
+        "outliers": [_outlier(record, fault) for record, fault in found.left_out],
         "frame": found.frame,
     }
 
 
-def _outlier(outlier: Outlier) -> dict[str, Any]:
+def _outlier(record: RecordId, fault: DataFault) -> dict[str, Any]:
+    point, orientation = record
+    is_single_record = fault.kind is not DataFaultKind.ZERO_SHIFT
     return {
-        "point": outlier.point,
-        "orientation": outlier.orientation,
-        "kind": outlier.kind.value,
-        "gauges": list(outlier.gauges),
-        "off_mm": None if outlier.off_mm is None else list(outlier.off_mm),
+        "point": point,
+        "orientation": orientation,
+        "kind": fault.kind.value,
+        "gauges": list(fault.gauges) if is_single_record else [],
+        "off_mm": None if fault.offset_mm is None else list(fault.offset_mm),
     }
 
 

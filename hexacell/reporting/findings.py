@@ -23,7 +23,7 @@ def findings(found: Identification, assessed: Assessment) -> tuple[str, ...]:
         _returns_badly(assessed),
         _noise(assessed),
         _unreachable(assessed),
-        *_left_out(found),
+        *map(str, found.data_faults),
     )
     return tuple(sentence for sentence in sentences if sentence)
 
@@ -149,14 +149,6 @@ def _unreachable(assessed: Assessment) -> str:
         return ""
     places = [str(place) for place, fits in enumerate(assessed.accuracy.reachable, start=1) if not fits]
     return f"Task poses that the robot cannot take are left out: {', '.join(places)}."
-
-
-def _left_out(found: Identification) -> tuple[str, ...]:
-    """Each anomaly in its own words; without them, which records are missing."""
-    if found.anomalies or not found.outliers:
-        return tuple(str(anomaly) for anomaly in found.anomalies)
-    where = ", ".join(f"point {o.point} orientation {o.orientation}" for o in found.outliers)
-    return (f"Left out, does not agree with the others: {where}.",)
 
 
 def _lower(sentence: str) -> str:

@@ -46,7 +46,7 @@ def outcome(table_one) -> Outcome:
         error = found.free - free
         errors.append(error)
         covered.append(np.abs(error) <= 1.959964 * np.sqrt(np.diag(found.free_covariance)))
-        removed += len(found.outliers)
+        removed += len(found.left_out)
     bound = cramer_rao_bound(robot, truth, campaign)
     return Outcome(np.array(errors), np.array(covered), bound, removed, SETS * len(campaign.joints))
 

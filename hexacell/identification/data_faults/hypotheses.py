@@ -1,11 +1,7 @@
-"""What may have spoilt records: gross errors, a slipped zero, misread gauges; the likeliest first.
+"""The fault hypotheses: gross errors of records, a shift of the gauges' zero, gauge faults.
 
-Gauges exchanged, reversed or reading in inches, at one point or at all of them.
-# MERGED-DOC
-A misreading is a known matrix T: the readings were d where they should have been T d. Were it so,
-the residuals P - d would be P - T d, which changes them by ``Z = -(T - 1) d`` in all records
-concerned; and the chi-square by ``2 Z^T M r + Z^T M Z`` (see :mod:`.expansion`). No parameter is
-estimated, so a fall of the chi-square is a likelihood ratio.
+A gauge fault is a known matrix T, at one point or at all of them: gauges exchanged, reversed or
+reading in inches. The readings were d and should have been T d.
 """
 
 from __future__ import annotations
@@ -16,96 +12,157 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import chdtri
 
+from hexacell.identification.data_faults.fault_model import (
+    PENALTY_PER_UNKNOWN,
+    CorrectedFit,
+    FaultHypothesis,
+)
+from hexacell.identification.data_faults.linearized_model import LinearizedModel
 from hexacell.identification.data_faults.score_tests import (
-    LinearizedModel,
     OutlierStatistics,
     ZeroShiftStatistics,
+    known_change_gains,
 )
+from hexacell.identification.problem.data_requirements import is_determined
 from hexacell.identification.problem.problem import Problem
 from hexacell.identification.solver.chi_square import ChiSquareTest
 from hexacell.identification.solver.result import GAUGES, DataFaultKind
 from hexacell.kinematics.rotations import Array, Mask
+from hexacell.measurements.records import RecordId
 
 MM_PER_INCH = 25.4
+
+WORTH_TESTING = 0.05
+"""Probability of the residuals below which zero shifts and gauge faults are tested too."""
+
+FALSE_SHIFTS_PER_FILE = 1e-3
+SMALLEST_GAUGE_FAULT_GAIN = 25.0
+"""A likelihood ratio of 270,000, for some dozens of gauge faults tested."""
+
+CONFIRMED_SHARE = 0.5
+"""Of the first-order gain of a gauge fault, what a refit must confirm."""
+
+SPLIT_POINT = -1
+"""Label of the point that the records after a zero shift form while it is tested."""
+
+
+def record_ids(problem: Problem) -> list[RecordId]:
+    """Point and orientation of each record."""
+    return [(point, orientation) for point, orientation in problem.labels.tolist()]
+
+
+def record_mask(problem: Problem, records: Collection[RecordId]) -> Mask:
+    """Which records (n,) of a problem are among some others."""
+    return np.array([record in records for record in record_ids(problem)], dtype=bool)
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class OutlierHypothesis(FaultHypothesis):
+    """Gross errors: these records disagree with all the others and are left out."""
+
+    records: tuple[RecordId, ...]
+
+    @property
+    def key(self) -> Hashable:
+        """The records."""
+        return self.records
+
+    def corrected(self, problem: Problem) -> Problem:
+        """The problem without these records."""
+        return problem.subset(~record_mask(problem, self.records))
+
+    def confirmed(self, current: CorrectedFit) -> CorrectedFit | None:
+        """The fit of the other records, if these determine the parameters."""
+        return self.trial(current) if is_determined(self.corrected(current.problem)) else None
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class ZeroShiftHypothesis(FaultHypothesis):
+    """The gauges' zero shifted right before a record; it and the later ones of the point are left out.
+
+    Attributes:
+        shift: (3,), mm, by which the gauges x, y and z read too much since then.
+    """
+
+    point: int
+    orientation: int
+    shift: Array
+
+    @property
+    def key(self) -> Hashable:
+        """The first record after the shift."""
+        return self.point, self.orientation
+
+    def rows(self, problem: Problem) -> Mask:
+        """The records (n,) after the shift."""
+        first = np.flatnonzero(record_mask(problem, [(self.point, self.orientation)]))[0]
+        after: Mask = (problem.labels[:, 0] == self.point) & (np.arange(problem.records) >= first)
+        return after
+
+    def corrected(self, problem: Problem) -> Problem:
+        """The problem without the records after the shift."""
+        return problem.subset(~self.rows(problem))
+
+    def trial(self, current: CorrectedFit) -> CorrectedFit | None:
+        """The fit without the records after the shift, if these agree with the others up to a constant."""
+        split = CorrectedFit.uncorrected(self._split(current.problem))
+        if not split.is_reliable:
+            return None
+        concerned = np.isin(split.fit.problem.labels[:, 0], [self.point, SPLIT_POINT])
+        statistics = OutlierStatistics.of(LinearizedModel.at_solution(split.fit))
+        is_constant = bool((statistics.threshold_ratio()[concerned] <= 1.0).all())
+        return current.corrected_for(self) if is_constant else None
+
+    def _split(self, problem: Problem) -> Problem:
+        """The problem with the records after the shift as a point with an unknown zero of its own."""
+        after = self.rows(problem)
+        labels = problem.labels.copy()
+        labels[after, 0] = SPLIT_POINT
+        first_rows = np.union1d(problem.first_rows, np.flatnonzero(after)[:1])
+        return replace(problem, labels=labels, first_rows=first_rows)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class GaugeFault:
-    """One way to misread gauges; ``remedy`` (3, 3) makes true readings of the false ones."""
+    """A known fault of gauges; ``remedy`` (3, 3) turns false readings x, y, z into true ones."""
 
     kind: DataFaultKind
     gauges: str
     remedy: Array
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class GaugeFaultHypothesis:
-    """A misreading at one point, or at every point.
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class GaugeFaultHypothesis(FaultHypothesis):
+    """A gauge fault at one point, or at every point (``point`` is none)."""
 
-    Attributes:
-        gain: by how much the chi-square would fall, to first order, were it undone.
-    """
-
-    misreading: GaugeFault
+    gauge_fault: GaugeFault
     point: int | None
-    gain: float
-    unknowns = 0
 
     @property
     def key(self) -> Hashable:
-        """The same for the same cause, however it was found."""
-        return self.misreading.kind, self.misreading.remedy.tobytes(), self.point
+        """The correction, and where."""
+        return self.gauge_fault.kind, self.gauge_fault.remedy.tobytes(), self.point
 
     def corrected(self, problem: Problem) -> Problem:
         """The problem with true readings."""
         rows = np.ones(problem.records, bool) if self.point is None else problem.labels[:, 0] == self.point
-        return corrected(problem, self.misreading, rows)
+        remedy = _in_base_frame(problem, self.gauge_fault)
+        deviations = np.where(rows[:, None], problem.deviations @ remedy.T, problem.deviations)
+        return replace(problem, deviations=deviations)
+
+    def confirmed(self, current: CorrectedFit) -> CorrectedFit | None:
+        """The fit with true readings, if it has a sufficient part of the first-order gain."""
+        corrected = current.corrected_for(self)
+        limit = current.fit.goodness.chi2 - CONFIRMED_SHARE * self.gain
+        return corrected if corrected.fit.goodness.chi2 < limit else None
 
 
-def corrected(problem: Problem, misreading: GaugeFault, rows: Mask) -> Problem:
-    """The problem with true readings in some records (n,)."""
-    change = _in_base_frame(problem, misreading.remedy)
-    deviations = np.where(rows[:, None], problem.deviations @ change.T, problem.deviations)
-    return replace(problem, deviations=deviations)
-
-
-def score_gauge_faults(expansion: LinearizedModel) -> list[GaugeFaultHypothesis]:
-    """Every misreading at every point and at all of them, with what undoing it would gain."""
-    problem = expansion.problem
-    points = [int(problem.labels[row, 0]) for row in problem.first_rows]
-    found = []
-    for misreading in GAUGE_FAULTS:
-        remedy = _in_base_frame(problem, misreading.remedy) - np.eye(3)
-        at_points, everywhere = _gains(expansion, -problem.deviations @ remedy.T)
-        found.append(GaugeFaultHypothesis(misreading, None, everywhere))
-        pairs = zip(points, at_points.tolist(), strict=True)
-        found += [GaugeFaultHypothesis(misreading, point, gain) for point, gain in pairs]
-    return found
-
-
-def _gains(expansion: LinearizedModel, change: Array) -> tuple[Array, float]:
-    """The fall of the chi-square if residuals change by (n, 3), mm, at each point (m,), or in all."""
-    problem, weights = expansion.problem, expansion.weights
-    weighted = np.einsum("nij,nj->ni", weights, change)
-    constants = np.linalg.solve(problem.group_sums(weights), problem.group_sums(weighted)[..., None])[
-        ..., 0
-    ]
-    centred = change - problem.per_record(constants)
-    score = problem.group_sums(np.sum(change * expansion.scores, axis=-1))
-    squares = problem.group_sums(np.sum(centred * weighted, axis=-1))
-    by_parameters = problem.group_sums(np.einsum("nip,ni->np", expansion.jacobian, weighted))
-    taken = np.einsum("mp,pq,mq->m", by_parameters, expansion.covariance, by_parameters)
-    everywhere = by_parameters.sum(axis=0)
-    total = squares.sum() - everywhere @ expansion.covariance @ everywhere
-    return -(2.0 * score + squares - taken), -float(2.0 * score.sum() + total)
-
-
-def _in_base_frame(problem: Problem, remedy: Array) -> Array:
-    turned: Array = problem.gauges @ remedy @ problem.gauges.T
+def _in_base_frame(problem: Problem, gauge_fault: GaugeFault) -> Array:
+    turned: Array = problem.gauges @ gauge_fault.remedy @ problem.gauges.T
     return turned
 
 
-def _misreadings() -> Iterator[GaugeFault]:
+def _gauge_faults() -> Iterator[GaugeFault]:
     for first, second in ((0, 1), (0, 2), (1, 2)):
         order = [0, 1, 2]
         order[first], order[second] = second, first
@@ -118,133 +175,64 @@ def _misreadings() -> Iterator[GaugeFault]:
         yield GaugeFault(kind, GAUGES, factor * np.eye(3))
 
 
-GAUGE_FAULTS = tuple(_misreadings())
-ALL_IN_INCHES = GAUGE_FAULTS[-1]
-
-
-WORTH_A_LOOK = 0.05
-"""Probability of the residuals from which down more is looked for than single gross errors."""
-
-FALSE_SLIPS_PER_FILE = 1e-3
-LEAST_GAIN = 25.0
-"""Of a misreading that is believed: a likelihood ratio of 270,000, for some dozens tried."""
-
-COST_OF_AN_UNKNOWN = 10.0
-"""What an explanation must lower the chi-square by for each number that it is free to choose."""
-
-NOBODYS_POINT = -1
-
-Label = tuple[int, int]
-
-
-@dataclass(frozen=True, slots=True)
-class OutlierHypothesis:
-    """Records, as point and orientation, that do not agree with all the others; to be left out."""
-
-    labels: tuple[Label, ...]
-    gain: float
-    unknowns: int
-
-    @property
-    def key(self) -> Hashable:
-        """The same for the same cause, however it was found."""
-        return self.labels
-
-    def corrected(self, problem: Problem) -> Problem:
-        """The problem without these records."""
-        return problem.subset(~record_mask(problem, self.labels))
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class ZeroShiftHypothesis:
-    """The gauges' zero slipped right before a record; it and the later ones of the point are useless.
-
-    Attributes:
-        shift: (3,), mm, what the gauges x, y and z show more since.
-    """
-
-    point: int
-    orientation: int
-    shift: Array
-    gain: float
-    unknowns = 3
-
-    @property
-    def key(self) -> Hashable:
-        """The same for the same cause, however it was found."""
-        return self.point, self.orientation
-
-    def rows(self, problem: Problem) -> Mask:
-        """The records (n,) after the slip."""
-        first = np.flatnonzero(record_mask(problem, [(self.point, self.orientation)]))[0]
-        after: Mask = (problem.labels[:, 0] == self.point) & (np.arange(problem.records) >= first)
-        return after
-
-    def corrected(self, problem: Problem) -> Problem:
-        """The problem without the records after the slip."""
-        return problem.subset(~self.rows(problem))
-
-    def split_station(self, problem: Problem) -> Problem:
-        """The problem with the records after the slip as a point of their own, its zero unknown too."""
-        after = self.rows(problem)
-        labels = problem.labels.copy()
-        labels[after, 0] = NOBODYS_POINT
-        first_rows = np.union1d(problem.first_rows, np.flatnonzero(after)[:1])
-        return replace(problem, labels=labels, first_rows=first_rows)
-
-
-FaultHypothesis = OutlierHypothesis | ZeroShiftHypothesis | GaugeFaultHypothesis
-
-
-def record_ids(problem: Problem) -> list[Label]:
-    """Point and orientation of each record."""
-    return [(point, orientation) for point, orientation in problem.labels.tolist()]
-
-
-def record_mask(problem: Problem, labels: Collection[Label]) -> Mask:
-    """Which records (n,) of a problem bear one of some labels."""
-    return np.array([label in labels for label in record_ids(problem)], dtype=bool)
+GAUGE_FAULTS = tuple(_gauge_faults())
+ALL_IN_INCHES = GaugeFaultHypothesis(gain=0.0, unknowns=0, gauge_fault=GAUGE_FAULTS[-1], point=None)
 
 
 def rank_hypotheses(
-    expansion: LinearizedModel, goodness: ChiSquareTest, *, found_before: int = 0
+    model: LinearizedModel, goodness: ChiSquareTest, *, found_before: int = 0
 ) -> list[FaultHypothesis]:
-    """The explanations of the residuals that chance does not explain as well, the likeliest first."""
-    tests = OutlierStatistics.of(expansion)
-    causes: list[FaultHypothesis] = [*_gross_error(expansion, tests, found_before)]
-    if goodness.probability < WORTH_A_LOOK:
-        causes += [*_slip(expansion, tests.scale), *_gauge_faults(expansion, goodness, tests.scale)]
-    return sorted(causes, key=lambda cause: COST_OF_AN_UNKNOWN * cause.unknowns - cause.gain)
+    """The significant hypotheses on the residuals of a model, the most likely first."""
+    statistics = OutlierStatistics.of(model)
+    hypotheses: list[FaultHypothesis] = [*_outlier(model, statistics, found_before)]
+    if goodness.probability < WORTH_TESTING:
+        hypotheses += _zero_shift(model, statistics.scale)
+        for hypothesis in score_gauge_faults(model):
+            remaining = max(1.0, (goodness.chi2 - hypothesis.gain) / goodness.expected)
+            if hypothesis.gain > SMALLEST_GAUGE_FAULT_GAIN * min(statistics.scale, remaining):
+                hypotheses.append(hypothesis)
+    return sorted(hypotheses, key=lambda hypothesis: hypothesis.cost)
 
 
-def _gross_error(
-    expansion: LinearizedModel, tests: OutlierStatistics, found_before: int
+def score_gauge_faults(model: LinearizedModel) -> list[GaugeFaultHypothesis]:
+    """Every gauge fault, at all points and at each, with its gain."""
+    problem = model.problem
+    points = [None, *(int(problem.labels[row, 0]) for row in problem.first_rows)]
+    hypotheses = []
+    for fault in GAUGE_FAULTS:
+        change = -problem.deviations @ (_in_base_frame(problem, fault) - np.eye(3)).T
+        at_points, at_all = known_change_gains(model, change)
+        hypotheses += [
+            GaugeFaultHypothesis(gain=gain, unknowns=0, gauge_fault=fault, point=point)
+            for point, gain in zip(points, [at_all, *at_points.tolist()], strict=True)
+        ]
+    return hypotheses
+
+
+def _outlier(
+    model: LinearizedModel, statistics: OutlierStatistics, found_before: int
 ) -> Iterator[OutlierHypothesis]:
-    excess = tests.threshold_ratio(found_before)
-    row = int(np.argmax(excess))
-    if excess[row] <= 1.0:
+    """The record with the most significant gross error, of one gauge or of any kind."""
+    ratio = statistics.threshold_ratio(found_before)
+    row = int(np.argmax(ratio))
+    if ratio[row] <= 1.0:
         return
-    point, orientation = expansion.problem.labels[row].tolist()
-    along_one, in_all = float(tests.along_gauges[row].max()), float(tests.omnibus[row])
-    one_is_enough = in_all - along_one < 2.0 * COST_OF_AN_UNKNOWN
-    gain, unknowns = (along_one, 1) if one_is_enough else (in_all, 3)
-    yield OutlierHypothesis(((point, orientation),), gain, unknowns)
+    point, orientation = model.problem.labels[row].tolist()
+    one_gauge, any_direction = float(statistics.along_gauges[row].max()), float(statistics.omnibus[row])
+    is_one_gauge = any_direction - one_gauge < 2.0 * PENALTY_PER_UNKNOWN
+    gain, unknowns = (one_gauge, 1) if is_one_gauge else (any_direction, 3)
+    yield OutlierHypothesis(gain=gain, unknowns=unknowns, records=((point, orientation),))
 
 
-def _slip(expansion: LinearizedModel, scale: float) -> Iterator[ZeroShiftHypothesis]:
-    tests = ZeroShiftStatistics.of(expansion)
-    if not len(tests.rows):
+def _zero_shift(model: LinearizedModel, scale: float) -> Iterator[ZeroShiftHypothesis]:
+    """The most significant shift of the gauges' zero."""
+    statistics = ZeroShiftStatistics.of(model)
+    if not len(statistics.rows):
         return
-    best = int(np.argmax(tests.gains))
-    if tests.gains[best] / scale > chdtri(3, FALSE_SLIPS_PER_FILE / len(tests.rows)):
-        point, orientation = expansion.problem.labels[tests.rows[best]].tolist()
-        yield ZeroShiftHypothesis(point, orientation, tests.shifts[best], float(tests.gains[best]))
-
-
-def _gauge_faults(
-    expansion: LinearizedModel, goodness: ChiSquareTest, scale: float
-) -> Iterator[GaugeFaultHypothesis]:
-    for suspect in score_gauge_faults(expansion):
-        left = max(1.0, (goodness.chi2 - suspect.gain) / goodness.expected)
-        if suspect.gain > LEAST_GAIN * min(scale, left):
-            yield suspect
+    best = int(np.argmax(statistics.gains))
+    gain = float(statistics.gains[best])
+    if gain / scale > chdtri(3, FALSE_SHIFTS_PER_FILE / len(statistics.rows)):
+        point, orientation = model.problem.labels[statistics.rows[best]].tolist()
+        yield ZeroShiftHypothesis(
+            gain=gain, unknowns=3, point=point, orientation=orientation, shift=statistics.shifts[best]
+        )

@@ -1,4 +1,4 @@
-"""Anomalies in words: what is wrong, how that shows, and what to do about it."""
+"""Data faults for people: what is wrong, how that shows, and what to do about it."""
 
 from __future__ import annotations
 
@@ -10,108 +10,122 @@ from hexacell.identification.data_faults.hypotheses import (
     MM_PER_INCH,
     GaugeFault,
     GaugeFaultHypothesis,
-    Label,
     ZeroShiftHypothesis,
 )
 from hexacell.identification.solver.chi_square import ChiSquareTest
-from hexacell.identification.solver.result import DataFault, DataFaultKind, Outlier
+from hexacell.identification.solver.result import GAUGES, DataFault, DataFaultKind
+from hexacell.measurements.records import Deviation, RecordId
 
-SLIPPED_SIGNIFICANTLY = 0.3
-"""Of the largest component of a slip: a gauge that shows less of it is not named."""
+NAMED_SHARE = 0.3
+"""Of the largest component of a zero shift: gauges with smaller components are not named."""
 
 
-def of_record(outlier: Outlier) -> DataFault:
-    """A record that was left out."""
-    where = f"Point {outlier.point}, orientation {outlier.orientation}"
-    sentence, action = _about_record(outlier)
+def rejected_record(
+    record: RecordId,
+    kind: DataFaultKind,
+    *,
+    gauges: str = "",
+    statistic: float = np.inf,
+    offset_mm: Deviation | None = None,
+    leg: tuple[int, float] | None = None,
+) -> DataFault:
+    """A record that is left out.
+
+    ``gauges`` alone are wrong, or none stands out. ``offset_mm`` is what the gauges x, y and z read too
+    much; ``leg`` (from 1) is off its commanded place by so many mm.
+    """
+    point, orientation = record
+    if kind is DataFaultKind.MISMATCHED_JOINTS and leg:
+        fact, action = _mismatched_joints(leg)
+    elif offset_mm is None:
+        fact, action = (
+            "a singularity is too near for this record to be used",
+            "Choose another orientation",
+        )
+    else:
+        fact = f"{_wrong_readings(kind, gauges, offset_mm)}; the record is left out"
+        action = "Measure it again"
     return DataFault(
-        outlier.kind, outlier.point, outlier.orientation, outlier.gauges, f"{where}: {sentence}", action
+        kind,
+        f"Point {point}, orientation {orientation}: {fact}",
+        action,
+        point=point,
+        orientation=orientation,
+        gauges=gauges,
+        left_out=(record,),
+        statistic=statistic,
+        offset_mm=offset_mm,
     )
 
 
-def of_slip(slip: ZeroShiftHypothesis, labels: Sequence[Label]) -> DataFault:
-    """A slip, with the records after it that were left out."""
-    gauges, fact = _slip_in_words(slip)
-    last = labels[-1][1]
-    return DataFault(
-        DataFaultKind.SLIPPED_ZERO,
-        slip.point,
-        slip.orientation,
-        gauges,
-        f"{fact}; orientations {slip.orientation} to {last} are left out",
-        f"Check that {_names(gauges)} and the station are clamped, and measure point {slip.point} again",
+def zero_shift(shift: ZeroShiftHypothesis, left_out: Sequence[RecordId]) -> DataFault:
+    """A shift of the gauges' zero, with the records after it that are left out."""
+    _, last = left_out[-1]
+    consequence = f"; orientations {shift.orientation} to {last} are left out"
+    return _zero_shift(shift, consequence, tuple(left_out))
+
+
+def refused_zero_shift(shift: ZeroShiftHypothesis, equations: int) -> DataFault:
+    """A shift of the gauges' zero after which too few records are left."""
+    consequence = f", and the records before it and at the other points give {equations} equations only"
+    return _zero_shift(shift, consequence)
+
+
+def gauge_fault(hypothesis: GaugeFaultHypothesis, before: ChiSquareTest, after: ChiSquareTest) -> DataFault:
+    """A gauge fault, refused; the residuals before and after its correction are the evidence."""
+    fault, point = hypothesis.gauge_fault, hypothesis.point
+    where = "at every point" if point is None else f"at point {point}"
+    looks, correction, action = _looks_correction_action(fault, where)
+    sentence = (
+        f"{_names(fault.gauges)} {looks} {where}: the residuals are {before.ratio:.3g} times the stated "
+        f"noise, and {after.ratio:.3g} times {correction}"
     )
+    return DataFault(fault.kind, sentence, action, point=point, gauges=fault.gauges)
 
 
-def of_slip_refused(slip: ZeroShiftHypothesis, equations: int) -> DataFault:
-    """A slip after which too little is left."""
-    gauges, fact = _slip_in_words(slip)
-    return DataFault(
-        DataFaultKind.SLIPPED_ZERO,
-        slip.point,
-        slip.orientation,
-        gauges,
-        f"{fact}, and the records before it and at the other points give {equations} equations only",
-        f"Check that {_names(gauges)} and the station are clamped, and measure point {slip.point} again",
-    )
+def _mismatched_joints(leg: tuple[int, float]) -> tuple[str, str]:
+    number, off = leg
+    return (
+        f"q{number} is {off:+.3f} mm from where the commanded pose puts it, unlike in the point's other "
+        "records; this one is left out"
+    ), "Check whether its q1 to q6 belong to another pose, or measure it again"
 
 
-def of_misreading(suspect: GaugeFaultHypothesis, before: ChiSquareTest, after: ChiSquareTest) -> DataFault:
-    """Misread gauges, refused."""
-    misreading = suspect.misreading
-    where = "at every point" if suspect.point is None else f"at point {suspect.point}"
-    proof = (
-        f"the residuals are {_times(before)} times the stated noise, and {_times(after)} times "
-        f"{_were_it_undone(misreading)}"
-    )
-    return DataFault(
-        misreading.kind,
-        suspect.point,
-        None,
-        misreading.gauges,
-        f"{_names(misreading.gauges)} {_look(misreading)} {where}: {proof}",
-        _remedy(misreading, where),
-    )
-
-
-def _about_record(outlier: Outlier) -> tuple[str, str]:
-    if outlier.kind is DataFaultKind.FOREIGN_JOINTS and outlier.stray:
-        leg, off = outlier.stray
-        return (
-            f"q{leg} is {off:+.3f} mm from where the commanded pose puts it, unlike in the point's other "
-            "records; this one is left out"
-        ), "Check whether its q1 to q6 belong to another pose, or measure it again"
-    if outlier.off_mm is None:
-        return "a singularity is too near for this record to be used", "Choose another orientation"
-    return f"{_about_readings(outlier, outlier.off_mm)}; the record is left out", "Measure it again"
-
-
-def _about_readings(outlier: Outlier, off_mm: tuple[float, float, float]) -> str:
-    if outlier.kind is not DataFaultKind.GROSS_ERROR:
-        words = {
-            DataFaultKind.EXCHANGED: "exchanged",
-            DataFaultKind.REVERSED: "reversed",
-            DataFaultKind.INCHES: "in inches",
-        }
-        return f"{_names(outlier.gauges)} read {words[outlier.kind]}"
-    if outlier.gauges:
-        off = off_mm["xyz".index(outlier.gauges)]
-        return f"gauge {outlier.gauges} shows {off:+.3f} mm more than all other records let expect"
-    x, y, z = off_mm
+def _wrong_readings(kind: DataFaultKind, gauges: str, offset_mm: Deviation) -> str:
+    match kind:
+        case DataFaultKind.EXCHANGED:
+            return f"{_names(gauges)} read exchanged"
+        case DataFaultKind.REVERSED:
+            return f"{_names(gauges)} read reversed"
+        case DataFaultKind.INCHES:
+            return f"{_names(gauges)} read in inches"
+    if gauges:
+        offset = offset_mm[GAUGES.index(gauges)]
+        return f"gauge {gauges} shows {offset:+.3f} mm more than all other records let expect"
+    x, y, z = offset_mm
     return (
         f"the gauges show x {x:+.3f}, y {y:+.3f}, z {z:+.3f} mm more than all other records let expect, "
         "so that more than one of them is wrong, or an encoder"
     )
 
 
-def _slip_in_words(slip: ZeroShiftHypothesis) -> tuple[str, str]:
-    size = np.abs(slip.shift)
-    moved = [axis for axis in range(3) if size[axis] >= SLIPPED_SIGNIFICANTLY * size.max()]
-    gauges = "".join("xyz"[axis] for axis in moved)
-    shift = ", ".join(f"{'xyz'[axis]} {slip.shift[axis]:+.3f}" for axis in moved)
-    return gauges, (
-        f"Point {slip.point}: the zero of {_names(gauges)} slipped before orientation {slip.orientation} "
-        f"({shift} mm)"
+def _zero_shift(
+    shift: ZeroShiftHypothesis, consequence: str, left_out: tuple[RecordId, ...] = ()
+) -> DataFault:
+    size = np.abs(shift.shift)
+    shifted = [axis for axis in range(3) if size[axis] >= NAMED_SHARE * size.max()]
+    gauges = "".join(GAUGES[axis] for axis in shifted)
+    components = ", ".join(f"{GAUGES[axis]} {shift.shift[axis]:+.3f}" for axis in shifted)
+    return DataFault(
+        DataFaultKind.ZERO_SHIFT,
+        f"Point {shift.point}: the zero of {_names(gauges)} slipped before orientation "
+        f"{shift.orientation} ({components} mm){consequence}",
+        f"Check that {_names(gauges)} and the station are clamped, and measure point {shift.point} again",
+        point=shift.point,
+        orientation=shift.orientation,
+        gauges=gauges,
+        left_out=left_out,
+        statistic=shift.gain,
     )
 
 
@@ -121,44 +135,28 @@ def _names(gauges: str) -> str:
     return f"gauges {', '.join(gauges[:-1])} and {gauges[-1]}"
 
 
-def _times(goodness: ChiSquareTest) -> str:
-    return f"{goodness.ratio:.3g}"
-
-
-def _look(misreading: GaugeFault) -> str:
-    plural = len(misreading.gauges) > 1
-    match misreading.kind:
+def _looks_correction_action(fault: GaugeFault, where: str) -> tuple[str, str, str]:
+    """How a gauge fault looks, what corrects it, and what to do."""
+    plural = len(fault.gauges) > 1
+    columns = " and ".join(f"d{gauge}" for gauge in fault.gauges)
+    match fault.kind:
         case DataFaultKind.INCHES:
-            return "seem to read in inches" if plural else "seems to read in inches"
-        case DataFaultKind.REVERSED:
-            return "look reversed" if plural else "looks reversed"
-        case _:
-            return "look exchanged"
-
-
-def _were_it_undone(misreading: GaugeFault) -> str:
-    match misreading.kind:
-        case DataFaultKind.INCHES:
-            return f"if these readings are multiplied by {MM_PER_INCH}"
-        case DataFaultKind.REVERSED:
-            return "with the sign of these readings changed"
-        case _:
-            return "with these readings exchanged"
-
-
-def _remedy(misreading: GaugeFault, where: str) -> str:
-    columns = " and ".join(f"d{gauge}" for gauge in misreading.gauges)
-    match misreading.kind:
-        case DataFaultKind.INCHES:
-            return (
+            look = "seem to read in inches" if plural else "seems to read in inches"
+            correction = f"if these readings are multiplied by {MM_PER_INCH}"
+            action = (
                 f"Switch to millimetres and measure again, or multiply {columns} {where} by {MM_PER_INCH}"
             )
         case DataFaultKind.REVERSED:
-            return (
+            look = "look reversed" if plural else "looks reversed"
+            correction = "with the sign of these readings changed"
+            action = (
                 f"Correct the counting direction and measure again, or change the sign of {columns} {where}"
             )
         case _:
-            return (
+            look = "look exchanged"
+            correction = "with these readings exchanged"
+            action = (
                 "Check which gauge is on which channel and measure again, or put "
                 f"{columns} {where} in the right order"
             )
+    return look, correction, action

@@ -1,4 +1,4 @@
-"""One record that took no part in a solution, judged by it: does it agree, and if not, why?"""
+"""The deletion test of one record: does it agree with a fit that it took no part in, and if not, why?"""
 
 from __future__ import annotations
 
@@ -7,107 +7,114 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import chdtri
 
-from hexacell.identification.data_faults.hypotheses import GAUGE_FAULTS, Label, record_ids, record_mask
-from hexacell.identification.data_faults.score_tests import LinearizedModel, OutlierStatistics
+from hexacell.identification.data_faults import messages
+from hexacell.identification.data_faults.hypotheses import GAUGE_FAULTS, record_ids, record_mask
+from hexacell.identification.data_faults.linearized_model import LinearizedModel
+from hexacell.identification.data_faults.score_tests import OutlierStatistics
 from hexacell.identification.problem.encoder_consistency import inconsistent_leg
 from hexacell.identification.problem.problem import Problem
 from hexacell.identification.solver import measurement_model
 from hexacell.identification.solver.levenberg_marquardt import LARGEST_AMPLIFICATION
 from hexacell.identification.solver.regularized_fit import Fit
-from hexacell.identification.solver.result import GAUGES, DataFaultKind
+from hexacell.identification.solver.result import GAUGES, DataFault, DataFaultKind
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array, Mask
+from hexacell.measurements.records import RecordId
 
-LEAST_MISREAD_MM = 1.0
-"""A gross error smaller than this resembles some misreading or other by chance."""
+SMALLEST_GAUGE_FAULT_MM = 1.0
+"""A smaller gross error resembles some gauge fault by chance."""
 
-NOT_SURPRISING = 1e-3
+SIGNIFICANCE = 1e-3
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class RecordVerdict:
-    """What a solution says about a record.
+class DeletionTest:
+    """What a fit says about a record that it left out.
 
     Attributes:
-        agrees: whether it does not differ from what is expected by more than chance allows.
-        kind: if it does not agree, why.
-        gauges: of ``xyz``, those that alone are wrong; empty where no single one is.
-        off: (3,), mm, what the gauges x, y and z show too much; none next to a singularity.
-        statistic: squared standardised length of that; infinite next to a singularity.
-        stray: the leg (from 1) that does not stand where it was sent, and how far off, mm.
+        fault: what is wrong with the record if it disagrees.
+        statistics: the tests of the fit's records and this one; none next to a singularity.
+        row: the record among them.
     """
 
-    agrees: bool
-    kind: DataFaultKind
-    gauges: str
-    off: Array | None
-    statistic: float
-    stray: tuple[int, float] | None
+    fault: DataFault
+    statistics: OutlierStatistics | None = None
+    row: int = 0
+
+    def agrees(self, found_before: int = 0) -> bool:
+        """Whether chance explains the difference, after some records that certainly disagree."""
+        if self.statistics is None:
+            return False
+        return bool(self.statistics.threshold_ratio(found_before)[self.row] <= 1.0)
 
 
-def test_record(problem: Problem, label: Label, found: Fit, *, found_before: int) -> RecordVerdict:
-    """Judge one record of a problem by a fit that it took no part in."""
-    stray = _stray(problem, label)
-    expansion = _with_record(problem, label, found)
-    if expansion is None:
-        return RecordVerdict(
-            False,
-            DataFaultKind.FOREIGN_JOINTS if stray else DataFaultKind.SINGULAR,
-            "",
-            None,
-            np.inf,
-            stray,
-        )
-    row = int(np.flatnonzero(record_mask(expansion.problem, [label]))[0])
-    tests = OutlierStatistics.of(expansion)
-    own, gauges = expansion.weights[row], expansion.problem.gauges
-    information = gauges.T @ own @ expansion.residual_covariance[row] @ own @ gauges
-    off = -np.linalg.pinv(information, hermitian=True) @ (gauges.T @ expansion.scores[row])
-    shown = expansion.problem.deviations[row] @ gauges
-    kind, wrong = _explanation(off, shown, information / tests.scale)
-    agrees = bool(tests.threshold_ratio(found_before)[row] <= 1.0)
-    if stray and not wrong:
-        kind = DataFaultKind.FOREIGN_JOINTS
-    return RecordVerdict(agrees, kind, wrong, off, float(tests.omnibus[row]), stray)
+def deletion_test(problem: Problem, record: RecordId, fit: Fit) -> DeletionTest:
+    """Test one record of a problem against a fit that it took no part in."""
+    leg = _inconsistent_leg(problem, record)
+    model = _model_with(problem, record, fit)
+    if model is None:
+        kind = DataFaultKind.MISMATCHED_JOINTS if leg else DataFaultKind.SINGULAR
+        return DeletionTest(messages.rejected_record(record, kind, leg=leg))
+    row = _row(model.problem, record)
+    statistics = OutlierStatistics.of(model)
+    weights, gauges = model.weights[row], model.problem.gauges
+    information = gauges.T @ weights @ model.residual_covariance[row] @ weights @ gauges
+    offset = -np.linalg.pinv(information, hermitian=True) @ (gauges.T @ model.scores[row])
+    readings = model.problem.deviations[row] @ gauges
+    kind, faulty = _simplest_cause(offset, readings, information / statistics.scale)
+    if leg and not faulty:
+        kind = DataFaultKind.MISMATCHED_JOINTS
+    fault = messages.rejected_record(
+        record,
+        kind,
+        gauges=faulty,
+        statistic=float(statistics.omnibus[row]),
+        offset_mm=(float(offset[0]), float(offset[1]), float(offset[2])),
+        leg=leg,
+    )
+    return DeletionTest(fault, statistics, row)
 
 
-def _stray(problem: Problem, label: Label) -> tuple[int, float] | None:
-    row = int(np.flatnonzero(record_mask(problem, [label]))[0])
-    others = problem.labels[:, 0] == label[0]
-    others[row] = False
-    return inconsistent_leg(problem.commands, problem.joints, row, others)
-
-
-def poses_at(problem: Problem, found: Fit) -> tuple[PoseBatch, Mask]:
+def poses_at(problem: Problem, fit: Fit) -> tuple[PoseBatch, Mask]:
     """Poses that close a fit's geometry at all records of a problem, and which (n,) were found."""
-    geometry = Geometry.from_vector(problem.basis @ found.solution.free)
+    geometry = Geometry.from_vector(problem.basis @ fit.solution.free)
     reached = problem.commands.solve_poses(geometry, problem.joints)
     return reached.poses, reached.found
 
 
-def _with_record(problem: Problem, label: Label, found: Fit) -> LinearizedModel | None:
-    """The expansion of a fit in its own records and one more; none if that is next to a singularity."""
-    some = problem.subset(record_mask(problem, {label, *record_ids(found.problem)}))
-    poses, reached = poses_at(some, found)
-    row = int(np.flatnonzero(record_mask(some, [label]))[0])
+def _row(problem: Problem, record: RecordId) -> int:
+    return int(np.flatnonzero(record_mask(problem, [record]))[0])
+
+
+def _inconsistent_leg(problem: Problem, record: RecordId) -> tuple[int, float] | None:
+    row = _row(problem, record)
+    others = problem.labels[:, 0] == record[0]
+    others[row] = False
+    return inconsistent_leg(problem.commands, problem.joints, row, others)
+
+
+def _model_with(problem: Problem, record: RecordId, fit: Fit) -> LinearizedModel | None:
+    """The linear model of a fit's records and one more; none if that is next to a singularity."""
+    some = problem.subset(record_mask(problem, {record, *record_ids(fit.problem)}))
+    poses, reached = poses_at(some, fit)
     if not reached.all():
         return None
-    prediction = measurement_model.predict(some, found.solution.free, poses)
-    if prediction.amplification[row] > LARGEST_AMPLIFICATION:
+    prediction = measurement_model.predict(some, fit.solution.free, poses)
+    if prediction.amplification[_row(some, record)] > LARGEST_AMPLIFICATION:
         return None
-    return LinearizedModel.around(some, prediction, found.active_prior)
+    return LinearizedModel.around(some, prediction, fit.active_prior)
 
 
-def _explanation(off: Array, shown: Array, information: Array) -> tuple[DataFaultKind, str]:
-    """The simplest one: a known misreading, else one wrong gauge, else a wrong record."""
-    if np.abs(off).max() > LEAST_MISREAD_MM:
-        rests = [off + misreading.remedy @ shown - shown for misreading in GAUGE_FAULTS]
-        squares = [float(rest @ information @ rest) for rest in rests]
+def _simplest_cause(offset: Array, readings: Array, information: Array) -> tuple[DataFaultKind, str]:
+    """A gauge fault if one explains the offset, else one wrong gauge, else a wrong record."""
+    if np.abs(offset).max() > SMALLEST_GAUGE_FAULT_MM:
+        unexplained = [offset + fault.remedy @ readings - readings for fault in GAUGE_FAULTS]
+        squares = [float(rest @ information @ rest) for rest in unexplained]
         best = int(np.argmin(squares))
-        if squares[best] < chdtri(3, NOT_SURPRISING):
+        if squares[best] < chdtri(3, SIGNIFICANCE):
             return GAUGE_FAULTS[best].kind, GAUGE_FAULTS[best].gauges
-    along = (information @ off) ** 2 / np.maximum(np.diag(information), 1e-300)
+    along = (information @ offset) ** 2 / np.maximum(np.diag(information), 1e-300)
     worst = int(np.argmax(along))
-    rest_of_it = float(off @ information @ off - along[worst])
-    return DataFaultKind.GROSS_ERROR, GAUGES[worst] if rest_of_it < chdtri(2, NOT_SURPRISING) else ""
+    others = float(offset @ information @ offset - along[worst])
+    return DataFaultKind.GROSS_ERROR, GAUGES[worst] if others < chdtri(2, SIGNIFICANCE) else ""

@@ -1,233 +1,226 @@
-"""Fit, find what is wrong with some records, leave them out or refuse, fit again.
+"""Stepwise selection of data faults: forward by penalized score tests, backward by deletion tests.
 
-Left out is what concerns records of their own: gross errors, and all that was measured after a
-gauge's zero slipped. Misread gauges are refused: their readings would have to be guessed, and
-somebody has to look at the machine or at the file.
+A fault hypothesis h adds k unknowns b to the linear model, ``r = r0 + J x + Z b``. Its gain, the
+decrease of the chi-square, is a score statistic that needs no second fit (:mod:`.score_tests`);
+its cost is ``c k - gain``, like Schwarz's criterion (BIC) with a constant c instead of log n.
+Starting with no fault at all:
+
+1. Forward. Fit the records. Of all significant hypotheses take the one of lowest cost that a refit
+   of the corrected records confirms, and repeat. Where the fit is unreliable, first-order tests
+   around it are not valid: hypotheses are tried by refits instead (:mod:`.hypothesis_search`).
+2. Backward. Test each rejected record against the final fit, in which it takes no part, readmit
+   those that agree, and go forward again.
+
+Gross errors, and all records after a shift of a gauge's zero, are left out. Gauge faults are
+refused: their readings would have to be guessed, so a person has to check the machine or the file.
+
+Sources: Rao 1948 (score test); Baarda 1968 and Pope, The Statistics of Residuals and the Detection of
+Outliers, NOAA NOS 65 NGS 1, 1976 (data snooping, one outlier after another); Atkinson and Riani 2000
+(several outliers, backward test by deletion); Schwarz, Estimating the Dimension of a Model, Annals of
+Statistics 6, 1978.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import islice
 
 import numpy as np
 
 from hexacell.identification.data_faults import messages
+from hexacell.identification.data_faults.fault_model import CorrectedFit, FaultHypothesis
 from hexacell.identification.data_faults.hypotheses import (
     ALL_IN_INCHES,
-    FaultHypothesis,
     GaugeFaultHypothesis,
-    Label,
     OutlierHypothesis,
     ZeroShiftHypothesis,
-    rank_hypotheses,
     record_ids,
     record_mask,
 )
 from hexacell.identification.data_faults.hypothesis_search import (
-    LARGEST_SHARE,
-    FaultSet,
-    is_consistent,
-    is_pure_offset,
-    is_unreliable,
+    LARGEST_REJECTED_SHARE,
+    hypotheses_at_solution,
     search,
 )
-from hexacell.identification.data_faults.record_test import RecordVerdict, poses_at, test_record
-from hexacell.identification.data_faults.score_tests import LinearizedModel
+from hexacell.identification.data_faults.record_test import DeletionTest, deletion_test, poses_at
 from hexacell.identification.problem.data_requirements import equations, is_determined
 from hexacell.identification.problem.problem import Problem
 from hexacell.identification.solver.multistart import start_points
-from hexacell.identification.solver.regularized_fit import QUICK, Fit, fit, refit
-from hexacell.identification.solver.result import DataFault, DataFaultKind, GaugeFaultError, Outlier
+from hexacell.identification.solver.regularized_fit import Fit, fit, refit
+from hexacell.identification.solver.result import DataFault, GaugeFaultError
 from hexacell.kinematics.rotations import Array
-
-CONFIRMED = 0.5
-"""Of the gain expected to first order, what a new solution must show of it."""
+from hexacell.measurements.records import RecordId
 
 FEW_RECORDS = 60
-ELSEWHERE = 4
-WITHIN = 3.0
-"""Before so few readings are called false, a search is begun at so many other robots; mean square of their
-differences from the drawing, in sigma."""
+OTHER_STARTS = 4
+LARGEST_MEAN_SQUARE = 3.0
+"""With so few records the cost has other minima. A gauge fault is refused only if none of so many
+other starts leads to one, whose mean square difference from the drawing, in sigma, is smaller."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ScreenedFit:
-    """A fit of the records that agree, and the others."""
+    """A fit of the records that agree, and what is wrong with the others."""
 
     fit: Fit
-    outliers: tuple[Outlier, ...]
-    anomalies: tuple[DataFault, ...]
+    data_faults: tuple[DataFault, ...] = ()
 
 
 def screen(problem: Problem) -> ScreenedFit:
-    """Fit a problem, and again without what disagrees.
+    """Fit a problem without the records that disagree with the others.
 
     Raises:
-        FalseReadings: gauges were misread, or so much came after a slip that too little is left.
+        GaugeFaultError: gauges were misread, or too few records are left before a shift of a zero.
     """
-    cleaning = _Cleaning(problem)
     try:
-        cleaning.run()
+        selected = _stepwise_selection(problem)
     except GaugeFaultError:
-        found = _begun_elsewhere(problem)
-        if found is None:
+        other = _other_minimum(problem)
+        if other is None:
             raise
-        return ScreenedFit(found, (), ())
-    return cleaning.result()
+        return ScreenedFit(other.fit)
+    return ScreenedFit(selected.fit, _data_faults(selected))
 
 
 def fit_unscreened(problem: Problem) -> ScreenedFit:
     """Fit a problem with all records that the solver can keep."""
-    return ScreenedFit(fit(problem), (), ())
+    return ScreenedFit(fit(problem))
 
 
-def _begun_elsewhere(problem: Problem) -> Fit | None:
-    """A robot within the tolerances that explains all readings as they are, if a search finds one.
+def _stepwise_selection(problem: Problem) -> CorrectedFit:
+    uncorrected = CorrectedFit.uncorrected(problem)
+    selected = _forward(uncorrected)
+    if len(_rejected(selected)) > 1 or not selected.is_consistent:
+        _refuse_inches(uncorrected)
+    readmitted = _readmit(selected)
+    return selected if readmitted is None else _forward(readmitted)
 
-    From the drawing a search may not: with few records the cost has other minima.
-    """
+
+def _forward(current: CorrectedFit) -> CorrectedFit:
+    """Correct for the most likely hypothesis until none is significant, or too many were rejected."""
+    while len(_rejected(current)) < LARGEST_REJECTED_SHARE * current.original.records:
+        extended = None
+        if not current.is_reliable:
+            extended = search(current)
+            current = current if extended else current.converged()
+        if extended is None and current.is_reliable:
+            extended = _most_likely(current)
+        if extended is None:
+            break
+        _require_correctable(current, extended)
+        current = extended
+    return current
+
+
+def _most_likely(current: CorrectedFit) -> CorrectedFit | None:
+    """The fit corrected for the hypothesis of lowest cost that is confirmed."""
+    ranked = hypotheses_at_solution(current, found_before=len(_rejected(current)))
+    confirmed = (hypothesis.confirmed(current) for hypothesis in ranked)
+    return next((extended for extended in confirmed if extended), None)
+
+
+def _require_correctable(current: CorrectedFit, extended: CorrectedFit) -> None:
+    """Raise where the additional faults cannot be corrected by leaving records out."""
+    problem = current.problem
+    for fault in extended.faults[len(current.faults) :]:
+        problem = fault.corrected(problem)
+        if isinstance(fault, GaugeFaultHypothesis):
+            before, after = current.fit.goodness, extended.fit.goodness
+            raise GaugeFaultError(messages.gauge_fault(fault, before, after))
+        if isinstance(fault, ZeroShiftHypothesis) and not is_determined(problem):
+            raise GaugeFaultError(messages.refused_zero_shift(fault, equations(problem)))
+
+
+def _refuse_inches(uncorrected: CorrectedFit) -> None:
+    """Readings in inches resemble a machine that needs no calibration, with some gross errors."""
+    in_mm = uncorrected.corrected_for(ALL_IN_INCHES)
+    if in_mm.is_consistent:
+        _require_correctable(uncorrected, in_mm)
+
+
+def _readmit(selected: CorrectedFit) -> CorrectedFit | None:
+    """The fit with the rejected records that agree with it; none if there are none."""
+    agreeing = _agreeing(selected)
+    if not agreeing:
+        return None
+    original, solution = selected.original, selected.fit.solution
+    problem = original.subset(record_mask(original, agreeing.union(record_ids(selected.fit.problem))))
+    poses, reached = poses_at(problem, selected.fit)
+    if not reached.all():
+        return None
+    again = refit(replace(problem, has_start_pose=reached), solution.free, poses)
+    readmitted = CorrectedFit(original, problem, again, _without(agreeing, selected.faults))
+    return readmitted if readmitted.is_reliable else None
+
+
+def _without(records: set[RecordId], faults: Sequence[FaultHypothesis]) -> tuple[FaultHypothesis, ...]:
+    """The faults without the gross errors of some records."""
+    return tuple(
+        replace(fault, records=tuple(record for record in fault.records if record not in records))
+        if isinstance(fault, OutlierHypothesis)
+        else fault
+        for fault in faults
+    )
+
+
+def _agreeing(selected: CorrectedFit) -> set[RecordId]:
+    """Rejected records that agree; the fewer disagree, the more significantly one has to."""
+    tests = _deletion_tests(selected)
+    disagreeing = sum(not test.agrees() for test in tests.values())
+    return {record for record, test in tests.items() if test.agrees(max(0, disagreeing - 1))}
+
+
+def _deletion_tests(selected: CorrectedFit) -> dict[RecordId, DeletionTest]:
+    """Tests of gross errors and of records that the solver left out, not of those after a zero shift."""
+    if selected.fit.problem.records == selected.original.records:
+        return {}
+    excluded = {record for shift in _zero_shifts(selected) for record in _after(shift, selected)}
+    excluded.update(record_ids(selected.fit.problem))
+    return {
+        record: deletion_test(selected.original, record, selected.fit)
+        for record in record_ids(selected.original)
+        if record not in excluded
+    }
+
+
+def _rejected(current: CorrectedFit) -> list[RecordId]:
+    """The records rejected for gross errors."""
+    outliers = (fault for fault in current.faults if isinstance(fault, OutlierHypothesis))
+    return [record for outlier in outliers for record in outlier.records]
+
+
+def _zero_shifts(current: CorrectedFit) -> list[ZeroShiftHypothesis]:
+    return [fault for fault in current.faults if isinstance(fault, ZeroShiftHypothesis)]
+
+
+def _after(shift: ZeroShiftHypothesis, current: CorrectedFit) -> list[RecordId]:
+    """All records after a zero shift."""
+    return record_ids(current.original.subset(shift.rows(current.original)))
+
+
+def _data_faults(selected: CorrectedFit) -> tuple[DataFault, ...]:
+    """What is wrong with the records that were left out."""
+    records = [test.fault for test in _deletion_tests(selected).values()]
+    shifts = [messages.zero_shift(shift, _after(shift, selected)) for shift in _zero_shifts(selected)]
+    return (*records, *shifts)
+
+
+def _other_minimum(problem: Problem) -> CorrectedFit | None:
+    """A fit within the tolerances that explains all readings as they are, from another start."""
     if problem.records > FEW_RECORDS:
         return None
     everywhere = np.ones(problem.records, dtype=bool)
-    for free, poses in islice(start_points(problem), ELSEWHERE):
-        begun = replace(problem, initial_parameters=free, start=poses, has_start_pose=everywhere)
-        found = fit(begun, manner=QUICK)
-        if is_consistent(problem, found) and _is_within(problem, found.solution.free):
+    for free, poses in islice(start_points(problem), OTHER_STARTS):
+        restarted = replace(problem, initial_parameters=free, start=poses, has_start_pose=everywhere)
+        found = CorrectedFit.uncorrected(restarted)
+        if found.is_consistent and _is_within_tolerances(problem, found.fit.solution.free):
             return found
     return None
 
 
-def _is_within(problem: Problem, free: Array) -> bool:
-    """Whether a robot is as near to the drawing as tolerances let some robots be."""
-    moved = free - problem.mechanism.convention.free_parameters(problem.prior.centre)
-    return bool(moved @ np.linalg.solve(problem.prior.covariance, moved) <= WITHIN * len(moved))
-
-
-class _Cleaning:
-    """What is left of the records, their fit, and what was found so far."""
-
-    def __init__(self, problem: Problem) -> None:
-        self.whole = problem
-        self.remaining = problem
-        self.fit = fit(problem, manner=QUICK)
-        self.gross: set[Label] = set()
-        self.slips: list[ZeroShiftHypothesis] = []
-
-    def run(self) -> None:
-        """Look for causes until none is left that chance does not explain as well."""
-        self._remove_all()
-        if len(self.gross) > 1 or not is_consistent(self.remaining, self.fit):
-            self._refuse_inches()
-        if self._left_out_singly() and self._readmit():
-            self._remove_all()
-
-    def _remove_all(self) -> None:
-        while len(self.gross) < LARGEST_SHARE * self.whole.records:
-            explanation = self._explanation()
-            if not explanation:
-                break
-            self._remove(explanation)
-
-    def _explanation(self) -> FaultSet:
-        if is_unreliable(self.remaining, self.fit):
-            found = search(self.remaining, self.fit)
-            if found or not self._patiently():
-                return found
-        expansion = LinearizedModel.at_solution(self.fit)
-        causes = rank_hypotheses(expansion, self.fit.goodness, found_before=len(self.gross))
-        return tuple([*filter(self._confirmed, causes)][:1])
-
-    def _patiently(self) -> bool:
-        """Whether a solution that was not reached in a hurry is reached with more patience."""
-        if not self.fit.solution.termination.converged:
-            self.fit = fit(self.remaining)
-        return not is_unreliable(self.remaining, self.fit)
-
-    def _confirmed(self, cause: FaultHypothesis) -> bool:
-        """A record can be left out if enough are left; what concerns more needs a second solution."""
-        if isinstance(cause, OutlierHypothesis):
-            return is_determined(cause.corrected(self.remaining))
-        if isinstance(cause, ZeroShiftHypothesis):
-            return is_pure_offset(self.remaining, cause)
-        trial = fit(cause.corrected(self.remaining), manner=QUICK)
-        return trial.goodness.chi2 < self.fit.goodness.chi2 - CONFIRMED * cause.gain
-
-    def _refuse_inches(self) -> None:
-        """Readings in inches resemble a machine that needs no calibration, with some gross errors."""
-        suspect = GaugeFaultHypothesis(ALL_IN_INCHES, None, 0.0)
-        in_mm = suspect.corrected(self.whole)
-        if is_consistent(in_mm, fit(in_mm, manner=QUICK)):
-            self.remaining, self.fit = self.whole, fit(self.whole, manner=QUICK)
-            self._remove((suspect,))
-
-    def _remove(self, explanation: FaultSet) -> None:
-        for cause in explanation:
-            self.remaining = cause.corrected(self.remaining)
-            if isinstance(cause, GaugeFaultHypothesis):
-                after = fit(self.remaining, manner=QUICK)
-                raise GaugeFaultError(messages.of_misreading(cause, self.fit.goodness, after.goodness))
-            if isinstance(cause, OutlierHypothesis):
-                self.gross.update(cause.labels)
-            elif is_determined(self.remaining):
-                self.slips.append(cause)
-            else:
-                raise GaugeFaultError(messages.of_slip_refused(cause, equations(self.remaining)))
-        self.fit = fit(self.remaining, manner=QUICK)
-
-    def _readmit(self) -> bool:
-        """Take back what was left out too hastily, from the solution on; whether there was anything."""
-        agreeing = self._agreeing()
-        if not agreeing:
-            return False
-        wanted = self.whole.subset(record_mask(self.whole, agreeing.union(record_ids(self.fit.problem))))
-        poses, reached = poses_at(wanted, self.fit)
-        if not reached.all():
-            return False
-        startable = replace(wanted, has_start_pose=reached)
-        again = refit(startable, self.fit.solution.free, poses)
-        if is_unreliable(wanted, again):
-            return False
-        self.gross -= agreeing
-        self.remaining, self.fit = wanted, again
-        return True
-
-    def _agreeing(self) -> set[Label]:
-        """Records that were left out and agree; the fewer disagree, the more must one do so to stay out."""
-        sure = [judged for judged in self._judgements(0).values() if not judged.agrees]
-        judgements = self._judgements(max(0, len(sure) - 1))
-        return {label for label, judged in judgements.items() if judged.agrees}
-
-    def _judgements(self, found_before: int) -> dict[Label, RecordVerdict]:
-        return {
-            label: test_record(self.whole, label, self.fit, found_before=found_before)
-            for label in self._left_out_singly()
-        }
-
-    def _left_out_singly(self) -> list[Label]:
-        """Gross errors, and records that the solver lost; those after a slip stay where they are."""
-        if self.fit.problem.records == self.whole.records:
-            return []
-        accounted_for = {label for slip in self.slips for label in self._labels_after(slip)}
-        accounted_for.update(record_ids(self.fit.problem))
-        return [label for label in record_ids(self.whole) if label not in accounted_for]
-
-    def _labels_after(self, slip: ZeroShiftHypothesis) -> list[Label]:
-        return record_ids(self.whole.subset(slip.rows(self.whole)))
-
-    def result(self) -> ScreenedFit:
-        """The records left out, each with its reason."""
-        judgements = self._judgements(0)
-        outliers = [_outlier(label, judgement) for label, judgement in judgements.items()]
-        anomalies = [messages.of_record(outlier) for outlier in outliers]
-        for slip in self.slips:
-            labels = self._labels_after(slip)
-            outliers += [Outlier(*label, float(slip.gain), DataFaultKind.SLIPPED_ZERO) for label in labels]
-            anomalies.append(messages.of_slip(slip, labels))
-        return ScreenedFit(self.fit, tuple(outliers), tuple(anomalies))
-
-
-def _outlier(label: Label, judgement: RecordVerdict) -> Outlier:
-    off = judgement.off
-    off_mm = None if off is None else (float(off[0]), float(off[1]), float(off[2]))
-    return Outlier(*label, judgement.statistic, judgement.kind, judgement.gauges, off_mm, judgement.stray)
+def _is_within_tolerances(problem: Problem, free: Array) -> bool:
+    """Whether a robot is as near to the drawing as some robots within the tolerances are."""
+    change = free - problem.mechanism.convention.free_parameters(problem.prior.centre)
+    squares = change @ np.linalg.solve(problem.prior.covariance, change)
+    return bool(squares <= LARGEST_MEAN_SQUARE * len(change))

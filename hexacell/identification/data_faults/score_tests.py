@@ -1,26 +1,23 @@
-"""Gross errors: single records that do not agree with all the others.
+"""Score tests of data faults: by how much one more unknown would lower the chi-square.
 
-Two tests of each record. The one of a shift along one gauge is the sharpest where one gauge was
-misread; the one of a shift in any direction finds the rest, a wrong encoder reading for one. Both
-are deletion statistics: the record is judged by what the others say about it, however much it pulls
-the solution its own way.
+An unknown b that adds ``Z b`` to the residuals r of a linear model has, next to the parameters, the
+estimate and the gain
 
-A slipped zero: from some record of a point on, the gauges show a constant more than before.
+    b = (Z^T M Z)^-1 Z^T M r,    gain = r^T M Z b,
 
-The residuals to first order, and the test of one more unknown in them.
-# MERGED-DOC
-With residuals r, their Jacobian J and weights W, all centred, an unknown b that adds ``Z b`` to the
-residuals is estimated, next to the parameters, by
-# MERGED-DOC
-    b = (Z^T M Z)^-1 Z^T M r,    M = W - W (A + J C J^T) W,
-# MERGED-DOC
-A what the stations and the gauges' scale absorb, C the parameters' covariance. Estimating it lowers
-the chi-square by ``r^T M Z b``; a b that is known beforehand lowers it by less. For a test
-neither a second solution nor the whole of M is needed: ``M r = W r`` where r is already the least
-there is, and of M only the blocks of the records concerned.
-# MERGED-DOC
-Source: added-variable (score) tests of linear models; Cook and Weisberg, Residuals and Influence
-in Regression, 1982, chapter 2.
+with M of :class:`~.linearized_model.LinearizedModel`. No second fit is needed, and of M only the
+blocks of the records concerned. Three choices of Z:
+
+- one record, along one gauge or in any direction: a gross error. The record is tested against what
+  the others predict (deletion residual), however strongly it pulls the solution.
+- one constant for a record and all later ones of its point: a shift of the gauges' zero.
+- a known change of the readings, with no unknown: a gauge fault. Readings d should have been T d,
+  so that the residuals change by ``z = -(T - 1) d`` and the chi-square by ``2 z^T M r + z^T M z``:
+  a likelihood ratio.
+
+Sources: Rao, Large sample tests of statistical hypotheses, Proc. Cambridge Phil. Soc. 44, 1948 (score
+test); Baarda, A testing procedure for use in geodetic networks, 1968 (data snooping); Cook and
+Weisberg, Residuals and Influence in Regression, 1982, chapter 2.
 """
 
 from __future__ import annotations
@@ -31,32 +28,29 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtri, ndtri
 
-from hexacell.identification.problem.problem import Problem
-from hexacell.identification.solver.measurement_model import Prediction
-from hexacell.identification.solver.nuisance_parameters import NuisanceElimination
-from hexacell.identification.solver.regularized_fit import Fit
+from hexacell.identification.data_faults.linearized_model import LinearizedModel
 from hexacell.kinematics.rotations import Array
 
 FALSE_ALARMS_PER_RECORD = 2e-4
 FALSE_ALARMS_PER_FILE = 0.02
-"""Whichever is the smaller: a hundred thousand good records should lose none either."""
+"""The smaller rate applies: a file of 100,000 good records must lose none either."""
 
 SMALLEST_REDUNDANCY = 1e-3
-"""A record that alone determines something has no residual there to be judged by."""
+"""Of a record's information: where the others determine less, its residual is no evidence."""
 
 MEDIAN_OF_CHI2_3 = 2.366
 SCATTER_OF_MEDIAN = 1.12
-"""Standard deviation of the median of n such values, over that median, times the root of n."""
+"""Relative standard deviation of the median of n such values, times the square root of n."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class OutlierStatistics:
-    """Tests of n records.
+    """Tests of n records for gross errors.
 
     Attributes:
         along_gauges: (n, 3) squared standardised shift along each gauge; about 1 for a good record.
         omnibus: (n,) squared standardised shift; about 3 for a good record.
-        scale: variance of the noise over the stated one, where it is surely larger.
+        scale: noise variance over the stated one where it is significantly larger, else 1.
     """
 
     along_gauges: Array
@@ -64,19 +58,19 @@ class OutlierStatistics:
     scale: float
 
     @classmethod
-    def of(cls, expansion: LinearizedModel) -> OutlierStatistics:
-        """The tests of all records of an expansion."""
-        own, gauges = expansion.weights, expansion.problem.gauges
-        left = expansion.residual_covariance
-        along_gauges = _along(gauges, expansion.scores, own @ left @ own, own)
-        statistic = _in_any_direction(expansion.residuals, left, own)
-        return cls(along_gauges, statistic, _scale(statistic))
+    def of(cls, model: LinearizedModel) -> OutlierStatistics:
+        """The tests of all records of a model."""
+        weights, gauges = model.weights, model.problem.gauges
+        covariance = model.residual_covariance
+        along_gauges = _along_gauges(gauges, model.scores, weights @ covariance @ weights, weights)
+        omnibus = _omnibus(model.residuals, covariance, weights)
+        return cls(along_gauges, omnibus, _noise_scale(omnibus))
 
     def threshold_ratio(self, found_before: int = 0) -> Array:
-        """By how many times (n,) a record's greater statistic exceeds what chance may give it.
+        """The larger statistic (n,) of each record over its critical value.
 
-        With every error that was found the next one is less surprising: the rate of false alarms
-        among all alarms is held (Benjamini and Hochberg 1995).
+        The false alarm rate grows with the errors found before, so that the share of false alarms
+        among all alarms stays constant (Benjamini and Hochberg 1995).
         """
         records = len(self.omnibus)
         rate = min(FALSE_ALARMS_PER_RECORD, FALSE_ALARMS_PER_FILE / records) * (found_before + 1) / 2.0
@@ -85,36 +79,37 @@ class OutlierStatistics:
         return threshold_ratio
 
 
-def _along(gauges: Array, scores: Array, block: Array, own: Array) -> Array:
+def _along_gauges(gauges: Array, scores: Array, block: Array, weights: Array) -> Array:
     score = scores @ gauges
     information = np.einsum("ia,nij,ja->na", gauges, block, gauges)
-    judged = information > SMALLEST_REDUNDANCY * np.einsum("ia,nij,ja->na", gauges, own, gauges)
-    tests: Array = np.where(judged, score**2 / np.where(judged, information, 1.0), 0.0)
-    return tests
+    testable = information > SMALLEST_REDUNDANCY * np.einsum("ia,nij,ja->na", gauges, weights, gauges)
+    statistics: Array = np.where(testable, score**2 / np.where(testable, information, 1.0), 0.0)
+    return statistics
 
 
-def _in_any_direction(residuals: Array, left: Array, own: Array) -> Array:
-    values, axes = np.linalg.eigh(left)
+def _omnibus(residuals: Array, covariance: Array, weights: Array) -> Array:
+    values, axes = np.linalg.eigh(covariance)
     along = np.einsum("nij,ni->nj", axes, residuals)
-    judged = values > SMALLEST_REDUNDANCY / np.linalg.eigvalsh(own)[:, -1:]
-    statistic: Array = np.sum(np.where(judged, along**2 / np.where(judged, values, 1.0), 0.0), axis=-1)
-    return statistic
+    testable = values > SMALLEST_REDUNDANCY / np.linalg.eigvalsh(weights)[:, -1:]
+    squares = np.where(testable, along**2 / np.where(testable, values, 1.0), 0.0)
+    statistics: Array = np.sum(squares, axis=-1)
+    return statistics
 
 
-def _scale(statistic: Array) -> float:
-    """The stated noise is believed unless the median record contradicts it beyond chance."""
-    ratio = float(np.median(statistic)) / MEDIAN_OF_CHI2_3
-    return ratio if ratio > 1.0 + 4.0 * SCATTER_OF_MEDIAN / np.sqrt(len(statistic)) else 1.0
+def _noise_scale(omnibus: Array) -> float:
+    """The noise variance by the median record; 1 unless it is significantly larger than stated."""
+    ratio = float(np.median(omnibus)) / MEDIAN_OF_CHI2_3
+    return ratio if ratio > 1.0 + 4.0 * SCATTER_OF_MEDIAN / np.sqrt(len(omnibus)) else 1.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ZeroShiftStatistics:
-    """Tests of a slip right before each of n records, at least two records before and after it.
+    """Tests of a zero shift right before a record, with at least two records before and after it.
 
     Attributes:
-        rows: (k,) the first record after each slip that can be tested.
-        gains: (k,) by how much the slip would lower the chi-square; about 3 where there is none.
-        shifts: (k, 3), mm, what the gauges x, y and z would show more.
+        rows: (k,) the first record after each testable shift.
+        gains: (k,) decrease of the chi-square; about 3 where there is no shift.
+        shifts: (k, 3), mm, by which the gauges x, y and z then read too much.
     """
 
     rows: NDArray[np.intp]
@@ -122,22 +117,22 @@ class ZeroShiftStatistics:
     shifts: Array
 
     @classmethod
-    def of(cls, expansion: LinearizedModel) -> ZeroShiftStatistics:
-        """All slips that the records of an expansion could show."""
-        problem, weights = expansion.problem, expansion.weights
-        rows = _testable(problem.first_rows, problem.records)
-        score = _sums_from(problem.first_rows, expansion.scores)[rows]
+    def of(cls, model: LinearizedModel) -> ZeroShiftStatistics:
+        """All shifts that the records of a model could show."""
+        problem, weights = model.problem, model.weights
+        rows = _testable_rows(problem.first_rows, problem.records)
+        score = _sums_from(problem.first_rows, model.scores)[rows]
         weight = _sums_from(problem.first_rows, weights)[rows]
-        by_parameters = _sums_from(problem.first_rows, weights @ expansion.jacobian)[rows]
-        whole = np.linalg.inv(problem.per_record(problem.group_sums(weights))[rows])
-        taken = by_parameters @ expansion.covariance @ np.swapaxes(by_parameters, -1, -2)
-        information = weight - weight @ whole @ weight - taken
+        by_parameters = _sums_from(problem.first_rows, weights @ model.jacobian)[rows]
+        station = np.linalg.inv(problem.per_record(problem.group_sums(weights))[rows])
+        taken = by_parameters @ model.covariance @ np.swapaxes(by_parameters, -1, -2)
+        information = weight - weight @ station @ weight - taken
         shift = np.einsum("kij,kj->ki", np.linalg.pinv(information, hermitian=True), score)
         return cls(rows, np.sum(score * shift, axis=-1), -shift @ problem.gauges)
 
 
-def _testable(first_rows: NDArray[np.intp], records: int) -> NDArray[np.intp]:
-    """A lone first or last record that is shifted is a gross error, and found as such."""
+def _testable_rows(first_rows: NDArray[np.intp], records: int) -> NDArray[np.intp]:
+    """Rows (k,) with two records of their point before them; a single shifted record is a gross error."""
     ends = np.append(first_rows[1:], records)
     spans = [np.arange(first + 2, end - 1) for first, end in zip(first_rows, ends, strict=True)]
     return np.concatenate(spans) if spans else np.zeros(0, dtype=np.intp)
@@ -153,68 +148,21 @@ def _sums_from(first_rows: NDArray[np.intp], values: Array) -> Array:
     return sums
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class LinearizedModel:
-    """The linear model of some records, at its own solution.
+def known_change_gains(model: LinearizedModel, change: Array) -> tuple[Array, float]:
+    """The decrease of the chi-square if the residuals change by ``change`` (n, 3), mm.
 
-    Attributes:
-        problem: the records.
-        weights: (n, 3, 3), 1/mm^2.
-        residuals: (n, 3), mm, centred: predicted position less measured deviation.
-        jacobian: (n, 3, p), centred.
-        covariance: of the free parameters (p, p), mm^2.
-        nuisance_covariance: (n, 3, 3), mm^2, the covariance of what centring takes from each record.
+    For the change at each point alone (m,), and at all of them together.
     """
-
-    problem: Problem
-    weights: Array
-    residuals: Array
-    jacobian: Array
-    covariance: Array
-    nuisance_covariance: Array
-
-    @classmethod
-    def at_solution(cls, fit: Fit) -> LinearizedModel:
-        """Around a fit, where no step is left to be made."""
-        return cls._of(fit.problem, fit.solution.prediction, fit.covariance)
-
-    @classmethod
-    def around(cls, problem: Problem, prediction: Prediction, held: Array) -> LinearizedModel:
-        """Around any geometry: what its linear problem leaves; ``held`` is the prior's precision."""
-        system = NuisanceElimination(problem, prediction.weights).system(
-            prediction.residuals, prediction.jacobian
-        )
-        covariance = np.linalg.inv(system.information() + held)
-        from_centre = prediction.free - problem.mechanism.convention.free_parameters(problem.prior.centre)
-        step = -covariance @ (system.gradient() + held @ from_centre)
-        return cls._of(problem, prediction, covariance, step)
-
-    @classmethod
-    def _of(
-        cls, problem: Problem, prediction: Prediction, covariance: Array, step: Array | None = None
-    ) -> LinearizedModel:
-        centring = NuisanceElimination(problem, prediction.weights)
-        residuals, jacobian = centring.centred(prediction.residuals), centring.centred(prediction.jacobian)
-        if step is not None:
-            residuals = residuals + jacobian @ step
-        return cls(
-            problem, prediction.weights, residuals, jacobian, covariance, centring.nuisance_covariance()
-        )
-
-    @property
-    def scores(self) -> Array:
-        """``W r`` (n, 3), 1/mm."""
-        scores: Array = np.einsum("nij,nj->ni", self.weights, self.residuals)
-        return scores
-
-    @property
-    def residual_covariance(self) -> Array:
-        """Covariance (n, 3, 3), mm^2, of each residual, and ``W left W`` is each record's block of M."""
-        taken = self.jacobian @ self.covariance @ np.swapaxes(self.jacobian, -1, -2)
-        remaining: Array = np.linalg.inv(self.weights) - self.nuisance_covariance - taken
-        return remaining
-
-    @property
-    def chi2(self) -> float:
-        """Weighted sum of squares of the residuals."""
-        return float(np.sum(self.scores * self.residuals))
+    problem, weights = model.problem, model.weights
+    weighted = np.einsum("nij,nj->ni", weights, change)
+    constants = np.linalg.solve(problem.group_sums(weights), problem.group_sums(weighted)[..., None])[
+        ..., 0
+    ]
+    centred = change - problem.per_record(constants)
+    score = problem.group_sums(np.sum(change * model.scores, axis=-1))
+    squares = problem.group_sums(np.sum(centred * weighted, axis=-1))
+    by_parameters = problem.group_sums(np.einsum("nip,ni->np", model.jacobian, weighted))
+    taken = np.einsum("mp,pq,mq->m", by_parameters, model.covariance, by_parameters)
+    total = by_parameters.sum(axis=0)
+    all_squares = squares.sum() - total @ model.covariance @ total
+    return -(2.0 * score + squares - taken), -float(2.0 * score.sum() + all_squares)

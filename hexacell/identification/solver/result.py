@@ -1,4 +1,4 @@
-"""What an identification found, how sure it is, and what it could not tell."""
+"""The result of an identification: geometry, covariance, and what is wrong with the data."""
 
 from __future__ import annotations
 
@@ -13,83 +13,68 @@ from hexacell.identification.solver.levenberg_marquardt import Termination
 from hexacell.kinematics.geometry import PARAMETER_NAMES, Geometry
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array
+from hexacell.measurements.records import Deviation, RecordId
 
 UNDETERMINED_RATIO = 0.5
-"""A standard deviation that measuring has not even halved is the drawing's, not the data's."""
-
+"""Of the prior standard deviation: a parameter with more left was not determined by the data."""
 
 GAUGES = "xyz"
 
 
 class DataFaultKind(StrEnum):
-    """What is wrong."""
+    """What is wrong with records."""
 
     GROSS_ERROR = "gross error"
     EXCHANGED = "exchanged gauges"
     REVERSED = "reversed gauge"
     INCHES = "inches"
-    SLIPPED_ZERO = "slipped zero"
-    FOREIGN_JOINTS = "joint variables of another pose"
+    ZERO_SHIFT = "slipped zero"
+    MISMATCHED_JOINTS = "joint variables of another pose"
     SINGULAR = "next to a singularity"
 
 
 @dataclass(frozen=True, slots=True)
 class DataFault:
-    """Records that do not agree with the others, and why.
+    """Records that disagree with the others, and why.
 
     Attributes:
         kind: what is wrong with them.
-        point: at which point; none where it is every point.
-        orientation: which record of the point; the first one after a slip; none where it is all.
-        gauges: the gauges concerned, of ``xyz``; empty where no single one stands out.
-        sentence: all that for people.
+        sentence: what is wrong and how it shows, for people.
         action: the next thing to do.
+        point: at which point; none where it is every point.
+        orientation: the record, or the first one after a zero shift; none where it is all of the point.
+        gauges: the gauges concerned, of ``xyz``; empty where no single one stands out.
+        left_out: the records left out; empty where the data are refused.
+        statistic: squared length of the standardized residual, about 3 for a good record; infinite for
+            a record that the identified geometry cannot reach.
+        offset_mm: what the gauges x, y and z of a record read too much; none where that is unknown.
     """
 
     kind: DataFaultKind
-    point: int | None
-    orientation: int | None
-    gauges: str
     sentence: str
     action: str
+    point: int | None = None
+    orientation: int | None = None
+    gauges: str = ""
+    left_out: tuple[RecordId, ...] = ()
+    statistic: float = np.inf
+    offset_mm: Deviation | None = None
 
     def __str__(self) -> str:
         return f"{self.sentence}. {self.action}."
 
 
 class GaugeFaultError(IdentifiabilityError):
-    """Readings that are wrong in a known way; a geometry fitted to them would be wrong too."""
+    """Readings with a data fault that cannot be left out; a geometry fitted to them would be wrong."""
 
-    def __init__(self, anomaly: DataFault) -> None:
-        self.anomaly = anomaly
-        super().__init__(anomaly.sentence, action=anomaly.action)
-
-
-@dataclass(frozen=True, slots=True)
-class Outlier:
-    """A record that does not agree with the others, and is left out.
-
-    Attributes:
-        statistic: squared length of its standardised residual; about 3 for a good record, infinite
-            for one that the identified geometry cannot follow at all.
-        kind: what is wrong with it.
-        gauges: of ``xyz``, those that alone are wrong; empty where no single one stands out.
-        off_mm: what the gauges x, y and z show too much; none where that cannot be said.
-        stray: the leg (from 1) that does not stand where it was sent, and how far off, mm.
-    """
-
-    point: int
-    orientation: int
-    statistic: float
-    kind: DataFaultKind = DataFaultKind.GROSS_ERROR
-    gauges: str = ""
-    off_mm: tuple[float, float, float] | None = None
-    stray: tuple[int, float] | None = None
+    def __init__(self, fault: DataFault) -> None:
+        self.fault = fault
+        super().__init__(fault.sentence, action=fault.action)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Identification:
-    """The identified geometry and everything said about it.
+    """The identified geometry, its covariance, and how it was found.
 
     Attributes:
         geometry: in the mechanism's frame convention, mm.
@@ -97,10 +82,10 @@ class Identification:
         free: the free parameters (p,), mm, and ``free_covariance`` (p, p) theirs.
         prior_sigma: (42,), mm, before measuring.
         problem: the records that were used.
-        poses: the platform at each of them, under the identified geometry.
+        poses: of the platform at each record, under the identified geometry.
         residual_rms_mm: of the centred residuals of the deviations.
         chi2: weighted sum of squares of those residuals, to be compared with ``dof``.
-        outliers: the records left out, and ``anomalies`` why, in words.
+        data_faults: what is wrong with the records that were left out.
     """
 
     geometry: Geometry
@@ -115,9 +100,8 @@ class Identification:
     dof: int
     iterations: int
     termination: Termination
-    outliers: tuple[Outlier, ...]
     frame: str
-    anomalies: tuple[DataFault, ...] = ()
+    data_faults: tuple[DataFault, ...] = ()
 
     @property
     def records(self) -> int:
@@ -131,7 +115,7 @@ class Identification:
 
     @property
     def converged(self) -> bool:
-        """Whether the solver ended at a solution."""
+        """Whether the solver reached a minimum."""
         return self.termination.converged
 
     @property
@@ -140,11 +124,13 @@ class Identification:
         return np.sqrt(np.diag(self.covariance))
 
     @property
+    def left_out(self) -> tuple[tuple[RecordId, DataFault], ...]:
+        """The records left out, each with its fault."""
+        return tuple((record, fault) for fault in self.data_faults for record in fault.left_out)
+
+    @property
     def undetermined(self) -> tuple[str, ...]:
-        """Parameters about which the data said next to nothing: posterior against prior."""
-        silent = self.sigma > UNDETERMINED_RATIO * self.prior_sigma
-        return tuple(
-            name
-            for name, prior, said_nothing in zip(PARAMETER_NAMES, self.prior_sigma, silent, strict=True)
-            if prior > 0.0 and said_nothing
-        )
+        """Parameters that the data hardly determine: their sigma is still near the prior's."""
+        undetermined = self.sigma > UNDETERMINED_RATIO * self.prior_sigma
+        rows = np.flatnonzero(undetermined & (self.prior_sigma > 0.0))
+        return tuple(PARAMETER_NAMES[row] for row in rows)

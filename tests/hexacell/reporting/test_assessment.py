@@ -15,7 +15,7 @@ from hexacell.cell.model import TaskSettings
 from hexacell.controller_config.interface import ControllerGeometry
 from hexacell.identification.estimator import identify
 from hexacell.identification.solver.levenberg_marquardt import Termination
-from hexacell.identification.solver.result import DataFault, DataFaultKind, Outlier
+from hexacell.identification.solver.result import DataFault, DataFaultKind
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import FrameTransform
 from hexacell.kinematics.pose import Pose, PoseBatch
@@ -141,27 +141,37 @@ def test_a_machine_that_repeats_is_not_accused(visit, assessed_of):
     assert assessment_document(found, assessed)["repeatability"]["recalibrating_helps"] is True
 
 
-def test_records_left_out_are_named_and_not_held_against_repeatability(good, settings, robot, visit):
+def gross_error(point, orientation):
+    return DataFault(
+        DataFaultKind.GROSS_ERROR,
+        f"gauge y is 0.2 mm off at point {point}, orientation {orientation}",
+        "Measure it again",
+        point=point,
+        orientation=orientation,
+        gauges="y",
+        left_out=((point, orientation),),
+    )
+
+
+def test_records_left_out_are_named_and_not_counted_in_the_repeatability(good, settings, robot, visit):
     found, _ = good
     twice = visited_twice(visit(seed=2).measured(0.01, seed=1), scatter_mm=0.0)
     wrong = replace(twice.records[-1], deviation=(25.4, 0.0, 0.0))
     measured = MeasurementSet((*twice.records[:-1], wrong))
-    left = replace(found, outliers=(Outlier(wrong.point, wrong.orientation, 1e6),))
+    left = replace(found, data_faults=(gross_error(wrong.point, wrong.orientation),))
     assessed = assess(settings, robot, measured, left)
     assert assessed.repeatability is not None
     assert assessed.repeatability.distance_mm < 1e-9
     assert any(
-        f"point {wrong.point} orientation {wrong.orientation}" in s for s in findings(left, assessed)
+        f"point {wrong.point}, orientation {wrong.orientation}" in s for s in findings(left, assessed)
     )
 
 
-def test_an_anomaly_speaks_for_itself(good):
+def test_a_data_fault_is_a_finding_in_its_own_words(good):
     found, assessed = good
-    gross = DataFault(
-        DataFaultKind.GROSS_ERROR, 2, 7, "y", "gauge y is 0.2 mm off at point 2", "Measure it again"
-    )
-    spoilt = replace(found, outliers=(Outlier(2, 7, 400.0),), anomalies=(gross,))
-    assert findings(spoilt, assessed)[-1] == "gauge y is 0.2 mm off at point 2. Measure it again."
+    spoiled = replace(found, data_faults=(gross_error(2, 7),))
+    expected = "gauge y is 0.2 mm off at point 2, orientation 7. Measure it again."
+    assert findings(spoiled, assessed)[-1] == expected
 
 
 def test_task_poses_out_of_reach_are_numbered_as_in_the_cell_file(visit, assessed_of, settings):

@@ -15,7 +15,7 @@ def without(measurements, *labels):
 
 
 def named(found):
-    return {(outlier.point, outlier.orientation) for outlier in found.outliers}
+    return {record for record, _ in found.left_out}
 
 
 @pytest.mark.parametrize(
@@ -33,7 +33,7 @@ def test_a_bad_record_is_named_and_the_rest_says_what_it_would_have_said(
 ):
     found = identify(make_problem(spoil(noisy, label, **error)))
     assert named(found) == {label}
-    assert found.outliers[0].statistic > 100.0
+    assert found.data_faults[0].statistic > 100.0
     clean = identify(make_problem(without(noisy, label)))
     assert found.geometry.largest_difference(clean.geometry) < 1e-6
     assert found.records == clean.records == 54
@@ -57,7 +57,7 @@ def test_sliders_where_no_machine_can_be_are_named_too(noisy, spoil, make_proble
     apart = spoil(noisy, (2, 4), joints=(-300, -300, -300, 300, 300, 300))
     found = identify(make_problem(apart))
     assert named(found) == {(2, 4)}
-    assert found.outliers[0].statistic == np.inf
+    assert found.data_faults[0].statistic == np.inf
     assert found.records == 54
     clean = identify(make_problem(without(noisy, (2, 4))))
     assert found.geometry.largest_difference(clean.geometry) < 1e-6
@@ -75,7 +75,7 @@ def test_several_bad_records_are_all_named(noisy, spoil, make_problem):
 
 def test_a_scatter_of_twice_the_noise_is_no_outlier(noisy, spoil, make_problem):
     found = identify(make_problem(spoil(noisy, (3, 7), deviation=(0.02, 0.0, 0.0))))
-    assert found.outliers == ()
+    assert found.data_faults == ()
 
 
 def test_no_more_than_a_tenth_is_ever_left_out(noisy, spoil, make_problem):
@@ -87,7 +87,7 @@ def test_no_more_than_a_tenth_is_ever_left_out(noisy, spoil, make_problem):
             error = random.uniform(-0.15, 0.15, 3)
             measured = spoil(measured, (point, orientation), deviation=error)
     found = identify(make_problem(measured))
-    assert len(found.outliers) <= 6
+    assert len(found.left_out) <= 6
     assert found.records >= 49
     assert found.chi2 > 3 * found.dof
 
@@ -95,6 +95,6 @@ def test_no_more_than_a_tenth_is_ever_left_out(noisy, spoil, make_problem):
 def test_nothing_is_left_out_where_nobody_asked(noisy, spoil, make_problem):
     spoilt = make_problem(spoil(noisy, (3, 7), deviation=(0.0, 0.0, 0.5)))
     found = identify(spoilt, find_outliers=False)
-    assert found.outliers == ()
+    assert found.data_faults == ()
     assert found.records == 55
     assert found.chi2 > 500

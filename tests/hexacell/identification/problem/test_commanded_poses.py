@@ -82,7 +82,7 @@ def test_a_calibrated_machine_is_calibrated_again(paper, visit, make_problem, se
     found = identify(problem)
     assert found.geometry.largest_difference(paper.actual) < EXACT_MM
     assert found.records == 55
-    assert found.outliers == ()
+    assert found.data_faults == ()
 
 
 def test_what_was_lent_is_where_the_search_begins(paper, visit, make_problem):

@@ -20,7 +20,7 @@ def assert_exact(found, true, records):
     assert found.converged
     assert found.geometry.largest_difference(true) < EXACT_MM
     assert found.records == records
-    assert found.outliers == ()
+    assert found.data_faults == ()
     assert found.residual_rms_mm < EXACT_MM
 
 

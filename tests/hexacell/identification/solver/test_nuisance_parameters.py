@@ -51,7 +51,7 @@ def test_errors_scatter_as_the_covariance_says_with_stations_set_up_badly(paper,
     errors, chi_squares = [], []
     for seed in range(count):
         found = identify(make_problem(set_up(seed), noise=STATED))
-        assert found.outliers == ()
+        assert found.data_faults == ()
         error = found.free - found.problem.mechanism.convention.free_parameters(paper.actual)
         errors.append(error @ np.linalg.solve(found.free_covariance, error))
         chi_squares.append(found.chi2)
@@ -71,7 +71,7 @@ def test_not_knowing_of_it_costs_accuracy_and_shows(paper, set_up, make_problem)
 def test_well_made_stations_lose_little_by_the_doubt(noisy, make_problem, identified):
     doubting = identify(make_problem(noisy, noise=STATED))
     assert doubting.sigma.max() > identified.sigma.max()
-    assert doubting.outliers == ()
+    assert doubting.data_faults == ()
 
 
 def test_a_station_that_is_surely_straight_is_the_limit_of_one_that_hardly_turns(

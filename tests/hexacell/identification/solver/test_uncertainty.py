@@ -46,7 +46,7 @@ def test_chi_square_is_that_of_the_degrees_of_freedom(repeated):
 
 
 def test_clean_records_are_never_left_out(repeated):
-    assert [found.outliers for found in repeated] == [()] * len(repeated)
+    assert [found.data_faults for found in repeated] == [()] * len(repeated)
     assert {found.records for found in repeated} == {55}
     assert all(found.converged for found in repeated)
     assert {found.undetermined for found in repeated} == {()}
@@ -57,7 +57,7 @@ def test_a_wrong_statement_of_the_noise_shows_in_chi_square_and_leaves_nothing_o
     noisy, make_problem, factor
 ):
     found = identify(make_problem(noisy, noise=Noise(0.01 * factor, 0.01 * factor)))
-    assert found.outliers == ()
+    assert found.data_faults == ()
     assert within(found.chi2 * factor**2, found.dof)
     assert not within(found.chi2, found.dof)
 

@@ -1,0 +1,108 @@
+"""What a fault hypothesis is, and the fit of a problem that is corrected for some of them."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Hashable
+from dataclasses import dataclass, replace
+
+from hexacell.identification.problem.problem import Problem
+from hexacell.identification.solver import regularized_fit
+from hexacell.identification.solver.chi_square import ChiSquareVerdict
+from hexacell.identification.solver.regularized_fit import QUICK, Fit
+
+PENALTY_PER_UNKNOWN = 10.0
+"""By how much a hypothesis must lower the chi-square for each number that it is free to choose."""
+
+LARGEST_TRUSTED_RATIO = 10.0
+"""Residuals over the stated noise up to which first-order tests around the solution are valid."""
+
+
+@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+class FaultHypothesis(ABC):
+    """One explanation of records that disagree with the others.
+
+    Attributes:
+        gain: the decrease of the chi-square if it is true, to first order.
+        unknowns: how many numbers it is free to choose.
+    """
+
+    gain: float
+    unknowns: int
+
+    @property
+    def cost(self) -> float:
+        """The penalized gain, negative: the most likely hypothesis has the lowest cost."""
+        return PENALTY_PER_UNKNOWN * self.unknowns - self.gain
+
+    @property
+    @abstractmethod
+    def key(self) -> Hashable:
+        """Equal for equal hypotheses, however they were found."""
+
+    @abstractmethod
+    def corrected(self, problem: Problem) -> Problem:
+        """The problem without the fault: readings corrected, or records left out."""
+
+    def trial(self, current: CorrectedFit) -> CorrectedFit | None:
+        """The fit corrected for this fault as well; none if the records contradict the hypothesis."""
+        return current.corrected_for(self)
+
+    def confirmed(self, current: CorrectedFit) -> CorrectedFit | None:
+        """The same where the current fit is reliable: none if the trial does not confirm the hypothesis."""
+        return self.trial(current)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CorrectedFit:
+    """A fit of records that are corrected for data faults.
+
+    Attributes:
+        original: all records as measured.
+        problem: the records after correction.
+        fit: their fit; the solver may have left out records next to a singularity.
+        faults: the hypotheses that were corrected for, in the order of selection.
+    """
+
+    original: Problem
+    problem: Problem
+    fit: Fit
+    faults: tuple[FaultHypothesis, ...] = ()
+
+    @classmethod
+    def uncorrected(cls, problem: Problem) -> CorrectedFit:
+        """The fit of all records as measured."""
+        return cls(problem, problem, regularized_fit.fit(problem, manner=QUICK))
+
+    def corrected_for(self, hypothesis: FaultHypothesis) -> CorrectedFit:
+        """The fit after correction for one more fault."""
+        problem = hypothesis.corrected(self.problem)
+        fit = regularized_fit.fit(problem, manner=QUICK)
+        return replace(self, problem=problem, fit=fit, faults=(*self.faults, hypothesis))
+
+    def converged(self) -> CorrectedFit:
+        """The same with the solver's full number of iterations where the quick fit was cut short."""
+        if self.fit.solution.termination.converged:
+            return self
+        return replace(self, fit=regularized_fit.fit(self.problem))
+
+    @property
+    def lost(self) -> int:
+        """How many records the solver left out."""
+        return self.problem.records - self.fit.problem.records
+
+    @property
+    def is_reliable(self) -> bool:
+        """Whether the solution is good enough for first-order tests around it."""
+        converged = self.fit.solution.termination.converged
+        return not self.lost and converged and self.fit.goodness.ratio <= LARGEST_TRUSTED_RATIO
+
+    @property
+    def is_consistent(self) -> bool:
+        """Whether all records agree with the stated noise."""
+        return self.is_reliable and self.fit.goodness.agreement is not ChiSquareVerdict.TOO_LARGE
+
+    @property
+    def misfit(self) -> float:
+        """The mean square residual; a lost record counts as one at the largest trusted ratio."""
+        return self.fit.goodness.ratio**2 + LARGEST_TRUSTED_RATIO**2 * self.lost

@@ -21,9 +21,9 @@ from hexacell.runs.run_folder import RunFolder, runs_folder
 from hexacell.storage.atomic_files import read_text, remove_stale_temporaries, write_atomically
 from hexacell.storage.cell_lock import config_lock
 from procedures.calibration.preflight import device_failures, plan_failures, raise_all, start_failures
-from procedures.calibration.provisional_geometry import holds_lent
 from procedures.calibration.workflow import Calibration, Mode
 from procedures.devices.reconnection import require_known
+from procedures.engine.config_transactions import holds_provisional
 from procedures.engine.engine import Engine, Listener
 from procedures.engine.operator import Operator, QuestionBroker
 from procedures.engine.recovery_policy import RecoveryPolicy
@@ -107,7 +107,7 @@ def _require_own_geometry(cell: Cell) -> None:
     """
     folder = runs_folder(cell)
     for path in sorted(folder.iterdir()) if folder.is_dir() else ():
-        if holds_lent(RunFolder(path), cell.config_path):
+        if holds_provisional(RunFolder(path), cell.config_path):
             raise UsageError(
                 f"the run {path} was interrupted and left its provisional geometry here",
                 subject=cell.config_path,
@@ -134,23 +134,23 @@ async def _run(
 ) -> events.Ended:
     if not order.resume:
         order.folder.create(cell)
-    desk = QuestionBroker(order.operator)
+    broker = QuestionBroker(order.operator)
     policy = RecoveryPolicy.of(cell.settings.recovery, attended=not order.unattended)
     performer = StepExecutor(
         cell,
         calibration,
         cell_now.devices,
         cell_now.clock,
-        desk,
+        broker,
         order.folder,
         cell_now.thermometers,
     )
     try:
         with Journal(order.folder.journal) as journal:
             remove_stale_temporaries(order.folder.path)
-            engine = Engine(performer, journal, listeners, inbox=inbox, desk=desk, policy=policy)
+            engine = Engine(performer, journal, listeners, queue=inbox, broker=broker, policy=policy)
             if engine.state.started is None:
-                engine.tell(_beginning(cell, calibration, cell_now))
+                engine.record(_beginning(cell, calibration, cell_now))
             engine.reopen_sets()
             return await engine.run()
     finally:

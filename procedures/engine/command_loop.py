@@ -1,4 +1,4 @@
-"""Doing one thing while heeding commands: which of them break it off, and which wait for its end."""
+"""Running a coroutine while commands are taken: some cancel it, the others wait for its end."""
 
 from __future__ import annotations
 
@@ -26,47 +26,50 @@ Result = TypeVar("Result")
 
 
 class StepCancelled(Exception):
-    """A command ended what was being done; the situation says which."""
+    """A command cancelled the coroutine; the flags say which."""
 
 
 class CommandLoop:
-    """The engine's ear: takes commands out of the inbox and keeps the situation that they make.
+    """Takes commands out of the queue and keeps the flags that they set.
 
-    ``supersede`` is given the commands that change what was measured and says why one cannot be
-    obeyed; ``decline`` hears of every command that was not.
+    Args:
+        queue: where commands are put.
+        broker: where questions are open, for answers.
+        invalidate: called with a command that undoes records; gives the reason if it is refused.
+        reject: called with every command that is refused, and the reason.
     """
 
     def __init__(
         self,
-        inbox: CommandQueue,
-        desk: QuestionBroker,
+        queue: CommandQueue,
+        broker: QuestionBroker,
         *,
-        supersede: Callable[[Undo | MeasureAgain], str | None],
-        decline: Callable[[Command, str], None],
+        invalidate: Callable[[Undo | MeasureAgain], str | None],
+        reject: Callable[[Command, str], None],
     ) -> None:
-        self.situation = EngineFlags()
+        self.flags = EngineFlags()
         self.watchers: list[Callable[[Status], None]] = []
-        self._inbox = inbox
-        self._desk = desk
-        self._supersede = supersede
-        self._decline = decline
-        desk.on_change = lambda: self.set_flags(asking=desk.open is not None)
+        self._queue = queue
+        self._broker = broker
+        self._invalidate = invalidate
+        self._reject = reject
+        broker.on_change = lambda: self.set_flags(asking=broker.open is not None)
 
-    def set_flags(self, **facts: Any) -> None:  # noqa: ANN401 - the fields of Situation
-        """Take facts into the situation; watchers hear of a new status."""
-        before = self.situation.status
-        self.situation = replace(self.situation, **facts)
-        if (now := self.situation.status) is not before:
+    def set_flags(self, **flags: Any) -> None:  # noqa: ANN401 - the fields of EngineFlags
+        """Set flags; watchers are called if the status changes by that."""
+        before = self.flags.status
+        self.flags = replace(self.flags, **flags)
+        if (now := self.flags.status) is not before:
             for watcher in self.watchers:
                 watcher(now)
 
     async def run_cancellable(self, work: Coroutine[Any, Any, Result]) -> Result:
-        """Do some work to its end.
+        """Run a coroutine to its end, taking commands meanwhile.
 
         Raises:
-            BrokenOff: a command did not let it come to its end; it has ended nevertheless.
+            StepCancelled: a command cancelled it; it has ended.
         """
-        task, listening = asyncio.ensure_future(work), asyncio.ensure_future(self._until_broken_off())
+        task, listening = asyncio.ensure_future(work), asyncio.ensure_future(self._until_cancelled())
         try:
             await asyncio.wait([task, listening], return_when=asyncio.FIRST_COMPLETED)
         finally:
@@ -74,55 +77,55 @@ class CommandLoop:
                 await cancel_and_wait(listening)
             finally:
                 await cancel_and_wait(task)
-        was_told_to = not listening.cancelled()
-        if was_told_to:
+        was_commanded = not listening.cancelled()
+        if was_commanded:
             listening.result()
-        if was_told_to and task.cancelled():
+        if was_commanded and task.cancelled():
             raise StepCancelled
         return task.result()
 
     async def take_one(self) -> None:
         """Wait for a command and take it."""
-        self._take(await self._inbox.next())
+        self._take(await self._queue.next())
 
     def catch_up(self) -> None:
         """Take the commands that wait."""
-        for command in self._inbox.take():
+        for command in self._queue.take():
             self._take(command)
 
-    async def _until_broken_off(self) -> None:
-        while not self._take(await self._inbox.next()):
+    async def _until_cancelled(self) -> None:
+        while not self._take(await self._queue.next()):
             pass
 
     def _take(self, command: Command) -> bool:
-        """Take one command; whether it breaks off what is being done."""
-        now = self.situation
+        """Take one command; whether it cancels what is running."""
+        flags = self.flags
         match command:
             case Stop():
-                self.set_flags(stopping=now.stopping or command.reason)
-                return now.asking
+                self.set_flags(stopping=flags.stopping or command.reason)
+                return flags.asking
             case Abort():
                 self.set_flags(stopping=command.reason)
                 return True
-            case Pause() if now.fault is None:
-                self.set_flags(pausing=True, at_once=now.at_once or command.at_once)
-                return command.at_once or now.asking
-            case Resume() if now.resting or now.pausing:
+            case Pause() if flags.fault is None:
+                self.set_flags(pausing=True, at_once=flags.at_once or command.at_once)
+                return command.at_once or flags.asking
+            case Resume() if flags.resting or flags.pausing:
                 self.set_flags(pausing=False, at_once=False, resting=False)
-            case Answer() if self._desk.answer(command.value):
+            case Answer() if self._broker.answer(command.value):
                 pass
             case Undo() | MeasureAgain():
-                if reason := self._supersede(command):
-                    self._decline(command, reason)
-                return now.asking and now.fault is None and not reason
+                if reason := self._invalidate(command):
+                    self._reject(command, reason)
+                return flags.asking and flags.fault is None and not reason
             case _:
-                self._decline(command, _useless(command, now))
+                self._reject(command, _refusal(command, flags))
         return False
 
 
-def _useless(command: Command, now: EngineFlags) -> str:
+def _refusal(command: Command, flags: EngineFlags) -> str:
     if isinstance(command, Answer):
         return "no question is open that this would answer"
-    if now.fault is not None:
+    if flags.fault is not None:
         return "a fault waits for somebody to say how to go on"
     return "the run does not rest"

@@ -1,4 +1,4 @@
-"""Doing a step: with the devices, the disk or the mathematics. Each gives the events it caused."""
+"""Executes steps: with the devices, the disk or by computation. Each step gives the event it caused."""
 
 from __future__ import annotations
 
@@ -8,32 +8,26 @@ from functools import cached_property
 import numpy as np
 
 from drivers.gauges.errors import GaugeAtEnd
-from hexacell.acceptance.gates import gates
-from hexacell.acceptance.validation import DeviationStatistics, Verdict, validate
 from hexacell.cell.loader import Cell
 from hexacell.clock import CellClock
-from hexacell.controller_config.change import ConfigChange, propose
 from hexacell.controller_config.interface import ControllerGeometry
-from hexacell.controller_config.write_back import Receipt, commit, rollback
-from hexacell.errors import HexacellError, LimitError, WriteBackUndone, consists_only_of
+from hexacell.errors import HexacellError, consists_only_of
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.rotations import Array
-from hexacell.measurements.csv_file import write_measurements
-from hexacell.reporting.assessment import assess
-from hexacell.reporting.documents import assessment_document, identification_document, outcome_line
 from hexacell.robot_model import config_format
 from hexacell.runs.run_folder import RunFolder
-from procedures.calibration.provisional_geometry import ProvisionalGeometry
-from procedures.calibration.workflow import Calibration, Mode
+from procedures.calibration.workflow import Calibration
 from procedures.devices.device_set import Devices, gather_errors
 from procedures.devices.reference_check import check_reference, in_words
 from procedures.devices.settling import Settled, settle
 from procedures.devices.temperatures import Thermometers
+from procedures.engine.computations import Computations
+from procedures.engine.config_transactions import ConfigTransactions
 from procedures.engine.operator import Operator
 from procedures.guards.guards import Guards
 from procedures.run import events
 from procedures.run.cancellation import in_thread
-from procedures.run.questions import ask_approval, ask_placement
+from procedures.run.questions import ask_placement
 from procedures.run.state import RunState
 from procedures.run.steps import CloseSet, Compute, Locate, Move, Phase, Place, Revisit, Sample, Step
 from procedures.run.trips import GuardTripped
@@ -41,7 +35,7 @@ from procedures.run.trips import GuardTripped
 
 @dataclass(frozen=True, eq=False)
 class StepExecutor:
-    """Everything a step may need."""
+    """Executes the steps of one run with its devices, its operator and its folder."""
 
     cell: Cell
     calibration: Calibration
@@ -53,13 +47,20 @@ class StepExecutor:
 
     @cached_property
     def guards(self) -> Guards:
-        """What stops the robot when something is wrong; what they latch lasts as long as this."""
+        """What stops the robot; a guard that tripped stays latched as long as this exists."""
         return Guards(self.cell.settings, self.devices, self.clock, self.folder.path)
 
     @cached_property
-    def lending(self) -> ProvisionalGeometry:
-        """Lends the controller a geometry, and takes it back."""
-        return ProvisionalGeometry(self.cell, self.calibration, self.guards, self.folder)
+    def config(self) -> ConfigTransactions:
+        """What changes the controller's config."""
+        return ConfigTransactions(
+            self.cell, self.calibration, self.guards, self.devices, self.folder, self.operator
+        )
+
+    @cached_property
+    def computations(self) -> Computations:
+        """What is computed."""
+        return Computations(self.cell, self.calibration, self.config, self.folder)
 
     async def prepare(self) -> None:
         """Make the controller ready to move; raises ``HexacellError``."""
@@ -174,124 +175,13 @@ class StepExecutor:
     async def _compute(self, step: Compute, state: RunState) -> events.Event:
         match step.kind:
             case "identify":
-                return await in_thread(self._identify, state)
+                return await in_thread(self.computations.identify, state)
             case "propose":
-                return await in_thread(self._propose, state)
+                return await in_thread(self.computations.propose, state)
             case "judge":
-                return await in_thread(self._judge, state)
+                return await in_thread(self.computations.judge, state)
             case _:
-                return await self._rewritten(step, state)
-
-    async def _rewritten(self, step: Compute, state: RunState) -> events.Event:
-        """The controller's config changed, and the controller has read it."""
-        match step.kind:
-            case "lend":
-                return await self.lending.lend(state)
-            case "take back":
-                return await self.lending.take_back(state)
-            case "commit":
-                return await self._commit(state)
-            case _:
-                return await self._roll_back()
-
-    def _identify(self, state: RunState) -> events.Event:
-        write_measurements(self.folder.measurements, state.measurements())
-        identified = self.calibration.identification(state)
-        robot = self.calibration.robot_of(state)
-        assessed = assess(self.cell.settings, robot, state.measurements(), identified)
-        document = identification_document(identified)
-        self.folder.write_result(document | assessment_document(identified, assessed))
-        return events.Identified(result=document, held_out=self.calibration.held_out_poses(identified))
-
-    def _propose(self, state: RunState) -> events.Event:
-        identified = self.calibration.identification(state)
-        robot, settings = self.calibration.robot, self.cell.settings
-        commanding, _ = robot.mechanism.normalize_frames(robot.controller)
-        conditions = gates(
-            identified,
-            robot.drawing,
-            robot.tolerances,
-            largest_change_mm=settings.acceptance.largest_change_mm,
-            before=commanding,
-        )
-        proposal = propose(
-            self.cell.config_path,
-            config_format(settings),
-            settings.controller.config_format,
-            robot.for_controller(identified.geometry),
-            fingerprint_at_start=state.started.config_sha256 if state.started else "",
-        )
-        proposal.save(self.folder.proposal)
-        return events.Proposed(
-            gates=tuple(
-                events.GateOutcome(
-                    name=g.name, passed=g.passed, sentence=g.sentence, needs_person=g.needs_person
-                )
-                for g in conditions
-            )
-        )
-
-    async def _commit(self, state: RunState) -> events.Event:
-        conditions = state.proposed.gates if state.proposed else ()
-        refused = [gate.sentence for gate in conditions if not gate.passed and not gate.needs_person]
-        if refused:
-            raise LimitError("the new geometry is refused: " + " ".join(refused))
-        proposal = ConfigChange.load(self.folder.proposal)
-        approved_by = await self._approval(conditions, proposal)
-        receipt = await in_thread(commit, proposal, self.folder.path)
-        try:
-            await self.guards.reload()
-        except HexacellError as error:
-            await in_thread(rollback, receipt)
-            raise await self._undone(receipt, error) from error
-        return events.Committed(approved_by=approved_by)
-
-    async def _undone(self, receipt: Receipt, error: HexacellError) -> WriteBackUndone:
-        """What to raise after a reload that failed, with the old config already back."""
-        action = None
-        try:
-            await self.devices.controller.reload()
-        except HexacellError:
-            action = "Start the controller anew before it moves: nobody knows which geometry it has"
-        return WriteBackUndone(
-            f"the controller did not take the new geometry ({error}); its config is as it was",
-            subject=receipt.path,
-            action=action,
-        )
-
-    async def _approval(self, conditions: tuple[events.GateOutcome, ...], proposal: ConfigChange) -> str:
-        automatic = self.cell.settings.acceptance.approval == "automatic"
-        if automatic and all(gate.passed for gate in conditions):
-            return "the cell file: within its limits"
-        name = await self.operator.ask(ask_approval(conditions, proposal.diff))
-        if name is None:
-            raise LimitError("the new geometry was declined; nothing was applied")
-        return name
-
-    def _judge(self, state: RunState) -> events.Event:
-        acceptance = self.cell.settings.acceptance
-        before = DeviationStatistics.of(state.held_out(Phase.BEFORE))
-        if self.calibration.mode is Mode.CHECK:
-            verdict = validate(
-                before, before, mean_mm=acceptance.mean_deviation_mm, largest_mm=acceptance.max_deviation_mm
-            )
-            return events.ResultValidated(
-                verdict=verdict, line=_check_line(before, acceptance.mean_deviation_mm, verdict)
-            )
-        after = DeviationStatistics.of(state.held_out(Phase.AFTER))
-        verdict = validate(
-            before, after, mean_mm=acceptance.mean_deviation_mm, largest_mm=acceptance.max_deviation_mm
-        )
-        if state.refusals(Phase.AFTER):
-            verdict = Verdict.WORSE
-        identified = self.calibration.identification(state)
-        line = outcome_line(identified, before, after, acceptance.mean_deviation_mm, verdict)
-        return events.ResultValidated(verdict=verdict, line=line)
-
-    async def _roll_back(self) -> events.Event:
-        await in_thread(rollback, Receipt.of(self.folder.path))
-        await self.guards.reload()
-        return events.RolledBack()
+                return await self.config.perform(step, state)
 
 
 def _reading(
@@ -310,15 +200,6 @@ def _reading(
         answers=tuple(tuple(reading.raw for reading in glance.gauges) for glance in settled.window),
         counts=tuple(glance.encoders.counts for glance in settled.window),
         temperatures=temperatures,
-    )
-
-
-def _check_line(found: DeviationStatistics | None, limit_mm: float, verdict: Verdict) -> str:
-    if found is None:
-        return f"held-out points: {verdict}"
-    return (
-        f"{found.poses} poses at held-out points; mean deviation {found.mean_mm:.3f} mm "
-        f"(limit {limit_mm:g}): {verdict}"
     )
 
 

@@ -17,7 +17,7 @@ import pytest
 
 from hexacell.controller_config.receipt import AFTER
 from hexacell.runs.run_folder import RunFolder
-from procedures.calibration.provisional_geometry import FOLDER
+from procedures.engine.config_transactions import PROVISIONAL_FOLDER
 from procedures.journal.journal import read_journal
 from procedures.run import events
 from tests.faults.cell import NEVER_GOOD_ENOUGH, PROVISIONAL, Site, make_site
@@ -137,7 +137,7 @@ class Whole:
     @property
     def config_lent(self) -> bytes | None:
         """The config that was lent meanwhile, if one was."""
-        kept = self.folder.path / FOLDER / AFTER
+        kept = self.folder.path / PROVISIONAL_FOLDER / AFTER
         return kept.read_bytes() if kept.exists() else None
 
     @property

@@ -73,12 +73,12 @@ class Rig:
     async def run(self, *listeners: Listener, policy: RecoveryPolicy = GIVE_UP) -> events.Ended:
         """Begin, or go on where the folder's journal ends; ``engine`` is the one that does."""
         self.folder.path.mkdir(exist_ok=True)
-        desk = QuestionBroker(self.performer.operator)
-        performer = replace(self.performer, operator=desk)
+        broker = QuestionBroker(self.performer.operator)
+        performer = replace(self.performer, operator=broker)
         with Journal(self.folder.journal) as journal:
-            engine = self.engine = Engine(performer, journal, listeners, desk=desk, policy=policy)
+            engine = self.engine = Engine(performer, journal, listeners, broker=broker, policy=policy)
             if engine.state.started is None:
-                engine.tell(self.started())
+                engine.record(self.started())
             engine.reopen_sets()
             return await engine.run()
 

@@ -279,7 +279,7 @@ JUDGED = {
 async def test_how_it_ends(bench, journal, happened: Any, code: int, line: str) -> None:
     engine = Engine(Script(bench.devices, []), journal)  # type: ignore[arg-type]
     for event in happened:
-        engine.tell(event)
+        engine.record(event)
     ended = await engine.run()
     assert ended == events.Ended(exit_code=code, line=line)
     assert journal.events[-1] == ended

@@ -13,7 +13,7 @@ from hexacell.controller_config.change import ConfigChange
 from hexacell.controller_config.write_back import commit
 from hexacell.errors import ExitCode
 from hexacell.kinematics.pose import Pose
-from procedures.engine import step_executor
+from procedures.engine import config_transactions
 from procedures.journal.journal import read_journal
 from procedures.run import events
 from procedures.run.state import RunState, fold
@@ -146,7 +146,7 @@ async def test_cancelled_while_writing_it_ends_what_it_writes(recording, replaye
         time.sleep(0.1)
         return commit(*order)
 
-    monkeypatch.setattr(step_executor, "commit", slow_commit)
+    monkeypatch.setattr(config_transactions, "commit", slow_commit)
     with pytest.raises(asyncio.CancelledError):
         await running
     assert rig.config == recording.config_after

@@ -1,0 +1,217 @@
+"""Changes of the controller's config during a run, each a transaction.
+
+A run makes two changes: a provisional geometry while the points are measured, and the result. One step
+applies a change, another reverts it::
+
+    change        applied by    reverted by    backup and receipt
+    provisional   lend          take back      <run>/lent
+    result        commit        roll back      <run>
+
+A transaction is begun in the journal by its step, written with a receipt that can undo it, read by the
+controller, and confirmed in the journal by its event. If the controller does not read a new geometry,
+the file is restored before the error goes on. A crash or a cancellation in between leaves a whole file,
+old or new, and the receipt; applying and reverting may both be repeated from there.
+
+Two cases need a revert that no decision of the procedure asks for. :func:`revert_unrecorded` is for a
+change whose event could not be journalled, :func:`revert_at_end` for a run that ends early. The engine
+carries out both.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from hexacell.cell.fields import GeometryValues
+from hexacell.cell.loader import Cell
+from hexacell.controller_config.change import ConfigChange, fingerprint, propose
+from hexacell.controller_config.receipt import RECEIPT, Receipt
+from hexacell.controller_config.write_back import commit, rollback
+from hexacell.errors import HexacellError, Interruption, LimitError, WriteBackUndone
+from hexacell.kinematics.geometry import Geometry
+from hexacell.robot_model import config_format
+from hexacell.runs.run_folder import RunFolder
+from procedures.calibration.workflow import Calibration, geometry_of
+from procedures.devices.device_set import Devices
+from procedures.engine.operator import Operator
+from procedures.guards.guards import Guards
+from procedures.run import events
+from procedures.run.cancellation import in_thread
+from procedures.run.questions import ask_approval
+from procedures.run.state import RunState
+from procedures.run.steps import Compute
+
+PROVISIONAL_FOLDER = "lent"
+TAKE_BACK = Compute(kind="take back")
+ROLL_BACK = Compute(kind="roll back")
+
+
+@dataclass(frozen=True, eq=False)
+class ConfigTransactions:
+    """Applies and reverts the changes of one run."""
+
+    cell: Cell
+    calibration: Calibration
+    guards: Guards
+    devices: Devices
+    folder: RunFolder
+    operator: Operator
+
+    async def perform(self, step: Compute, state: RunState) -> events.Event:
+        """Do one of the four steps; gives the event that confirms it.
+
+        Raises:
+            WriteBackUndone: the controller did not read the new geometry; its config is as before.
+            HexacellError: there is no geometry, or the config cannot be written or read.
+        """
+        match step.kind:
+            case "lend":
+                return await self._apply_provisional(state)
+            case "take back":
+                return await self._revert_provisional(state)
+            case "commit":
+                return await self._apply_result(state)
+            case _:
+                return await self._revert_result()
+
+    def change_to(self, geometry: Geometry, state: RunState) -> ConfigChange:
+        """The change of the config to a geometry in the frame convention; nothing is written.
+
+        Raises:
+            FileError: the config is not the one that the run began with.
+        """
+        settings = self.cell.settings
+        return propose(
+            self.cell.config_path,
+            config_format(settings),
+            settings.controller.config_format,
+            self.calibration.robot.for_controller(geometry),
+            fingerprint_at_start=state.started.config_sha256 if state.started else "",
+        )
+
+    async def _apply_provisional(self, state: RunState) -> events.Event:
+        geometry = await in_thread(self.calibration.to_lend, state)
+        await self._apply(
+            await in_thread(self.change_to, geometry, state),
+            self._provisional_backup,
+            "the provisional geometry",
+            action="Correct that, or run without `provisional`",
+        )
+        values = GeometryValues.model_validate(
+            {"S": geometry.S.tolist(), "B": geometry.B.tolist(), "l": geometry.l.tolist()}
+        )
+        return events.ProvisionalApplied(geometry=values, folder=PROVISIONAL_FOLDER)
+
+    async def _apply_result(self, state: RunState) -> events.Event:
+        conditions = state.proposed.gates if state.proposed else ()
+        refused = [gate.sentence for gate in conditions if not gate.passed and not gate.needs_person]
+        if refused:
+            raise LimitError("the new geometry is refused: " + " ".join(refused))
+        change = ConfigChange.load(self.folder.proposal)
+        approved_by = await self._approval(conditions, change)
+        await self._apply(change, self.folder.path, "the new geometry")
+        return events.Committed(approved_by=approved_by)
+
+    async def _approval(self, conditions: tuple[events.GateOutcome, ...], change: ConfigChange) -> str:
+        automatic = self.cell.settings.acceptance.approval == "automatic"
+        if automatic and all(gate.passed for gate in conditions):
+            return "the cell file: within its limits"
+        name = await self.operator.ask(ask_approval(conditions, change.diff))
+        if name is None:
+            raise LimitError("the new geometry was declined; nothing was applied")
+        return name
+
+    async def _apply(
+        self, change: ConfigChange, backup: Path, name: str, action: str | None = None
+    ) -> None:
+        receipt = await in_thread(commit, change, backup)
+        try:
+            await self.guards.reload()
+        except HexacellError as error:
+            await in_thread(rollback, receipt)
+            raise WriteBackUndone(
+                f"the controller did not take {name} ({error}); its config is as it was",
+                subject=receipt.path,
+                action=action if await self._reads_again() else "Start the controller anew before it moves",
+            ) from error
+
+    async def _reads_again(self) -> bool:
+        """Reload the restored config; whether the controller is known to have its old geometry."""
+        try:
+            await self.devices.controller.reload()
+        except HexacellError:
+            return False
+        return True
+
+    async def _revert_provisional(self, state: RunState) -> events.Event:
+        written = holds_provisional(self.folder, self.cell.config_path)
+        if written:
+            await in_thread(rollback, Receipt.of(self._provisional_backup))
+        try:
+            await self.guards.reload()
+        except HexacellError:
+            # Far from level, the slider positions may belong to no pose of the old geometry. The file
+            # must not differ from what the controller has until it can be reloaded.
+            if written and state.lent is not None:
+                change = await in_thread(self.change_to, geometry_of(state.lent), state)
+                await in_thread(commit, change, self._provisional_backup)
+            raise
+        return events.ProvisionalReverted()
+
+    async def _revert_result(self) -> events.Event:
+        await in_thread(rollback, Receipt.of(self.folder.path))
+        await self.guards.reload()
+        return events.RolledBack()
+
+    @property
+    def _provisional_backup(self) -> Path:
+        return self.folder.path / PROVISIONAL_FOLDER
+
+
+def holds_provisional(folder: RunFolder, config: Path) -> bool:
+    """Whether a config holds the provisional geometry that a run wrote; raises ``FileError``."""
+    backup = folder.path / PROVISIONAL_FOLDER
+    return (backup / RECEIPT).is_file() and Receipt.of(backup).sha256_after == fingerprint(config)
+
+
+@dataclass(frozen=True, slots=True)
+class Reversal:
+    """A transaction to revert.
+
+    Attributes:
+        step: the step that reverts it.
+        failure: what to report if that fails; empty if the next resumption tries again.
+        is_recorded: whether the step is journalled, as any other is.
+    """
+
+    step: Compute
+    failure: str
+    is_recorded: bool = True
+
+
+def revert_unrecorded(event: events.Event, state: RunState) -> Reversal | None:
+    """What to revert if an event could not be journalled; ``state`` is the one without it."""
+    if isinstance(event, events.Committed) and state.committed is None:
+        step, name = ROLL_BACK, "the new geometry"
+    elif isinstance(event, events.ProvisionalApplied) and not state.lending:
+        step, name = TAKE_BACK, "a provisional geometry"
+    else:
+        return None
+    failure = f"the controller has {name}, which could be neither noted nor taken back"
+    return Reversal(step, failure, is_recorded=False)
+
+
+def revert_at_end(state: RunState, error: BaseException) -> Reversal | None:
+    """What to revert if an error ends the run.
+
+    A result that was not verified is reverted after a failure; a person who interrupts may resume and
+    verify it. A provisional geometry is reverted where the robot is at a reference. Elsewhere the slider
+    positions may belong to no pose of the old geometry, and the resumed run reverts it.
+    """
+    is_failure = isinstance(error, HexacellError) and not isinstance(error, Interruption)
+    if is_failure and state.is_unverified:
+        return Reversal(ROLL_BACK, "the new geometry was not verified, and could not be taken back")
+    is_at_reference = state.standing is not None and state.standing[1] == 1
+    if state.config_write_pending or (state.lending and is_at_reference):
+        return Reversal(TAKE_BACK, "")
+    return None

@@ -1,8 +1,8 @@
-"""What must hold before a new geometry may enter a controller."""
+"""The conditions that an identification must meet before its geometry is written to a controller."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from pydantic import BaseModel, ConfigDict
 
 from hexacell.identification.diagnostics.tolerance_check import tolerance_violations
 from hexacell.identification.problem.problem import Tolerances
@@ -10,12 +10,13 @@ from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.geometry import Geometry
 
 
-@dataclass(frozen=True, slots=True)
-class AcceptanceGate:
-    """One condition, and the sentence that says how it stands.
+class AcceptanceGate(BaseModel):
+    """One condition for writing back, whether it is met, and that as a sentence for people.
 
-    ``needs_person``: where it is not met, a person may still decide to go on.
+    ``needs_person``: where it is not met, a person may accept the geometry nevertheless.
     """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
 
     name: str
     passed: bool
@@ -36,13 +37,15 @@ def gates(
         _converged(identified),
         _determined(identified),
         _within_tolerance(identified, drawing, tolerances),
-        _small_enough(identified.geometry, before, largest_change_mm),
+        _small_change(identified.geometry, before, largest_change_mm),
     )
 
 
 def _converged(identified: Identification) -> AcceptanceGate:
     return AcceptanceGate(
-        "converged", identified.converged, f"The solver ended because {identified.termination.value}."
+        name="converged",
+        passed=identified.converged,
+        sentence=f"The solver ended because {identified.termination.value}.",
     )
 
 
@@ -53,27 +56,29 @@ def _determined(identified: Identification) -> AcceptanceGate:
         if names
         else "The data determine every parameter."
     )
-    return AcceptanceGate("determined", not names, sentence, needs_person=True)
+    return AcceptanceGate(name="determined", passed=not names, sentence=sentence, needs_person=True)
 
 
 def _within_tolerance(
     identified: Identification, drawing: Geometry, tolerances: Tolerances
 ) -> AcceptanceGate:
-    beyond = tolerance_violations(identified, drawing, tolerances)
-    names = ", ".join(f"{excess.name} ({excess.change_mm:+.2f} mm)" for excess in beyond)
+    violations = tolerance_violations(identified, drawing, tolerances)
+    names = ", ".join(f"{violation.name} ({violation.change_mm:+.2f} mm)" for violation in violations)
     sentence = (
         f"Beyond the drawing's tolerance: {names}."
-        if beyond
+        if violations
         else "Every parameter is within the drawing's tolerance."
     )
-    return AcceptanceGate("within tolerance", not beyond, sentence)
+    return AcceptanceGate(name="within tolerance", passed=not violations, sentence=sentence)
 
 
-def _small_enough(after: Geometry, before: Geometry, largest_change_mm: float) -> AcceptanceGate:
-    change = after.largest_difference(before)
+def _small_change(after: Geometry, before: Geometry, largest_change_mm: float) -> AcceptanceGate:
+    change_mm = after.largest_difference(before)
     return AcceptanceGate(
-        "small change",
-        change <= largest_change_mm,
-        f"The largest change is {change:.2f} mm (limit without a person {largest_change_mm:g} mm).",
+        name="small change",
+        passed=change_mm <= largest_change_mm,
+        sentence=(
+            f"The largest change is {change_mm:.2f} mm (limit without a person {largest_change_mm:g} mm)."
+        ),
         needs_person=True,
     )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 
 from hexacell.acceptance.gates import gates
 from hexacell.acceptance.validation import DeviationStatistics, Verdict, validate
@@ -54,7 +54,7 @@ class Computations:
             before=commanding,
         )
         self.config.change_to(identified.geometry, state).save(self.folder.proposal)
-        return events.Proposed(gates=tuple(events.GateOutcome(**asdict(gate)) for gate in conditions))
+        return events.Proposed(gates=conditions)
 
     def judge(self, state: RunState) -> events.ResultValidated:
         """Compare the deviations at the held-out points with the limits."""

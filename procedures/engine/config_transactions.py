@@ -22,6 +22,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
+from hexacell.acceptance.gates import AcceptanceGate
 from hexacell.cell.fields import GeometryValues
 from hexacell.cell.loader import Cell
 from hexacell.controller_config.change import ConfigChange, fingerprint, propose
@@ -112,7 +113,7 @@ class ConfigTransactions:
         await self._apply(change, self.folder.path, "the new geometry")
         return events.Committed(approved_by=approved_by)
 
-    async def _approval(self, conditions: tuple[events.GateOutcome, ...], change: ConfigChange) -> str:
+    async def _approval(self, conditions: tuple[AcceptanceGate, ...], change: ConfigChange) -> str:
         automatic = self.cell.settings.acceptance.approval == "automatic"
         if automatic and all(gate.passed for gate in conditions):
             return "the cell file: within its limits"

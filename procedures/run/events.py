@@ -10,6 +10,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field
 
+from hexacell.acceptance.gates import AcceptanceGate
 from hexacell.acceptance.validation import Verdict
 from hexacell.cell.fields import GeometryValues
 from hexacell.cell.recovery import Action, FailureKind
@@ -194,20 +195,11 @@ class Identified(Frozen):
     held_out: tuple[tuple[SixNumbers, ...], ...]
 
 
-class GateOutcome(Frozen):
-    """One condition for writing back, and the sentence that says how it stands."""
-
-    name: str
-    passed: bool
-    sentence: str
-    needs_person: bool = False
-
-
 class Proposed(Frozen):
     """The new geometry stands in the run folder, beside the conditions for writing it."""
 
     kind: Literal["proposed"] = "proposed"
-    gates: tuple[GateOutcome, ...]
+    gates: tuple[AcceptanceGate, ...]
 
 
 class Committed(Frozen):

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
+from hexacell.acceptance.gates import AcceptanceGate
 from hexacell.cell.recovery import Action
 from hexacell.kinematics.pose import Pose
-from procedures.run.events import GateOutcome
 
 PLACED = "placed"
 """The one answer to a request to place the gauges."""
@@ -34,7 +34,7 @@ class GaugePlacement:
 class PendingChange:
     """A change of the controller's config: its acceptance gates, and the text change as a diff."""
 
-    gates: tuple[GateOutcome, ...]
+    gates: tuple[AcceptanceGate, ...]
     diff: str
 
 
@@ -84,7 +84,7 @@ def ask_placement(point: int, pose: Pose) -> Question:
     )
 
 
-def ask_approval(gates: Sequence[GateOutcome], diff: str) -> Question:
+def ask_approval(gates: Sequence[AcceptanceGate], diff: str) -> Question:
     """Ask whether the config may be written; answered by the name of who approves."""
     return Question(
         QuestionKind.APPROVE_CHANGE,

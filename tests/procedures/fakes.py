@@ -10,12 +10,12 @@ from dataclasses import dataclass, field
 from drivers.gauges.errors import GaugeAtEnd
 from drivers.interfaces import ControllerStatus, DeviceIdentity, EncoderSample, GaugeReading
 from drivers.simulated.robot import SimulatedMachine
+from hexacell.acceptance.gates import AcceptanceGate
 from hexacell.cell.recovery import Action
 from hexacell.clock import CellClock
 from hexacell.errors import HexacellError
 from hexacell.kinematics.pose import Pose
 from procedures.devices.device_set import Devices, MountedGauge
-from procedures.run import events
 from procedures.run.questions import GaugePlacement, PendingChange, Question, StepFailure
 
 HALF_TRAVEL_MM = 6.25
@@ -154,7 +154,7 @@ class Approver:
     def __init__(self, name: str | None = "a tester") -> None:
         self.name = name
         self.placed: list[int] = []
-        self.asked: list[tuple[Sequence[events.GateOutcome], str]] = []
+        self.asked: list[tuple[Sequence[AcceptanceGate], str]] = []
         self.problems: list[str] = []
         self.decisions: list[Action] = []
 

@@ -10,6 +10,7 @@ import pytest
 
 from drivers.simulated.gauges.faults import InjectedGaugeFault
 from drivers.simulated.linuxcnc.faults import Fault
+from hexacell.acceptance.gates import AcceptanceGate
 from hexacell.acceptance.validation import Verdict
 from hexacell.controller_config.change import ConfigChange
 from hexacell.errors import AnswerNeeded, DeviceError, ExitCode, FileError, LimitError, WriteBackUndone
@@ -17,8 +18,8 @@ from hexacell.kinematics.geometry import Geometry
 from procedures.run import events
 from procedures.run.steps import Phase
 
-DOUBTFUL = events.GateOutcome(name="small", passed=False, sentence="It is 20 mm.", needs_person=True)
-FORBIDDEN = events.GateOutcome(name="within tolerance", passed=False, sentence="Beyond: l3 (-13.00 mm).")
+DOUBTFUL = AcceptanceGate(name="small", passed=False, sentence="It is 20 mm.", needs_person=True)
+FORBIDDEN = AcceptanceGate(name="within tolerance", passed=False, sentence="Beyond: l3 (-13.00 mm).")
 
 
 def at(kind: type[Any], action: Callable[[], Any]) -> Any:
@@ -37,7 +38,7 @@ def at(kind: type[Any], action: Callable[[], Any]) -> Any:
 def proposed(finished, make_site) -> Callable[..., Any]:
     """A site whose run has come to its proposal, with these gates or those that it had."""
 
-    def make(gates: Sequence[events.GateOutcome] | None = None, **changes: Any) -> Any:
+    def make(gates: Sequence[AcceptanceGate] | None = None, **changes: Any) -> Any:
         site = make_site(**changes)
         history = list(finished.until(events.Proposed))
         if gates is not None:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import pytest
 
+from hexacell.acceptance.gates import AcceptanceGate
 from hexacell.cell.recovery import Action
 from hexacell.kinematics.pose import Pose
 from hexacell.presentation.questions import matching_choice, question_text, repeated_text
-from procedures.run.events import GateOutcome
 from procedures.run.questions import ask_approval, ask_placement, ask_recovery
 
 CHOICES = (Action.RETRY, Action.MEASURE_AGAIN, Action.REDO_SET, Action.ABORT)
@@ -22,8 +22,8 @@ def test_placing_gauges_names_the_point_and_the_pose() -> None:
 
 def test_an_approval_shows_the_change_then_every_gate() -> None:
     gates = [
-        GateOutcome(name="converged", passed=True, sentence="The solver ended."),
-        GateOutcome(name="small change", passed=False, sentence="It is 9 mm.", needs_person=True),
+        AcceptanceGate(name="converged", passed=True, sentence="The solver ended."),
+        AcceptanceGate(name="small change", passed=False, sentence="It is 9 mm.", needs_person=True),
     ]
     assert question_text(ask_approval(gates, "-1\n+2")) == (
         "\n-1\n+2\nok  The solver ended.\nNO  It is 9 mm.\n"

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import pytest
 
+from hexacell.acceptance.gates import AcceptanceGate
 from hexacell.cell.recovery import Action
 from hexacell.errors import AnswerNeeded, ExitCode
 from hexacell.kinematics.pose import Pose
 from procedures.engine.operator import UnattendedOperator
-from procedures.run.events import GateOutcome
 from procedures.run.questions import ask_approval, ask_placement, ask_recovery
 
 
@@ -20,10 +20,10 @@ async def test_nobody_carries_gauges() -> None:
 
 async def test_nobody_approves_and_the_reasons_are_said() -> None:
     gates = [
-        GateOutcome(
+        AcceptanceGate(
             name="small change", passed=False, sentence="The largest change is 9 mm.", needs_person=True
         ),
-        GateOutcome(name="converged", passed=True, sentence="The solver ended."),
+        AcceptanceGate(name="converged", passed=True, sentence="The solver ended."),
     ]
     with pytest.raises(AnswerNeeded, match=r"approval: The largest change is 9 mm\.$"):
         await UnattendedOperator().ask(ask_approval(gates, "diff"))

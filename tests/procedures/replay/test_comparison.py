@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 
+from hexacell.acceptance.gates import AcceptanceGate
 from procedures.journal.line_format import decode
 from procedures.replay.comparison import Aspect, Change, Difference, changes, is_prose
 from procedures.run import events
@@ -80,7 +81,7 @@ def checked(body: bytes) -> bytes:
 
 
 def test_prose_is_told_from_the_rest() -> None:
-    gates = [events.GateOutcome(name="n", passed=True, sentence=words) for words in ("One.", "Two.")]
+    gates = [AcceptanceGate(name="n", passed=True, sentence=words) for words in ("One.", "Two.")]
     first, second = (events.Proposed(gates=(gate,)) for gate in gates)
     [change] = changes(first, second, 1e-9)
     assert change == Change("gates[0].sentence", "One.", "Two.")

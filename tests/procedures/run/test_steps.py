@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydantic import TypeAdapter, ValidationError
 
+from hexacell.acceptance.gates import AcceptanceGate
 from hexacell.acceptance.validation import Verdict
 from hexacell.cell.fields import GeometryValues
 from hexacell.cell.recovery import Action, FailureKind
@@ -96,9 +97,7 @@ geometry = st.builds(
     B=st.tuples(*[three] * 6),
     l=st.tuples(*[st.floats(1, 1e4)] * 6),
 )
-gate = st.builds(
-    events.GateOutcome, name=text, passed=st.booleans(), sentence=text, needs_person=st.booleans()
-)
+gate = st.builds(AcceptanceGate, name=text, passed=st.booleans(), sentence=text, needs_person=st.booleans())
 some_event: st.SearchStrategy[Any] = st.one_of(
     st.builds(
         events.RunStarted,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from hexacell.acceptance.gates import AcceptanceGate
 from procedures.journal.journal import read_journal
 from procedures.run import events
 from procedures.run.state import RunState
@@ -35,12 +36,12 @@ def happened(rig: Any, kind: type[Any]) -> list[Any]:
     return [event for event in read_journal(rig.folder.journal) if isinstance(event, kind)]
 
 
-GOOD = events.GateOutcome(name="converged", passed=True, sentence="The solver ended well.")
-FORBIDDEN = events.GateOutcome(name="within tolerance", passed=False, sentence="Beyond: l3 (-13.00 mm).")
-DOUBTFUL = events.GateOutcome(name="small", passed=False, sentence="It is 20 mm.", needs_person=True)
+GOOD = AcceptanceGate(name="converged", passed=True, sentence="The solver ended well.")
+FORBIDDEN = AcceptanceGate(name="within tolerance", passed=False, sentence="Beyond: l3 (-13.00 mm).")
+DOUBTFUL = AcceptanceGate(name="small", passed=False, sentence="It is 20 mm.", needs_person=True)
 
 
-def proposed(recording, *gates: events.GateOutcome) -> list[events.Event]:
+def proposed(recording, *gates: AcceptanceGate) -> list[events.Event]:
     return [*recording.until(events.Proposed)[:-1], events.Proposed(gates=gates)]
 
 

@@ -1,1 +1,1 @@
-"""How to talk to gauges, encoders and controllers, real or simulated."""
+"""Device drivers: gauges, encoders, controllers, thermometers, stop input; real and simulated."""

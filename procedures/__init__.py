@@ -1,1 +1,1 @@
-"""What is done to the robot, in what order, and what is kept of it."""
+"""What is done to the robot: runs, the engine that drives them, guards, journal, replay."""

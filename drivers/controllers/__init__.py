@@ -1,1 +1,1 @@
-"""Robot controllers, one protocol a family of files."""
+"""Drivers of robot controllers, one package a protocol."""

@@ -1,1 +1,1 @@
-"""Slider encoders: six CANopen nodes after CiA 406 behind any CAN interface."""
+"""Driver of the slider encoders: six CANopen nodes (CiA 406) on any CAN interface."""

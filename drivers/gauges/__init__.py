@@ -1,1 +1,1 @@
-"""Dial indicators on serial lines, one protocol a file."""
+"""Drivers of dial indicators on serial lines, one protocol a file."""

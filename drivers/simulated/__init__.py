@@ -1,1 +1,1 @@
-"""A cell that answers on the wire, byte for byte, with nothing attached."""
+"""A simulated cell that answers on the wire as real devices do, byte for byte."""

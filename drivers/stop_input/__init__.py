@@ -1,1 +1,1 @@
-"""A stop line that is watched while the robot moves."""
+"""The stop input: a contact or a file that forbids motion."""

@@ -1,1 +1,1 @@
-"""Thermometers, one protocol a file."""
+"""Drivers of thermometers, one protocol a file."""

@@ -1,1 +1,1 @@
-"""Whether a result may be accepted: gates before, validation after it is written."""
+"""Acceptance of a result: gates before it is written, validation afterwards."""

@@ -1,1 +1,1 @@
-"""Runs put together: cell, devices, procedure, identification, write-back."""
+"""The application layer: runs, replays, the demo and the devices of a cell, put together."""

@@ -1,1 +1,1 @@
-"""What a campaign does next and what it will give: points, budget, forecasts, decisions."""
+"""The measuring campaign: which point and pose next, when to stop, what accuracy to expect."""

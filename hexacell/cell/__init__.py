@@ -1,1 +1,1 @@
-"""The cell file: one robot, its devices, its limits, and what is asked of it."""
+"""The cell file: one robot, its devices, its limits, and the plan."""

@@ -1,1 +1,1 @@
-"""The command line: parses arguments, prints, reads keys; decides and words nothing itself."""
+"""The command line: parses arguments, prints and reads keys."""

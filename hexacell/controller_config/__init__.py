@@ -1,1 +1,1 @@
-"""The controller's own config: formats, a proposed change, the change made, and the way back."""
+"""The controller's config: its formats, a proposed change, the write-back and its rollback."""

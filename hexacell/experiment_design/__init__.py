@@ -1,1 +1,1 @@
-"""Which pose to measure next: candidates, predicted records, criteria, selection."""
+"""Experiment design: candidate poses, predicted records, criteria, selection."""

@@ -1,1 +1,1 @@
-"""From records to a geometry: the problem, the solver, what it found and how sure it is."""
+"""Identification: from records to a geometry with its covariance."""

@@ -1,1 +1,1 @@
-"""Kinematics of six-legged parallel mechanisms: poses, geometry, inverse, forward, sensitivity."""
+"""Kinematics of six-legged parallel mechanisms: inverse, forward, sensitivity."""

@@ -1,1 +1,1 @@
-"""What is found of a result, and the documents that say it to programs."""
+"""Reports of a result: its assessment, findings in sentences, JSON documents."""

@@ -1,1 +1,1 @@
-"""Files that survive a power cut, locks, and places in TOML text."""
+"""Atomic files, locks, and locations in TOML text."""

@@ -1,1 +1,1 @@
-"""Simulation studies: robots that are known exactly, and what a calibration makes of them."""
+"""Simulation studies: calibrations of robots whose geometry is known exactly."""

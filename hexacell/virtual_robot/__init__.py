@@ -1,1 +1,1 @@
-"""Robots drawn within their tolerances, and how they move when commanded."""
+"""Virtual robots: geometries drawn within the tolerances, and how they move when commanded."""

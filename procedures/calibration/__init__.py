@@ -1,1 +1,1 @@
-"""The calibration: every point zeroed, commanded and recorded, then identified and verified."""
+"""The calibration procedure: which step comes next, preflight, paths."""

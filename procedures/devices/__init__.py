@@ -1,1 +1,1 @@
-"""A cell's devices as one: opened again, settled, brought back to their reference."""
+"""The devices of a cell together: reading, settling, reconnecting."""

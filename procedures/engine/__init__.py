@@ -1,1 +1,1 @@
-"""What drives a run: takes commands, executes steps, appends events."""
+"""What drives a run: takes commands, executes steps, appends events, recovers from failures."""

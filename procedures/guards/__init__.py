@@ -1,1 +1,1 @@
-"""When to stop: what must hold at the start, before each move, and while the robot moves."""
+"""Guards: what must hold before and during motion, and stops the robot otherwise."""

@@ -1,1 +1,1 @@
-"""The journal: the only truth about a run on the disk."""
+"""The journal: all events of a run, on the disk."""

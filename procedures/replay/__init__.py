@@ -1,1 +1,1 @@
-"""A recorded run decided and computed again, and compared."""
+"""Replay: a recorded run decided and computed again, and compared."""

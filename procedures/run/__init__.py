@@ -1,1 +1,1 @@
-"""What a run is: commands, steps, events, and the state that is folded from them."""
+"""What a run is: steps, events, commands, questions, and the state folded from the events."""

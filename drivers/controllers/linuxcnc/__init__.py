@@ -1,1 +1,1 @@
-"""The linuxcncrsh protocol of LinuxCNC."""
+"""Driver of LinuxCNC over its remote shell, linuxcncrsh."""

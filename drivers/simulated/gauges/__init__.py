@@ -1,1 +1,1 @@
-"""Simulated dial indicators that answer byte for byte on a pseudo-terminal or a socket."""
+"""Simulated dial indicators on a pseudo-terminal or a socket."""

@@ -1,1 +1,1 @@
-"""A LinuxCNC that answers linuxcncrsh."""
+"""A simulated LinuxCNC that answers linuxcncrsh."""

@@ -1,1 +1,1 @@
-"""How simulated devices are reached: pseudo-terminals, TCP, CAN over a line."""
+"""Transports of simulated devices: pseudo-terminals, TCP, CAN over a serial line."""

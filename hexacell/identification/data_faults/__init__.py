@@ -1,1 +1,1 @@
-"""Gross errors, zero shifts and misread gauges: found, named, left out."""
+"""Faults in the data: outliers, zero shifts and misread gauges, found and named."""

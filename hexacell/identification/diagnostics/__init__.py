@@ -1,1 +1,1 @@
-"""How good a solution is: accuracy, correlation, tolerances, repeatability, variances."""
+"""Diagnostics of a solution: accuracy, correlations, tolerances, repeatability, noise levels."""

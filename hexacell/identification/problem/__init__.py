@@ -1,1 +1,1 @@
-"""What is to be identified from what: records, commanded poses, prior and noise, checked."""
+"""The identification problem: records, commanded poses, prior and noise, checked."""

@@ -1,1 +1,1 @@
-"""Regularized weighted least squares: from a problem to a geometry with its covariance."""
+"""The solver: regularized weighted least squares by Levenberg-Marquardt."""

@@ -1,1 +1,1 @@
-"""One mechanism a file: its constraints, their derivatives, its frame convention."""
+"""One mechanism a file: constraints, derivatives, frame convention."""

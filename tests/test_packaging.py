@@ -87,7 +87,7 @@ def test_the_wheel_announces_the_program_and_the_plugins(unpacked: Path) -> None
 
 
 def test_the_wheel_finds_its_configs(unpacked: Path, tmp_path: Path) -> None:
-    script = "from hexacell import bundled; print(bundled.bundled_config('simulated-hexaglide'))"
+    script = "from hexacell.cell import bundled; print(bundled.bundled_config('simulated-hexaglide'))"
     result = python("-c", script, folder=tmp_path, PYTHONPATH=str(unpacked))
     assert result.returncode == 0, result.stderr
     assert Path(result.stdout.strip()) == unpacked / "hexacell/_configs/simulated-hexaglide.toml"

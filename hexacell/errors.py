@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import difflib
+from collections.abc import Iterable
 from enum import IntEnum
 from pathlib import Path
 from typing import ClassVar
@@ -138,3 +140,10 @@ def consists_only_of(error: HexacellError, *kinds: type[HexacellError]) -> bool:
 def flatten_errors(error: HexacellError) -> list[HexacellError]:
     """The errors that one report is made of."""
     return error.errors if isinstance(error, SeveralErrors) else [error]
+
+
+def did_you_mean(name: str, known: Iterable[str]) -> str | None:
+    """The next action after an unknown name: the known name most like it; None if none is like it."""
+    by_lower_case = {candidate.lower(): candidate for candidate in known}
+    found = difflib.get_close_matches(name.lower(), by_lower_case, n=1)
+    return f"Did you mean '{by_lower_case[found[0]]}'?" if found else None

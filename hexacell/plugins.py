@@ -8,8 +8,7 @@ from enum import StrEnum
 from importlib.metadata import EntryPoint, entry_points
 from typing import Any
 
-from hexacell.cell.diagnostics import nearest
-from hexacell.errors import UsageError
+from hexacell.errors import UsageError, did_you_mean
 
 Factory = Callable[..., Any]
 _log = logging.getLogger(__name__)
@@ -85,8 +84,7 @@ def _only(group: Group, name: str) -> EntryPoint:
 
 def _unknown(group: Group, name: str) -> UsageError:
     known = names(group)
-    likely = nearest(name, known)
-    action = f"Did you mean '{likely}'?" if likely else f"Known are: {', '.join(known) or 'none'}"
+    action = did_you_mean(name, known) or f"Known are: {', '.join(known) or 'none'}"
     return UsageError(f"there is no {group.noun} '{name}'", action=action)
 
 

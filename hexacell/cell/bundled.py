@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from hexacell.cell.diagnostics import nearest
-from hexacell.errors import UsageError
+from hexacell.errors import UsageError, did_you_mean
 
 CONTROLLER = ".controller.toml"
 """How the name of a controller's config ends; what precedes it is the name of its cell."""
@@ -33,8 +32,7 @@ def bundled_config(name: str) -> Path:
     known = {path.stem: path for path in bundled_configs() if not path.name.endswith(CONTROLLER)}
     found = known.get(name) or known.get(name.removesuffix(".toml"))
     if found is None:
-        likely = nearest(name, known)
-        action = f"Did you mean '{likely}'?" if likely else f"There are: {', '.join(known)}"
+        action = did_you_mean(name, known) or f"There are: {', '.join(known)}"
         raise UsageError(f"no cell called '{name}' comes with hexacell", action=action)
     return found
 

@@ -1,14 +1,11 @@
-"""The cell file: read, checked, shown, and written.
+"""The cell file: read, checked, described and written.
 
-What may stand in it is the model in :mod:`hexacell.cell.model`; here is how its text becomes
-settings, with the line of every value and an error that a technician can act on.
+:mod:`hexacell.cell.model` says what a cell file may hold. Here its text becomes settings, with the line of
+every value and errors that a technician can act on.
 """
 
 from __future__ import annotations
 
-import json
-import re
-import tomllib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,13 +13,14 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from hexacell.cell.diagnostics import Document, Errors, explained, foreign_values, locate
+from hexacell.cell.diagnostics import Errors, explain_refusal, unsupported_values
 from hexacell.cell.fields import Section
 from hexacell.cell.model import CellSettings
 from hexacell.cell.toml_writer import subsections, to_toml
 from hexacell.errors import FileError, SeveralErrors
 from hexacell.storage.atomic_files import read_text
-from hexacell.storage.toml_locations import BYTE_ORDER_MARK, KeyPath
+from hexacell.storage.toml_document import BYTE_ORDER_MARK, TomlDocument
+from hexacell.storage.toml_locations import KeyPath
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,8 +60,8 @@ def load_cell(path: Path) -> Cell:
         SeveralErrors: It has more than one; each of ``errors`` is a FileError with its line.
     """
     text = read_text(path).removeprefix(BYTE_ORDER_MARK)
-    document = _parsed(path, text)
-    settings = _checked(document)
+    document = TomlDocument.parse(text, path)
+    settings = _checked(document, path)
     origins = {dotted(key): Origin(document.lines.get(key)) for key in _keys(settings, ())}
     return Cell(path, settings, text, origins)
 
@@ -101,44 +99,19 @@ def _keys(section: Section, path: KeyPath) -> Iterator[KeyPath]:
             yield from _keys(subsection, key)
 
 
-def _parsed(path: Path, text: str) -> Document:
+def _checked(document: TomlDocument, path: Path) -> CellSettings:
+    errors: Errors = unsupported_values(document)
     try:
-        data = tomllib.loads(text)
-        return Document(path, data, json.dumps(data, default=str), locate(text))
-    except tomllib.TOMLDecodeError as error:
-        raise _not_toml(path, text, str(error)) from None
-    except RecursionError:
-        raise FileError("brackets are nested too deeply", subject=path, action="Remove some") from None
-    except ValueError:
-        # Python refuses to read or write integers of thousands of digits, without saying where.
-        raise FileError("has a number of too many digits", subject=path, action="Shorten it") from None
-
-
-_POSITION = re.compile(r" \(at (?:line (?P<line>\d+), column (?P<column>\d+)|end of document)\)$")
-
-
-def _not_toml(path: Path, text: str, message: str) -> FileError:
-    position = _POSITION.search(message)
-    line = int(position["line"]) if position and position["line"] else len(text.splitlines())
-    words = _POSITION.sub("", message)
-    # "Cannot overwrite a value", "Cannot declare ('gauges',) twice" and their like.
-    words = "a key or a section stands twice" if words.startswith("Cannot ") else words
-    return FileError(f"is not valid TOML: {words}", subject=path, line=line, action="Correct this line")
-
-
-def _checked(document: Document) -> CellSettings:
-    errors: Errors = foreign_values(document)
-    try:
-        # As JSON, since strict checking then still takes arrays for tuples.
-        settings = CellSettings.model_validate_json(document.json, strict=True)
+        # As JSON, because strict validation then accepts arrays as tuples.
+        settings = CellSettings.model_validate_json(document.to_json(), strict=True)
     except ValidationError as refusal:
-        errors |= explained(document, refusal)
+        errors |= explain_refusal(document, refusal)
     if errors:
-        raise _together(document.path, list(errors.values()))
+        raise _joined(path, list(errors.values()))
     return settings
 
 
-def _together(path: Path, errors: list[FileError]) -> FileError | SeveralErrors:
+def _joined(path: Path, errors: list[FileError]) -> FileError | SeveralErrors:
     if len(errors) == 1:
         return errors[0]
     in_order = sorted(errors, key=lambda error: error.line or 0)

@@ -9,8 +9,8 @@ from collections.abc import Callable, Iterator
 
 import tomlkit
 
-from hexacell.cell.diagnostics import header
 from hexacell.cell.fields import Section
+from hexacell.cell.model_lookup import header
 from hexacell.storage.toml_locations import KeyPath
 
 Remark = Callable[[KeyPath], str | None]

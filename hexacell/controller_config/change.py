@@ -19,8 +19,8 @@ from hexacell.kinematics.geometry import Geometry
 from hexacell.storage import atomic_files
 
 
-class Document(BaseModel):
-    """A frozen record; written atomically, checked when read."""
+class JsonRecord(BaseModel):
+    """A frozen record in a JSON file of its own: written atomically, validated when read."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
@@ -45,18 +45,18 @@ class Document(BaseModel):
         except ValidationError as error:
             first = error.errors(include_url=False)[0]
             where = ".".join(str(key) for key in first["loc"]) or "the whole"
-            problem = f"this is no {cls.noun}: {where}: {first['msg']}"
+            problem = f"this is not a {cls.noun}: {where}: {first['msg']}"
             raise FileError(problem, subject=path, action="Restore the file") from error
 
 
-class ConfigChange(Document):
+class ConfigChange(JsonRecord):
     """A new geometry for a controller, and exactly the text it would put into the config.
 
     It holds all that a person must see and all that a commit needs, so that what is written is what
     was approved, whatever happens to the program in between.
     """
 
-    noun: ClassVar[str] = "proposal"
+    noun: ClassVar[str] = "config change"
 
     path: Path
     format: str

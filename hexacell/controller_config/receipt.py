@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import ClassVar
 
-from hexacell.controller_config.change import ConfigChange, Document
+from hexacell.controller_config.change import ConfigChange, JsonRecord
 from hexacell.errors import FileError
 from hexacell.storage import atomic_files
 
@@ -15,13 +15,13 @@ RECEIPT = "write-back.json"
 STRANGER = "config-found"
 
 
-class Receipt(Document):
+class Receipt(JsonRecord):
     """What a commit did, and where the way back is.
 
     ``backup_folder`` is where the receipt was found; a run folder may be moved.
     """
 
-    noun: ClassVar[str] = "receipt"
+    noun: ClassVar[str] = "receipt of a write-back"
 
     path: Path
     format: str

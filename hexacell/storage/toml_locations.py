@@ -1,146 +1,130 @@
-"""Where each value stands in a TOML text.
+"""The line of every value in a TOML text.
 
-Parsers give values without their places; to change a number and nothing else, and to name the line
-of a wrong one, the places are needed. The scanner here only finds where tokens begin and end. What
-they mean, and whether the text is TOML at all (https://toml.io/en/v1.0.0), is left to ``tomllib``,
-which must have accepted the text before.
+Error messages name the line of a wrong value; ``tomllib`` and ``tomlkit`` give values without lines.
+The scanner here only finds where tokens begin and end. What they mean, and whether the text is TOML at
+all (https://toml.io/en/v1.0.0), is decided by ``tomllib``, which must have accepted the text before.
 """
 
 from __future__ import annotations
 
 import re
 import tomllib
-from dataclasses import dataclass
 
 KeyPath = tuple[str | int, ...]
 """Keys of tables and, counted from 0, positions in arrays, from the document's root."""
-
-BYTE_ORDER_MARK = "\ufeff"
 
 _BLANKS = re.compile(r"(?:[ \t\r\n]|#[^\n]*)*")
 _BASIC_STRING = r'"(?:[^"\\]|\\.)*"'
 _LITERAL_STRING = r"'[^']*'"
 _STRING = re.compile(
-    # Up to two quotation marks may stand right before the three that end a multi-line string.
+    # A multi-line string may end with up to two quotation marks before the three that close it.
     r'"""(?:[^\\]|\\.)*?"{3,5}' + r"|'''.*?'{3,5}|" + _BASIC_STRING + "|" + _LITERAL_STRING,
     re.DOTALL,
 )
-# A date may have a blank between day and time, so a bare value ends where something else begins.
+# A date and its time may be separated by a blank, so a blank does not end a bare value.
 _BARE_VALUE = re.compile(r"[^,\]}#\r\n]*")
 _KEYS = re.compile(rf"""(?:{_BASIC_STRING}|{_LITERAL_STRING}|[^"'=\]])+""")
 
 
-@dataclass(frozen=True, slots=True)
-class Span:
-    """The characters ``text[start:end]``."""
+def locate(text: str) -> dict[KeyPath, int]:
+    """The line, from 1, of every table, value and array element in valid TOML.
 
-    start: int
-    end: int
-
-    def of(self, text: str) -> str:
-        """The characters themselves."""
-        return text[self.start : self.end]
-
-
-def locate(text: str) -> dict[KeyPath, Span]:
-    """Where everything stands in a valid TOML text.
-
-    Values, also those inside arrays and inline tables, have the span of the whole value; a table
-    that is opened by a header or by a dotted key has the span of the keys that mention it first.
+    A table has the line of the header or dotted key that mentions it first. A byte order mark must be
+    removed before.
     """
     return _Scanner(text).document()
-
-
-def line_of(text: str, offset: int) -> int:
-    """The line, from 1, of the character at ``offset``."""
-    return text.count("\n", 0, offset) + 1
 
 
 class _Scanner:
     def __init__(self, text: str) -> None:
         self._text = text
-        self._at = len(BYTE_ORDER_MARK) if text.startswith(BYTE_ORDER_MARK) else 0
+        self._offset = 0
+        self._line = 1
+        self._line_offset = 0
         self._table: KeyPath = ()
-        self._spans: dict[KeyPath, Span] = {}
+        self._lines: dict[KeyPath, int] = {}
         self._lengths: dict[KeyPath, int] = {}
 
-    def document(self) -> dict[KeyPath, Span]:
+    def document(self) -> dict[KeyPath, int]:
         while self._next():
             if self._next() == "[":
                 self._header()
             else:
                 self._key_and_value(self._table)
-        return self._spans
+        return self._lines
 
     def _next(self) -> str:
         self._match(_BLANKS)
-        return self._text[self._at : self._at + 1]
+        return self._text[self._offset : self._offset + 1]
 
-    def _match(self, pattern: re.Pattern[str]) -> Span:
-        match = pattern.match(self._text, self._at)
-        assert match is not None, f"no TOML at {self._at}: tomllib has not seen this text"  # noqa: S101
-        self._at = match.end()
-        return Span(match.start(), match.end())
+    def _match(self, pattern: re.Pattern[str]) -> str:
+        match = pattern.match(self._text, self._offset)
+        assert match is not None, f"no TOML at {self._offset}: tomllib has not accepted this text"  # noqa: S101
+        self._offset = match.end()
+        return match[0]
+
+    def _line_here(self) -> int:
+        self._line += self._text.count("\n", self._line_offset, self._offset)
+        self._line_offset = self._offset
+        return self._line
 
     def _header(self) -> None:
-        brackets = 2 if self._text.startswith("[[", self._at) else 1
-        self._at += brackets
-        span = self._match(_KEYS)
-        self._at += brackets
-        self._table = self._opened((), span)
+        brackets = 2 if self._text.startswith("[[", self._offset) else 1
+        self._offset += brackets
+        self._table = self._open((), self._match(_KEYS))
+        self._offset += brackets
         if brackets == 2:
             index = self._lengths.get(self._table, 0)
             self._lengths[self._table] = index + 1
             self._table = (*self._table, index)
-            self._spans[self._table] = span
+            self._lines[self._table] = self._line_here()
 
-    def _opened(self, path: KeyPath, span: Span) -> KeyPath:
-        for key in _keys(span.of(self._text)):
-            # A header below an array of tables speaks of the table opened last.
+    def _open(self, path: KeyPath, keys: str) -> KeyPath:
+        """The path that ``keys``, read just now, lead to from ``path``."""
+        for key in _split_keys(keys):
+            # A header below an array of tables continues the last table of the array.
             path = (*path, self._lengths[path] - 1) if path in self._lengths else path
             path = (*path, key)
-            self._spans.setdefault(path, span)
+            self._lines.setdefault(path, self._line_here())
         return path
 
     def _key_and_value(self, table: KeyPath) -> None:
-        path = self._opened(table, self._match(_KEYS))
-        self._at += len("=")
+        path = self._open(table, self._match(_KEYS))
+        self._offset += len("=")
         self._value(path)
 
     def _value(self, path: KeyPath) -> None:
-        first, start = self._next(), self._at
+        first = self._next()
+        self._lines[path] = self._line_here()
         if first == "[":
             self._array(path)
         elif first == "{":
             self._inline_table(path)
-        elif first in {'"', "'"}:
-            self._match(_STRING)
         else:
-            self._at = start + len(self._match(_BARE_VALUE).of(self._text).rstrip(" \t"))
-        self._spans[path] = Span(start, self._at)
+            self._match(_STRING if first in {'"', "'"} else _BARE_VALUE)
 
     def _array(self, path: KeyPath) -> None:
-        self._at += len("[")
+        self._offset += len("[")
         index = 0
         while self._next() != "]":
             self._value((*path, index))
             index += 1
             self._skip_comma()
-        self._at += len("]")
+        self._offset += len("]")
 
     def _inline_table(self, path: KeyPath) -> None:
-        self._at += len("{")
+        self._offset += len("{")
         while self._next() != "}":
             self._key_and_value(path)
             self._skip_comma()
-        self._at += len("}")
+        self._offset += len("}")
 
     def _skip_comma(self) -> None:
         if self._next() == ",":
-            self._at += len(",")
+            self._offset += len(",")
 
 
-def _keys(dotted: str) -> list[str]:
+def _split_keys(dotted: str) -> list[str]:
     node: object = tomllib.loads(f"{dotted} = 0")
     keys = []
     while isinstance(node, dict):

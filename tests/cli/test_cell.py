@@ -84,8 +84,12 @@ CELL_MISTAKES = {
     ),
     "too large": (("tilt_deg = 45.0", "tilt_deg = 90.0"), "tilt_deg", "must be 80 or less"),
     "infinity": (("joint_max_mm = 800.0", "joint_max_mm = inf"), "joint_max_mm", "must be a finite number"),
-    "no TOML": (("tilt_deg = 45.0", "tilt_deg = = 45.0"), "tilt_deg", "is not valid TOML"),
-    "key twice": (("tilt_deg = 45.0", "tilt_deg = 45.0\ntilt_deg = 4.0"), "tilt_deg = 4.0", "stands twice"),
+    "no TOML": (("tilt_deg = 45.0", "tilt_deg = = 45.0"), "tilt_deg", "not valid TOML"),
+    "key twice": (
+        ("tilt_deg = 45.0", "tilt_deg = 45.0\ntilt_deg = 4.0"),
+        "tilt_deg = 4.0",
+        "defined twice",
+    ),
 }
 
 
@@ -116,8 +120,11 @@ def test_missing_sections_are_all_named_at_once(typed_here, cell_folder):
 
 
 CONFIG_MISTAKES = {
-    "four numbers": (("[0.0, -155.0, 0.0],  # leg 1", "[0.0, -155.0, 0.0, 1.0],  # leg 1"), "row 1 of S"),
-    "five lengths": (("  590.0,  # leg 6\n", ""), "l is "),
+    "four numbers": (
+        ("[0.0, -155.0, 0.0],  # leg 1", "[0.0, -155.0, 0.0, 1.0],  # leg 1"),
+        "row 1 is",
+    ),
+    "five lengths": (("  590.0,  # leg 6\n", ""), "'l' in [geometry] is a list of 5"),
     "no geometry": (("\n[geometry]", "\n[geometries]"), "there is no [geometry]"),
     "a leg of no length": (("  590.0,  # leg 1", "  0.0,  # leg 1"), "leg 1 is 0.0 mm long"),
     "no TOML": (("\n[geometry]", "\n[geometry"), "Correct this line"),

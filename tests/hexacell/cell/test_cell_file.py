@@ -90,8 +90,8 @@ def test_other_encodings_are_refused(cell_text, tmp_path, encoding):
         ("[limits]", "[limits", "']'"),
         ("tilt_deg = 45.0", "tilt_deg = ", "Invalid value"),
         ("tilt_deg = 45.0", "tilt_deg 45.0", "'='"),
-        ("tilt_deg = 45.0", "tilt_deg = 45.0\ntilt_deg = 45.0", "stands twice"),
-        ("[limits]", "[noise]", "stands twice"),
+        ("tilt_deg = 45.0", "tilt_deg = 45.0\ntilt_deg = 45.0", "defined twice"),
+        ("[limits]", "[noise]", "defined twice"),
     ],
 )
 def test_toml_mistakes_have_a_line(load_changed, line_with, old, new, problem):

@@ -78,7 +78,7 @@ def test_an_edited_proposal_is_refused(tmp_path: Path, proposal: ConfigChange, k
 def test_a_file_that_is_no_proposal_is_refused(tmp_path: Path, text: str) -> None:
     path = tmp_path / "proposal.json"
     path.write_text(text)
-    with pytest.raises(FileError, match="this is no proposal") as caught:
+    with pytest.raises(FileError, match="this is not a config change") as caught:
         ConfigChange.load(path)
     assert caught.value.subject == str(path)
 

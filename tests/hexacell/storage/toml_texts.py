@@ -1,15 +1,11 @@
-"""Values are found on the lines where they stand."""
+"""Random TOML texts in all kinds of layouts, and the places in them."""
 
-from __future__ import annotations
-
-import tomllib
-from collections.abc import Iterator
 from itertools import count
+from typing import Any
 
-from hypothesis import given
 from hypothesis import strategies as st
 
-from hexacell.cell.diagnostics import line_of, locate
+from hexacell.storage.toml_locations import KeyPath
 
 DECOYS = ["", "# [x] = {", "  # '''", '# """', "\t"]
 TEXTS = ["'[a]'", '"}#\\""', "'''\n]\n[[b]]\n'''", '"""\n k = 1 \\"""\n"""', "''", '""']
@@ -71,45 +67,13 @@ def documents(draw: st.DrawFn) -> str:
     return _Writer(draw).document()
 
 
-def _places(path: tuple[str | int, ...], value: object) -> Iterator[tuple[tuple[str | int, ...], object]]:
-    if path:
-        yield path, value
-    inner = (
-        value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
-    )
-    for key, item in inner:
-        yield from _places((*path, key), item)
-
-
-@given(text=documents())
-def test_every_place_is_found_and_nothing_else(text):
-    assert set(locate(text)) == {path for path, _ in _places((), tomllib.loads(text))}
-
-
-@given(text=documents())
-def test_numbers_are_found_on_their_lines(text):
-    lines = locate(text)
-    for path, value in _places((), tomllib.loads(text)):
-        if isinstance(value, int) and value >= FIRST_MARK:
-            assert lines[path] == text[: text.index(str(value))].count("\n") + 1
-
-
-def test_every_kind_of_place():
-    text = "top = 1\n[a]\nb.c = [[1,\n2], { d = '''\n''', e = 3 }]\n[[list]]\n[[list]]\n[list.sub]\nk = 1\n"
-    expected = {
-        ("top",): 1,
-        ("a",): 2,
-        ("a", "b", "c"): 3,
-        ("a", "b", "c", 0, 1): 4,
-        ("a", "b", "c", 1, "e"): 5,
-        ("list", 0): 6,
-        ("list", 1): 7,
-        ("list", 1, "sub", "k"): 9,
-    }
-    assert {path: locate(text)[path] for path in expected} == expected
-
-
-def test_what_is_not_there_is_looked_for_around_it():
-    lines = locate("a = 1\n[b]\nc = 2\n")
-    assert line_of(lines, ("b", "missing", 3)) == 2
-    assert line_of(lines, ("missing",)) is None
+def leaves(node: Any, path: KeyPath = ()) -> dict[KeyPath, Any]:
+    """Every value in what tomllib read, tables and arrays included, by its path."""
+    found = {path: node} if path else {}
+    if isinstance(node, dict):
+        for key, child in node.items():
+            found |= leaves(child, (*path, key))
+    if isinstance(node, list):
+        for index, child in enumerate(node):
+            found |= leaves(child, (*path, index))
+    return found

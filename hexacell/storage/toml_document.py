@@ -1,0 +1,134 @@
+"""A TOML text as read: its values, the line of each, and errors that name file and line."""
+
+from __future__ import annotations
+
+import json
+import re
+import tomllib
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Self
+
+from hexacell.errors import FileError
+from hexacell.storage.toml_locations import KeyPath, locate
+
+BYTE_ORDER_MARK = "\ufeff"
+
+_LONGEST_QUOTE = 40
+_POSITION = re.compile(r" \(at (?:line (?P<line>\d+), column \d+|end of document)\)$")
+
+
+@dataclass(frozen=True, slots=True)
+class TomlDocument:
+    """What a TOML text says, and on which lines.
+
+    Attributes:
+        data: the values, as ``tomllib`` reads them.
+        lines: the line, from 1, of every table, value and array element.
+        source: the file that errors name; a text may have none.
+    """
+
+    data: Mapping[str, Any]
+    lines: Mapping[KeyPath, int]
+    source: Path | None = None
+
+    @classmethod
+    def parse(cls, text: str, source: Path | None = None) -> Self:
+        """The document in ``text``; raises ``FileError`` with the line where it is no TOML."""
+        text = text.removeprefix(BYTE_ORDER_MARK)
+        with _file_errors(text, source):
+            return cls(tomllib.loads(text), locate(text), source)
+
+    def to_json(self) -> str:
+        """The values as JSON, dates and times as text; raises ``FileError`` for endless integers."""
+        with _file_errors("", self.source):
+            return json.dumps(self.data, default=str)
+
+    def value(self, path: KeyPath) -> Any:  # noqa: ANN401 - whatever TOML may hold
+        """What the text says at ``path``; raises ``LookupError``."""
+        found: Any = self.data
+        for key in path:
+            found = found[key]
+        return found
+
+    def line_of(self, path: KeyPath) -> int | None:
+        """The line of ``path`` or, where the text does not have it, of the innermost table around it."""
+        for length in range(len(path), 0, -1):
+            if path[:length] in self.lines:
+                return self.lines[path[:length]]
+        return None
+
+    def error(self, path: KeyPath, problem: str, action: str) -> FileError:
+        """A problem at ``path``, with its line."""
+        return FileError(problem, subject=self.source, line=self.line_of(path), action=action)
+
+    def mismatch(self, path: KeyPath, expected: str) -> str:
+        """What is at ``path`` and what must be there, as the problem of an error."""
+        return f"{self.place(path)} is {_description(self.value(path))}, but must be {expected}"
+
+    def place(self, path: KeyPath) -> str:
+        """A place as a person finds it: ``'S' in [robot.nominal], row 4, number 2``."""
+        last = max(depth for depth, key in enumerate(path) if isinstance(key, str))
+        words = f"'{path[last]}' {_table_words(path[:last])}"
+        for depth in range(last + 1, len(path)):
+            item = "row" if isinstance(self.value(path[: depth + 1]), list) else "number"
+            words += f", {item} {int(path[depth]) + 1}"
+        return words
+
+
+def table_header(path: KeyPath) -> str:
+    """The header that opens the table at ``path``: ``[robot.nominal]``, ``[[gauges]]``."""
+    names = ".".join(key for key in path if isinstance(key, str))
+    return f"[[{names}]]" if isinstance(path[-1], int) else f"[{names}]"
+
+
+def _table_words(path: KeyPath) -> str:
+    if not path:
+        return "at the top of the file"
+    numbers = [f" number {key + 1}" for key in path if isinstance(key, int)]
+    return f"in {table_header(path)}{''.join(numbers)}"
+
+
+def _description(value: object) -> str:
+    match value:
+        case bool():
+            return str(value).lower()
+        case str():
+            return f'the text "{_shortened(value)}"'
+        case int() | float():
+            return _shortened(repr(value))
+        case list():
+            return f"a list of {len(value)} item{'' if len(value) == 1 else 's'}"
+        case dict():
+            return "a section"
+        case _:
+            return "a date or a time"
+
+
+def _shortened(text: str) -> str:
+    return text if len(text) <= _LONGEST_QUOTE else f"{text[:_LONGEST_QUOTE]}..."
+
+
+@contextmanager
+def _file_errors(text: str, source: Path | None) -> Iterator[None]:
+    try:
+        yield
+    except tomllib.TOMLDecodeError as error:
+        raise _syntax_error(str(error), text, source) from error
+    except RecursionError:
+        raise FileError("brackets are nested too deeply", subject=source, action="Remove some") from None
+    except ValueError:
+        # Python refuses to read or write integers of thousands of digits, without saying where.
+        raise FileError("a number has too many digits", subject=source, action="Shorten it") from None
+
+
+def _syntax_error(message: str, text: str, source: Path | None) -> FileError:
+    position = _POSITION.search(message)
+    last = text.count("\n") + (not text.endswith("\n"))
+    line = int(position["line"]) if position and position["line"] else last
+    problem = _POSITION.sub("", message)
+    # "Cannot overwrite a value", "Cannot declare ('gauges',) twice" and similar messages.
+    problem = "a key or a section is defined twice" if problem.startswith("Cannot ") else problem
+    return FileError(f"not valid TOML: {problem}", subject=source, line=line, action="Correct this line")

@@ -15,6 +15,7 @@ from hexacell.errors import ReachError
 from hexacell.identification.belief import Limits, RobotBelief
 from hexacell.identification.problem.problem import Noise, Prior, Problem, Tolerances, build_problem
 from hexacell.identification.solver.result import Identification
+from hexacell.kinematics.commanded_motion import CommandedRobot
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.inverse import inverse_kinematics
 from hexacell.kinematics.mechanism import FrameTransform, Mechanism
@@ -53,6 +54,10 @@ class Robot:
         if self.uses_provisional:
             return self.provisional[-1]
         return self.mechanism.normalize_frames(self.controller)[0]
+
+    def commanded(self, actual: Geometry) -> CommandedRobot:
+        """This robot under its controller, with an ``actual`` geometry in the convention's frames."""
+        return CommandedRobot(self.mechanism, self.branch, self.commanding, actual)
 
     @cached_property
     def prior(self) -> Prior:

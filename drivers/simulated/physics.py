@@ -18,7 +18,8 @@ from hexacell.cell.simulation import SimulationSettings
 from hexacell.clock import CellClock
 from hexacell.errors import ReachError
 from hexacell.kinematics import rotations
-from hexacell.kinematics.forward import continue_solution, forward_kinematics
+from hexacell.kinematics.commanded_motion import change_geometry
+from hexacell.kinematics.forward import forward_kinematics
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import Mechanism
 from hexacell.kinematics.pose import PoseBatch
@@ -104,14 +105,7 @@ class RobotPhysics:
         self._motion = Motion.rest(start_joints)
         self._joints = start_joints
         self._passed = 0
-        first = continue_solution(
-            mechanism,
-            self._truth,
-            start_joints[None],
-            start=start,
-            start_geometry=start_geometry,
-            start_joints=start_joints[None],
-        )
+        first = change_geometry(mechanism, start_geometry, self._truth, start, start_joints[None])
         if not first.found[0]:
             raise ReachError(
                 f"the simulated machine cannot stand at {start.pose(0)}",

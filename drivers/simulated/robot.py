@@ -13,7 +13,7 @@ from hexacell.clock import CellClock
 from hexacell.controller_config.interface import ConfigFormat, ControllerGeometry
 from hexacell.errors import FileError
 from hexacell.kinematics import rotations
-from hexacell.kinematics.forward import continue_solution
+from hexacell.kinematics.commanded_motion import change_geometry
 from hexacell.kinematics.mechanism import Mechanism
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.rotations import Array
@@ -91,14 +91,7 @@ class SimulatedMachine:
             here = self._here()
             joints = self._joints(here)
             new = self._format.read(self._config)
-            found = continue_solution(
-                self._mechanism,
-                new.geometry,
-                joints,
-                start=here,
-                start_geometry=self._geometry.geometry,
-                start_joints=joints,
-            )
+            found = change_geometry(self._mechanism, self._geometry.geometry, new.geometry, here, joints)
             if not found.found[0]:
                 raise FileError("with this geometry the sliders cannot stand so", subject=self._config)
             self._geometry = new

@@ -90,10 +90,10 @@ class PlannedInformation:
 def _spread(drawn: RobotBelief, poses: PoseBatch, records: int) -> PoseBatch:
     """The first of the poses, then those that tell most, each beside what is taken already."""
     offered = reachable(drawn, poses)
-    if not len(offered) or not np.array_equal(offered.targets.rotations[0], poses.rotations[0]):
+    if not len(offered) or not np.array_equal(offered.targets.poses.rotations[0], poses.rotations[0]):
         return poses[[]]
     taken = [0]
-    jacobian, by_joints = position_derivatives(drawn, ReachableTargets(offered.targets, offered.joints))
+    jacobian, by_joints = position_derivatives(drawn, offered.targets)
     change = jacobian - jacobian[0]
     noise = record_covariance(by_joints, drawn.noise)
     noise = noise + noise[0]
@@ -105,7 +105,7 @@ def _spread(drawn: RobotBelief, poses: PoseBatch, records: int) -> PoseBatch:
         best = int(np.argmax(gain))
         taken.append(best)
         covariance = covariance_update(covariance, change[best], noise[best])
-    return offered.targets[taken]
+    return offered.targets.poses[taken]
 
 
 def covariance_update(covariance: Array, jacobian: Array, noise: Array) -> Array:

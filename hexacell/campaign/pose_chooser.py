@@ -1,8 +1,7 @@
-"""The pose to measure next at a point: chosen among many, or the next safe one of a list."""
+"""The pose to measure next at a point, and the path to it: selected, or the next safe one of a list."""
 
 from __future__ import annotations
 
-from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,21 +22,30 @@ from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.motion.route_search import find_route
 from hexacell.robot_model import Robot
 
-WELL_KNOWN = np.radians(0.5)
-"""Uncertainty of the platform's orientation below which large turns are safe, and worth most."""
+WELL_KNOWN_SIGMA = np.radians(0.5)
+"""Standard deviation of the platform's orientation below which large rotations are safe, and most
+informative."""
 
-SMALL_SHARE = 0.1
-"""Of the tilts allowed, tried where no turn of full size is safe."""
+SMALL_TILT_SHARE = 0.1
+"""Of the largest tilt, for candidates where none of full size is safe."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Attempt:
+    """From which of the point's records a path is to start, and the share of the largest tilt."""
+
+    start: int
+    tilt_share: float = 1.0
 
 
 @dataclass(frozen=True, eq=False)
 class PoseChooser:
-    """Chooses for one cell.
+    """Chooses poses for one cell.
 
     Attributes:
-        listed: poses to visit; none where they are to be chosen.
+        pose_list: poses to visit; none where they are to be selected.
         task: where the robot has to be accurate.
-        candidates: among how many orientations.
+        candidates: number of candidate orientations.
     """
 
     settings: CellSettings
@@ -47,85 +55,94 @@ class PoseChooser:
     candidates: int
 
     def choose_with_path(
-        self, belief: RobotBelief, at: GaugeZero, state: CampaignState
+        self, belief: RobotBelief, zero: GaugeZero, state: CampaignState
     ) -> tuple[SelectedPose, tuple[Pose, ...]]:
-        """As :meth:`select_pose`, and the poses to pass on the way from where the robot is now.
+        """As :meth:`choose`, and the poses to pass on the path from where the robot is now.
 
         These are in the controller's frames.
 
         Raises:
-            LimitError: there is none within the limits.
+            LimitError: there is no pose, or no path to it, within the limits.
         """
-        choice, start = self._choose(belief, at, state)
+        selected, start = self._choose(belief, zero, state)
         if state.present is None:
-            return choice, ()
+            return selected, ()
         visited = _visited(state)
-        stops = [self._as_visited(visited, self.robot.to_command(stop)) for stop in choice.stops]
-        way = [*visited[start : start + 1], *stops]
-        if state.present in way:  # as a rule, and the way is checked already
-            return choice, tuple(way[way.index(state.present) + 1 :])
-        between = [*stops, *visited]
-        held = [self.robot.from_commands([pose]) for pose in between]
-        present, goal = self.robot.from_commands([state.present]), PoseBatch.of([choice.command])
-        rows = find_route(belief, present, goal, held, at.reference)
-        if rows is None:
+        waypoints = [self._as_visited(visited, self.robot.to_command(pose)) for pose in selected.waypoints]
+        path = [*visited[start : start + 1], *waypoints]
+        if state.present in path:  # the usual case; the path was checked when the pose was selected
+            return selected, tuple(path[path.index(state.present) + 1 :])
+        via = [*waypoints, *visited]
+        commands = [self.robot.from_commands([pose]) for pose in via]
+        present, end = self.robot.from_commands([state.present]), PoseBatch.of([selected.command])
+        route = find_route(belief, present, end, commands, zero.reference)
+        if route is None:
             raise LimitError("no safe straight line leads on from here")
-        return choice, tuple(between[row] for row in rows)
+        return selected, tuple(via[row] for row in route)
 
-    def choose(self, belief: RobotBelief, at: GaugeZero, state: CampaignState) -> SelectedPose:
+    def choose(self, belief: RobotBelief, zero: GaugeZero, state: CampaignState) -> SelectedPose:
         """The pose to measure next, in the mechanism's frame convention.
 
         It can be reached from the pose of the last record, or else from the reference, wherever the
-        robot is now: an interrupted run measures what an undisturbed one does.
+        robot is now: an interrupted run measures the same poses as an undisturbed one.
 
         Raises:
             LimitError: there is none within the limits.
         """
-        return self._choose(belief, at, state)[0]
+        return self._choose(belief, zero, state)[0]
 
-    def _choose(self, belief: RobotBelief, at: GaugeZero, state: CampaignState) -> tuple[SelectedPose, int]:
-        """The choice, and which of the poses visited here its way starts from."""
+    def _choose(
+        self, belief: RobotBelief, zero: GaugeZero, state: CampaignState
+    ) -> tuple[SelectedPose, int]:
+        """The selected pose, and the row of the point's record that its path starts from."""
         last = max(0, len(_visited(state)) - 1)
-        # The last resort is for when so little is known that nearly all turns are too large.
-        *tries, resort = dict.fromkeys([(last, 1.0), (0, 1.0), (0, SMALL_SHARE)])
-        for start, share in tries:
-            with suppress(LimitError):
-                return self._chosen(belief, at, state, start, share), start
-        start, share = resort
-        return self._chosen(belief, at, state, start, share), start
+        # Small tilts are for when so little is known that nearly all candidates are too large.
+        attempts = dict.fromkeys([_Attempt(last), _Attempt(0), _Attempt(0, SMALL_TILT_SHARE)])
+        failure: LimitError | None = None
+        for attempt in attempts:
+            try:
+                return self._select(belief, zero, state, attempt), attempt.start
+            except LimitError as error:
+                failure = error
+        assert failure is not None  # noqa: S101 - there is always an attempt
+        raise failure
 
-    def _chosen(
-        self, belief: RobotBelief, at: GaugeZero, state: CampaignState, start: int, share: float
+    def _select(
+        self, belief: RobotBelief, zero: GaugeZero, state: CampaignState, attempt: _Attempt
     ) -> SelectedPose:
         visited = self.robot.from_commands(_visited(state))
-        begin = visited[start : start + 1] if len(visited) else None
-        home = visited[:1] if start else None
+        start = visited[attempt.start : attempt.start + 1] if len(visited) else None
+        reference_command = visited[:1] if attempt.start else None
         if self.pose_list is not None:
-            waiting = self.robot.from_commands(
-                without_visited(self.pose_list.at(state.point or 0)[1:], _visited(state))
+            waiting = without_visited(self.pose_list.at(state.point or 0)[1:], _visited(state))
+            return select_from_list(
+                belief,
+                zero,
+                self.robot.from_commands(waiting),
+                start,
+                reference_command=reference_command,
+                skipped=state.refusals,
             )
-            passed_over = state.refusals
-            return select_from_list(belief, at, waiting, begin, home=home, passed_over=passed_over)
-        tilt = share * belief.limits.tilt
-        is_known = orientation_sigma(belief, at.target) <= WELL_KNOWN
-        amplitudes = Amplitudes.MOSTLY_LARGE if is_known else Amplitudes.ALL_SCALES
-        turns = candidates.orientations(self.candidates, tilt, self._seed(state), amplitudes)
-        return select_pose(belief, at, turns, begin, self._goal(belief), home)
+        tilt = attempt.tilt_share * belief.limits.tilt
+        well_known = orientation_sigma(belief, zero.target) <= WELL_KNOWN_SIGMA
+        amplitudes = Amplitudes.MOSTLY_LARGE if well_known else Amplitudes.ALL_SCALES
+        orientations = candidates.orientations(self.candidates, tilt, self._seed(state), amplitudes)
+        return select_pose(belief, zero, orientations, start, self._criterion(belief), reference_command)
 
     @staticmethod
-    def _as_visited(visited: list[Pose], stop: Pose) -> Pose:
-        """The reference as it was visited, to the last bit, where that is one of the stops."""
-        return visited[0] if visited and is_same_pose(visited[0], stop) else stop
+    def _as_visited(visited: list[Pose], waypoint: Pose) -> Pose:
+        """The reference exactly as it was visited, where that is the waypoint."""
+        return visited[0] if visited and is_same_pose(visited[0], waypoint) else waypoint
 
-    def _goal(self, belief: RobotBelief) -> Criterion:
-        criterion = CriterionName(self.settings.identification.criterion)
-        if criterion is CriterionName.PARAMETERS:
+    def _criterion(self, belief: RobotBelief) -> Criterion:
+        name = CriterionName(self.settings.identification.criterion)
+        if name is CriterionName.PARAMETERS:
             return Criterion(belief.basis.T @ belief.basis)
-        error = self.task.error(belief) if criterion is CriterionName.TASK else None
+        error = self.task.error(belief) if name is CriterionName.TASK else None
         return D_OPTIMAL if error is None else Criterion(error.weight())
 
     def _seed(self, state: CampaignState) -> int:
-        """Other candidates for every record and every attempt, and the same when done again."""
+        """Different for every record and every attempt, and the same when they are repeated."""
         point = state.point or 0
         attempt = state.records_at(point) + 100 * state.refusals
         return self.settings.identification.seed + 1000 * point + attempt

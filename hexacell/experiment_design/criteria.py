@@ -1,11 +1,13 @@
-"""What a measurement is worth: three criteria of optimal design.
+"""Criteria of optimal experiment design: what a record would be worth.
 
-A record with Jacobian H against its point's reference and own covariance V changes the parameters'
-covariance C to ``C - C H^T (H C H^T + V)^-1 H C`` before it is measured. What counts is
+A record with Jacobian H against its point's reference and covariance V changes the covariance C of the
+parameters to ``C - C H^T (H C H^T + V)^-1 H C``, which is known before it is measured. Records are
+chosen one at a time, each the best beside those taken (Fedorov, Theory of Optimal Experiments, 1972;
+Atkinson & Donev, Optimum Experimental Designs, 1992), for one of the criteria
 
-- D, the volume of C: ``log det``;
-- A, the sum of the variances of all parameters: ``tr C``;
-- I, the mean variance of the position at the task poses: ``tr(J C J^T)``.
+- D: the volume of the confidence ellipsoid, ``log det C``;
+- A: the sum of the variances of all parameters, ``tr C``;
+- I: the mean variance of the position at the task poses, ``tr(J C J^T)``.
 """
 
 from __future__ import annotations
@@ -19,7 +21,7 @@ from hexacell.kinematics.rotations import Array
 
 
 class CriterionName(StrEnum):
-    """What the orientations are chosen for."""
+    """What poses are chosen for: D, A or I, as the cell file names them."""
 
     INFORMATION = "information"
     PARAMETERS = "parameters"
@@ -28,26 +30,28 @@ class CriterionName(StrEnum):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Criterion:
-    """A criterion that can be evaluated.
+    """An optimality criterion.
 
     Attributes:
-        weight: (p, p), 1: what the variances of the free parameters count; none for D.
+        weight: of the free parameters' covariance (p, p), dimensionless; none for D.
     """
 
     weight: Array | None = None
 
-    def gain(self, covariance: Array, change: Array, noise: Array) -> Array:
-        """How much each of n records would be worth (n,): nat for D, mm^2 for A and I.
+    def gain(self, covariance: Array, jacobian: Array, noise: Array) -> Array:
+        """What each of n records would gain (n,): nat for D, mm^2 for A and I.
 
-        ``covariance`` (p, p) and the records' own ``noise`` (n, 3, 3) in mm^2, ``change`` (n, 3, p)
-        their Jacobians.
+        Args:
+            covariance: of the free parameters (p, p), mm^2.
+            jacobian: of the records (n, 3, p).
+            noise: covariance of the records themselves (n, 3, 3), mm^2.
         """
-        spread_by_parameter = change @ covariance
-        spread = spread_by_parameter @ np.swapaxes(change, -1, -2) + noise
+        crossing = jacobian @ covariance
+        total = crossing @ np.swapaxes(jacobian, -1, -2) + noise
         if self.weight is None:
-            return np.asarray(0.5 * (np.linalg.slogdet(spread)[1] - np.linalg.slogdet(noise)[1]))
-        lost = np.linalg.solve(np.linalg.cholesky(spread), spread_by_parameter)
-        gain: Array = np.einsum("nij,jk,nik->n", lost, self.weight, lost, optimize=True)
+            return np.asarray(0.5 * (np.linalg.slogdet(total)[1] - np.linalg.slogdet(noise)[1]))
+        factor = np.linalg.solve(np.linalg.cholesky(total), crossing)
+        gain: Array = np.einsum("nij,jk,nik->n", factor, self.weight, factor, optimize=True)
         return gain
 
 

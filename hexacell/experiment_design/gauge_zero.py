@@ -1,4 +1,4 @@
-"""Where a point's gauges were zeroed, as far as its records tell."""
+"""Where the ball was when a point's gauges were zeroed, estimated from the point's records."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from hexacell.kinematics.sensitivity import pose_jacobian, position_sensitivity
 
 @dataclass(frozen=True, slots=True, eq=False)
 class GaugeZero:
-    """What is known of the zeroed gauges at a point.
+    """What is known of the zero of a point's gauges.
 
     Attributes:
-        reference: where the estimate says the ball was when they were zeroed (3,), mm.
+        reference: estimated position (3,), mm, of the ball when they were zeroed.
         orientation: the platform's then (3, 3), under the estimate.
-        joints: the sliders' positions then (6,), mm.
+        joints: joint variables then (6,), mm.
         jacobian: derivative (3, p) of ``reference`` by the free parameters.
         covariance: of ``reference`` (3, 3), mm^2, the parameters being known.
     """
@@ -36,26 +36,32 @@ class GaugeZero:
 
     @property
     def target(self) -> ReachableTargets:
-        """The reference, one of one."""
+        """The reference as a target (1)."""
         return ReachableTargets(PoseBatch.at(self.reference, self.orientation[None]), self.joints[None])
 
     def command(self, belief: RobotBelief) -> PoseBatch:
-        """The command, one of one, that led to the reference."""
+        """The command (1) that leads to the reference."""
         return commands_for(belief, self.target)[0]
 
     def mode(self, belief: RobotBelief) -> Array:
         """The assembly mode (1,) of the estimated robot at the reference."""
-        stand = self.target
-        return assembly_mode(pose_jacobian(belief.mechanism, belief.estimate, stand.targets, stand.joints))
+        target = self.target
+        return assembly_mode(pose_jacobian(belief.mechanism, belief.estimate, target.poses, target.joints))
 
 
 def estimate_gauge_zero(
     belief: RobotBelief, poses: PoseBatch, joints: Array, deviations: Array
 ) -> GaugeZero:
-    """The station of a point's records so far (n): their poses under the estimate, the first at zero.
+    """The weighted mean of what each of a point's records (n) says of the zero.
+
+    Args:
+        belief: what is known of the robot.
+        poses: of the records, under the estimate; the first is the reference.
+        joints: joint variables (n, 6), mm.
+        deviations: what the gauges showed (n, 3), mm.
 
     Raises:
-        LimitError: all of them stand at a singularity, where nothing can be said.
+        LimitError: all poses are at a singularity, where the records say nothing.
     """
     jacobian, by_joints = position_derivatives(belief, ReachableTargets(poses, joints))
     weights = record_weights(by_joints, belief.noise)
@@ -64,13 +70,13 @@ def estimate_gauge_zero(
     except np.linalg.LinAlgError:
         raise LimitError("the records of this point say nothing about where the ball is") from None
     reference = covariance @ np.einsum("nij,nj->i", weights, poses.positions - deviations)
-    mean = covariance @ np.einsum("nij,njp->ip", weights, jacobian)
-    return GaugeZero(reference, poses.rotations[0], joints[0], mean, covariance)
+    mean_jacobian = covariance @ np.einsum("nij,njp->ip", weights, jacobian)
+    return GaugeZero(reference, poses.rotations[0], joints[0], mean_jacobian, covariance)
 
 
-def position_derivatives(belief: RobotBelief, stands: ReachableTargets) -> tuple[Array, Array]:
-    """Of the ball's position at n poses: (n, 3, p) by the free parameters, (n, 3, 6) by the joints."""
+def position_derivatives(belief: RobotBelief, targets: ReachableTargets) -> tuple[Array, Array]:
+    """Of the ball's position at n targets: (n, 3, p) by the free parameters, (n, 3, 6) by the joints."""
     by_parameters, by_joints = position_sensitivity(
-        belief.mechanism, belief.estimate, stands.targets, stands.joints
+        belief.mechanism, belief.estimate, targets.poses, targets.joints
     )
     return by_parameters @ belief.basis, by_joints

@@ -1,4 +1,17 @@
-"""The pose worth measuring next: the most informative one that surely stays inside the travel."""
+"""Selection of the pose to measure next: greedy optimal design under limits of travel and motion.
+
+Candidates are scored first, by the gain of a criterion (:mod:`hexacell.experiment_design.criteria`). Those
+that linear propagation puts inside the gauges' travel are ranked by it. The ranking is then walked from
+the best downward, a few candidates at a time, and the first is taken that
+
+1. the controller can be commanded to,
+2. satisfies the chance constraint on the travel
+   (:mod:`hexacell.experiment_design.travel_monte_carlo`),
+3. can be reached by a path along which the constraint holds as well.
+
+Of the few examined together a straight path is preferred to one over waypoints, which takes more moves,
+unless the gain makes up for them; a path over the reference is the last choice.
+"""
 
 from __future__ import annotations
 
@@ -6,53 +19,41 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hexacell.errors import LimitError
-from hexacell.experiment_design import travel_monte_carlo
-from hexacell.experiment_design.candidates import (
-    ReachableTargets,
-    commands_for,
-    outcomes_of,
-    reachable_targets,
-)
+from hexacell.experiment_design.candidates import commands_for, outcomes_of, reachable_targets
 from hexacell.experiment_design.criteria import D_OPTIMAL, Criterion
 from hexacell.experiment_design.gauge_zero import GaugeZero
 from hexacell.experiment_design.predicted_records import TRAVEL_SHARE, PredictedRecords, predict_records
+from hexacell.experiment_design.travel_monte_carlo import TravelConstraint
 from hexacell.identification.belief import RobotBelief
 from hexacell.kinematics.pose import Pose, PoseBatch
-from hexacell.kinematics.rotations import Array, Mask
+from hexacell.kinematics.rotations import Array
 from hexacell.motion.waypoint_planner import Path, PathPlanner, Rows
 
-SelectionOptions = Callable[[Rows], Iterator[Path | None]]
-"""Of getting to some of the candidates."""
+MOST_CANDIDATES = 240
+COMMAND_BATCH = 48
+PATH_BATCH = 4
+"""The best candidates are examined, their commands in batches and their paths in smaller ones: one of the
+first few is usually taken."""
 
-NEAR_SHARE = 0.4
-"""Of the travel. What stays within it does so even if the prediction is twice as wrong as it says, which
-holds once the platform's orientation is known to a few degrees."""
-
-MOST = 240
-COMMANDED = 48
-AT_ONCE = 4
-"""Candidates that are tried, the best first; for so many at a time the command is searched, and for so
-many the way, as one of the first will mostly do."""
-
-ROUND_ABOUT = 1.2
-"""How much more a pose must be worth for a way that is not straight, as each stop takes another move."""
+WAYPOINT_GAIN_RATIO = 1.2
+"""How much more a candidate must gain to be reached over waypoints, which take more moves."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SelectedPose:
-    """The pose chosen.
+    """The selected pose.
 
     Attributes:
         command: what to send to the controller as it is configured now.
         joints: joint variables (6,), mm, it will go to.
-        deviation: what the gauges are expected to show (3,), mm, and ``sigma`` (3,), mm.
+        deviation: what the gauges are expected to show (3,), mm.
+        sigma: standard deviation (3,), mm, of ``deviation``.
         gain: information gained on the parameters, nat.
-        change: Jacobian (3, p) of the deviation by the free parameters; ``noise`` its covariance
-            (3, 3), mm^2, the parameters being known.
-        stops: commands to pass on the way from where it was chosen to start; none on a straight line.
+        jacobian: of the deviation (3, p) by the free parameters.
+        covariance: of the deviation (3, 3), mm^2, the parameters being known.
+        waypoints: commands to pass on the path; none on a straight line.
     """
 
     command: Pose
@@ -62,148 +63,149 @@ class SelectedPose:
     gain: float
     jacobian: Array
     covariance: Array
-    stops: tuple[Pose, ...] = ()
+    waypoints: tuple[Pose, ...] = ()
 
 
 def select_pose(
     belief: RobotBelief,
-    at: GaugeZero,
-    turns: Array,
+    zero: GaugeZero,
+    orientations: Array,
     start: PoseBatch | None = None,
-    goal: Criterion = D_OPTIMAL,
-    home: PoseBatch | None = None,
+    criterion: Criterion = D_OPTIMAL,
+    reference_command: PoseBatch | None = None,
 ) -> SelectedPose:
-    """The best of some turns (n, 3, 3) away from the orientation at the zeroed reference.
+    """The best of some orientations (n, 3, 3), relative to the platform's at the zeroed reference.
 
-    Turns start there and not at the untilted platform: with millimetres of error in the joints the
-    platform may stand 20 degrees from where the controller believes it to be. From the command
-    ``start``, by default that of the reference, a clear way must lead there, over the reference's
-    own command ``home`` if it is told.
+    They are not relative to the level platform: with millimetres of error in the joints the platform may
+    be 20 degrees from where the controller believes it to be.
+
+    Args:
+        belief: what is known of the robot.
+        zero: of the point's gauges.
+        orientations: the candidates.
+        start: the command (1) that the path starts from; by default that of the reference.
+        criterion: what is gained.
+        reference_command: the command (1) of the reference, if paths may lead over it.
 
     Raises:
-        LimitError: none of them is reachable within the limits and surely inside the travel.
+        LimitError: none is reachable within the limits and almost surely inside the travel.
     """
-    targets = PoseBatch.at(at.reference, turns @ at.orientation)
-    offered = predict_records(belief, at, reachable_targets(belief, targets, at.mode(belief)))
-    if not len(offered):
+    poses = PoseBatch.at(zero.reference, orientations @ zero.orientation)
+    records = predict_records(belief, zero, reachable_targets(belief, poses, zero.mode(belief)))
+    if not len(records):
         raise LimitError("no orientation is within reach, joint range, tilt limit and singularity margin")
-    worth = goal.gain(belief.covariance, offered.jacobian, offered.covariance)
-    rows = np.flatnonzero(offered.within(TRAVEL_SHARE * belief.limits.gauge_travel_mm))
-    leave = PathPlanner(belief, at.command(belief) if start is None else start, home, at.reference)
-    for some in _in_portions(rows[np.argsort(-worth[rows], kind="stable")][:MOST], COMMANDED):
-        commands, held = commands_for(belief, offered.targets[some])
-        for few in _in_portions(np.flatnonzero(held), AT_ONCE):
-            tried = some[few]
-            if choice := _first_safe(belief, at, offered[tried], commands[few], worth[tried], leave):
-                return choice
+    gains = criterion.gain(belief.covariance, records.jacobian, records.covariance)
+    search = _PathSearch.at(belief, zero, start, reference_command)
+    for ranked in _batches(_ranking(belief, records, gains), COMMAND_BATCH):
+        commands, found = commands_for(belief, records.targets[ranked])
+        for few in _batches(np.flatnonzero(found), PATH_BATCH):
+            rows = ranked[few]
+            if selected := search.first_safe(records[rows], commands[few], gains[rows]):
+                return selected
     raise LimitError("no orientation surely keeps the ball inside the gauges' travel")
 
 
 def select_from_list(
     belief: RobotBelief,
-    at: GaugeZero,
+    zero: GaugeZero,
     commands: PoseBatch,
     start: PoseBatch | None = None,
     *,
-    home: PoseBatch | None = None,
-    passed_over: int = 0,
+    reference_command: PoseBatch | None = None,
+    skipped: int = 0,
 ) -> SelectedPose:
-    """The first of some commands (n) that surely stays inside the travel, after so many passed over.
+    """The first of some commands (n) that almost surely stays inside the travel.
+
+    As :func:`select_pose`; the list's order takes the place of the gain. The first ``skipped`` of those
+    inside the travel are left out.
 
     Raises:
         LimitError: none of them does.
     """
-    stands, rows = outcomes_of(belief, commands)
-    offered = predict_records(belief, at, stands)
-    inside = offered.within(TRAVEL_SHARE * belief.limits.gauge_travel_mm)
-    kept = np.flatnonzero(inside)[passed_over:]
-    leave = PathPlanner(belief, at.command(belief) if start is None else start, home, at.reference)
-    alike = np.full(len(kept), np.inf)
-    choice = _first_safe(belief, at, offered[kept], commands[rows[kept]], alike, leave)
-    if choice is None:
+    targets, rows = outcomes_of(belief, commands)
+    records = predict_records(belief, zero, targets)
+    inside = np.flatnonzero(records.within(TRAVEL_SHARE * belief.limits.gauge_travel_mm))[skipped:]
+    search = _PathSearch.at(belief, zero, start, reference_command)
+    no_preference = np.full(len(inside), np.inf)
+    selected = search.first_safe(records[inside], commands[rows[inside]], no_preference)
+    if selected is None:
         raise LimitError(
             "none of the poses left in the list surely keeps the ball inside the gauges' travel"
         )
-    return choice
+    return selected
 
 
-def _first_safe(
-    belief: RobotBelief,
-    at: GaugeZero,
-    offered: PredictedRecords,
-    commands: PoseBatch,
-    worth: Array,
-    leave: PathPlanner,
-) -> SelectedPose | None:
-    """The first pose to which a way leads with the ball inside.
+def _ranking(belief: RobotBelief, records: PredictedRecords, gains: Array) -> Rows:
+    """Rows of the records inside the travel by linear propagation, the best first."""
+    rows = np.flatnonzero(records.within(TRAVEL_SHARE * belief.limits.gauge_travel_mm))
+    return rows[np.argsort(-gains[rows], kind="stable")][:MOST_CANDIDATES]
 
-    One to which no straight way leads comes first only where it is worth the moves that it takes
-    more; over the reference, which takes most, the way leads where there is no other to any.
-    """
-    if not len(offered):
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _PathSearch:
+    """Search for candidates that can be reached safely, all from one command."""
+
+    belief: RobotBelief
+    travel: TravelConstraint
+    planner: PathPlanner
+
+    @classmethod
+    def at(
+        cls,
+        belief: RobotBelief,
+        zero: GaugeZero,
+        start: PoseBatch | None,
+        reference_command: PoseBatch | None,
+    ) -> _PathSearch:
+        """The search at a point whose gauges were zeroed at ``zero``."""
+        start = zero.command(belief) if start is None else start
+        planner = PathPlanner(belief, start, reference_command, zero.reference)
+        return cls(belief, TravelConstraint(belief, zero), planner)
+
+    def first_safe(
+        self, records: PredictedRecords, commands: PoseBatch, gains: Array
+    ) -> SelectedPose | None:
+        """The first of some ranked candidates to which a safe path leads."""
+        if not len(records):
+            return None
+        paths, rows = self.planner.options(commands), np.flatnonzero(self.travel.holds(records))
+        found = self._first(paths.straight, rows)
+        worth_waypoints = rows
+        if found is not None:
+            better = rows[rows < found[0]]
+            worth_waypoints = better[gains[better] >= WAYPOINT_GAIN_RATIO * gains[found[0]]]
+        found = (
+            self._first(paths.via_waypoints, worth_waypoints)
+            or found
+            or self._first(paths.via_reference, rows)
+        )
+        if found is None:
+            return None
+        row, path = found
+        return self._selected(records[np.array([row])], commands.pose(row), path.waypoints)
+
+    def _first(self, paths_to: Callable[[Rows], list[Path | None]], rows: Rows) -> tuple[int, Path] | None:
+        """The first row to which a path leads along which the ball stays inside, and the path."""
+        for row, path in zip(rows.tolist(), paths_to(rows), strict=True):
+            if path is not None and self.travel.holds_along(path):
+                return row, path
         return None
-    ways, every = leave.ways(commands), _safe(belief, at, offered)
 
-    def first(manner: SelectionOptions, rows: Rows) -> tuple[int, Path] | None:
-        found = zip(rows.tolist(), manner(rows), strict=True)
-        return next(((row, way) for row, way in found if way and _stays_inside(belief, at, way)), None)
-
-    best = first(ways.straight, every)
-    better = every
-    if best is not None:
-        before = every[every < best[0]]
-        better = before[worth[before] >= ROUND_ABOUT * worth[best[0]]]
-    best = first(ways.via_waypoints, better) or best or first(ways.via_reference, every)
-    if best is None:
-        return None
-    row, way = best
-    return _choice(belief, offered[np.array([row])], commands.pose(row), way.stops)
-
-
-def _safe(belief: RobotBelief, at: GaugeZero, offered: PredictedRecords) -> Rows:
-    """Which of some poses keep the ball inside; asked together they cost less than each on its way."""
-    safe = _near(belief, at, offered)
-    if not safe.all():
-        safe[~safe] = _surely_inside(belief, at, offered.targets[~safe])
-    return np.flatnonzero(safe)
+    def _selected(
+        self, record: PredictedRecords, command: Pose, waypoints: tuple[Pose, ...]
+    ) -> SelectedPose:
+        gain = D_OPTIMAL.gain(self.belief.covariance, record.jacobian, record.covariance)
+        return SelectedPose(
+            command=command,
+            joints=record.targets.joints[0],
+            deviation=record.deviation[0],
+            sigma=record.sigma[0],
+            gain=float(gain[0]),
+            jacobian=record.jacobian[0],
+            covariance=record.covariance[0],
+            waypoints=waypoints,
+        )
 
 
-def _stays_inside(belief: RobotBelief, at: GaugeZero, way: Path) -> bool:
-    """Whether the ball surely does on a way.
-
-    Every other pose is looked at; from one to the next little changes.
-    """
-    stands = ReachableTargets(way.poses[slice(None, None, -2)], way.joints[::-2])
-    near = _near(belief, at, predict_records(belief, at, stands))
-    return bool(near.all() or _surely_inside(belief, at, stands[~near]).all())
-
-
-def _near(belief: RobotBelief, at: GaugeZero, offered: PredictedRecords) -> Mask:
-    """Which poses need no closer look: straight propagation says near, and holds nearby."""
-    is_known = travel_monte_carlo.orientation_sigma(belief, at.target) <= travel_monte_carlo.LITTLE_KNOWN
-    near: Mask = offered.within(NEAR_SHARE * belief.limits.gauge_travel_mm) & is_known
-    return near
-
-
-def _surely_inside(belief: RobotBelief, at: GaugeZero, stands: ReachableTargets) -> Mask:
-    """Which poses keep the ball inside the travel where straight error propagation may not hold."""
-    return travel_monte_carlo.stays_in_travel(belief, at.joints, at.target.targets, stands)
-
-
-def _choice(
-    belief: RobotBelief, one: PredictedRecords, command: Pose, stops: tuple[Pose, ...]
-) -> SelectedPose:
-    return SelectedPose(
-        command=command,
-        joints=one.targets.joints[0],
-        deviation=one.deviation[0],
-        sigma=one.sigma[0],
-        gain=float(D_OPTIMAL.gain(belief.covariance, one.jacobian, one.covariance)[0]),
-        jacobian=one.jacobian[0],
-        covariance=one.covariance[0],
-        stops=stops,
-    )
-
-
-def _in_portions(rows: NDArray[np.intp], size: int) -> Iterator[NDArray[np.intp]]:
+def _batches(rows: Rows, size: int) -> Iterator[Rows]:
     return (rows[first : first + size] for first in range(0, len(rows), size))

@@ -1,4 +1,4 @@
-"""Poses to choose from at a point, and the records that they would give."""
+"""Records that candidate poses would give, predicted by linear propagation of covariance."""
 
 from __future__ import annotations
 
@@ -15,18 +15,20 @@ from hexacell.kinematics.rotations import Array, Mask
 
 SAFETY_SIGMAS = 4.0
 TRAVEL_SHARE = 0.9
-"""Of the travel, for the predicted deviation and four sigma. What tells most lies at this limit, so that
-of 50,000 records thousands do; with three sigma one in some thousands left the travel."""
+"""Share of the travel that the predicted deviation and four sigma may use. The most informative poses are
+at this limit, thousands of 50,000 records; with three sigma one in some thousands left the travel."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PredictedRecords:
-    """Poses to choose from, and the records (n) they would give.
+    """The records (n) that some targets would give.
 
     Attributes:
-        change: Jacobians (n, 3, p) of the deviations; ``noise`` their covariance (n, 3, 3), mm^2,
-            the parameters being known.
-        deviation: expected (n, 3), mm, and its ``sigma`` (n, 3), mm.
+        targets: the poses.
+        jacobian: of the deviations (n, 3, p) by the free parameters.
+        covariance: of the deviations (n, 3, 3), mm^2, the parameters being known.
+        deviation: expected deviations (n, 3), mm.
+        sigma: their standard deviations (n, 3), mm, as the parameters are known now.
     """
 
     targets: ReachableTargets
@@ -54,11 +56,12 @@ class PredictedRecords:
         return within
 
 
-def predict_records(belief: RobotBelief, at: GaugeZero, stands: ReachableTargets) -> PredictedRecords:
-    """The records of some poses, by straight error propagation."""
-    jacobian, by_joints = position_derivatives(belief, stands)
-    noise = record_covariance(by_joints, belief.noise) + at.covariance
-    change = jacobian - at.jacobian
-    spread = change @ belief.covariance @ np.swapaxes(change, -1, -2) + noise
-    sigma = np.sqrt(np.diagonal(spread, axis1=-2, axis2=-1))
-    return PredictedRecords(stands, change, noise, stands.targets.positions - at.reference, sigma)
+def predict_records(belief: RobotBelief, zero: GaugeZero, targets: ReachableTargets) -> PredictedRecords:
+    """The records of some targets at a point whose gauges were zeroed at ``zero``."""
+    by_parameters, by_joints = position_derivatives(belief, targets)
+    covariance = record_covariance(by_joints, belief.noise) + zero.covariance
+    jacobian = by_parameters - zero.jacobian
+    total = jacobian @ belief.covariance @ np.swapaxes(jacobian, -1, -2) + covariance
+    sigma = np.sqrt(np.diagonal(total, axis1=-2, axis2=-1))
+    deviation = targets.poses.positions - zero.reference
+    return PredictedRecords(targets, jacobian, covariance, deviation, sigma)

@@ -1,158 +1,219 @@
-"""Whether deviations stay inside the travel where straight-line error propagation does not hold.
+"""The chance constraint on the gauges' travel, evaluated by Monte Carlo where it is not linear.
 
-While little is known, the platform may stand many degrees from where the estimate puts it, and the
-predicted deviation is far from linear in the parameters. Robots are drawn from what is known, and
-each is asked where it would really go.
+A pose may be measured if the ball almost surely stays inside the gauges' travel there. The deviation d of
+the ball from the reference depends on the unknown parameters theta, of which the belief is a normal
+distribution; the constraint is P(|d(theta)| <= travel) >= 1 - epsilon on each axis.
+
+Near the reference d is linear in theta, and propagation of covariance gives its distribution
+(:meth:`PredictedRecords.within <hexacell.experiment_design.predicted_records.PredictedRecords.within>`).
+While little is known it is far from linear: the platform's orientation may be wrong by many degrees. Then
+robots are sampled from the belief and the forward kinematics of each is solved, as in the scenario
+approach to chance constraints (Calafiore & Campi, IEEE Trans. Automatic Control 51, 2006), with antithetic
+variates. How cautious the evaluation is depends on the standard deviation s of the orientation:
+
+- s <= ``uncertain_sigma``: few samples. All of them, and their mean and ``sigmas`` standard deviations,
+  must be inside ``travel / (1 + s / half_travel_sigma)``: the less is known, the heavier the tails.
+- above: many samples, of which all but the worst must stay within ``uncertain_share`` of the travel.
+
+The constants were chosen so that of 1,000 simulated robots none left the travel.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 
 import numpy as np
 
 from hexacell.experiment_design.candidates import ReachableTargets
+from hexacell.experiment_design.gauge_zero import GaugeZero
+from hexacell.experiment_design.predicted_records import PredictedRecords, predict_records
 from hexacell.identification.belief import RobotBelief
 from hexacell.kinematics.forward import apply_twist, forward_kinematics
 from hexacell.kinematics.geometry import GeometryBatch
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array, Mask
 from hexacell.kinematics.sensitivity import Sensitivity, has_singularity_margin, pose_sensitivity
+from hexacell.motion.waypoint_planner import Path
 
-ROBOTS = 24
-MANY_ROBOTS = 240
-LITTLE_KNOWN = np.radians(3.0)
-"""Uncertainty of the platform's orientation beyond which many robots are drawn. Under the drawing's
-tolerances one robot in a hundred then strays twenty times as far as straight propagation says."""
 
-NEARLY_ALL_SHARE = 0.4
-"""Of the travel. Nearly all of many robots, all but the worst, stay within it: of 1,000 others none left
-the travel."""
+@dataclass(frozen=True, slots=True)
+class TravelCheckSettings:
+    """Constants of the evaluation; standard deviations of the platform's orientation in rad.
 
-FEWEST = 6
-"""Robots that can stand at the reference; of fewer nothing can be said."""
+    Attributes:
+        linear_share: of the travel. Within it, at four sigma, linear propagation is believed unless the
+            orientation is uncertain: the ball stays inside even if the prediction is wrong by a factor
+            of two.
+        uncertain_sigma: standard deviation beyond which the orientation is uncertain. Under the drawing's
+            tolerances one robot in a hundred then deviates twenty times as far as linear propagation says.
+        samples: robots sampled, and ``samples_uncertain`` where the orientation is uncertain.
+        uncertain_share: of the travel, where the orientation is uncertain.
+        half_travel_sigma: standard deviation at which half of the travel may be used.
+        sigmas: standard deviations of the sampled deviations that must be inside the travel.
+        fewest_samples: sampled robots that can take the reference pose; of fewer nothing can be said.
+        margin_share: of the singularity margin, which all sampled robots must keep.
+    """
 
-DRAWN_MARGIN_SHARE = 0.5
-"""Of the singularity margin, kept by all drawn robots that are not the estimated one."""
+    linear_share: float = 0.4
+    uncertain_sigma: float = float(np.radians(3.0))
+    samples: int = 24
+    samples_uncertain: int = 240
+    uncertain_share: float = 0.4
+    half_travel_sigma: float = float(np.radians(6.0))
+    sigmas: float = 4.0
+    fewest_samples: int = 6
+    margin_share: float = 0.5
 
-SIGMAS = 4.0
-"""So far the deviations of a robot that was not drawn are supposed to scatter."""
 
-HALF_AT = np.radians(6.0)
-"""Uncertainty of the platform's orientation at which only half of the travel may be used: the less is
-known, the heavier the tails are."""
+SETTINGS = TravelCheckSettings()
+
+
+@dataclass(frozen=True, eq=False)
+class TravelConstraint:
+    """The chance constraint at a point whose gauges were zeroed at ``zero``."""
+
+    belief: RobotBelief
+    zero: GaugeZero
+    settings: TravelCheckSettings = SETTINGS
+
+    def holds(self, records: PredictedRecords) -> Mask:
+        """At which of n predicted records the ball almost surely stays inside the travel."""
+        holds = self._holds_linearly(records)
+        if not holds.all():
+            holds[~holds] = self._holds_for_samples(records.targets[~holds])
+        return holds
+
+    def holds_along(self, path: Path) -> bool:
+        """Whether the ball almost surely stays inside along a path.
+
+        Every other pose is checked, the last included: from one to the next little changes.
+        """
+        targets = ReachableTargets(path.poses[slice(None, None, -2)], path.joints[::-2])
+        linear = self._holds_linearly(predict_records(self.belief, self.zero, targets))
+        return bool(linear.all() or self._holds_for_samples(targets[~linear]).all())
+
+    def _holds_linearly(self, records: PredictedRecords) -> Mask:
+        if self._is_uncertain:
+            return np.zeros(len(records), dtype=bool)
+        return records.within(self.settings.linear_share * self.belief.limits.gauge_travel_mm)
+
+    def _holds_for_samples(self, targets: ReachableTargets) -> Mask:
+        return stays_in_travel(
+            self.belief, self.zero.joints, self.zero.target.poses, targets, self.settings
+        )
+
+    @cached_property
+    def _is_uncertain(self) -> bool:
+        return orientation_sigma(self.belief, self.zero.target) > self.settings.uncertain_sigma
 
 
 def stays_in_travel(
-    belief: RobotBelief, reference_joints: Array, reference: PoseBatch, stands: ReachableTargets
+    belief: RobotBelief,
+    reference_joints: Array,
+    reference: PoseBatch,
+    targets: ReachableTargets,
+    settings: TravelCheckSettings = SETTINGS,
 ) -> Mask:
-    """Which of n poses keep the ball inside the travel on every robot that may be the true one.
+    """At which of n targets the ball stays inside the travel on the robots sampled from the belief.
 
-    The gauges are zeroed at the ``reference`` pose, where the sliders stand at ``reference_joints``
-    (6,), mm. A robot that cannot take the reference pose is not the true one.
+    The gauges are zeroed at the ``reference`` pose (1), where the joint variables are
+    ``reference_joints`` (6,), mm. Samples that cannot take it are dropped: the true robot could.
     """
-    joints = np.concatenate([reference_joints[None], stands.joints])
+    joints = np.concatenate([reference_joints[None], targets.joints])
     poses = PoseBatch(
-        np.concatenate([reference.positions, stands.targets.positions]),
-        np.concatenate([reference.rotations, stands.targets.rotations]),
+        np.concatenate([reference.positions, targets.poses.positions]),
+        np.concatenate([reference.rotations, targets.poses.rotations]),
     )
-    # The reference is where the records of its point say it was, which is not quite where it closes.
+    # The reference is estimated from its records, so that it closes the legs only approximately.
     poses = forward_kinematics(belief.mechanism, belief.estimate, joints, poses).poses
-    known = pose_sensitivity(belief.mechanism, belief.estimate, poses, joints)
-    turn = _turn_sigma(belief, known)
-    if turn > LITTLE_KNOWN:
-        return _nearly_all_near(_drawn(belief, MANY_ROBOTS, joints, poses, known), belief)
-    drawn = _drawn(belief, ROBOTS, joints, poses, known)
-    stays: Mask = np.all(drawn.found, axis=0)
-    travel = belief.limits.gauge_travel_mm / (1.0 + turn / HALF_AT)
-    stays &= _all_inside(drawn.deviations, travel)
-    return stays
+    sensitivity = pose_sensitivity(belief.mechanism, belief.estimate, poses, joints)
+    sigma = _orientation_sigma(belief, sensitivity)
+    is_uncertain = sigma > settings.uncertain_sigma
+    samples = settings.samples_uncertain if is_uncertain else settings.samples
+    sampled = _sample(belief, samples, joints, poses, sensitivity, settings)
+    if len(sampled.found) < settings.fewest_samples:
+        return np.zeros(len(targets), dtype=bool)
+    travel = belief.limits.gauge_travel_mm
+    if is_uncertain:
+        return _nearly_all_within(sampled, settings.uncertain_share * travel)
+    return _all_within(sampled, travel / (1.0 + sigma / settings.half_travel_sigma), settings.sigmas)
 
 
-def orientation_sigma(belief: RobotBelief, stands: ReachableTargets) -> float:
-    """How surely the platform's orientation is known at the first of some poses: one sigma, rad.
+def orientation_sigma(belief: RobotBelief, targets: ReachableTargets) -> float:
+    """Standard deviation, rad, of the platform's orientation at the first of some targets.
 
     About the base axis about which it is known least.
     """
-    known = pose_sensitivity(belief.mechanism, belief.estimate, stands.targets, stands.joints)
-    return _turn_sigma(belief, known)
+    sensitivity = pose_sensitivity(belief.mechanism, belief.estimate, targets.poses, targets.joints)
+    return _orientation_sigma(belief, sensitivity)
 
 
-def _turn_sigma(belief: RobotBelief, known: Sensitivity) -> float:
-    turned = known.parameters[0, 3:] @ belief.basis
-    return float(np.sqrt(np.einsum("ip,pq,iq->i", turned, belief.covariance, turned).max()))
+def _orientation_sigma(belief: RobotBelief, sensitivity: Sensitivity) -> float:
+    rotation = sensitivity.parameters[0, 3:] @ belief.basis
+    return float(np.sqrt(np.einsum("ip,pq,iq->i", rotation, belief.covariance, rotation).max()))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Drawn:
-    """Robots (r) that can stand at the reference, asked for n poses.
+class _SampledRobots:
+    """Robots (r) that can take the reference pose, at n targets.
 
     Attributes:
-        found: (r, n) whether they can take them clear of singularities; ``deviations`` (r, n, 3), mm.
+        found: (r, n) whether they take the target clear of singularities.
+        deviations: (r, n, 3), mm, from the reference.
     """
 
     found: Mask
     deviations: Array
 
 
-def _drawn(belief: RobotBelief, robots: int, joints: Array, poses: PoseBatch, known: Sensitivity) -> _Drawn:
-    """Where robots drawn from what is known stand; the first of the poses is the reference."""
+def _sample(
+    belief: RobotBelief,
+    samples: int,
+    joints: Array,
+    poses: PoseBatch,
+    sensitivity: Sensitivity,
+    settings: TravelCheckSettings,
+) -> _SampledRobots:
+    """Solve n poses, the reference first, for robots sampled from the belief."""
     root = np.linalg.cholesky(belief.covariance)
-    changes = _draws(robots, len(belief.free)) @ root.T @ belief.basis.T
-    count = len(joints)
-    steps = np.einsum("nip,rp->rni", known.parameters, changes).reshape(-1, 6)
-    again = np.tile(np.arange(count), robots)
-    geometries = GeometryBatch.from_vectors((belief.estimate.vector() + changes).repeat(count, axis=0))
-    result = forward_kinematics(
-        belief.mechanism,
-        geometries,
-        joints[again],
-        apply_twist(poses[again], steps),
-        mode=known.mode[again],
-    )
-    found = result.found.reshape(robots, count)
-    first = np.arange(robots) * count
-    # One that would stand next to a singularity there is refused before anything moves.
-    stands = found[:, 0] & has_singularity_margin(
-        belief.mechanism,
-        geometries[first],
-        result.poses[first],
-        joints[np.zeros(robots, dtype=int)],
-        belief.limits.singularity_margin,
-    )
-    found &= has_singularity_margin(
-        belief.mechanism,
-        geometries,
-        result.poses,
-        joints[again],
-        DRAWN_MARGIN_SHARE * belief.limits.singularity_margin,
-    ).reshape(robots, count)
-    positions = result.poses.positions.reshape(robots, count, 3)[stands]
-    return _Drawn(found[stands, 1:], positions[:, 1:] - positions[:, :1])
+    errors = _standard_normal(samples, len(belief.free)) @ root.T @ belief.basis.T
+    count, margin = len(joints), belief.limits.singularity_margin
+    # Newton's method starts where linear propagation puts the pose of each robot.
+    steps = np.einsum("nip,rp->rni", sensitivity.parameters, errors).reshape(-1, 6)
+    rows = np.tile(np.arange(count), samples)
+    robots = GeometryBatch.from_vectors((belief.estimate.vector() + errors).repeat(count, axis=0))
+    start, mode = apply_twist(poses[rows], steps), sensitivity.mode[rows]
+    result = forward_kinematics(belief.mechanism, robots, joints[rows], start, mode=mode)
+    found = result.found.reshape(samples, count)
+    first = np.arange(samples) * count
+    at_reference = (robots[first], result.poses[first], joints[np.zeros(samples, dtype=int)], margin)
+    # A robot next to a singularity at its reference is refused before anything moves.
+    kept = found[:, 0] & has_singularity_margin(belief.mechanism, *at_reference)
+    everywhere = (robots, result.poses, joints[rows], settings.margin_share * margin)
+    found &= has_singularity_margin(belief.mechanism, *everywhere).reshape(samples, count)
+    positions = result.poses.positions.reshape(samples, count, 3)[kept]
+    return _SampledRobots(found[kept, 1:], positions[:, 1:] - positions[:, :1])
 
 
-def _nearly_all_near(drawn: _Drawn, belief: RobotBelief) -> Mask:
-    """Which of the poses all robots but the worst take without straying far."""
-    if len(drawn.found) < FEWEST:
-        return np.zeros(drawn.found.shape[1], dtype=bool)
-    farthest = np.where(drawn.found, np.abs(drawn.deviations).max(axis=-1), np.inf)
-    near: Mask = np.sort(farthest, axis=0)[-2] <= NEARLY_ALL_SHARE * belief.limits.gauge_travel_mm
-    return near
+def _nearly_all_within(sampled: _SampledRobots, distance_mm: float) -> Mask:
+    """At which targets all sampled robots but the worst stay within a distance."""
+    farthest = np.where(sampled.found, np.abs(sampled.deviations).max(axis=-1), np.inf)
+    within: Mask = np.sort(farthest, axis=0)[-2] <= distance_mm
+    return within
 
 
-def _all_inside(deviations: Array, travel_mm: float) -> Mask:
-    """Whether deviations (robots, n, 3), mm, stay inside, and those of robots not drawn would too."""
-    if len(deviations) < FEWEST:
-        return np.zeros(deviations.shape[1], dtype=bool)
-    unlucky = np.abs(deviations.mean(axis=0)) + SIGMAS * deviations.std(axis=0)
-    farthest = np.maximum(unlucky, np.abs(deviations).max(axis=0)).max(axis=-1)
-    inside: Mask = farthest <= travel_mm
-    return inside
+def _all_within(sampled: _SampledRobots, distance_mm: float, sigmas: float) -> Mask:
+    """At which targets all sampled robots, and those that some sigmas predict, stay within a distance."""
+    deviations = sampled.deviations
+    predicted = np.abs(deviations.mean(axis=0)) + sigmas * deviations.std(axis=0)
+    farthest = np.maximum(predicted, np.abs(deviations).max(axis=0)).max(axis=-1)
+    within: Mask = np.all(sampled.found, axis=0) & (farthest <= distance_mm)
+    return within
 
 
 @lru_cache
-def _draws(robots: int, count: int) -> Array:
-    """The same for every choice, so that a choice can be made again: (robots, count), antithetic."""
-    half = np.random.default_rng(0).standard_normal((robots // 2, count))
+def _standard_normal(samples: int, count: int) -> Array:
+    """(samples, count) antithetic normal variates, the same ones every time: choices can be repeated."""
+    half = np.random.default_rng(0).standard_normal((samples // 2, count))
     return np.concatenate([half, -half])

@@ -1,12 +1,11 @@
-"""Poses that judge the result: commanded as a user would, inside the travel, away from all others.
+"""Held-out poses that validate the result: commanded as a user would, inside the travel, far apart.
 
-Away from each other, and from the orientations that the geometry was identified with: near those it
-fits in any case.
+They are far from each other and from the orientations that the geometry was identified with, near which
+it fits in any case: a greedy maximin (space-filling) design (Johnson, Moore & Ylvisaker, J. Stat. Planning
+and Inference 26, 1990).
 """
 
 from __future__ import annotations
-
-from itertools import pairwise
 
 import numpy as np
 
@@ -15,50 +14,50 @@ from hexacell.experiment_design.candidates import within_limits
 from hexacell.experiment_design.predicted_records import TRAVEL_SHARE
 from hexacell.identification.belief import RobotBelief
 from hexacell.kinematics import rotations
-from hexacell.kinematics.forward import continue_solution
+from hexacell.kinematics.commanded_motion import ActualPoses
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array, Mask
 from hexacell.kinematics.sensitivity import pose_sensitivity, singularity_margin
 from hexacell.motion.path_check import is_clear
 
 SAFETY_SIGMAS = 3.0
-"""They are few and not chosen for where they lie, so that hardly one comes near this limit; what has
-tilts too small would judge too kindly."""
+"""Fewer than for identification: these poses are few and not chosen near the limit of the travel, and
+smaller tilts would validate too little."""
 
 
 def select_validation_poses(
     belief: RobotBelief, point: Array, count: int, orientations: Array, used: Array | None = None
 ) -> PoseBatch:
-    """``count`` poses at a point (3,), mm, the first of them untilted.
+    """``count`` poses at a point (3,), mm; the first is level.
 
-    The controller is sent there with its own geometry, uncorrected; the ball must surely stay
-    within the travel all the same, and the corrected robot must be able to go there too. Of the
-    orientations (n, 3, 3) that do, those are taken in which the platform really stands farthest from
-    where it stands in the others and in the ``used`` ones (k, 3, 3), wherever these were.
+    The ball stays inside the travel although the controller still commands with its own geometry, and
+    the corrected robot can take them too. Of the orientations (n, 3, 3) that allow this, those are
+    selected whose actual orientations are farthest from each other and from the ``used`` ones (k, 3, 3),
+    wherever these were measured.
 
     Raises:
         LimitError: too few of them do.
     """
     poses = PoseBatch.at(point, np.concatenate([np.eye(3)[None], orientations]))
-    joints = belief.mechanism.inverse(belief.controller, belief.branch, poses)
+    joints = belief.commanded.joints(poses)
     usable = np.flatnonzero(within_limits(belief.limits, poses, joints) & _after(belief, poses))
     if not len(usable) or usable[0] != 0:
         raise LimitError(f"the untilted platform cannot stand at {poses.pose(0)} within the limits")
-    really, inside = _inside_travel(belief, poses[usable], joints[usable])
-    if not inside[0]:
+    poses = poses[usable]
+    actual = belief.commanded.actual_poses(poses)
+    if not actual.found[0]:
         raise LimitError(f"where the robot really goes for {poses.pose(0)} cannot be told")
-    kept = poses[usable[inside]]
-    stands = really.rotations[inside]
-    taken = _farthest_apart(belief, kept, stands, _nearest(stands, used), count)
-    if len(taken) < count:
+    inside = _stays_inside(belief, actual)
+    selected = _select_farthest(belief, poses[inside], actual.poses[inside], used, count)
+    if len(selected) < count:
         raise LimitError(
-            f"only {len(taken)} orientations at {poses.pose(0)} keep the ball inside the travel"
+            f"only {len(selected)} orientations at {poses.pose(0)} keep the ball inside the travel"
         )
-    return kept[taken]
+    return poses[inside][selected]
 
 
 def _after(belief: RobotBelief, poses: PoseBatch) -> Mask:
-    """Which poses the estimated geometry can take within the limits."""
+    """Which poses the estimated geometry can take within the limits, once it commands."""
     joints = belief.mechanism.inverse(belief.estimate, belief.branch, poses)
     fits = within_limits(belief.limits, poses, joints)
     rows = np.flatnonzero(fits)
@@ -67,79 +66,48 @@ def _after(belief: RobotBelief, poses: PoseBatch) -> Mask:
     return fits
 
 
-def _inside_travel(belief: RobotBelief, poses: PoseBatch, joints: Array) -> tuple[PoseBatch, Mask]:
-    """Where the uncorrected robot goes; is it surely inside the travel of gauges zeroed at the first."""
-    really = continue_solution(
-        belief.mechanism,
-        belief.estimate,
-        joints,
-        start=poses,
-        start_geometry=belief.controller,
-        start_joints=joints,
-    )
-    sensitivity = pose_sensitivity(belief.mechanism, belief.estimate, really.poses, joints)
+def _stays_inside(belief: RobotBelief, actual: ActualPoses) -> Mask:
+    """At which poses the ball stays inside the travel of gauges that are zeroed at the first of them."""
+    sensitivity = pose_sensitivity(belief.mechanism, belief.estimate, actual.poses, actual.joints)
     jacobian = sensitivity.parameters[:, :3] @ belief.basis
     change = jacobian - jacobian[0]
-    spread = change @ belief.covariance @ np.swapaxes(change, -1, -2)
-    sigma = np.sqrt(np.diagonal(spread, axis1=-2, axis2=-1) + 2.0 * belief.noise.gauge_mm**2)
-    deviation = really.poses.positions - really.poses.positions[0]
+    covariance = change @ belief.covariance @ np.swapaxes(change, -1, -2)
+    sigma = np.sqrt(np.diagonal(covariance, axis1=-2, axis2=-1) + 2.0 * belief.noise.gauge_mm**2)
+    deviation = actual.poses.positions - actual.poses.positions[0]
     limit = TRAVEL_SHARE * belief.limits.gauge_travel_mm
-    inside: Mask = (np.abs(deviation) + SAFETY_SIGMAS * sigma <= limit).all(axis=-1)
-    inside &= really.found
-    inside[0] = really.found[0]
-    return really.poses, inside
+    inside: Mask = (np.abs(deviation) + SAFETY_SIGMAS * sigma <= limit).all(axis=-1) & actual.found
+    inside[0] = actual.found[0]
+    return inside
 
 
-def _nearest(stands: Array, used: Array | None) -> Array:
-    """How far orientations (n, 3, 3) are from the nearest of those used (n,), rad."""
-    apart = np.full(len(stands), np.inf)
-    for other in () if used is None else used:
-        apart = np.minimum(apart, _angles(stands, other))
-    return apart
-
-
-def _angles(stands: Array, other: Array) -> Array:
-    angles: Array = np.linalg.norm(rotations.to_vector(stands @ other.T), axis=-1)
-    return angles
-
-
-def _farthest_apart(
-    belief: RobotBelief, poses: PoseBatch, stands: Array, apart: Array, count: int
+def _select_farthest(
+    belief: RobotBelief, commands: PoseBatch, actual: PoseBatch, used: Array | None, count: int
 ) -> list[int]:
-    """Rows of poses from the first on, each next one farthest from those taken, a clear way ahead.
+    """Rows of commands: the first, then each next one farthest from those selected and used.
 
-    ``stands`` (n, 3, 3) is how the platform really stands in them, ``apart`` (n,), rad, how far that
-    is from what was taken before. A way must be clear there and back to the first, where the set ends,
-    with the ball inside the travel.
+    From each a clear line must lead to the next, and back to the first, where the set ends.
     """
-    taken = [0]
-    while len(taken) < count:
-        apart = np.minimum(apart, _angles(stands, stands[taken[-1]]))
-        best = int(np.argmax(apart))
-        while apart[best] > 0.0 and not _ways_clear(belief, poses, (taken[-1], best, 0)):
-            apart[best] = 0.0
-            best = int(np.argmax(apart))
-        if apart[best] <= 0.0:
+    distance = np.full(len(commands), np.inf)
+    for orientation in () if used is None else used:
+        distance = np.minimum(distance, _angles(actual.rotations, orientation))
+    reference, selected = actual.positions[0], [0]
+    while len(selected) < count:
+        last = selected[-1]
+        distance = np.minimum(distance, _angles(actual.rotations, actual.rotations[last]))
+        best = int(np.argmax(distance))
+        while distance[best] > 0.0 and not (
+            is_clear(belief, commands[[last]], commands[[best]], reference)
+            and is_clear(belief, commands[[best]], commands[[0]], reference)
+        ):
+            distance[best] = 0.0
+            best = int(np.argmax(distance))
+        if distance[best] <= 0.0:
             break
-        taken.append(best)
-    return taken
+        selected.append(best)
+    return selected
 
 
-def _ways_clear(belief: RobotBelief, poses: PoseBatch, rows: tuple[int, ...]) -> bool:
-    reference = _zeroed(belief, poses[[0]])
-    return all(is_clear(belief, poses[[start]], poses[[end]], reference) for start, end in pairwise(rows))
-
-
-def _zeroed(belief: RobotBelief, first: PoseBatch) -> Array:
-    """Where the uncorrected robot really takes the ball (3,), mm, for the pose that zeroes the gauges."""
-    joints = belief.mechanism.inverse(belief.controller, belief.branch, first)
-    really = continue_solution(
-        belief.mechanism,
-        belief.estimate,
-        joints,
-        start=first,
-        start_geometry=belief.controller,
-        start_joints=joints,
-    )
-    ball: Array = really.poses.positions[0]
-    return ball
+def _angles(orientations: Array, other: Array) -> Array:
+    """Angles (n,), rad, between orientations (n, 3, 3) and another one (3, 3)."""
+    angles: Array = np.linalg.norm(rotations.to_vector(orientations @ other.T), axis=-1)
+    return angles

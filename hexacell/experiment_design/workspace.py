@@ -1,4 +1,4 @@
-"""Poses that span the workspace, where a cell does not say what its robot is for."""
+"""Poses that span the workspace, for cells that state no task poses."""
 
 from __future__ import annotations
 
@@ -10,18 +10,18 @@ from hexacell.kinematics import rotations
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array
 
-TILT = np.radians(15.0)
-"""Small enough for a machine that is not calibrated yet, large enough to show what tilting does."""
+ANGLE = np.radians(15.0)
+"""Small enough for a robot that is not calibrated yet, large enough to show errors of orientation."""
 
 
 def workspace_poses(belief: RobotBelief, points: Array) -> PoseBatch:
-    """At ball positions (m, 3), mm: level, tilted either way about x and y, turned either way about z.
+    """Seven poses at each ball position (m, 3), mm: level, and rotated both ways about x, y and z.
 
-    Left out is what the robot cannot reach within its limits, by its estimated geometry and by the
-    controller's.
+    Poses that the robot cannot take within its limits, by its estimated geometry or by the controller's,
+    are left out.
     """
-    vectors = min(TILT, belief.limits.tilt) * np.concatenate([np.zeros((1, 3)), np.eye(3), -np.eye(3)])
-    turns = rotations.from_vector(vectors)
-    positions = np.repeat(points, len(turns), axis=0)
-    poses = PoseBatch(positions, np.tile(turns, (len(points), 1, 1)))
-    return reachable(belief, poses).targets
+    vectors = min(ANGLE, belief.limits.tilt) * np.concatenate([np.zeros((1, 3)), np.eye(3), -np.eye(3)])
+    rotated = rotations.from_vector(vectors)
+    positions = np.repeat(points, len(rotated), axis=0)
+    poses = PoseBatch(positions, np.tile(rotated, (len(points), 1, 1)))
+    return reachable(belief, poses).targets.poses

@@ -1,4 +1,4 @@
-"""What is known of the robot at one moment, and what may be asked of it."""
+"""What is known of the robot at one moment, and the limits it must keep."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from hexacell.identification.problem.problem import Noise
+from hexacell.kinematics.commanded_motion import CommandedRobot
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import Branch, Mechanism
 from hexacell.kinematics.rotations import Array
@@ -15,7 +16,7 @@ from hexacell.kinematics.rotations import Array
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """What no commanded pose may exceed: mm and rad; the margin is dimensionless."""
+    """Limits that every commanded pose keeps: mm and rad; the singularity margin is dimensionless."""
 
     gauge_travel_mm: float
     tilt: float
@@ -52,3 +53,8 @@ class RobotBelief:
     def estimate(self) -> Geometry:
         """The estimated geometry."""
         return Geometry.from_vector(self.basis @ np.asarray(self.free))
+
+    @cached_property
+    def commanded(self) -> CommandedRobot:
+        """The estimated robot under its controller."""
+        return CommandedRobot(self.mechanism, self.branch, self.controller, self.estimate)

@@ -1,4 +1,14 @@
-"""Straight lines of commands, and where a robot really goes while its controller follows them."""
+"""Straight lines of commands, and the actual path of a robot while its controller follows them.
+
+The controller interpolates the command linearly. The actual pose at each point of the line closes the
+robot's own geometry at the joint variables that the controller computes; it is found by path tracking
+with a predictor and a corrector (Allgower & Georg, Numerical Continuation Methods, 1990). The predictor
+moves the last actual pose by the change of the command, the corrector is Newton's method.
+
+Tracking point by point is slow for many lines, so :func:`trace_path` first corrects all points of all
+lines at once, each predicted from the start of its line. That is exact wherever Newton's method stays on
+the branch. Lines that may have left it are verified, and tracked point by point if that fails.
+"""
 
 from __future__ import annotations
 
@@ -18,32 +28,34 @@ from hexacell.kinematics.rotations import Array, Mask
 from hexacell.kinematics.sensitivity import pose_jacobian
 
 PIECES = 12
-PIECES_BETWEEN_STOPS = 4
+PIECES_BETWEEN_WAYPOINTS = 4
+"""Pieces that a line is divided into."""
 
-CLOSE_MM = 1e-4
-"""So well the poses on a line are known; travel is checked in tenths of a millimetre."""
+TOLERANCE_MM = 1e-4
+"""Of the constraints at the poses of a line; gauge travel is checked in tenths of a millimetre."""
 
 JUMP_MM = 20.0
-JUMP = np.radians(10.0)
-"""What a robot may move otherwise than commanded in a piece of a line and be believed."""
+JUMP_ANGLE = np.radians(10.0)
+"""Largest difference, within a piece of a line, between the motion of the robot and of the command.
+A larger one may be a jump to another solution."""
 
 
 def interpolate_line(start: PoseBatch, end: PoseBatch, pieces: int = PIECES) -> PoseBatch:
-    """The poses (pieces + 1) on a controller's straight line from one pose to another.
+    """The poses on a controller's straight lines, ``pieces + 1`` a line.
 
-    Controllers move all six numbers x, y, z, a, b, c evenly (LinuxCNC's G0), angles included. Of n
-    lines, with one start or n of them, the poses come piece by piece.
+    Controllers interpolate all six numbers x, y, z, a, b, c linearly, angles included (LinuxCNC's G0).
+    ``end`` has n poses and ``start`` one or n. The poses of n lines are ordered by piece, then by line.
     """
-    share = np.linspace(0.0, 1.0, pieces + 1)[:, None, None]
-    begin, ends = (rotations.to_angles(poses.rotations) for poses in (start, end))
-    positions = (1.0 - share) * start.positions + share * end.positions
-    angles = (1.0 - share) * begin + share * ends
+    fraction = np.linspace(0.0, 1.0, pieces + 1)[:, None, None]
+    start_angles, end_angles = (rotations.to_angles(poses.rotations) for poses in (start, end))
+    positions = (1.0 - fraction) * start.positions + fraction * end.positions
+    angles = (1.0 - fraction) * start_angles + fraction * end_angles
     return PoseBatch(positions.reshape(-1, 3), rotations.from_angles(angles.reshape(-1, 3)))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LineBatch:
-    """Poses one after the other on n lines.
+    """Poses along n lines.
 
     Attributes:
         positions: (pieces + 1, n, 3), mm.
@@ -55,19 +67,20 @@ class LineBatch:
 
     @classmethod
     def from_poses(cls, poses: PoseBatch, count: int) -> LineBatch:
-        """Of poses that come piece by piece."""
+        """``count`` lines from poses that are ordered by piece, then by line."""
         return cls(poses.positions.reshape(-1, count, 3), poses.rotations.reshape(-1, count, 3, 3))
 
     @classmethod
-    def through(cls, stops: Sequence[PoseBatch], times: int = 1) -> LineBatch:
-        """From stop to stop, of which there are one or n at a time, by straight lines.
+    def through(cls, waypoints: Sequence[PoseBatch], refinement: int = 1) -> LineBatch:
+        """Straight lines from waypoint to waypoint, one or n poses each; n at the end.
 
-        In so many ``times`` the pieces that these lines have as a rule.
+        ``refinement`` multiplies the usual number of pieces.
         """
-        pieces = times * (PIECES if len(stops) == 2 else PIECES_BETWEEN_STOPS)
-        count = len(stops[-1])
+        pieces = refinement * (PIECES if len(waypoints) == 2 else PIECES_BETWEEN_WAYPOINTS)
+        count = len(waypoints[-1])
         parts = [
-            cls.from_poses(interpolate_line(here, there, pieces), count) for here, there in pairwise(stops)
+            cls.from_poses(interpolate_line(start, end, pieces), count)
+            for start, end in pairwise(waypoints)
         ]
         return cls(
             np.concatenate([parts[0].positions[:1], *(part.positions[1:] for part in parts)]),
@@ -80,29 +93,34 @@ class LineBatch:
         return self.positions.shape[0], self.positions.shape[1]
 
     def __getitem__(self, pieces: slice) -> LineBatch:
-        """The poses after some pieces."""
         return LineBatch(self.positions[pieces], self.rotations[pieces])
 
     def at(self, piece: int, rows: NDArray[np.intp]) -> PoseBatch:
-        """The poses on some lines after so many pieces."""
+        """The poses of some lines at the end of a piece."""
         return PoseBatch(self.positions[piece, rows], self.rotations[piece, rows])
 
     def lines(self, rows: NDArray[np.intp]) -> LineBatch:
-        """Some of them."""
+        """Some of the lines."""
         return LineBatch(self.positions[:, rows], self.rotations[:, rows])
 
     def flat(self) -> PoseBatch:
-        """All poses, piece by piece."""
+        """All poses, ordered by piece, then by line."""
         return PoseBatch(self.positions.reshape(-1, 3), self.rotations.reshape(-1, 3, 3))
+
+    def with_lines(self, rows: NDArray[np.intp], lines: LineBatch) -> LineBatch:
+        """A copy in which ``lines`` replace those in ``rows``."""
+        positions, turns = self.positions.copy(), self.rotations.copy()
+        positions[:, rows], turns[:, rows] = lines.positions, lines.rotations
+        return LineBatch(positions, turns)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TracedPath:
-    """Where a robot goes on n lines.
+    """The actual path of a robot along n lines.
 
     Attributes:
-        actual: of lines that are not ``found`` it says nothing.
-        found: (n,) along which of them it can go, and stays on its assembly mode.
+        actual: poses; meaningless on lines that are not ``found``.
+        found: (n,) lines that the robot can follow on its assembly mode.
     """
 
     actual: LineBatch
@@ -114,99 +132,94 @@ def trace_path(
     geometry: Geometry,
     commands: LineBatch,
     joints: Array,
-    here: PoseBatch,
+    start: PoseBatch,
     *,
     thorough: bool = True,
 ) -> TracedPath:
-    """Where a robot goes while its controller moves the sliders (pieces + 1, n, 6), mm, along lines.
+    """The actual path of a robot whose joints move through (pieces + 1, n, 6), mm, along n lines.
 
-    ``here`` (1) is where it is at the start of all of them. Each pose is the one that is found from
-    the pose before it. All are searched for at once, from where the robot would be if it moved as
-    commanded; where they move far otherwise, each is found again from the one before. Lines on which
-    that differs, a few in a hundred, are followed step by step if it is to be ``thorough``, else given
-    up.
+    ``start`` (1) is the actual pose at the start of all lines. Lines on which poses from one parallel
+    correction cannot be confirmed, a few in a hundred, are tracked point by point if ``thorough``, else
+    they count as not found.
     """
-    jacobian = pose_jacobian(mechanism, geometry, here, joints[0, :1])
+    jacobian = pose_jacobian(mechanism, geometry, start, joints[0, :1])
     robot = _Robot(mechanism, geometry, assembly_mode(jacobian))
-    begin = _carried(commands[:1], commands, LineBatch.from_poses(here, 1))
-    found, reached = robot.found(joints, begin)
-    sure: Mask = np.all(reached, axis=0)
-    jumping = np.flatnonzero(sure & _jumps(commands, found))
-    if len(jumping):
-        sure[jumping] = robot.confirmed(joints[:, jumping], commands.lines(jumping), found.lines(jumping))
-    doubtful = np.flatnonzero(~sure)
-    if not (thorough and len(doubtful)):
-        return TracedPath(found, sure)
-    stepped, went = _step_by_step(robot, commands.lines(doubtful), joints[:, doubtful], here)
-    positions, turns = found.positions.copy(), found.rotations.copy()
-    positions[:, doubtful], turns[:, doubtful] = stepped.positions, stepped.rotations
-    sure[doubtful] = went
-    return TracedPath(LineBatch(positions, turns), sure)
+    predicted = _predict(commands[:1], commands, LineBatch.from_poses(start, 1))
+    actual, converged = robot.correct(joints, predicted)
+    confirmed: Mask = np.all(converged, axis=0)
+    suspect = np.flatnonzero(confirmed & _may_have_jumped(commands, actual))
+    if len(suspect):
+        confirmed[suspect] = robot.confirm(
+            joints[:, suspect], commands.lines(suspect), actual.lines(suspect)
+        )
+    open_rows = np.flatnonzero(~confirmed)
+    if not (thorough and len(open_rows)):
+        return TracedPath(actual, confirmed)
+    tracked = _track(robot, commands.lines(open_rows), joints[:, open_rows], start)
+    confirmed[open_rows] = tracked.found
+    return TracedPath(actual.with_lines(open_rows, tracked.actual), confirmed)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Robot:
-    """A robot on one of its assembly modes, the sign ``mode`` (1,) of its Jacobian's determinant."""
+    """A robot on one assembly mode: the sign ``mode`` (1,) of its Jacobian's determinant."""
 
     mechanism: Mechanism
     geometry: Geometry
     mode: Array
 
-    def found(self, joints: Array, start: LineBatch) -> tuple[LineBatch, Mask]:
-        """Poses of joint variables (m, n, 6), mm, from nearby ones, and which were found (m, n)."""
+    def correct(self, joints: Array, predicted: LineBatch) -> tuple[LineBatch, Mask]:
+        """Newton's method from predicted poses at joints (m, n, 6), mm; which converged (m, n)."""
         shape = joints.shape[:2]
         result = forward_kinematics(
             self.mechanism,
             self.geometry,
             joints.reshape(-1, 6),
-            start.flat(),
+            predicted.flat(),
             mode=self.mode.repeat(shape[0] * shape[1]),
-            close_mm=CLOSE_MM,
+            close_mm=TOLERANCE_MM,
         )
         return LineBatch.from_poses(result.poses, shape[1]), result.found.reshape(shape)
 
-    def confirmed(self, joints: Array, commands: LineBatch, poses: LineBatch) -> Mask:
-        """On which lines (n,) each pose is found from the one before."""
-        again, found = self.found(joints[1:], _carried(commands[:-1], commands[1:], poses[:-1]))
-        same = np.abs(again.positions - poses.positions[1:]).max(axis=-1) < 10.0 * CLOSE_MM
-        confirmed: Mask = (same & found).all(axis=0)
+    def confirm(self, joints: Array, commands: LineBatch, actual: LineBatch) -> Mask:
+        """On which lines (n,) each pose is found again from the pose before it."""
+        again, converged = self.correct(joints[1:], _predict(commands[:-1], commands[1:], actual[:-1]))
+        same = np.abs(again.positions - actual.positions[1:]).max(axis=-1) < 10.0 * TOLERANCE_MM
+        confirmed: Mask = np.all(converged & same, axis=0)
         return confirmed
 
 
-def _jumps(commands: LineBatch, poses: LineBatch) -> Mask:
-    """On which lines (n,) the robot moves so far otherwise than commanded that it may have jumped.
+def _may_have_jumped(commands: LineBatch, actual: LineBatch) -> Mask:
+    """On which lines (n,) the actual motion within a piece is far from the commanded one.
 
-    From one solution of the forward kinematics to another; these lie farther apart.
+    It may be a jump to another solution of the forward kinematics; these are farther apart.
     """
-    carried = _carried(commands[:-1], commands[1:], poses[:-1])
-    away = np.linalg.norm(poses.positions[1:] - carried.positions, axis=-1)
-    cosine = 0.5 * (np.einsum("mnij,mnij->mn", poses.rotations[1:], carried.rotations) - 1.0)
-    jumps: Mask = ((away > JUMP_MM) | (cosine < np.cos(JUMP))).any(axis=0)
-    return jumps
+    predicted = _predict(commands[:-1], commands[1:], actual[:-1])
+    distance = np.linalg.norm(actual.positions[1:] - predicted.positions, axis=-1)
+    cosine = 0.5 * (np.einsum("mnij,mnij->mn", actual.rotations[1:], predicted.rotations) - 1.0)
+    suspect: Mask = ((distance > JUMP_MM) | (cosine < np.cos(JUMP_ANGLE))).any(axis=0)
+    return suspect
 
 
-def _carried(before: LineBatch, after: LineBatch, real: LineBatch) -> LineBatch:
-    """Where the robot will be if it moves as the command does, from ``before`` to ``after``."""
+def _predict(before: LineBatch, after: LineBatch, actual: LineBatch) -> LineBatch:
+    """Actual poses moved by the change of the command from ``before`` to ``after``."""
     turns = after.rotations @ np.swapaxes(before.rotations, -1, -2)
-    return LineBatch(real.positions + after.positions - before.positions, turns @ real.rotations)
+    return LineBatch(actual.positions + after.positions - before.positions, turns @ actual.rotations)
 
 
-def _step_by_step(
-    robot: _Robot, commands: LineBatch, joints: Array, here: PoseBatch
-) -> tuple[LineBatch, Mask]:
-    really = LineBatch(commands.positions.copy(), commands.rotations.copy())
+def _track(robot: _Robot, commands: LineBatch, joints: Array, start: PoseBatch) -> TracedPath:
+    """The lines point by point, each point predicted from the one before."""
+    positions, turns = commands.positions.copy(), commands.rotations.copy()
     rows = np.arange(joints.shape[1])
-    start = LineBatch.from_poses(here[np.zeros(len(rows), dtype=int)], len(rows))
+    predicted = LineBatch.from_poses(start[np.zeros(len(rows), dtype=int)], len(rows))
     for piece in range(len(joints)):
-        found, went = robot.found(joints[[piece]][:, rows], start)
-        # What cannot be followed is not led on: it would cost more than all the others.
-        kept = went[0]
-        rows, found = rows[kept], found.lines(np.flatnonzero(kept))
+        actual, converged = robot.correct(joints[[piece]][:, rows], predicted)
+        # Lines that fail are dropped: continuing them would cost more than all the others.
+        rows, actual = rows[converged[0]], actual.lines(np.flatnonzero(converged[0]))
         if not len(rows):
             break
-        really.positions[piece, rows] = found.positions[0]
-        really.rotations[piece, rows] = found.rotations[0]
+        positions[piece, rows], turns[piece, rows] = actual.positions[0], actual.rotations[0]
         if piece + 1 < len(joints):
-            now, then = commands[piece : piece + 1], commands[piece + 1 : piece + 2]
-            start = _carried(now.lines(rows), then.lines(rows), found)
-    return really, np.isin(np.arange(joints.shape[1]), rows)
+            before, after = commands[piece : piece + 1], commands[piece + 1 : piece + 2]
+            predicted = _predict(before.lines(rows), after.lines(rows), actual)
+    return TracedPath(LineBatch(positions, turns), np.isin(np.arange(joints.shape[1]), rows))

@@ -1,14 +1,16 @@
-"""How to get from one command to others with gauges at the ball.
+"""Paths from one command to others with gauges at the ball: straight, over waypoints, over the reference.
 
-A controller moves along a straight line of its own six numbers. Its geometry is wrong by millimetres,
-and by other ones in every orientation, so that between two poses far apart the ball leaves the travel
-though it is inside at both. There the way is led over stops at which the command gives way by as much
-as the estimate says the ball would have moved.
+A controller moves along a straight line of its own six numbers. Its geometry is wrong by millimetres, and
+differently in every orientation. Between two orientations far apart the ball may therefore leave the
+gauges' travel although it is inside at both ends. A path over waypoints corrects this: at some points of
+the straight line the command is shifted back by the deviation that the estimate predicts there.
+
+Lines between two large rotations often cross a singularity, though each end can be reached from the
+reference. A path over the reference is therefore the third kind.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -23,142 +25,140 @@ from hexacell.motion.trajectory import PIECES
 
 Rows = NDArray[np.intp]
 
-STOPS_AT = (1, PIECES // 3, 2 * PIECES // 3, PIECES - 1)
-"""Pieces of the straight line after which the stops lie: closer together next to wide turns, where the
-ball moves fastest."""
+WAYPOINT_PIECES = (1, PIECES // 3, 2 * PIECES // 3, PIECES - 1)
+"""Pieces of the straight line after which the waypoints are: closer together near the ends, where
+rotations are large and the ball moves fastest."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Path:
-    """One way.
+    """A path that keeps joint ranges, singularity margin and gauge travel.
 
     Attributes:
-        stops: commands to pass on the way.
-        poses: where the estimated robot will be on it (m), and its ``joints`` (m, 6), mm.
-        farthest: how far the ball gets from the reference along any axis, mm.
+        waypoints: commands between its ends.
+        poses: actual poses (m) of the estimated robot along it, and their ``joints`` (m, 6), mm.
     """
 
-    stops: tuple[Pose, ...]
+    waypoints: tuple[Pose, ...]
     poses: PoseBatch
     joints: Array
-    farthest: float
 
-    def then(self, over: Pose, onward: Path) -> Path:
-        """This way, and ``onward`` from the pose ``over`` at its end."""
+    def then(self, waypoint: Pose, onward: Path) -> Path:
+        """This path, and ``onward`` from the ``waypoint`` at its end."""
         return Path(
-            (*self.stops, over, *onward.stops),
+            (*self.waypoints, waypoint, *onward.waypoints),
             PoseBatch(
                 np.concatenate([self.poses.positions, onward.poses.positions]),
                 np.concatenate([self.poses.rotations, onward.poses.rotations]),
             ),
             np.concatenate([self.joints, onward.joints]),
-            max(self.farthest, onward.farthest),
         )
 
 
 @dataclass(frozen=True, eq=False)
 class PathPlanner:
-    """Leaving one command with gauges at the ball.
+    """Plans paths from one command.
 
     Attributes:
-        start: the command to leave from.
-        home: the reference's command; none if that is where it starts.
+        start: the command (1) that paths start from.
+        reference_command: the command (1) of the reference; none if paths start there.
         reference: where the ball was when the gauges were zeroed (3,), mm.
     """
 
     belief: RobotBelief
     start: PoseBatch
-    home: PoseBatch | None
+    reference_command: PoseBatch | None
     reference: Array
 
-    def to(self, ends: PoseBatch) -> list[Path | None]:
-        """The ways to n commands, straight or else led, as far as there are."""
-        return self.ways(ends).any()
+    def plan(self, ends: PoseBatch) -> list[Path | None]:
+        """A path to each of n commands, straight or else over waypoints; none where there is neither."""
+        options = self.options(ends)
+        paths = options.straight(np.arange(len(ends)))
+        blocked = np.array([row for row, path in enumerate(paths) if path is None], dtype=np.intp)
+        for row, path in zip(blocked, options.via_waypoints(blocked), strict=True):
+            paths[row] = path
+        return paths
 
-    def ways(self, ends: PoseBatch) -> PathOptions:
-        """All that lead to n commands."""
-        return PathOptions(self, ends)
+    def options(self, ends: PoseBatch) -> PathOptions:
+        """The paths of each kind to n commands.
+
+        A single line is searched thoroughly. Of several lines one that is hard to trace is left out:
+        tracing it costs more than trying another end.
+        """
+        return PathOptions(self, ends, self.check(ends, thorough=len(ends) == 1))
+
+    def check(
+        self, ends: PoseBatch, waypoints: tuple[PoseBatch, ...] = (), *, thorough: bool
+    ) -> CheckedLines:
+        """Check lines from the start to n commands, straight or over waypoints (n each)."""
+        return check_lines(
+            self.belief, self._start_state, ends, self.reference, waypoints, thorough=thorough
+        )
 
     @cached_property
-    def beginning(self) -> StartState:
-        """Where it leaves from."""
+    def from_reference(self) -> PathPlanner | None:
+        """The planner of paths from the reference; none if this one starts there."""
+        if self.reference_command is None:
+            return None
+        return PathPlanner(self.belief, self.reference_command, None, self.reference)
+
+    @cached_property
+    def to_reference(self) -> Path | None:
+        """The path to the reference; none if there is none, or this planner starts there."""
+        return None if self.reference_command is None else self.plan(self.reference_command)[0]
+
+    @cached_property
+    def _start_state(self) -> StartState:
         return start_state(self.belief, self.start)
 
-    @cached_property
-    def from_home(self) -> PathPlanner | None:
-        """Leaving the reference."""
-        if self.home is None:
-            return None
-        return PathPlanner(self.belief, self.home, None, self.reference)
 
-    @cached_property
-    def back(self) -> Path | None:
-        """The way to the reference."""
-        return None if self.home is None else self.to(self.home)[0]
-
-
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False)
 class PathOptions:
-    """Ways from one command to n others; each manner answers for some ``rows`` of them."""
+    """Three kinds of path to n commands, each for some ``rows`` of them; none where there is no path.
 
-    departure: PathPlanner
+    Attributes:
+        lines: the straight lines.
+    """
+
+    planner: PathPlanner
     ends: PoseBatch
+    lines: CheckedLines
 
-    def straight(self, rows: Rows) -> Iterator[Path | None]:
-        """Straight ways that are clear in the sense of :func:`hexacell.motion.path_check.check_lines`."""
-        return _passages(self._ahead, (), rows)
+    def straight(self, rows: Rows) -> list[Path | None]:
+        """Straight paths."""
+        return [_path(self.lines, (), row) for row in rows.tolist()]
 
-    def via_waypoints(self, rows: Rows) -> Iterator[Path | None]:
-        """Ways over stops; of straight ones that are not open nothing says where to give way."""
-        leading = np.flatnonzero(self._ahead.is_open[rows])
-        if not len(leading):
-            return iter([None] * len(rows))
-        stops = tuple(self._giving_way(piece, rows[leading]) for piece in STOPS_AT)
-        led = self._look_ahead(self.ends[rows[leading]], stops)
-        places = np.full(len(rows), -1)
-        places[leading] = np.arange(len(leading))
-        return _passages(led, stops, places)
+    def via_waypoints(self, rows: Rows) -> list[Path | None]:
+        """Paths over shifted waypoints, which are known only where the straight line is open."""
+        is_open = self.lines.is_open[rows]
+        if not is_open.any():
+            return [None] * len(rows)
+        waypoints = tuple(self._shifted(piece, rows[is_open]) for piece in WAYPOINT_PIECES)
+        lines = self.planner.check(self.ends[rows[is_open]], waypoints, thorough=len(self.ends) == 1)
+        places = np.cumsum(is_open) - 1
+        return [
+            _path(lines, waypoints, place) if opened else None
+            for place, opened in zip(places.tolist(), is_open.tolist(), strict=True)
+        ]
 
-    def via_reference(self, rows: Rows) -> Iterator[Path | None]:
-        """Ways over the reference.
+    def via_reference(self, rows: Rows) -> list[Path | None]:
+        """Paths over the reference, each half straight or over waypoints."""
+        back, onward = self.planner.to_reference, self.planner.from_reference
+        if back is None or onward is None or not len(rows):
+            return [None] * len(rows)
+        reference = onward.start.pose(0)
+        paths = onward.plan(self.ends[rows])
+        return [None if path is None else back.then(reference, path) for path in paths]
 
-        Lines between two large turns often lead through a singularity, where each of the two could
-        be reached from the reference.
-        """
-        home, back, onward = self.departure.home, self.departure.back, self.departure.from_home
-        if home is None or back is None or onward is None or not len(rows):
-            return iter([None] * len(rows))
-        over, ways = home.pose(0), onward.to(self.ends[rows])
-        return (None if way is None else back.then(over, way) for way in ways)
-
-    def any(self) -> list[Path | None]:
-        """To each of them, straight or else led."""
-        ways = list(self.straight(np.arange(len(self.ends))))
-        rows = np.array([row for row, way in enumerate(ways) if way is None], dtype=np.intp)
-        for row, way in zip(rows, self.via_waypoints(rows), strict=True):
-            ways[row] = way
-        return ways
-
-    @cached_property
-    def _ahead(self) -> CheckedLines:
-        return self._look_ahead(self.ends)
-
-    def _look_ahead(self, ends: PoseBatch, stops: tuple[PoseBatch, ...] = ()) -> CheckedLines:
-        leave, thorough = self.departure, len(self.ends) == 1
-        return check_lines(leave.belief, leave.beginning, ends, leave.reference, stops, thorough=thorough)
-
-    def _giving_way(self, piece: int, rows: Rows) -> PoseBatch:
-        """Commands on some lines after so many pieces, less what the ball is off the reference there."""
-        commands, really = self._ahead.commands.at(piece, rows), self._ahead.actual.at(piece, rows)
-        off = really.positions - self.departure.reference
-        return PoseBatch(commands.positions - off, commands.rotations)
+    def _shifted(self, piece: int, rows: Rows) -> PoseBatch:
+        """Commands on some lines after a piece, shifted back by the ball's deviation there."""
+        commands, actual = self.lines.commands.at(piece, rows), self.lines.actual.at(piece, rows)
+        deviation = actual.positions - self.planner.reference
+        return PoseBatch(commands.positions - deviation, commands.rotations)
 
 
-def _passages(ahead: CheckedLines, stops: tuple[PoseBatch, ...], rows: Rows) -> Iterator[Path | None]:
-    """Some of n ways over n stops each; none where there is none, or the row is negative."""
-    for row in rows.tolist():
-        if row < 0 or not ahead.is_clear[row]:
-            yield None
-        else:
-            over = tuple(stop.pose(row) for stop in stops)
-            yield Path(over, *ahead.traced(row), float(ahead.farthest[row]))
+def _path(lines: CheckedLines, waypoints: tuple[PoseBatch, ...], row: int) -> Path | None:
+    """One of the lines as a path, with one of n poses of each waypoint; none if it is not clear."""
+    if not lines.is_clear[row]:
+        return None
+    return Path(tuple(waypoint.pose(row) for waypoint in waypoints), *lines.traced(row))

@@ -13,7 +13,7 @@ import numpy as np
 from hexacell.errors import LimitError
 from hexacell.experiment_design.candidates import within_limits
 from hexacell.kinematics import rotations
-from hexacell.kinematics.forward import continue_solution
+from hexacell.kinematics.forward import CONTINUATION_STAGES
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array
@@ -148,43 +148,26 @@ class _Chosen:
 
     def offer(self, commands: PoseBatch, wanted: int) -> None:
         robot = self._robot
-        joints = robot.mechanism.inverse(robot.controller, robot.branch, commands)
-        rows = np.flatnonzero(within_limits(robot.limits, commands, joints))
-        commands, joints = commands[rows], joints[rows]
-        really = continue_solution(
-            robot.mechanism,
-            self._truth,
-            joints,
-            start=commands,
-            start_geometry=robot.controller,
-            start_joints=joints,
-        )
+        actual = robot.commanded(self._truth).actual_poses(commands)
+        rows = np.flatnonzero(actual.found & within_limits(robot.limits, commands, actual.joints))
+        commands, joints, really = commands[rows], actual.joints[rows], actual.poses[rows]
         margins = [
             singularity_margin(robot.mechanism, geometry, poses, joints)
-            for geometry, poses in ((robot.controller, commands), (self._truth, really.poses))
+            for geometry, poses in ((robot.commanding, commands), (self._truth, really))
         ]
-        clear = really.found & (np.min(margins, axis=0, initial=np.inf) >= self._margin)
+        clear = np.min(margins, axis=0, initial=np.inf) >= self._margin
         kept = np.flatnonzero(clear)[: wanted - self.count]
         self.commands.append(commands[kept])
         self.joints.append(joints[kept])
-        self.really.append(really.poses[kept])
+        self.really.append(really[kept])
 
 
 def _commands(robot: Robot, truth: Geometry, targets: PoseBatch) -> PoseBatch:
-    """What to command so that the true robot goes to the targets, where the controller can."""
+    """The commands that bring the true robot to those of the targets that it can be brought to."""
     joints = robot.mechanism.inverse(truth, robot.branch, targets)
     rows = np.flatnonzero(np.isfinite(joints).all(axis=-1))
-    found = continue_solution(
-        robot.mechanism,
-        robot.controller,
-        joints[rows],
-        start=targets[rows],
-        start_geometry=truth,
-        start_joints=joints[rows],
-    )
-    back = robot.mechanism.inverse(robot.controller, robot.branch, found.poses)
-    agrees = np.abs(np.nan_to_num(back, nan=np.inf) - joints[rows]).max(axis=-1, initial=0.0) < 1e-6
-    return found.poses[np.flatnonzero(found.found & agrees)]
+    commands = robot.commanded(truth).commands_for(targets[rows], joints[rows], stages=CONTINUATION_STAGES)
+    return commands.poses[np.flatnonzero(commands.found)]
 
 
 def _campaign(sets: list[_Chosen], orientations: int) -> Campaign:

@@ -148,8 +148,8 @@ class AdaptiveCampaign:
         start, *trail = reversed(self._trail)
         belief = self._plan.estimate(self.state).belief
         home = self._held(self._trail[0])
-        (way,) = PathPlanner(belief, self._held(start), None, reference).to(home)
-        stops = trail if way is None else [self.robot.to_command(pose) for pose in way.stops]
+        (way,) = PathPlanner(belief, self._held(start), None, reference).plan(home)
+        stops = trail if way is None else [self.robot.to_command(pose) for pose in way.waypoints]
         for pose in (*stops, self._trail[0]):
             self._go(pose)
 

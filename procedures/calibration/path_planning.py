@@ -1,13 +1,14 @@
-"""How to get to a pose from wherever the robot stands: by checked straight lines, or not at all."""
+"""The next move to a pose from wherever the robot is: along checked straight lines, or not at all.
+
+The paths are those of :mod:`hexacell.motion`; this module takes their ends from the state of a run.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hexacell.campaign.pose_list import is_same_pose
 from hexacell.errors import HexacellError, LimitError
 from hexacell.experiment_design.gauge_zero import GaugeZero
 from hexacell.identification.belief import RobotBelief
@@ -15,8 +16,9 @@ from hexacell.identification.estimator import estimate_online
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.rotations import Array
-from hexacell.motion.path_check import is_clear
-from hexacell.motion.route_search import ball_position, find_route
+from hexacell.motion.path_check import ball_position
+from hexacell.motion.return_path import next_return_move
+from hexacell.motion.route_search import find_route
 from hexacell.motion.waypoint_planner import PathPlanner
 from hexacell.robot_model import Robot
 from procedures.run.state import RunState
@@ -24,12 +26,12 @@ from procedures.run.steps import Move, SetKey, SixNumbers
 
 
 class NoSafePath(LimitError):
-    """No checked straight line leads on from where the robot stands; nothing moved."""
+    """No checked straight line leads on from where the robot is; nothing moved."""
 
 
 @dataclass(frozen=True, eq=False)
 class RunPathPlanner:
-    """The ways of one robot."""
+    """Plans the moves of one robot."""
 
     robot: Robot
 
@@ -38,46 +40,41 @@ class RunPathPlanner:
         return not state.off_plan and (state.standing is None or state.standing[0] == key)
 
     def towards(self, state: RunState, goal: Move, reference: Array | None = None) -> Move:
-        """``goal`` if the straight line to it is clear, else the first move of a way round.
+        """The next move towards ``goal``: ``goal`` itself if the straight line to it is clear.
 
-        With gauges at a ``reference`` (3,), mm, the ball stays inside their travel all the way, unless
-        it is outside already. Ways round lead over untilted poses and over poses the set has visited.
+        With gauges zeroed where the ball was at ``reference`` (3,), mm, the ball stays inside their
+        travel on the path, unless it is outside already. Intermediate poses are level ones, poses that
+        the set has visited, and waypoints.
 
         Raises:
-            NoSafeWay: there is none.
+            NoSafePath: there is no path.
         """
         if state.target is None:
             return goal
-        via = self._between(state, goal)
-        poses = [self._held(pose) for _, pose in via]
-        start, end = self._held(state.target), self._held(goal.pose)
+        via = self._intermediate(state, goal)
+        start, end = self._command(state.target), self._command(goal.pose)
         belief = self._belief(state)
-        if reference is not None and not _inside(belief, start, reference):
+        if reference is not None and not _is_inside(belief, start, reference):
             reference = None
-        way = find_route(belief, start, end, poses, reference)
-        if way:
-            orientation, pose = via[way[0]]
+        route = find_route(belief, start, end, [self._command(pose) for _, pose in via], reference)
+        if route:
+            orientation, pose = via[route[0]]
             return Move(at=goal.at, orientation=orientation, pose=pose)
-        if way is None:
-            return self._led(belief, state.target, goal, reference)
-        return goal
-
-    def _led(self, belief: RobotBelief, here: SixNumbers, goal: Move, reference: Array | None) -> Move:
-        """The first stop on the way to a goal to which no straight lines lead."""
-        if reference is not None:
-            (way,) = PathPlanner(belief, self._held(here), None, reference).to(self._held(goal.pose))
-            if way is not None:
-                return self._stop(goal, way.stops[0])
-        raise _no_way(here, goal)
+        if route is not None:
+            return goal
+        paths = [] if reference is None else PathPlanner(belief, start, None, reference).plan(end)
+        for path in paths:
+            if path is not None:
+                return self._waypoint(goal.at, path.waypoints[0])
+        raise _no_safe_path(state.target, goal)
 
     def back(
         self, state: RunState, key: SetKey, known: tuple[RobotBelief, GaugeZero] | None
     ) -> Move | None:
-        """The next move on the way back to a set's reference, the gauges being there.
+        """The next move back to a set's reference, the gauges being there.
 
-        As straight as what is ``known`` finds safe: to the reference itself, to it over stops, or to
-        the earliest pose of the trail. The last resort is the way that the robot came. Nothing if it
-        did not come from the reference.
+        See :func:`hexacell.motion.return_path.next_return_move`. Where nothing is ``known`` the robot
+        returns along its trail. None if it did not come from the reference.
         """
         trail = state.path_from_reference
         if len(trail) < 2 or state.target != trail[-1][1] or trail[0][1] != state.set(key).pose(1):
@@ -85,51 +82,32 @@ class RunPathPlanner:
         moves = [Move(at=key, orientation=orientation, pose=pose) for orientation, pose in trail[:-1]]
         if known is None or len(moves) == 1:
             return moves[-1]
-        return self._straightest(known, trail, moves)
-
-    def _straightest(
-        self,
-        known: tuple[RobotBelief, GaugeZero],
-        trail: Sequence[tuple[int, SixNumbers]],
-        moves: list[Move],
-    ) -> Move:
-        """What is decided at a stop follows from where the way over the stops began.
-
-        Decided anew, it might lead back there, and from there to the stop again.
-        """
-        here, home, (belief, reference) = trail[-1][1], moves[0], (known[0], known[1].reference)
-        begun = next(pose for orientation, pose in reversed(trail) if orientation)
-        (way,) = PathPlanner(belief, self._held(begun), None, reference).to(self._held(home.pose))
-        line = [] if way is None else [Pose(*begun), *map(self.robot.to_command, way.stops)]
-        passed = next((row for row, pose in enumerate(line) if is_same_pose(pose, Pose(*here))), None)
-        if passed is not None:
-            stops = line[passed + 1 :]
-            return Move(at=home.at, orientation=0, pose=stops[0].as_tuple()) if stops else home
-        start = self._held(here)
-        nearest_first = (home, *moves[1:-1])
-        straight = (m for m in nearest_first if is_clear(belief, start, self._held(m.pose), reference))
-        return next(straight, moves[-1])
-
-    def _stop(self, goal: Move, command: Pose) -> Move:
-        """A pose of the convention's frames on the way to a goal."""
-        return Move(at=goal.at, orientation=0, pose=self.robot.to_command(command).as_tuple())
+        belief, zero = known
+        commands = self.robot.from_commands(Pose(*pose) for _, pose in trail)
+        departure = max(row for row, (orientation, _) in enumerate(trail) if orientation)
+        move = next_return_move(belief, zero.reference, commands, departure)
+        return moves[move] if isinstance(move, int) else self._waypoint(key, move)
 
     def ball_at(self, state: RunState, pose: SixNumbers) -> Array | None:
-        """Where the ball really is (3,), mm, at a commanded pose, by what is known now."""
-        return ball_position(self._belief(state), self._held(pose))
+        """The estimated position (3,), mm, of the ball at a commanded pose."""
+        return ball_position(self._belief(state), self._command(pose))
 
-    def _between(self, state: RunState, goal: Move) -> list[tuple[int, SixNumbers]]:
-        """Poses that a way round may lead over, with their orientations; 0 where nothing is measured."""
+    def _waypoint(self, key: SetKey, command: Pose) -> Move:
+        """A move to a pose in the convention's frames at which nothing is measured."""
+        return Move(at=key, orientation=0, pose=self.robot.to_command(command).as_tuple())
+
+    def _intermediate(self, state: RunState, goal: Move) -> list[tuple[int, SixNumbers]]:
+        """Poses that a route may lead over, with their orientations; 0 where nothing is measured."""
         samples = state.set(goal.at).samples
         visited = [(s.orientation, s.pose) for s in samples if s.orientation != goal.orientation]
-        level = [_untilted(pose) for pose in (state.target, goal.pose) if pose is not None]
+        level = [_level(pose) for pose in (state.target, goal.pose) if pose is not None]
         return [*((0, pose) for pose in level), *visited]
 
-    def _held(self, pose: SixNumbers) -> PoseBatch:
+    def _command(self, pose: SixNumbers) -> PoseBatch:
         return self.robot.from_commands([Pose(*pose)])
 
     def _belief(self, state: RunState) -> RobotBelief:
-        """What is known by now; with the identified geometry in the controller, that one commands."""
+        """What is known by now; the identified geometry commands once it is written."""
         found = state.identified.result.get("geometry") if state.identified else None
         if found is None:
             return self._by_records(state)
@@ -148,17 +126,18 @@ class RunPathPlanner:
             return self.robot.belief()
 
 
-def _inside(belief: RobotBelief, pose: PoseBatch, reference: Array) -> bool:
-    ball = ball_position(belief, pose)
+def _is_inside(belief: RobotBelief, command: PoseBatch, reference: Array) -> bool:
+    ball = ball_position(belief, command)
     return ball is not None and bool(np.abs(ball - reference).max() <= belief.limits.gauge_travel_mm)
 
 
-def _untilted(pose: SixNumbers) -> SixNumbers:
+def _level(pose: SixNumbers) -> SixNumbers:
+    """The same position without tilt and rotation."""
     x, y, z, *_ = pose
     return (x, y, z, 0.0, 0.0, 0.0)
 
 
-def _no_way(here: SixNumbers, goal: Move) -> NoSafePath:
+def _no_safe_path(here: SixNumbers, goal: Move) -> NoSafePath:
     return NoSafePath(
         f"{goal.at}: the robot stands at {Pose(*here)}, and no straight line that keeps to the limits "
         f"leads from there to {goal.target}; it was not moved",

@@ -21,7 +21,7 @@ import numpy as np
 
 from hexacell.identification.diagnostics.frame_alignment import FrameFit, pose_errors
 from hexacell.identification.solver.result import Identification
-from hexacell.kinematics.forward import continue_solution
+from hexacell.kinematics.commanded_motion import CommandedRobot
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import Branch
 from hexacell.kinematics.pose import PoseBatch
@@ -122,27 +122,14 @@ def predicted_accuracy(
 def _reached(
     found: Identification, controller: Geometry, branch: Branch, commanded: PoseBatch
 ) -> tuple[PoseBatch, Mask]:
-    """Where the estimated machine stands when the controller is sent to n poses, and which it can take.
+    """Where the estimated robot goes when the controller is sent to n poses, and which poses it can take.
 
-    A pose that the estimate itself could not be sent to, once it is in the controller, is left out.
+    A pose that the estimate itself could not be commanded to, once the controller has it, is left out.
     """
     mechanism = found.problem.mechanism
-    joints = mechanism.inverse(controller, branch, commanded)
-    after = mechanism.inverse(found.geometry, branch, commanded)
-    rows = np.flatnonzero(np.isfinite(joints).all(axis=-1) & np.isfinite(after).all(axis=-1))
-    result = continue_solution(
-        mechanism,
-        found.geometry,
-        joints[rows],
-        start=commanded[rows],
-        start_geometry=controller,
-        start_joints=joints[rows],
-    )
-    positions, orientations = commanded.positions.copy(), commanded.rotations.copy()
-    positions[rows], orientations[rows] = result.poses.positions, result.poses.rotations
-    can_take = np.zeros(len(commanded), dtype=bool)
-    can_take[rows] = result.found
-    return PoseBatch(positions, orientations), can_take
+    actual = CommandedRobot(mechanism, branch, controller, found.geometry).actual_poses(commanded)
+    corrected = mechanism.inverse(found.geometry, branch, commanded)
+    return actual.poses, actual.found & np.isfinite(corrected).all(axis=-1)
 
 
 def _derivatives(found: Identification, branch: Branch, poses: PoseBatch) -> Array:

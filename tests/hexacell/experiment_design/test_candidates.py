@@ -49,26 +49,26 @@ def found(know, much):
 def test_candidates_are_where_the_estimated_robot_stands(found, much, legs):
     assert len(found) > 100
     estimated = legs(much.geometry)
-    for target, joints in zip(as_vectors(found.targets), found.joints, strict=True):
+    for target, joints in zip(as_vectors(found.targets.poses), found.targets.joints, strict=True):
         assert np.abs(estimated.errors(target, joints)).max() < 1e-9
 
 
 def test_commands_lead_the_controllers_own_inverse_to_the_joints(found, paper, legs, vector_of):
     controller = legs(paper.nominal)
-    for row, joints in enumerate(found.joints):
+    for row, joints in enumerate(found.targets.joints):
         command = vector_of(found.commands.pose(row))  # as it is sent: six numbers
         np.testing.assert_allclose(controller.joints(command), joints, atol=1e-6)
 
 
 def test_candidates_are_clear_of_singularities_on_both_sides(found, much, paper, legs):
-    for poses, geometry in ((found.targets, much.geometry), (found.commands, paper.nominal)):
-        for vector, joints in zip(as_vectors(poses), found.joints, strict=True):
+    for poses, geometry in ((found.targets.poses, much.geometry), (found.commands, paper.nominal)):
+        for vector, joints in zip(as_vectors(poses), found.targets.joints, strict=True):
             assert legs(geometry).margin(joints, vector) > 0.05 - 1e-4
 
 
 def test_candidates_keep_to_tilt_and_joint_limits(found):
-    assert found.targets.tilts().max() <= TILT
-    assert np.abs(found.joints).max() <= 800.0
+    assert found.targets.poses.tilts().max() <= TILT
+    assert np.abs(found.targets.joints).max() <= 800.0
 
 
 def test_some_poses_of_the_estimated_robot_have_no_command(know, much):
@@ -78,7 +78,7 @@ def test_some_poses_of_the_estimated_robot_have_no_command(know, much):
     through_itself = reachable(know(much, controller=much.geometry), targets)
     assert len(through_nominal) < len(through_itself)
     np.testing.assert_allclose(
-        through_itself.commands.positions, through_itself.targets.positions, atol=1e-8
+        through_itself.commands.positions, through_itself.targets.poses.positions, atol=1e-8
     )
 
 

@@ -13,7 +13,7 @@ from hexacell.errors import ExitCode, LimitError
 from hexacell.experiment_design import pose_selection
 from hexacell.experiment_design.candidates import orientations
 from hexacell.experiment_design.gauge_zero import estimate_gauge_zero
-from hexacell.experiment_design.pose_selection import ROUND_ABOUT, select_pose
+from hexacell.experiment_design.pose_selection import WAYPOINT_GAIN_RATIO, select_pose
 from hexacell.experiment_design.predicted_records import SAFETY_SIGMAS, TRAVEL_SHARE
 from hexacell.identification.estimator import estimate_online
 from hexacell.kinematics.geometry import Geometry
@@ -139,7 +139,7 @@ def test_no_other_orientation_that_fits_gains_more(know, much):
     at = station_of(know, much, 1)
     best = select_pose(know(much), at, TURNS)
     for rows in (slice(0, 64), slice(64, 128), slice(128, 256)):
-        assert select_pose(know(much), at, TURNS[rows]).gain <= ROUND_ABOUT * best.gain
+        assert select_pose(know(much), at, TURNS[rows]).gain <= WAYPOINT_GAIN_RATIO * best.gain
 
 
 def test_amplitudes_grow_with_what_is_known(know, little, much):
@@ -169,7 +169,7 @@ def test_the_way_from_the_present_pose_is_clear_and_inside_the_travel(
     at = station_of(know, much, 1)
     start = much.problem.commands.poses[[present]]
     choice = select_pose(know(much), at, TURNS, start)
-    line = [np.array(pose.as_tuple()) for pose in (start.pose(0), *choice.stops, choice.command)]
+    line = [np.array(pose.as_tuple()) for pose in (start.pose(0), *choice.waypoints, choice.command)]
     real = much.poses[[present]]
     near = np.concatenate([real.positions[0], Rotation.from_matrix(real.rotations[0]).as_rotvec()])
     for begin, end in pairwise(line):
@@ -196,14 +196,14 @@ def test_stops_must_be_worth_the_moves_that_they_take(know, much, monkeypatch):
     at, start = station_of(know, much, 1), much.problem.commands.poses[[2]]
 
     def chosen(least):
-        monkeypatch.setattr(pose_selection, "ROUND_ABOUT", least)
+        monkeypatch.setattr(pose_selection, "WAYPOINT_GAIN_RATIO", least)
         return select_pose(know(much), at, TURNS, start)
 
-    free, dear, usual = chosen(1.0), chosen(100.0), chosen(ROUND_ABOUT)
-    assert free.stops
-    assert not dear.stops
+    free, dear, usual = chosen(1.0), chosen(100.0), chosen(WAYPOINT_GAIN_RATIO)
+    assert free.waypoints
+    assert not dear.waypoints
     assert free.gain > dear.gain
-    assert usual.gain >= (ROUND_ABOUT if usual.stops else 1.0) * dear.gain
+    assert usual.gain >= (WAYPOINT_GAIN_RATIO if usual.waypoints else 1.0) * dear.gain
 
 
 def test_what_a_record_will_depend_on_is_how_it_moves_with_the_parameters(stage, legs, hexaglide):

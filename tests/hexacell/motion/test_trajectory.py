@@ -75,7 +75,7 @@ def test_what_is_in_doubt_is_followed_step_by_step_or_given_up(
 ):
     ways, joints = commanded
     sure = trace_path(hexaglide, paper.actual, ways, joints, here)
-    monkeypatch.setattr(module._Robot, "confirmed", lambda *_: False)
+    monkeypatch.setattr(module._Robot, "confirm", lambda *_: False)
     monkeypatch.setattr(module, "JUMP_MM", 0.0)
     doubted = trace_path(hexaglide, paper.actual, ways, joints, here)
     np.testing.assert_array_equal(doubted.found, sure.found)
@@ -85,14 +85,14 @@ def test_what_is_in_doubt_is_followed_step_by_step_or_given_up(
     assert not trace_path(hexaglide, paper.actual, ways, joints, here, thorough=False).found.any()
 
 
-def test_a_leap_to_another_solution_is_not_a_way(hexaglide, paper, commanded, here, monkeypatch):
-    """Poses of another assembly mode amid a line, as a search that was led astray would find them."""
+def test_a_jump_to_another_solution_is_not_a_path(hexaglide, paper, commanded, here, monkeypatch):
+    """Poses of another assembly mode amid a line, as a search that left its branch would find them."""
     ways, joints = commanded
     sure = trace_path(hexaglide, paper.actual, ways, joints, here)
-    honest = module._Robot.found
+    honest = module._Robot.correct
     asked = []
 
-    def astray(robot, joints, start):
+    def jumping(robot, joints, start):
         poses, found = honest(robot, joints, start)
         asked.append(len(joints))
         if len(asked) == 1:
@@ -101,19 +101,19 @@ def test_a_leap_to_another_solution_is_not_a_way(hexaglide, paper, commanded, he
             return LineBatch(poses.positions + np.array([0.0, 0.0, 1.0]), turned), found
         return poses, found
 
-    monkeypatch.setattr(module._Robot, "found", astray)
-    mended = trace_path(hexaglide, paper.actual, ways, joints, here)
+    monkeypatch.setattr(module._Robot, "correct", jumping)
+    repaired = trace_path(hexaglide, paper.actual, ways, joints, here)
     assert len(asked) > 1
-    np.testing.assert_array_equal(mended.found, sure.found)
+    np.testing.assert_array_equal(repaired.found, sure.found)
     np.testing.assert_allclose(
-        mended.actual.positions[:, sure.found], sure.actual.positions[:, sure.found], atol=1e-3
+        repaired.actual.positions[:, sure.found], sure.actual.positions[:, sure.found], atol=1e-3
     )
 
 
-def test_from_stop_to_stop():
+def test_from_waypoint_to_waypoint():
     stop, end = PoseBatch.of([Pose(0, 0, 560, 10)]), PoseBatch.of([Pose(10, 0, 550, 0, 10, 0)])
-    way = LineBatch.through((START, stop, end), times=2)
+    way = LineBatch.through((START, stop, end), refinement=2)
     pieces = way.shape[0] - 1
-    assert pieces == 4 * module.PIECES_BETWEEN_STOPS
+    assert pieces == 4 * module.PIECES_BETWEEN_WAYPOINTS
     passed = [way.flat().pose(row).as_tuple() for row in (0, pieces // 2, pieces)]
     np.testing.assert_allclose(passed, [p.pose(0).as_tuple() for p in (START, stop, end)], atol=1e-9)

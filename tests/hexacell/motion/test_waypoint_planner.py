@@ -12,7 +12,7 @@ from hexacell.kinematics.forward import continue_solution
 from hexacell.kinematics.inverse import inverse_kinematics
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.motion.trajectory import interpolate_line
-from hexacell.motion.waypoint_planner import STOPS_AT, PathPlanner
+from hexacell.motion.waypoint_planner import WAYPOINT_PIECES, PathPlanner
 
 TRAVEL_MM = 5.0
 BALL = np.array([0.0, 0.0, 550.0])
@@ -58,47 +58,47 @@ def farthest(well, line):
 
 
 def line_of(passage, start, end):
-    return [start, *(PoseBatch.of([stop]) for stop in passage.stops), end]
+    return [start, *(PoseBatch.of([stop]) for stop in passage.waypoints), end]
 
 
 def test_where_the_straight_line_leaves_the_travel_stops_keep_the_ball_inside(well, commands, home):
     """From one wide turn to others: hardly any straight line is safe, many led ones are."""
     start = commands[[int(np.argmax(commands.tilts()))]]
-    ways = PathPlanner(well, start, None, BALL).to(commands)
-    led = [row for row, way in enumerate(ways) if way and way.stops]
-    direct = [row for row, way in enumerate(ways) if way and not way.stops]
+    ways = PathPlanner(well, start, None, BALL).plan(commands)
+    led = [row for row, way in enumerate(ways) if way and way.waypoints]
+    direct = [row for row, way in enumerate(ways) if way and not way.waypoints]
     assert len(led) > len(direct) > 0
     for row in [*led[:10], *direct[:5]]:
         passage, end = ways[row], commands[[row]]
         assert passage is not None
         seen = farthest(well, line_of(passage, start, end))
         assert seen <= TRAVEL_MM + 0.1
-        assert passage.farthest == pytest.approx(seen, abs=0.3)
+        assert np.abs(passage.poses.positions - BALL).max() == pytest.approx(seen, abs=0.3)
     for row in led[:10]:
         passage = ways[row]
         assert passage is not None
-        assert len(passage.stops) == len(STOPS_AT)
+        assert len(passage.waypoints) == len(WAYPOINT_PIECES)
         assert farthest(well, [start, commands[[row]]]) > TRAVEL_MM
 
 
 def test_over_the_reference_the_ball_stays_inside_as_well(well, commands, home):
     start = commands[[int(np.argmax(commands.tilts()))]]
     leave = PathPlanner(well, start, home, BALL)
-    over = leave.ways(commands).via_reference(np.arange(len(commands)))
+    over = leave.options(commands).via_reference(np.arange(len(commands)))
     found = [(row, way) for row, way in enumerate(over) if way is not None]
     assert len(found) > len(commands) // 4
     for row, way in found[:5]:
-        assert home.pose(0) in way.stops
+        assert home.pose(0) in way.waypoints
         assert farthest(well, line_of(way, start, commands[[row]])) <= TRAVEL_MM + 0.1
 
 
 def test_from_the_reference_itself_there_is_no_way_over_it(well, commands, home):
-    ways = PathPlanner(well, home, None, BALL).ways(commands)
+    ways = PathPlanner(well, home, None, BALL).options(commands)
     assert list(ways.via_reference(np.array([0, 1]))) == [None, None]
 
 
 def test_nothing_leads_away_from_where_the_robot_cannot_be(well, commands):
     beyond = PoseBatch.at([0.0, 0.0, 5000.0], np.eye(3)[None])
     leave = PathPlanner(well, beyond, beyond, BALL)
-    assert not any(leave.to(commands))
-    assert list(leave.ways(commands).via_reference(np.array([0, 1]))) == [None, None]
+    assert not any(leave.plan(commands))
+    assert list(leave.options(commands).via_reference(np.array([0, 1]))) == [None, None]

@@ -116,7 +116,7 @@ def test_where_repeatability_dominates_recalibrating_will_not_help(visit, assess
     )
     nearly = robot.mechanism.normalize_frames(nearly)[0]
     known = replace(
-        robot, drawing=nearly, controller=nearly, change=robot.mechanism.normalize_frames(nearly)[1]
+        robot, drawing=nearly, controller=nearly, frames=robot.mechanism.normalize_frames(nearly)[1]
     )
     measured = visited_twice(visit(commanding=nearly, seed=2).measured(0.01), scatter_mm=0.3)
     found, assessed = assessed_of(measured, known)

@@ -106,7 +106,7 @@ def test_poses_that_were_visited_are_ways_round(recording, make_rig, monkeypatch
 
 async def test_with_no_way_nothing_moves(make_rig, monkeypatch) -> None:
     rig = make_rig()
-    monkeypatch.setattr(path_planning, "route", lambda *_: None)
+    monkeypatch.setattr(path_planning, "find_route", lambda *_: None)
     policy = RecoveryPolicy.of(rig.cell.settings.recovery, attended=False)
     with pytest.raises(NoSafePath):
         await rig.run(policy=policy)

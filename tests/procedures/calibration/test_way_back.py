@@ -13,9 +13,9 @@ from hexacell.errors import IdentifiabilityError
 from hexacell.kinematics.forward import continue_solution
 from hexacell.kinematics.inverse import inverse_kinematics
 from hexacell.kinematics.pose import Pose, PoseBatch
+from hexacell.motion import return_path
 from hexacell.motion import route_search as route_module
 from hexacell.motion.trajectory import interpolate_line
-from procedures.calibration import path_planning
 from procedures.calibration import workflow as module
 from procedures.run import events
 from procedures.run.state import fold
@@ -33,17 +33,17 @@ class Ways:
         self.clear_to = clear_to
         self.stops = stops
         monkeypatch.setattr(module.Calibration, "_known", lambda *_: (None, self))
-        monkeypatch.setattr(path_planning, "is_clear", self._is_clear)
-        monkeypatch.setattr(path_planning, "PathPlanner", self._departure)
+        monkeypatch.setattr(return_path, "is_clear", self._is_clear)
+        monkeypatch.setattr(return_path, "PathPlanner", self._departure)
         self.reference = np.zeros(3)
 
     def _departure(self, _: Any, start: Any, home: Any, reference: Any) -> Any:
-        def to(end: Any) -> Any:
+        def plan(end: Any) -> Any:
             clear = self._is_clear(_, start, end, reference)
-            return [SimpleNamespace(stops=self.stops) if clear else None]
+            return [SimpleNamespace(waypoints=self.stops) if clear else None]
 
         assert home is None
-        return SimpleNamespace(to=to)
+        return SimpleNamespace(plan=plan)
 
     def _is_clear(self, _: Any, present: Any, target: Any, reference: Any) -> bool:
         assert reference is self.reference
@@ -91,8 +91,8 @@ def test_at_a_stop_it_is_not_decided_anew(make_rig, story, monkeypatch) -> None:
         asked.append(start.pose(0).a)
         return stands_in._departure(_, start, home, reference)
 
-    monkeypatch.setattr(path_planning, "PathPlanner", from_the_last_record_only)
-    monkeypatch.setattr(path_planning, "is_clear", lambda *_: False)
+    monkeypatch.setattr(return_path, "PathPlanner", from_the_last_record_only)
+    monkeypatch.setattr(return_path, "is_clear", lambda *_: False)
     monkeypatch.setattr(route_module, "is_clear", lambda *_: False)
     step = calibration.next_step(fold([*happened, story().arrived(0, to_stop.pose)]))
     assert step.key == "P1/o01/move"

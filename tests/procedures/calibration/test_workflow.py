@@ -18,7 +18,7 @@ from hexacell.campaign.planner import REFUSALS
 from hexacell.errors import LimitError
 from hexacell.kinematics.pose import Pose
 from hexacell.motion.route_search import find_route
-from procedures.calibration.path_planning import RunPathPlanner
+from procedures.calibration import path_planning
 from procedures.calibration.workflow import Calibration, Mode, expected_records
 from procedures.run import events
 from procedures.run.state import fold
@@ -187,7 +187,7 @@ class Choices:
         self.made = 0
         self._refusal = refusal
         monkeypatch.setattr(module.Plan, "_visit", self._choose)
-        monkeypatch.setattr(RunPathPlanner, "_straightest", lambda _, known, here, moves: moves[0])
+        monkeypatch.setattr(path_planning, "next_return_move", lambda *_: 0)
         monkeypatch.setattr(Calibration, "_known", lambda *_: (None, SimpleNamespace(reference=None)))
 
     def _choose(self, situation: Any, point: int) -> MeasurePose:
@@ -328,7 +328,7 @@ def test_the_way_after_a_refusal_begins_where_the_robot_is(recording, make_rig, 
         starts.append(start.pose(0).as_tuple())
         return find_route(belief, start, *others)
 
-    monkeypatch.setattr(pose_chooser, "route", spy)
+    monkeypatch.setattr(pose_chooser, "find_route", spy)
     sampled = recording.until(events.RecordTaken, count=4)
     refused_at = (101.0, -99.0, 502.0, 4.0, -3.0, 2.0)
     key = sampled[-1].at

@@ -7,9 +7,10 @@ from contextlib import ExitStack
 from pathlib import Path
 
 from hexacell.application.calibration_run import RunRequest
+from hexacell.application.simulated_cell import require_simulation
 from hexacell.cell.bundled import CONTROLLER, bundled_config
 from hexacell.cell.loader import load_cell
-from hexacell.errors import FileError, UsageError
+from hexacell.errors import FileError
 from hexacell.runs.run_folder import RunFolder
 from hexacell.storage.atomic_files import create_folder_durably, os_error_to_file_error, write_atomically
 from hexacell.storage.cell_lock import config_lock, lock_path
@@ -28,14 +29,9 @@ def prepare_demo(folder: Path, config_name: str) -> RunRequest:
         FileError: the folder is not empty and not an earlier demo's.
         CellBusy: a demo is running in it.
     """
-    cell = load_cell(_copy_cell(_require_simulation(bundled_config(config_name)), folder))
+    bundled = require_simulation(load_cell(bundled_config(config_name)))
+    cell = load_cell(_copy_cell(bundled.path, folder))
     return RunRequest(cell, RunFolder(folder / "run"), Mode.OPTIMISE, UnattendedOperator(), unattended=True)
-
-
-def _require_simulation(cell_file: Path) -> Path:
-    if load_cell(cell_file).settings.simulation is None:
-        raise UsageError("there is no [simulation] in it: this is a real cell", subject=cell_file)
-    return cell_file
 
 
 def _copy_cell(cell_file: Path, folder: Path) -> Path:

@@ -8,20 +8,16 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from hexacell.application.device_setup import device_addresses
-from hexacell.cell.loader import dump, load_cell
-from hexacell.errors import ExitCode, UsageError
+from hexacell.application.simulated_cell import served_cell
+from hexacell.cell.loader import load_cell
+from hexacell.errors import ExitCode
 from hexacell.storage.atomic_files import write_atomically
 
 
 def main(options: argparse.Namespace) -> ExitCode:
     """Serve until interrupted; stdout gets a cell file with the addresses of the served devices."""
     cell = load_cell(options.cell)
-    if cell.settings.simulation is None:
-        raise UsageError("there is no [simulation] in it: this is a real cell", subject=cell.path)
-    with _blocked_signals() as stops, device_addresses(cell, other_processes=True) as settings:
-        controller = settings.controller.model_copy(update={"config": str(cell.config_path.resolve())})
-        text = dump(settings.model_copy(update={"controller": controller}))
+    with _blocked_signals() as stops, served_cell(cell) as text:
         if options.output is None:
             print(text, flush=True)
         else:

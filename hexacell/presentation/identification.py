@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from hexacell.application.fit import FitResult
 from hexacell.identification.diagnostics.pose_accuracy import PoseErrors
 from hexacell.identification.diagnostics.repeatability import Repeatability
 from hexacell.identification.diagnostics.variance_components import NoiseLevel, NoiseLevels
@@ -17,14 +18,15 @@ from hexacell.reporting.findings import findings, pair_sentences
 PARAMETER_HEADER = f"{'mm':4}{'drawing':>10}{'identified':>12}{'change':>9}{'sigma':>8}"
 
 
-def identification_report(found: Identification, drawing: Geometry, assessed: Assessment) -> str:
+def identification_report(result: FitResult) -> str:
     """The whole report that ``hexacell fit`` prints."""
+    found, assessed = result.identified, result.assessed
     return blocks(
         [
             "\n".join(wrapped(sentence) for sentence in findings(found, assessed)),
             accuracy_table(assessed),
             _data_and_termination(found),
-            parameter_table(found, drawing),
+            parameter_table(found, result.drawing),
             residual_line(found, assessed.goodness),
             noise_table(assessed.noise),
             repeatability_lines(assessed.repeatability),

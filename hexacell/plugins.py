@@ -1,8 +1,7 @@
-"""What third parties add through entry points: found by name, imported only when asked for."""
+"""Plug-ins that packages announce as entry points: found by name, imported only when needed."""
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Callable, Sequence
 from enum import StrEnum
 from importlib.metadata import EntryPoint, entry_points
@@ -11,11 +10,10 @@ from typing import Any
 from hexacell.errors import UsageError, did_you_mean
 
 Factory = Callable[..., Any]
-_log = logging.getLogger(__name__)
 
 
 class Group(StrEnum):
-    """A kind of plug-in: the entry point group that packages announce theirs in."""
+    """A kind of plug-in: the name of its entry point group."""
 
     GAUGES = "hexacell.gauges"
     ENCODERS = "hexacell.encoders"
@@ -26,7 +24,7 @@ class Group(StrEnum):
 
     @property
     def noun(self) -> str:
-        """What one of the group is called in a sentence."""
+        """The word for one plug-in of the group in a message."""
         return _NOUNS[self]
 
 
@@ -41,32 +39,18 @@ _NOUNS = {
 
 
 def names(group: Group) -> tuple[str, ...]:
-    """The names of everything announced in ``group``, sorted. Nothing is imported."""
+    """The names announced in ``group``, sorted. Nothing is imported."""
     return tuple(sorted(entry_points(group=group).names))
 
 
 def load(group: Group, name: str) -> Factory:
-    """Import the class, or whatever else makes one, that is announced as ``name`` in ``group``.
+    """Import the class or factory that is announced as ``name`` in ``group``.
 
     Raises:
-        UsageError: nothing has that name, or two packages claim it, or its import fails or gives
-            nothing that can be called.
+        UsageError: nothing has that name, two packages define it, its import fails, or it is not
+            callable.
     """
     return _import(group, _only(group, name))
-
-
-def load_all(group: Group) -> dict[str, Factory]:
-    """Import everything announced in ``group``, by name.
-
-    What cannot be imported is left out, with a warning in this module's log.
-    """
-    loaded = {}
-    for name in names(group):
-        try:
-            loaded[name] = load(group, name)
-        except UsageError as error:
-            _log.warning("left out: %s", error)
-    return loaded
 
 
 def _only(group: Group, name: str) -> EntryPoint:
@@ -76,7 +60,7 @@ def _only(group: Group, name: str) -> EntryPoint:
     found = list(by_target.values())
     if len(found) > 1:
         raise UsageError(
-            f"{group.noun} '{name}' is offered more than once, by {_packages(found)}",
+            f"{group.noun} '{name}' is defined more than once, by {_packages(found)}",
             action="Uninstall all but one",
         )
     return found[0]
@@ -91,10 +75,10 @@ def _unknown(group: Group, name: str) -> UsageError:
 def _import(group: Group, point: EntryPoint) -> Factory:
     try:
         factory: object = point.load()
-    except Exception as error:  # a stranger's module may fail in any way
+    except Exception as error:  # third-party code may fail in any way
         raise _broken(group, point, repr(error)) from error
     if not callable(factory):
-        raise _broken(group, point, f"{factory!r} cannot be called")
+        raise _broken(group, point, f"{factory!r} is not callable")
     return factory
 
 

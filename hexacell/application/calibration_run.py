@@ -19,7 +19,7 @@ from hexacell.kinematics.geometry import Geometry
 from hexacell.robot_model import Robot, make_robot, robot_of
 from hexacell.runs.run_folder import RunFolder, runs_folder
 from hexacell.storage.atomic_files import read_text, remove_stale_temporaries, write_atomically
-from hexacell.storage.cell_lock import config_lock
+from hexacell.storage.cell_lock import cell_lock
 from procedures.calibration.preflight import device_failures, plan_failures, raise_all, start_failures
 from procedures.calibration.workflow import Calibration, Mode
 from procedures.devices.reconnection import require_known
@@ -53,7 +53,7 @@ async def preflight(cell: Cell, mode: Mode, *, unattended: bool) -> tuple[events
         HexacellError: every failure, in one report.
     """
     calibration = Calibration(cell.settings, robot_of(cell), mode, pose_list_of(cell))
-    with config_lock(cell.config_path):
+    with cell_lock(cell.config_path):
         failures = await _plan_failures(calibration, unattended=unattended)
         with _joined(failures), device_addresses(cell) as settings:
             async with open_devices(settings, cell.path.parent) as cell_now:
@@ -73,7 +73,7 @@ async def calibrate(
         HexacellError: it could not begin, or a step could not be done.
     """
     cell = order.cell
-    with config_lock(cell.config_path):
+    with cell_lock(cell.config_path):
         remove_stale_temporaries(cell.config_path)
         started = _started(order) if order.resume else None
         if started is None:

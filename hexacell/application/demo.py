@@ -13,7 +13,7 @@ from hexacell.cell.loader import load_cell
 from hexacell.errors import FileError
 from hexacell.runs.run_folder import RunFolder
 from hexacell.storage.atomic_files import create_folder_durably, os_error_to_file_error, write_atomically
-from hexacell.storage.cell_lock import config_lock, lock_path
+from hexacell.storage.cell_lock import cell_lock, lock_path
 from procedures.calibration.workflow import Mode
 from procedures.engine.operator import UnattendedOperator
 
@@ -57,7 +57,7 @@ def _clear(folder: Path) -> None:
     kept = {folder / MARKER, *(folder / lock_path(config).name for config in configs)}
     with ExitStack() as locks:
         for config in configs:
-            locks.enter_context(config_lock(config))
+            locks.enter_context(cell_lock(config))
         try:
             for item in set(folder.iterdir()) - kept:
                 shutil.rmtree(item) if item.is_dir() and not item.is_symlink() else item.unlink()

@@ -78,17 +78,6 @@ class MeasurementSet:
         places = {point: place for place, point in enumerate(dict.fromkeys(self.points.tolist()))}
         return _frozen(np.array([places[record.point] for record in self.records], dtype=np.intp))
 
-    @property
-    def number_of_points(self) -> int:
-        """How many points (m) have records."""
-        return len(self.reference_rows)
-
-    @cached_property
-    def reference_rows(self) -> NDArray[np.intp]:
-        """The row (m,) of each point's reference, in the order of ``group``."""
-        _, first_rows = np.unique(self.group, return_index=True)
-        return _frozen(first_rows)
-
     @cached_property
     def poses(self) -> PoseBatch:
         """The commanded poses."""

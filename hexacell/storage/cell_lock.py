@@ -1,21 +1,20 @@
-"""One process per cell: whoever moves the robot holds its lock.
+"""One process per cell: the process that moves the robot holds the cell's lock.
 
-The lock is an advisory ``flock`` on a small file beside the controller's config, the file that the
-cell file names. This place was chosen because it is the one thing that everybody who moves this
-robot shares:
+The lock is an advisory ``flock`` on a small file beside the controller's config. Everybody who moves this
+robot shares that file:
 
 - A second cell file for the same robot, a copy or a link, names the same config and so the same lock.
-- The technician and the scheduler are different users, often on one shared folder. A folder of each
-  user's own would give each a lock of their own, and both could move the robot.
-- The config itself cannot carry the lock: a write-back replaces it, and whoever came afterwards would
-  lock the new file while the old one is still held.
+- The technician and the scheduler are different users. With a lock in a folder of each user both could
+  move the robot at once.
+- The config itself cannot carry the lock: a write-back replaces it, and a later process would lock the new
+  file while the old one is still held.
 
 A config copied to another folder makes another lock; the controller and the serial ports then refuse
 the second process.
 
-The kernel lets go when the process ends, however it ends, so there are no stale locks. The file stays:
-were it deleted, two processes could hold two files of the same name. What it says about the holder is
-for people only.
+The kernel releases the lock when the process ends, however it ends, so there are no stale locks. The file
+stays: if it were deleted, two processes could hold two files of the same name. Its content names the
+holder, for people only.
 """
 
 from __future__ import annotations
@@ -25,7 +24,6 @@ import getpass
 import json
 import os
 import socket
-import tomllib
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass
@@ -36,13 +34,13 @@ from hexacell.errors import CellBusy, FileError
 from hexacell.storage import atomic_files
 
 _LONGEST_NOTE = 4096
-# O_NOFOLLOW: in a shared folder nobody may turn the holder's note into a write to another file.
+# O_NOFOLLOW: in a shared folder a link must not turn the holder's note into a write to another file.
 _FLAGS = os.O_RDWR | os.O_NOFOLLOW
 
 
 @dataclass(frozen=True, slots=True)
 class LockOwner:
-    """Who holds a cell; ``since`` is local time with its offset, ISO 8601."""
+    """The process that holds a cell; ``since`` is local time with its offset, ISO 8601."""
 
     pid: int
     user: str
@@ -51,7 +49,7 @@ class LockOwner:
 
     @classmethod
     def this_process(cls) -> LockOwner:
-        """The holder that this process would be, from now on."""
+        """This process as a holder, from now on."""
         since = datetime.now(UTC).astimezone().isoformat(timespec="seconds")
         return cls(os.getpid(), _user(), socket.gethostname(), since)
 
@@ -60,20 +58,13 @@ class LockOwner:
 
 
 @contextmanager
-def cell_lock(cell_path: Path) -> Iterator[None]:
-    """Hold the cell of a cell file for as long as the context lasts; never waits.
+def cell_lock(config: Path) -> Iterator[None]:
+    """Hold the cell whose controller reads ``config`` until the context ends; never waits.
 
     Raises:
         CellBusy: another process, or this one, holds it; the message names pid, user, host and since.
-        FileError: the cell file names no config, or the lock file cannot be opened.
+        FileError: the lock file cannot be opened.
     """
-    with config_lock(config_of(cell_path)):
-        yield
-
-
-@contextmanager
-def config_lock(config: Path) -> Iterator[None]:
-    """Hold the cell whose controller reads ``config``; the same as :func:`cell_lock`."""
     path = lock_path(config)
     descriptor = _open(path)
     try:
@@ -83,29 +74,16 @@ def config_lock(config: Path) -> Iterator[None]:
             yield
         finally:
             _note(descriptor, "")
-            # Said aloud, because a forked child may still have the descriptor open.
+            # Explicit, because a forked child may still have the descriptor open.
             fcntl.flock(descriptor, fcntl.LOCK_UN)
     finally:
         os.close(descriptor)
 
 
 def lock_path(config: Path) -> Path:
-    """The lock file of a controller config: beside the file itself, links followed."""
+    """The lock file of a controller config: beside the file itself, links resolved."""
     target = Path(os.path.realpath(config))
     return target.with_name(f".{target.name}.hexacell-lock")
-
-
-def config_of(cell_path: Path) -> Path:
-    """The controller config that a cell file names, whatever else may be wrong with that file."""
-    try:
-        config = tomllib.loads(atomic_files.read_text(cell_path))["controller"]["config"]
-        return cell_path.parent / Path(config)
-    except (KeyError, TypeError, ValueError) as error:
-        raise FileError(
-            "this cell file names no controller config ([controller] config)",
-            subject=cell_path,
-            action="Check it with `hexacell cell validate`",
-        ) from error
 
 
 def _open(path: Path) -> int:
@@ -119,7 +97,7 @@ def _open(path: Path) -> int:
 
 def _create(path: Path) -> int:
     descriptor = os.open(path, _FLAGS | os.O_CREAT | os.O_EXCL, 0o666)
-    # The other users of the cell must be able to open it, whatever this one's umask is.
+    # Other users of the cell must be able to open it, whatever this process's umask is.
     with suppress(OSError):
         os.fchmod(descriptor, 0o666)
     return descriptor
@@ -147,7 +125,7 @@ def _acquire(descriptor: int, config: Path) -> None:
 
 
 def _note(descriptor: int, text: str) -> None:
-    # Written before it is cut to length: a reader finds a complete first line at every moment.
+    # Written before the file is truncated: a reader finds a complete first line at any moment.
     data = text.encode()
     with suppress(OSError):
         os.pwrite(descriptor, data, 0)

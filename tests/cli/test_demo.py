@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hexacell.storage.cell_lock import config_lock
+from hexacell.storage.cell_lock import cell_lock
 from procedures.run import events
 
 # An independent reading of TOML, good enough for a config: what is text, remark, number, or neither.
@@ -238,7 +238,7 @@ def test_a_file_where_the_folder_should_be(typed_here, tmp_path, folder, words):
 
 def test_a_demo_that_is_running_is_not_swept_away(typed_here, former):
     before = contents(former)
-    with config_lock(former / "simulated-hexaglide.controller.toml"):
+    with cell_lock(former / "simulated-hexaglide.controller.toml"):
         outcome = typed_here("demo")
     assert outcome.code == 5
     assert f"in use by process {os.getpid()} " in outcome.err

@@ -10,7 +10,7 @@ from hexacell.cli.console import Console
 from hexacell.cli.run_session import execute_run
 from hexacell.errors import CellBusy
 from hexacell.runs.run_folder import RunFolder
-from hexacell.storage.cell_lock import config_lock
+from hexacell.storage.cell_lock import cell_lock
 from procedures.calibration.workflow import Mode
 from procedures.engine.operator import UnattendedOperator
 from procedures.journal.journal import Journal
@@ -36,6 +36,6 @@ def test_a_geometry_that_nobody_verified_is_never_left_without_a_word(
             journal.append(event)
     cell = load_cell(cell_folder.cell)
     order = RunRequest(cell, folder, Mode.OPTIMISE, UnattendedOperator(), unattended=True, resume=True)
-    with config_lock(cell.config_path), pytest.raises(CellBusy):
+    with cell_lock(cell.config_path), pytest.raises(CellBusy):
         execute_run(order, Console())
     assert (UNVERIFIED in capsys.readouterr().err) == is_said

@@ -16,7 +16,7 @@ from hexacell.controller_config.write_back import Receipt
 from hexacell.errors import CellBusy, ExitCode, FileError, UsageError
 from hexacell.measurements.csv_file import read_measurements
 from hexacell.runs.run_folder import RunFolder
-from hexacell.storage.cell_lock import config_lock
+from hexacell.storage.cell_lock import cell_lock
 from procedures.calibration.workflow import Mode
 from procedures.journal.journal import Journal, read_journal
 from procedures.run import events
@@ -105,7 +105,7 @@ async def test_a_folder_with_a_run_takes_no_new_one(finished) -> None:
 
 async def test_a_cell_in_use_is_left_alone(make_site) -> None:
     site = make_site()
-    with config_lock(site.cell.config_path), pytest.raises(CellBusy) as refusal:
+    with cell_lock(site.cell.config_path), pytest.raises(CellBusy) as refusal:
         await site.calibrate()
     assert refusal.value.exit_code is ExitCode.BUSY
     assert not site.folder.path.exists()
@@ -118,13 +118,13 @@ async def test_the_cell_is_held_while_it_runs_and_free_afterwards(make_site, fin
 
     def listener(event: events.Event, _: object) -> None:
         if isinstance(event, events.Committed):
-            with pytest.raises(CellBusy), config_lock(site.cell.config_path):
+            with pytest.raises(CellBusy), cell_lock(site.cell.config_path):
                 pass
             busy.append(True)
 
     await site.calibrate(listener, resume=True)
     assert busy == [True]
-    with config_lock(site.cell.config_path):
+    with cell_lock(site.cell.config_path):
         pass
 
 

@@ -20,7 +20,7 @@ from hexacell.errors import (
     ReachError,
     SeveralErrors,
 )
-from hexacell.storage.cell_lock import config_lock
+from hexacell.storage.cell_lock import cell_lock
 from procedures.calibration.workflow import Mode
 
 FAR = (0.0, 0.0, 2000.0)
@@ -102,7 +102,7 @@ async def test_a_stop_during_the_checks_of_the_plan_leaves_nothing(make_site, mo
         await run
     assert not site.folder.path.exists()
     assert not site.simulated.controller.control.on, "not even switched on"
-    with config_lock(site.cell.config_path):
+    with cell_lock(site.cell.config_path):
         pass
 
 
@@ -138,7 +138,7 @@ async def test_one_failure_is_said_as_it_is(make_site) -> None:
 
 async def test_a_cell_in_use_is_not_even_looked_at(make_site) -> None:
     site = make_site()
-    with config_lock(site.cell.config_path), pytest.raises(CellBusy):
+    with cell_lock(site.cell.config_path), pytest.raises(CellBusy):
         await check(site)
 
 

@@ -31,14 +31,11 @@ def test_points_are_grouped_in_the_order_of_measurement():
     order = [(7, 1), (3, 5), (7, 2), (3, 1), (9, 1)]
     measurements = MeasurementSet(tuple(record(*label) for label in order))
     np.testing.assert_array_equal(measurements.group, [0, 1, 0, 1, 2])
-    np.testing.assert_array_equal(measurements.reference_rows, [0, 1, 4])
-    assert measurements.number_of_points == 3
 
 
 def test_empty_set_has_empty_arrays():
     measurements = MeasurementSet(())
     assert len(measurements) == 0
-    assert measurements.number_of_points == 0
     assert measurements.labels.shape == (0, 2)
     assert measurements.group.shape == (0,)
     assert measurements.positions.shape == (0, 3)
@@ -52,9 +49,7 @@ def test_the_same_record_twice_is_refused():
         MeasurementSet((record(2, 3), record(2, 4), record(2, 3, z=0.0)))
 
 
-@pytest.mark.parametrize(
-    "name", ["labels", "group", "reference_rows", "positions", "rotations", "joints", "deviations"]
-)
+@pytest.mark.parametrize("name", ["labels", "group", "positions", "rotations", "joints", "deviations"])
 def test_arrays_cannot_be_changed(name):
     array = getattr(MeasurementSet((record(1, 1),)), name)
     with pytest.raises(ValueError, match="read-only"):

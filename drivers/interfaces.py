@@ -44,7 +44,7 @@ class ControllerStatus:
 
     estop: bool
     enabled: bool
-    complaints: tuple[str, ...] = ()
+    error_messages: tuple[str, ...] = ()
 
     @property
     def may_move(self) -> bool:

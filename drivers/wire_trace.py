@@ -11,7 +11,7 @@ from enum import StrEnum
 CAPACITY_BYTES = 4 << 20
 
 
-class Direction(StrEnum):
+class TrafficDirection(StrEnum):
     """Which way bytes went, seen from here."""
 
     SENT = ">"
@@ -24,7 +24,7 @@ class TraceEntry:
 
     time_s: float
     line: str
-    direction: Direction
+    direction: TrafficDirection
     data: bytes
 
     def __str__(self) -> str:
@@ -34,7 +34,7 @@ class TraceEntry:
         )
 
 
-Recorder = Callable[[TraceEntry], None]
+TraceRecorder = Callable[[TraceEntry], None]
 """Takes entries in a line's thread; it must neither block nor raise."""
 
 
@@ -45,7 +45,7 @@ class WireTrace:
     """
 
     def __init__(self, capacity: int = CAPACITY_BYTES) -> None:
-        self.forgotten = 0
+        self.dropped = 0
         self._capacity = capacity
         self._size = 0
         self._entries: deque[TraceEntry] = deque()
@@ -58,7 +58,7 @@ class WireTrace:
             self._size += len(entry.data)
             while self._size > self._capacity:
                 self._size -= len(self._entries.popleft().data)
-                self.forgotten += 1
+                self.dropped += 1
 
     def entries(self) -> tuple[TraceEntry, ...]:
         """What is kept, oldest first."""
@@ -68,7 +68,7 @@ class WireTrace:
     def text(self) -> str:
         """The trace as a file's text, one entry a line; the first line says what was forgotten."""
         entries = self.entries()
-        head = [f"# {self.forgotten} earlier entries were forgotten"] if self.forgotten else []
+        head = [f"# {self.dropped} earlier entries were forgotten"] if self.dropped else []
         return "".join(f"{line}\n" for line in (*head, *entries))
 
 

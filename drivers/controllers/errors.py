@@ -9,7 +9,7 @@ class ConnectionLost(DeviceError):
     """There is no line to the controller, or it broke."""
 
 
-class AnswerOverdue(ConnectionLost):
+class ResponseTimeout(ConnectionLost):
     """Nothing came over the line in time; it may still come."""
 
 

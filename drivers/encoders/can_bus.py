@@ -13,14 +13,14 @@ import can
 import canopen
 
 from drivers.encoders.errors import BusError
-from drivers.wire_trace import Direction, Recorder, TraceEntry
+from drivers.wire_trace import TraceEntry, TraceRecorder, TrafficDirection
 
 SLICE_S = 0.03
 """Longest uninterrupted wait."""
 
-SEND_S = 0.2
+SEND_TIMEOUT_S = 0.2
 """Longest wait for an interface to take a frame."""
-PATIENCE_S = 1.0
+JOIN_TIMEOUT_S = 1.0
 """Longest wait for the receiving thread, should an interface ignore the time it is given."""
 
 # Failures leave this package as errors; without a handler canopen would also print them.
@@ -39,11 +39,11 @@ class EncoderBus:
     """
 
     def __init__(
-        self, settings: Mapping[str, Any], interrupted: threading.Event, trace: Recorder | None = None
+        self, settings: Mapping[str, Any], interrupted: threading.Event, trace: TraceRecorder | None = None
     ) -> None:
         self.name = _name_of(settings)
-        self.news = threading.Condition()
-        self.guard: Callable[[], None] = lambda: None
+        self.condition = threading.Condition()
+        self.health_check: Callable[[], None] = lambda: None
         self._interrupted = interrupted
         self._trace = trace
         self._failure: Exception | None = None
@@ -59,12 +59,12 @@ class EncoderBus:
         Raises:
             DeviceError: What is wrong.
         """
-        with self.news:
+        with self.condition:
             if self._failure is not None:
                 raise self._error("has died", self._failure) from self._failure
             if self._interrupted.is_set():
                 raise BusError("was interrupted", subject=self.name, action="Read again")
-            self.guard()
+            self.health_check()
 
     def wait_for(self, ready: Callable[[], bool], timeout_s: float) -> bool:
         """Wait until ``ready()``; false after ``timeout_s``.
@@ -73,13 +73,13 @@ class EncoderBus:
             DeviceError: As :meth:`check`.
         """
         deadline = time.monotonic() + timeout_s
-        with self.news:
+        with self.condition:
             while not ready():
                 self.check()
                 left = deadline - time.monotonic()
                 if left <= 0:
                     return False
-                self.news.wait(min(left, SLICE_S))
+                self.condition.wait(min(left, SLICE_S))
         return True
 
     def listen(self, seconds: float) -> None:
@@ -93,9 +93,9 @@ class EncoderBus:
     def close(self) -> None:
         """End the receiving thread and let the bus go, dead or alive."""
         self._closing.set()
-        self._receiver.join(PATIENCE_S)
+        self._receiver.join(JOIN_TIMEOUT_S)
         _shut_down(self._bus)
-        self._receiver.join(PATIENCE_S)
+        self._receiver.join(JOIN_TIMEOUT_S)
 
     def _connect(self, settings: Mapping[str, Any]) -> can.BusABC:
         try:
@@ -114,23 +114,23 @@ class EncoderBus:
                 if message is not None and _concerns_canopen(message):
                     self._deliver(message)
         except Exception as error:  # whatever it is, it must reach whoever waits
-            with self.news:
+            with self.condition:
                 self._failure = error
-                self.news.notify_all()
+                self.condition.notify_all()
 
     def _deliver(self, message: can.Message) -> None:
-        with self.news:
-            self._record(Direction.RECEIVED, message)
+        with self.condition:
+            self._record(TrafficDirection.RECEIVED, message)
             self.network.notify(message.arbitration_id, message.data, message.timestamp)
 
     def _send(self, message: can.Message) -> None:
-        self._record(Direction.SENT, message)
+        self._record(TrafficDirection.SENT, message)
         try:
-            self._bus.send(message, timeout=SEND_S)
+            self._bus.send(message, timeout=SEND_TIMEOUT_S)
         except Exception as error:
             raise self._error("does not take a frame", error) from error
 
-    def _record(self, direction: Direction, message: can.Message) -> None:
+    def _record(self, direction: TrafficDirection, message: can.Message) -> None:
         if self._trace is not None:
             text = f"{message.arbitration_id:03X}#{bytes(message.data).hex().upper()}"
             self._trace(TraceEntry(time.time(), self.name, direction, text.encode()))

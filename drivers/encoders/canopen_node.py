@@ -19,7 +19,7 @@ from drivers.encoders.errors import (
     SilentNodeError,
     WrongDeviceError,
 )
-from drivers.encoders.object_dictionary import Entry
+from drivers.encoders.object_dictionary import ObjectEntry
 
 _NMT = 0x000
 
@@ -47,7 +47,7 @@ class EncoderNode:
         """
         self._bus.network.send_message(_NMT, bytes((command, self.leg.node)))
 
-    def read(self, entry: Entry) -> int:
+    def read(self, entry: ObjectEntry) -> int:
         """The value of an entry that must be there.
 
         Raises:
@@ -60,7 +60,7 @@ class EncoderNode:
             )
         return value
 
-    def read_optional(self, entry: Entry) -> int | None:
+    def read_optional(self, entry: ObjectEntry) -> int | None:
         """The value of an entry; none if the device says that it has no such thing.
 
         Raises:
@@ -73,7 +73,7 @@ class EncoderNode:
         except SdoCommunicationError as error:
             raise self._no_sense(entry, error) from error
 
-    def write(self, entry: Entry, value: int) -> None:
+    def write(self, entry: ObjectEntry, value: int) -> None:
         """Write an entry.
 
         Raises:
@@ -96,12 +96,12 @@ class EncoderNode:
         Raises:
             DuplicatedNodeError: One did.
         """
-        if self.sdo.surplus:
-            raise duplicated("answered one request twice", self.leg)
+        if self.sdo.has_surplus_response:
+            raise duplicated_node("answered one request twice", self.leg)
 
-    def _no_sense(self, entry: Entry, error: Exception) -> DuplicatedNodeError | SilentNodeError:
-        if self.sdo.surplus:
-            return duplicated("answered one request twice", self.leg)
+    def _no_sense(self, entry: ObjectEntry, error: Exception) -> DuplicatedNodeError | SilentNodeError:
+        if self.sdo.has_surplus_response:
+            return duplicated_node("answered one request twice", self.leg)
         return SilentNodeError(
             f"does not answer for {entry}: {error}",
             self.leg,
@@ -109,7 +109,7 @@ class EncoderNode:
         )
 
 
-def duplicated(what: str, leg: Leg) -> DuplicatedNodeError:
+def duplicated_node(what: str, leg: Leg) -> DuplicatedNodeError:
     """The error for a node id that two devices share."""
     return DuplicatedNodeError(
         f"{what}: two devices share node id {leg.node}, or another program uses this bus",
@@ -119,7 +119,7 @@ def duplicated(what: str, leg: Leg) -> DuplicatedNodeError:
 
 
 SDO_REQUEST = 0x600
-SDO_ANSWER = 0x580
+SDO_RESPONSE = 0x580
 _UPLOAD_DEVICE_TYPE = bytes((0x40, 0x00, 0x10, 0, 0, 0, 0, 0))
 
 
@@ -134,10 +134,10 @@ class CountingSdoClient(SdoClient):
 
     def __init__(self, bus: EncoderBus, node: int, timeout_s: float) -> None:
         dictionary = ObjectDictionary()  # type: ignore[no-untyped-call]
-        super().__init__(SDO_REQUEST + node, SDO_ANSWER + node, dictionary)  # type: ignore[no-untyped-call]
+        super().__init__(SDO_REQUEST + node, SDO_RESPONSE + node, dictionary)  # type: ignore[no-untyped-call]
         self.network = bus.network
-        self.surplus = False
-        self.answered = False
+        self.has_surplus_response = False
+        self.has_responded = False
         self._bus = bus
         self._timeout_s = timeout_s
         self._owed = 0
@@ -152,11 +152,11 @@ class CountingSdoClient(SdoClient):
         """Take an answer that came in; too short a frame is none."""
         if len(data) != 8:
             return
-        self.answered = True
+        self.has_responded = True
         self._owed -= 1
-        self.surplus = self.surplus or self._owed < 0
+        self.has_surplus_response = self.has_surplus_response or self._owed < 0
         super().on_response(can_id, data, timestamp)  # type: ignore[no-untyped-call]
-        self._bus.news.notify_all()
+        self._bus.condition.notify_all()
 
     def request_response(self, sdo_request: bytes) -> bytes:
         """Send one request and return its answer, once no earlier answer is under way.
@@ -166,7 +166,7 @@ class CountingSdoClient(SdoClient):
             canopen.SdoError: No answer, an abort, or nonsense.
         """
         self._bus.wait_for(lambda: self._owed <= 0, self._timeout_s)
-        with self._bus.news:
+        with self._bus.condition:
             self._owed = 1
         answer: bytes = super().request_response(sdo_request)  # type: ignore[no-untyped-call]
         return answer

@@ -8,7 +8,7 @@ from functools import partial
 from drivers.encoders.session import EncoderSession
 from drivers.encoders.worker_thread import WorkerThread
 from drivers.interfaces import DeviceIdentity, EncoderSample
-from drivers.wire_trace import Recorder
+from drivers.wire_trace import TraceRecorder
 from hexacell.cell.devices import EncoderSettings
 from hexacell.errors import DeviceError
 
@@ -21,7 +21,7 @@ class Cia406Bank:
     ``DeviceError``, those of the bus and of nodes one of :mod:`drivers.encoders.errors`.
     """
 
-    def __init__(self, settings: EncoderSettings, trace: Recorder | None = None) -> None:
+    def __init__(self, settings: EncoderSettings, trace: TraceRecorder | None = None) -> None:
         self._settings = settings
         self._trace = trace
         self._owner: WorkerThread | None = None
@@ -39,7 +39,7 @@ class Cia406Bank:
         await self.close()
         self._owner = WorkerThread("encoders")
         try:
-            return await self._owner.run(partial(self._open, self._owner.interrupted))
+            return await self._owner.run(partial(self._open, self._owner.cancelled))
         except BaseException:
             await self.close()
             raise

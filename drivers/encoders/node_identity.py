@@ -22,11 +22,11 @@ from drivers.encoders.object_dictionary import (
 from drivers.interfaces import DeviceIdentity
 from hexacell.cell.devices import EncoderSettings
 
-QUIET_S = 0.03
+SECOND_RESPONSE_S = 0.03
 """How long a second device may take to answer the same request."""
 
 
-def find(nodes: Sequence[EncoderNode], bus: EncoderBus, timeout_s: float) -> None:
+def detect_nodes(nodes: Sequence[EncoderNode], bus: EncoderBus, timeout_s: float) -> None:
     """Ask all nodes at once whether they are there.
 
     Raises:
@@ -35,16 +35,16 @@ def find(nodes: Sequence[EncoderNode], bus: EncoderBus, timeout_s: float) -> Non
     """
     for node in nodes:
         node.sdo.probe()
-    bus.wait_for(lambda: all(node.sdo.answered for node in nodes), timeout_s)
-    bus.listen(QUIET_S)
+    bus.wait_for(lambda: all(node.sdo.has_responded for node in nodes), timeout_s)
+    bus.listen(SECOND_RESPONSE_S)
     for node in nodes:
         node.check_alone()
-    missing = [node for node in nodes if not node.sdo.answered]
+    missing = [node for node in nodes if not node.sdo.has_responded]
     if missing:
         raise _missing(missing, _strangers(nodes, bus))
 
 
-def device_type(node: EncoderNode) -> DeviceType:
+def read_device_type(node: EncoderNode) -> DeviceType:
     """The kind of encoder that answers.
 
     Raises:
@@ -78,9 +78,9 @@ def check_measuring_step(node: EncoderNode, step_nm: float) -> None:
         )
 
 
-def identify(node: EncoderNode, kind: DeviceType) -> DeviceIdentity:
+def read_identity(node: EncoderNode, kind: DeviceType) -> DeviceIdentity:
     """The device's own identity (1018h); parts that it does not have are left out."""
-    words = [f"CiA {ENCODER_PROFILE} {kind.words}"]
+    words = [f"CiA {ENCODER_PROFILE} {kind.description}"]
     for name, entry in (("vendor", VENDOR), ("product", PRODUCT), ("revision", REVISION)):
         value = node.read_optional(entry)
         words += [] if value is None else [f"{name} 0x{value:08X}"]
@@ -124,7 +124,7 @@ def _missing(missing: Sequence[EncoderNode], strangers: Sequence[int]) -> Missin
 def _strangers(nodes: Sequence[EncoderNode], bus: EncoderBus) -> list[int]:
     """Nodes that answer although no leg has them: often a factory-set node id."""
     bus.network.scanner.search()
-    bus.listen(QUIET_S)
+    bus.listen(SECOND_RESPONSE_S)
     return sorted(set(bus.network.scanner.nodes) - {node.leg.node for node in nodes})
 
 

@@ -16,12 +16,12 @@ from canopen.emcy import EmcyError
 from drivers.encoders.can_bus import EncoderBus
 from drivers.encoders.canopen_node import EncoderNode
 from drivers.encoders.errors import InvalidSampleError, Leg, RestartedNodeError, SilentNodeError
-from drivers.encoders.object_dictionary import ALARMS, ERROR_REGISTER, Entry
+from drivers.encoders.object_dictionary import ALARMS, ERROR_REGISTER, ObjectEntry
 
 HEARTBEAT = 0x700
 EMERGENCY = 0x080
 
-HEARTBEATS_MISSED = 3
+MAX_MISSED_HEARTBEATS = 3
 """So many in a row are a loss."""
 JITTER_S = 0.2
 """What a PC may be late by in looking."""
@@ -51,20 +51,20 @@ class NodeMonitor:
         self.restarted = False
         self.emergency: str | None = None
         self.emergencies = 0
-        self.patience_s = HEARTBEATS_MISSED * heartbeat_ms / 1000 + JITTER_S
+        self.timeout_s = MAX_MISSED_HEARTBEATS * heartbeat_ms / 1000 + JITTER_S
         self._heartbeat_ms = heartbeat_ms
         self._heard: float | None = None
         self._was_operational = False
-        self._news = bus.news
+        self._news = bus.condition
         bus.network.subscribe(HEARTBEAT + leg.node, self._on_heartbeat)
         bus.network.subscribe(EMERGENCY + leg.node, self._on_emergency)
 
     @property
     def is_silent(self) -> bool:
         """Whether its heartbeat is overdue."""
-        return self._heard is not None and time.monotonic() - self._heard > self.patience_s
+        return self._heard is not None and time.monotonic() - self._heard > self.timeout_s
 
-    def expect_heartbeats(self) -> None:
+    def start_heartbeat_timeout(self) -> None:
         """From now on silence is a fault, unless heartbeats are off."""
         if self._heartbeat_ms:
             self._heard = time.monotonic()
@@ -89,7 +89,7 @@ class NodeMonitor:
         self._news.notify_all()
 
 
-def check(watches: Sequence[NodeMonitor]) -> None:
+def check_nodes(watches: Sequence[NodeMonitor]) -> None:
     """Raise if some node cannot be relied on.
 
     Raises:
@@ -105,10 +105,10 @@ def check(watches: Sequence[NodeMonitor]) -> None:
         raise _silent(silent, everybody=len(silent) == len(watches))
     for watch in watches:
         if watch.emergency is not None:
-            raise invalid(f"reports {watch.emergency}", watch.leg)
+            raise invalid_sample(f"reports {watch.emergency}", watch.leg)
 
 
-def invalid(what: str, leg: Leg) -> InvalidSampleError:
+def invalid_sample(what: str, leg: Leg) -> InvalidSampleError:
     """The error for positions that the device itself does not vouch for."""
     return InvalidSampleError(
         f"{what}; its position cannot be trusted",
@@ -117,7 +117,7 @@ def invalid(what: str, leg: Leg) -> InvalidSampleError:
     )
 
 
-def advice(*, everybody: bool) -> str:
+def silence_action(*, everybody: bool) -> str:
     """Where to look when one leg is silent, or when all are."""
     where = "the CAN adapter, supply and termination" if everybody else "its supply and cable"
     return f"Check {where}, then open the encoders again; the set that was being measured is void"
@@ -133,9 +133,9 @@ def _restarted(legs: Sequence[Leg]) -> RestartedNodeError:
 
 def _silent(watches: Sequence[NodeMonitor], *, everybody: bool) -> SilentNodeError:
     return SilentNodeError(
-        f"no heartbeat for {watches[0].patience_s:.2g} s",
+        f"no heartbeat for {watches[0].timeout_s:.2g} s",
         *(watch.leg for watch in watches),
-        action=advice(everybody=everybody),
+        action=silence_action(everybody=everybody),
     )
 
 
@@ -150,7 +150,7 @@ def _in_words(error: EmcyError) -> str:
     return f"emergency {error.code:04X} ({known}, error register {error.register:#04x})"
 
 
-PERIOD_S = 0.1
+ALARM_POLL_S = 0.1
 """A device that raises an alarm without an emergency message is found out after so long."""
 
 _COMMUNICATION = 0x10
@@ -160,7 +160,7 @@ _COMMUNICATION = 0x10
 @dataclass(frozen=True, slots=True)
 class _Supported:
     node: EncoderNode
-    entries: tuple[Entry, ...]
+    entries: tuple[ObjectEntry, ...]
 
 
 class AlarmPoll:
@@ -193,10 +193,10 @@ class AlarmPoll:
         for supported in self._supported:
             _check(supported)
         self._seen = emergencies
-        self._due = time.monotonic() + PERIOD_S
+        self._due = time.monotonic() + ALARM_POLL_S
 
 
-def _has(node: EncoderNode, entry: Entry) -> bool:
+def _has(node: EncoderNode, entry: ObjectEntry) -> bool:
     return node.read_optional(entry) is not None
 
 
@@ -206,4 +206,4 @@ def _check(supported: _Supported) -> None:
         if entry is ERROR_REGISTER:
             value &= ~_COMMUNICATION
         if value:
-            raise invalid(f"has an alarm ({entry} is {value:#06x})", supported.node.leg)
+            raise invalid_sample(f"has an alarm ({entry} is {value:#06x})", supported.node.leg)

@@ -7,7 +7,7 @@ from enum import IntEnum
 
 
 @dataclass(frozen=True, slots=True)
-class Entry:
+class ObjectEntry:
     """One entry: ``size`` is what a write sends, bytes."""
 
     index: int
@@ -25,57 +25,57 @@ class DeviceType(IntEnum):
     SEVERAL_MAGNETS = 0x000A_0196
 
     @property
-    def words(self) -> str:
+    def description(self) -> str:
         """What a device of this type is called."""
         one = "absolute linear encoder"
         return one if self is DeviceType.ABSOLUTE_LINEAR else f"{one} for several magnets"
 
     @property
-    def position(self) -> Entry:
+    def position(self) -> ObjectEntry:
         """Where a device of this type keeps the position of its (first) magnet."""
         return POSITION if self is DeviceType.ABSOLUTE_LINEAR else POSITION_OF_MAGNET_1
 
 
 ENCODER_PROFILE = 406
 
-DEVICE_TYPE = Entry(0x1000, 0, 4)
-ERROR_REGISTER = Entry(0x1001, 0, 1)
-PRODUCER_HEARTBEAT = Entry(0x1017, 0, 2)
-VENDOR = Entry(0x1018, 1, 4)
-PRODUCT = Entry(0x1018, 2, 4)
-REVISION = Entry(0x1018, 3, 4)
-SERIAL_NUMBER = Entry(0x1018, 4, 4)
+DEVICE_TYPE = ObjectEntry(0x1000, 0, 4)
+ERROR_REGISTER = ObjectEntry(0x1001, 0, 1)
+PRODUCER_HEARTBEAT = ObjectEntry(0x1017, 0, 2)
+VENDOR = ObjectEntry(0x1018, 1, 4)
+PRODUCT = ObjectEntry(0x1018, 2, 4)
+REVISION = ObjectEntry(0x1018, 3, 4)
+SERIAL_NUMBER = ObjectEntry(0x1018, 4, 4)
 
-POSITION = Entry(0x6004, 0, 4)
-POSITION_OF_MAGNET_1 = Entry(0x6020, 1, 4)
-MEASURING_STEP_SETTING = Entry(0x6005, 1, 4)
-MEASURING_STEP = Entry(0x6501, 0, 4)
-ALARMS = Entry(0x6503, 0, 2)
+POSITION = ObjectEntry(0x6004, 0, 4)
+POSITION_OF_MAGNET_1 = ObjectEntry(0x6020, 1, 4)
+MEASURING_STEP_SETTING = ObjectEntry(0x6005, 1, 4)
+MEASURING_STEP = ObjectEntry(0x6501, 0, 4)
+ALARMS = ObjectEntry(0x6503, 0, 2)
 
 TPDO_COUNT = 4
 """TPDOs whose COB-IDs are predefined: 180h, 280h, 380h and 480h plus the node id (CiA 301)."""
 
 
-def tpdo_parameter(number: int, subindex: int, size: int) -> Entry:
+def tpdo_parameter(number: int, subindex: int, size: int) -> ObjectEntry:
     """A communication parameter of TPDO ``number`` (from 1)."""
-    return Entry(0x1800 + number - 1, subindex, size)
+    return ObjectEntry(0x1800 + number - 1, subindex, size)
 
 
-def tpdo_cob_id(number: int) -> Entry:
+def tpdo_cob_id(number: int) -> ObjectEntry:
     """Its COB-ID, with bit 31 set while it is off."""
     return tpdo_parameter(number, 1, 4)
 
 
-def tpdo_transmission_type(number: int) -> Entry:
+def tpdo_transmission_type(number: int) -> ObjectEntry:
     """When it is sent: 1 to 240 with every n-th SYNC, 254 and 255 on events."""
     return tpdo_parameter(number, 2, 1)
 
 
-def tpdo_event_timer(number: int) -> Entry:
+def tpdo_event_timer(number: int) -> ObjectEntry:
     """Its event timer, ms; 0 is off."""
     return tpdo_parameter(number, 5, 2)
 
 
-def tpdo_mapping(number: int, slot: int) -> Entry:
+def tpdo_mapping(number: int, slot: int) -> ObjectEntry:
     """What it carries in ``slot`` (from 1); slot 0 is how many there are."""
-    return Entry(0x1A00 + number - 1, slot, 4 if slot else 1)
+    return ObjectEntry(0x1A00 + number - 1, slot, 4 if slot else 1)

@@ -16,7 +16,7 @@ from drivers.encoders.object_dictionary import (
     PRODUCER_HEARTBEAT,
     TPDO_COUNT,
     DeviceType,
-    Entry,
+    ObjectEntry,
     tpdo_cob_id,
     tpdo_event_timer,
     tpdo_mapping,
@@ -90,7 +90,7 @@ class PositionChannel:
         return int.from_bytes(data[self.first : self.length], "little", signed=signed)
 
 
-def configure(node: EncoderNode, kind: DeviceType, heartbeat_ms: int) -> PositionChannel:
+def configure_position_tpdo(node: EncoderNode, kind: DeviceType, heartbeat_ms: int) -> PositionChannel:
     """Set one TPDO to the position with every SYNC, switch the others off, start the heartbeat.
 
     Raises:
@@ -145,7 +145,7 @@ def _set_up(node: EncoderNode, tpdo: Tpdo, kind: DeviceType) -> PositionChannel:
     return PositionChannel(cob_id, offset // 8)
 
 
-def _map_only(node: EncoderNode, number: int, position: Entry) -> None:
+def _map_only(node: EncoderNode, number: int, position: ObjectEntry) -> None:
     node.write(tpdo_mapping(number, 0), 0)
     node.write(tpdo_mapping(number, 1), _mapped(position).value)
     node.write(tpdo_mapping(number, 0), 1)
@@ -159,7 +159,7 @@ def _check_kept(node: EncoderNode, number: int) -> None:
         raise _refused(node, f"acknowledges, but does not do, switching TPDO {number} on")
 
 
-def _mapped(entry: Entry) -> MappedEntry:
+def _mapped(entry: ObjectEntry) -> MappedEntry:
     return MappedEntry(entry.index, entry.subindex, _POSITION_BITS)
 
 

@@ -11,16 +11,16 @@ from drivers.encoders.errors import BusError, Leg
 from drivers.encoders.node_identity import (
     check_measuring_step,
     check_serial_number,
-    device_type,
-    find,
-    identify,
+    detect_nodes,
+    read_device_type,
+    read_identity,
 )
-from drivers.encoders.node_monitor import AlarmPoll, NodeMonitor, check
+from drivers.encoders.node_monitor import AlarmPoll, NodeMonitor, check_nodes
 from drivers.encoders.object_dictionary import DeviceType
-from drivers.encoders.pdo_configuration import configure
+from drivers.encoders.pdo_configuration import configure_position_tpdo
 from drivers.encoders.sync_sampling import SyncSampler
 from drivers.interfaces import DeviceIdentity, EncoderSample
-from drivers.wire_trace import Recorder
+from drivers.wire_trace import TraceRecorder
 from hexacell.cell.devices import EncoderSettings
 
 NM_TO_MM = 1e-6
@@ -34,7 +34,7 @@ class EncoderSession:
     """
 
     def __init__(
-        self, settings: EncoderSettings, interrupted: threading.Event, trace: Recorder | None = None
+        self, settings: EncoderSettings, interrupted: threading.Event, trace: TraceRecorder | None = None
     ) -> None:
         self._settings = settings
         self._bus = EncoderBus(_bus_settings(settings), interrupted, trace)
@@ -56,7 +56,7 @@ class EncoderSession:
             DeviceError: What is wrong.
         """
         self._bus.check()
-        counts = self._rounds.take(signed=self._settings.signed)
+        counts = self._rounds.sample(signed=self._settings.signed)
         self._alarms.check()
         self._bus.check()
         return EncoderSample(counts, positions_mm(counts, self._settings))
@@ -71,17 +71,18 @@ class EncoderSession:
         nodes = tuple(EncoderNode(leg, self._bus, settings.timeout_s) for leg in legs)
         for node in nodes:
             node.command(NmtCommand.ENTER_PRE_OPERATIONAL)
-        find(nodes, self._bus, settings.timeout_s)
+        detect_nodes(nodes, self._bus, settings.timeout_s)
         watches = tuple(NodeMonitor(leg, self._bus, settings.heartbeat_ms) for leg in legs)
-        kinds = tuple(device_type(node) for node in nodes)
+        kinds = tuple(read_device_type(node) for node in nodes)
         self._identities = tuple(map(self._identify, nodes, kinds))
         channels = tuple(
-            configure(node, kind, settings.heartbeat_ms) for node, kind in zip(nodes, kinds, strict=True)
+            configure_position_tpdo(node, kind, settings.heartbeat_ms)
+            for node, kind in zip(nodes, kinds, strict=True)
         )
         for watch in watches:
-            watch.expect_heartbeats()
+            watch.start_heartbeat_timeout()
         self._rounds = SyncSampler(legs, channels, self._bus, settings.timeout_s)
-        self._bus.guard = partial(_check_all, nodes, watches, self._rounds)
+        self._bus.health_check = partial(_check_all, nodes, watches, self._rounds)
         self._alarms = AlarmPoll(nodes, watches)
         for node in nodes:
             node.command(NmtCommand.START)
@@ -89,7 +90,7 @@ class EncoderSession:
 
     def _identify(self, node: EncoderNode, kind: DeviceType) -> DeviceIdentity:
         check_measuring_step(node, self._settings.measuring_step_nm)
-        identity = identify(node, kind)
+        identity = read_identity(node, kind)
         check_serial_number(node, identity, self._settings)
         return identity
 
@@ -106,7 +107,7 @@ def _check_all(
 ) -> None:
     for node in nodes:
         node.check_alone()
-    check(watches)
+    check_nodes(watches)
     rounds.check()
 
 

@@ -8,15 +8,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from drivers.encoders.can_bus import EncoderBus
-from drivers.encoders.canopen_node import duplicated
+from drivers.encoders.canopen_node import duplicated_node
 from drivers.encoders.errors import BusError, Leg, SilentNodeError, WrongDeviceError
-from drivers.encoders.node_identity import QUIET_S
-from drivers.encoders.node_monitor import advice
+from drivers.encoders.node_identity import SECOND_RESPONSE_S
+from drivers.encoders.node_monitor import silence_action
 from drivers.encoders.pdo_configuration import PositionChannel
 
 SYNC = 0x080
-TRIES = 3
-SUSPICION = 3
+MAX_SYNCS = 3
+LATE_RESPONSE_TIMEOUTS = 3
 """How long to listen after a round in which a late answer may have slipped, in timeouts."""
 
 
@@ -45,20 +45,20 @@ class SyncSampler:
             bus.network.subscribe(channel.cob_id, self._on_position)
         bus.network.subscribe(SYNC, self._on_foreign_sync)
 
-    def take(self, *, signed: bool) -> tuple[int, ...]:
+    def sample(self, *, signed: bool) -> tuple[int, ...]:
         """One complete round: counts of all legs.
 
         Raises:
             SilentNodeError: Some leg did not answer in any of ``TRIES`` rounds.
             DeviceError: As :meth:`EncoderBus.check`.
         """
-        for _ in range(TRIES):
+        for _ in range(MAX_SYNCS):
             in_step = self._catch_up()
             self._ask()
             if not self._bus.wait_for(self._nothing_owed, self._timeout_s):
                 continue
             if not in_step:
-                self._bus.listen(SUSPICION * self._timeout_s)
+                self._bus.listen(LATE_RESPONSE_TIMEOUTS * self._timeout_s)
             self._bus.check()
             return self._decode(signed=signed)
         raise self._silent()
@@ -69,8 +69,8 @@ class SyncSampler:
         Raises:
             DeviceError: As :meth:`take`.
         """
-        self.take(signed=signed)
-        self._bus.listen(QUIET_S)
+        self.sample(signed=signed)
+        self._bus.listen(SECOND_RESPONSE_S)
 
     def check(self) -> None:
         """Raise if somebody sent what was not asked for.
@@ -81,7 +81,7 @@ class SyncSampler:
         """
         for leg, owed in zip(self._legs, self._owed, strict=True):
             if owed < 0:
-                raise duplicated("sent more positions than there were SYNCs", leg)
+                raise duplicated_node("sent more positions than there were SYNCs", leg)
         if self._foreign_sync:
             raise BusError(
                 "somebody else sends SYNC here",
@@ -93,12 +93,12 @@ class SyncSampler:
         """Wait for late answers; false if some had to be written off."""
         if self._bus.wait_for(self._nothing_owed, self._timeout_s):
             return True
-        with self._bus.news:
+        with self._bus.condition:
             self._owed = [min(owed, 0) for owed in self._owed]
         return False
 
     def _ask(self) -> None:
-        with self._bus.news:
+        with self._bus.condition:
             self._owed = [owed + 1 for owed in self._owed]
         self._bus.network.send_message(SYNC, b"")
 
@@ -119,9 +119,9 @@ class SyncSampler:
     def _silent(self) -> SilentNodeError:
         silent = [leg for leg, owed in zip(self._legs, self._owed, strict=True) if owed > 0]
         return SilentNodeError(
-            f"no answer to SYNC within {self._timeout_s:g} s, {TRIES} times",
+            f"no answer to SYNC within {self._timeout_s:g} s, {MAX_SYNCS} times",
             *silent,
-            action=advice(everybody=len(silent) == len(self._legs)),
+            action=silence_action(everybody=len(silent) == len(self._legs)),
         )
 
     def _on_position(self, can_id: int, data: bytearray, _timestamp: float) -> None:
@@ -129,7 +129,7 @@ class SyncSampler:
         self._owed[place] -= 1
         self._frames[place] = bytes(data)
         if self._nothing_owed():
-            self._bus.news.notify_all()
+            self._bus.condition.notify_all()
 
     def _on_foreign_sync(self, _can_id: int, _data: bytearray, _timestamp: float) -> None:
         self._foreign_sync = True

@@ -23,7 +23,7 @@ class WorkerThread:
 
     def __init__(self, name: str) -> None:
         self.name = name
-        self.interrupted = threading.Event()
+        self.cancelled = threading.Event()
         self._finished = False
         self._turn = asyncio.Lock()
         self._executor = ThreadPoolExecutor(1, thread_name_prefix=name)
@@ -47,18 +47,18 @@ class WorkerThread:
     async def finish(self, job: Callable[[], None]) -> None:
         """Interrupt the job that runs, run ``job`` as the last one, and end the thread."""
         self._finished = True
-        self.interrupted.set()
+        self.cancelled.set()
         try:
             await asyncio.shield(asyncio.get_running_loop().run_in_executor(self._executor, job))
         finally:
             self._executor.shutdown()
 
     async def _see_off(self, future: asyncio.Future[Result]) -> None:
-        self.interrupted.set()
+        self.cancelled.set()
         try:
             await asyncio.wait([future])
             with suppress(Exception):
                 future.result()
         finally:
             if not self._finished:
-                self.interrupted.clear()
+                self.cancelled.clear()

@@ -17,15 +17,15 @@ from drivers.gauges.errors import FrameRejected, GaugeAtEnd, GaugeSilent
 from drivers.gauges.protocol import DisplayedValue, GaugeState, LineSettings, ProtocolSpec, Unit
 from drivers.gauges.serial_gauge import SerialGauge
 
-ASK = b"R\r"
-VALUE = re.compile(rb"([+-])(?=.{8}, )( *\d+\.\d+ *), (IN|MM)\r")
+VALUE_REQUEST = b"R\r"
+VALUE_FRAME = re.compile(rb"([+-])(?=.{8}, )( *\d+\.\d+ *), (IN|MM)\r")
 PARAMETER = re.compile(rb"(?:[pP](\d{3}) ?= ?)?(\d{1,3})\r")
 UNITS = {b"IN": Unit.INCH, b"MM": Unit.MM}
 UNIT_NUMBERS = {1: Unit.INCH, 2: Unit.MM}
 MODES = {0: "ABS", 1: "TIR", 2: "INCR"}
 
 
-class Refusal(Enum):
+class CdiError(Enum):
     """What the instrument says instead of an answer."""
 
     NOT_FOUND = b"NOT FOUND\r"
@@ -44,16 +44,16 @@ class Parameter(IntEnum):
     RATIO = 40
 
 
-def parse_value(frame: bytes) -> DisplayedValue | Refusal:
+def parse_value(frame: bytes) -> DisplayedValue | CdiError:
     """What an answer to ``R`` says.
 
     Raises:
         FrameRejected: The frame is neither a value nor a refusal, to the last byte.
     """
-    if match := VALUE.fullmatch(frame):
+    if match := VALUE_FRAME.fullmatch(frame):
         return DisplayedValue.of(match[1], match[2], frame, UNITS[match[3]])
     try:
-        return Refusal(frame)
+        return CdiError(frame)
     except ValueError:
         raise FrameRejected(frame) from None
 
@@ -64,7 +64,7 @@ def parse_parameter(frame: bytes, parameter: Parameter) -> int | None:
     Raises:
         FrameRejected: The frame is neither, or names another parameter.
     """
-    if frame in {Refusal.NOT_FOUND.value, Refusal.NO_ACCESS.value}:
+    if frame in {CdiError.NOT_FOUND.value, CdiError.NO_ACCESS.value}:
         return None
     match = PARAMETER.fullmatch(frame)
     if match is None or int(match[1] or parameter) != parameter:
@@ -75,7 +75,7 @@ def parse_parameter(frame: bytes, parameter: Parameter) -> int | None:
 class CdiGauge(SerialGauge):
     """A CDI or Starrett dial indicator."""
 
-    dialect: ClassVar[ProtocolSpec] = ProtocolSpec(
+    spec: ClassVar[ProtocolSpec] = ProtocolSpec(
         "cdi", "CDI or Starrett indicator", LineSettings(9600), "+  2.1380, MM\r\n"
     )
     normal_modes: ClassVar[frozenset[str]] = frozenset({"ABS", "INCR"})
@@ -83,15 +83,15 @@ class CdiGauge(SerialGauge):
     _knows_parameters: bool | None = None
 
     @property
-    def question(self) -> bytes:
+    def value_request(self) -> bytes:
         """What asks for the value shown."""
-        return ASK
+        return VALUE_REQUEST
 
     def _understand(self, frame: bytes) -> DisplayedValue:
         answer = parse_value(frame)
         if isinstance(answer, DisplayedValue):
             return answer
-        if answer is Refusal.OUT_OF_BOUNDS:
+        if answer is CdiError.OUT_OF_BOUNDS:
             raise GaugeAtEnd(
                 "plunger at its end (OUT OF BOUNDS)",
                 subject=self.subject,

@@ -19,9 +19,9 @@ from drivers.gauges.serial_gauge import SerialGauge
 from drivers.interfaces import GaugeReading
 from hexacell.errors import DeviceError
 
-VALUE = re.compile(rb"0(\d{1,2})A([+-])(?=.{8}\r)(\d+\.\d+)\r")
-ERROR = re.compile(rb"9(\d)(\d)\r")
-ABOUT = re.compile(rb"([ -~]{4,60})\r")
+VALUE_FRAME = re.compile(rb"0(\d{1,2})A([+-])(?=.{8}\r)(\d+\.\d+)\r")
+ERROR_FRAME = re.compile(rb"9(\d)(\d)\r")
+IDENTIFICATION_FRAME = re.compile(rb"([ -~]{4,60})\r")
 NO_GAUGE = 1
 BUSY = 8
 BUSY_PAUSE_S = 0.05
@@ -45,23 +45,23 @@ def parse_value(frame: bytes, channel: int) -> DisplayedValue | MultiplexerError
     Raises:
         FrameRejected: The frame is neither a value of this channel nor an error, to the last byte.
     """
-    value = VALUE.fullmatch(frame)
+    value = VALUE_FRAME.fullmatch(frame)
     if value and int(value[1]) == channel:
         return DisplayedValue.of(value[2], value[3], frame)
-    error = ERROR.fullmatch(frame)
+    error = ERROR_FRAME.fullmatch(frame)
     if error and int(error[1]) in {1, channel}:
         return MultiplexerError(int(error[2]))
     raise FrameRejected(frame)
 
 
-def parse_about(frame: bytes) -> str:
+def parse_identification(frame: bytes) -> str:
     """The multiplexer's description of itself, which is free text.
 
     Raises:
         FrameRejected: It is no text of a likely length, or a value.
     """
-    match = ABOUT.fullmatch(frame)
-    if match is None or VALUE.fullmatch(frame):
+    match = IDENTIFICATION_FRAME.fullmatch(frame)
+    if match is None or VALUE_FRAME.fullmatch(frame):
         raise FrameRejected(frame)
     return match[1].decode("ascii").strip()
 
@@ -69,7 +69,7 @@ def parse_about(frame: bytes) -> str:
 class Mux10Gauge(SerialGauge):
     """A dial indicator on one channel of a Mitutoyo MUX-10 or a multiplexer with its format."""
 
-    dialect: ClassVar[ProtocolSpec] = ProtocolSpec(
+    spec: ClassVar[ProtocolSpec] = ProtocolSpec(
         "mux10", "Mitutoyo MUX-10 channel", LineSettings(9600), "01A+0000.123\r"
     )
 
@@ -79,7 +79,7 @@ class Mux10Gauge(SerialGauge):
         return self.settings.channel
 
     @property
-    def question(self) -> bytes:
+    def value_request(self) -> bytes:
         """What asks for the value shown."""
         return b"%d\r" % self.channel
 
@@ -139,6 +139,6 @@ class Mux10Gauge(SerialGauge):
     async def _about(self) -> str | None:
         """What the multiplexer says of itself, if it does."""
         try:
-            return await self._query(b"V\r", parse_about)
+            return await self._query(b"V\r", parse_identification)
         except (GaugeSilent, WrongAnswer):
             return None

@@ -47,7 +47,7 @@ class ProtocolSpec:
     example: str
 
 
-def silence(subject: str, port: str, timeout_s: float, *, echo: bool) -> GaugeSilent:
+def silent_gauge(subject: str, port: str, timeout_s: float, *, echo: bool) -> GaugeSilent:
     """Nothing came; with ``echo``, nothing but our own question."""
     if echo:
         return GaugeSilent(
@@ -62,7 +62,7 @@ def silence(subject: str, port: str, timeout_s: float, *, echo: bool) -> GaugeSi
     )
 
 
-def wrong_answer(subject: str, dialect: ProtocolSpec, received: bytes) -> WrongAnswer:
+def unexpected_answer(subject: str, dialect: ProtocolSpec, received: bytes) -> WrongAnswer:
     """Something came that is no frame of the protocol, again and again."""
     if any(byte & BIT_7 for byte in received):
         return WrongAnswer(

@@ -13,8 +13,8 @@ from drivers.gauges.protocol import (
     GaugeState,
     ProtocolSpec,
     Unit,
-    silence,
-    wrong_answer,
+    silent_gauge,
+    unexpected_answer,
 )
 from drivers.interfaces import DeviceIdentity, GaugeReading
 from drivers.serial.port import NoAnswer
@@ -23,7 +23,7 @@ from hexacell.cell.devices import GaugeSettings
 from hexacell.errors import DeviceError, FileError
 
 AGREEMENT_MM = 0.05  # readings in a row closer than this agree: noise, no flipped digit
-READINGS = 12  # enough for a ball that still swings to come to rest
+MAX_READINGS = 12  # enough for a ball that still swings to come to rest
 TRIES = 3
 
 Parsed = TypeVar("Parsed")
@@ -35,13 +35,13 @@ class SerialGauge(ABC):
     Values are what the instrument shows, mm, in its own zero and direction.
     """
 
-    dialect: ClassVar[ProtocolSpec]
+    spec: ClassVar[ProtocolSpec]
     normal_modes: ClassVar[frozenset[str]] = frozenset()
 
-    def __init__(self, settings: GaugeSettings, links: SharedSerialPorts) -> None:
+    def __init__(self, settings: GaugeSettings, ports: SharedSerialPorts) -> None:
         self.settings = settings
         self.subject = f"gauge {settings.name}"
-        self._links = links
+        self._links = ports
         self._link: SharedSerialPort | None = None
         self._session = 0
         self._state: GaugeState | None = None
@@ -59,7 +59,7 @@ class SerialGauge(ABC):
 
     @property
     @abstractmethod
-    def question(self) -> bytes:
+    def value_request(self) -> bytes:
         """What asks for the value shown."""
 
     @abstractmethod
@@ -86,8 +86,8 @@ class SerialGauge(ABC):
             await self.close()
             raise
         self._state = state
-        description = state.identification or self.dialect.makers
-        return DeviceIdentity(self.name, self.dialect.protocol, description)
+        description = state.identification or self.spec.makers
+        return DeviceIdentity(self.name, self.spec.protocol, description)
 
     async def read(self) -> GaugeReading:
         """The value shown, mm, once two readings in a row agree.
@@ -100,7 +100,7 @@ class SerialGauge(ABC):
         """
         self._opened_state()
         readings = [self._in_mm(await self._shown())]
-        while len(readings) < READINGS:
+        while len(readings) < MAX_READINGS:
             readings.append(self._in_mm(await self._shown()))
             if abs(readings[-1].value - readings[-2].value) <= AGREEMENT_MM:
                 return GaugeReading(readings[-1].value, readings[-1].text)
@@ -120,10 +120,10 @@ class SerialGauge(ABC):
         """
         self._opened_state()
         try:
-            shown = self._in_mm(self._understand(await self._ask(self.question)))
+            shown = self._in_mm(self._understand(await self._ask(self.value_request)))
         except FrameRejected as rejection:
             self._distrust()
-            raise wrong_answer(self.subject, self.dialect, rejection.frame) from rejection
+            raise unexpected_answer(self.subject, self.spec, rejection.frame) from rejection
         return GaugeReading(shown.value, shown.text)
 
     async def check(self) -> None:
@@ -148,11 +148,11 @@ class SerialGauge(ABC):
     async def _connect(self) -> None:
         if self.settings.port is None:
             raise FileError("has no port", subject=self.subject, action="Name it in the cell file")
-        serial = self.dialect.line.overlaid(self.settings.serial)
+        serial = self.spec.line.overlaid(self.settings.serial)
         link = self._links.acquire(self.settings.port, self.name, serial, channel=self.channel)
         self._link = link
         self._session = await link.open()
-        link.take_strays()
+        link.take_unsolicited()
 
     async def _inspect_awake(self) -> GaugeState:
         try:
@@ -162,7 +162,7 @@ class SerialGauge(ABC):
             return await self._inspect()
 
     async def _shown(self) -> DisplayedValue:
-        return await self._query(self.question, self._understand)
+        return await self._query(self.value_request, self._understand)
 
     async def _query(self, request: bytes, parse: Callable[[bytes], Parsed]) -> Parsed:
         """What ``parse`` finds in the answer; asked again if it rejects the frame."""
@@ -183,13 +183,13 @@ class SerialGauge(ABC):
             if beside := missing.received.replace(request, b"").strip():
                 raise FrameRejected(beside) from missing
             echo = bool(missing.received)
-            raise silence(self.subject, link.url, self.settings.timeout_s, echo=echo) from missing
+            raise silent_gauge(self.subject, link.url, self.settings.timeout_s, echo=echo) from missing
 
     def _distrust(self) -> None:
         self._live_link().require_silence()
 
     def _nonsense(self, received: bytes) -> DeviceError:
-        return wrong_answer(self.subject, self.dialect, received)
+        return unexpected_answer(self.subject, self.spec, received)
 
     def _in_mm(self, shown: DisplayedValue) -> DisplayedValue:
         if shown.apparent_unit is Unit.INCH:
@@ -230,6 +230,6 @@ class SerialGauge(ABC):
             raise DeviceError("is not open", subject=self.subject)
         if self._void is not None:
             raise self._void
-        if self._link.session != self._session:
+        if self._link.open_count != self._session:
             raise self._voided("lost its port in between")
         return self._link

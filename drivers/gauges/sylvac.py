@@ -19,12 +19,12 @@ from drivers.gauges.protocol import DisplayedValue, GaugeState, LineSettings, Pr
 from drivers.gauges.serial_gauge import SerialGauge
 from hexacell.errors import DeviceError
 
-ASK = b"?\r"
-VALUE = re.compile(rb"([+\- ])(\d{1,5}\.\d{1,6})[<=>]?\r")
+VALUE_REQUEST = b"?\r"
+VALUE_FRAME = re.compile(rb"([+\- ])(\d{1,5}\.\d{1,6})[<=>]?\r")
 POWER_UP = re.compile(rb"(?<![A-Z])[A-Z]{2}\d{2,}[\w.]*\r")  # maker, instrument, options
 
 
-class Fault(Enum):
+class SylvacError(Enum):
     """An error that the instrument reports instead of an answer."""
 
     SENSOR = b"ERR0\r"
@@ -33,7 +33,7 @@ class Fault(Enum):
     RANGE = b"ERR3\r"
 
 
-FAULTS = frozenset(fault.value for fault in Fault)
+ERROR_FRAMES = frozenset(fault.value for fault in SylvacError)
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,10 +49,10 @@ class Query:
         Raises:
             FrameRejected: The frame is no answer to this query.
         """
-        if frame == Fault.COMMAND.value:
+        if frame == SylvacError.COMMAND.value:
             return None
         match = self.answer.fullmatch(frame)
-        if match is None or frame in FAULTS:
+        if match is None or frame in ERROR_FRAMES:
             raise FrameRejected(frame)
         return match[1].decode("ascii").strip()
 
@@ -66,16 +66,16 @@ PRESET = Query(b"PRE?\r", re.compile(rb"(?:PRE ?)?([+\- ]?\d{1,5}\.\d{1,6})\r"))
 BATTERY = Query(b"BAT?\r", re.compile(rb"(?:BAT ?)?([01])\r"))
 
 
-def parse_value(frame: bytes) -> DisplayedValue | Fault:
+def parse_value(frame: bytes) -> DisplayedValue | SylvacError:
     """What an answer to ``?`` says.
 
     Raises:
         FrameRejected: The frame is neither a value nor an error, to the last byte.
     """
-    if match := VALUE.fullmatch(frame):
+    if match := VALUE_FRAME.fullmatch(frame):
         return DisplayedValue.of(match[1], match[2], frame)
     try:
-        return Fault(frame)
+        return SylvacError(frame)
     except ValueError:
         raise FrameRejected(frame) from None
 
@@ -84,25 +84,25 @@ class SylvacGauge(SerialGauge):
     """A dial indicator that speaks Sylvac's opto-RS duplex protocol."""
 
     # duplex cables are fed by DTR high and RTS low
-    dialect: ClassVar[ProtocolSpec] = ProtocolSpec(
+    spec: ClassVar[ProtocolSpec] = ProtocolSpec(
         "sylvac", "Sylvac opto-RS indicator", LineSettings(4800, 7, "E", 2, rts=False), "+12.345\r"
     )
     normal_modes: ClassVar[frozenset[str]] = frozenset({"NOR", "REF", "REF1", "REF2"})
 
     @property
-    def question(self) -> bytes:
+    def value_request(self) -> bytes:
         """What asks for the value shown."""
-        return ASK
+        return VALUE_REQUEST
 
     def _understand(self, frame: bytes) -> DisplayedValue:
         match parse_value(frame):
             case DisplayedValue() as shown:
                 return shown
-            case Fault.RANGE:
+            case SylvacError.RANGE:
                 raise GaugeAtEnd(
                     "plunger at its end (ERR3)", subject=self.subject, action="Move the gauge or the ball"
                 )
-            case Fault.SENSOR:
+            case SylvacError.SENSOR:
                 raise self._voided("moved too fast or its sensor fails (ERR0)")
             case _:  # our question did not reach it as sent
                 raise FrameRejected(frame)
@@ -126,7 +126,7 @@ class SylvacGauge(SerialGauge):
 
     async def _ask(self, request: bytes) -> bytes:
         frame = await super()._ask(request)
-        unasked = self._live_link().take_strays()
+        unasked = self._live_link().take_unsolicited()
         unasked += frame if request != IDENTIFICATION.command else b""
         if power_up := POWER_UP.search(unasked):
             self._distrust()
@@ -134,11 +134,11 @@ class SylvacGauge(SerialGauge):
         return frame
 
     def _nonsense(self, received: bytes) -> DeviceError:
-        if received == Fault.PARITY.value:
+        if received == SylvacError.PARITY.value:
             return WrongAnswer(
                 "hears our questions with wrong parity (ERR2)",
                 subject=self.subject,
-                action=f"Check parity settings: {self.dialect.protocol} uses {self.dialect.line}",
+                action=f"Check parity settings: {self.spec.protocol} uses {self.spec.line}",
             )
         return super()._nonsense(received)
 

@@ -17,20 +17,20 @@ _CAUSES = {
 }
 
 
-class LinkLost(DeviceError):
+class PortLost(DeviceError):
     """There is no line to a device, or it broke."""
 
 
-def cannot_open(subject: str, url: str, error: BaseException) -> DeviceError:
+def port_open_failed(subject: str, url: str, error: BaseException) -> DeviceError:
     """Opening the port failed with ``error``, an ``OSError`` or a ``termios.error``."""
     problem, action = _CAUSES.get(
         getattr(error, "errno", None) or 0,
         (f"cannot be opened: {error}", "Check the device and port in the cell file"),
     )
-    return LinkLost(f"port {url} {problem}", subject=subject, action=action)
+    return PortLost(f"port {url} {problem}", subject=subject, action=action)
 
 
-def settings_refused(subject: str, url: str, error: BaseException) -> FileError:
+def settings_rejected(subject: str, url: str, error: BaseException) -> FileError:
     """The URL or one of the settings means nothing to pyserial."""
     return FileError(
         f"port {url} or its serial settings are refused: {error}",
@@ -39,21 +39,21 @@ def settings_refused(subject: str, url: str, error: BaseException) -> FileError:
     )
 
 
-def lost(subject: str, url: str, reason: str) -> DeviceError:
+def port_lost(subject: str, url: str, reason: str) -> DeviceError:
     """The port was there and is no longer."""
-    return LinkLost(
+    return PortLost(
         f"port {url} was lost ({reason})",
         subject=subject,
         action="Plug it in and open the device again; its zero is void",
     )
 
 
-def closed(subject: str, url: str) -> DeviceError:
+def port_closed(subject: str, url: str) -> DeviceError:
     """The port is being closed, by ourselves."""
-    return LinkLost(f"port {url} is closed", subject=subject)
+    return PortLost(f"port {url} is closed", subject=subject)
 
 
-def keeps_sending(subject: str, url: str) -> DeviceError:
+def line_not_silent(subject: str, url: str) -> DeviceError:
     """The device never falls silent, so no answer can be told from the rest."""
     return DeviceError(
         f"the device on {url} keeps sending unasked",

@@ -18,8 +18,14 @@ from contextlib import contextmanager, suppress
 
 import serial
 
-from drivers.serial.errors import cannot_open, closed, keeps_sending, lost, settings_refused
-from drivers.wire_trace import Direction, Recorder, TraceEntry
+from drivers.serial.errors import (
+    line_not_silent,
+    port_closed,
+    port_lost,
+    port_open_failed,
+    settings_rejected,
+)
+from drivers.wire_trace import TraceEntry, TraceRecorder, TrafficDirection
 from hexacell.errors import DeviceError
 
 SLICE_S = 0.05
@@ -52,18 +58,18 @@ class SerialPort:
         self,
         url: str,
         settings: Mapping[str, object],
-        recorder: Recorder | None = None,
+        recorder: TraceRecorder | None = None,
         worst_latency_s: float = WORST_LATENCY_S,
     ) -> None:
         self.url = url
         self.subject = f"port {url}"
-        self.stopping = threading.Event()
-        self.strays: deque[bytes] = deque(maxlen=64)
+        self.closing = threading.Event()
+        self.unsolicited: deque[bytes] = deque(maxlen=64)
         self._settings = settings
         self._recorder = recorder
         self._worst_latency_s = worst_latency_s
         self._port: serial.Serial | None = None
-        self.session = 0
+        self.open_count = 0
         self._asked_at = 0.0
         self._last_traffic = 0.0
         self._silence_s = 0.0
@@ -80,9 +86,9 @@ class SerialPort:
             self.close()
         if self._port is None:
             self._port = self._opened()
-            self.session += 1
+            self.open_count += 1
             self._silence_s, self._early = 0.0, b""
-        return self.session
+        return self.open_count
 
     def exchange(self, request: bytes, terminator: bytes, timeout_s: float) -> bytes:
         """Send ``request``; the first whole frame that answers it, ``terminator`` included.
@@ -92,7 +98,7 @@ class SerialPort:
             DeviceError: The port is not open, was lost, or is being closed.
         """
         if self._port is None:
-            raise lost(self.subject, self.url, "it is not open")
+            raise port_lost(self.subject, self.url, "it is not open")
         with self._losing_the_port():
             self._resynchronise(self._port)
             self._send(self._port, request)
@@ -125,9 +131,9 @@ class SerialPort:
                 tries += 1
                 self._try_to_open(port, last=tries == OPEN_TRIES)
         except (ValueError, TypeError) as error:
-            raise settings_refused(self.subject, self.url, error) from error
+            raise settings_rejected(self.subject, self.url, error) from error
         except (OSError, termios.error) as error:
-            raise cannot_open(self.subject, self.url, error) from error
+            raise port_open_failed(self.subject, self.url, error) from error
         return port
 
     def _try_to_open(self, port: serial.Serial, *, last: bool) -> None:
@@ -155,13 +161,13 @@ class SerialPort:
         give_up_at = time.monotonic() + PATIENCE * max(self._silence_s, FRAME_GAP_S)
         while self._since_traffic_s() < self._silence_s or port.in_waiting:
             if time.monotonic() > give_up_at:
-                raise keeps_sending(self.subject, self.url)
+                raise line_not_silent(self.subject, self.url)
             self._put_aside(self._read(port))
         self._silence_s = 0.0
 
     def _put_aside(self, data: bytes) -> None:
         if data.strip(LINE_ENDS):
-            self.strays.append(data)
+            self.unsolicited.append(data)
             self.require_silence()
 
     def _since_traffic_s(self) -> float:
@@ -181,13 +187,13 @@ class SerialPort:
 
     def _read(self, port: serial.Serial) -> bytes:
         """Whatever comes within one slice, perhaps nothing."""
-        if self.stopping.is_set():
-            raise closed(self.subject, self.url)
+        if self.closing.is_set():
+            raise port_closed(self.subject, self.url)
         data = port.read(1)
         if data:
             data += self._waiting(port)
             self._last_traffic = time.monotonic()
-            self._record(Direction.RECEIVED, data)
+            self._record(TrafficDirection.RECEIVED, data)
         return data
 
     def _waiting(self, port: serial.Serial) -> bytes:
@@ -198,22 +204,22 @@ class SerialPort:
         return data
 
     def _send(self, port: serial.Serial, request: bytes) -> None:
-        if self.stopping.is_set():
-            raise closed(self.subject, self.url)
-        self._record(Direction.SENT, request)
+        if self.closing.is_set():
+            raise port_closed(self.subject, self.url)
+        self._record(TrafficDirection.SENT, request)
         self._asked_at = self._last_traffic = time.monotonic()
         # pyserial raises it also where all was sent and this thread then got no turn for so long;
         # whether anybody heard, the answer tells.
         with suppress(serial.SerialTimeoutException):
             port.write(request)
 
-    def _record(self, direction: Direction, data: bytes) -> None:
+    def _record(self, direction: TrafficDirection, data: bytes) -> None:
         if data and self._recorder is not None:
             self._recorder(TraceEntry(time.time(), self.url, direction, data))
 
     def _pause(self, seconds: float) -> None:
-        if self.stopping.wait(seconds):
-            raise closed(self.subject, self.url)
+        if self.closing.wait(seconds):
+            raise port_closed(self.subject, self.url)
 
     @contextmanager
     def _losing_the_port(self) -> Iterator[None]:
@@ -221,7 +227,7 @@ class SerialPort:
             yield
         except (OSError, termios.error) as error:
             self.close()
-            raise lost(self.subject, self.url, str(error)) from error
+            raise port_lost(self.subject, self.url, str(error)) from error
 
 
 def _refuses_parity(error: termios.error) -> bool:

@@ -9,9 +9,9 @@ from dataclasses import dataclass, field
 from functools import partial
 from typing import TypeVar
 
-from drivers.serial.errors import closed, settings_refused
+from drivers.serial.errors import port_closed, settings_rejected
 from drivers.serial.port import WORST_LATENCY_S, SerialPort
-from drivers.wire_trace import Recorder
+from drivers.wire_trace import TraceRecorder
 from hexacell.errors import FileError
 
 Result = TypeVar("Result")
@@ -32,7 +32,7 @@ class SharedSerialPort:
         self,
         url: str,
         *,
-        trace: Recorder | None = None,
+        trace: TraceRecorder | None = None,
         worst_latency_s: float = WORST_LATENCY_S,
         **serial_settings: object,
     ) -> None:
@@ -51,9 +51,9 @@ class SharedSerialPort:
         self._wire.subject = subject
 
     @property
-    def session(self) -> int:
+    def open_count(self) -> int:
         """How often the port has been opened: it grows when it was lost and opened again."""
-        return self._wire.session
+        return self._wire.open_count
 
     async def open(self) -> int:
         """Open the port unless it is open and alive; the number of its session.
@@ -81,9 +81,9 @@ class SharedSerialPort:
         if not self._closed:
             self._owner.submit(self._wire.require_silence)
 
-    def take_strays(self) -> bytes:
+    def take_unsolicited(self) -> bytes:
         """What came unasked or too late since this was last called; the latest bytes only."""
-        strays = self._wire.strays
+        strays = self._wire.unsolicited
         return b"".join(strays.popleft() for _ in range(len(strays)))
 
     async def close(self) -> None:
@@ -91,7 +91,7 @@ class SharedSerialPort:
         if self._closed:
             return
         self._closed = True
-        self._wire.stopping.set()
+        self._wire.closing.set()
         finished = self._owner.submit(self._wire.close)
         self._owner.shutdown(wait=False)
         await asyncio.shield(asyncio.wrap_future(finished))
@@ -99,7 +99,7 @@ class SharedSerialPort:
 
     async def _run(self, job: Callable[[], Result]) -> Result:
         if self._closed:
-            raise closed(self.subject, self.url)
+            raise port_closed(self.subject, self.url)
         return await asyncio.wrap_future(self._owner.submit(job))
 
 
@@ -119,7 +119,9 @@ class _Shared:
 class SharedSerialPorts:
     """The links of one cell: gauges on one port share one link."""
 
-    def __init__(self, *, trace: Recorder | None = None, worst_latency_s: float = WORST_LATENCY_S) -> None:
+    def __init__(
+        self, *, trace: TraceRecorder | None = None, worst_latency_s: float = WORST_LATENCY_S
+    ) -> None:
         self._trace = trace
         self._worst_latency_s = worst_latency_s
         self._shared: dict[str, _Shared] = {}
@@ -165,7 +167,7 @@ class SharedSerialPorts:
                 url, trace=self._trace, worst_latency_s=self._worst_latency_s, **settings
             )
         except TypeError as error:  # a setting has the name of one of ours
-            raise settings_refused(f"port {url}", url, error) from error
+            raise settings_rejected(f"port {url}", url, error) from error
 
     @staticmethod
     def _refuse_conflict(

@@ -10,7 +10,7 @@ from typing import Any, Self
 
 from drivers.simulated.encoders import SimulatedEncoderBank
 from drivers.simulated.fault_schedule import CellFaults, FaultSchedule
-from drivers.simulated.gauges.rack import GaugeRack
+from drivers.simulated.gauges.rack import SimulatedGaugeBank
 from drivers.simulated.linuxcnc.server import SimulatedController
 from drivers.simulated.physics import RobotPhysics
 from drivers.simulated.robot import SimulatedMachine
@@ -48,12 +48,12 @@ class SimulatedCell:
     ) -> None:
         clock = CellClock(settings.timing.clock_factor)
         home = Pose(*settings.identification.points[0])
-        self.world = _world(mechanism, simulation, clock, config_format, config, home)
-        self.machine = SimulatedMachine(mechanism, config_format, config, self.world, clock, home)
+        self.physics = _physics(mechanism, simulation, clock, config_format, config, home)
+        self.machine = SimulatedMachine(mechanism, config_format, config, self.physics, clock, home)
         with ExitStack() as served:
             stop_file = _stop_file(settings, served)
-            self.gauges = served.enter_context(_rack(settings, simulation, self.world, clock))
-            self.encoders = served.enter_context(_bank(settings, simulation, self.world, clock))
+            self.gauges = served.enter_context(_rack(settings, simulation, self.physics, clock))
+            self.encoders = served.enter_context(_bank(settings, simulation, self.physics, clock))
             bus: dict[str, Any] = self.encoders.bus_settings
             if other_processes:
                 adapter = served.enter_context(serve_slcan(self.encoders.channel, "pty"))
@@ -61,7 +61,7 @@ class SimulatedCell:
             self.controller = served.enter_context(_controller(settings, self.machine, config))
             self.faults = CellFaults(self.gauges, self.encoders, self.controller, stop_file)
             self.schedule = served.enter_context(FaultSchedule(self.faults, clock, simulation.faults))
-            self.world.on_travel = self.schedule.move_begun
+            self.physics.on_motion_start = self.schedule.on_motion_start
             self._served = served.pop_all()
         self.settings = settings.model_copy(
             update={
@@ -95,7 +95,7 @@ def _stop_file(settings: CellSettings, served: ExitStack) -> Path:
     return Path(served.enter_context(TemporaryDirectory(prefix="hexacell-"))) / "stop"
 
 
-def _world(
+def _physics(
     mechanism: Mechanism,
     simulation: SimulationSettings,
     clock: CellClock,
@@ -117,18 +117,18 @@ def _world(
 
 
 def _rack(
-    settings: CellSettings, simulation: SimulationSettings, world: RobotPhysics, clock: CellClock
-) -> GaugeRack:
-    plungers = {gauge.name: _Plunger(world, gauge) for gauge in settings.gauges}
-    return GaugeRack(settings.gauges, plungers, simulation.gauges, clock, seed=simulation.seed)
+    settings: CellSettings, simulation: SimulationSettings, physics: RobotPhysics, clock: CellClock
+) -> SimulatedGaugeBank:
+    plungers = {gauge.name: _Plunger(physics, gauge) for gauge in settings.gauges}
+    return SimulatedGaugeBank(settings.gauges, plungers, simulation.gauges, clock, seed=simulation.seed)
 
 
 def _bank(
-    settings: CellSettings, simulation: SimulationSettings, world: RobotPhysics, clock: CellClock
+    settings: CellSettings, simulation: SimulationSettings, physics: RobotPhysics, clock: CellClock
 ) -> SimulatedEncoderBank:
     latency = simulation.encoders.latency_s
     return SimulatedEncoderBank(
-        settings.encoders, lambda: world.sliders().tolist(), clock, latency_s=latency
+        settings.encoders, lambda: physics.encoder_positions().tolist(), clock, latency_s=latency
     )
 
 
@@ -145,9 +145,9 @@ def _controller(settings: CellSettings, machine: SimulatedMachine, config: Path)
 class _Plunger:
     """What one gauge's plunger does, in the instrument's own direction."""
 
-    def __init__(self, world: RobotPhysics, gauge: GaugeSettings) -> None:
-        self._world = world
+    def __init__(self, physics: RobotPhysics, gauge: GaugeSettings) -> None:
+        self._physics = physics
         self._gauge = gauge
 
     def __call__(self) -> float:
-        return self._gauge.sign * self._world.displacement(self._gauge.axis)
+        return self._gauge.sign * self._physics.gauge_displacement(self._gauge.axis)

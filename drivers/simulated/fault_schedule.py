@@ -13,8 +13,8 @@ from typing import Self
 
 from drivers.simulated.encoders import SimulatedEncoderBank
 from drivers.simulated.gauges.faults import InjectedGaugeFault
-from drivers.simulated.gauges.rack import GaugeRack
-from drivers.simulated.linuxcnc.faults import Fault
+from drivers.simulated.gauges.rack import SimulatedGaugeBank
+from drivers.simulated.linuxcnc.faults import ControllerFault
 from drivers.simulated.linuxcnc.server import SimulatedController
 from hexacell.cell.simulation import SimulatedFault
 from hexacell.clock import CellClock
@@ -58,7 +58,7 @@ class CellFaults:
 
     def __init__(
         self,
-        gauges: GaugeRack,
+        gauges: SimulatedGaugeBank,
         encoders: SimulatedEncoderBank,
         controller: SimulatedController,
         stop_file: Path,
@@ -120,11 +120,11 @@ class CellFaults:
         if kind is FaultKind.UNPLUGGED:
             (controller.unplug if on else controller.plug_in)()
         elif kind is FaultKind.SILENT:
-            (controller.faults.inject if on else controller.faults.clear)(Fault.SILENT)
+            (controller.faults.inject if on else controller.faults.clear)(ControllerFault.SILENT)
         elif on and kind is FaultKind.EMERGENCY_STOP:
-            controller.control.set_estop(on=True)
+            controller.state.set_estop(on=True)
         elif on:
-            controller.control.lag()
+            controller.state.exceed_following_error()
 
     def _encoder_fault(self, kind: FaultKind, leg: int, *, on: bool) -> None:
         faults = self._encoders.faults
@@ -137,7 +137,7 @@ class CellFaults:
 
 
 @dataclass(frozen=True, slots=True)
-class Struck:
+class InjectedFault:
     """A fault that struck, and when on the cell's clock."""
 
     fault: SimulatedFault
@@ -158,8 +158,8 @@ class FaultSchedule:
     def __init__(
         self, faults: CellFaults, clock: CellClock, planned: Sequence[SimulatedFault] = ()
     ) -> None:
-        self.moves = 0
-        self.struck: list[Struck] = []
+        self.move_count = 0
+        self.injected: list[InjectedFault] = []
         self._faults = faults
         self._clock = clock
         self._waiting: list[SimulatedFault] = []
@@ -170,9 +170,9 @@ class FaultSchedule:
         self._thread: threading.Thread | None = None
         begun_s = clock.now()
         for fault in planned:
-            self.plan(fault, begun_s)
+            self.schedule(fault, begun_s)
 
-    def plan(self, fault: SimulatedFault, since_s: float | None = None) -> None:
+    def schedule(self, fault: SimulatedFault, since_s: float | None = None) -> None:
         """Have a fault strike later: in a move, or so long after ``since_s``, which is now by default.
 
         Raises:
@@ -188,11 +188,11 @@ class FaultSchedule:
                 self._thread = threading.Thread(target=self._serve, name="simulated faults")
                 self._thread.start()
 
-    def move_begun(self) -> None:
+    def on_motion_start(self) -> None:
         """Another move has begun now."""
         with self._news:
-            self.moves += 1
-            for fault in [fault for fault in self._waiting if fault.at_move == self.moves]:
+            self.move_count += 1
+            for fault in [fault for fault in self._waiting if fault.at_move == self.move_count]:
                 self._waiting.remove(fault)
                 self._expect(fault, self._clock.now())
 
@@ -221,7 +221,7 @@ class FaultSchedule:
         while (due := self._next()) is not None:
             on, fault = due
             if on:
-                self.struck.append(Struck(fault, self._clock.now()))
+                self.injected.append(InjectedFault(fault, self._clock.now()))
             change = self._faults.inject if on else self._faults.clear
             change(FaultKind(fault.kind), fault.device)
 

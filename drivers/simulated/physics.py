@@ -38,33 +38,33 @@ class Motion:
     """
 
     path: Array
-    begins_s: float
+    start_s: float
     duration_s: float
     stopped_s: float = np.inf
 
     @classmethod
-    def rest(cls, joints: Array) -> Motion:
+    def stationary(cls, joints: Array) -> Motion:
         """No motion: sliders standing at (6,), mm, for ever."""
         return cls(np.stack([joints, joints]), -1e9, 0.0)
 
     @property
-    def ends_s(self) -> float:
+    def end_s(self) -> float:
         """When the sliders stand again."""
-        return min(self.begins_s + self.duration_s, self.stopped_s)
+        return min(self.start_s + self.duration_s, self.stopped_s)
 
     def fraction(self, now_s: float) -> float:
         """How much of the way is done, 0 to 1."""
-        elapsed = min(now_s, self.stopped_s) - self.begins_s
+        elapsed = min(now_s, self.stopped_s) - self.start_s
         t = 1.0 if elapsed >= self.duration_s else max(0.0, elapsed / self.duration_s)
         return t * t * (3.0 - 2.0 * t)
 
-    def place(self, now_s: float) -> float:
+    def path_position(self, now_s: float) -> float:
         """Where on the path the sliders are, in rows of it."""
         return self.fraction(now_s) * (len(self.path) - 1)
 
     def joints(self, now_s: float) -> Array:
         """Slider positions (6,), mm, at a time."""
-        place = self.place(now_s)
+        place = self.path_position(now_s)
         below = min(int(place), len(self.path) - 2)
         share = place - below
         joints: Array = (1.0 - share) * self.path[below] + share * self.path[below + 1]
@@ -72,7 +72,7 @@ class Motion:
 
 
 AXES = "xyz"
-SWING_HZ = 8.0
+RINGING_HZ = 8.0
 
 
 class RobotPhysics:
@@ -97,12 +97,12 @@ class RobotPhysics:
         values = settings.geometry
         self._truth = Geometry(values.S, values.B, values.l)
         self._mechanism = mechanism
-        self.on_travel: Callable[[], None] = lambda: None
+        self.on_motion_start: Callable[[], None] = lambda: None
         self._settings = settings
         self._clock = clock
         self._random = np.random.default_rng(settings.seed)
         self._lock = threading.RLock()
-        self._motion = Motion.rest(start_joints)
+        self._motion = Motion.stationary(start_joints)
         self._joints = start_joints
         self._passed = 0
         first = change_geometry(mechanism, start_geometry, self._truth, start, start_joints[None])
@@ -116,7 +116,7 @@ class RobotPhysics:
         self._triad = self._turned()
         self._disturb()
 
-    def travel(self, path: Array) -> Motion:
+    def start_motion(self, path: Array) -> Motion:
         """Send the sliders along a path (k, 6), mm, that begins where they stand; returns at once."""
         motion = self._settings.motion
         with self._lock:
@@ -127,34 +127,34 @@ class RobotPhysics:
             duration = max(motion.minimum_s, longest / motion.speed_mm_s)
             self._motion, self._passed = Motion(really, self._clock.now(), duration), 0
             self._disturb()
-            self.on_travel()
+            self.on_motion_start()
             return self._motion
 
     def stop(self) -> None:
         """Stop the sliders where they are."""
         with self._lock:
             now = self._clock.now()
-            if now < self._motion.ends_s:
+            if now < self._motion.end_s:
                 self._motion = replace(self._motion, stopped_s=now)
 
     @property
-    def still_since_s(self) -> float:
+    def motion_end_s(self) -> float:
         """When the sliders came, or will come, to rest, on the cell's clock."""
         with self._lock:
-            return self._motion.ends_s
+            return self._motion.end_s
 
     def progress(self) -> float:
         """How much of the last way is done, 0 to 1."""
         with self._lock:
             return self._motion.fraction(self._clock.now())
 
-    def sliders(self) -> Array:
+    def encoder_positions(self) -> Array:
         """What the encoders see (6,), mm."""
         with self._lock:
             flicker = self._settings.encoders.flicker_mm * self._random.standard_normal(6)
             return self._motion.joints(self._clock.now()) + self._encoder_noise + flicker
 
-    def displacement(self, axis: str) -> float:
+    def gauge_displacement(self, axis: str) -> float:
         """What a gauge sees: the ball's way along its axis from the middle of its travel, mm."""
         with self._lock:
             ball = self._ball()
@@ -165,8 +165,8 @@ class RobotPhysics:
     def _ball(self) -> Array:
         now = self._catch_up()
         ball: Array = self._pose.positions[0]
-        if now >= self._motion.ends_s:
-            ball = ball + self._swinging(now - self._motion.ends_s)
+        if now >= self._motion.end_s:
+            ball = ball + self._swinging(now - self._motion.end_s)
             if np.linalg.norm(ball - self._station) > self._settings.station_reach_mm:
                 self._station, self._triad = self._placed(ball), self._turned()
         return ball
@@ -179,7 +179,7 @@ class RobotPhysics:
     def _catch_up(self) -> float:
         """Bring the platform along the way the sliders have gone since it was last looked at."""
         now = self._clock.now()
-        place = self._motion.place(now)
+        place = self._motion.path_position(now)
         while self._passed + 1 <= place:
             self._passed += 1
             self._follow(self._motion.path[self._passed])
@@ -198,7 +198,7 @@ class RobotPhysics:
 
     def _swinging(self, since_s: float) -> Array:
         motion = self._settings.motion
-        decay = np.exp(-since_s / motion.ringing_s) * np.cos(2.0 * np.pi * SWING_HZ * since_s)
+        decay = np.exp(-since_s / motion.ringing_s) * np.cos(2.0 * np.pi * RINGING_HZ * since_s)
         swinging: Array = motion.ringing_mm * decay * self._swing / np.linalg.norm(self._swing)
         return swinging
 

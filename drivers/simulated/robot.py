@@ -19,7 +19,7 @@ from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.rotations import Array
 from hexacell.motion.trajectory import interpolate_line
 
-STEPS = 24
+LINE_STEPS = 24
 """Straight lines are cut into so many pieces, which is where joints are computed."""
 
 
@@ -31,14 +31,14 @@ class SimulatedMachine:
         mechanism: Mechanism,
         config_format: ConfigFormat,
         config: Path,
-        world: RobotPhysics,
+        physics: RobotPhysics,
         clock: CellClock,
         home: Pose,
     ) -> None:
         self._mechanism = mechanism
         self._format = config_format
         self._config = config
-        self._world = world
+        self._physics = physics
         self._clock = clock
         self._geometry = config_format.read(config)
         self._way = PoseBatch.of([home, home])
@@ -53,7 +53,7 @@ class SimulatedMachine:
             KinematicsFailure: a leg cannot reach some place on the way.
         """
         stops = self._stops
-        way = interpolate_line(PoseBatch.of([self.pose()]), PoseBatch.of([pose]), STEPS)
+        way = interpolate_line(PoseBatch.of([self.pose()]), PoseBatch.of([pose]), LINE_STEPS)
         joints = self._joints(way)
         if np.isnan(joints).any():
             raise KinematicsFailure("Linear move on line 0 fails kinematicsInverse")
@@ -62,14 +62,14 @@ class SimulatedMachine:
                 return
             self._halt.clear()
             self._way = way
-            motion = self._world.travel(joints)
+            motion = self._physics.start_motion(joints)
         self._clock.wait(motion.duration_s, self._halt)
 
     def stop(self) -> None:
         """Stop in place."""
         with self._lock:
             self._stops += 1
-            self._world.stop()
+            self._physics.stop()
             self._halt.set()
 
     def pose(self) -> Pose:
@@ -104,7 +104,7 @@ class SimulatedMachine:
         """The encoders are absolute: nothing to look for."""
 
     def _here(self) -> PoseBatch:
-        return _between(self._way, self._world.progress())
+        return _between(self._way, self._physics.progress())
 
     def _joints(self, poses: PoseBatch) -> Array:
         geometry: ControllerGeometry = self._geometry

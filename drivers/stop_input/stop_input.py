@@ -17,7 +17,7 @@ from typing import Protocol
 import serial
 
 from drivers.interfaces import DeviceIdentity
-from drivers.serial.errors import cannot_open, settings_refused
+from drivers.serial.errors import port_open_failed, settings_rejected
 from hexacell.cell.model import GuardSettings
 from hexacell.errors import HexacellError
 
@@ -25,7 +25,7 @@ SUBJECT = "stop line"
 _OUTPUTS = {"dsr": "DTR", "cts": "RTS"}
 
 
-class Contact(Protocol):
+class StopSource(Protocol):
     """One way to forbid motion; ``device`` is what it is wired to, if it is wired at all."""
 
     device: str
@@ -92,10 +92,10 @@ class StopContact:
             self._port = port
             getattr(port, self._line)
         except (ValueError, TypeError) as error:
-            raise settings_refused(SUBJECT, self._url, error) from error
+            raise settings_rejected(SUBJECT, self._url, error) from error
         except (OSError, termios.error) as error:
             self.close()
-            raise cannot_open(SUBJECT, self._url, error) from error
+            raise port_open_failed(SUBJECT, self._url, error) from error
 
     def active_reason(self) -> str | None:
         """Whether the contact is open, or the port was lost. The question is one system call."""
@@ -116,10 +116,10 @@ class StopContact:
                 port.close()
 
 
-class ContactLine:
+class CombinedStopInput:
     """A :class:`drivers.interfaces.StopInput` made of contacts: any of them forbids motion."""
 
-    def __init__(self, contacts: Sequence[Contact] = ()) -> None:
+    def __init__(self, contacts: Sequence[StopSource] = ()) -> None:
         self._contacts = tuple(contacts)
 
     async def open(self) -> DeviceIdentity | None:
@@ -148,11 +148,11 @@ class ContactLine:
             contact.close()
 
 
-def stop_line(settings: GuardSettings, folder: Path) -> ContactLine:
+def stop_input_of(settings: GuardSettings, folder: Path) -> CombinedStopInput:
     """What a cell file in ``folder`` says under [guards]."""
-    contacts: list[Contact] = []
+    contacts: list[StopSource] = []
     if settings.stop_file is not None:
         contacts.append(StopFile(folder / settings.stop_file))
     if settings.stop_port is not None:
         contacts.append(StopContact(settings.stop_port, settings.stop_contact))
-    return ContactLine(contacts)
+    return CombinedStopInput(contacts)

@@ -18,7 +18,7 @@ from hexacell.cell.model import ThermometerSettings
 from hexacell.errors import DeviceError
 from hexacell.storage.atomic_files import os_error_to_file_error
 
-LONGEST = 64
+MAX_BYTES = 64
 PLAUSIBLE_C = (-100.0, 300.0)
 
 
@@ -97,6 +97,6 @@ def _content(path: Path) -> str:
     # Without waiting, should somebody name a pipe; files of the kernel do not mind.
     descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK)
     try:
-        return os.read(descriptor, LONGEST).decode("ascii", errors="replace").strip()
+        return os.read(descriptor, MAX_BYTES).decode("ascii", errors="replace").strip()
     finally:
         os.close(descriptor)

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from drivers.interfaces import DeviceIdentity
 from drivers.serial.shared_port import SharedSerialPorts
-from drivers.stop_input.stop_input import stop_line
+from drivers.stop_input.stop_input import stop_input_of
 from drivers.wire_trace import WireTrace
 from hexacell.cell.loader import Cell
 from hexacell.cell.model import CellSettings
@@ -97,7 +97,7 @@ def devices_of(
     )
     encoders = load(Group.ENCODERS, settings.encoders.protocol)(settings.encoders, trace=trace)
     controller = load(Group.CONTROLLERS, settings.controller.protocol)(settings.controller, trace=trace)
-    return Devices(gauges, encoders, controller, stop_line(settings.guards, folder or Path()))
+    return Devices(gauges, encoders, controller, stop_input_of(settings.guards, folder or Path()))
 
 
 @asynccontextmanager

@@ -24,10 +24,10 @@ from procedures.journal.journal import read_entries
 from procedures.journal.line_format import Entry
 from procedures.replay.comparison import TOLERANCE, Aspect, Difference
 from procedures.replay.recorded_devices import (
-    Playback,
     RecordedClock,
     RecordedOperator,
-    RecordedPerformer,
+    RecordedOutcome,
+    RecordedStepExecutor,
     RecordedThermometers,
     recorded_devices,
 )
@@ -128,8 +128,8 @@ def _set_up(
     run = RunFolder(scratch / "run")
     run.path.mkdir()
     calibration = Calibration(settings, robot_of_run(cell, started), Mode(started.mode), pose_list_of(cell))
-    tape = Playback(settings.timing.window_s)
-    performer = RecordedPerformer(
+    tape = RecordedOutcome(settings.timing.window_s)
+    performer = RecordedStepExecutor(
         cell,
         calibration,
         recorded_devices(settings, tape),

@@ -69,10 +69,10 @@ async def device_failures(devices: Devices) -> list[HexacellError]:
 
 async def start_failures(devices: Devices, folder: Path, free_disk_mb: float) -> list[HexacellError]:
     """What keeps a run from beginning beside its devices: the stop line, and a disk without room."""
-    pressed = await devices.stop_line.active_reason()
+    pressed = await devices.stop_input.active_reason()
     trips = [
-        None if pressed is None else rules.forbidden(pressed),
-        rules.disk(str(folder), free_bytes(folder), free_disk_mb),
+        None if pressed is None else rules.motion_forbidden(pressed),
+        rules.low_disk_space(str(folder), free_bytes(folder), free_disk_mb),
     ]
     return [trip.as_error() for trip in trips if trip is not None]
 

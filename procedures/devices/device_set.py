@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import TypeVar
 
 from drivers.interfaces import Controller, DeviceIdentity, EncoderBank, Gauge, StopInput
-from drivers.stop_input.stop_input import ContactLine
+from drivers.stop_input.stop_input import CombinedStopInput
 from hexacell.errors import HexacellError, SeveralErrors, flatten_errors
 
 Result = TypeVar("Result")
@@ -30,7 +30,7 @@ class Devices:
     gauges: tuple[MountedGauge, ...]
     encoders: EncoderBank
     controller: Controller
-    stop_line: StopInput = field(default_factory=ContactLine)
+    stop_input: StopInput = field(default_factory=CombinedStopInput)
 
     async def open(self) -> tuple[DeviceIdentity, ...]:
         """Connect to all of them at once; nothing moves.
@@ -39,7 +39,7 @@ class Devices:
             SeveralErrors: one or more do not answer as they must; all are named.
         """
         calls: list[Awaitable[tuple[DeviceIdentity, ...]]] = [_alone(m.gauge.open()) for m in self.gauges]
-        calls += [self.encoders.open(), _alone(self.controller.open()), _if_any(self.stop_line.open())]
+        calls += [self.encoders.open(), _alone(self.controller.open()), _if_any(self.stop_input.open())]
         found = await gather_errors("devices do not answer as they must", calls)
         return tuple(identity for identities in found for identity in identities)
 
@@ -49,7 +49,7 @@ class Devices:
             *(mounted.gauge for mounted in self.gauges),
             self.encoders,
             self.controller,
-            self.stop_line,
+            self.stop_input,
         ]
         await asyncio.gather(*(port.close() for port in ports), return_exceptions=True)
 

@@ -8,13 +8,13 @@ from drivers.controllers.errors import ConnectionLost
 from drivers.encoders import errors as encoder
 from drivers.gauges.errors import GaugeSilent, WrongAnswer, WrongMode, WrongUnit, ZeroVoid
 from drivers.interfaces import DeviceIdentity
-from drivers.serial.errors import LinkLost
+from drivers.serial.errors import PortLost
 from hexacell.errors import DeviceError, HexacellError
 from procedures.devices.device_set import Devices, MountedGauge, gather_errors
 from procedures.run.events import Identity
 from procedures.run.trips import Guard, GuardTripped, causes_of
 
-OF_GAUGES = (GaugeSilent, WrongAnswer, WrongMode, WrongUnit, ZeroVoid, LinkLost)
+OF_GAUGES = (GaugeSilent, WrongAnswer, WrongMode, WrongUnit, ZeroVoid, PortLost)
 OF_ENCODERS = (
     encoder.BusError,
     encoder.SilentNodeError,

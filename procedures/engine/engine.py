@@ -184,7 +184,7 @@ class Engine:
             SeveralErrors: the cause, and why it cannot be reverted, where that must be reported.
         """
         try:
-            self._executor.guards.watch.clear()  # a guard whose reason persists trips again
+            self._executor.guards.supervisor.clear()  # a guard whose reason persists trips again
             if reversal.is_recorded:
                 self.record(events.StepBegun(step=reversal.step))
             event = await shielded(self._executor.perform(reversal.step, self.state))

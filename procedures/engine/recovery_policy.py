@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from drivers.controllers import errors as controller
 from drivers.encoders import errors as encoder
 from drivers.gauges import errors as gauge
-from drivers.serial.errors import LinkLost
+from drivers.serial.errors import PortLost
 from hexacell.cell.recovery import (
     Action,
     AttendedRecovery,
@@ -45,7 +45,7 @@ KINDS: Mapping[type[HexacellError], FailureKind] = {
     controller.ConnectionLost: FailureKind.LINK_LOST,
     controller.CommandRefused: FailureKind.CONTROLLER,
     controller.MotionInterrupted: FailureKind.CONTROLLER,
-    LinkLost: FailureKind.LINK_LOST,
+    PortLost: FailureKind.LINK_LOST,
     NeverSettled: FailureKind.UNSETTLED,
     TravelError: FailureKind.GAUGE_AT_END,
     NoSafePath: FailureKind.NO_WAY,

@@ -95,7 +95,7 @@ class StepExecutor:
             if step.at.phase is not Phase.AFTER or not tripped.trip.is_about_the_ball:
                 raise
             # The new geometry takes the ball off its plate: that is a verdict, and it is rolled back.
-            self.guards.watch.clear()
+            self.guards.supervisor.clear()
             return events.RecordRejected(at=step.at, orientation=step.orientation, reason=str(tripped))
         return events.Arrived(at=step.at, orientation=step.orientation, pose=step.pose)
 
@@ -112,7 +112,7 @@ class StepExecutor:
     async def _place(self, step: Place) -> events.Event:
         if self.cell.settings.stations.placement == "by-hand":
             question = ask_placement(step.at.point, Pose(*step.pose))
-            await self.guards.stand(lambda: self.operator.ask(question))
+            await self.guards.at_standstill(lambda: self.operator.ask(question))
         return events.GaugesPlaced(at=step.at)
 
     async def _sample(self, step: Sample, state: RunState) -> events.Event:
@@ -169,7 +169,7 @@ class StepExecutor:
 
     async def _read(self) -> events.Reading:
         timing = self.cell.settings.timing
-        settled = await self.guards.sample(lambda: settle(self.devices, timing, self.clock))
+        settled = await self.guards.during_readings(lambda: settle(self.devices, timing, self.clock))
         return _reading(self.devices, settled, await self.thermometers.read())
 
     async def _compute(self, step: Compute, state: RunState) -> events.Event:

@@ -25,7 +25,7 @@ from hexacell.kinematics.rotations import Array
 from procedures.devices.device_set import Devices, MountedGauge
 from procedures.guards import rules
 from procedures.guards.polling import DevicePoller, DevicePollers, LineActivity
-from procedures.guards.snapshot import GaugeDeviation, Limits
+from procedures.guards.snapshot import GaugeDeviation, GuardLimits
 from procedures.guards.supervision import MotionSupervisor, Supervised
 from procedures.run.state import RunState
 from procedures.run.steps import Move, ThreeNumbers
@@ -33,13 +33,13 @@ from procedures.run.trips import GuardTripped, Trip
 
 Result = TypeVar("Result")
 
-PAUSE_S = 0.02
+POLL_PAUSE_S = 0.02
 """Between two questions to one device, s on the wall."""
 
-ENDING_S = 0.5
+STOP_GRACE_S = 0.5
 """How long a motion may take to end when it was told to, s on the wall; then its driver is told."""
 
-SIGMAS = 5.0
+STUCK_GAUGE_SIGMAS = 5.0
 
 
 class Guards:
@@ -48,7 +48,7 @@ class Guards:
     def __init__(self, settings: CellSettings, devices: Devices, clock: CellClock, folder: Path) -> None:
         self._settings = settings
         self._devices = devices
-        self.watch = MotionSupervisor(devices.controller, clock, folder, settings.guards.free_disk_mb)
+        self.supervisor = MotionSupervisor(devices.controller, clock, folder, settings.guards.free_disk_mb)
 
     async def prepare(self) -> None:
         """Make the controller ready to move; whoever decides to do so has seen to what is latched.
@@ -56,9 +56,9 @@ class Guards:
         Raises:
             GuardTripped: motion is forbidden, an encoder is not to be trusted, or the disk is full.
         """
-        self.watch.clear()
-        await self.watch.supervise(
-            self._devices.controller.prepare, self._lanes(), self._limits(), ENDING_S
+        self.supervisor.clear()
+        await self.supervisor.supervise(
+            self._devices.controller.prepare, self._lanes(), self._limits(), STOP_GRACE_S
         )
 
     async def move(self, step: Move, state: RunState, commanded: Callable[[], Array]) -> None:
@@ -69,31 +69,33 @@ class Guards:
         """
         plungers = self._plungers(step, state)
         lanes = self._lanes(controller=True, plungers=plungers)
-        reached = await self.watch.supervise(lambda: self._go(step), lanes, self._limits(), ENDING_S)
+        reached = await self.supervisor.supervise(
+            lambda: self._go(step), lanes, self._limits(), STOP_GRACE_S
+        )
         limit = self._settings.guards.following_mm
         trip = rules.following_error(
             await asyncio.to_thread(commanded), np.array(reached.positions_mm), limit
         )
         if trip := trip or _frozen(step, state, plungers):
-            raise await self.watch.stop(trip)
+            raise await self.supervisor.stop(trip)
 
-    async def stand(self, action: Supervised[Result]) -> Result:
+    async def at_standstill(self, action: Supervised[Result]) -> Result:
         """Do something at the robot, which must not move.
 
         Raises:
             GuardTripped: it did, or may no longer.
         """
         limits = self._limits(rest_mm=self._settings.guards.following_mm)
-        return await self.watch.supervise(action, self._lanes(controller=True), limits)
+        return await self.supervisor.supervise(action, self._lanes(controller=True), limits)
 
-    async def sample(self, action: Supervised[Result]) -> Result:
+    async def during_readings(self, action: Supervised[Result]) -> Result:
         """Take readings; the devices that are read are left to who reads them.
 
         Raises:
             GuardTripped: the robot may no longer move.
         """
         lanes = self._lanes(controller=True, encoders=False)
-        return await self.watch.supervise(action, lanes, self._limits())
+        return await self.supervisor.supervise(action, lanes, self._limits())
 
     async def reload(self) -> None:
         """Make the controller read its config again.
@@ -101,60 +103,62 @@ class Guards:
         Raises:
             GuardTripped: motion is forbidden, or an encoder is not to be trusted.
         """
-        await self.watch.supervise(self._devices.controller.reload, self._lanes(), self._limits(), ENDING_S)
+        await self.supervisor.supervise(
+            self._devices.controller.reload, self._lanes(), self._limits(), STOP_GRACE_S
+        )
 
     def drift(self, point: str, drift_mm: ThreeNumbers) -> GuardTripped | None:
         """The error to raise where a set's reference drifted too far; it is not latched: nothing moved."""
-        trip = rules.drift(point, drift_mm, self._settings.acceptance.drift_mm)
+        trip = rules.reference_drift(point, drift_mm, self._settings.acceptance.drift_mm)
         return None if trip is None else trip.as_error()
 
     async def _go(self, step: Move) -> EncoderSample:
         await self._devices.controller.move(step.target)
         return await self._devices.encoders.read()
 
-    def _limits(self, rest_mm: float | None = None) -> Limits:
+    def _limits(self, rest_mm: float | None = None) -> GuardLimits:
         guards = self._settings.guards
         plate_mm = self._settings.limits.gauge_travel_mm + guards.plate_margin_mm
-        return Limits(guards.stale_s, plate_mm, rest_mm)
+        return GuardLimits(guards.stale_s, plate_mm, rest_mm)
 
     def _lanes(
         self,
         *,
         controller: bool = False,
         encoders: bool = True,
-        plungers: tuple[Plunger, ...] = (),
+        plungers: tuple[WatchedGauge, ...] = (),
     ) -> DevicePollers:
         devices = self._devices
         return DevicePollers(
             gauges=self._gauge_lanes(plungers),
-            encoders=DevicePoller("encoders", devices.encoders.read, PAUSE_S) if encoders else None,
-            controller=DevicePoller("controller", devices.controller.status, PAUSE_S)
+            encoders=DevicePoller("encoders", devices.encoders.read, POLL_PAUSE_S) if encoders else None,
+            controller=DevicePoller("controller", devices.controller.status, POLL_PAUSE_S)
             if controller
             else None,
-            stop_line=DevicePoller(STOP_LINE, self._forbidden, PAUSE_S),
+            stop_input=DevicePoller(STOP_LINE, self._forbidden, POLL_PAUSE_S),
         )
 
-    def _gauge_lanes(self, plungers: tuple[Plunger, ...]) -> tuple[DevicePoller[GaugeDeviation], ...]:
+    def _gauge_lanes(self, plungers: tuple[WatchedGauge, ...]) -> tuple[DevicePoller[GaugeDeviation], ...]:
         """Gauges behind one multiplexer share a port, and with it a line."""
         ports = {f"gauge {gauge.name}": gauge.port or gauge.name for gauge in self._settings.gauges}
         lines: defaultdict[str, LineActivity] = defaultdict(LineActivity)
         return tuple(
-            DevicePoller(plunger.device, plunger.look, PAUSE_S, lines[ports[plunger.device]])
+            DevicePoller(plunger.device, plunger.read_deviation, POLL_PAUSE_S, lines[ports[plunger.device]])
             for plunger in plungers
         )
 
     async def _forbidden(self) -> str:
-        return await self._devices.stop_line.active_reason() or ""
+        return await self._devices.stop_input.active_reason() or ""
 
-    def _plungers(self, step: Move, state: RunState) -> tuple[Plunger, ...]:
+    def _plungers(self, step: Move, state: RunState) -> tuple[WatchedGauge, ...]:
         samples = state.set(step.at).samples
         if not samples:
             return ()
         reference = samples[0].reading.gauges_mm
-        return tuple(Plunger(mounted, reference[mounted.axis]) for mounted in self._devices.gauges)
+        return tuple(WatchedGauge(mounted, reference[mounted.axis]) for mounted in self._devices.gauges)
 
 
-class Plunger:
+class WatchedGauge:
     """A mounted gauge within a set, and all that it showed."""
 
     def __init__(self, mounted: MountedGauge, reference_mm: float) -> None:
@@ -164,7 +168,7 @@ class Plunger:
         self._mounted = mounted
         self._reference_mm = reference_mm
 
-    async def look(self) -> GaugeDeviation:
+    async def read_deviation(self) -> GaugeDeviation:
         """How far the plunger is from the set's reference now."""
         reading = await self._mounted.gauge.read_once()
         self.shown.append(reading.raw)
@@ -172,14 +176,14 @@ class Plunger:
         return GaugeDeviation(self.axis, on_axis - self._reference_mm)
 
 
-def _frozen(step: Move, state: RunState, plungers: tuple[Plunger, ...]) -> Trip | None:
+def _frozen(step: Move, state: RunState, plungers: tuple[WatchedGauge, ...]) -> Trip | None:
     """A gauge that did not follow a ball which, as far as is known, has moved a good way."""
     samples = state.set(step.at).samples
     if step.expected is None or state.standing != (step.at, len(samples)):
         return None
     for plunger in plungers:
         way = step.expected.deviation_mm[plunger.axis] - samples[-1].deviation_mm[plunger.axis]
-        surely = max(0.0, abs(way) - SIGMAS * step.expected.sigma_mm[plunger.axis])
+        surely = max(0.0, abs(way) - STUCK_GAUGE_SIGMAS * step.expected.sigma_mm[plunger.axis])
         if trip := rules.stuck_gauge(plunger.device, tuple(plunger.shown), float(np.copysign(surely, way))):
             return trip
     return None

@@ -17,7 +17,7 @@ from drivers.serial.port import FRAME_GAP_S
 from hexacell.clock import CellClock
 from hexacell.errors import HexacellError
 from procedures.guards.rules import first_trip
-from procedures.guards.snapshot import DeviceReport, GaugeDeviation, Limits, Snapshot
+from procedures.guards.snapshot import DeviceReport, GaugeDeviation, GuardLimits, Snapshot
 from procedures.run.trips import Guard, Trip
 
 T = TypeVar("T")
@@ -45,14 +45,14 @@ class DevicePoller(Generic[T]):
     def __init__(
         self, device: str, ask: Callable[[], Awaitable[T]], pause_s: float, line: LineActivity | None = None
     ) -> None:
-        self.looks = 0
+        self.answer_count = 0
         self.line = line or LineActivity()
         self._heard: DeviceReport[T] = DeviceReport(device)
         self._ask = ask
         self._pause_s = pause_s
 
     @property
-    def heard(self) -> DeviceReport[T]:
+    def report(self) -> DeviceReport[T]:
         """The latest of it."""
         return replace(self._heard, silent_s=self.line.silent_s)
 
@@ -60,7 +60,7 @@ class DevicePoller(Generic[T]):
         """Ask until cancelled; ``news`` is called after every answer and every failure."""
         while True:
             self._heard = await self._look()
-            self.looks += not self._heard.garbled
+            self.answer_count += not self._heard.garbled_count
             news()
             await clock.sleep(self._pause_s * clock.factor)
 
@@ -69,21 +69,21 @@ class DevicePoller(Generic[T]):
             value = await self._ask()
         except WrongAnswer as error:
             self.line.silent_s = -RECOVERY_S
-            return replace(self._heard, error=error, garbled=self._heard.garbled + 1)
+            return replace(self._heard, error=error, garbled_count=self._heard.garbled_count + 1)
         except GaugeAtEnd as error:
             self.line.silent_s = 0.0
-            return replace(self._heard, error=error, garbled=0)
+            return replace(self._heard, error=error, garbled_count=0)
         except HexacellError as error:
-            return replace(self._heard, error=error, garbled=0)
+            return replace(self._heard, error=error, garbled_count=0)
         self.line.silent_s = 0.0
         first = value if self._heard.first is None else self._heard.first
-        return replace(self._heard, value=value, first=first, error=None, garbled=0)
+        return replace(self._heard, value=value, first=first, error=None, garbled_count=0)
 
 
 TICK_S = 0.01
 """How often silence is looked for, s on the wall."""
 
-TURN_S = 0.02
+MAX_DELAY_S = 0.02
 """The longest that this process may be late and still be sure that it would have heard an answer."""
 
 
@@ -94,25 +94,25 @@ class DevicePollers:
     gauges: tuple[DevicePoller[GaugeDeviation], ...] = ()
     encoders: DevicePoller[EncoderSample] | None = None
     controller: DevicePoller[ControllerStatus] | None = None
-    stop_line: DevicePoller[str] | None = None
+    stop_input: DevicePoller[str] | None = None
 
-    def each(self) -> tuple[DevicePoller[Any], ...]:
+    def all(self) -> tuple[DevicePoller[Any], ...]:
         """All that are there."""
-        rest = (self.encoders, self.controller, self.stop_line)
+        rest = (self.encoders, self.controller, self.stop_input)
         return (*self.gauges, *(lane for lane in rest if lane is not None))
 
     def snapshot(self) -> Snapshot:
         """What they have heard by now."""
         return Snapshot(
-            gauges=tuple(lane.heard for lane in self.gauges),
+            gauges=tuple(lane.report for lane in self.gauges),
             encoders=_heard(self.encoders),
             controller=_heard(self.controller),
-            stop_line=_heard(self.stop_line),
+            stop_input=_heard(self.stop_input),
         )
 
 
 def _heard(lane: DevicePoller[T] | None) -> DeviceReport[T] | None:
-    return None if lane is None else lane.heard
+    return None if lane is None else lane.report
 
 
 @dataclass(eq=False)
@@ -123,8 +123,8 @@ class GuardMonitor:
     has passed between two ticks no more counts than ``TURN_S`` beyond one.
     """
 
-    lanes: DevicePollers
-    limits: Limits
+    pollers: DevicePollers
+    limits: GuardLimits
     clock: CellClock
     trip: Trip | None = None
     _news: asyncio.Event = field(default_factory=asyncio.Event)
@@ -133,7 +133,7 @@ class GuardMonitor:
     _tasks: tuple[asyncio.Task[None], ...] = ()
 
     async def __aenter__(self) -> Self:
-        runs = [lane.run(self.clock, self._judge) for lane in self.lanes.each()]
+        runs = [lane.run(self.clock, self._judge) for lane in self.pollers.all()]
         self._tasks = tuple(asyncio.ensure_future(run) for run in (*runs, self._tick()))
         for task in self._tasks:
             task.add_done_callback(self._end_of)
@@ -146,7 +146,7 @@ class GuardMonitor:
             task.cancel()
         await asyncio.gather(*self._tasks, return_exceptions=True)
 
-    async def until(self, doing: asyncio.Future[Any]) -> None:
+    async def wait_for(self, doing: asyncio.Future[Any]) -> None:
         """Wait until something is done or a guard trips; raises what broke the patrol itself."""
         tripping = asyncio.ensure_future(self._tripped.wait())
         try:
@@ -155,17 +155,17 @@ class GuardMonitor:
             tripping.cancel()
         self._raise_broken()
 
-    async def asked_again(self) -> Trip | None:
+    async def poll_all(self) -> Trip | None:
         """Wait until each device was asked once more, or one stays silent; the trip, if there is one.
 
         Nothing moves meanwhile, so what trips first is not in a hurry: it is named with all the rest.
         """
-        marks = [(lane, lane.looks) for lane in self.lanes.each()]
-        while not self._is_over() and any(lane.looks <= mark for lane, mark in marks):
+        marks = [(lane, lane.answer_count) for lane in self.pollers.all()]
+        while not self._is_over() and any(lane.answer_count <= mark for lane, mark in marks):
             self._news.clear()
             await self._news.wait()
         self._raise_broken()
-        self.trip = first_trip(self.lanes.snapshot(), self.limits) or self.trip
+        self.trip = first_trip(self.pollers.snapshot(), self.limits) or self.trip
         return self.trip
 
     async def _tick(self) -> None:
@@ -173,9 +173,9 @@ class GuardMonitor:
         while True:
             await self.clock.sleep(TICK_S * self.clock.factor)
             now = self.clock.now()
-            passed = min(self.clock.on_the_wall(now - before), TICK_S + TURN_S)
+            passed = min(self.clock.on_the_wall(now - before), TICK_S + MAX_DELAY_S)
             before = now
-            for line in {lane.line for lane in self.lanes.each()}:
+            for line in {lane.line for lane in self.pollers.all()}:
                 line.silent_s += passed
             self._judge()
 
@@ -185,7 +185,7 @@ class GuardMonitor:
 
     def _judge(self) -> None:
         if self.trip is None:
-            self.trip = first_trip(self.lanes.snapshot(), self.limits)
+            self.trip = first_trip(self.pollers.snapshot(), self.limits)
         if self.trip is not None:
             self._tripped.set()
         self._news.set()

@@ -18,37 +18,37 @@ from drivers.gauges.errors import GaugeAtEnd
 from drivers.stop_input.stop_input import SUBJECT as STOP_LINE
 from hexacell.kinematics.rotations import Array
 from hexacell.storage import atomic_files
-from procedures.guards.snapshot import DeviceReport, Limits, Snapshot
+from procedures.guards.snapshot import DeviceReport, GuardLimits, Snapshot
 from procedures.run.trips import Guard, Trip
 
-GARBLED = 3
+MAX_GARBLED = 3
 """So many answers in a row that make no sense are a broken device, fewer a noisy line."""
 
-FROZEN_MM = 1.0
+STUCK_GAUGE_MM = 1.0
 """A plunger that should have moved farther than this, and shows the same to the last digit, has not."""
 
-Rule = Callable[[Snapshot, Limits], Trip | None]
+Rule = Callable[[Snapshot, GuardLimits], Trip | None]
 
 
-def first_trip(snapshot: Snapshot, limits: Limits) -> Trip | None:
+def first_trip(snapshot: Snapshot, limits: GuardLimits) -> Trip | None:
     """What trips first, if anything does."""
     return next((trip for rule in RULES if (trip := rule(snapshot, limits))), None)
 
 
-def stop_line(snapshot: Snapshot, _limits: Limits) -> Trip | None:
+def stop_requested(snapshot: Snapshot, _limits: GuardLimits) -> Trip | None:
     """Somebody forbids motion."""
-    line = snapshot.stop_line
-    return None if line is None or not line.value else forbidden(line.value)
+    line = snapshot.stop_input
+    return None if line is None or not line.value else motion_forbidden(line.value)
 
 
-def controller(snapshot: Snapshot, _limits: Limits) -> Trip | None:
+def controller_not_ready(snapshot: Snapshot, _limits: GuardLimits) -> Trip | None:
     """The controller is in emergency stop, off, or complains of a following error."""
     heard = snapshot.controller
     if heard is None or heard.value is None or heard.value.may_move:
         return None
     status = heard.value
-    said = "; ".join(status.complaints)
-    if any("following error" in complaint.lower() for complaint in status.complaints):
+    said = "; ".join(status.error_messages)
+    if any("following error" in complaint.lower() for complaint in status.error_messages):
         action = "Look for what blocks that leg, then switch on and resume"
         return Trip(Guard.FOLLOWING, heard.device, f"switched itself off: {said}", action)
     problem = "is in emergency stop" if status.estop else "was switched off"
@@ -57,13 +57,13 @@ def controller(snapshot: Snapshot, _limits: Limits) -> Trip | None:
     return Trip(Guard.CONTROLLER, heard.device, f"{problem}: {said}" if said else problem, action)
 
 
-def encoders(snapshot: Snapshot, _limits: Limits) -> Trip | None:
+def encoder_fault(snapshot: Snapshot, _limits: GuardLimits) -> Trip | None:
     """An encoder has an alarm, restarted, or a round stayed incomplete."""
     heard = snapshot.encoders
     return None if heard is None or heard.error is None else _reported(Guard.ENCODERS, heard)
 
 
-def gauge_end(snapshot: Snapshot, _limits: Limits) -> Trip | None:
+def gauge_at_end(snapshot: Snapshot, _limits: GuardLimits) -> Trip | None:
     """A plunger has come to an end of its travel; one that was there from the beginning may leave it."""
     for gauge in snapshot.gauges:
         if isinstance(gauge.error, GaugeAtEnd) and gauge.value is not None:
@@ -71,7 +71,7 @@ def gauge_end(snapshot: Snapshot, _limits: Limits) -> Trip | None:
     return None
 
 
-def devices(snapshot: Snapshot, _limits: Limits) -> Trip | None:
+def device_faults(snapshot: Snapshot, _limits: GuardLimits) -> Trip | None:
     """Devices say themselves that something is wrong with them, or only nonsense; all are named."""
     trips = [
         _reported(Guard.DEVICE, heard)
@@ -86,7 +86,7 @@ def devices(snapshot: Snapshot, _limits: Limits) -> Trip | None:
     return Trip(Guard.DEVICE, trips[0].device, "; ".join(problems), ". ".join(actions), causes)
 
 
-def device_silent(snapshot: Snapshot, limits: Limits) -> Trip | None:
+def device_silent(snapshot: Snapshot, limits: GuardLimits) -> Trip | None:
     """A device has not answered for too long."""
     for heard in _all(snapshot):
         if heard.silent_s > limits.stale_s:
@@ -99,7 +99,7 @@ def device_silent(snapshot: Snapshot, limits: Limits) -> Trip | None:
     return None
 
 
-def ball_off_gauge(snapshot: Snapshot, limits: Limits) -> Trip | None:
+def ball_off_gauge(snapshot: Snapshot, limits: GuardLimits) -> Trip | None:
     """The ball is leaving the plate: farther off than allowed, and than it was in the beginning."""
     for gauge in snapshot.gauges:
         if gauge.value is None or gauge.first is None:
@@ -116,7 +116,7 @@ def ball_off_gauge(snapshot: Snapshot, limits: Limits) -> Trip | None:
     return None
 
 
-def unexpected_motion(snapshot: Snapshot, limits: Limits) -> Trip | None:
+def unexpected_motion(snapshot: Snapshot, limits: GuardLimits) -> Trip | None:
     """A slider moves although nothing was commanded."""
     heard = snapshot.encoders
     if limits.rest_mm is None or heard is None or heard.value is None or heard.first is None:
@@ -127,18 +127,18 @@ def unexpected_motion(snapshot: Snapshot, limits: Limits) -> Trip | None:
 
 
 RULES: tuple[Rule, ...] = (
-    stop_line,
-    controller,
-    encoders,
-    gauge_end,
+    stop_requested,
+    controller_not_ready,
+    encoder_fault,
+    gauge_at_end,
     ball_off_gauge,
     unexpected_motion,
-    devices,
+    device_faults,
     device_silent,
 )
 
 
-def forbidden(reason: str) -> Trip:
+def motion_forbidden(reason: str) -> Trip:
     """The stop line is pressed, for this reason."""
     return Trip(
         Guard.STOP_LINE,
@@ -156,7 +156,7 @@ def following_error(commanded: Array, measured: Array, limit_mm: float) -> Trip 
 
 def stuck_gauge(gauge: str, shown: tuple[str, ...], expected_mm: float) -> Trip | None:
     """At the end of a move: a gauge that showed one value all the way, while its ball had to move."""
-    if len(shown) < GARBLED or len(set(shown)) > 1 or abs(expected_mm) <= FROZEN_MM:
+    if len(shown) < MAX_GARBLED or len(set(shown)) > 1 or abs(expected_mm) <= STUCK_GAUGE_MM:
         return None
     return Trip(
         Guard.STALE,
@@ -166,7 +166,7 @@ def stuck_gauge(gauge: str, shown: tuple[str, ...], expected_mm: float) -> Trip 
     )
 
 
-def drift(point: str, drift_mm: tuple[float, ...], limit_mm: float) -> Trip | None:
+def reference_drift(point: str, drift_mm: tuple[float, ...], limit_mm: float) -> Trip | None:
     """Back at a set's reference: the gauges show what they did."""
     if max(map(abs, drift_mm)) <= limit_mm:
         return None
@@ -179,7 +179,7 @@ def drift(point: str, drift_mm: tuple[float, ...], limit_mm: float) -> Trip | No
     )
 
 
-def disk(folder: str, free_bytes: int, limit_mb: float) -> Trip | None:
+def low_disk_space(folder: str, free_bytes: int, limit_mb: float) -> Trip | None:
     """There is room for what will be written."""
     free_mb = free_bytes / 1e6
     if free_mb >= limit_mb:
@@ -193,13 +193,13 @@ def disk(folder: str, free_bytes: int, limit_mb: float) -> Trip | None:
 
 
 def _all(snapshot: Snapshot) -> Iterator[DeviceReport[object]]:
-    for heard in (*snapshot.gauges, snapshot.encoders, snapshot.controller, snapshot.stop_line):
+    for heard in (*snapshot.gauges, snapshot.encoders, snapshot.controller, snapshot.stop_input):
         if heard is not None:
             yield heard
 
 
 def _counts(heard: DeviceReport[object]) -> bool:
-    return heard.garbled == 0 or heard.garbled >= GARBLED
+    return heard.garbled_count == 0 or heard.garbled_count >= MAX_GARBLED
 
 
 def _reported(guard: Guard, heard: DeviceReport[object]) -> Trip:

@@ -29,7 +29,7 @@ class DeviceReport(Generic[T_co]):
     value: T_co | None = None
     first: T_co | None = None
     error: HexacellError | None = None
-    garbled: int = 0
+    garbled_count: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,12 +47,12 @@ class Snapshot:
     gauges: tuple[DeviceReport[GaugeDeviation], ...] = ()
     encoders: DeviceReport[EncoderSample] | None = None
     controller: DeviceReport[ControllerStatus] | None = None
-    stop_line: DeviceReport[str] | None = None
+    stop_input: DeviceReport[str] | None = None
     """Its value is why motion is forbidden; empty while it is not."""
 
 
 @dataclass(frozen=True, slots=True)
-class Limits:
+class GuardLimits:
     """What a snapshot is held against during one action.
 
     Attributes:

@@ -13,7 +13,7 @@ from hexacell.errors import HexacellError
 from procedures.guards import rules
 from procedures.guards.polling import DevicePollers, GuardMonitor
 from procedures.guards.rules import free_bytes
-from procedures.guards.snapshot import Limits
+from procedures.guards.snapshot import GuardLimits
 from procedures.run.cancellation import shielded
 from procedures.run.trips import GuardTripped, Trip
 
@@ -47,7 +47,7 @@ class MotionSupervisor:
         """
         if self.latched is not None:
             raise self.latched.as_error()
-        if trip := rules.disk(str(self._folder), free_bytes(self._folder), self._free_disk_mb):
+        if trip := rules.low_disk_space(str(self._folder), free_bytes(self._folder), self._free_disk_mb):
             raise self.latch(trip)
 
     def latch(self, trip: Trip) -> GuardTripped:
@@ -64,7 +64,7 @@ class MotionSupervisor:
         return self.latch(trip)
 
     async def supervise(
-        self, action: Supervised[Result], lanes: DevicePollers, limits: Limits, ending_s: float = 0.0
+        self, action: Supervised[Result], lanes: DevicePollers, limits: GuardLimits, ending_s: float = 0.0
     ) -> Result:
         """Watch over an action; it begins once every device under watch has answered.
 
@@ -77,11 +77,11 @@ class MotionSupervisor:
         """
         self.check()
         async with GuardMonitor(lanes, limits, self._clock) as patrol:
-            if trip := await patrol.asked_again():
+            if trip := await patrol.poll_all():
                 raise self.latch(trip)
             doing = asyncio.ensure_future(action())
             try:
-                await patrol.until(doing)
+                await patrol.wait_for(doing)
                 if patrol.trip is None:
                     return await self._result(doing, patrol)
                 tripped = await self.stop(patrol.trip)
@@ -94,7 +94,7 @@ class MotionSupervisor:
         try:
             return await done
         except HexacellError as error:
-            if trip := await patrol.asked_again():
+            if trip := await patrol.poll_all():
                 raise await self.stop(trip) from error
             raise
 

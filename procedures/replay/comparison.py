@@ -17,7 +17,7 @@ from procedures.run.events import Reading
 TOLERANCE = 1e-9
 """The largest difference that rounding may make: in a field's own unit, above 1 relative."""
 
-PROSE = frozenset({"sentence", "line", "reason"})
+WORDING_FIELDS = frozenset({"sentence", "line", "reason"})
 """Fields for people; a later version may word them otherwise."""
 
 
@@ -61,12 +61,12 @@ def changes(recorded: BaseModel, replayed: BaseModel, tolerance: float) -> list[
     return list(_changes("", stated, replayed.model_dump(mode="json"), tolerance))
 
 
-def is_prose(change: Change) -> bool:
+def is_wording(change: Change) -> bool:
     """Whether nothing but the wording differs."""
-    return change.field.rpartition(".")[2] in PROSE
+    return change.field.rpartition(".")[2] in WORDING_FIELDS
 
 
-def unlike_its_counts(reading: Reading, encoders: EncoderSettings) -> Change | None:
+def counts_mismatch(reading: Reading, encoders: EncoderSettings) -> Change | None:
     """Slider positions that do not follow from the counts behind them, by more than half a count."""
     means = np.mean([positions_mm(counts, encoders) for counts in reading.counts], axis=0)
     half_mm = encoders.measuring_step_nm * 0.5e-6

@@ -31,7 +31,7 @@ from procedures.run.steps import Move
 PROTOCOL = "recorded"
 
 
-class Playback:
+class RecordedOutcome:
     """What came of the step that is being replayed, and how far it was read.
 
     A record keeps the mean and the range of its window, not each reading in it: readings are made up
@@ -43,18 +43,18 @@ class Playback:
         self._window_s = window_s
         self.outcome: events.Event | None = None
         self.begun_s = 0.0
-        self.looks = 0
+        self.samples_read = 0
 
-    def put_in(self, outcome: events.Event) -> None:
+    def load(self, outcome: events.Event) -> None:
         """The outcome that the devices are to bring about from now on."""
         self.begun_s = self.now()
         self.outcome = outcome
-        self.looks = 0
+        self.samples_read = 0
 
     def now(self) -> float:
         """Seconds: all readings of a window at once, but for the first and the last."""
-        passed = 0.5 * min(self.looks, 1)
-        if self.looks and self.looks >= self._length - 1:
+        passed = 0.5 * min(self.samples_read, 1)
+        if self.samples_read and self.samples_read >= self._length - 1:
             passed = 1.0 + 1e-6
         return self.begun_s + passed * self._window_s
 
@@ -65,7 +65,7 @@ class Playback:
 
     def required_reading(self) -> events.Reading:
         """The same; raises ``DeviceError`` when more is asked for than there is."""
-        if self.reading is None or self.looks >= self._length:
+        if self.reading is None or self.samples_read >= self._length:
             raise DeviceError("the journal has no further reading", subject="the recorded devices")
         return self.reading
 
@@ -77,7 +77,7 @@ class Playback:
 class RecordedClock(CellClock):
     """The tape's time; waiting takes none."""
 
-    def __init__(self, tape: Playback) -> None:
+    def __init__(self, tape: RecordedOutcome) -> None:
         super().__init__()
         self._tape = tape
 
@@ -97,7 +97,7 @@ class RecordedClock(CellClock):
 class RecordedGauge:
     """A gauge that shows what one showed; ``row`` is its place in the cell file."""
 
-    def __init__(self, tape: Playback, row: int, mount: tuple[str, int, int]) -> None:
+    def __init__(self, tape: RecordedOutcome, row: int, mount: tuple[str, int, int]) -> None:
         self._tape = tape
         self._row = row
         self.name, self._axis, self._sign = mount
@@ -111,7 +111,7 @@ class RecordedGauge:
         outcome = self._tape.outcome
         if isinstance(outcome, events.RecordRejected) and outcome.reading is None:
             return self._at_end(outcome.reason)
-        reading, look = self._tape.required_reading(), self._tape.looks
+        reading, look = self._tape.required_reading(), self._tape.samples_read
         mean, half = reading.gauges_mm[self._axis], reading.spread_mm[self._axis] / 2
         offset = {0: half, 1: -half}.get(look, 0.0)
         return GaugeReading(self._sign * (mean + offset), reading.answers[look][self._row])
@@ -136,7 +136,7 @@ class RecordedGauge:
 class RecordedEncoders:
     """Encoders that count what they counted."""
 
-    tape: Playback
+    tape: RecordedOutcome
 
     async def open(self) -> tuple[DeviceIdentity, ...]:
         """Nothing to connect to."""
@@ -145,8 +145,8 @@ class RecordedEncoders:
     async def read(self) -> EncoderSample:
         """The next round of the window."""
         reading = self.tape.required_reading()
-        self.tape.looks += 1
-        return EncoderSample(reading.counts[self.tape.looks - 1], reading.joints_mm)
+        self.tape.samples_read += 1
+        return EncoderSample(reading.counts[self.tape.samples_read - 1], reading.joints_mm)
 
     async def close(self) -> None:
         """Nothing to let go."""
@@ -156,7 +156,7 @@ class RecordedEncoders:
 class RecordedController:
     """A controller whose moves all arrive: those that did not are no arrivals in the journal."""
 
-    tape: Playback
+    tape: RecordedOutcome
 
     async def open(self) -> DeviceIdentity:
         """Nothing to connect to."""
@@ -193,7 +193,7 @@ class RecordedController:
 class RecordedOperator:
     """A person who answers what somebody answered."""
 
-    tape: Playback
+    tape: RecordedOutcome
 
     async def ask(self, question: Question) -> str | None:
         """Who approved a change, if anybody did; a question about a failure is never asked here."""
@@ -205,7 +205,7 @@ class RecordedOperator:
 class RecordedThermometers(Thermometers):
     """Thermometers that show what they showed."""
 
-    def __init__(self, tape: Playback) -> None:
+    def __init__(self, tape: RecordedOutcome) -> None:
         super().__init__()
         self._tape = tape
 
@@ -214,7 +214,7 @@ class RecordedThermometers(Thermometers):
         return self._tape.reading.temperatures if self._tape.reading is not None else ()
 
 
-def recorded_devices(settings: CellSettings, tape: Playback) -> Devices:
+def recorded_devices(settings: CellSettings, tape: RecordedOutcome) -> Devices:
     """The devices of a cell as its journal knows them."""
     mounts = [(gauge.name, "xyz".index(gauge.axis), int(gauge.sign)) for gauge in settings.gauges]
     gauges = tuple(
@@ -227,7 +227,7 @@ def recorded_devices(settings: CellSettings, tape: Playback) -> Devices:
 Result = TypeVar("Result")
 
 
-class NoGuards(Guards):
+class InactiveGuards(Guards):
     """Guards that let everything be done; what they judge by numbers alone, drift, they still judge."""
 
     async def prepare(self) -> None:
@@ -249,10 +249,10 @@ class NoGuards(Guards):
         """It has read its config."""
 
 
-class RecordedPerformer(StepExecutor):
+class RecordedStepExecutor(StepExecutor):
     """A performer whose devices are those of a journal."""
 
     @cached_property
     def guards(self) -> Guards:
         """None."""
-        return NoGuards(self.cell.settings, self.devices, self.clock, self.folder.path)
+        return InactiveGuards(self.cell.settings, self.devices, self.clock, self.folder.path)

@@ -31,10 +31,10 @@ from procedures.replay.comparison import (
     Change,
     Difference,
     changes,
-    is_prose,
-    unlike_its_counts,
+    counts_mismatch,
+    is_wording,
 )
-from procedures.replay.recorded_devices import Playback
+from procedures.replay.recorded_devices import RecordedOutcome
 from procedures.run import events
 from procedures.run.events import Event
 from procedures.run.state import RunState, apply
@@ -90,7 +90,7 @@ class Replayer:
     def __init__(
         self,
         performer: StepExecutor,
-        tape: Playback,
+        tape: RecordedOutcome,
         scratch: Path,
         scope: Scope = Scope.ALL,
         tolerance: float = TOLERANCE,
@@ -103,7 +103,7 @@ class Replayer:
         self._state = RunState()
         self._doing: Step | None = None
         self._line = 0
-        self.tally = ReplayReport()
+        self.report = ReplayReport()
 
     async def replay(self, entries: Sequence[Entry]) -> ReplayReport:
         """Go through all of them."""
@@ -111,7 +111,7 @@ class Replayer:
             self._line = entry.number
             await self._compare(entry.event, entries[:place])
             self._state = apply(self._state, entry.event)
-        return self.tally
+        return self.report
 
     async def _compare(self, event: events.Event, before: Sequence[Entry]) -> None:
         match event:
@@ -127,14 +127,14 @@ class Replayer:
                 await self._outcome(self._doing, event)
                 self._doing = None
             case _:
-                self.tally.taken += 1
-        if event.kind in BROKEN_OFF:
+                self.report.taken += 1
+        if event.kind in CANCELLED:
             self._doing = None
 
     async def _decision(self, event: events.StepBegun) -> None:
         if not self._scope.decides:
             return
-        self.tally.decisions += 1
+        self.report.decisions += 1
         decided = await self._decided()
         self._note(Aspect.DECISION, event.step.key, event.step, decided)
 
@@ -145,46 +145,46 @@ class Replayer:
     async def _outcome(self, step: Step, event: events.Event) -> None:
         if not self._scope.derives(step):
             return
-        self.tally.results += 1
+        self.report.results += 1
         derived = await self._performed(step, event)
         self._note(Aspect.RESULT, step.key, event, derived)
         if isinstance(event, events.RecordTaken):
             encoders = self._performer.cell.settings.encoders
-            if change := unlike_its_counts(event.reading, encoders):
+            if change := counts_mismatch(event.reading, encoders):
                 self._differ(Aspect.RESULT, step.key, change)
 
     async def _performed(self, step: Step, outcome: events.Event) -> events.Event | Exception:
-        self._tape.put_in(outcome)
+        self._tape.load(outcome)
         return await _or_error(self._performer.perform(step, self._state))
 
     async def _interruption(self, event: events.Interrupted) -> None:
         """A failure that needs no device and no disk comes again; any other is taken as it stands."""
         if event.exit_code != ExitCode.OUT_OF_LIMITS:
-            self.tally.taken += 1
+            self.report.taken += 1
         elif self._doing is None:
             await self._undecided(event)
-        elif self._doing.kind in COMPUTED and self._scope.derives(self._doing):
-            self.tally.results += 1
+        elif self._doing.kind in COMPUTED_STEPS and self._scope.derives(self._doing):
+            self.report.results += 1
             derived = await self._performed(self._doing, event)
             self._note(Aspect.RESULT, self._doing.key, event, derived)
         else:
-            self.tally.taken += 1
+            self.report.taken += 1
 
     async def _undecided(self, event: events.Interrupted) -> None:
         """Deciding itself may have failed, or something between two steps."""
         decided = await self._decided() if self._scope.decides else None
         if isinstance(decided, Exception):
-            self.tally.decisions += 1
+            self.report.decisions += 1
             self._note(Aspect.DECISION, "deciding", event, decided)
         else:
-            self.tally.taken += 1
+            self.report.taken += 1
 
     async def _end(self, event: events.Ended, before: Sequence[Entry]) -> None:
         """The real engine finds nothing left to do and ends the run likewise."""
         if self._scope is not Scope.ALL:
-            self.tally.taken += 1
+            self.report.taken += 1
             return
-        self.tally.results += 1
+        self.report.results += 1
         left = await self._decided()
         if left is not None:
             self._note(Aspect.DECISION, "end", event, left)
@@ -203,10 +203,10 @@ class Replayer:
             self._differ(aspect, place, Change("", _in_words(recorded), _in_words(found)))
             return
         for change in changes(recorded, found, self._tolerance):
-            self._differ(Aspect.WORDS if is_prose(change) else aspect, place, change)
+            self._differ(Aspect.WORDS if is_wording(change) else aspect, place, change)
 
     def _differ(self, aspect: Aspect, place: str, change: Change) -> None:
-        self.tally.differences.append(Difference(self._line, place, aspect, change))
+        self.report.differences.append(Difference(self._line, place, aspect, change))
 
 
 async def _or_error(work: Awaitable[Outcome]) -> Outcome | Exception:
@@ -232,7 +232,7 @@ def _in_words(found: object) -> str:
             return str(getattr(found, "key", getattr(found, "kind", found)))
 
 
-OUTCOMES: dict[str, frozenset[str]] = {
+OUTCOME_KINDS: dict[str, frozenset[str]] = {
     "locate": frozenset({"located"}),
     "move": frozenset({"arrived"}),
     "place": frozenset({"placed"}),
@@ -249,17 +249,17 @@ OUTCOMES: dict[str, frozenset[str]] = {
 }
 """Kinds of events by the kind of step."""
 
-MEASURED = frozenset({"confirmed", "voided", "closed"})
+MEASURED_KINDS = frozenset({"confirmed", "voided", "closed"})
 """Kinds that can be derived again only from the reading that they hold; version 1 kept none."""
 
-BROKEN_OFF = frozenset({"interrupted", "failed", "paused"})
+CANCELLED = frozenset({"interrupted", "failed", "paused"})
 """After these the step that was being done is over without an outcome."""
 
-COMPUTED = frozenset({"lend", "take back", "identify", "propose", "commit", "judge"})
+COMPUTED_STEPS = frozenset({"lend", "take back", "identify", "propose", "commit", "judge"})
 """Steps whose failure follows from what is recorded, unless it came from a device or the disk."""
 
 
 def is_outcome(step: Step, event: Event) -> bool:
     """Whether an event is what came of a step, with all that it was made from."""
-    is_whole = event.kind not in MEASURED or getattr(event, "reading", None) is not None
-    return is_whole and event.kind in OUTCOMES.get(step.kind, ())
+    is_whole = event.kind not in MEASURED_KINDS or getattr(event, "reading", None) is not None
+    return is_whole and event.kind in OUTCOME_KINDS.get(step.kind, ())

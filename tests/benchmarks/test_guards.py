@@ -68,7 +68,9 @@ class Watched:
 
     async def slow_move(self, orientation: int) -> None:
         step = Move(at=P1, orientation=orientation, pose=(0.0, 0.0, 550.0, 0.0, 0.0, 2.0 * orientation))
-        await self.guards.move(step, self.state, lambda: np.array(self.simulated.world.sliders()))
+        await self.guards.move(
+            step, self.state, lambda: np.array(self.simulated.physics.encoder_positions())
+        )
 
 
 def settings_of(cell: Cell, protocol: str) -> Any:
@@ -172,11 +174,13 @@ async def stopping_s(folder: Path, protocol: str, kind: FaultKind, device: str) 
     async with watched(folder, protocol) as cell:
         schedule = cell.simulated.schedule
         after = 0.3 + 0.1 * float(np.random.default_rng(abs(hash(folder)) % 1000).random())
-        schedule.plan(SimulatedFault(kind=kind, device=device, at_move=schedule.moves + 1, after_s=after))
+        schedule.schedule(
+            SimulatedFault(kind=kind, device=device, at_move=schedule.move_count + 1, after_s=after)
+        )
         with pytest.raises(GuardTripped) as tripped:
             await cell.slow_move(2)
-        still_s = cell.simulated.world.still_since_s
-        struck_s = schedule.struck[0].at_s if schedule.struck else still_s
+        still_s = cell.simulated.physics.motion_end_s
+        struck_s = schedule.injected[0].at_s if schedule.injected else still_s
         return still_s - struck_s, tripped.value.trip.guard
 
 

@@ -1,12 +1,12 @@
-from drivers.wire_trace import Direction, TraceEntry, WireTrace
+from drivers.wire_trace import TraceEntry, TrafficDirection, WireTrace
 
 
 def entry(data, time_s=1.5):
-    return TraceEntry(time_s, "/dev/ttyUSB0", Direction.SENT, data)
+    return TraceEntry(time_s, "/dev/ttyUSB0", TrafficDirection.SENT, data)
 
 
 def test_an_entry_reads_as_one_line():
-    received = TraceEntry(12.3456789, "/dev/ttyUSB0", Direction.RECEIVED, b"+1.2\r")
+    received = TraceEntry(12.3456789, "/dev/ttyUSB0", TrafficDirection.RECEIVED, b"+1.2\r")
     assert str(received) == "12.345679 /dev/ttyUSB0 < 2b 31 2e 32 0d  +1.2."
 
 
@@ -15,7 +15,7 @@ def test_the_latest_bytes_are_kept_and_the_rest_is_counted():
     for number in range(5):
         trace(entry(b"abcd", number))
     assert [kept.time_s for kept in trace.entries()] == [3, 4]
-    assert trace.forgotten == 3
+    assert trace.dropped == 3
     assert trace.text().splitlines()[0] == "# 3 earlier entries were forgotten"
     assert len(trace.text().splitlines()) == 3
 
@@ -30,4 +30,4 @@ def test_more_than_fits_at_once_is_not_kept():
     trace = WireTrace(capacity=3)
     trace(entry(b"abcd"))
     assert trace.entries() == ()
-    assert trace.forgotten == 1
+    assert trace.dropped == 1

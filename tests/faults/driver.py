@@ -89,7 +89,7 @@ def serve() -> None:
         (Group.CONFIG_FORMATS, "toml"),
     ):
         load(group, name)
-    workflow.CANDIDATES, workflow.HELD_OUT_CANDIDATES, robot.STEPS = 64, 64, 8
+    workflow.CANDIDATES, workflow.HELD_OUT_CANDIDATES, robot.LINE_STEPS = 64, 64, 8
     scipy.stats.qmc.Sobol(3).random(2)  # which reads a file that not everybody may read
     print("ready", flush=True)
     for line in sys.stdin:

@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 
 from drivers.simulated import robot as machine_module
-from drivers.simulated.cell import _world
+from drivers.simulated.cell import _physics
 from drivers.simulated.physics import RobotPhysics
 from drivers.simulated.robot import SimulatedMachine
 from hexacell.application.calibration_run import _beginning
@@ -51,11 +51,13 @@ class Rig:
         bench = self.bench = Bench()
         self.clock, self.gauges, self.controller = bench.clock, bench.gauges, bench.controller
         home, config = Pose(*self.cell.settings.identification.points[0]), self.cell.config_path
-        self.world: RobotPhysics = _world(Hexaglide(), simulation, self.clock, NativeToml(), config, home)
-        self.machine = SimulatedMachine(Hexaglide(), NativeToml(), config, self.world, self.clock, home)
+        self.physics: RobotPhysics = _physics(
+            Hexaglide(), simulation, self.clock, NativeToml(), config, home
+        )
+        self.machine = SimulatedMachine(Hexaglide(), NativeToml(), config, self.physics, self.clock, home)
         for gauge in bench.gauges:
-            gauge.shown = partial(self.world.displacement, gauge.name)
-        bench.encoders.shown = lambda: list(self.world.sliders())
+            gauge.shown = partial(self.physics.gauge_displacement, gauge.name)
+        bench.encoders.shown = lambda: list(self.physics.encoder_positions())
         bench.controller.machine = self.machine
         self.calibration = Calibration(self.cell.settings, robot_of(self.cell), self.mode)
         self.performer = StepExecutor(

@@ -7,7 +7,7 @@ from typing import TypeVar
 
 from drivers.controllers.errors import CommandRefused
 from drivers.controllers.linuxcnc.connection import Connection
-from drivers.controllers.linuxcnc.protocol import Answer, parse_homed, parse_pose, parse_positions
+from drivers.controllers.linuxcnc.protocol import Response, parse_homed, parse_pose, parse_positions
 from hexacell.errors import DeviceError
 from hexacell.kinematics.pose import Pose
 
@@ -85,13 +85,13 @@ class ControllerCommands:
             complaints[_MOST_TOLD:] = [f"and {len(complaints) - _MOST_TOLD} more"]
         return "; ".join(complaints) or await self._state()
 
-    async def _got(self, what: str) -> Answer:
+    async def _got(self, what: str) -> Response:
         # LinuxCNC 2.9 reads the commands of all clients with one strtok(): two that speak at the same
         # moment garble each other's. A question can be asked again; an order is left to the caller.
         answer = await self.connection.ask(f"get {what}")
         return answer if answer.accepted else await self.connection.ask(f"get {what}")
 
-    async def _refusal(self, what: str, answer: Answer) -> CommandRefused:
+    async def _refusal(self, what: str, answer: Response) -> CommandRefused:
         if (await self.get_if_known("enable")).upper() == "OFF":
             return CommandRefused(
                 f"'set {what}'",
@@ -99,7 +99,7 @@ class ControllerCommands:
                 subject=self.subject,
                 action="See that nobody else moves the robot, then prepare it again",
             )
-        return CommandRefused(f"'set {what}'", await self.reason(answer.remarks), subject=self.subject)
+        return CommandRefused(f"'set {what}'", await self.reason(answer.explanations), subject=self.subject)
 
     async def _state(self) -> str:
         if await self.is_on("estop"):

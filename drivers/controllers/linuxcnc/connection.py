@@ -9,11 +9,17 @@ import time
 from collections import deque
 from typing import Self
 
-from drivers.controllers.errors import AnswerOverdue, ConnectionLost
-from drivers.controllers.linuxcnc.protocol import Answer, LineBuffer, answer_in, encode, explanation_in
+from drivers.controllers.errors import ConnectionLost, ResponseTimeout
+from drivers.controllers.linuxcnc.protocol import (
+    LineBuffer,
+    Response,
+    encode,
+    parse_explanation,
+    parse_response,
+)
 from drivers.controllers.linuxcnc.send_arbiter import SendArbiter
 from drivers.controllers.linuxcnc.settings import Address, Timeouts
-from drivers.wire_trace import Direction, Recorder, TraceEntry
+from drivers.wire_trace import TraceEntry, TraceRecorder, TrafficDirection
 from hexacell.errors import DeviceError, UsageError
 
 _CLIENT = "hexacell 1.0"
@@ -34,7 +40,7 @@ class Connection:
         self,
         address: Address,
         patience: Timeouts,
-        recorder: Recorder | None,
+        recorder: TraceRecorder | None,
         reader: asyncio.StreamReader,
         writer: asyncio.StreamWriter,
     ) -> None:
@@ -56,7 +62,7 @@ class Connection:
         cls,
         address: Address,
         patience: Timeouts,
-        recorder: Recorder | None = None,
+        recorder: TraceRecorder | None = None,
         *,
         commanding: bool = True,
     ) -> Self:
@@ -76,11 +82,11 @@ class Connection:
             raise
         return connection
 
-    async def ask(self, command: str, patience_s: float | None = None) -> Answer:
+    async def ask(self, command: str, patience_s: float | None = None) -> Response:
         """The answer to one command, a refusal included.
 
         Raises:
-            AnswerOverdue: It did not come within ``patience_s``.
+            ResponseTimeout: It did not come within ``patience_s``.
             ConnectionLost: The line broke.
         """
         line = self._encoded(command)
@@ -90,7 +96,7 @@ class Connection:
             await self._write(line)
             return await self._owed_answer(patience_s or self._patience.answer)
 
-    async def catch_up(self) -> None:
+    async def collect_late_response(self) -> None:
         """Collect an answer that nobody waited for to the end.
 
         Raises:
@@ -126,7 +132,7 @@ class Connection:
         self.server = self._server_in(await self._first_line())
         await self._write(self._encoded("set echo off"))
         with contextlib.suppress(TimeoutError):  # answered by its echo alone, if at all
-            await self._line(_now() + self._patience.remark)
+            await self._line(_now() + self._patience.explanation)
         await self.ask("set verbose on")
 
     async def _first_line(self) -> str:
@@ -137,7 +143,7 @@ class Connection:
         except TimeoutError:
             if self._buffer.rest:
                 raise self._stranger(self._buffer.rest) from None
-            raise AnswerOverdue(
+            raise ResponseTimeout(
                 "takes the connection but says nothing",
                 subject=self._address.name,
                 action="Check that linuxcncrsh listens there, and restart LinuxCNC if it hangs",
@@ -170,37 +176,37 @@ class Connection:
             raise UsageError(str(error), subject=self._address.name) from error
 
     async def _write(self, line: bytes) -> None:
-        self._record(Direction.SENT, line)
+        self._record(TrafficDirection.SENT, line)
         try:
             self._writer.write(line)
             await self._writer.drain()
         except OSError as error:
             raise ConnectionLost("closed the connection", subject=self._address.name) from error
 
-    async def _owed_answer(self, patience_s: float) -> Answer:
+    async def _owed_answer(self, patience_s: float) -> Response:
         assert self._owed is not None  # noqa: S101 - both callers see to it
         answer = await self._answer_to(self._owed, patience_s)
         self._owed = None
         return answer
 
-    async def _answer_to(self, command: str, patience_s: float) -> Answer:
+    async def _answer_to(self, command: str, patience_s: float) -> Response:
         give_up = _now() + patience_s
         remarks: list[str] = []
         try:
-            while (answer := answer_in(line := await self._line(give_up), command)) is None:
-                if explanation := explanation_in(line):
+            while (answer := parse_response(line := await self._line(give_up), command)) is None:
+                if explanation := parse_explanation(line):
                     remarks.append(explanation)
-                    give_up = min(give_up, _now() + self._patience.remark)
+                    give_up = min(give_up, _now() + self._patience.explanation)
         except TimeoutError:
             if remarks:  # 2.10 refuses what another client's motion holds up without a NAK
-                return Answer(accepted=False, remarks=tuple(remarks))
+                return Response(accepted=False, explanations=tuple(remarks))
             asked = " ".join(command.split()[:2])  # no passwords in messages
-            raise AnswerOverdue(
+            raise ResponseTimeout(
                 f"did not answer '{asked}' within {patience_s:g} s",
                 subject=self._address.name,
                 action="Check that LinuxCNC still runs",
             ) from None
-        return Answer(answer.accepted, answer.text, tuple(remarks))
+        return Response(answer.accepted, answer.text, tuple(remarks))
 
     async def _line(self, give_up: float) -> str:
         while not self._lines:
@@ -214,14 +220,14 @@ class Connection:
             data = await self._reader.read(_CHUNK)
         except OSError:
             data = b""
-        self._record(Direction.RECEIVED, data)
+        self._record(TrafficDirection.RECEIVED, data)
         if not data:
             raise ConnectionLost(
                 "closed the connection", subject=self._address.name, action="Check that LinuxCNC still runs"
             )
         return data
 
-    def _record(self, direction: Direction, data: bytes) -> None:
+    def _record(self, direction: TrafficDirection, data: bytes) -> None:
         if self._recorder is None or not data:
             return
         for password in (self._address.connect_password, self._address.enable_password):

@@ -8,11 +8,11 @@ from pathlib import PurePath
 
 from drivers.controllers import reload_command
 from drivers.controllers.errors import (
-    AnswerOverdue,
     CommandRefused,
     ConnectionLost,
     MotionInterrupted,
     MoveRefused,
+    ResponseTimeout,
 )
 from drivers.controllers.linuxcnc import startup as readiness
 from drivers.controllers.linuxcnc.commands import ControllerCommands
@@ -20,7 +20,7 @@ from drivers.controllers.linuxcnc.protocol import pose_difference, rapid_move
 from drivers.controllers.linuxcnc.session import Session
 from drivers.controllers.linuxcnc.settings import Address, Timeouts
 from drivers.interfaces import ControllerStatus, DeviceIdentity
-from drivers.wire_trace import Recorder
+from drivers.wire_trace import TraceRecorder
 from hexacell.cell.devices import ControllerSettings
 from hexacell.errors import DeviceError
 from hexacell.kinematics.pose import Pose
@@ -40,7 +40,7 @@ class LinuxcncrshController:
         self,
         settings: ControllerSettings,
         *,
-        trace: Recorder | None = None,
+        trace: TraceRecorder | None = None,
         patience: Timeouts = _PATIENCE,
     ) -> None:
         address = Address.of(settings)
@@ -72,16 +72,16 @@ class LinuxcncrshController:
             MotionInterrupted: ``stop`` was called meanwhile.
             DeviceError: A step has no effect; or units, offsets or modes would falsify coordinates.
         """
-        stops = self._session.stops
+        stops = self._session.stop_count
         async with self._turn:
             commands = await self._session.in_control()
             await commands.errors()
-            await readiness.wait_for_completion(commands)
+            await readiness.acknowledge_on_completion(commands)
             await readiness.leave_emergency_stop(commands, self._patience)
-            await readiness.switch(commands, self._patience, on=True)
+            await readiness.switch_machine(commands, self._patience, on=True)
             await self._home_if_needed(commands, stops)
-            await readiness.choose_mdi(commands, self._patience)
-            await readiness.check_meaning_of_coordinates(commands)
+            await readiness.enter_mdi_mode(commands, self._patience)
+            await readiness.check_coordinate_system(commands)
 
     async def move(self, pose: Pose) -> None:
         """Go to ``pose`` and return once the controller's own position agrees with it.
@@ -93,10 +93,10 @@ class LinuxcncrshController:
             MotionInterrupted: It stopped elsewhere; the message says where.
             DeviceError: The line broke.
         """
-        stops = self._session.stops
+        stops = self._session.stop_count
         block = self._rapid_move(pose)
         async with self._turn:
-            commands = await self._session.in_step()
+            commands = await self._session.synchronized()
             if self._was_stopped_since(stops):
                 raise MotionInterrupted("was stopped before it moved", subject=self._name)
             await self._travel(commands, block, pose)
@@ -105,12 +105,12 @@ class LinuxcncrshController:
     async def pose(self) -> Pose:
         """The pose the controller believes the platform to have, mm and deg."""
         async with self._turn:
-            return await (await self._session.in_step()).pose()
+            return await (await self._session.synchronized()).pose()
 
     async def joint_positions(self) -> tuple[float, ...]:
         """The six joints as the controller has them, mm."""
         async with self._turn:
-            return await (await self._session.in_step()).joints()
+            return await (await self._session.synchronized()).joints()
 
     async def status(self) -> ControllerStatus:
         """Whether it is in emergency stop, whether it is on, and why not; also while ``move`` waits."""
@@ -132,20 +132,20 @@ class LinuxcncrshController:
         Raises:
             DeviceError: The command failed, the machine does not come back, or a joint moved.
         """
-        stops = self._session.stops
+        stops = self._session.stop_count
         async with self._turn:
-            commands = await self._session.in_step()
+            commands = await self._session.synchronized()
             before = await commands.joints()
-            await readiness.switch(commands, self._patience, on=False)
+            await readiness.switch_machine(commands, self._patience, on=False)
             if command := self._settings.reload_command:
                 await reload_command.run(command, self._name, self._patience.reload)
-            again = await self._session.come_back()
+            again = await self._session.reconnect()
             if again is not commands:  # a LinuxCNC that was started anew is in emergency stop
                 await readiness.leave_emergency_stop(again, self._patience)
-            await readiness.switch(again, self._patience, on=True)
+            await readiness.switch_machine(again, self._patience, on=True)
             if not await self._home_if_needed(again, stops):
                 self._expect_unmoved(before, await again.joints())
-            await readiness.choose_mdi(again, self._patience)
+            await readiness.enter_mdi_mode(again, self._patience)
 
     async def close(self) -> None:
         """Let the connection go; closing twice is harmless."""
@@ -155,7 +155,7 @@ class LinuxcncrshController:
         if await commands.all_homed():
             return False
         limit_s, poll_s = self._settings.move_timeout_s, self._patience.poll
-        await readiness.home(commands, limit_s, poll_s, lambda: self._was_stopped_since(stops))
+        await readiness.home_joints(commands, limit_s, poll_s, lambda: self._was_stopped_since(stops))
         return True
 
     def _rapid_move(self, pose: Pose) -> str:
@@ -171,7 +171,7 @@ class LinuxcncrshController:
         except CommandRefused as refusal:
             move = f"to move to {pose}"
             raise MoveRefused(move, refusal.reason, subject=self._name, action=refusal.action) from refusal
-        except AnswerOverdue as overdue:
+        except ResponseTimeout as overdue:
             await self.stop()
             problem = f"was still moving after {limit_s:g} s and was stopped"
             action = "Raise controller.move_timeout_s if the move was as it should be"
@@ -203,7 +203,7 @@ class LinuxcncrshController:
         return position <= settings.position_tolerance_mm and angle <= settings.angle_tolerance_deg
 
     def _was_stopped_since(self, stops: int) -> bool:
-        return self._session.stops != stops
+        return self._session.stop_count != stops
 
     def _expect_unmoved(self, before: tuple[float, ...], after: tuple[float, ...]) -> None:
         moved = [abs(new - old) for new, old in zip(after, before, strict=True)]

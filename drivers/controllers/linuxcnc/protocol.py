@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 from hexacell.kinematics.pose import Pose
 
-LONGEST_LINE = 255
+MAX_LINE_BYTES = 255
 """Bytes of one command with its line end; the server of LinuxCNC 2.9 overruns its buffer beyond."""
 
 _LEGS = 6
@@ -24,7 +24,7 @@ _DECIMALS = 8
 
 
 @dataclass(frozen=True, slots=True)
-class Answer:
+class Response:
     """What the controller said to one command.
 
     ``text`` is what follows the name of what was asked for, empty after ``set``. ``remarks`` are
@@ -33,7 +33,7 @@ class Answer:
 
     accepted: bool
     text: str = ""
-    remarks: tuple[str, ...] = ()
+    explanations: tuple[str, ...] = ()
 
 
 class LineBuffer:
@@ -60,8 +60,8 @@ def encode(command: str) -> bytes:
         ValueError: It is longer than the server's buffer, or is more than one line.
     """
     line = command.encode() + b"\r\n"
-    if len(line) > LONGEST_LINE:
-        raise ValueError(f"a command of {len(line)} bytes is longer than the {LONGEST_LINE} it can take")
+    if len(line) > MAX_LINE_BYTES:
+        raise ValueError(f"a command of {len(line)} bytes is longer than the {MAX_LINE_BYTES} it can take")
     if b"\r" in line[:-2] or b"\n" in line[:-2]:
         raise ValueError("a command must be a single line")
     return line
@@ -79,24 +79,24 @@ def rapid_move(pose: Pose) -> str:
     return "G0 " + " ".join(f"{axis}{value:.{_DECIMALS}f}" for axis, value in words)
 
 
-def explanation_in(line: str) -> str:
+def parse_explanation(line: str) -> str:
     """The explanation in one of 2.10's ``error: ...`` lines, empty for any other line."""
     return line[len(_EXPLANATION) :].strip() if line.lower().startswith(_EXPLANATION) else ""
 
 
-def answer_in(line: str, command: str) -> Answer | None:
+def parse_response(line: str, command: str) -> Response | None:
     """What ``line`` says to ``command``, or nothing if it is no answer to it, such as an echo."""
     verb, name = (word.upper() for word in command.split()[:2])
     names = (name, _OTHER_NAME.get(name, name))
     match line.upper().split():
         case [said, "NAK"] if said == verb:
-            return Answer(accepted=False)
+            return Response(accepted=False)
         case [said, what, "NAK"] if said == verb and what in names:
-            return Answer(accepted=False)
+            return Response(accepted=False)
         case ["SET", what, "ACK"] if verb == "SET" and what in names:
-            return Answer(accepted=True)
+            return Response(accepted=True)
         case [what, *_] if verb == "GET" and what in names:
-            return Answer(accepted=True, text=line[len(what) :].strip())
+            return Response(accepted=True, text=line[len(what) :].strip())
     return None
 
 

@@ -13,7 +13,7 @@ from drivers.controllers.linuxcnc.settings import Address, Timeouts
 from drivers.controllers.linuxcnc.status_channel import StatusConnection
 from drivers.controllers.linuxcnc.stop import stop_in_place
 from drivers.interfaces import ControllerStatus
-from drivers.wire_trace import Recorder
+from drivers.wire_trace import TraceRecorder
 from hexacell.errors import DeviceError
 
 
@@ -24,8 +24,8 @@ class Session:
         stops: how often ``stop`` was called; whoever waits for a motion compares.
     """
 
-    def __init__(self, address: Address, patience: Timeouts, trace: Recorder | None) -> None:
-        self.stops = 0
+    def __init__(self, address: Address, patience: Timeouts, trace: TraceRecorder | None) -> None:
+        self.stop_count = 0
         self._address = address
         self._patience = patience
         self._trace = trace
@@ -42,12 +42,12 @@ class Session:
         """The first connection; nothing is left behind if there is none."""
         was_open, self._is_open = self._is_open, True
         try:
-            return await self.in_step()
+            return await self.synchronized()
         except BaseException:
             self._is_open = was_open
             raise
 
-    async def in_step(self) -> ControllerCommands:
+    async def synchronized(self) -> ControllerCommands:
         """A connection on which no answer is owed, and which has control unless another took it.
 
         Raises:
@@ -57,7 +57,7 @@ class Session:
         await self._may_speak.wait()
         if self._commands is not None:
             try:
-                await self._commands.connection.catch_up()
+                await self._commands.connection.collect_late_response()
             except ConnectionLost:
                 await self._drop()
         if self._commands is None:
@@ -70,19 +70,19 @@ class Session:
     async def in_control(self) -> ControllerCommands:
         """The same, after taking control from whoever has it."""
         self._has_control = False
-        self._lookout.forget()
-        return await self.in_step()
+        self._lookout.reset_complaints()
+        return await self.synchronized()
 
-    async def come_back(self) -> ControllerCommands:
+    async def reconnect(self) -> ControllerCommands:
         """The same, once a controller that may be starting anew can be reached.
 
         Raises:
             ConnectionLost: It cannot, for as long as ``patience.comeback``.
         """
-        give_up = _now() + self._patience.comeback
+        give_up = _now() + self._patience.reconnect
         while True:
             try:
-                return await self.in_step()
+                return await self.synchronized()
             except ConnectionLost:
                 if _now() > give_up:
                     raise
@@ -104,7 +104,7 @@ class Session:
         Raises:
             DeviceError: The machine could not be stopped, or it is not known whether it was.
         """
-        self.stops += 1
+        self.stop_count += 1
         async with self._stop_turn:
             self._may_speak.clear()
             try:
@@ -126,7 +126,7 @@ class Session:
         connection.may_speak, connection.floor = self._may_speak, self._floor
         commands = ControllerCommands(connection, self._address.name)
         try:
-            await readiness.wait_for_completion(commands)
+            await readiness.acknowledge_on_completion(commands)
             self._expect_open()  # it may have been closed in the meantime
         except BaseException:
             await connection.close()

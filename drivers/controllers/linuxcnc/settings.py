@@ -45,10 +45,10 @@ class Timeouts:
 
     connect: float = 3.0
     answer: float = 5.0
-    remark: float = 0.3
+    explanation: float = 0.3
     poll: float = 0.05
     arrival: float = 1.0
     stop: float = 5.0
     switch: float = 5.0
     reload: float = 120.0
-    comeback: float = 60.0
+    reconnect: float = 60.0

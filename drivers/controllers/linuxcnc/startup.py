@@ -21,7 +21,7 @@ _MODAL_ACTION = "Put it into RS274NGC_STARTUP_CODE, or send it in MDI"
 _OFFSET_MM = 1e-6
 
 
-async def wait_for_completion(commands: ControllerCommands) -> None:
+async def acknowledge_on_completion(commands: ControllerCommands) -> None:
     """Let orders be answered when they are done rather than when they arrive.
 
     Global and lasting in 2.9, the connection's own in 2.10, which calls it ``wait_mode``.
@@ -49,7 +49,7 @@ async def leave_emergency_stop(commands: ControllerCommands, patience: Timeouts)
         )
 
 
-async def switch(commands: ControllerCommands, patience: Timeouts, *, on: bool) -> None:
+async def switch_machine(commands: ControllerCommands, patience: Timeouts, *, on: bool) -> None:
     """Switch the machine on or off.
 
     Raises:
@@ -65,7 +65,9 @@ async def switch(commands: ControllerCommands, patience: Timeouts, *, on: bool) 
         )
 
 
-async def home(commands: ControllerCommands, patience_s: float, poll_s: float, stopped: Stopped) -> None:
+async def home_joints(
+    commands: ControllerCommands, patience_s: float, poll_s: float, stopped: Stopped
+) -> None:
     """Home all joints that are not; the machine moves.
 
     LinuxCNC homes in joint mode only, and is in teleoperation once it has been homed before.
@@ -89,7 +91,7 @@ async def home(commands: ControllerCommands, patience_s: float, poll_s: float, s
         await asyncio.sleep(poll_s)
 
 
-async def choose_mdi(commands: ControllerCommands, patience: Timeouts) -> None:
+async def enter_mdi_mode(commands: ControllerCommands, patience: Timeouts) -> None:
     """Enter the mode in which it takes single commands.
 
     Raises:
@@ -105,7 +107,7 @@ async def choose_mdi(commands: ControllerCommands, patience: Timeouts) -> None:
         raise DeviceError(problem, subject=commands.subject)
 
 
-async def check_meaning_of_coordinates(commands: ControllerCommands) -> None:
+async def check_coordinate_system(commands: ControllerCommands) -> None:
     """Refuse units, offsets and modes under which ``G0 X1`` is not 1 mm in machine coordinates.
 
     Raises:

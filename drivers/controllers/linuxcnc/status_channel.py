@@ -10,7 +10,7 @@ from drivers.controllers.linuxcnc.connection import Connection
 from drivers.controllers.linuxcnc.send_arbiter import SendArbiter
 from drivers.controllers.linuxcnc.settings import Address, Timeouts
 from drivers.interfaces import ControllerStatus
-from drivers.wire_trace import Recorder
+from drivers.wire_trace import TraceRecorder
 
 HANDOVER_S = 0.05
 """Longest wait for a question that is being asked; an answer takes a millisecond."""
@@ -24,7 +24,7 @@ class StatusConnection:
     """
 
     def __init__(
-        self, address: Address, patience: Timeouts, floor: SendArbiter, trace: Recorder | None
+        self, address: Address, patience: Timeouts, floor: SendArbiter, trace: TraceRecorder | None
     ) -> None:
         self._address = address
         self._patience = patience
@@ -49,7 +49,7 @@ class StatusConnection:
                 await self._drop()
                 raise
 
-    def forget(self) -> None:
+    def reset_complaints(self) -> None:
         """Leave complaints to whoever switches it on now."""
         self._was_on, self._complaints = False, ()
 
@@ -84,7 +84,7 @@ class StatusConnection:
     async def _in_step(self) -> ControllerCommands:
         if self._commands is not None:
             try:
-                await self._commands.connection.catch_up()
+                await self._commands.connection.collect_late_response()
             except ConnectionLost:
                 await self._drop()
         if self._commands is None:

@@ -8,7 +8,7 @@ from drivers.controllers.linuxcnc.commands import ControllerCommands
 from drivers.controllers.linuxcnc.connection import Connection
 from drivers.controllers.linuxcnc.protocol import pose_difference
 from drivers.controllers.linuxcnc.settings import Address, Timeouts
-from drivers.wire_trace import Recorder
+from drivers.wire_trace import TraceRecorder
 from hexacell.errors import DeviceError
 
 _ATTEMPTS = 3
@@ -23,7 +23,7 @@ async def stop_in_place(
     address: Address,
     patience: Timeouts,
     tolerance_mm: float,
-    recorder: Recorder | None = None,
+    recorder: TraceRecorder | None = None,
     ready: Connection | None = None,
 ) -> None:
     """Abort over a connection of its own until successive positions agree within ``tolerance_mm``.
@@ -58,7 +58,7 @@ async def _stopped_at_once(
 
 
 async def _try_to_stop(
-    address: Address, patience: Timeouts, tolerance_mm: float, recorder: Recorder | None
+    address: Address, patience: Timeouts, tolerance_mm: float, recorder: TraceRecorder | None
 ) -> None:
     """Try again whatever went wrong: commands of two clients that coincide garble each other."""
     for attempt in range(1, _ATTEMPTS + 1):

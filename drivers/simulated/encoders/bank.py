@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 from types import TracebackType
 from typing import Any, Self
 
-from drivers.simulated.encoders.can_bus import SimulatedLine
+from drivers.simulated.encoders.can_bus import SimulatedCanBus
 from drivers.simulated.encoders.node import DeviceData, SimulatedEncoder
 from drivers.simulated.encoders.vendors import EVENTS_AND_SYNC, Vendor
 from hexacell.cell.devices import EncoderSettings
@@ -38,17 +38,17 @@ class SimulatedEncoderBank:
         positions: Positions,
         clock: CellClock,
         latency_s: float = 0.0,
-        makers: Sequence[Vendor] = (EVENTS_AND_SYNC,) * 6,
+        vendors: Sequence[Vendor] = (EVENTS_AND_SYNC,) * 6,
     ) -> None:
         self.channel = f"hexacell-encoders-{uuid.uuid4().hex}"
-        self.line = SimulatedLine(self.channel)
+        self.bus = SimulatedCanBus(self.channel)
         self.unplugged: set[int] = set()
         self.faults = EncoderFaults(self)
         self._settings = settings
         self._positions = positions
         self._clock = clock
         self._latency_s = latency_s
-        self._makers = tuple(makers)
+        self._makers = tuple(vendors)
         serial_numbers = settings.serial_numbers or range(FIRST_SERIAL_NUMBER, FIRST_SERIAL_NUMBER + 6)
         self._encoders = tuple(
             self._make(leg, serial_number) for leg, serial_number in enumerate(serial_numbers, 1)
@@ -62,17 +62,17 @@ class SimulatedEncoderBank:
 
     def start(self) -> None:
         """Switch the encoders on."""
-        with self.line.lock:
+        with self.bus.lock:
             self._sample()
-            self.line.subscribe(_SYNC, self._on_sync)
+            self.bus.subscribe(_SYNC, self._on_sync)
             for leg, encoder in enumerate(self._encoders, 1):
                 if leg not in self.unplugged:
                     encoder.plug_in()
-        self.line.start()
+        self.bus.start()
 
     def close(self) -> None:
         """Switch them off and let the channel go; closing twice is harmless."""
-        self.line.close()
+        self.bus.close()
 
     def __enter__(self) -> Self:
         self.start()
@@ -90,7 +90,7 @@ class SimulatedEncoderBank:
         """The encoder of a leg, from 1."""
         return self._encoders[leg - 1]
 
-    def add_twin(self, leg: int) -> None:
+    def add_duplicate(self, leg: int) -> None:
         """Plug in a second device under a leg's node id."""
         twin = self._make(leg, self.encoder(leg).data.serial_number + 1000)
         self._twins.append((leg, twin))
@@ -101,7 +101,7 @@ class SimulatedEncoderBank:
         data = DeviceData(
             settings.nodes[leg - 1], serial_number, round(settings.measuring_step_nm), settings.signed
         )
-        return SimulatedEncoder(self.line, self._makers[leg - 1], data, self._clock.on_the_wall)
+        return SimulatedEncoder(self.bus, self._makers[leg - 1], data, self._clock.on_the_wall)
 
     def _on_sync(self, _can_id: int, _data: bytearray, _timestamp: float) -> None:
         self._sample()
@@ -113,7 +113,7 @@ class SimulatedEncoderBank:
 
     def _send_later(self, encoder: SimulatedEncoder, cob_id: int, data: bytes, delay_s: float) -> None:
         if delay_s:
-            self.line.call_later(self._clock.on_the_wall(delay_s), lambda: encoder.send(cob_id, data))
+            self.bus.call_later(self._clock.on_the_wall(delay_s), lambda: encoder.send(cob_id, data))
         else:
             encoder.send(cob_id, data)
 
@@ -146,29 +146,29 @@ class EncoderFaults:
 
     def unplug(self, leg: int) -> None:
         """The node vanishes; before ``start`` it was never there."""
-        with self._bank.line.lock:
+        with self._bank.bus.lock:
             self._bank.encoder(leg).unplug()
             self._bank.unplugged.add(leg)
 
     def plug_in(self, leg: int) -> None:
         """It comes back, without configuration."""
-        with self._bank.line.lock:
+        with self._bank.bus.lock:
             self._bank.unplugged.discard(leg)
             self._bank.encoder(leg).plug_in()
 
     def duplicate(self, leg: int) -> None:
         """A second device with the same node id and another serial number appears."""
-        with self._bank.line.lock:
-            self._bank.add_twin(leg)
+        with self._bank.bus.lock:
+            self._bank.add_duplicate(leg)
 
     def silence(self, leg: int, *, silent: bool = True) -> None:
         """It no longer answers SYNC, but everything else."""
-        with self._bank.line.lock:
+        with self._bank.bus.lock:
             self._bank.encoder(leg).is_silent = silent
 
     def emergency(self, leg: int, code: int = NO_MAGNET, register: int = POSITION_ERROR) -> None:
         """It reports an error; ``clear_emergency`` takes it back."""
-        with self._bank.line.lock:
+        with self._bank.bus.lock:
             self._bank.encoder(leg).emergency(code, register)
 
     def clear_emergency(self, leg: int) -> None:
@@ -177,24 +177,24 @@ class EncoderFaults:
 
     def alarm(self, leg: int, bits: int = 1) -> None:
         """It raises alarms in 6503h without a message; 0 takes them back."""
-        with self._bank.line.lock:
+        with self._bank.bus.lock:
             self._bank.encoder(leg).set_alarms(bits)
 
     def reboot(self, leg: int) -> None:
         """It restarts and loses its configuration."""
-        with self._bank.line.lock:
+        with self._bank.bus.lock:
             self._bank.encoder(leg).boot()
 
     def stop_heartbeat(self, leg: int) -> None:
         """Its heartbeat ends; it still answers."""
-        with self._bank.line.lock:
+        with self._bank.bus.lock:
             self._bank.encoder(leg).stop_heartbeat()
 
     def delay(self, leg: int, seconds: float) -> None:
         """Its answers come so much later, with what it sampled at their SYNC: stale rounds."""
-        with self._bank.line.lock:
+        with self._bank.bus.lock:
             self._bank.encoder(leg).delay_s = seconds
 
     def kill_bus(self) -> None:
         """Every node falls silent for good."""
-        self._bank.line.stop()
+        self._bank.bus.stop()

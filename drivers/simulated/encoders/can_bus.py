@@ -33,7 +33,7 @@ class Timer:
         self.cancelled = True
 
 
-class SimulatedLine(canopen.Network):
+class SimulatedCanBus(canopen.Network):
     """A CANopen network for simulated nodes on python-can's ``virtual`` interface.
 
     Everything that nodes do happens with ``lock`` held, on the line's own thread or on that of
@@ -121,7 +121,7 @@ class SimulatedLine(canopen.Network):
 class PeriodicFrame:
     """A frame that repeats until stopped; what canopen's heartbeat asks of a periodic task."""
 
-    def __init__(self, line: SimulatedLine, can_id: int, data: bytes, period_s: float) -> None:
+    def __init__(self, line: SimulatedCanBus, can_id: int, data: bytes, period_s: float) -> None:
         self._line = line
         self._can_id = can_id
         self._data = data

@@ -15,7 +15,7 @@ from canopen.objectdictionary import ODVariable
 from canopen.sdo.exceptions import SdoAbortedError
 
 from drivers.simulated.encoders import object_dictionary
-from drivers.simulated.encoders.can_bus import SimulatedLine, Timer
+from drivers.simulated.encoders.can_bus import SimulatedCanBus, Timer
 from drivers.simulated.encoders.vendors import Vendor
 
 _NMT = 0x000
@@ -40,7 +40,7 @@ class SimulatedEncoder:
     """A device on the line. ``counts`` is the position of its last sample."""
 
     def __init__(
-        self, line: SimulatedLine, maker: Vendor, data: DeviceData, on_the_wall: Callable[[float], float]
+        self, line: SimulatedCanBus, maker: Vendor, data: DeviceData, on_the_wall: Callable[[float], float]
     ) -> None:
         self.data = data
         self.counts = 0

@@ -44,7 +44,7 @@ def apply_fault(indicator: Indicator, fault: InjectedGaugeFault, *, on: bool) ->
         case InjectedGaugeFault.PUSHED:
             indicator.push(on=on)
         case InjectedGaugeFault.FROZEN:
-            indicator.stick(on=on)
+            indicator.jam(on=on)
         case InjectedGaugeFault.HOLD:
             (indicator.hold if on else indicator.release)()
         case InjectedGaugeFault.AUTO_OFF:
@@ -75,20 +75,20 @@ class WireFaults:
         self._random = Random(seed)  # noqa: S311 - a simulation
         self._active: dict[InjectedGaugeFault, _Strike] = {}
 
-    def begin(self, fault: InjectedGaugeFault, *, answers: int | None, seconds: float) -> None:
+    def inject(self, fault: InjectedGaugeFault, *, answers: int | None, seconds: float) -> None:
         """Let ``fault`` strike the next ``answers``, or all of them; ``seconds`` is how late."""
         self._active[fault] = _Strike(answers, seconds)
 
-    def end(self, fault: InjectedGaugeFault) -> None:
+    def clear(self, fault: InjectedGaugeFault) -> None:
         """Let it strike no more."""
         self._active.pop(fault, None)
 
-    def inject(self, answer: bytes) -> tuple[bytes, float]:
+    def apply(self, answer: bytes) -> tuple[bytes, float]:
         """What becomes of ``answer``: the bytes that leave, and how many seconds late."""
         delay = 0.0
         for fault, strike in tuple(self._active.items()):
             if not strike.strikes():
-                self.end(fault)
+                self.clear(fault)
             elif fault is InjectedGaugeFault.SILENT:
                 answer = b""
             elif fault is InjectedGaugeFault.LATE:

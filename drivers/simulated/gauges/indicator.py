@@ -8,7 +8,7 @@ from math import copysign
 MM_PER_INCH = 25.4
 PUSH_MM = 6.0
 
-Plunger = Callable[[], float]
+PlungerPosition = Callable[[], float]
 """Where the plunger is now, mm from the middle of its travel, noise included.
 
 Called from the thread that serves the line.
@@ -18,7 +18,7 @@ Called from the thread that serves the line.
 class Indicator:
     """One instrument. Its keys are the methods, its settings the attributes."""
 
-    def __init__(self, plunger: Plunger, travel_mm: float = 12.5) -> None:
+    def __init__(self, plunger: PlungerPosition, travel_mm: float = 12.5) -> None:
         self.inch = False
         self.reversed = False
         self.battery_low = False
@@ -52,7 +52,7 @@ class Indicator:
         """Let the display follow the plunger again."""
         self._held_mm = None
 
-    def stick(self, *, on: bool) -> None:
+    def jam(self, *, on: bool) -> None:
         """Let the plunger jam where it is, or come free: it goes on answering."""
         self._stuck_mm = self._plunger() if on else None
 

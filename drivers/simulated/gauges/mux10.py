@@ -10,7 +10,7 @@ from drivers.simulated.gauges.indicator import Indicator
 NO_GAUGE = b"911\r"
 GAUGE_ERROR = b"912\r"
 BUSY = b"918\r"
-ABOUT = b"MUX-10F SIMULATED\r"
+IDENTIFICATION = b"MUX-10F SIMULATED\r"
 
 
 def format_value(channel: int, value: float, *, inch: bool) -> bytes:
@@ -29,7 +29,7 @@ class Mux10Device(Device):
     def answer(self, command: bytes) -> bytes:
         """A data frame or an error; nothing if the command is no channel number and not ``V``."""
         if command == b"V":
-            return ABOUT
+            return IDENTIFICATION
         if not command.isdigit():
             return b""
         if self.busy:

@@ -9,9 +9,9 @@ from typing import Self
 from drivers.simulated.gauges.cdi import CdiDevice
 from drivers.simulated.gauges.device import Device
 from drivers.simulated.gauges.faults import InjectedGaugeFault
-from drivers.simulated.gauges.indicator import Indicator, Plunger
+from drivers.simulated.gauges.indicator import Indicator, PlungerPosition
 from drivers.simulated.gauges.mux10 import Mux10Device
-from drivers.simulated.gauges.server import ServedLine, serve_gauges
+from drivers.simulated.gauges.server import GaugeLineServer, serve_gauges
 from drivers.simulated.gauges.sylvac import SylvacDevice
 from hexacell.cell.devices import GaugeSettings
 from hexacell.cell.simulation import SimulatedGauges
@@ -40,7 +40,7 @@ def simulated_device(protocol: str, indicators: Mapping[int, Indicator]) -> Devi
     return DEVICES[protocol](indicators)
 
 
-class GaugeRack:
+class SimulatedGaugeBank:
     """The gauges of a simulated cell, each on a line that is served until the rack is closed.
 
     ``plungers`` are by gauge name: mm from the middle of the travel, in the instrument's own
@@ -54,7 +54,7 @@ class GaugeRack:
     def __init__(
         self,
         gauges: Sequence[GaugeSettings],
-        plungers: Mapping[str, Plunger],
+        plungers: Mapping[str, PlungerPosition],
         settings: SimulatedGauges,
         clock: CellClock,
         *,
@@ -63,7 +63,7 @@ class GaugeRack:
         self.indicators = {gauge.name: Indicator(plungers[gauge.name], gauge.travel_mm) for gauge in gauges}
         self._settings = settings
         self._clock = clock
-        self._lines: dict[str, ServedLine] = {}
+        self._lines: dict[str, GaugeLineServer] = {}
         with ExitStack() as served:
             for number, group in enumerate(_by_line(gauges)):
                 line = served.enter_context(self._serve(group, seed + number))
@@ -75,7 +75,7 @@ class GaugeRack:
         )
         """The gauges' settings as given, with the ports under which they are reached."""
 
-    def line(self, gauge: str) -> ServedLine:
+    def line(self, gauge: str) -> GaugeLineServer:
         """The line that ``gauge`` is on."""
         return self._lines[gauge]
 
@@ -89,7 +89,7 @@ class GaugeRack:
         """Undo :meth:`inject`."""
         self.line(gauge).clear(fault, channel=self._channels[gauge])
 
-    def _serve(self, group: Sequence[GaugeSettings], seed: int) -> ServedLine:
+    def _serve(self, group: Sequence[GaugeSettings], seed: int) -> GaugeLineServer:
         indicators = {_channel(gauge): self.indicators[gauge.name] for gauge in group}
         return serve_gauges(
             simulated_device(group[0].protocol, indicators),

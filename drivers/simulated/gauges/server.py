@@ -27,7 +27,7 @@ LONGEST_WAIT_S = 5.0
 _log = logging.getLogger(__name__)
 
 
-class ServedLine:
+class GaugeLineServer:
     """A device on a transport, answered for by a thread of its own until it is closed.
 
     An answer leaves ``latency_s`` and the time that question and answer take on the wire after the
@@ -81,7 +81,7 @@ class ServedLine:
         """Undo :meth:`inject`: a plug is plugged in, an instrument is switched on again."""
         self._do(lambda: self._end(fault, channel))
 
-    def send_unasked(self, data: bytes) -> None:
+    def send_unsolicited(self, data: bytes) -> None:
         """Put ``data`` on the line now, as a data button or a foot switch does."""
         self._do(lambda: self._transport.send(data))
 
@@ -146,7 +146,7 @@ class ServedLine:
             self._answer(command.strip(b"\n"))
 
     def _answer(self, command: bytes) -> None:
-        answer, delay_s = self._faults.inject(self.device.answer(command))
+        answer, delay_s = self._faults.apply(self.device.answer(command))
         wire_s = (len(command) + len(COMMAND_END) + len(answer)) * self._byte_s
         free_at = max([self._clock.now(), *(due for due, _ in self._answers)])
         self._answers.append((free_at + self._latency_s + wire_s + delay_s, answer))
@@ -166,13 +166,13 @@ class ServedLine:
         if fault is InjectedGaugeFault.UNPLUGGED:
             self._unplug()
         elif not apply_fault(self._indicator(channel), fault, on=True):
-            self._faults.begin(fault, answers=answers, seconds=seconds)
+            self._faults.inject(fault, answers=answers, seconds=seconds)
 
     def _end(self, fault: InjectedGaugeFault, channel: int | None) -> None:
         if fault is InjectedGaugeFault.UNPLUGGED:
             self._transport.plug_in()
         elif not apply_fault(self._indicator(channel), fault, on=False):
-            self._faults.end(fault)
+            self._faults.clear(fault)
         elif fault is InjectedGaugeFault.AUTO_OFF:
             self._transport.send(self.device.power_up())
 
@@ -194,10 +194,10 @@ def serve_gauges(
     latency_s: float = 0.02,
     baudrate: int | None = None,
     seed: int = 0,
-) -> ServedLine:
+) -> GaugeLineServer:
     """Serve ``device`` from now on; ``url`` says where, ``close`` ends it.
 
     ``name`` is what a pseudo-terminal is called in its folder.
     """
     line = PtyTransport(name) if transport == "pty" else SocketTransport()
-    return ServedLine(device, line, clock, latency_s=latency_s, baudrate=baudrate, seed=seed)
+    return GaugeLineServer(device, line, clock, latency_s=latency_s, baudrate=baudrate, seed=seed)

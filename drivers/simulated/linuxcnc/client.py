@@ -9,13 +9,13 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 
-from drivers.simulated.linuxcnc.faults import Fault, Faults
-from drivers.simulated.linuxcnc.get_commands import QUESTIONS
-from drivers.simulated.linuxcnc.session import Access, Context
-from drivers.simulated.linuxcnc.set_commands import ORDERS, Level
-from drivers.simulated.linuxcnc.state import ConnectionCut, Control
+from drivers.simulated.linuxcnc.faults import ControllerFault, ControllerFaults
+from drivers.simulated.linuxcnc.get_commands import GET_COMMANDS
+from drivers.simulated.linuxcnc.session import ClientSession, ServerSettings
+from drivers.simulated.linuxcnc.set_commands import SET_COMMANDS, Permission
+from drivers.simulated.linuxcnc.state import ConnectionCut, ControllerState
 
-LONGEST_LINE = 255
+MAX_LINE_BYTES = 255
 
 _LINE_ENDS = re.compile(rb"[\r\n]")
 
@@ -24,9 +24,13 @@ class Client:
     """One connection; ``write`` sends bytes back over it."""
 
     def __init__(
-        self, control: Control, faults: Faults, access: Access, write: Callable[[bytes], None]
+        self,
+        control: ControllerState,
+        faults: ControllerFaults,
+        access: ServerSettings,
+        write: Callable[[bytes], None],
     ) -> None:
-        self._context = Context(control, access)
+        self._context = ClientSession(control, access)
         self._faults = faults
         self._write = write
         self._rest = b""
@@ -37,13 +41,13 @@ class Client:
         Raises:
             ConnectionCut: The client said ``quit``, overran the buffer, or met with a fault.
         """
-        if self._faults.strikes(Fault.SILENT):
+        if self._faults.triggers(ControllerFault.SILENT):
             return
         if self._context.echo and self._context.greeted:
             self._write(data)
         *lines, self._rest = _LINE_ENDS.split(self._rest + data)
         for line in lines:
-            if len(line) > LONGEST_LINE:
+            if len(line) > MAX_LINE_BYTES:
                 raise ConnectionCut
             self._obey(line.decode("utf-8", "replace"))
 
@@ -60,7 +64,7 @@ class Client:
                 raise ConnectionCut
 
     def _hello(self, password: str, name_and_version: str) -> None:
-        refused = self._faults.strikes(Fault.REFUSES_PASSWORD)
+        refused = self._faults.triggers(ControllerFault.REFUSES_PASSWORD)
         known = password == self._context.access.connect_password and len(name_and_version.split()) >= 2
         if known and not refused:
             self._context.greeted = True
@@ -71,8 +75,8 @@ class Client:
     def _get(self, what: str) -> None:
         if not what:
             self._write(b"GET NAK\r\n")
-        elif what in QUESTIONS:
-            self._write(f"{what} {QUESTIONS[what](self._context)}\r\n".encode())
+        elif what in GET_COMMANDS:
+            self._write(f"{what} {GET_COMMANDS[what](self._context)}\r\n".encode())
         else:
             self._write(f"GET {what} NAK\r\n\r\n".encode())
 
@@ -81,15 +85,15 @@ class Client:
             self._write(b"SET NAK\r\n")
         elif not what:
             self._write(b"SET NAK\n\r")
-        elif not (self._may(what) and ORDERS[what].obey(self._context, argument)):
+        elif not (self._may(what) and SET_COMMANDS[what].execute(self._context, argument)):
             self._write(f"SET {what} NAK\n\r".encode())
         elif self._context.verbose:
             self._write(f"SET {what} ACK\n\r".encode())
 
     def _may(self, what: str) -> bool:
-        if what not in ORDERS:
+        if what not in SET_COMMANDS:
             return False
-        level = ORDERS[what].level
-        return (level < Level.COMMANDER or self._context.commands) and (
-            level < Level.ON or self._context.control.on
+        level = SET_COMMANDS[what].permission
+        return (level < Permission.COMMANDER or self._context.has_control) and (
+            level < Permission.ON or self._context.control.enabled
         )

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 
-from drivers.simulated.linuxcnc.session import Context
+from drivers.simulated.linuxcnc.session import ClientSession
 
 _MODAL_CODES = "G0 G17 G40 G21 G90 G94 G54 G49 G99 G64 G97 G91.1 G8 G92.2 F0 S0"
 
@@ -21,13 +21,13 @@ def _numbers(values: Iterable[float]) -> str:
     return " ".join(f"{value:.6f}" for value in values)
 
 
-QUESTIONS: dict[str, Callable[[Context], str]] = {
+GET_COMMANDS: dict[str, Callable[[ClientSession], str]] = {
     "ECHO": lambda context: _on_off(on=context.echo),
     "VERBOSE": lambda context: _on_off(on=context.verbose),
-    "ENABLE": lambda context: _on_off(on=context.commands),
-    "SET_WAIT": lambda context: context.control.answers.value,
+    "ENABLE": lambda context: _on_off(on=context.has_control),
+    "SET_WAIT": lambda context: context.control.wait_mode.value,
     "ESTOP": lambda context: _on_off(on=context.control.estop),
-    "MACHINE": lambda context: _on_off(on=context.control.on),
+    "MACHINE": lambda context: _on_off(on=context.control.enabled),
     "MODE": lambda context: context.control.mode.value,
     "ERROR": lambda context: context.control.next_error(),
     "TELEOP_ENABLE": lambda context: _yes_no(yes=context.control.teleop),

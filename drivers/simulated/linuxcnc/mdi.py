@@ -17,7 +17,7 @@ class BlockError(Exception):
     """A block that the interpreter does not take, in LinuxCNC's words."""
 
 
-def target_of(block: str, current: Pose) -> Pose | None:
+def parse_block(block: str, current: Pose) -> Pose | None:
     """Where ``block`` leads from ``current``; words that are missing keep their values.
 
     Returns nothing for a block without motion.

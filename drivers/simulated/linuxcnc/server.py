@@ -9,10 +9,10 @@ from contextlib import suppress
 from typing import Self
 
 from drivers.simulated.linuxcnc.client import Client
-from drivers.simulated.linuxcnc.faults import Faults
+from drivers.simulated.linuxcnc.faults import ControllerFaults
 from drivers.simulated.linuxcnc.machine import Machine
-from drivers.simulated.linuxcnc.session import Access
-from drivers.simulated.linuxcnc.state import ConnectionCut, Control
+from drivers.simulated.linuxcnc.session import ServerSettings
+from drivers.simulated.linuxcnc.state import ConnectionCut, ControllerState
 
 HOST = "127.0.0.1"
 
@@ -38,13 +38,13 @@ class SimulatedController:
         enable_password: str = "EMCTOO",  # noqa: S107 - likewise
         config: str = "simulated.ini",
     ) -> None:
-        self.faults = Faults()
-        self.control = Control(machine, self.faults)
-        access = Access(connect_password, enable_password, "EMCNETSVR 1.1", config)
+        self.faults = ControllerFaults()
+        self.state = ControllerState(machine, self.faults)
+        access = ServerSettings(connect_password, enable_password, "EMCNETSVR 1.1", config)
         try:
-            self._server = _Server(port, self.control, self.faults, access)
+            self._server = _Server(port, self.state, self.faults, access)
         except BaseException:
-            self.control.close()
+            self.state.close()
             raise
         self.port = self._server.server_address[1]
         self._thread = threading.Thread(
@@ -64,7 +64,7 @@ class SimulatedController:
     def close(self) -> None:
         """Stop the machine, cut all connections and end all threads; closing twice is harmless."""
         self._server.shutdown()
-        self.control.close()
+        self.state.close()
         self._server.cut_all()
         self._server.server_close()
         self._thread.join()
@@ -80,7 +80,9 @@ class _Server(socketserver.ThreadingTCPServer):
     allow_reuse_address = True
     daemon_threads = False
 
-    def __init__(self, port: int, control: Control, faults: Faults, access: Access) -> None:
+    def __init__(
+        self, port: int, control: ControllerState, faults: ControllerFaults, access: ServerSettings
+    ) -> None:
         self.control = control
         self.faults = faults
         self.access = access

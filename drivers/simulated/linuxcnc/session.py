@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from drivers.simulated.linuxcnc.state import Control
+from drivers.simulated.linuxcnc.state import ControllerState
 
 
 @dataclass(frozen=True, slots=True)
-class Access:
+class ServerSettings:
     """The passwords, and what a client is told about the server."""
 
     connect_password: str
@@ -18,16 +18,16 @@ class Access:
 
 
 @dataclass(slots=True, eq=False)
-class Context:
+class ClientSession:
     """One connection's own settings, beside the control that all share."""
 
-    control: Control
-    access: Access
+    control: ControllerState
+    access: ServerSettings
     greeted: bool = False
     echo: bool = True
     verbose: bool = False
 
     @property
-    def commands(self) -> bool:
+    def has_control(self) -> bool:
         """Whether this is the one client that may give orders."""
         return self.control.commander is self

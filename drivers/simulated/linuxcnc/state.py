@@ -12,22 +12,22 @@ from collections.abc import Callable
 from concurrent.futures import CancelledError, Future, ThreadPoolExecutor, wait
 from enum import Enum
 
-from drivers.simulated.linuxcnc.faults import Fault, Faults
+from drivers.simulated.linuxcnc.faults import ControllerFault, ControllerFaults
 from drivers.simulated.linuxcnc.machine import KinematicsFailure, Machine
-from drivers.simulated.linuxcnc.mdi import BlockError, target_of
+from drivers.simulated.linuxcnc.mdi import BlockError, parse_block
 from hexacell.errors import HexacellError
 from hexacell.kinematics.pose import Pose
 
 MID_MOVE_S = 0.02
 """When faults in the middle of a move strike, s after it began."""
 
-LAGGING = 3
+FAULTY_JOINT = 3
 """The joint whose following errors are simulated, as LinuxCNC counts them: from 0."""
 
 _AGAIN_S = 0.05
 
 
-class Mode(Enum):
+class TaskMode(Enum):
     """The task mode."""
 
     MANUAL = "MANUAL"
@@ -35,7 +35,7 @@ class Mode(Enum):
     MDI = "MDI"
 
 
-class Wait(Enum):
+class WaitMode(Enum):
     """When an order is answered."""
 
     RECEIVED = "RECEIVED"
@@ -46,16 +46,16 @@ class ConnectionCut(Exception):
     """The connection over which something was ordered is to be cut."""
 
 
-class Control:
+class ControllerState:
     """One machine's controller; one thread of its own carries out motions, one after another."""
 
-    def __init__(self, machine: Machine, faults: Faults) -> None:
+    def __init__(self, machine: Machine, faults: ControllerFaults) -> None:
         self.estop = True
-        self.on = False
-        self.mode = Mode.MANUAL
+        self.enabled = False
+        self.mode = TaskMode.MANUAL
         self.teleop = False
         self.homed = False
-        self.answers = Wait.RECEIVED
+        self.wait_mode = WaitMode.RECEIVED
         self.commander: object | None = None
         self.machine = machine
         self._faults = faults
@@ -87,10 +87,10 @@ class Control:
             self.estop = on
         return True
 
-    def lag(self, joint: int = LAGGING) -> None:
+    def exceed_following_error(self, joint: int = FAULTY_JOINT) -> None:
         """A joint's following error exceeds its limit: the drives are switched off, and it says why."""
         with self._lock:
-            self._errors.append(following_error(joint))
+            self._errors.append(following_error_message(joint))
             self._switch_off()
 
     def set_machine(self, *, on: bool) -> bool:
@@ -98,22 +98,22 @@ class Control:
         with self._lock:
             if not on:
                 self._switch_off()
-            elif not self.estop and not self.on:
+            elif not self.estop and not self.enabled:
                 self._switch_on()
         return True
 
-    def set_mode(self, mode: Mode) -> bool:
+    def set_mode(self, mode: TaskMode) -> bool:
         """Change mode; MDI before homing is acknowledged and refused."""
-        if mode is not Mode.MANUAL and not self.homed:
+        if mode is not TaskMode.MANUAL and not self.homed:
             self._errors.append("all joints must be homed before going into coordinated mode")
             return True
         self.mode = mode
-        self.teleop = mode is Mode.MANUAL and self.homed
+        self.teleop = mode is TaskMode.MANUAL and self.homed
         return True
 
     def home(self) -> bool:
         """Begin to home; acknowledged at once, and without effect outside joint mode."""
-        if self.mode is not Mode.MANUAL:
+        if self.mode is not TaskMode.MANUAL:
             self._errors.append("can't do that (EMC_JOINT_HOME:123) in MDI mode")
         elif self.teleop:
             self._errors.append("must be in joint mode to home")
@@ -137,38 +137,38 @@ class Control:
             ConnectionCut: A fault demands it, or the controller is being closed.
         """
         try:
-            target = target_of(block, self.machine.pose())
+            target = parse_block(block, self.machine.pose())
             self._expect_mdi()
         except BlockError as error:
             return self._failed(str(error))
-        if self._faults.strikes(Fault.REFUSES_MOVE):
-            return self._failed(following_error(LAGGING))
-        if target is None or self._faults.strikes(Fault.STAYS_PUT):
+        if self._faults.triggers(ControllerFault.REFUSES_MOVE):
+            return self._failed(following_error_message(FAULTY_JOINT))
+        if target is None or self._faults.triggers(ControllerFault.DOES_NOT_MOVE):
             return True
         job = self._start(lambda: self._travel(target))
         self._strike_in_mid_move(job)
-        return self.answers is Wait.RECEIVED or _outcome(job)
+        return self.wait_mode is WaitMode.RECEIVED or _outcome(job)
 
     def _expect_mdi(self) -> None:
         if not self.homed:
             raise BlockError("Can't issue MDI command when not homed")
-        if self.mode is not Mode.MDI:
+        if self.mode is not TaskMode.MDI:
             raise BlockError("Must be in MDI mode to issue MDI command")
 
     def _failed(self, *errors: str) -> bool:
         self._errors.extend(errors)
-        return self.answers is Wait.RECEIVED
+        return self.wait_mode is WaitMode.RECEIVED
 
     def _strike_in_mid_move(self, job: Future[bool]) -> None:
-        drops = self._faults.strikes(Fault.DROPS_CONNECTION)
-        stops = self._faults.strikes(Fault.EMERGENCY_STOP)
-        lags = self._faults.strikes(Fault.FOLLOWING_ERROR)
+        drops = self._faults.triggers(ControllerFault.DROPS_CONNECTION)
+        stops = self._faults.triggers(ControllerFault.EMERGENCY_STOP)
+        lags = self._faults.triggers(ControllerFault.FOLLOWING_ERROR)
         if drops or stops or lags:
             wait([job], timeout=MID_MOVE_S)
         if stops:
             self.set_estop(on=True)
         if lags:
-            self.lag()
+            self.exceed_following_error()
         if drops:
             raise ConnectionCut
 
@@ -204,16 +204,16 @@ class Control:
         except HexacellError as error:
             self._errors.append(str(error))
         else:
-            self.on = True
+            self.enabled = True
 
     def _switch_off(self) -> None:
         self.abort()
-        if self.on:
-            self.on = False
+        if self.enabled:
+            self.enabled = False
             self.machine.switch_off()
 
 
-def following_error(joint: int) -> str:
+def following_error_message(joint: int) -> str:
     """What LinuxCNC says when it switches the machine off for one."""
     return f"joint {joint} following error"
 

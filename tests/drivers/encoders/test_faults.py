@@ -60,7 +60,7 @@ async def test_an_emergency_amid_a_round_spoils_that_round(raw, bank):
 
 
 async def test_after_an_emergency_the_alarms_are_looked_at(raw, bank, monkeypatch):
-    monkeypatch.setattr("drivers.encoders.node_monitor.PERIOD_S", 60.0)
+    monkeypatch.setattr("drivers.encoders.node_monitor.ALARM_POLL_S", 60.0)
     for node in raw.nodes.values():
         node.objects[0x6503, 0] = bytes(2)
     await bank.open()
@@ -76,7 +76,7 @@ async def test_after_an_emergency_the_alarms_are_looked_at(raw, bank, monkeypatc
 
 
 async def test_alarms_without_an_emergency_are_found_out(raw, bank, monkeypatch):
-    monkeypatch.setattr("drivers.encoders.node_monitor.PERIOD_S", 0.0)
+    monkeypatch.setattr("drivers.encoders.node_monitor.ALARM_POLL_S", 0.0)
     for node in raw.nodes.values():
         node.objects[0x6503, 0] = bytes(2)
     await bank.open()

@@ -10,8 +10,8 @@ import pytest
 
 from drivers.encoders.cia406 import Cia406Bank
 from drivers.encoders.errors import BusError, DuplicatedNodeError, SilentNodeError, WrongDeviceError
-from drivers.encoders.sync_sampling import TRIES
-from drivers.wire_trace import Direction, TraceEntry
+from drivers.encoders.sync_sampling import MAX_SYNCS
+from drivers.wire_trace import TraceEntry, TrafficDirection
 
 
 def counts(value: int) -> bytes:
@@ -82,7 +82,7 @@ async def test_a_silent_leg_is_named_after_bounded_tries(raw, bank, hurry):
         SilentNodeError, match=r"encoder of leg 5 \(node 5\): no answer to SYNC.*its supply"
     ):
         await bank.read()
-    assert raw.syncs - before == TRIES
+    assert raw.syncs - before == MAX_SYNCS
     assert time.monotonic() - begin < 2.0
 
 
@@ -185,8 +185,8 @@ async def test_every_frame_can_be_traced(raw, settings):
     await bank.read()
     await bank.close()
     seen = [(entry.direction, entry.data) for entry in entries]
-    assert seen[0] == (Direction.SENT, b"080#")
-    assert (Direction.RECEIVED, b"286#70170000") in seen
+    assert seen[0] == (TrafficDirection.SENT, b"080#")
+    assert (TrafficDirection.RECEIVED, b"286#70170000") in seen
     assert len(seen) == 7
     assert all(entry.line.startswith("encoder bus virtual") for entry in entries)
 

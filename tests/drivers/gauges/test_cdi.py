@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.gauges.cdi import CdiGauge, Parameter, Refusal, parse_parameter, parse_value
+from drivers.gauges.cdi import CdiError, CdiGauge, Parameter, parse_parameter, parse_value
 from drivers.gauges.errors import (
     FrameRejected,
     GaugeAtEnd,
@@ -62,7 +62,7 @@ def test_a_value_is_read_with_its_unit(frame, value, unit):
     assert (shown.value, shown.apparent_unit) == (value, unit)
 
 
-@pytest.mark.parametrize("refusal", Refusal)
+@pytest.mark.parametrize("refusal", CdiError)
 def test_a_refusal_is_read(refusal):
     assert parse_value(refusal.value) is refusal
 

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from drivers.gauges import mux10
 from drivers.gauges.errors import FrameRejected, GaugeAtEnd, GaugeSilent, WrongAnswer, WrongUnit, ZeroVoid
-from drivers.gauges.mux10 import MultiplexerError, Mux10Gauge, parse_about, parse_value
+from drivers.gauges.mux10 import MultiplexerError, Mux10Gauge, parse_identification, parse_value
 from drivers.gauges.protocol import DisplayedValue
 from drivers.interfaces import DeviceIdentity, GaugeReading
 from drivers.simulated.gauges.mux10 import format_value
@@ -106,7 +106,7 @@ def test_noise_is_a_value_only_if_it_is_one_to_the_last_byte(noise):
 def test_no_part_of_a_value_is_a_value(value, front, back):
     frame = format_value(2, value, inch=False)
     part = frame[front : len(frame) - back]
-    if part != frame:
+    if part != frame and not re.fullmatch(rb"9[12]\d\r", part):  # the last digits may be an error frame
         with pytest.raises(FrameRejected):
             parse_value(part, 2)
 
@@ -114,7 +114,7 @@ def test_no_part_of_a_value_is_a_value(value, front, back):
 @pytest.mark.parametrize("frame", [b"911\r", b"01A+0000.123\r", b"\x80MUX\r", b"\r"])
 def test_an_error_or_a_value_is_no_description(frame):
     with pytest.raises(FrameRejected):
-        parse_about(frame)
+        parse_identification(frame)
 
 
 # Dialogues

@@ -59,10 +59,10 @@ class StillClock(CellClock):
 
 @dataclass
 class Twin:
-    """A world and the machine in it, beside what an onlooker may compute for himself."""
+    """A physics and the machine in it, beside what an onlooker may compute for himself."""
 
     clock: StillClock
-    world: RobotPhysics
+    physics: RobotPhysics
     machine: SimulatedMachine
     config: Path
     truth: Geometry
@@ -96,7 +96,7 @@ class Twin:
 
     def seen(self) -> Array:
         """What the three gauges see, mm."""
-        return np.array([self.world.displacement(axis) for axis in "xyz"])
+        return np.array([self.physics.gauge_displacement(axis) for axis in "xyz"])
 
 
 MakeTwin = Callable[..., Twin]
@@ -122,7 +122,7 @@ def make_twin(bundled_cell: Cell) -> MakeTwin:
         start = PoseBatch.of([home])
         joints = inverse_kinematics(Hexaglide(), read.geometry, read.branch, start)[0]
         clock = StillClock()
-        world = RobotPhysics(
+        physics = RobotPhysics(
             Hexaglide(),
             simulation,
             clock,
@@ -130,10 +130,10 @@ def make_twin(bundled_cell: Cell) -> MakeTwin:
             start_geometry=read.geometry,
             start_joints=joints,
         )
-        machine = SimulatedMachine(Hexaglide(), NativeToml(), config, world, clock, home)
+        machine = SimulatedMachine(Hexaglide(), NativeToml(), config, physics, clock, home)
         values = simulation.geometry
         truth = Geometry(values.S, values.B, values.l)
-        return Twin(clock, world, machine, config, truth, read.geometry)
+        return Twin(clock, physics, machine, config, truth, read.geometry)
 
     return make
 

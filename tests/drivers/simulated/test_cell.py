@@ -59,7 +59,7 @@ def slow(settings: CellSettings) -> CellSettings:
 
 
 async def under_way(cell: SimulatedCell) -> None:
-    while cell.world.progress() in {0.0, 1.0}:  # noqa: ASYNC110 - threads move the simulation
+    while cell.physics.progress() in {0.0, 1.0}:  # noqa: ASYNC110 - threads move the simulation
         await asyncio.sleep(0.001)
 
 
@@ -85,10 +85,10 @@ async def test_every_device_answers_and_the_robot_moves(bundled_cell) -> None:
             await controller.move(target)
             after = (await encoders.read()).positions_mm
             readings = [(await gauge.read()).value_mm for gauge in gauges]
-            seen = [cell.world.displacement(axis) for axis in "xyz"]
+            seen = [cell.physics.gauge_displacement(axis) for axis in "xyz"]
             assert (await controller.pose()).as_tuple() == pytest.approx(target.as_tuple(), abs=1e-3)
         assert before != after
-        assert after == pytest.approx(cell.world.sliders().tolist(), abs=0.01)
+        assert after == pytest.approx(cell.physics.encoder_positions().tolist(), abs=0.01)
         assert readings == pytest.approx(seen, abs=0.05)
 
 
@@ -111,11 +111,11 @@ async def test_a_move_that_is_cancelled_stops_the_robot_in_place(bundled_cell) -
             moving.cancel()
             with pytest.raises(asyncio.CancelledError):
                 await moving
-            progress = cell.world.progress()
-            sliders = cell.world.sliders()
+            progress = cell.physics.progress()
+            sliders = cell.physics.encoder_positions()
         assert 0.0 < progress < 1.0
-        assert cell.world.progress() == progress
-        assert cell.world.sliders() == pytest.approx(sliders, abs=0.01)
+        assert cell.physics.progress() == progress
+        assert cell.physics.encoder_positions() == pytest.approx(sliders, abs=0.01)
 
 
 async def test_a_stop_while_it_moves_is_said(bundled_cell) -> None:
@@ -138,7 +138,9 @@ async def test_gauges_count_the_way_they_are_mounted(bundled_cell, signs: tuple[
     with serve(bundled_cell, settings.model_copy(update={"gauges": gauges})) as cell:
         async with drivers(cell.settings) as (opened, _, _):
             readings = [(await gauge.read()).value_mm for gauge in opened]
-        expected = [sign * cell.world.displacement(axis) for sign, axis in zip(signs, "xyz", strict=True)]
+        expected = [
+            sign * cell.physics.gauge_displacement(axis) for sign, axis in zip(signs, "xyz", strict=True)
+        ]
     assert readings == pytest.approx(expected, abs=0.05)
 
 

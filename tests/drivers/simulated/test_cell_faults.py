@@ -97,11 +97,11 @@ def test_the_stop_line_is_a_file(cell) -> None:
 
 
 def test_an_emergency_stop_and_a_following_error_switch_the_machine_off(cell) -> None:
-    control = cell.controller.control
+    control = cell.controller.state
     for kind, estop in ((FaultKind.FOLLOWING_ERROR, False), (FaultKind.EMERGENCY_STOP, True)):
         control.set_estop(on=False)
         control.set_machine(on=True)
-        assert control.on
+        assert control.enabled
         cell.faults.inject(kind)
         assert (control.on, control.estop) == (False, estop)
     assert control.next_error() == "joint 3 following error"
@@ -159,7 +159,7 @@ def test_faults_are_injected_and_cleared_in_their_order() -> None:
     planned = [fault("b", after_s=4.0), fault("a", after_s=1.0, lasts_s=5.0)]
     with FaultSchedule(log, clock, planned) as schedule:
         assert log.wait_for(3) == [("inject", "a"), ("inject", "b"), ("clear", "a")]
-        assert [struck.fault.device for struck in schedule.struck] == ["a", "b"]
+        assert [injected.fault.device for injected in schedule.injected] == ["a", "b"]
     for (_, _, at_s), due_s in zip(log.told, (1.0, 4.0, 6.0), strict=True):
         assert at_s >= due_s
 
@@ -168,13 +168,13 @@ def test_a_fault_waits_for_its_move() -> None:
     clock = CellClock(100.0)
     log: Any = Log(clock)
     with FaultSchedule(log, clock, [fault("x", at_move=2)]) as schedule:
-        schedule.move_begun()
+        schedule.on_motion_start()
         assert log.told == []
-        schedule.move_begun()
+        schedule.on_motion_start()
         assert log.wait_for(1) == [("inject", "x")]
-        schedule.move_begun()
-        schedule.plan(fault("y", at_move=schedule.moves + 1))
-        schedule.move_begun()
+        schedule.on_motion_start()
+        schedule.schedule(fault("y", at_move=schedule.move_count + 1))
+        schedule.on_motion_start()
         assert log.wait_for(2) == [("inject", "x"), ("inject", "y")]
 
 

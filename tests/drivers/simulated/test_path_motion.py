@@ -16,7 +16,7 @@ PATH = np.array([[0.0] * 6, [1.0] * 6, [3.0, 2.0, 2.0, 2.0, 2.0, 2.0]])
 
 @pytest.fixture
 def motion() -> Motion:
-    return Motion(PATH, begins_s=10.0, duration_s=4.0)
+    return Motion(PATH, start_s=10.0, duration_s=4.0)
 
 
 @pytest.mark.parametrize(
@@ -24,18 +24,18 @@ def motion() -> Motion:
 )
 def test_how_far_it_is(motion: Motion, now_s: float, fraction: float) -> None:
     assert motion.fraction(now_s) == fraction
-    assert motion.place(now_s) == 2.0 * fraction
+    assert motion.path_position(now_s) == 2.0 * fraction
 
 
 def test_it_begins_and_ends_where_the_path_does(motion: Motion) -> None:
     assert np.array_equal(motion.joints(10.0), PATH[0])
     assert np.array_equal(motion.joints(12.0), PATH[1])
     assert np.array_equal(motion.joints(14.0), PATH[2])
-    assert motion.ends_s == 14.0
+    assert motion.end_s == 14.0
 
 
 def test_between_rows_it_goes_straight(motion: Motion) -> None:
-    place = motion.place(13.0)
+    place = motion.path_position(13.0)
     assert 1.0 < place < 2.0
     expected = PATH[1] + (place - 1.0) * (PATH[2] - PATH[1])
     assert motion.joints(13.0) == pytest.approx(expected)
@@ -54,25 +54,25 @@ times = st.floats(-100.0, 100.0)
 @given(earlier=times, later=times)
 def test_it_never_goes_back(earlier: float, later: float) -> None:
     earlier, later = sorted((earlier, later))
-    motion = Motion(PATH, begins_s=0.0, duration_s=3.0)
+    motion = Motion(PATH, start_s=0.0, duration_s=3.0)
     assert 0.0 <= motion.fraction(earlier) <= motion.fraction(later) <= 1.0
 
 
 @given(stopped=st.floats(10.0, 14.0), later=st.floats(0.0, 100.0))
 def test_stopped_it_stays_where_it_was(stopped: float, later: float) -> None:
-    motion = Motion(PATH, begins_s=10.0, duration_s=4.0)
+    motion = Motion(PATH, start_s=10.0, duration_s=4.0)
     halted = replace(motion, stopped_s=stopped)
-    assert halted.ends_s == stopped
+    assert halted.end_s == stopped
     assert np.array_equal(halted.joints(stopped + later), motion.joints(stopped))
 
 
 def test_rest_is_no_motion() -> None:
-    rest = Motion.rest(PATH[1])
-    assert rest.ends_s < 0.0
+    rest = Motion.stationary(PATH[1])
+    assert rest.end_s < 0.0
     assert rest.fraction(0.0) == 1.0
     assert np.array_equal(rest.joints(0.0), PATH[1])
 
 
 def test_a_way_of_no_duration_is_done_at_once() -> None:
-    motion = Motion(PATH, begins_s=1.0, duration_s=0.0)
+    motion = Motion(PATH, start_s=1.0, duration_s=0.0)
     assert np.array_equal(motion.joints(1.0), PATH[-1])

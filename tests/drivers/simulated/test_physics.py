@@ -28,7 +28,7 @@ def go(twin: Any, pose: Pose) -> None:
 
 def there_and_back(twin: Any, start: Any) -> None:
     for path in ([start, start + 1.0], [start + 1.0, start]):
-        twin.world.travel(np.stack(path))
+        twin.physics.start_motion(np.stack(path))
         twin.clock.time_s += 10.0
 
 
@@ -51,7 +51,7 @@ def test_it_is_not_where_the_controller_believes(make_twin) -> None:
 def test_the_sliders_go_where_the_controllers_geometry_puts_them(twin) -> None:
     for pose in POSES:
         go(twin, pose)
-        assert twin.world.sliders() == pytest.approx(twin.joints_for(pose), abs=1e-9)
+        assert twin.physics.encoder_positions() == pytest.approx(twin.joints_for(pose), abs=1e-9)
 
 
 def test_the_way_there_does_not_matter(make_twin) -> None:
@@ -65,7 +65,9 @@ def test_the_way_there_does_not_matter(make_twin) -> None:
 def test_how_often_it_is_looked_at_does_not_matter(make_twin) -> None:
     one, other = make_twin(station_reach_mm=1e6), make_twin(station_reach_mm=1e6)
     for twin, looks in ((one, 1), (other, 200)):
-        motion = twin.world.travel(np.linspace(twin.world.sliders(), twin.joints_for(FAR), 25))
+        motion = twin.physics.start_motion(
+            np.linspace(twin.physics.encoder_positions(), twin.joints_for(FAR), 25)
+        )
         for _ in range(looks):
             twin.clock.time_s += motion.duration_s / looks
             twin.seen()
@@ -75,69 +77,69 @@ def test_how_often_it_is_looked_at_does_not_matter(make_twin) -> None:
 
 def test_a_move_takes_the_time_of_its_longest_slider(make_twin) -> None:
     twin = make_twin(motion__speed_mm_s=50.0, motion__minimum_s=0.2)
-    here = twin.world.sliders()
-    motion = twin.world.travel(np.stack([here, here + np.array([0.0, 0.0, -30.0, 0.0, 0.0, 10.0])]))
+    here = twin.physics.encoder_positions()
+    motion = twin.physics.start_motion(np.stack([here, here + np.array([0.0, 0.0, -30.0, 0.0, 0.0, 10.0])]))
     assert motion.duration_s == pytest.approx(0.6)
     twin.clock.time_s += 10.0
-    here = twin.world.sliders()
-    assert twin.world.travel(np.stack([here, here + 0.001])).duration_s == 0.2
+    here = twin.physics.encoder_positions()
+    assert twin.physics.start_motion(np.stack([here, here + 0.001])).duration_s == 0.2
 
 
 def test_on_the_way_sliders_and_ball_are_in_between(make_twin) -> None:
     twin = make_twin(station_reach_mm=1e6)
-    start, seen = twin.world.sliders(), twin.seen()
+    start, seen = twin.physics.encoder_positions(), twin.seen()
     end = start + 20.0  # all of them alike: the platform goes along the rails
-    motion = twin.world.travel(np.stack([start, end]))
+    motion = twin.physics.start_motion(np.stack([start, end]))
     twin.clock.time_s += motion.duration_s / 2.0
-    assert twin.world.progress() == pytest.approx(0.5)
-    assert twin.world.sliders() == pytest.approx(start + 10.0)
+    assert twin.physics.progress() == pytest.approx(0.5)
+    assert twin.physics.encoder_positions() == pytest.approx(start + 10.0)
     assert twin.seen() - seen == pytest.approx([10.0, 0.0, 0.0], abs=1e-6)
 
 
 def test_stopped_it_stays_in_place(make_twin) -> None:
     twin = make_twin(station_reach_mm=1e6)
-    start, seen = twin.world.sliders(), twin.seen()
-    motion = twin.world.travel(np.stack([start, start + 20.0]))
+    start, seen = twin.physics.encoder_positions(), twin.seen()
+    motion = twin.physics.start_motion(np.stack([start, start + 20.0]))
     twin.clock.time_s += motion.duration_s / 2.0
-    twin.world.stop()
+    twin.physics.stop()
     for _ in range(3):
-        assert twin.world.progress() == pytest.approx(0.5)
-        assert twin.world.sliders() == pytest.approx(start + 10.0)
+        assert twin.physics.progress() == pytest.approx(0.5)
+        assert twin.physics.encoder_positions() == pytest.approx(start + 10.0)
         assert twin.seen() - seen == pytest.approx([10.0, 0.0, 0.0], abs=1e-6)
         twin.clock.time_s += motion.duration_s
-        twin.world.stop()
+        twin.physics.stop()
 
 
 def test_stopping_what_stands_changes_nothing(twin) -> None:
     go(twin, POSES[0])
-    before = twin.world.sliders()
-    twin.world.stop()
-    assert twin.world.progress() == 1.0
-    assert np.array_equal(twin.world.sliders(), before)
+    before = twin.physics.encoder_positions()
+    twin.physics.stop()
+    assert twin.physics.progress() == 1.0
+    assert np.array_equal(twin.physics.encoder_positions(), before)
 
 
 def test_after_a_stop_the_next_way_begins_in_place(twin) -> None:
-    start = twin.world.sliders()
-    motion = twin.world.travel(np.stack([start, start + 20.0]))
+    start = twin.physics.encoder_positions()
+    motion = twin.physics.start_motion(np.stack([start, start + 20.0]))
     twin.clock.time_s += motion.duration_s / 2.0
-    twin.world.stop()
-    back = twin.world.travel(np.stack([start + 10.0, start]))
-    assert twin.world.sliders() == pytest.approx(start + 10.0)
+    twin.physics.stop()
+    back = twin.physics.start_motion(np.stack([start + 10.0, start]))
+    assert twin.physics.encoder_positions() == pytest.approx(start + 10.0)
     twin.clock.time_s += back.duration_s
-    assert twin.world.sliders() == pytest.approx(start)
+    assert twin.physics.encoder_positions() == pytest.approx(start)
 
 
 def test_noise_is_drawn_at_every_stop_and_stays_until_the_next(make_twin) -> None:
     twin = make_twin(gauges__noise_mm=0.01, encoders__noise_mm=0.01, station_reach_mm=1e6)
     gauges, sliders = [], []
-    start = twin.world._motion.path[0]
+    start = twin.physics._motion.path[0]
     for _ in range(60):
         there_and_back(twin, start)
         seen = twin.seen()
         assert np.array_equal(twin.seen(), seen)
-        assert np.array_equal(twin.world.sliders(), twin.world.sliders())
+        assert np.array_equal(twin.physics.encoder_positions(), twin.physics.encoder_positions())
         gauges.append(seen)
-        sliders.append(twin.world.sliders() - start)
+        sliders.append(twin.physics.encoder_positions() - start)
     for scatter in (np.array(gauges) - np.mean(gauges, axis=0), np.array(sliders)):
         # 180 and 360 numbers: their standard deviation is known to 5 %.
         assert np.std(scatter) == pytest.approx(0.01, rel=0.25)
@@ -147,7 +149,7 @@ def test_noise_is_drawn_at_every_stop_and_stays_until_the_next(make_twin) -> Non
 def test_flicker_is_drawn_at_every_reading(make_twin) -> None:
     twin = make_twin(gauges__flicker_mm=0.002, encoders__flicker_mm=0.002)
     gauges = np.array([twin.seen() for _ in range(60)])
-    sliders = np.array([twin.world.sliders() for _ in range(60)])
+    sliders = np.array([twin.physics.encoder_positions() for _ in range(60)])
     for readings in (gauges, sliders):
         assert np.std(readings - readings.mean(axis=0)) == pytest.approx(0.002, rel=0.25)
 
@@ -180,22 +182,22 @@ def test_on_arrival_the_ball_swings_and_the_swing_decays(make_twin) -> None:
 
 
 def _placing(one: Any, other: Any) -> Any:
-    return other.world._station - one.world._station
+    return other.physics._station - one.physics._station
 
 
 def test_sliders_do_not_swing(make_twin) -> None:
     twin = make_twin(motion__ringing_mm=0.5)
     twin.machine.move(POSES[0])
-    assert twin.world.sliders() == pytest.approx(twin.joints_for(POSES[0]), abs=1e-9)
+    assert twin.physics.encoder_positions() == pytest.approx(twin.joints_for(POSES[0]), abs=1e-9)
 
 
 def test_a_machine_may_not_repeat(make_twin) -> None:
     twin = make_twin(motion__repeatability_mm=0.5, station_reach_mm=1e6)
-    start = twin.world.sliders()
+    start = twin.physics.encoder_positions()
     stops = []
     for _ in range(40):
         there_and_back(twin, start)
-        stops.append(twin.world.sliders() - start)
+        stops.append(twin.physics.encoder_positions() - start)
     assert np.std(stops) == pytest.approx(0.5, rel=0.25)
 
 
@@ -223,8 +225,8 @@ def test_beyond_reach_they_are_carried_to_the_ball(make_twin) -> None:
 def test_they_are_not_carried_while_the_robot_moves(make_twin) -> None:
     twin = make_twin(station_reach_mm=30.0)
     before = twin.seen()
-    start = twin.world.sliders()
-    motion = twin.world.travel(np.stack([start, start + 50.0, start]))
+    start = twin.physics.encoder_positions()
+    motion = twin.physics.start_motion(np.stack([start, start + 50.0, start]))
     twin.clock.time_s += motion.duration_s / 2.0
     assert twin.seen() - before == pytest.approx([50.0, 0.0, 0.0], abs=1e-6)
     twin.clock.time_s += motion.duration_s
@@ -254,26 +256,28 @@ def test_a_world_that_cannot_stand_there_is_refused(make_twin, bundled_cell) -> 
 def test_driven_where_nobody_knows_it_comes_back(make_twin) -> None:
     """Sliders that tear the platform apart: afterwards everything is as before."""
     twin = make_twin(station_reach_mm=1e6)
-    start, seen = twin.world.sliders(), twin.seen()
+    start, seen = twin.physics.encoder_positions(), twin.seen()
     apart = start + np.repeat([-400.0, 400.0], 3)
-    motion = twin.world.travel(np.linspace(start, apart, 25))
+    motion = twin.physics.start_motion(np.linspace(start, apart, 25))
     twin.clock.time_s += motion.duration_s + 1.0
     assert np.isfinite(twin.seen()).all()
-    motion = twin.world.travel(np.linspace(apart, start, 25))
+    motion = twin.physics.start_motion(np.linspace(apart, start, 25))
     twin.clock.time_s += motion.duration_s + 1.0
     assert twin.seen() == pytest.approx(seen, abs=1e-6)
 
 
 def test_many_may_look_at_once(make_twin) -> None:
     twin = make_twin(station_reach_mm=1e6)
-    motion = twin.world.travel(np.linspace(twin.world.sliders(), twin.joints_for(POSES[2]), 25))
+    motion = twin.physics.start_motion(
+        np.linspace(twin.physics.encoder_positions(), twin.joints_for(POSES[2]), 25)
+    )
     failures: list[BaseException] = []
 
     def look(axis: str) -> None:
         try:
             for _ in range(20):
-                twin.world.displacement(axis)
-                twin.world.sliders()
+                twin.physics.gauge_displacement(axis)
+                twin.physics.encoder_positions()
                 twin.clock.time_s += motion.duration_s / 50.0
         except BaseException as error:  # told to the test
             failures.append(error)

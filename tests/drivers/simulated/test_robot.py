@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from drivers.simulated.linuxcnc.machine import KinematicsFailure
-from drivers.simulated.robot import STEPS
+from drivers.simulated.robot import LINE_STEPS
 from hexacell.controller_config.toml_format import NativeToml
 from hexacell.errors import FileError
 from hexacell.kinematics.geometry import Geometry
@@ -27,7 +27,7 @@ def test_a_move_ends_at_its_target(twin) -> None:
     twin.machine.move(TILTED)
     assert twin.machine.pose().as_tuple() == pytest.approx(TILTED.as_tuple(), abs=1e-9)
     assert twin.machine.joints() == pytest.approx(twin.joints_for(TILTED), abs=1e-9)
-    assert twin.world.sliders() == pytest.approx(twin.joints_for(TILTED), abs=1e-9)
+    assert twin.physics.encoder_positions() == pytest.approx(twin.joints_for(TILTED), abs=1e-9)
 
 
 def test_a_move_lasts_until_the_sliders_stand(make_twin) -> None:
@@ -35,7 +35,7 @@ def test_a_move_lasts_until_the_sliders_stand(make_twin) -> None:
     begun = twin.clock.now()
     twin.machine.move(TILTED)
     assert twin.clock.now() - begun == 2.5
-    assert twin.world.progress() == 1.0
+    assert twin.physics.progress() == 1.0
 
 
 def test_its_pose_on_the_way_is_on_the_way(twin) -> None:
@@ -53,19 +53,19 @@ def test_its_pose_on_the_way_is_on_the_way(twin) -> None:
 def test_it_goes_straight(twin) -> None:
     """At every piece of the line the sliders are where the geometry puts them for that pose."""
     paths: list[Any] = []
-    real = twin.world.travel
+    real = twin.physics.start_motion
 
     def travel(path: Any) -> Any:
         paths.append(path)
         return real(path)
 
-    twin.world.travel = travel
+    twin.physics.start_motion = travel
     target = Pose(30.0, -20.0, 540.0)
     twin.machine.move(target)
     (path,) = paths
-    assert path.shape == (STEPS + 1, 6)
+    assert path.shape == (LINE_STEPS + 1, 6)
     middle = Pose(15.0, -10.0, 545.0)
-    assert path[STEPS // 2] == pytest.approx(twin.joints_for(middle), abs=1e-9)
+    assert path[LINE_STEPS // 2] == pytest.approx(twin.joints_for(middle), abs=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -73,11 +73,11 @@ def test_it_goes_straight(twin) -> None:
 )
 def test_a_pose_out_of_reach_is_refused_and_nothing_moves(twin, pose: Pose) -> None:
     twin.machine.move(TILTED)
-    before, time_s = twin.world.sliders(), twin.clock.now()
+    before, time_s = twin.physics.encoder_positions(), twin.clock.now()
     with pytest.raises(KinematicsFailure, match="kinematicsInverse"):
         twin.machine.move(pose)
     assert twin.clock.now() == time_s
-    assert np.array_equal(twin.world.sliders(), before)
+    assert np.array_equal(twin.physics.encoder_positions(), before)
     assert twin.machine.pose().as_tuple() == pytest.approx(TILTED.as_tuple(), abs=1e-9)
 
 
@@ -85,7 +85,7 @@ def test_after_a_refusal_it_still_moves(twin) -> None:
     with pytest.raises(KinematicsFailure):
         twin.machine.move(Pose(0.0, 0.0, 2000.0))
     twin.machine.move(TILTED)
-    assert twin.world.sliders() == pytest.approx(twin.joints_for(TILTED), abs=1e-9)
+    assert twin.physics.encoder_positions() == pytest.approx(twin.joints_for(TILTED), abs=1e-9)
 
 
 def stop_half_way(twin: Any) -> None:
@@ -102,7 +102,7 @@ def test_it_stops_in_place(twin) -> None:
     there = Pose(2.0, 0.0, 550.0)
     twin.clock.time_s += 10.0
     assert twin.machine.pose().as_tuple() == pytest.approx(there.as_tuple(), abs=1e-6)
-    assert twin.world.sliders() == pytest.approx(twin.joints_for(there), abs=1e-3)
+    assert twin.physics.encoder_positions() == pytest.approx(twin.joints_for(there), abs=1e-3)
 
 
 def test_after_a_stop_it_goes_on_from_there(twin) -> None:
@@ -110,7 +110,7 @@ def test_after_a_stop_it_goes_on_from_there(twin) -> None:
     twin.machine.move(Pose(4.0, 0.0, 550.0))
     twin.clock.on_wait = lambda: None
     twin.machine.move(TILTED)
-    assert twin.world.sliders() == pytest.approx(twin.joints_for(TILTED), abs=1e-9)
+    assert twin.physics.encoder_positions() == pytest.approx(twin.joints_for(TILTED), abs=1e-9)
 
 
 def test_a_stop_while_the_way_is_being_computed_is_not_lost(twin, monkeypatch) -> None:
@@ -121,11 +121,11 @@ def test_a_stop_while_the_way_is_being_computed_is_not_lost(twin, monkeypatch) -
         return real(poses)
 
     monkeypatch.setattr(twin.machine, "_joints", interrupted)
-    before = twin.world.sliders()
+    before = twin.physics.encoder_positions()
     twin.machine.move(TILTED)
     monkeypatch.undo()
     twin.clock.time_s += 10.0
-    assert np.array_equal(twin.world.sliders(), before)
+    assert np.array_equal(twin.physics.encoder_positions(), before)
     assert twin.machine.pose().as_tuple() == pytest.approx((0.0, 0.0, 550.0, 0.0, 0.0, 0.0), abs=1e-9)
 
 
@@ -133,7 +133,7 @@ def test_stopping_what_stands_does_not_stop_the_next_move(twin) -> None:
     twin.machine.stop()
     twin.machine.stop()
     twin.machine.move(TILTED)
-    assert twin.world.sliders() == pytest.approx(twin.joints_for(TILTED), abs=1e-9)
+    assert twin.physics.encoder_positions() == pytest.approx(twin.joints_for(TILTED), abs=1e-9)
 
 
 def test_a_stop_from_another_thread_ends_the_wait(make_twin) -> None:
@@ -160,11 +160,11 @@ def test_a_stop_from_another_thread_ends_the_wait(make_twin) -> None:
 
 def test_switched_on_it_reads_its_geometry_and_the_sliders_stay(twin) -> None:
     twin.machine.move(TILTED)
-    sliders, seen = twin.world.sliders(), twin.seen()
+    sliders, seen = twin.physics.encoder_positions(), twin.seen()
     rewrite(twin, twin.truth)
     assert twin.machine.pose().as_tuple() == pytest.approx(TILTED.as_tuple(), abs=1e-9)
     twin.machine.switch_on()
-    assert np.array_equal(twin.world.sliders(), sliders)
+    assert np.array_equal(twin.physics.encoder_positions(), sliders)
     assert np.array_equal(twin.seen(), seen)
     believed = twin.machine.pose()
     assert believed.position == pytest.approx(twin.ball_at(TILTED), abs=1e-6)
@@ -184,10 +184,10 @@ def test_with_the_true_geometry_it_goes_where_it_is_sent(make_twin) -> None:
 
 def test_switching_off_moves_nothing(twin) -> None:
     twin.machine.move(TILTED)
-    before = twin.world.sliders()
+    before = twin.physics.encoder_positions()
     twin.machine.switch_off()
     twin.machine.home()
-    assert np.array_equal(twin.world.sliders(), before)
+    assert np.array_equal(twin.physics.encoder_positions(), before)
 
 
 def test_a_config_that_cannot_be_read_leaves_the_old_geometry(twin) -> None:
@@ -197,7 +197,7 @@ def test_a_config_that_cannot_be_read_leaves_the_old_geometry(twin) -> None:
         twin.machine.switch_on()
     twin.config.write_text(kept)
     twin.machine.move(TILTED)
-    assert twin.world.sliders() == pytest.approx(twin.joints_for(TILTED), abs=1e-9)
+    assert twin.physics.encoder_positions() == pytest.approx(twin.joints_for(TILTED), abs=1e-9)
 
 
 def test_a_geometry_that_cannot_hold_the_sliders_is_refused(twin) -> None:
@@ -208,4 +208,4 @@ def test_a_geometry_that_cannot_hold_the_sliders_is_refused(twin) -> None:
         twin.machine.switch_on()
     twin.config.write_text(kept)
     twin.machine.move(TILTED)
-    assert twin.world.sliders() == pytest.approx(twin.joints_for(TILTED), abs=1e-9)
+    assert twin.physics.encoder_positions() == pytest.approx(twin.joints_for(TILTED), abs=1e-9)

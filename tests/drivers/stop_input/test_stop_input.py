@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 import serial
 
-from drivers.stop_input.stop_input import ContactLine, StopContact, StopFile, stop_line
+from drivers.stop_input.stop_input import CombinedStopInput, StopContact, StopFile, stop_input_of
 from hexacell.cell.model import GuardSettings
 from hexacell.errors import DeviceError, FileError
 
@@ -52,14 +52,14 @@ def port(monkeypatch: pytest.MonkeyPatch) -> Port:
 
 
 async def test_without_one_nothing_is_forbidden() -> None:
-    line = stop_line(GuardSettings(), Path())
+    line = stop_input_of(GuardSettings(), Path())
     assert await line.open() is None
     assert await line.active_reason() is None
     await line.close()
 
 
 async def test_a_file_forbids_while_it_exists(tmp_path: Path) -> None:
-    line = stop_line(GuardSettings(stop_file="stop"), tmp_path)
+    line = stop_input_of(GuardSettings(stop_file="stop"), tmp_path)
     assert await line.open() is None, "a file is no device"
     assert await line.active_reason() is None
     (tmp_path / "stop").touch()
@@ -81,7 +81,7 @@ async def test_a_file_that_cannot_be_looked_for_forbids(tmp_path: Path) -> None:
 @pytest.mark.parametrize("contact", ["dsr", "cts"])
 async def test_a_contact_forbids_while_it_is_open(port: Port, contact: Any) -> None:
     settings = GuardSettings(stop_port="/dev/ttyS9", stop_contact=contact)
-    line = stop_line(settings, Path())
+    line = stop_input_of(settings, Path())
     identity = await line.open()
     assert identity is not None
     assert identity.description == f"{contact.upper()} of /dev/ttyS9"
@@ -95,7 +95,7 @@ async def test_a_contact_forbids_while_it_is_open(port: Port, contact: Any) -> N
 
 
 async def test_an_adapter_that_was_pulled_out_forbids(port: Port) -> None:
-    line = stop_line(GuardSettings(stop_port="/dev/ttyS9"), Path())
+    line = stop_input_of(GuardSettings(stop_port="/dev/ttyS9"), Path())
     await line.open()
     port.broken = OSError(5, "Input/output error")
     assert "was lost" in (await line.active_reason() or "")
@@ -112,13 +112,13 @@ async def test_before_it_is_open_and_after_it_is_closed_it_forbids(port: Port) -
 
 
 async def test_a_port_that_is_absent_is_refused(tmp_path: Path) -> None:
-    line = stop_line(GuardSettings(stop_port=str(tmp_path / "nothing")), Path())
+    line = stop_input_of(GuardSettings(stop_port=str(tmp_path / "nothing")), Path())
     with pytest.raises(DeviceError, match=r"stop line: port .*nothing is absent"):
         await line.open()
 
 
 async def test_a_port_that_means_nothing_is_refused() -> None:
-    line = stop_line(GuardSettings(stop_port="nonsense://x"), Path())
+    line = stop_input_of(GuardSettings(stop_port="nonsense://x"), Path())
     with pytest.raises(FileError, match="stop line"):
         await line.open()
 
@@ -128,7 +128,7 @@ async def test_a_port_without_modem_lines_is_refused_or_forbids() -> None:
     import os
 
     near, far = os.openpty()
-    line = ContactLine([StopContact(os.ttyname(far), "dsr")])
+    line = CombinedStopInput([StopContact(os.ttyname(far), "dsr")])
     try:
         try:
             await line.open()
@@ -142,7 +142,7 @@ async def test_a_port_without_modem_lines_is_refused_or_forbids() -> None:
 
 
 async def test_each_of_several_forbids(port: Port, tmp_path: Path) -> None:
-    line = stop_line(GuardSettings(stop_file="stop", stop_port="/dev/ttyS9"), tmp_path)
+    line = stop_input_of(GuardSettings(stop_file="stop", stop_port="/dev/ttyS9"), tmp_path)
     await line.open()
     port.contact_closed = False
     (tmp_path / "stop").touch()

@@ -196,7 +196,7 @@ async def test_cancelled_it_stops_in_place_and_goes_on_later(make_site, finished
     assert site.happened(events.Interrupted)[-1] == events.Interrupted(
         reason="CancelledError", exit_code=ExitCode.INTERRUPTED
     )
-    assert site.simulated.world.progress() == 1.0
+    assert site.simulated.physics.progress() == 1.0
     first, wire = read_journal(site.folder.journal), site.folder.wire.read_bytes()
 
     ended = await site.calibrate(resume=True)

@@ -46,7 +46,12 @@ def striking(site: Any, key: str, kind: FaultKind, device: str) -> Callable[...,
     def listener(event: events.Event, _: object) -> None:
         if isinstance(event, events.StepBegun) and event.step.key == key:
             schedule = site.simulated.schedule
-            fault = {"kind": kind.value, "device": device, "at_move": schedule.moves + 1, "after_s": 5.0}
+            fault = {
+                "kind": kind.value,
+                "device": device,
+                "at_move": schedule.move_count + 1,
+                "after_s": 5.0,
+            }
             schedule.plan(SimulatedFault.model_validate(fault))
 
     return listener
@@ -66,12 +71,12 @@ async def test_what_happens_on_a_move_stops_it(make_site, kind, device, key, gua
     assert interrupted[-1].reason == str(tripped.value)
     # The first point is where the robot stands already: it may be there before it is stopped.
     assert key in [event.step.key for event in site.happened(events.StepBegun)][-3:]
-    (struck,) = site.simulated.schedule.struck
+    (struck,) = site.simulated.schedule.injected
     if device == "controller" and kind is FaultKind.UNPLUGGED:
         assert "could not be stopped" in str(tripped.value)
         assert str(tripped.value).endswith("Press the emergency stop")
     else:
-        assert site.simulated.world.still_since_s < struck.at_s + 20.0, "a second on the wall"
+        assert site.simulated.physics.motion_end_s < struck.at_s + 20.0, "a second on the wall"
 
 
 @pytest.mark.slow

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from drivers.simulated.gauges.faults import InjectedGaugeFault
-from drivers.simulated.linuxcnc.faults import Fault
+from drivers.simulated.linuxcnc.faults import ControllerFault
 from hexacell.acceptance.gates import AcceptanceGate
 from hexacell.acceptance.validation import Verdict
 from hexacell.controller_config.change import ConfigChange
@@ -83,11 +83,11 @@ async def test_a_gate_that_needs_a_person_who_is_there(proposed, approver) -> No
 
 def bend(site: Any, millimetres: float) -> None:
     """Somebody leans on the machine: its true geometry is another from now on."""
-    world = site.simulated.world
-    bent = world._truth.vector() + millimetres * np.sin(np.arange(42.0))
-    with world._lock:
-        world._truth = Geometry.from_vector(bent)
-        world._joints = world._joints + np.nan  # so that the platform is moved along at once
+    physics = site.simulated.physics
+    bent = physics._truth.vector() + millimetres * np.sin(np.arange(42.0))
+    with physics._lock:
+        physics._truth = Geometry.from_vector(bent)
+        physics._joints = physics._joints + np.nan  # so that the platform is moved along at once
 
 
 async def test_worse_than_before_is_rolled_back_bit_for_bit(proposed, finished) -> None:
@@ -121,7 +121,7 @@ async def test_a_controller_that_does_not_take_the_reload(proposed, finished, tm
         await site.calibrate(resume=True)
     assert undone.value.exit_code is ExitCode.WRITE_BACK_UNDONE
     assert site.config == finished.config_before
-    assert site.simulated.controller.control.on
+    assert site.simulated.controller.state.enabled
     assert site.simulated.machine._geometry.geometry.largest_difference(_drawing(site)) == 0.0
     assert not site.happened(events.Committed)
 
@@ -179,7 +179,10 @@ async def test_two_gauges_that_fail_at_once_are_both_named(make_site) -> None:
 
 async def test_an_emergency_stop_stops_it(make_site) -> None:
     site = make_site()
-    fault = at(events.RecordTaken, lambda: site.simulated.controller.faults.inject(Fault.EMERGENCY_STOP, 1))
+    fault = at(
+        events.RecordTaken,
+        lambda: site.simulated.controller.faults.inject(ControllerFault.EMERGENCY_STOP, 1),
+    )
     with pytest.raises(DeviceError, match="controller") as refusal:
         await site.calibrate(fault)
     assert refusal.value.exit_code is ExitCode.HARDWARE
@@ -192,7 +195,7 @@ async def test_a_gauge_carried_away_while_measuring_is_no_record(make_site) -> N
     site = make_site(acceptance__drift_mm=0.05)
 
     def push() -> None:
-        site.simulated.world._station += np.array([0.0, 8.0, 0.0])
+        site.simulated.physics._station += np.array([0.0, 8.0, 0.0])
 
     with pytest.raises((LimitError, DeviceError)):
         await site.calibrate(at(events.RecordTaken, push))

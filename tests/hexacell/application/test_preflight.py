@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from drivers.simulated.gauges.faults import InjectedGaugeFault
-from drivers.simulated.linuxcnc.faults import Fault
+from drivers.simulated.linuxcnc.faults import ControllerFault
 from hexacell.application.calibration_run import preflight
 from hexacell.campaign import feasibility
 from hexacell.errors import (
@@ -39,7 +39,7 @@ async def test_a_cell_that_is_ready_says_who_answered_and_nothing_moves(make_sit
     assert names[:3] == ["x", "y", "z"]
     assert len(names) == 10
     assert site.simulated.machine.joints() == before
-    assert not site.simulated.controller.control.on, "not even switched on"
+    assert not site.simulated.controller.state.enabled, "not even switched on"
 
 
 async def test_a_cell_that_serves_itself_is_checked_too(make_cell) -> None:
@@ -57,7 +57,7 @@ async def test_every_failure_is_said_at_once(make_site) -> None:
     site.simulated.gauges.inject("x", InjectedGaugeFault.INCH)
     site.simulated.gauges.inject("z", InjectedGaugeFault.HOLD)
     site.simulated.encoders.faults.unplug(4)
-    site.simulated.controller.faults.inject(Fault.REFUSES_PASSWORD)
+    site.simulated.controller.faults.inject(ControllerFault.REFUSES_PASSWORD)
     before = site.simulated.machine.joints()
     with pytest.raises(SeveralErrors) as refusal:
         await check(site)
@@ -101,7 +101,7 @@ async def test_a_stop_during_the_checks_of_the_plan_leaves_nothing(make_site, mo
     with pytest.raises(asyncio.CancelledError):
         await run
     assert not site.folder.path.exists()
-    assert not site.simulated.controller.control.on, "not even switched on"
+    assert not site.simulated.controller.state.enabled, "not even switched on"
     with cell_lock(site.cell.config_path):
         pass
 
@@ -119,7 +119,7 @@ async def test_devices_that_open_but_cannot_be_read_are_said(make_site, monkeypa
 
 async def test_gauges_away_from_the_ball_do_not_stand_in_the_way(make_site) -> None:
     site = make_site()
-    site.simulated.world._station += np.array([9.0, -9.0, 0.0])
+    site.simulated.physics._station += np.array([9.0, -9.0, 0.0])
     assert len(await check(site)) == 10
 
 

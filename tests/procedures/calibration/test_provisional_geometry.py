@@ -84,7 +84,7 @@ async def test_what_is_lent_is_nearer_to_the_truth(rig) -> None:
 
     with pytest.raises(Interruption):
         await rig.run(at(events.ProvisionalApplied, look))
-    truth = rig.world._truth
+    truth = rig.physics._truth
     mechanism = rig.calibration.robot.mechanism
     free = [
         mechanism.convention.free_parameters(mechanism.normalize_frames(geometry)[0])

@@ -132,7 +132,7 @@ def test_nothing_known_leads_back_one_by_one(make_rig, story, monkeypatch) -> No
 def test_the_ball_stays_inside_the_travel_on_every_way(recording, make_rig) -> None:
     """Judged by the truth, which the procedure does not know."""
     rig = make_rig()
-    robot, truth = rig.calibration.robot, rig.world._truth
+    robot, truth = rig.calibration.robot, rig.physics._truth
     settings = rig.cell.settings
     here: dict[Any, PoseBatch] = {}
     reference: dict[Any, Any] = {}

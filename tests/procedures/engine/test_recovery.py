@@ -8,10 +8,10 @@ from typing import Any
 
 import pytest
 
-from drivers.controllers.errors import AnswerOverdue, ConnectionLost, MotionInterrupted, MoveRefused
+from drivers.controllers.errors import ConnectionLost, MotionInterrupted, MoveRefused, ResponseTimeout
 from drivers.encoders.errors import BusError, InvalidSampleError, RestartedNodeError, SilentNodeError
 from drivers.gauges.errors import GaugeAtEnd, GaugeSilent, GaugeUnsteady, WrongUnit, ZeroVoid
-from drivers.serial.errors import LinkLost, lost
+from drivers.serial.errors import PortLost, port_lost
 from hexacell.cell.recovery import Action, FailureKind, RecoverySettings
 from hexacell.errors import (
     AnswerNeeded,
@@ -62,9 +62,9 @@ class TrippedGuard(DeviceError):
         (InvalidSampleError("no magnet", **NODE), FailureKind.ENCODER_ALARM),
         (RestartedNodeError("booted", **NODE), FailureKind.ENCODER_RESTARTED),
         (BusError("died"), FailureKind.LINK_LOST),
-        (lost("gauge x", "/dev/x", "unplugged"), FailureKind.LINK_LOST),
+        (port_lost("gauge x", "/dev/x", "unplugged"), FailureKind.LINK_LOST),
         (ConnectionLost("gone"), FailureKind.LINK_LOST),
-        (AnswerOverdue("late"), FailureKind.LINK_LOST),
+        (ResponseTimeout("late"), FailureKind.LINK_LOST),
         (MoveRefused("to move", "limits", subject="controller"), FailureKind.CONTROLLER),
         (MotionInterrupted("stopped elsewhere"), FailureKind.CONTROLLER),
         (DriftTripped(Trip(Guard.DRIFT, "P1", "drifted", "Resume")), FailureKind.DRIFT),
@@ -384,4 +384,4 @@ class TestANewGeometryThatCannotBeVerified:
 
 
 def test_a_link_that_was_lost_is_a_kind_of_its_own() -> None:
-    assert isinstance(lost("gauge x", "/dev/x", "unplugged"), LinkLost)
+    assert isinstance(port_lost("gauge x", "/dev/x", "unplugged"), PortLost)

@@ -95,7 +95,7 @@ class Scene:
             gauge.shown = self._shown(gauge.name, gauge.shown)
             gauge.read_once = self._asked(gauge.name, gauge.read_once)
             gauge.read = self._asked(gauge.name, gauge.read)
-        object.__setattr__(self.rig.bench.devices, "stop_line", self)
+        object.__setattr__(self.rig.bench.devices, "stop_input", self)
 
     @property
     def now(self) -> float:
@@ -106,7 +106,7 @@ class Scene:
         self.controller._do("move", str(pose))
         stops = self.stops
         self.rig.machine.move(pose)
-        while self.now < self.rig.world.still_since_s:
+        while self.now < self.rig.physics.motion_end_s:
             await self.rig.clock.sleep(0.005)
         if self.stops != stops or not self.controller.now.may_move:
             raise MotionInterrupted("stopped on the way", subject="controller")
@@ -137,7 +137,7 @@ class Scene:
         await self._answer("encoders", ENCODERS_S)
         if self.encoder_alarm:
             raise DeviceError("reports no magnet", subject="encoder 3", action="Look at it")
-        positions = tuple(float(value) + self.slip_mm for value in self.rig.world.sliders())
+        positions = tuple(float(value) + self.slip_mm for value in self.rig.physics.encoder_positions())
         return EncoderSample(tuple(round(1000 * value) for value in positions), positions)
 
     async def active_reason(self) -> str | None:

@@ -172,23 +172,23 @@ async def happens(stage: Any, step: Any, fault: Fault) -> None:
     at_s, ended = await struck(scene, fault, doing)
     goes_on = step is reload and step not in fault.steps
     assert (scene.rig.config == config) is not goes_on
-    assert scene.rig.world.still_since_s <= at_s + MUST_S or (step in OUTSIDE and step not in fault.steps)
+    assert scene.rig.physics.motion_end_s <= at_s + MUST_S or (step in OUTSIDE and step not in fault.steps)
     if step is move_afterwards and fault.guard in {Guard.GAUGE_END, Guard.PLATE}:
         assert isinstance(ended, events.RecordRejected), "a verdict on the new geometry"
-        assert scene.rig.performer.guards.watch.latched is None
+        assert scene.rig.performer.guards.supervisor.latched is None
     elif step in fault.steps:
         tripped = root(ended)
         assert tripped.trip.guard is fault.guard
         assert tripped.exit_code is ExitCode.HARDWARE
         assert tripped.action
-        assert scene.rig.performer.guards.watch.latched == tripped.trip
+        assert scene.rig.performer.guards.supervisor.latched == tripped.trip
         assert scene.stops
         with pytest.raises(GuardTripped):
             await scene.do(move(P1, 3))
     elif step not in READING:
         assert not isinstance(ended, BaseException), "nothing that concerns this step"
     if step in {*OUTSIDE, *WITHIN} and step in fault.steps:
-        assert scene.rig.world.progress() < 1.0, "stopped on the way"
+        assert scene.rig.physics.progress() < 1.0, "stopped on the way"
 
 
 SOME = (
@@ -224,7 +224,7 @@ async def test_on_a_full_disk_nothing_begins(stage: Any, step: Any, monkeypatch:
     scene = stage(step)
     config = scene.rig.config
     doing = await step(scene)
-    orders, still_since_s = len(scene.controller.log), scene.rig.world.still_since_s
+    orders, still_since_s = len(scene.controller.log), scene.rig.physics.motion_end_s
     monkeypatch.setattr(supervision, "free_bytes", lambda folder: 49_900_000)
     with pytest.raises(HexacellError) as refusal:
         await doing()
@@ -233,4 +233,4 @@ async def test_on_a_full_disk_nothing_begins(stage: Any, step: Any, monkeypatch:
     assert scene.rig.config == config
     if step is not reload:
         assert len(scene.controller.log) == orders
-    assert scene.rig.world.still_since_s == still_since_s
+    assert scene.rig.physics.motion_end_s == still_since_s

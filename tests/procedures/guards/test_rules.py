@@ -13,11 +13,11 @@ from drivers.gauges.errors import GaugeAtEnd, GaugeSilent, WrongAnswer, ZeroVoid
 from drivers.interfaces import ControllerStatus, EncoderSample
 from hexacell.errors import DeviceError, ExitCode, LimitError
 from procedures.guards import rules
-from procedures.guards.snapshot import DeviceReport, GaugeDeviation, Limits, Snapshot
+from procedures.guards.snapshot import DeviceReport, GaugeDeviation, GuardLimits, Snapshot
 from procedures.run import events
 from procedures.run.trips import DriftTripped, Guard, GuardTripped, Trip
 
-LIMITS = Limits(stale_s=0.12, plate_mm=5.5)
+LIMITS = GuardLimits(stale_s=0.12, plate_mm=5.5)
 AT_END = GaugeAtEnd("plunger at its end", subject="gauge x", action="Move the gauge or the ball")
 
 
@@ -43,11 +43,11 @@ WELL = Snapshot(
     gauges=(gauge(axis=0), gauge(5.5, axis=1), gauge(-5.5, axis=2)),
     encoders=sliders((100.0,) * 6),
     controller=status(),
-    stop_line=DeviceReport("stop line", value=""),
+    stop_input=DeviceReport("stop line", value=""),
 )
 
 
-def tripped(limits: Limits = LIMITS, **changes: Any) -> Trip:
+def tripped(limits: GuardLimits = LIMITS, **changes: Any) -> Trip:
     from dataclasses import replace
 
     trip = rules.first_trip(replace(WELL, **changes), limits)
@@ -72,7 +72,7 @@ def test_what_was_not_heard_yet_trips_nothing_but_time() -> None:
 
 
 def test_the_stop_line_says_how_it_is_pressed() -> None:
-    trip = tripped(stop_line=DeviceReport("stop line", value="/cell/stop exists"))
+    trip = tripped(stop_input=DeviceReport("stop line", value="/cell/stop exists"))
     assert trip.guard is Guard.STOP_LINE
     assert "/cell/stop exists" in trip.problem
 
@@ -133,7 +133,7 @@ def test_where_the_robot_must_stand_no_slider_moves(leg: int, way: float) -> Non
     now[leg] += way
     snapshot = Snapshot(encoders=sliders(tuple(now), (10.0,) * 6))
     assert rules.first_trip(snapshot, LIMITS) is None, "a robot that moves may"
-    trip = rules.first_trip(snapshot, Limits(0.12, 5.5, rest_mm=1.0))
+    trip = rules.first_trip(snapshot, GuardLimits(0.12, 5.5, rest_mm=1.0))
     if abs(now[leg] - 10.0) > 1.0:
         assert trip is not None
         assert (trip.guard, trip.device) == (Guard.FOLLOWING, f"slider {leg + 1}")
@@ -157,7 +157,7 @@ def test_a_noisy_line_is_no_broken_device(garbled: int, trips: bool) -> None:
     assert (trip is not None and trip.guard is Guard.DEVICE) is trips
 
 
-@pytest.mark.parametrize("device", ["gauges", "encoders", "controller", "stop_line"])
+@pytest.mark.parametrize("device", ["gauges", "encoders", "controller", "stop_input"])
 def test_any_device_may_be_silent_for_so_long_and_no_longer(device: str) -> None:
     def snapshot(silent_s: float) -> Snapshot:
         heard: Any = DeviceReport("it", silent_s)
@@ -175,10 +175,10 @@ def test_the_plainest_cause_comes_first() -> None:
         "gauges": (gauge(9.0, error=AT_END, silent_s=1.0),),
         "encoders": DeviceReport("encoders", error=DeviceError("has an alarm"), silent_s=1.0),
         "controller": status(estop=True, enabled=False),
-        "stop_line": DeviceReport("stop line", value="active_reason"),
+        "stop_input": DeviceReport("stop line", value="active_reason"),
     }
     order = []
-    for key in ("stop_line", "controller", "encoders", "gauges"):
+    for key in ("stop_input", "controller", "encoders", "gauges"):
         order.append(tripped(**everything).guard)
         everything[key] = getattr(WELL, key)
     assert order == [Guard.STOP_LINE, Guard.CONTROLLER, Guard.ENCODERS, Guard.GAUGE_END]
@@ -218,8 +218,8 @@ def test_a_gauge_that_does_not_follow_its_ball(
 
 
 def test_drift_leaves_with_its_own_code() -> None:
-    assert rules.drift("P2", (0.1, -0.1, 0.0), 0.1) is None
-    trip = rules.drift("P2", (0.0, -0.101, 0.0), 0.1)
+    assert rules.reference_drift("P2", (0.1, -0.1, 0.0), 0.1) is None
+    trip = rules.reference_drift("P2", (0.0, -0.101, 0.0), 0.1)
     assert trip is not None
     error = trip.as_error()
     assert isinstance(error, DriftTripped)
@@ -229,7 +229,7 @@ def test_drift_leaves_with_its_own_code() -> None:
 
 @pytest.mark.parametrize(("free", "trips"), [(50_000_000, False), (49_999_999, True), (0, True)])
 def test_the_disk_must_have_room(free: int, trips: bool) -> None:
-    assert (rules.disk("/runs", free, 50.0) is not None) is trips
+    assert (rules.low_disk_space("/runs", free, 50.0) is not None) is trips
 
 
 def test_a_robot_that_could_not_be_stopped_comes_first() -> None:

@@ -12,7 +12,7 @@ from drivers.gauges.errors import GaugeAtEnd, WrongAnswer
 from drivers.interfaces import GaugeReading
 from hexacell.errors import DeviceError, HexacellError, LimitError
 from procedures.guards.polling import DevicePoller, DevicePollers, GuardMonitor, LineActivity
-from procedures.guards.snapshot import Limits
+from procedures.guards.snapshot import GuardLimits
 from procedures.journal.journal import read_journal
 from procedures.run import events
 from procedures.run.steps import CloseSet, Expectation, Move, Phase, Sample, SetKey
@@ -95,7 +95,7 @@ async def test_what_is_latched_lasts_until_it_is_cleared(scene) -> None:
     for step in (move(2), sample(1)):
         with pytest.raises(GuardTripped, match="the button"):
             await stage.do(step)
-    stage.rig.performer.guards.watch.clear()
+    stage.rig.performer.guards.supervisor.clear()
     await stage.do(move(2))
 
 
@@ -166,7 +166,7 @@ async def test_cancelling_ends_the_action_and_the_watch(scene) -> None:
     moving.cancel()
     with pytest.raises(asyncio.CancelledError):
         await moving
-    assert stage.rig.performer.guards.watch.latched is None
+    assert stage.rig.performer.guards.supervisor.latched is None
 
 
 async def test_a_noisy_line_is_borne(scene) -> None:
@@ -268,7 +268,7 @@ async def test_a_drifted_reference_is_not_latched(scene) -> None:
     stage.shift["y"] = 0.2
     with pytest.raises(LimitError, match=r"P1: back at the reference .*more than 0\.1 mm"):
         await stage.do(CloseSet(at=P1))
-    assert stage.rig.performer.guards.watch.latched is None
+    assert stage.rig.performer.guards.supervisor.latched is None
 
 
 async def test_lanes_of_one_line_are_silent_together(scene) -> None:
@@ -282,7 +282,7 @@ async def test_lanes_of_one_line_are_silent_together(scene) -> None:
         return "here"
 
     lanes = tuple(DevicePoller("it", queued, 0.0, shared) for _ in range(5))
-    async with GuardMonitor(DevicePollers(gauges=lanes), Limits(0.12, 5.5), clock) as patrol:  # type: ignore[arg-type]
+    async with GuardMonitor(DevicePollers(gauges=lanes), GuardLimits(0.12, 5.5), clock) as patrol:  # type: ignore[arg-type]
         await clock.sleep(2.0)
         assert patrol.trip is None, "one answer in 0.25 s each, but one in 0.05 s altogether"
 
@@ -295,8 +295,8 @@ async def test_a_process_without_turns_is_deaf_not_its_devices_silent(scene) -> 
         await clock.sleep(0.05)
         return ""
 
-    lanes = DevicePollers(stop_line=DevicePoller("stop line", slow, 0.02))
-    async with GuardMonitor(lanes, Limits(0.12, 5.5), clock) as patrol:
+    lanes = DevicePollers(stop_input=DevicePoller("stop line", slow, 0.02))
+    async with GuardMonitor(lanes, GuardLimits(0.12, 5.5), clock) as patrol:
         await clock.sleep(0.2)
         clock.time_s += 5.0
         await clock.sleep(0.2)
@@ -316,6 +316,6 @@ async def test_errors_of_a_lane_do_not_hide_what_it_said() -> None:
     seen = []
     for _ in range(4):
         lane._heard = await lane._look()
-        seen.append((lane.heard.value, lane.heard.first, str(lane.heard.error or "")))
+        seen.append((lane.report.value, lane.report.first, str(lane.report.error or "")))
     assert seen == [(1.0, 1.0, ""), (1.0, 1.0, "g: end"), (1.0, 1.0, "g: off"), (2.0, 1.0, "")]
-    assert np.isclose(lane.heard.silent_s, 0.0)
+    assert np.isclose(lane.report.silent_s, 0.0)

@@ -10,7 +10,7 @@ import pytest
 
 from hexacell.acceptance.gates import AcceptanceGate
 from procedures.journal.line_format import decode
-from procedures.replay.comparison import Aspect, Change, Difference, changes, is_prose
+from procedures.replay.comparison import Aspect, Change, Difference, changes, is_wording
 from procedures.run import events
 from procedures.run.steps import Phase, SetKey
 
@@ -85,8 +85,8 @@ def test_prose_is_told_from_the_rest() -> None:
     first, second = (events.Proposed(gates=(gate,)) for gate in gates)
     [change] = changes(first, second, 1e-9)
     assert change == Change("gates[0].sentence", "One.", "Two.")
-    assert is_prose(change)
-    assert not is_prose(Change("reading.line_up", 1, 2))
+    assert is_wording(change)
+    assert not is_wording(Change("reading.line_up", 1, 2))
 
 
 def test_a_difference_in_words_is_short_and_says_where() -> None:

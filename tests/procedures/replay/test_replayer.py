@@ -23,10 +23,10 @@ from procedures.journal.journal import read_journal
 from procedures.journal.line_format import Entry
 from procedures.replay.comparison import Aspect
 from procedures.replay.recorded_devices import (
-    Playback,
     RecordedClock,
     RecordedOperator,
-    RecordedPerformer,
+    RecordedOutcome,
+    RecordedStepExecutor,
     recorded_devices,
 )
 from procedures.replay.replayer import Replayer, ReplayReport, Scope
@@ -47,9 +47,9 @@ def through(
 ) -> ReplayReport:
     """A history through the procedure of a rig's cell, whose config is as it was at the beginning."""
     folder.mkdir()
-    tape = Playback(rig.cell.settings.timing.window_s)
+    tape = RecordedOutcome(rig.cell.settings.timing.window_s)
     calibration = Calibration(rig.cell.settings, robot_of(rig.cell), rig.mode)
-    performer = RecordedPerformer(
+    performer = RecordedStepExecutor(
         rig.cell,
         calibration,
         recorded_devices(rig.cell.settings, tape),

@@ -14,8 +14,10 @@ from drivers.controllers.linuxcnc.settings import Timeouts
 from drivers.wire_trace import WireTrace
 from hexacell.cell.devices import ControllerSettings
 
-PATIENT = Timeouts(remark=0.05, poll=0.002)
-IMPATIENT = Timeouts(answer=0.4, remark=0.05, poll=0.002, arrival=0.02, stop=0.6, switch=0.02, comeback=0.2)
+PATIENT = Timeouts(explanation=0.05, poll=0.002)
+IMPATIENT = Timeouts(
+    answer=0.4, explanation=0.05, poll=0.002, arrival=0.02, stop=0.6, switch=0.02, reconnect=0.2
+)
 """For tests in which something does not happen."""
 
 

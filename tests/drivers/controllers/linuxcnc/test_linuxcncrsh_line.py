@@ -7,7 +7,7 @@ import time
 
 import pytest
 
-from drivers.controllers.errors import AnswerOverdue, MoveRefused
+from drivers.controllers.errors import MoveRefused, ResponseTimeout
 from hexacell.errors import DeviceError
 from tests.drivers.controllers.linuxcnc.motion_dialogue import (
     ACK,
@@ -82,7 +82,7 @@ async def test_an_overdue_answer_leaves_the_line_in_step(play):
     driver = await play.opened(
         [("get abs_act_pos", late, ARRIVED), ("get abs_act_pos", HALF_WAY)],
     )
-    with pytest.raises(AnswerOverdue, match=r"did not answer 'get abs_act_pos' within 0\.4 s"):
+    with pytest.raises(ResponseTimeout, match=r"did not answer 'get abs_act_pos' within 0\.4 s"):
         await driver.pose()
     late.set()
     assert (await driver.pose()).x == 5.0
@@ -93,7 +93,7 @@ async def test_an_answer_that_never_comes_costs_the_connection(play):
     driver = await play.opened(
         [("get abs_act_pos", play.SILENCE)], [*play.OPENING[:-1], ("get abs_act_pos", HALF_WAY)]
     )
-    with pytest.raises(AnswerOverdue):
+    with pytest.raises(ResponseTimeout):
         await driver.pose()
     assert (await driver.pose()).x == 5.0
 

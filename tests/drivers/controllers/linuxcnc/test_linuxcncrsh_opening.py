@@ -7,7 +7,7 @@ import socket
 
 import pytest
 
-from drivers.controllers.errors import AnswerOverdue, ConnectionLost
+from drivers.controllers.errors import ConnectionLost, ResponseTimeout
 from drivers.controllers.linuxcnc.controller import LinuxcncrshController
 from drivers.controllers.linuxcnc.settings import Timeouts
 from drivers.interfaces import DeviceIdentity
@@ -140,14 +140,14 @@ async def test_a_host_that_takes_no_notice(monkeypatch):
 async def test_a_mute_server(play):
     play.patience = play.IMPATIENT
     driver = await play.driver([(HELLO, play.SILENCE)])
-    with pytest.raises(AnswerOverdue, match="takes the connection but says nothing"):
+    with pytest.raises(ResponseTimeout, match="takes the connection but says nothing"):
         await driver.open()
 
 
 async def test_a_server_that_falls_silent_while_greeting_is_no_reason_to_wait_for_ever(play):
     play.patience = play.IMPATIENT
     driver = await play.driver([*play.GREETING[:2], ("set verbose on", play.SILENCE)])
-    with pytest.raises(AnswerOverdue, match=r"did not answer 'set verbose' within 0\.4 s"):
+    with pytest.raises(ResponseTimeout, match=r"did not answer 'set verbose' within 0\.4 s"):
         await driver.open()
 
 

@@ -7,14 +7,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drivers.controllers.linuxcnc.protocol import (
-    Answer,
     LineBuffer,
-    answer_in,
+    Response,
     encode,
-    explanation_in,
+    parse_explanation,
     parse_homed,
     parse_pose,
     parse_positions,
+    parse_response,
     pose_difference,
     rapid_move,
 )
@@ -89,34 +89,36 @@ def test_a_pose_that_is_none_is_not_sent(value):
 @pytest.mark.parametrize(
     ("line", "command", "answer"),
     [
-        ("SET MDI ACK", "set mdi G0 X1", Answer(accepted=True)),
-        ("SET MDI NAK", "set mdi G0 X1", Answer(accepted=False)),
-        ("SET NAK", "set mdi G0 X1", Answer(accepted=False)),
-        ("SET WAIT_MODE ACK", "set set_wait done", Answer(accepted=True)),
+        ("SET MDI ACK", "set mdi G0 X1", Response(accepted=True)),
+        ("SET MDI NAK", "set mdi G0 X1", Response(accepted=False)),
+        ("SET NAK", "set mdi G0 X1", Response(accepted=False)),
+        ("SET WAIT_MODE ACK", "set set_wait done", Response(accepted=True)),
         ("SET MODE ACK", "set mdi G0 X1", None),
         ("set mdi G0 X1", "set mdi G0 X1", None),
         ("MDI ACK", "set mdi G0 X1", None),
         ("GET MDI NAK", "set mdi G0 X1", None),
-        ("ESTOP ON", "get estop", Answer(accepted=True, text="ON")),
-        ("ERROR OK", "get error", Answer(accepted=True, text="OK")),
-        ("ERROR", "get error", Answer(accepted=True, text="")),
-        ("ERROR a  b NAK", "get error", Answer(accepted=True, text="a  b NAK")),
+        ("ESTOP ON", "get estop", Response(accepted=True, text="ON")),
+        ("ERROR OK", "get error", Response(accepted=True, text="OK")),
+        ("ERROR", "get error", Response(accepted=True, text="")),
+        ("ERROR a  b NAK", "get error", Response(accepted=True, text="a  b NAK")),
         ("error: no", "get error", None),
-        ("GET FOO NAK", "get foo", Answer(accepted=False)),
-        ("GET NAK", "get foo", Answer(accepted=False)),
+        ("GET FOO NAK", "get foo", Response(accepted=False)),
+        ("GET NAK", "get foo", Response(accepted=False)),
         ("JOINT_POS 1 2 3 4 5 6", "get abs_act_pos", None),
         ("get estop", "get estop", None),
         ("SET ESTOP ACK", "get estop", None),
     ],
 )
 def test_what_answers_what(line, command, answer):
-    assert answer_in(line, command) == answer
+    assert parse_response(line, command) == answer
 
 
 def test_explanations_are_told_from_answers():
-    assert explanation_in("error: Machine must be 'ON' for SET MDI") == "Machine must be 'ON' for SET MDI"
-    assert explanation_in("ERROR OK") == ""
-    assert explanation_in("warning: newer") == ""
+    assert (
+        parse_explanation("error: Machine must be 'ON' for SET MDI") == "Machine must be 'ON' for SET MDI"
+    )
+    assert parse_explanation("ERROR OK") == ""
+    assert parse_explanation("warning: newer") == ""
 
 
 def test_positions_beyond_the_sixth_belong_to_other_axes():

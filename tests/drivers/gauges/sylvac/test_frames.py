@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from drivers.gauges.errors import FrameRejected
 from drivers.gauges.protocol import DisplayedValue
-from drivers.gauges.sylvac import BATTERY, IDENTIFICATION, PRESET, Fault, parse_value
+from drivers.gauges.sylvac import BATTERY, IDENTIFICATION, PRESET, SylvacError, parse_value
 from drivers.simulated.gauges.sylvac import format_value
 
 
@@ -30,7 +30,7 @@ def test_a_value_is_read(frame, value):
     )
 
 
-@pytest.mark.parametrize("fault", Fault)
+@pytest.mark.parametrize("fault", SylvacError)
 def test_a_fault_is_read(fault):
     assert parse_value(fault.value) is fault
 

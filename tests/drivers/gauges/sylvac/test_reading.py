@@ -3,7 +3,7 @@
 import pytest
 
 from drivers.gauges.errors import GaugeAtEnd, GaugeSilent, GaugeUnsteady, WrongAnswer
-from drivers.gauges.serial_gauge import READINGS
+from drivers.gauges.serial_gauge import MAX_READINGS
 from drivers.gauges.sylvac import SylvacGauge
 from drivers.interfaces import DeviceIdentity, Gauge, GaugeReading
 from hexacell.errors import DeviceError
@@ -68,7 +68,7 @@ async def test_a_flipped_digit_does_not_get_through(dialogue, opened):
 
 
 async def test_readings_that_never_agree_are_an_error_of_their_own(dialogue, opened):
-    dialogue.expect(*((b"?\r", b"+%d.000\r" % number) for number in range(READINGS)))
+    dialogue.expect(*((b"?\r", b"+%d.000\r" % number) for number in range(MAX_READINGS)))
     with pytest.raises(GaugeUnsteady, match=r"\+0\.000, \+1\.000"):
         await opened.read()
 

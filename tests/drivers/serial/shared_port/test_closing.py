@@ -20,7 +20,7 @@ async def test_a_cancelled_exchange_leaves_the_link_in_step(fake):
     with pytest.raises(asyncio.CancelledError):
         await first
     assert await link.exchange(b"2\r", b"\r", LONG_S) == b"to 2\r"
-    assert link.take_strays() == b""
+    assert link.take_unsolicited() == b""
     await link.close()
 
 

@@ -8,7 +8,7 @@ import serial
 
 from drivers.serial.port import FRAME_LIMIT, NoAnswer
 from drivers.serial.shared_port import SharedSerialPort
-from drivers.wire_trace import Direction, WireTrace
+from drivers.wire_trace import TrafficDirection, WireTrace
 from hexacell.errors import DeviceError
 from tests.drivers.serial.shared_port.fake_port import LONG_S, SOON_S, WORST_LATENCY_S, FakePort, opened
 
@@ -61,7 +61,7 @@ async def test_a_late_answer_is_never_the_answer_to_the_next_question(fake):
     with pytest.raises(NoAnswer):
         await link.exchange(b"1\r", b"\r", SOON_S)
     assert await link.exchange(b"2\r", b"\r", LONG_S) == b"second\r"
-    assert link.take_strays() == b"late\r"
+    assert link.take_unsolicited() == b"late\r"
     assert await link.exchange(b"3\r", b"\r", LONG_S) == b"third\r"
     await link.close()
 
@@ -83,8 +83,8 @@ async def test_what_nobody_asked_for_is_put_aside(fake):
     link = await opened()
     port.due = [(0.0, b"SY276.1\r"), (time.monotonic() + SOON_S, b"more\r")]
     assert await link.exchange(b"?\r", b"\r", LONG_S) == b"answer\r"
-    assert link.take_strays() == b"SY276.1\rmore\r"
-    assert link.take_strays() == b""
+    assert link.take_unsolicited() == b"SY276.1\rmore\r"
+    assert link.take_unsolicited() == b""
     await link.close()
 
 
@@ -94,7 +94,7 @@ async def test_a_second_frame_behind_the_answer_does_not_answer_the_next_questio
     link = await opened()
     assert await link.exchange(b"?\r", b"\r", LONG_S) == b"one\r"
     assert await link.exchange(b"?\r", b"\r", LONG_S) == b"two\r"
-    assert link.take_strays() == b"key\r"
+    assert link.take_unsolicited() == b"key\r"
     await link.close()
 
 
@@ -145,6 +145,6 @@ async def test_every_byte_is_traced(fake):
     await link.exchange(b"?\r", b"\r", LONG_S)
     await link.close()
     assert [(each.line, each.direction, each.data) for each in trace.entries()] == [
-        ("fake", Direction.SENT, b"?\r"),
-        ("fake", Direction.RECEIVED, b"?\r+1.234\r"),
+        ("fake", TrafficDirection.SENT, b"?\r"),
+        ("fake", TrafficDirection.RECEIVED, b"?\r+1.234\r"),
     ]

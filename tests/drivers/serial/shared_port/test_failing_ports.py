@@ -7,7 +7,7 @@ import termios
 import pytest
 import serial
 
-from drivers.serial.errors import cannot_open
+from drivers.serial.errors import port_open_failed
 from drivers.serial.shared_port import SharedSerialPort
 from hexacell.errors import DeviceError, ExitCode
 from tests.drivers.serial.shared_port.fake_port import LONG_S, FakePort, opened
@@ -40,7 +40,7 @@ async def test_a_refused_connection_is_told():
     ],
 )
 def test_the_cause_is_told_in_words(number, words):
-    error = cannot_open("gauge x", "/dev/ttyUSB0", serial.SerialException(number, "reason"))
+    error = port_open_failed("gauge x", "/dev/ttyUSB0", serial.SerialException(number, "reason"))
     assert words in str(error)
     assert error.action
 
@@ -91,7 +91,7 @@ async def test_a_port_that_breaks_is_lost_until_it_is_opened_again(fake, broken)
     port.broken = None
     with pytest.raises(DeviceError, match="was lost"):
         await link.exchange(b"?\r", b"\r", LONG_S)
-    assert link.session == 1
+    assert link.open_count == 1
     assert await link.open() == 2
     assert await link.exchange(b"?\r", b"\r", LONG_S) == b"+1.234\r"
     await link.close()
@@ -102,7 +102,7 @@ async def test_opening_an_open_port_is_no_new_session(fake):
     link = await opened()
     port.due = [(0.0, b"SY276.1\r")]
     assert await link.open() == 1
-    assert link.take_strays() == b"SY276.1\r"
+    assert link.take_unsolicited() == b"SY276.1\r"
     await link.close()
 
 

@@ -25,7 +25,7 @@ SETTLE_S = 0.05
 
 
 async def test_rounds_are_complete_and_of_one_instant(make_bank, reach, driver, samples):
-    simulated = make_bank(makers=(EVENTS_AND_SYNC, EVENTS_ONLY, TWO_MAGNETS) * 2)
+    simulated = make_bank(vendors=(EVENTS_AND_SYNC, EVENTS_ONLY, TWO_MAGNETS) * 2)
     bank = driver(reach(simulated))
     await bank.open()
     before = samples.taken
@@ -43,7 +43,7 @@ async def test_thousands_of_rounds(make_bank, driver, samples):
 
 @pytest.mark.parametrize("maker", [EVENTS_AND_SYNC, EVENTS_ONLY, TWO_MAGNETS])
 async def test_every_make_is_brought_to_one_sample_per_sync(make_bank, driver, listen, maker):
-    simulated = make_bank(makers=(maker,) * 6)
+    simulated = make_bank(vendors=(maker,) * 6)
     bank = driver(simulated.bus_settings)
     identities = await bank.open()
     assert [identity.serial_number for identity in identities] == [str(1001 + leg) for leg in range(6)]

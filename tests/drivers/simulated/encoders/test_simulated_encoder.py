@@ -21,7 +21,7 @@ def test_every_node_announces_itself(settings, samples):
 
 
 def test_nothing_is_sent_unasked_before_start(make_bank, listen):
-    ear = listen(make_bank(makers=(EVENTS_ONLY,) * 6))
+    ear = listen(make_bank(vendors=(EVENTS_ONLY,) * 6))
     assert ear.heard() == []
     ear.send(SYNC)
     assert ear.heard() == []
@@ -93,7 +93,7 @@ def test_a_heartbeat_tells_the_state(make_bank, listen):
     ],
 )
 def test_the_dictionary_answers(make_bank, listen, maker, object_, value):
-    assert listen(make_bank(makers=(maker,) * 6)).sdo(1, object_) == value
+    assert listen(make_bank(vendors=(maker,) * 6)).sdo(1, object_) == value
 
 
 @pytest.mark.parametrize(
@@ -121,7 +121,7 @@ def test_pdos_are_not_changed_while_operational(make_bank, listen):
 
 
 def test_a_fixed_mapping_stays(make_bank, listen):
-    ear = listen(make_bank(makers=(TWO_MAGNETS,) * 6))
+    ear = listen(make_bank(vendors=(TWO_MAGNETS,) * 6))
     ear.sdo(1, "2301180181020080")
     assert ear.sdo(1, "2f011a0000").endswith("02000106")
 

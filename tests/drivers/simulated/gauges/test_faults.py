@@ -30,23 +30,23 @@ def test_nothing_to_flip_stays_as_it_is():
 
 def test_a_fault_strikes_as_many_answers_as_told():
     faults = WireFaults()
-    faults.begin(InjectedGaugeFault.SILENT, answers=2, seconds=0.0)
-    assert [faults.inject(b"+1\r")[0] for _ in range(3)] == [b"", b"", b"+1\r"]
+    faults.inject(InjectedGaugeFault.SILENT, answers=2, seconds=0.0)
+    assert [faults.apply(b"+1\r")[0] for _ in range(3)] == [b"", b"", b"+1\r"]
 
 
 def test_a_fault_without_number_strikes_until_it_ends():
     faults = WireFaults()
-    faults.begin(InjectedGaugeFault.LATE, answers=None, seconds=2.0)
-    assert [faults.inject(b"+1\r") for _ in range(9)] == [(b"+1\r", 2.0)] * 9
-    faults.end(InjectedGaugeFault.LATE)
-    faults.end(InjectedGaugeFault.LATE)
-    assert faults.inject(b"+1\r") == (b"+1\r", 0.0)
+    faults.inject(InjectedGaugeFault.LATE, answers=None, seconds=2.0)
+    assert [faults.apply(b"+1\r") for _ in range(9)] == [(b"+1\r", 2.0)] * 9
+    faults.clear(InjectedGaugeFault.LATE)
+    faults.clear(InjectedGaugeFault.LATE)
+    assert faults.apply(b"+1\r") == (b"+1\r", 0.0)
 
 
 def test_faults_combine():
     faults = WireFaults()
-    faults.begin(InjectedGaugeFault.LATE, answers=None, seconds=2.0)
-    faults.begin(InjectedGaugeFault.GARBLED_DIGIT, answers=None, seconds=0.0)
-    answer, delay = faults.inject(b"+1.234\r")
+    faults.inject(InjectedGaugeFault.LATE, answers=None, seconds=2.0)
+    faults.inject(InjectedGaugeFault.GARBLED_DIGIT, answers=None, seconds=0.0)
+    answer, delay = faults.apply(b"+1.234\r")
     assert answer != b"+1.234\r"
     assert delay == 2.0

@@ -7,11 +7,11 @@ import time
 
 import pytest
 
-from drivers.controllers.errors import AnswerOverdue, ConnectionLost, MotionInterrupted, MoveRefused
+from drivers.controllers.errors import ConnectionLost, MotionInterrupted, MoveRefused, ResponseTimeout
 from drivers.controllers.linuxcnc.settings import Timeouts
-from drivers.simulated.linuxcnc.faults import Fault
+from drivers.simulated.linuxcnc.faults import ControllerFault
 from drivers.simulated.linuxcnc.server import SimulatedController
-from drivers.simulated.linuxcnc.state import Wait
+from drivers.simulated.linuxcnc.state import WaitMode
 from hexacell.errors import DeviceError
 from hexacell.kinematics.pose import Pose
 
@@ -144,7 +144,7 @@ async def test_stopping_while_homing(driver, machine):
 
 async def test_an_unreachable_pose_while_another_client_waits_for_no_completion(ready, simulated):
     """``set_wait received`` is global in 2.9: NAK becomes ACK, and only the position tells."""
-    simulated.control.answers = Wait.RECEIVED
+    simulated.state.wait_mode = WaitMode.RECEIVED
     with pytest.raises(MotionInterrupted, match="fails kinematicsInverse"):
         await ready.move(Pose(0.0, 0.0, 5000.0))
     await ready.prepare()
@@ -187,29 +187,29 @@ async def test_a_slider_that_jumps_when_the_machine_comes_on(ready, machine):
 async def test_a_silent_controller(driver, simulated):
     controller = driver(Timeouts(answer=0.3))
     await controller.open()
-    simulated.faults.inject(Fault.SILENT)
-    with pytest.raises(AnswerOverdue, match="did not answer 'get abs_act_pos'"):
+    simulated.faults.inject(ControllerFault.SILENT)
+    with pytest.raises(ResponseTimeout, match="did not answer 'get abs_act_pos'"):
         await controller.pose()
-    simulated.faults.clear(Fault.SILENT)
+    simulated.faults.clear(ControllerFault.SILENT)
     assert await controller.pose() == HOME
     await controller.close()
 
 
 async def test_a_refused_password(driver, simulated):
-    simulated.faults.inject(Fault.REFUSES_PASSWORD)
+    simulated.faults.inject(ControllerFault.REFUSES_PASSWORD)
     with pytest.raises(DeviceError, match="refuses the connect password"):
         await driver().open()
 
 
 async def test_a_refused_move(ready, simulated):
-    simulated.faults.inject(Fault.REFUSES_MOVE, times=1)
+    simulated.faults.inject(ControllerFault.REFUSES_MOVE, times=1)
     with pytest.raises(MoveRefused, match="joint 3 following error"):
         await ready.move(TARGET)
     await ready.move(TARGET)
 
 
 async def test_an_acknowledged_move_that_does_not_take_place(ready, simulated):
-    simulated.faults.inject(Fault.STAYS_PUT, times=1)
+    simulated.faults.inject(ControllerFault.DOES_NOT_MOVE, times=1)
     with pytest.raises(MotionInterrupted, match=r"stopped at X0\.000 .* on the way to X100\.000"):
         await ready.move(TARGET)
     await ready.move(TARGET)
@@ -217,7 +217,7 @@ async def test_an_acknowledged_move_that_does_not_take_place(ready, simulated):
 
 async def test_a_connection_dropped_in_mid_move(ready, simulated, machine):
     machine.duration_s = LONG_S
-    simulated.faults.inject(Fault.DROPS_CONNECTION, times=1)
+    simulated.faults.inject(ControllerFault.DROPS_CONNECTION, times=1)
     with pytest.raises(ConnectionLost, match="closed the connection"):
         await ready.move(TARGET)
     stood = await ready.pose()
@@ -227,7 +227,7 @@ async def test_a_connection_dropped_in_mid_move(ready, simulated, machine):
 
 async def test_an_emergency_stop_in_mid_move(ready, simulated, machine):
     machine.duration_s = LONG_S
-    simulated.faults.inject(Fault.EMERGENCY_STOP, times=1)
+    simulated.faults.inject(ControllerFault.EMERGENCY_STOP, times=1)
     with pytest.raises(MotionInterrupted, match="it is in emergency stop"):
         await ready.move(TARGET)
     machine.duration_s = 0.01

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drivers.controllers.linuxcnc.protocol import rapid_move
-from drivers.simulated.linuxcnc.mdi import BlockError, target_of
+from drivers.simulated.linuxcnc.mdi import BlockError, parse_block
 from hexacell.kinematics.pose import Pose
 
 HERE = Pose(1.0, 2.0, 3.0, 4.0, 5.0, 6.0)
@@ -15,7 +15,7 @@ HERE = Pose(1.0, 2.0, 3.0, 4.0, 5.0, 6.0)
 
 @given(st.builds(Pose, *[st.floats(-1e4, 1e4)] * 6))
 def test_what_the_driver_says_is_understood(pose):
-    target = target_of(rapid_move(pose), HERE)
+    target = parse_block(rapid_move(pose), HERE)
     assert target is not None
     assert target.as_tuple() == pytest.approx(pose.as_tuple(), abs=1e-8)
 
@@ -32,7 +32,7 @@ def test_what_the_driver_says_is_understood(pose):
     ],
 )
 def test_missing_words_keep_their_values(block, target):
-    assert target_of(block, HERE) == target
+    assert parse_block(block, HERE) == target
 
 
 @pytest.mark.parametrize(
@@ -48,12 +48,12 @@ def test_missing_words_keep_their_values(block, target):
 )
 def test_what_is_not_understood(block, words):
     with pytest.raises(BlockError, match=words):
-        target_of(block, HERE)
+        parse_block(block, HERE)
 
 
 @given(st.text())
 def test_nothing_else_is_raised(block):
     try:
-        target_of(block, HERE)
+        parse_block(block, HERE)
     except BlockError:
         return

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from drivers.simulated.linuxcnc.faults import Fault
+from drivers.simulated.linuxcnc.faults import ControllerFault
 
 NOBODY = [
     ("get estop", b"ESTOP ON\r\n"),
@@ -253,7 +253,7 @@ def test_homing_that_is_aborted_leaves_it_unhomed(client, machine):
 
 def test_silence(client, simulated):
     me = client()
-    simulated.faults.inject(Fault.SILENT, times=1)
+    simulated.faults.inject(ControllerFault.SILENT, times=1)
     me.send("get estop")
     me.expect_silence()
     me.say("get estop", b"ESTOP ON\r\n")
@@ -261,19 +261,19 @@ def test_silence(client, simulated):
 
 def test_a_refused_password(client, simulated):
     me = client()
-    simulated.faults.inject(Fault.REFUSES_PASSWORD)
+    simulated.faults.inject(ControllerFault.REFUSES_PASSWORD)
     me.say("hello EMC test 1.0", b"HELLO NAK\r\n")
-    simulated.faults.clear(Fault.REFUSES_PASSWORD)
+    simulated.faults.clear(ControllerFault.REFUSES_PASSWORD)
     me.say("hello EMC test 1.0", b"HELLO ACK EMCNETSVR 1.1\r\n")
 
 
 def test_faults_of_moves_strike_as_often_as_told(client, simulated, machine):
     me = client()
     me.make_ready()
-    simulated.faults.inject(Fault.REFUSES_MOVE, times=1)
+    simulated.faults.inject(ControllerFault.REFUSES_MOVE, times=1)
     me.say("set mdi G0 X1", b"SET MDI NAK\n\r")
     me.say("get error", b"ERROR joint 3 following error\r\n")
-    simulated.faults.inject(Fault.STAYS_PUT, times=1)
+    simulated.faults.inject(ControllerFault.DOES_NOT_MOVE, times=1)
     me.say("set mdi G0 X1", b"SET MDI ACK\n\r")
     assert machine.pose().x == 0.0
     me.say("set mdi G0 X1", b"SET MDI ACK\n\r")
@@ -284,7 +284,7 @@ def test_an_emergency_stop_in_the_middle_of_a_move(client, simulated, machine):
     me = client()
     me.make_ready()
     machine.duration_s = 30.0
-    simulated.faults.inject(Fault.EMERGENCY_STOP, times=1)
+    simulated.faults.inject(ControllerFault.EMERGENCY_STOP, times=1)
     me.say("set mdi G0 X100", b"SET MDI ACK\n\r")
     me.say("get estop", b"ESTOP ON\r\n")
     assert 0.0 < machine.pose().x < 99.0
@@ -294,7 +294,7 @@ def test_a_connection_dropped_in_the_middle_of_a_move(client, simulated, machine
     me = client()
     me.make_ready()
     machine.duration_s = 30.0
-    simulated.faults.inject(Fault.DROPS_CONNECTION, times=1)
+    simulated.faults.inject(ControllerFault.DROPS_CONNECTION, times=1)
     me.send("set mdi G0 X100")
     me.expect_end()
     assert machine.events[-1] == "move"

@@ -10,7 +10,7 @@ from drivers.gauges.serial_gauge import SerialGauge
 from drivers.gauges.sylvac import SylvacGauge
 from drivers.serial.shared_port import SharedSerialPorts
 from drivers.simulated.gauges.indicator import Indicator
-from drivers.simulated.gauges.rack import GaugeRack, simulated_device
+from drivers.simulated.gauges.rack import SimulatedGaugeBank, simulated_device
 from drivers.simulated.gauges.server import serve_gauges
 from hexacell.cell.devices import GaugeSettings
 from hexacell.cell.simulation import SimulatedGauges
@@ -41,7 +41,7 @@ class Cell:
         ]
         plungers = {name: lambda name=name: self.balls[name] for name in "xyz"}
         simulated = SimulatedGauges(transport=transport, **simulation)
-        self.rack = GaugeRack(settings, plungers, simulated, CellClock(FAST))
+        self.rack = SimulatedGaugeBank(settings, plungers, simulated, CellClock(FAST))
         self.links = SharedSerialPorts(worst_latency_s=WORST_LATENCY_S)
         self.gauges = {each.name: DRIVERS[each.protocol](each, self.links) for each in self.rack.gauges}
 

@@ -83,7 +83,7 @@ async def test_a_plunger_at_its_end(protocol):
 async def test_a_data_button_is_not_mistaken_for_an_answer():
     async with cell(["mux10"] * 3) as made:
         await made.open()
-        made.rack.line("x").send_unasked(b"01A+0009.999\r")
+        made.rack.line("x").send_unsolicited(b"01A+0009.999\r")
         assert await made.values() == [1.0, 2.0, 3.0]
 
 

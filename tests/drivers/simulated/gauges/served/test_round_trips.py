@@ -9,7 +9,7 @@ import serial
 
 from drivers.serial.shared_port import SharedSerialPort
 from drivers.simulated.gauges.faults import InjectedGaugeFault
-from drivers.simulated.gauges.rack import GaugeRack
+from drivers.simulated.gauges.rack import SimulatedGaugeBank
 from hexacell.cell.devices import GaugeSettings
 from hexacell.cell.simulation import SimulatedGauges
 from hexacell.clock import CellClock
@@ -42,7 +42,7 @@ def test_multiplexers_on_different_ports_are_different_lines():
         for name in "xyz"
     ]
     plungers = {name: lambda: 0.0 for name in "xyz"}
-    with GaugeRack(settings, plungers, SimulatedGauges(), CellClock()) as rack:
+    with SimulatedGaugeBank(settings, plungers, SimulatedGauges(), CellClock()) as rack:
         assert len({rack.line(name).url for name in "xyz"}) == 3
 
 
@@ -53,7 +53,7 @@ def test_an_unknown_protocol_is_refused_and_nothing_is_left_open():
     ]
     plungers = {"x": lambda: 0.0, "y": lambda: 0.0}
     with pytest.raises(FileError, match=r"no simulated gauge speaks protocol morse.*cdi, mux10, sylvac"):
-        GaugeRack(settings, plungers, SimulatedGauges(), CellClock())
+        SimulatedGaugeBank(settings, plungers, SimulatedGauges(), CellClock())
 
 
 @pytest.mark.parametrize("asked", [False, True])
@@ -159,7 +159,7 @@ def test_nothing_stays_in_the_file_system():
 def test_answers_to_nobody_are_lost_as_on_a_cable():
     with served("sylvac") as line:
         for _ in range(1000):
-            line.send_unasked(b"+1.000\r" * 10)
+            line.send_unsolicited(b"+1.000\r" * 10)
         port = serial.serial_for_url(line.url, timeout=LONG_S)
         time.sleep(0.01)
         port.reset_input_buffer()

@@ -122,7 +122,7 @@ def changed(section: Any, changes: dict[str, Any]) -> Any:
 def hurry(patch: pytest.MonkeyPatch) -> None:
     patch.setattr(calibration_module, "CANDIDATES", 64)
     patch.setattr(calibration_module, "HELD_OUT_CANDIDATES", 128)
-    patch.setattr(machine_module, "STEPS", 8)
+    patch.setattr(machine_module, "LINE_STEPS", 8)
 
 
 def new_rig(folder: Path, mode: Mode = Mode.OPTIMISE, operator: Any = None, **changes: Any) -> Rig:

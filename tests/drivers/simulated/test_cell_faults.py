@@ -103,7 +103,7 @@ def test_an_emergency_stop_and_a_following_error_switch_the_machine_off(cell) ->
         control.set_machine(on=True)
         assert control.enabled
         cell.faults.inject(kind)
-        assert (control.on, control.estop) == (False, estop)
+        assert (control.enabled, control.estop) == (False, estop)
     assert control.next_error() == "joint 3 following error"
 
 

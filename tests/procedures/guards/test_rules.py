@@ -152,7 +152,7 @@ def test_devices_that_fail_are_all_named() -> None:
 @pytest.mark.parametrize(("garbled", "trips"), [(1, False), (2, False), (3, True), (4, True)])
 def test_a_noisy_line_is_no_broken_device(garbled: int, trips: bool) -> None:
     nonsense = WrongAnswer("answers b'0'", subject="gauge y", action="Check it")
-    snapshot = Snapshot((gauge(axis=1, error=nonsense, garbled=garbled),))
+    snapshot = Snapshot((gauge(axis=1, error=nonsense, garbled_count=garbled),))
     trip = rules.first_trip(snapshot, LIMITS)
     assert (trip is not None and trip.guard is Guard.DEVICE) is trips
 

@@ -6,7 +6,7 @@ from pydantic import BaseModel, ConfigDict
 
 from hexacell.identification.diagnostics.tolerance_check import tolerance_violations
 from hexacell.identification.problem.problem import Tolerances
-from hexacell.identification.solver.result import Identification
+from hexacell.identification.solver.result import GeometryEstimate
 from hexacell.kinematics.geometry import Geometry
 
 
@@ -25,7 +25,7 @@ class AcceptanceGate(BaseModel):
 
 
 def gates(
-    identified: Identification,
+    identified: GeometryEstimate,
     drawing: Geometry,
     tolerances: Tolerances,
     *,
@@ -41,15 +41,15 @@ def gates(
     )
 
 
-def _converged(identified: Identification) -> AcceptanceGate:
+def _converged(identified: GeometryEstimate) -> AcceptanceGate:
     return AcceptanceGate(
         name="converged",
-        passed=identified.converged,
+        passed=identified.termination.converged,
         sentence=f"The solver ended because {identified.termination.value}.",
     )
 
 
-def _determined(identified: Identification) -> AcceptanceGate:
+def _determined(identified: GeometryEstimate) -> AcceptanceGate:
     names = identified.undetermined
     sentence = (
         f"Not determined by these data: {', '.join(names)}."
@@ -60,7 +60,7 @@ def _determined(identified: Identification) -> AcceptanceGate:
 
 
 def _within_tolerance(
-    identified: Identification, drawing: Geometry, tolerances: Tolerances
+    identified: GeometryEstimate, drawing: Geometry, tolerances: Tolerances
 ) -> AcceptanceGate:
     violations = tolerance_violations(identified, drawing, tolerances)
     names = ", ".join(f"{violation.name} ({violation.change_mm:+.2f} mm)" for violation in violations)

@@ -164,14 +164,18 @@ def _pose(pose: Pose) -> dict[str, float]:
 
 
 def outcome_line(
-    found: Identification,
+    counts: tuple[int, int, int],
     before: DeviationStatistics | None,
     after: DeviationStatistics | None,
     limit_mm: float,
     verdict: Verdict,
 ) -> str:
-    """The one line everywhere: what was used, held-out deviation before and after, the verdict."""
-    what = f"{len(found.free)} parameters, {found.records} records at {found.points} points"
+    """The one line everywhere: what was used, held-out deviation before and after, the verdict.
+
+    ``counts`` are the numbers of free parameters, of records, and of points.
+    """
+    parameters, records, points = counts
+    what = f"{parameters} parameters, {records} records at {points} points"
     if before is None or after is None:
         return f"{what}; held-out points: {verdict}"
     means = f"{before.mean_mm:.2f} -> {after.mean_mm:.3f} mm"

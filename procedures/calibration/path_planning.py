@@ -13,7 +13,6 @@ from hexacell.errors import HexacellError, LimitError
 from hexacell.experiment_design.gauge_zero import GaugeZero
 from hexacell.identification.belief import RobotBelief
 from hexacell.identification.estimator import estimate_online
-from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.rotations import Array
 from hexacell.motion.path_check import ball_position
@@ -108,10 +107,9 @@ class RunPathPlanner:
 
     def _belief(self, state: RunState) -> RobotBelief:
         """What is known by now; the identified geometry commands once it is written."""
-        found = state.identified.result.get("geometry") if state.identified else None
-        if found is None:
+        if state.identified is None:
             return self._by_records(state)
-        geometry = Geometry(**found)
+        geometry = state.identified.result.identified_geometry
         free = self.robot.mechanism.convention.free_parameters(geometry)
         known = replace(self.robot.belief(), free=np.asarray(free))
         return replace(known, controller=geometry) if state.committed else known

@@ -14,6 +14,7 @@ from hexacell.runs.run_folder import RunFolder
 from procedures.calibration.workflow import Calibration, Mode
 from procedures.engine.config_transactions import ConfigTransactions
 from procedures.run import events
+from procedures.run.identified import IdentificationResult
 from procedures.run.state import RunState
 from procedures.run.steps import Phase
 
@@ -35,7 +36,8 @@ class Computations:
         assessed = assess(self.cell.settings, self.calibration.robot_of(state), measurements, identified)
         document = identification_document(identified)
         self.folder.write_result(document | assessment_document(identified, assessed))
-        return events.Identified(result=document, held_out=self.calibration.held_out_poses(identified))
+        result = IdentificationResult.of(document)
+        return events.Identified(result=result, held_out=self.calibration.held_out_poses(identified))
 
     def propose(self, state: RunState) -> events.Proposed:
         """Save the change of the config, and hold the geometry against the gates.
@@ -43,7 +45,7 @@ class Computations:
         Raises:
             FileError: the config is not the one that the run began with.
         """
-        identified = self.calibration.identification(state)
+        identified = _identified(state).estimate
         robot = self.calibration.robot
         commanding, _ = robot.mechanism.normalize_frames(robot.controller)
         conditions = gates(
@@ -64,9 +66,12 @@ class Computations:
             return events.ResultValidated(verdict=verdict, line=self._check_line(before, verdict))
         after = DeviationStatistics.of(state.held_out(Phase.AFTER))
         verdict = Verdict.WORSE if state.refusals(Phase.AFTER) else self._verdict(before, after)
-        identified = self.calibration.identification(state)
-        line = outcome_line(identified, before, after, self._limit_mm, verdict)
+        line = outcome_line(self._counts(_identified(state)), before, after, self._limit_mm, verdict)
         return events.ResultValidated(verdict=verdict, line=line)
+
+    def _counts(self, result: IdentificationResult) -> tuple[int, int, int]:
+        free = self.calibration.robot.mechanism.convention.free_parameters(result.identified_geometry)
+        return len(free), result.records, result.points
 
     @property
     def _limit_mm(self) -> float:
@@ -83,3 +88,8 @@ class Computations:
             f"{found.poses} poses at held-out points; mean deviation {found.mean_mm:.3f} mm "
             f"(limit {self._limit_mm:g}): {verdict}"
         )
+
+
+def _identified(state: RunState) -> IdentificationResult:
+    assert state.identified is not None  # noqa: S101 - decided only after the identification
+    return state.identified.result

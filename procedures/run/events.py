@@ -6,7 +6,7 @@ commanded, and in ``RunStarted`` the geometry that commanded it.
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Literal, Self
 
 from pydantic import Field
 
@@ -15,6 +15,7 @@ from hexacell.acceptance.validation import Verdict
 from hexacell.cell.fields import GeometryValues
 from hexacell.cell.recovery import Action, FailureKind
 from hexacell.controller_config.interface import Branch
+from procedures.run.identified import IdentificationResult
 from procedures.run.steps import Frozen, SetKey, SixNumbers, Step, ThreeNumbers
 from procedures.run.trips import Guard, Trip
 
@@ -191,7 +192,7 @@ class Identified(Frozen):
     """The geometry was identified, and the poses that will judge it were chosen."""
 
     kind: Literal["identified"] = "identified"
-    result: dict[str, Any]
+    result: IdentificationResult
     held_out: tuple[tuple[SixNumbers, ...], ...]
 
 

@@ -42,7 +42,8 @@ def require_valid(run: RunFolder) -> RunState:
     assert read_measurements(run.measurements) == state.measurements()
     assert state.identified is not None
     result = json.loads(run.result.read_text())
-    assert {key: result[key] for key in state.identified.result} == state.identified.result
+    identified = state.identified.result.model_dump(mode="json")
+    assert {key: result[key] for key in identified} == identified
     return state
 
 

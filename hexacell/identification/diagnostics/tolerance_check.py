@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hexacell.identification.problem.problem import Tolerances
-from hexacell.identification.solver.result import Identification
+from hexacell.identification.solver.result import GeometryEstimate
 from hexacell.kinematics.geometry import PARAMETER_NAMES, Geometry
 from hexacell.kinematics.rotations import Array
 
@@ -32,7 +32,7 @@ class ToleranceViolation:
 
 
 def tolerance_violations(
-    found: Identification, drawing: Geometry, tolerances: Tolerances
+    found: GeometryEstimate, drawing: Geometry, tolerances: Tolerances
 ) -> tuple[ToleranceViolation, ...]:
     """The parameters that, three sigma granted, are beyond their tolerance; not a number is beyond all."""
     change = found.geometry.vector() - drawing.vector()

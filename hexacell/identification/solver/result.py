@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import StrEnum
+from typing import Protocol
 
 import numpy as np
 
@@ -70,6 +71,30 @@ class GaugeFaultError(IdentifiabilityError):
     def __init__(self, fault: DataFault) -> None:
         self.fault = fault
         super().__init__(fault.sentence, action=fault.action)
+
+
+class GeometryEstimate(Protocol):
+    """An identified geometry with its uncertainty: an :class:`Identification`, or what is kept of one."""
+
+    @property
+    def geometry(self) -> Geometry:
+        """In the mechanism's frame convention, mm."""
+        ...
+
+    @property
+    def sigma(self) -> Array:
+        """Standard deviations of the parameters, mm."""
+        ...
+
+    @property
+    def termination(self) -> Termination:
+        """Why the solver ended."""
+        ...
+
+    @property
+    def undetermined(self) -> tuple[str, ...]:
+        """Parameters about which the data said next to nothing."""
+        ...
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -58,7 +58,8 @@ def test_the_run_folder_says_everything(finished) -> None:
     assert read_measurements(folder.measurements) == state.measurements()
     assert state.identified
     result = json.loads(folder.result.read_text())
-    assert {key: result[key] for key in state.identified.result} == state.identified.result
+    identified = state.identified.result.model_dump(mode="json")
+    assert {key: result[key] for key in identified} == identified
     assert result["findings"]
     assert folder.wire.stat().st_size > 1000
 

@@ -98,7 +98,7 @@ async def test_a_manipulated_journal_is_another_run(finished, tmp_path) -> None:
     entries = recorded(finished)
     place = next(n for n, entry in enumerate(entries) if isinstance(entry.event, events.Identified))
     identified = entries[place].event
-    result = identified.result | {"chi2": identified.result["chi2"] + 1e-6}
+    result = identified.result.model_copy(update={"chi2": identified.result.chi2 + 1e-6})
     entries[place] = replace(entries[place], event=identified.model_copy(update={"result": result}))
     path = write(tmp_path / "journal.jsonl", entries)
     replayed = await replay(path, Scope.IDENTIFICATION)

@@ -96,9 +96,12 @@ def test_a_record_that_nothing_can_follow_is_no_obstacle_to_json(noisy, make_pro
     json.dumps(document, allow_nan=False)
 
 
-def test_the_one_line(identified):
+COUNTS = (35, 55, 5)
+
+
+def test_the_one_line():
     line = outcome_line(
-        identified,
+        COUNTS,
         DeviationStatistics(3.412, 6.0, 10),
         DeviationStatistics(0.0119, 0.03, 10),
         0.05,
@@ -114,6 +117,6 @@ def test_the_one_line(identified):
     ("before", "after"),
     [(None, None), (DeviationStatistics(3.4, 6.0, 10), None), (None, DeviationStatistics(0.01, 0.03, 10))],
 )
-def test_missing_evidence_is_said_and_is_no_pass(identified, before, after):
-    line = outcome_line(identified, before, after, 0.05, Verdict.NOT_EVALUATED)
+def test_missing_evidence_is_said_and_is_no_pass(before, after):
+    line = outcome_line(COUNTS, before, after, 0.05, Verdict.NOT_EVALUATED)
     assert line == "35 parameters, 55 records at 5 points; held-out points: not evaluated"

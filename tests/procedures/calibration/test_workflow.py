@@ -23,12 +23,13 @@ from procedures.calibration.workflow import Calibration, Mode, expected_records
 from procedures.run import events
 from procedures.run.state import fold
 from procedures.run.steps import Compute, Move, Phase, Place, Sample
+from tests.procedures.identified import an_identification
 
 POINTS, ORIENTATIONS, HELD_OUT = 2, 9, 3
 HELD_OUT_POSES = tuple(
     tuple((float(point), 0.0, 500.0, float(n), 0.0, 0.0) for n in range(HELD_OUT)) for point in (1, 2)
 )
-IDENTIFIED = events.Identified(result={}, held_out=HELD_OUT_POSES)
+IDENTIFIED = events.Identified(result=an_identification(), held_out=HELD_OUT_POSES)
 PROPOSED = events.Proposed(gates=())
 COMMITTED = events.Committed(approved_by="a tester")
 ENDED = events.Ended(exit_code=0, line="over")

@@ -24,6 +24,7 @@ from procedures.journal import line_format
 from procedures.journal.journal import Journal, read_entries, read_journal
 from procedures.run import events
 from procedures.run.steps import Phase, SetKey
+from tests.procedures.identified import an_identification
 from tests.procedures.journal.told import TOLD, write_told
 
 
@@ -131,13 +132,17 @@ texts = st.text(st.characters(exclude_categories=["Cs"]))
 
 
 @settings(max_examples=50, suppress_health_check=[HealthCheck.function_scoped_fixture])
-@given(text=texts, values=st.tuples(numbers, numbers, numbers), result=st.dictionaries(texts, numbers))
-def test_every_number_and_every_text_comes_back(path: Path, text, values, result) -> None:
+@given(
+    text=texts,
+    values=st.tuples(numbers, numbers, numbers),
+    results=st.lists(numbers, max_size=3).map(tuple),
+)
+def test_every_number_and_every_text_comes_back(path: Path, text, values, results) -> None:
     key = SetKey(phase=Phase.IDENTIFY, point=1)
     told = (
         events.SetClosed(at=key, drift_mm=values),
         events.SetInvalidated(at=key, reason=text),
-        events.Identified(result=result, held_out=()),
+        events.Identified(result=an_identification(covariance=(results,), frame=text), held_out=()),
     )
     path.unlink(missing_ok=True)
     with Journal(path) as journal:

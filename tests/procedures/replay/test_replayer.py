@@ -262,7 +262,7 @@ MANIPULATIONS: dict[str, tuple[type[Any], dict[str, Any], int, Scope, str]] = {
     ),
     "the covariance": (
         events.Identified,
-        {"result": {"covariance": [[0.5]]}},
+        {"result.covariance": ((0.5,),)},
         1,
         Scope.IDENTIFICATION,
         "result.covariance",

@@ -10,6 +10,7 @@ from hexacell.acceptance.validation import Verdict
 from procedures.run import events
 from procedures.run.state import RunState, apply, fold
 from procedures.run.steps import CloseSet, Phase, SetKey
+from tests.procedures.identified import an_identification
 
 P1 = SetKey(phase=Phase.IDENTIFY, point=1)
 
@@ -111,7 +112,7 @@ def test_held_out_deviations_leave_references_out(story) -> None:
 @pytest.mark.parametrize(
     ("event", "attribute"),
     [
-        (events.Identified(result={"converged": True}, held_out=()), "identified"),
+        (events.Identified(result=an_identification(), held_out=()), "identified"),
         (events.Proposed(gates=()), "proposed"),
         (events.Committed(approved_by="a tester"), "committed"),
         (events.ResultValidated(verdict=Verdict.PASS, line="pass"), "judged"),

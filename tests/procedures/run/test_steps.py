@@ -14,8 +14,10 @@ from hexacell.acceptance.gates import AcceptanceGate
 from hexacell.acceptance.validation import Verdict
 from hexacell.cell.fields import GeometryValues
 from hexacell.cell.recovery import Action, FailureKind
+from hexacell.identification.solver.result import DataFaultKind
 from procedures.journal.journal import Journal, read_journal
 from procedures.run import events, steps
+from procedures.run.identified import OutlierRecord
 from procedures.run.steps import (
     CloseSet,
     Compute,
@@ -30,6 +32,7 @@ from procedures.run.steps import (
     Step,
 )
 from procedures.run.trips import Guard
+from tests.procedures.identified import an_identification
 
 POSE = (1.0, 2.0, 3.0, 4.0, 5.0, 6.0)
 P2 = SetKey(phase=Phase.IDENTIFY, point=2)
@@ -98,6 +101,14 @@ geometry = st.builds(
     l=st.tuples(*[st.floats(1, 1e4)] * 6),
 )
 gate = st.builds(AcceptanceGate, name=text, passed=st.booleans(), sentence=text, needs_person=st.booleans())
+outlier = st.builds(
+    OutlierRecord,
+    point=count,
+    orientation=count,
+    kind=st.sampled_from(DataFaultKind),
+    gauges=st.lists(st.sampled_from("xyz"), max_size=3).map(tuple),
+    off_mm=st.none() | three,
+)
 some_event: st.SearchStrategy[Any] = st.one_of(
     st.builds(
         events.RunStarted,
@@ -127,7 +138,15 @@ some_event: st.SearchStrategy[Any] = st.one_of(
     st.builds(events.SetInvalidated, at=set_key, reason=text),
     st.builds(
         events.Identified,
-        result=st.dictionaries(text, st.none() | st.booleans() | number | st.lists(number), max_size=3),
+        result=st.builds(
+            an_identification,
+            converged=st.booleans(),
+            chi2=number,
+            covariance=st.lists(st.lists(number, max_size=2).map(tuple), max_size=2).map(tuple),
+            undetermined=st.lists(text, max_size=2).map(tuple),
+            outliers=st.lists(outlier, max_size=2).map(tuple),
+            frame=text,
+        ),
         held_out=st.lists(st.lists(six, max_size=2).map(tuple), max_size=2).map(tuple),
     ),
     st.builds(events.Proposed, gates=st.lists(gate, max_size=3).map(tuple)),

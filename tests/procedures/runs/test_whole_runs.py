@@ -37,7 +37,7 @@ def test_the_controller_gets_the_true_geometry(recording, tmp_path) -> None:
     truth = Geometry(**tomllib.loads(recording.history[0].cell_text)["simulation"]["geometry"])
     found, expected = (Hexaglide().normalize_frames(geometry)[0].vector() for geometry in (written, truth))
     (identified,) = (event for event in recording.history if isinstance(event, events.Identified))
-    sigma = Geometry(**identified.result["sigma"]).vector()
+    sigma = identified.result.estimate.sigma
     assert np.abs(found - expected)[sigma > 0.0].max() > 0.0
     assert (np.abs(found - expected) <= 5.0 * sigma + 1e-6).all()
 
@@ -50,7 +50,8 @@ def test_what_a_run_leaves_in_its_folder(recording) -> None:
     assert len(measured) == 18
     assert state.identified
     result = json.loads(folder.result.read_text())
-    assert {key: result[key] for key in state.identified.result} == state.identified.result
+    identified = state.identified.result.model_dump(mode="json")
+    assert {key: result[key] for key in identified} == identified
     assert result["findings"]
     proposal = ConfigChange.load(folder.proposal)
     assert proposal.text_before.encode() == recording.config_before

@@ -1,0 +1,81 @@
+"""An identification as the journal keeps it: all that follows from it needs no other computation."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Self
+
+from hexacell.identification.solver.levenberg_marquardt import Termination
+from hexacell.identification.solver.result import DataFaultKind
+from hexacell.kinematics.geometry import Geometry
+from hexacell.kinematics.rotations import Array
+from procedures.run.steps import Frozen, SixNumbers, ThreeNumbers
+
+SixPoints = tuple[ThreeNumbers, ThreeNumbers, ThreeNumbers, ThreeNumbers, ThreeNumbers, ThreeNumbers]
+
+
+class ParameterValues(Frozen):
+    """One number a parameter of the mechanism, mm."""
+
+    S: SixPoints
+    B: SixPoints
+    l: SixNumbers  # noqa: E741 - the paper's symbol
+
+
+class OutlierRecord(Frozen):
+    """A record that was left out.
+
+    ``gauges`` are those that alone are wrong, and ``off_mm`` what the gauges x, y and z show too much.
+    """
+
+    point: int
+    orientation: int
+    kind: DataFaultKind = DataFaultKind.GROSS_ERROR
+    gauges: tuple[str, ...] = ()
+    off_mm: ThreeNumbers | None = None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class KeptEstimate:
+    """A :class:`~hexacell.identification.solver.result.GeometryEstimate` from the journal."""
+
+    geometry: Geometry
+    sigma: Array
+    termination: Termination
+    undetermined: tuple[str, ...]
+
+
+class IdentificationResult(Frozen):
+    """The identified geometry and how certain it is, as in ``result.json``."""
+
+    converged: bool
+    termination: Termination
+    iterations: int
+    records: int
+    points: int
+    residual_rms_mm: float
+    chi2: float
+    dof: int
+    geometry: ParameterValues
+    sigma: ParameterValues
+    covariance: tuple[tuple[float, ...], ...]
+    undetermined: tuple[str, ...]
+    outliers: tuple[OutlierRecord, ...]
+    frame: str
+
+    @classmethod
+    def of(cls, document: Mapping[str, Any]) -> Self:
+        """The result in :func:`~hexacell.reporting.documents.identification_document`."""
+        return cls.model_validate(document)
+
+    @property
+    def estimate(self) -> KeptEstimate:
+        """What the acceptance gates need."""
+        sigma = Geometry(self.sigma.S, self.sigma.B, self.sigma.l).vector()
+        return KeptEstimate(self.identified_geometry, sigma, self.termination, self.undetermined)
+
+    @property
+    def identified_geometry(self) -> Geometry:
+        """In the mechanism's frame convention, mm."""
+        return Geometry(self.geometry.S, self.geometry.B, self.geometry.l)

@@ -99,7 +99,7 @@ class CellFolder:
         self.cell.write_text(changed(self.cell.read_text(), edits))
 
     def snapshot(self) -> dict[str, bytes | None]:
-        """Everything in it, but for the lock, which holds nothing that counts."""
+        """Everything in it except the lock, whose content has no meaning."""
         return {
             str(path.relative_to(self.path)): path.read_bytes() if path.is_file() else None
             for path in self.path.rglob("*")
@@ -110,7 +110,7 @@ class CellFolder:
         return sorted((self.path / "runs" / "simulated-hexaglide").glob("*"))
 
     def rewound(self, run: Path, before: str) -> Path:
-        """A run of this cell that stands where ``run`` stood before a step."""
+        """A run of this cell that got as far as ``run`` before a step."""
         history = read_journal(run / "journal.jsonl")
         steps = [event.step.key if isinstance(event, events.StepBegun) else "" for event in history]
         started = history[0].model_copy(update={"cell_text": self.cell.read_text()})
@@ -132,7 +132,7 @@ def copy_cell(folder: Path) -> CellFolder:
 
 @pytest.fixture
 def cell_folder(tmp_path: Path) -> CellFolder:
-    """The cell of the demo, as it comes."""
+    """The cell of the demo, unchanged."""
     folder = tmp_path / "cell"
     folder.mkdir()
     return copy_cell(folder)
@@ -163,7 +163,7 @@ def surroundings(temporary: Path) -> dict[str, str]:
 
 
 def run_command(folder: Path, *arguments: object) -> Outcome:
-    """Type a command in ``folder``, with nobody at the terminal, and wait until it ends."""
+    """Run a command in ``folder`` without a terminal, and wait until it ends."""
     temporary = folder / f"temporary-{secrets.token_hex(4)}"
     ended = subprocess.run(
         command(*arguments),
@@ -184,7 +184,7 @@ Typed = Callable[..., Outcome]
 
 @pytest.fixture
 def typed(tmp_path: Path) -> Typed:
-    """Types a command in a process of its own, in the test's folder."""
+    """Runs a command in a process of its own, in the test's folder."""
     return lambda *arguments: run_command(tmp_path, *arguments)
 
 
@@ -192,7 +192,7 @@ def typed(tmp_path: Path) -> Typed:
 def typed_here(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> Typed:
-    """The same within this process, where starting would cost more than the command."""
+    """The same within this process, if starting one would take longer than the command."""
     monkeypatch.chdir(tmp_path)
 
     def run(*arguments: object) -> Outcome:
@@ -204,14 +204,14 @@ def typed_here(
 
 @pytest.fixture
 def one_robot(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Foretell on a single robot and from few poses: what it says is under test, not how well."""
+    """Predict on a single robot and from few poses: the output is under test, not its quality."""
     monkeypatch.setattr("hexacell.campaign.dry_run.ROBOTS", 1)
     monkeypatch.setattr("hexacell.campaign.dry_run.CANDIDATES", 32)
 
 
 @pytest.fixture
 def few_candidates(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Choose among few poses in this process, and check the plan on few: that is not under test."""
+    """Choose among few poses in this process, and check the plan on few; neither is under test."""
     monkeypatch.setattr("hexacell.campaign.feasibility.CANDIDATES", 8)
     monkeypatch.setattr("hexacell.campaign.feasibility.DRAWN", 4)
     monkeypatch.setattr("procedures.calibration.workflow.CANDIDATES", 64)
@@ -220,7 +220,7 @@ def few_candidates(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @dataclass
 class Process:
-    """A command that is under way; what it prints goes to files."""
+    """A running command; its output goes to files."""
 
     popen: subprocess.Popen[str]
     out_path: Path
@@ -236,7 +236,7 @@ class Process:
         return self.err_path.read_text()
 
     def wait_for(self, words: str, where: Callable[[], str]) -> None:
-        """Wait until it has printed some words."""
+        """Wait until it has printed some text."""
         self.wait_until(lambda: words in where(), words)
 
     def wait_until(self, condition: Callable[[], bool], what: str) -> None:
@@ -247,7 +247,7 @@ class Process:
             time.sleep(0.02)
 
     def ended(self) -> Outcome:
-        """How it ends by itself, having left no temporary files."""
+        """How it ends by itself; it leaves no temporary files."""
         code = self.popen.wait(PATIENCE_S)
         assert "Traceback" not in self.err, self.err
         assert list(self.temporary.iterdir()) == []
@@ -265,14 +265,14 @@ Start = Callable[..., Process]
 
 @pytest.fixture
 def start(tmp_path: Path) -> Iterator[Start]:
-    """Types a command and lets it go on; whatever still runs after the test is ended."""
+    """Starts a command; if it still runs after the test, it is killed."""
     with started_in(tmp_path) as starting:
         yield starting
 
 
 @pytest.fixture(scope="session")
 def processes() -> Callable[[Path], AbstractContextManager[Start]]:
-    """The same for a folder and as long as one wants; a fresh short cell is put into the folder."""
+    """The same for any folder and scope; the folder gets a fresh short cell."""
 
     def with_cell(folder: Path) -> AbstractContextManager[Start]:
         copy_cell(folder).edit(*SHORT)
@@ -291,7 +291,7 @@ def started_in(folder: Path) -> Iterator[Start]:
 
 
 class Processes:
-    """Commands that are under way in one folder."""
+    """Running commands in one folder."""
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder

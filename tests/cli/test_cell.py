@@ -1,4 +1,4 @@
-"""``hexacell cell``, and what every command says about files it cannot work with."""
+"""``hexacell cell``, and what every command reports about files it cannot use."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def test_validate_with_json(typed_here, cell_folder):
     assert "valid" in outcome.err
 
 
-def test_schema_describes_the_cells_that_come_with_it(typed_here):
+def test_schema_describes_the_bundled_cells(typed_here):
     pretty, compact = typed_here("cell", "schema"), typed_here("cell", "schema", "--json")
     assert (pretty.code, pretty.err) == (compact.code, compact.err) == (0, "")
     assert compact.out.count("\n") == 1
@@ -40,7 +40,7 @@ def test_schema_describes_the_cells_that_come_with_it(typed_here):
     assert set(compact.document["required"]) < set(compact.document["properties"])
 
 
-def test_show_is_a_cell_file_with_defaults_and_where_all_is_from(typed_here, cell_folder):
+def test_show_is_a_cell_file_with_defaults_and_origins(typed_here, cell_folder):
     outcome = typed_here("cell", "show", cell_folder.cell)
     assert (outcome.code, outcome.err) == (0, "")
     assert "move_timeout_s = 60.0  # default\n" in outcome.out
@@ -189,7 +189,7 @@ def test_a_config_that_is_a_folder(typed_here, cell_folder):
 
 @contextmanager
 def an_ordinary_user() -> Iterator[None]:
-    """Root may read everything, so do without being root for a moment."""
+    """Root can read everything, so drop root for a moment."""
     is_root = os.geteuid() == 0
     if is_root:
         os.seteuid(65534)

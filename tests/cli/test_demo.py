@@ -1,4 +1,4 @@
-"""The demo, judged by what it leaves behind rather than by what it says."""
+"""The demo, judged by the files it leaves rather than by its output."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def remarks(text: str) -> list[str]:
 
 
 def distances(demo, phase: str) -> list[float]:
-    """How far the ball strayed at held-out poses, mm, from the raw readings in the journal."""
+    """Deviations of the ball at held-out poses, mm, from the raw readings in the journal."""
     zeros: dict[int, np.ndarray] = {}
     found = []
     for event in demo.events():
@@ -58,7 +58,7 @@ def distances(demo, phase: str) -> list[float]:
     return found
 
 
-def test_it_ends_well_with_one_document_and_words_beside_it(demo):
+def test_it_passes_with_one_document_and_text_on_stderr(demo):
     outcome = demo.outcome
     assert outcome.code == 0, outcome.err
     document = outcome.document
@@ -69,7 +69,7 @@ def test_it_ends_well_with_one_document_and_words_beside_it(demo):
         assert (demo.folder.parent / document[name]).exists()
 
 
-def test_it_says_how_much_better_the_robot_became(demo):
+def test_it_prints_the_deviation_before_and_after(demo):
     line = demo.outcome.document["line"]
     match = re.fullmatch(
         r"35 parameters, 5[0-5] records at 5 points; mean deviation at held-out points "
@@ -88,11 +88,11 @@ def test_the_mean_deviation_falls_by_more_than_99_percent(demo):
     assert np.mean(after) < 0.01 * np.mean(before)
 
 
-def test_it_says_that_its_clock_is_fast(demo):
+def test_it_prints_how_fast_its_clock_is(demo):
     assert "The simulated cell's clock runs 50 times as fast as real time." in demo.outcome.err
 
 
-def test_what_it_says_on_the_way_fits_a_terminal(demo):
+def test_its_output_fits_a_terminal(demo):
     *words, _result = demo.outcome.err.splitlines()
     assert max(map(len, words)) <= 80
     sets = [line for line in words if " records, " in line]
@@ -127,7 +127,7 @@ def test_only_number_tokens_of_the_geometry_are_new_in_the_config(demo):
     assert len(remarks(before)) > 20
 
 
-def test_the_rest_of_the_config_means_what_it_meant(demo):
+def test_the_rest_of_the_config_has_the_same_meaning(demo):
     before, after = (
         tomllib.loads((demo.run / f"config-{when}").read_text()) for when in ("before", "after")
     )
@@ -147,7 +147,7 @@ def test_the_controller_holds_what_was_identified_and_nothing_else_was_touched(d
     assert demo.cell.read_bytes() == (demo.run / "cell.toml").read_bytes()
 
 
-def test_what_it_found_is_how_the_robot_was_really_built(demo):
+def test_the_identified_geometry_is_the_true_one(demo):
     truth = tomllib.loads(demo.cell.read_text())["simulation"]["geometry"]
     nominal = tomllib.loads(demo.cell.read_text())["robot"]["nominal"]
     result = json.loads((demo.run / "result.json").read_text())["geometry"]
@@ -172,8 +172,8 @@ def test_its_run_folder_has_all_that_is_promised(demo):
 
 
 @pytest.fixture
-def former(tmp_path: Path) -> Path:
-    """What a former demo left, with something in it that a new one would lose."""
+def earlier(tmp_path: Path) -> Path:
+    """An earlier demo's folder, with something in it that a new one would remove."""
     folder = tmp_path / "hexacell-demo"
     (folder / "run").mkdir(parents=True)
     (folder / ".hexacell-demo").touch()
@@ -198,22 +198,22 @@ def contents(folder: Path) -> dict[Path, bytes | None]:
         ("simulated-hexaglide.controller", "Did you mean 'simulated-hexaglide'?"),
     ],
 )
-def test_an_unknown_cell_costs_nobody_a_former_demo(typed_here, former, name, words):
-    before = contents(former)
+def test_an_unknown_cell_does_not_remove_an_earlier_demo(typed_here, earlier, name, words):
+    before = contents(earlier)
     outcome = typed_here("demo", "--config", name)
     assert outcome.code == 2
     assert words in outcome.err
-    assert contents(former) == before
+    assert contents(earlier) == before
 
 
-def test_the_cells_on_offer_are_cells(typed_here):
+def test_the_bundled_cells_can_be_loaded(typed_here):
     outcome = typed_here("demo", "--config", "12")
     assert "There are: paper-experiment, simulated-hexaglide" in outcome.err.replace(
         "linuxcnc-hexaglide, ", ""
     )
 
 
-def test_a_folder_of_somebody_elses_is_left_alone(typed_here, tmp_path):
+def test_a_folder_that_is_no_demo_is_left_alone(typed_here, tmp_path):
     theirs = tmp_path / "theirs"
     theirs.mkdir()
     (theirs / "thesis.txt").write_text("years")
@@ -236,20 +236,20 @@ def test_a_file_where_the_folder_should_be(typed_here, tmp_path, folder, words):
     assert contents(tmp_path) == {tmp_path / "file": b"mine"}
 
 
-def test_a_demo_that_is_running_is_not_swept_away(typed_here, former):
-    before = contents(former)
-    with cell_lock(former / "simulated-hexaglide.controller.toml"):
+def test_a_running_demo_is_not_removed(typed_here, earlier):
+    before = contents(earlier)
+    with cell_lock(earlier / "simulated-hexaglide.controller.toml"):
         outcome = typed_here("demo")
     assert outcome.code == 5
     assert f"in use by process {os.getpid()} " in outcome.err
-    assert contents(former) == before
+    assert contents(earlier) == before
 
 
-def test_a_former_demo_is_replaced(former, start):
+def test_an_earlier_demo_is_replaced(earlier, start):
     process = start("demo")
     process.wait_for("TCP controller", lambda: process.out)
-    assert (former / "simulated-hexaglide.toml").is_file()
-    assert b"precious" not in contents(former).values()
+    assert (earlier / "simulated-hexaglide.toml").is_file()
+    assert b"precious" not in contents(earlier).values()
 
 
 @pytest.mark.slow

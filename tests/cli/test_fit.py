@@ -1,4 +1,4 @@
-"""``hexacell fit``: the same answer from a file, and every mistake that a file can have."""
+"""``hexacell fit``: the same result from a file, and every mistake that a file can have."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def fit(typed, cell_folder, measurements="m.csv", *arguments):
 
 @pytest.mark.parametrize("config", ["config-before", "config-after"])
 def test_the_demos_records_give_the_demos_geometry(typed_here, demo, cell_folder, config):
-    """Whether the controller holds the old geometry still or the new one already."""
+    """Whether the controller's config has the old geometry or the new one."""
     shutil.copy(demo.run / config, cell_folder.controller)
     outcome = fit(typed_here, cell_folder, demo.run / "measurements.csv", "--json")
     assert outcome.code == 0
@@ -37,7 +37,7 @@ def test_the_demos_records_give_the_demos_geometry(typed_here, demo, cell_folder
         assert np.abs(found - expected[name]).max() < 1e-9
 
 
-def test_the_document_is_as_promised(typed, demo):
+def test_the_document_is_as_documented(typed, demo):
     outcome = typed("fit", demo.cell, "--measurements", demo.run / "measurements.csv", "--json")
     assert (outcome.code, outcome.err) == (0, "")
     document = outcome.document
@@ -56,7 +56,7 @@ def test_the_document_is_as_promised(typed, demo):
     assert 0.5 < document["chi2"] / document["dof"] < 1.5
 
 
-def test_words_have_a_line_for_every_free_parameter(typed_here, demo):
+def test_the_text_has_a_line_for_every_free_parameter(typed_here, demo):
     outcome = typed_here("fit", demo.cell, "--measurements", demo.run / "measurements.csv")
     assert (outcome.code, outcome.err) == (0, "")
     records = len((demo.run / "measurements.csv").read_text().splitlines()) - 1
@@ -68,7 +68,7 @@ def test_words_have_a_line_for_every_free_parameter(typed_here, demo):
         assert float(new) - float(old) == pytest.approx(float(change), abs=0.0011)
 
 
-def test_few_records_are_no_geometry(typed_here, cell_folder, tmp_path, records):
+def test_too_few_records_are_refused(typed_here, cell_folder, tmp_path, records):
     (tmp_path / "m.csv").write_text("\n".join([*records[:3], *records[12:14]]))
     outcome = fit(typed_here, cell_folder, "m.csv", "--json")
     assert outcome.code == 1
@@ -158,7 +158,7 @@ def test_a_file_that_cannot_be_read(typed_here, cell_folder, name, words):
     assert words in outcome.err
 
 
-def test_further_columns_another_order_and_windows_line_ends_are_welcome(
+def test_further_columns_another_order_and_windows_line_ends_are_accepted(
     typed_here, demo, tmp_path, records
 ):
     order = [*reversed(range(len(HEADER)))]

@@ -1,4 +1,4 @@
-"""What a newcomer types first: nothing, a wrong word, ``--help``."""
+"""What a newcomer types first: nothing, a wrong command, ``--help``."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def imported(folder: Path, *arguments: str) -> set[str]:
 
 
 @pytest.mark.parametrize("arguments", [["run", "--help"], [], ["frobnicate"], ["fit", "--help"]])
-def test_nothing_slow_is_imported_to_help(tmp_path, arguments):
+def test_help_imports_nothing_slow(tmp_path, arguments):
     modules = imported(tmp_path, *arguments)
     assert "hexacell" in modules
     assert modules.isdisjoint(SLOW_TO_IMPORT)
@@ -81,7 +81,7 @@ def test_no_arguments_are_answered_with_the_help(typed):
         (["simulate", "cell.toml", "--json"], "unrecognized arguments: --json"),
     ],
 )
-def test_a_slip_is_told_in_one_line(typed_here, arguments, words):
+def test_a_usage_error_is_one_line(typed_here, arguments, words):
     outcome = typed_here(*arguments)
     assert outcome.code == 2
     assert outcome.err.startswith("hexacell: ")
@@ -89,7 +89,7 @@ def test_a_slip_is_told_in_one_line(typed_here, arguments, words):
     assert words in outcome.err
 
 
-def test_a_slip_with_json_is_a_document_too(typed):
+def test_a_usage_error_with_json_is_a_document_too(typed):
     outcome = typed("run", "--json")
     assert outcome.code == 2
     assert outcome.document == {

@@ -1,4 +1,4 @@
-"""``hexacell next``: asked record by record by a program that knows nothing of our code."""
+"""``hexacell next``: called record by record by an independent program."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ PROMISED = {
 
 
 class Stranger:
-    """Somebody else's robot, gauges and program: it sends poses, reads, and writes lines of CSV."""
+    """Another program with its own robot and gauges: it sends poses, reads, and writes lines of CSV."""
 
     def __init__(self, cell: Path, controller: Path, file: Path, noise_mm: float = NOISE_MM) -> None:
         truth = tomllib.loads(cell.read_text())["simulation"]["geometry"]
@@ -55,7 +55,7 @@ class Stranger:
             csv.writer(stream).writerow(HEADER)
 
     def measure(self, asked: dict[str, Any]) -> None:
-        """Go where it is said, read, and write it down."""
+        """Go to the proposed pose, read, and append a line."""
         pose = [asked["pose"][name] for name in "xyzabc"]
         command = PoseBatch.of([Pose(*pose)])
         joints = inverse_kinematics(Hexaglide(), self.believed, self.branch, command)
@@ -80,7 +80,7 @@ class Stranger:
             csv.writer(stream).writerow(row)
 
     def continue_solution(self, ask: Callable[[], dict[str, Any]]) -> list[dict[str, Any]]:
-        """Measure whatever is asked for until it is done; all that was said."""
+        """Measure every proposed pose until it is done; all documents."""
         said: list[dict[str, Any]] = []
         while not said or not said[-1]["done"]:
             said.append(ask())
@@ -106,7 +106,7 @@ def stranger(cell_folder: Any, tmp_path: Path) -> Stranger:
 
 @pytest.fixture(autouse=True)
 def few(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Choose among few poses in this process: how good the choice is is not under test there."""
+    """Choose among few poses in this process; the quality of the choice is not under test."""
     monkeypatch.setattr("hexacell.cli.commands.next.Plan", partial(Plan, candidates=128))
 
 
@@ -140,7 +140,7 @@ def test_record_by_record_to_the_end(typed_here, short_cell, stranger):
 @pytest.mark.slow
 @pytest.mark.timeout(600)
 def test_it_reaches_the_accuracy_of_a_run(typed, cell_folder, stranger, demo):
-    """Every question a process of its own; the demo ran the same cell on its own devices."""
+    """Every call is a process of its own; the demo ran the same cell on its own devices."""
     said = stranger.continue_solution(asking(typed, cell_folder, stranger.file))
     assert len(said) == 56
     assert stranger.farthest < TRAVEL_MM
@@ -163,7 +163,7 @@ EMPTY = {"header only": ",".join(HEADER) + "\n", "nothing at all": "", "blank li
 
 
 @pytest.mark.parametrize("text", EMPTY.values(), ids=EMPTY)
-def test_an_empty_file_is_a_start(typed_here, cell_folder, tmp_path, text):
+def test_an_empty_file_starts_a_campaign(typed_here, cell_folder, tmp_path, text):
     (tmp_path / "m.csv").write_text(text)
     outcome = typed_here("next", cell_folder.cell, "--measurements", "m.csv", "--json")
     assert (outcome.code, outcome.err) == (0, "")
@@ -172,7 +172,7 @@ def test_an_empty_file_is_a_start(typed_here, cell_folder, tmp_path, text):
     assert said["pose"] == {"x": 0.0, "y": 0.0, "z": 550.0, "a": 0.0, "b": 0.0, "c": 0.0}
 
 
-def test_words_for_people(typed_here, cell_folder, stranger):
+def test_text_for_users(typed_here, cell_folder, stranger):
     outcome = typed_here("next", cell_folder.cell, "--measurements", stranger.file)
     assert (outcome.code, outcome.err) == (0, "")
     assert "Begin point 1: go to X0.000 Y0.000 Z550.000" in outcome.out
@@ -226,7 +226,7 @@ def test_a_file_that_is_not_there(typed_here, cell_folder):
 
 
 @pytest.mark.parametrize("number", ["-1", "one"])
-def test_a_count_of_refusals_that_is_none(typed_here, cell_folder, number):
+def test_an_invalid_count_of_refusals(typed_here, cell_folder, number):
     outcome = typed_here("next", cell_folder.cell, "--measurements", "m.csv", "--refused", number)
     assert outcome.code == 2
     assert "--refused" in outcome.err

@@ -1,4 +1,4 @@
-"""What stands in the way of a calibration is said before anything moves, all of it at once."""
+"""Everything that prevents a calibration is reported at once, before anything moves."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def never_moves(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture
 def cell_folder(short_cell: Any) -> Any:
-    """A short cell: what stands in its way is as with many points."""
+    """A short cell: its failures are those of a cell with many points."""
     return short_cell
 
 
@@ -46,7 +46,7 @@ def serving(tmp_path_factory: pytest.TempPathFactory, processes: Any) -> Iterato
 
 @pytest.fixture
 def served(serving: str, cell_folder: Any) -> Any:
-    """A folder whose cell file leads to the served cell, to be spoilt."""
+    """A folder whose cell file reaches the served cell; tests break it."""
     cell_folder.cell.write_text(
         re.sub(r"(?m)^config = .*$", f'config = "{cell_folder.controller.name}"', serving)
     )
@@ -60,7 +60,7 @@ def port_of(served: Any, gauge: str) -> str:
 
 
 def refused(typed: Any, served: Any, command: str, code: int, *words: str) -> str:
-    """Assert that a command ends with a code and says these words, and leaves the folder as it is."""
+    """Assert that a command ends with a code and prints these words, and leaves the folder unchanged."""
     before = served.snapshot()
     outcome = typed(command, served.cell, "--json")
     assert outcome.code == outcome.document["exit_code"] == code, outcome.err
@@ -72,7 +72,7 @@ def refused(typed: Any, served: Any, command: str, code: int, *words: str) -> st
 
 
 @pytest.mark.usefixtures("never_moves", "one_robot")
-def test_a_cell_that_is_in_order(typed_here, cell_folder):
+def test_a_cell_without_faults(typed_here, cell_folder):
     before = cell_folder.snapshot()
     outcome = typed_here("preflight", cell_folder.cell)
     assert (outcome.code, outcome.err) == (0, "")
@@ -134,7 +134,7 @@ def test_a_port_that_is_not_there(typed_here, served, command):
 
 @pytest.fixture
 def silent_port() -> Iterator[str]:
-    """A serial port at whose other end nobody is."""
+    """A serial port with nothing at its other end."""
     master, slave = pty.openpty()
     tty.setraw(slave)
     yield os.ttyname(slave)
@@ -167,7 +167,7 @@ def test_a_bus_that_is_not_there(typed_here, served):
 
 @pytest.fixture
 def closed_port() -> int:
-    """A TCP port that nobody listens on."""
+    """A TCP port on which nothing listens."""
     with socket.create_server(("127.0.0.1", 0)) as server:
         return int(server.getsockname()[1])
 
@@ -236,7 +236,7 @@ UNKNOWN = {
 @pytest.mark.parametrize(
     "command", [["preflight"], ["run"], ["simulate"], ["cell", "validate"]], ids=" ".join
 )
-def test_what_no_plugin_offers_gets_the_nearest(typed_here, cell_folder, command, thing):
+def test_an_unknown_plugin_is_reported_with_the_nearest(typed_here, cell_folder, command, thing):
     edit, words = UNKNOWN[thing]
     cell_folder.edit(edit)
     before = cell_folder.snapshot()

@@ -1,4 +1,4 @@
-"""Preflight over the plan: what cannot work is refused with the reason, what can is foretold."""
+"""Preflight of the plan: a plan that cannot work is refused with the reason, others are predicted."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ def test_a_cell_that_cannot_be_calibrated_is_refused_with_the_reason(
 
 
 @pytest.mark.usefixtures("one_robot")
-def test_what_the_plan_will_give_is_said_before_any_motion(typed_here: Any, cell_folder: Any) -> None:
+def test_the_predicted_accuracy_is_printed_before_any_motion(typed_here: Any, cell_folder: Any) -> None:
     cell_folder.edit(("orientations = 11", "orientations = 7"))
     before = cell_folder.snapshot()
     outcome = typed_here("preflight", cell_folder.cell, "--json")
@@ -159,7 +159,7 @@ def test_a_list_of_poses_goes_through_the_same_preflight(
 
 @pytest.mark.usefixtures("one_robot")
 def test_a_list_of_poses_that_can_be_measured(typed_here: Any, cell_folder: Any) -> None:
-    """Gauges with a long travel can follow it even on a robot that is not calibrated."""
+    """Gauges with a long travel can measure it even on an uncalibrated robot."""
     listed(cell_folder, lambda rows: rows)
     cell_folder.edit(("gauge_travel_mm = 5.0", "gauge_travel_mm = 60.0"))
     outcome = typed_here("preflight", cell_folder.cell, "--json")

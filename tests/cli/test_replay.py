@@ -1,4 +1,4 @@
-"""``hexacell replay``: what it says and how it ends."""
+"""``hexacell replay``: its output and exit codes."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ def test_the_identification_alone(typed_here, manipulated):
     assert outcome.out.startswith("0 decisions and 1 results of ")
 
 
-def test_what_cannot_be_read_is_told(typed_here, demo, tmp_path):
+def test_an_unreadable_journal_is_reported(typed_here, demo, tmp_path):
     outcome = typed_here("replay", tmp_path / "nowhere")
     assert outcome.code == 2
     assert "nowhere: cannot be read: it does not exist" in outcome.err

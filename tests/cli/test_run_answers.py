@@ -1,4 +1,4 @@
-"""Who lets a new geometry into the controller: limits, a person, or nobody."""
+"""Who approves a new geometry: limits, a person, or nobody."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class Terminal:
     seen: int = field(default=0)
 
     def read_until(self, words: str) -> str:
-        """What is shown up to these words, since the last time."""
+        """What is shown from the last time up to these words."""
         give_up = time.monotonic() + 30.0
         while (place := self.shown.find(words, self.seen)) < 0:
             if time.monotonic() > give_up:
@@ -72,7 +72,7 @@ def start_at(terminal, start, *arguments):
 
 
 def ended(process, terminal):
-    """How it ends, its terminal being read meanwhile."""
+    """How it ends; its terminal is read meanwhile."""
     give_up = time.monotonic() + 30.0
     while process.popen.poll() is None and time.monotonic() < give_up:
         terminal.drain()
@@ -107,7 +107,7 @@ class TestNobodyIsThere:
         assert re.search(r"The largest change is \d\.\d\d mm \(limit without a person 1 mm\)", outcome.err)
         assert fast_cell.controller.read_bytes() == config
 
-    def test_a_result_out_of_limits_is_taken_back_bit_for_bit(self, typed_here, fast_cell, demo):
+    def test_a_result_out_of_limits_is_rolled_back_bit_for_bit(self, typed_here, fast_cell, demo):
         fast_cell.edit(("mean_deviation_mm = 0.05", "mean_deviation_mm = 0.0001"))
         run = fast_cell.rewound(demo.run, before="propose")
         config = fast_cell.controller.read_bytes()
@@ -128,9 +128,7 @@ class TestNobodyIsThere:
         assert f"{fast_cell.controller}: the config changed since the run began" in outcome.err
         assert fast_cell.controller.read_bytes() == theirs
 
-    def test_a_controller_that_does_not_take_it_gets_the_old_one_back(
-        self, start, typed_here, fast_cell, demo
-    ):
+    def test_a_controller_that_refuses_it_gets_the_old_one_back(self, start, typed_here, fast_cell, demo):
         simulation = start("simulate", fast_cell.cell)
         simulation.wait_for("serving", lambda: simulation.err)
         fast_cell.cell.write_text(
@@ -146,7 +144,7 @@ class TestNobodyIsThere:
         assert "its config is as it was" in outcome.err
         assert fast_cell.controller.read_bytes() == config
 
-    def test_a_check_touches_nothing(self, typed_here, fast_cell):
+    def test_a_check_changes_nothing(self, typed_here, fast_cell):
         fast_cell.edit(("orientations = 6", "orientations = 2"))
         config = fast_cell.controller.read_bytes()
         outcome = typed_here("run", fast_cell.cell, "--unattended", "--json")
@@ -162,7 +160,7 @@ class TestNobodyIsThere:
         sampled = [e for e in read_journal(run / "journal.jsonl") if isinstance(e, events.RecordTaken)]
         assert {event.at.phase.value for event in sampled} == {"before-V"}
 
-    def test_closed_standard_streams_are_nobody(self, start, fast_cell, demo):
+    def test_closed_standard_streams_are_unattended(self, start, fast_cell, demo):
         fast_cell.edit(ASK)
         run = fast_cell.rewound(demo.run, before="propose")
         process = start("run", fast_cell.cell, "--resume", run, through='exec "$@" <&- >&- 2>&-')
@@ -205,7 +203,7 @@ class TestAPersonAtTheTerminal:
         assert "left without an answer" in terminal.shown
         assert cell.controller.read_bytes() == (demo.run / "config-before").read_bytes()
 
-    def test_a_question_keeps_nobody_from_leaving(self, waiting, terminal):
+    def test_a_question_can_be_interrupted(self, waiting, terminal):
         process, _, _ = waiting
         begun = time.monotonic()
         process.popen.send_signal(signal.SIGINT)
@@ -213,7 +211,7 @@ class TestAPersonAtTheTerminal:
         assert time.monotonic() - begun < 2.0
         assert "hexacell: interrupted" in terminal.shown
 
-    def test_carries_the_gauges_from_point_to_point(self, quick_cell, start, terminal):
+    def test_moves_the_gauges_from_point_to_point(self, quick_cell, start, terminal):
         quick_cell.edit(BY_HAND)
         process = start_at(terminal, start, "run", quick_cell.cell, "--mode", "check")
         terminal.read_until("Press Enter when they are in place. ")

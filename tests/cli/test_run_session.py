@@ -1,4 +1,4 @@
-"""The last words of a run that did not come to its end."""
+"""What is printed when a run ends early."""
 
 from __future__ import annotations
 
@@ -25,10 +25,8 @@ UNVERIFIED = "The controller's config holds the new geometry, which is not verif
 @pytest.mark.parametrize(
     ("history", "is_said"), [([], False), ([COMMITTED], True), ([COMMITTED, *WITHDRAWN], False)]
 )
-def test_a_geometry_that_nobody_verified_is_never_left_without_a_word(
-    cell_folder, capsys, history, is_said: bool
-) -> None:
-    """Not even where resuming fails before the engine runs."""
+def test_an_unverified_geometry_is_always_reported(cell_folder, capsys, history, is_said: bool) -> None:
+    """Also if resuming fails before the engine runs."""
     folder = RunFolder(cell_folder.path / "run")
     folder.path.mkdir()
     with Journal(folder.journal) as journal:

@@ -1,4 +1,4 @@
-"""A run that is stopped, and goes on later as its last words say."""
+"""A run that is stopped, and resumed with the command that it printed."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def records_in(cell) -> int:
 
 
 def to_go_on(words: str) -> list[str]:
-    """The command that the last words of a run give, without ``hexacell``."""
+    """The command that a stopped run prints, without ``hexacell``."""
     lines = words.splitlines()
     place = lines.index("Stopped; what was measured is kept. To go on:")
     program, *arguments = shlex.split(lines[place + 1])
@@ -51,7 +51,7 @@ def to_go_on(words: str) -> list[str]:
     return arguments
 
 
-def test_a_check_is_stopped_at_once_and_goes_on_as_it_says(start, typed_here, good_cell):
+def test_a_check_is_stopped_at_once_and_resumed_as_it_says(start, typed_here, good_cell):
     config = good_cell.controller.read_bytes()
     process = start("run", good_cell.cell, "--unattended")
     under_way(process, good_cell, 1)
@@ -105,7 +105,7 @@ def test_a_stop_before_anything_was_measured_leaves_nothing_to_resume(start, goo
     assert ("To go on" in outcome.out) == bool(good_cell.runs())
 
 
-def test_a_terminal_that_goes_stops_it_too_and_json_says_so(start, good_cell):
+def test_a_closed_terminal_stops_it_too_and_json_says_so(start, good_cell):
     process = start("run", good_cell.cell, "--unattended", "--json")
     under_way(process, good_cell, 1)
     outcome, seconds = process.stopped(signal.SIGHUP)
@@ -114,8 +114,8 @@ def test_a_terminal_that_goes_stops_it_too_and_json_says_so(start, good_cell):
     assert "To go on:" in outcome.err
 
 
-def test_impatience_changes_nothing(start, good_cell):
-    """Ctrl-C again and again while it stops."""
+def test_repeated_ctrl_c_changes_nothing(start, good_cell):
+    """Ctrl-C several times while it stops."""
     process = start("run", good_cell.cell, "--unattended")
     under_way(process, good_cell, 1)
     for _ in range(5):
@@ -126,7 +126,7 @@ def test_impatience_changes_nothing(start, good_cell):
 
 
 def test_sigterm_stops_what_ignores_ctrl_c(start, good_cell):
-    """So a shell script starts what it puts into the background."""
+    """As in the background job of a shell script."""
     process = start("run", good_cell.cell, "--unattended", through="trap '' INT; exec \"$@\"")
     under_way(process, good_cell, 1)
     process.popen.send_signal(signal.SIGINT)
@@ -145,7 +145,7 @@ def test_a_kill_leaves_what_can_be_resumed(start, typed_here, good_cell):
     assert resumed.code == 0, resumed.err
 
 
-def test_nobody_listening_is_no_reason_to_stop(start, good_cell):
+def test_a_closed_output_does_not_stop_it(start, good_cell):
     """``hexacell run ... | head -1``: the job is done, and the exit code is the job's."""
     reader, writer = os.pipe()
     os.close(reader)
@@ -217,7 +217,7 @@ class TestWhatCannotBeResumed:
         self.refused(typed_here, cell_folder, rewound, "the journal is empty")
 
 
-def test_the_words_of_a_run_and_its_journal_agree(demo):
+def test_the_output_of_a_run_agrees_with_its_journal(demo):
     ended = history(demo.run)[-1]
     assert isinstance(ended, events.Ended)
     assert json.loads(demo.outcome.out)["line"] == ended.line

@@ -1,4 +1,4 @@
-"""Signals while an engine runs: commands, in the order they came, and nothing cut short."""
+"""Signals while an engine runs: commands in their order, and no step is cut short."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def send(*numbers: signal.Signals) -> None:
 
 
 async def commands_after(signals: SignalCommands, *numbers: signal.Signals) -> list[Command]:
-    """What an engine finds in its inbox."""
+    """The commands that an engine receives."""
     with signals.inbox.attended():
         send(*numbers)
         return [await signals.inbox.next() for _ in numbers]
@@ -57,7 +57,7 @@ INT, TERM, HUP = ENDING_SIGNALS
         ((TERM, HUP), [STOP, STOP]),
     ],
 )
-def test_the_first_stops_and_ctrl_c_once_more_aborts(signals, numbers: Any, commands: Any) -> None:
+def test_the_first_signal_stops_and_a_second_ctrl_c_aborts(signals, numbers: Any, commands: Any) -> None:
     assert signals.run(commands_after(signals, *numbers)) == commands
 
 
@@ -121,7 +121,7 @@ def test_what_is_ignored_stays_ignored(signals) -> None:
         signal.signal(INT, former)
 
 
-def test_a_mistake_of_the_program_is_a_document_and_a_traceback(monkeypatch, capsys) -> None:
+def test_a_bug_gives_a_document_and_a_traceback(monkeypatch, capsys) -> None:
     def mistake(_: Any) -> Any:
         raise ZeroDivisionError("division by zero")
 

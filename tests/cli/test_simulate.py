@@ -23,7 +23,7 @@ def serving(start, folder):
 
 @pytest.fixture
 def served(start, quick_cell):
-    """The folder of a quick cell that another process serves; ``served.toml`` leads to it."""
+    """The folder of a quick cell that another process serves; ``served.toml`` reaches it."""
     process, text = serving(start, quick_cell)
     (quick_cell.path / "served.toml").write_text(text)
     return process, quick_cell.path / "served.toml"
@@ -31,7 +31,7 @@ def served(start, quick_cell):
 
 @pytest.fixture(scope="module")
 def shared(tmp_path_factory, processes):
-    """A cell that is served for several tests: its folder, the process, and what that printed."""
+    """A cell that is served for several tests: its folder, the process, and its output."""
     folder = tmp_path_factory.mktemp("shared")
     with processes(folder) as start:
         process = start("simulate", folder / CELL)
@@ -52,7 +52,7 @@ def test_it_prints_a_complete_cell_file_before_it_says_that_it_serves(shared, ty
     assert typed_here("cell", "validate", printed).code == 0
 
 
-def test_the_truth_stays_hidden(shared):
+def test_the_true_geometry_is_not_printed(shared):
     folder, _, text = shared
     truth = tomllib.loads((folder / CELL).read_text())["simulation"]["geometry"]
     for length in truth["l"]:
@@ -94,14 +94,14 @@ def test_it_ends_cleanly(start, cell_folder, number):
         assert port.startswith("/dev/pts/") or not Path(port).exists()
 
 
-def test_it_has_no_processes_that_could_stay(shared):
+def test_it_starts_no_other_processes(shared):
     _, process, _ = shared
     pid = process.popen.pid
     assert Path(f"/proc/{pid}/task/{pid}/children").read_text() == ""
 
 
 def test_it_ends_while_a_run_talks_to_it(served, start):
-    """The run then says which device has gone, and that it can be resumed."""
+    """The run then reports which device is lost, and that it can be resumed."""
     simulation, printed = served
     run = start("run", printed, "--mode", "check")
     run.wait_until(lambda: "journal" in names_below(printed.parent), "a journal")
@@ -117,7 +117,7 @@ def names_below(folder: Path) -> set[str]:
     return {path.stem for path in folder.rglob("*")}
 
 
-def test_output_goes_to_a_file_where_one_is_named(start, cell_folder):
+def test_output_goes_to_the_named_file(start, cell_folder):
     process = start("simulate", cell_folder.cell, "--output", "served.toml")
     process.wait_for("serving", lambda: process.err)
     assert process.out == ""

@@ -39,7 +39,7 @@ def rejected_record(
         fact, action = _mismatched_joints(leg)
     elif offset_mm is None:
         fact, action = (
-            "a singularity is too near for this record to be used",
+            "the pose is too near a singularity for this record to be used",
             "Choose another orientation",
         )
     else:
@@ -67,7 +67,7 @@ def zero_shift(shift: ZeroShiftHypothesis, left_out: Sequence[RecordId]) -> Data
 
 def refused_zero_shift(shift: ZeroShiftHypothesis, equations: int) -> DataFault:
     """A shift of the gauges' zero after which too few records are left."""
-    consequence = f", and the records before it and at the other points give {equations} equations only"
+    consequence = f", and the records before it and at the other points give only {equations} equations"
     return _zero_shift(shift, consequence)
 
 
@@ -86,9 +86,9 @@ def gauge_fault(hypothesis: GaugeFaultHypothesis, before: ChiSquareTest, after: 
 def _mismatched_joints(leg: tuple[int, float]) -> tuple[str, str]:
     number, off = leg
     return (
-        f"q{number} is {off:+.3f} mm from where the commanded pose puts it, unlike in the point's other "
-        "records; this one is left out"
-    ), "Check whether its q1 to q6 belong to another pose, or measure it again"
+        f"q{number} is {off:+.3f} mm off its place for the commanded pose, unlike in the point's other "
+        "records; the record is left out"
+    ), "Check whether q1 to q6 belong to another pose, or measure it again"
 
 
 def _wrong_readings(kind: DataFaultKind, gauges: str, offset_mm: Deviation) -> str:
@@ -101,11 +101,11 @@ def _wrong_readings(kind: DataFaultKind, gauges: str, offset_mm: Deviation) -> s
             return f"{_names(gauges)} read in inches"
     if gauges:
         offset = offset_mm[GAUGES.index(gauges)]
-        return f"gauge {gauges} shows {offset:+.3f} mm more than all other records let expect"
+        return f"gauge {gauges} is {offset:+.3f} mm off what all other records predict"
     x, y, z = offset_mm
     return (
-        f"the gauges show x {x:+.3f}, y {y:+.3f}, z {z:+.3f} mm more than all other records let expect, "
-        "so that more than one of them is wrong, or an encoder"
+        f"the gauges are x {x:+.3f}, y {y:+.3f}, z {z:+.3f} mm off what all other records predict: "
+        "more than one of them is wrong, or an encoder"
     )
 
 

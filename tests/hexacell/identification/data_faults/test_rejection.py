@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from hexacell.identification.estimator import identify
+from hexacell.identification.solver.result import DataFaultKind, GaugeFaultError
 from hexacell.measurements.records import MeasurementSet
 
 
@@ -98,3 +101,97 @@ def test_nothing_is_left_out_where_nobody_asked(noisy, spoil, make_problem):
     assert found.data_faults == ()
     assert found.records == 55
     assert found.chi2 > 500
+
+
+def changed(measurements, change, *, point=None, first=1):
+    """Readings d (3,) replaced by ``change(d)``, at one point or at all, from one orientation on."""
+    return MeasurementSet(
+        tuple(
+            replace(record, deviation=tuple(np.asarray(change(np.array(record.deviation))).tolist()))
+            if point in {None, record.point} and record.orientation >= first
+            else record
+            for record in measurements.records
+        )
+    )
+
+
+def test_all_records_after_a_shift_of_the_zero_are_left_out(noisy, make_problem):
+    shifted = changed(noisy, lambda d: np.add(d, [0.0, 0.4, 0.0]), point=2, first=5)
+    found = identify(make_problem(shifted))
+    (fault,) = found.data_faults
+    assert (fault.kind, fault.point, fault.orientation) == (DataFaultKind.ZERO_SHIFT, 2, 5)
+    assert fault.gauges == "y"
+    assert fault.left_out == tuple((2, orientation) for orientation in range(5, 12))
+    clean = identify(make_problem(without(noisy, *fault.left_out)))
+    assert found.geometry.largest_difference(clean.geometry) < 1e-6
+
+
+def test_two_shifts_of_the_zero_are_found_one_after_the_other(noisy, make_problem):
+    shifted = changed(noisy, lambda d: np.add(d, [0.0, 0.4, 0.0]), point=2, first=5)
+    shifted = changed(shifted, lambda d: np.add(d, [1.0, 0.0, 0.0]), point=4, first=7)
+    faults = identify(make_problem(shifted)).data_faults
+    assert {(fault.kind, fault.point, fault.orientation) for fault in faults} == {
+        (DataFaultKind.ZERO_SHIFT, 2, 5),
+        (DataFaultKind.ZERO_SHIFT, 4, 7),
+    }
+
+
+def test_a_shift_that_leaves_too_few_records_is_refused(visit, make_problem):
+    few = visit(points=2, orientations=10, seed=80).measured(0.01, seed=81)
+    shifted = changed(few, lambda d: np.add(d, [0.0, 1.5, 0.5]), point=1, first=3)
+    with pytest.raises(GaugeFaultError, match="give only 30 equations") as raised:
+        identify(make_problem(shifted))
+    assert raised.value.fault.kind is DataFaultKind.ZERO_SHIFT
+    assert raised.value.fault.left_out == ()
+
+
+@pytest.mark.parametrize(
+    ("change", "point", "kind", "gauges"),
+    [
+        (lambda d: d * [1.0, 1.0, -1.0], 2, DataFaultKind.REVERSED, "z"),
+        (lambda d: -d, None, DataFaultKind.REVERSED, "xyz"),
+        (lambda d: d[[1, 0, 2]], None, DataFaultKind.EXCHANGED, "xy"),
+        (lambda d: d[[2, 0, 1]], 3, DataFaultKind.EXCHANGED, "xyz"),
+        (lambda d: d / [1.0, 25.4, 1.0], 1, DataFaultKind.INCHES, "y"),
+        (lambda d: d / 25.4, None, DataFaultKind.INCHES, "xyz"),
+    ],
+)
+def test_a_gauge_fault_is_refused_and_named(visit, make_problem, change, point, kind, gauges):
+    """Of more records than those for which a fit from other starts is tried first, which takes long."""
+    many = visit(points=6, seed=2).measured(0.01, seed=1)
+    with pytest.raises(GaugeFaultError) as raised:
+        identify(make_problem(changed(many, change, point=point)))
+    fault = raised.value.fault
+    assert (fault.kind, fault.point, fault.gauges) == (kind, point, gauges)
+    assert fault.left_out == ()
+    assert str(raised.value) == f"{fault.sentence}. {fault.action}"
+
+
+def test_a_gauge_fault_in_few_records_is_refused_too(noisy, make_problem):
+    with pytest.raises(GaugeFaultError, match="gauge z seems to read in inches at point 3"):
+        identify(make_problem(changed(noisy, lambda d: d / [1.0, 1.0, 25.4], point=3)))
+
+
+@pytest.mark.parametrize(
+    ("change", "kind", "gauges"),
+    [
+        (lambda d: d[[1, 0, 2]], DataFaultKind.EXCHANGED, "xy"),
+        (lambda d: d * [1.0, 1.0, -1.0], DataFaultKind.REVERSED, "z"),
+    ],
+)
+def test_a_gauge_fault_of_one_record_leaves_only_that_out(noisy, make_problem, change, kind, gauges):
+    records = list(noisy.records)
+    wrong = records[17]
+    records[17] = replace(wrong, deviation=tuple(change(np.array(wrong.deviation)).tolist()))
+    (fault,) = identify(make_problem(MeasurementSet(tuple(records)))).data_faults
+    assert (fault.kind, fault.gauges) == (kind, gauges)
+    assert fault.left_out == ((wrong.point, wrong.orientation),)
+
+
+def test_joint_variables_of_another_pose_are_recognized(noisy, make_problem):
+    records = list(noisy.records)
+    first, second = records[16], records[17]
+    records[16], records[17] = replace(first, joints=second.joints), replace(second, joints=first.joints)
+    faults = identify(make_problem(MeasurementSet(tuple(records)))).data_faults
+    assert [fault.kind for fault in faults] == [DataFaultKind.MISMATCHED_JOINTS] * 2
+    assert [fault.orientation for fault in faults] == [first.orientation, second.orientation]

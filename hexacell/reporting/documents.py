@@ -48,6 +48,7 @@ def identification_document(found: Identification) -> dict[str, Any]:
 
 def _outlier(record: RecordId, fault: DataFault) -> dict[str, Any]:
     point, orientation = record
+    # The gauges of a zero shift are named in its finding only.
     is_single_record = fault.kind is not DataFaultKind.ZERO_SHIFT
     return {
         "point": point,

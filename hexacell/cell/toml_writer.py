@@ -23,7 +23,7 @@ def to_toml(settings: Section, remark: Remark = lambda _: None) -> str:
 
 
 def subsections(path: KeyPath, value: object) -> list[tuple[KeyPath, Section]]:
-    """The sections that the value at ``path`` is made of, each with its path; none if it is plain."""
+    """The sections in the value at ``path``, each with its path; none if it is a plain value."""
     if isinstance(value, Section):
         return [(path, value)]
     items = value if isinstance(value, tuple) else ()
@@ -31,7 +31,7 @@ def subsections(path: KeyPath, value: object) -> list[tuple[KeyPath, Section]]:
 
 
 def _section(section: Section, path: KeyPath, remark: Remark) -> Iterator[str]:
-    """The section's own values first: after the first header every key would belong to that."""
+    """The section's own values first: after a header every key belongs to the section it opens."""
     for name, value in section:
         if not subsections((*path, name), value):
             yield from _setting(name, value, remark((*path, name)))
@@ -44,32 +44,14 @@ def _section(section: Section, path: KeyPath, remark: Remark) -> Iterator[str]:
 def _setting(name: str, value: object, comment: str | None) -> list[str]:
     if value is None:
         return [f"# {name} is not set"] if comment else []
-    return [f"{name} = {_value(value, rows=True)}" + (f"  # {comment}" if comment else "")]
+    return [f"{name} = {_value(value)}" + (f"  # {comment}" if comment else "")]
 
 
-def _value(value: object, *, rows: bool = False) -> str:
-    match value:
-        case bool():
-            return str(value).lower()
-        case int():
-            return str(int(value))
-        case float():
-            return repr(float(value))
-        case tuple() | list():
-            return _list(value, rows=rows)
-        case dict():
-            pairs = (f"{_key(key)} = {_value(inner)}" for key, inner in value.items() if inner is not None)
-            return "{" + ", ".join(pairs) + "}"
-        case _:
-            return tomlkit.item(value).as_string()
-
-
-def _list(items: tuple[object, ...] | list[object], *, rows: bool) -> str:
-    """A list on one line, or, ``rows`` asked for and lists in it, one of them a line."""
-    if rows and items and all(isinstance(item, tuple) for item in items):
-        return "[\n" + "".join(f"  {_value(item)},\n" for item in items) + "]"
-    return "[" + ", ".join(_value(item) for item in items) + "]"
-
-
-def _key(name: str) -> str:
-    return tomlkit.key(name).as_string()
+def _value(value: object) -> str:
+    if isinstance(value, tuple) and value and all(isinstance(row, tuple) for row in value):
+        return "[\n" + "".join(f"  {_value(row)},\n" for row in value) + "]"
+    if isinstance(value, dict):
+        table = tomlkit.inline_table()
+        table.update(value)
+        return table.as_string()
+    return tomlkit.item(value).as_string()

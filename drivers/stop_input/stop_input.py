@@ -18,7 +18,7 @@ import serial
 
 from drivers.interfaces import DeviceIdentity
 from drivers.serial.errors import port_open_failed, settings_rejected
-from hexacell.cell.model import GuardSettings
+from hexacell.cell.limits import GuardSettings
 from hexacell.errors import HexacellError
 
 SUBJECT = "stop line"

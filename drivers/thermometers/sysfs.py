@@ -14,7 +14,7 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
 
 from drivers.interfaces import DeviceIdentity, TemperatureReading
-from hexacell.cell.model import ThermometerSettings
+from hexacell.cell.devices import ThermometerSettings
 from hexacell.errors import DeviceError
 from hexacell.storage.atomic_files import os_error_to_file_error
 

@@ -11,8 +11,8 @@ from hexacell import __version__
 from hexacell.application.calibration_run import robot_of_run
 from hexacell.application.device_setup import with_settings
 from hexacell.campaign.pose_list import pose_list_of
+from hexacell.cell.calibration import IdentificationSettings
 from hexacell.cell.loader import Cell, load_cell
-from hexacell.cell.model import IdentificationSettings
 from hexacell.cell.toml_writer import to_toml
 from hexacell.controller_config.change import ConfigChange
 from hexacell.controller_config.receipt import BEFORE

@@ -7,7 +7,7 @@ from pathlib import Path
 from hexacell.errors import UsageError, did_you_mean
 
 CONTROLLER = ".controller.toml"
-"""How the name of a controller's config ends; what precedes it is the name of its cell."""
+"""The end of the name of a controller's config; the rest is the name of its cell."""
 
 _IN_THE_WHEEL = Path(__file__).parents[1] / "_configs"
 _IN_A_CHECKOUT = Path(__file__).parents[2] / "configs"
@@ -24,7 +24,7 @@ def bundled_configs() -> tuple[Path, ...]:
 def bundled_config(name: str) -> Path:
     """The cell called ``name``, with or without its suffix: ``simulated-hexaglide``.
 
-    It is a cell file, or a folder with one and what belongs to it.
+    It is a cell file, or a folder with a cell file and the files that it names.
 
     Raises:
         UsageError: no such config comes with the package; the message names the nearest.

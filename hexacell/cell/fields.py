@@ -1,4 +1,4 @@
-"""What all sections of the cell file share."""
+"""Types that the sections of the cell file share."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ SixPoints = tuple[Point, Point, Point, Point, Point, Point]
 
 
 class Section(BaseModel):
-    """A section of the cell file: frozen, and nothing unknown in it."""
+    """A section of the cell file: frozen, without unknown keys."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
 
 def broken_rule(problem: str, action: str) -> PydanticCustomError:
-    """What a validator raises: the problem in plain words and the next thing to do."""
+    """The error that a validator raises: the problem and the next action."""
     return PydanticCustomError("broken_rule", "{problem}", {"problem": problem, "action": action})
 
 

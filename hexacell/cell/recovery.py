@@ -1,4 +1,4 @@
-"""The section of the cell file that says what follows a failure."""
+"""The section of the cell file that says how failures are handled."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from hexacell.cell.fields import NotNegative, Positive, Section, broken_rule
 
 
 class Action(StrEnum):
-    """What follows a failure.
+    """How a failure is handled.
 
-    ``retry``: the same again. ``measure-again``: reopen the device if it is one that was lost,
-    return to the set's reference and, if the gauges kept their zero, take the record again.
-    ``redo-set``: give the set up and measure it anew. ``ask``: a person chooses. ``abort``: end.
+    ``retry``: do the same again. ``measure-again``: reconnect the device if it was lost, return to the
+    set's reference and, if the gauges kept their zero, take the record again. ``redo-set``: discard the
+    set and measure it again. ``ask``: a person chooses. ``abort``: end the run.
     """
 
     RETRY = "retry"
@@ -26,7 +26,7 @@ class Action(StrEnum):
 
 
 class FailureKind(StrEnum):
-    """Kinds of failure that may be answered differently; the values are keys of the cell file."""
+    """Kinds of failure with a recovery of their own; the values are keys of the cell file."""
 
     GAUGE_SILENT = "gauge_silent"
     GAUGE_SETTING = "gauge_setting"
@@ -44,12 +44,12 @@ class FailureKind(StrEnum):
     FILE = "file"
     OTHER = "other"
     FINAL = "final"
-    """Nothing that is done again would change it: a limit exceeded, an answer missing."""
+    """Trying again would not change it: a limit exceeded, an answer missing."""
 
 
 Word = Literal["retry", "measure-again", "redo-set", "ask", "abort"]
 Ladder = tuple[Word, ...]
-"""What follows the first failure of a kind at a set, the second, and so on; the last word stays."""
+"""How the first failure of a kind at a set is handled, the second, and so on; the last entry repeats."""
 
 _ASK: tuple[Word, ...] = ("ask",)
 _ABORT: tuple[Word, ...] = ("abort",)
@@ -57,7 +57,7 @@ _REDO: tuple[Word, ...] = ("redo-set", "redo-set", "abort")
 
 
 class _Ladders(Section):
-    """One ladder a kind; each must end with an end, or it would be climbed for ever."""
+    """One ladder for each kind of failure. Each ends with ask or abort, so that attempts are bounded."""
 
     @model_validator(mode="after")
     def _every_ladder_ends(self) -> Self:
@@ -67,7 +67,7 @@ class _Ladders(Section):
         return self
 
     def ladder(self, kind: FailureKind) -> tuple[Action, ...]:
-        """What follows failures of a kind, one after the other."""
+        """The actions after successive failures of a kind."""
         words: tuple[str, ...] = getattr(self, kind.value, _ABORT)
         return tuple(Action(word) for word in words)
 
@@ -75,33 +75,33 @@ class _Ladders(Section):
 class AttendedRecovery(_Ladders):
     """With a technician at the machine."""
 
-    gauge_silent: Ladder = Field(_ASK, description="no answer, or none that makes sense")
+    gauge_silent: Ladder = Field(_ASK, description="no answer, or an invalid one")
     gauge_setting: Ladder = Field(_ASK, description="inches, hold, a wrong mode, a low battery")
     gauge_at_end: Ladder = Field(_ASK, description="a plunger at an end of its travel at a reference")
-    unsettled: Ladder = Field(_ASK, description="the readings never came to rest")
-    zero_void: Ladder = Field(_ASK, description="a gauge was off, or set differently, in between")
+    unsettled: Ladder = Field(_ASK, description="the readings did not settle")
+    zero_void: Ladder = Field(_ASK, description="a gauge was switched off or set differently")
     encoder_silent: Ladder = Field(_ASK, description="a round of positions was not complete")
     encoder_alarm: Ladder = Field(_ASK, description="an encoder reports an error")
     encoder_restarted: Ladder = Field(_ASK, description="an encoder lost its configuration")
-    controller: Ladder = Field(_ASK, description="the controller refused, or stopped elsewhere")
+    controller: Ladder = Field(_ASK, description="the controller refused, or stopped at another place")
     link_lost: Ladder = Field(_ASK, description="a cable or connection broke")
     drift: Ladder = Field(_ASK, description="the reference is beyond acceptance.drift_mm at the end")
-    no_way: Ladder = Field(_ASK, description="no checked straight line leads on")
-    guard: Ladder = Field(_ASK, description="a guard tripped while the robot was watched")
+    no_way: Ladder = Field(_ASK, description="no safe path")
+    guard: Ladder = Field(_ASK, description="a guard tripped")
     file: Ladder = Field(_ASK, description="a file could not be written or read")
     other: Ladder = Field(_ASK, description="any other failure of a device")
 
 
 class UnattendedRecovery(_Ladders):
-    """With nobody there: a bounded number of attempts, then the run ends."""
+    """Without a technician: a bounded number of attempts, then the run ends."""
 
-    gauge_silent: Ladder = Field(("retry", *_REDO), description="no answer, or none that makes sense")
+    gauge_silent: Ladder = Field(("retry", *_REDO), description="no answer, or an invalid one")
     gauge_setting: Ladder = Field(_ABORT, description="inches, hold, a wrong mode, a low battery")
     gauge_at_end: Ladder = Field(("redo-set", "abort"), description="a plunger at an end at a reference")
     unsettled: Ladder = Field(
-        ("retry", "measure-again", "redo-set", "abort"), description="the readings never came to rest"
+        ("retry", "measure-again", "redo-set", "abort"), description="the readings did not settle"
     )
-    zero_void: Ladder = Field(_REDO, description="a gauge was off, or set differently, in between")
+    zero_void: Ladder = Field(_REDO, description="a gauge was switched off or set differently")
     encoder_silent: Ladder = Field(
         ("retry", "measure-again", "measure-again", "abort"), description="a round was not complete"
     )
@@ -109,14 +109,14 @@ class UnattendedRecovery(_Ladders):
         ("measure-again", "measure-again", "abort"), description="an encoder reports an error"
     )
     encoder_restarted: Ladder = Field(_REDO, description="an encoder lost its configuration")
-    controller: Ladder = Field(_ABORT, description="the controller refused, or stopped elsewhere")
+    controller: Ladder = Field(_ABORT, description="the controller refused, or stopped at another place")
     link_lost: Ladder = Field(
         ("measure-again", "measure-again", "measure-again", "abort"),
         description="a cable or connection broke",
     )
     drift: Ladder = Field(_REDO, description="the reference is beyond acceptance.drift_mm at the end")
-    no_way: Ladder = Field(("redo-set", "abort"), description="no checked straight line leads on")
-    guard: Ladder = Field(_ABORT, description="a guard tripped while the robot was watched")
+    no_way: Ladder = Field(("redo-set", "abort"), description="no safe path")
+    guard: Ladder = Field(_ABORT, description="a guard tripped")
     file: Ladder = Field(_ABORT, description="a file could not be written or read")
     other: Ladder = Field(_ABORT, description="any other failure of a device")
 
@@ -129,11 +129,11 @@ class UnattendedRecovery(_Ladders):
 
 
 class RecoverySettings(Section):
-    """What follows a failure or an interruption."""
+    """How failures and interruptions are handled."""
 
     agreement_mm: Positive = Field(
-        0.05, description="largest change of a reference, gauges and sliders, with which a set goes on"
+        0.05, description="largest change of a reference, gauges and sliders, with which a set continues"
     )
-    wait_s: NotNegative = Field(2.0, description="before a device that failed is tried again")
+    wait_s: NotNegative = Field(2.0, description="wait before a failed device is tried again")
     attended: AttendedRecovery = AttendedRecovery()
     unattended: UnattendedRecovery = UnattendedRecovery()

@@ -1,4 +1,4 @@
-"""The section that a simulated cell adds: what is hidden, how it moves, what it scatters."""
+"""The section of a simulated cell: its true geometry, motion, noise and faults."""
 
 from __future__ import annotations
 
@@ -14,13 +14,11 @@ class SimulatedGauges(Section):
 
     noise_mm: NotNegative = Field(0.01, description="drawn at every stop of the robot, 1 sigma")
     flicker_mm: NotNegative = Field(0.001, description="drawn at every reading, 1 sigma")
-    latency_s: NotNegative = Field(0.02, description="between question and answer")
-    baudrate: int | None = Field(None, ge=300, description="wire speed imitated; default the protocol's")
-    transport: Literal["pty", "socket"] = Field("pty", description="what the gauges' lines are made of")
+    latency_s: NotNegative = Field(0.02, description="between request and answer")
+    baudrate: int | None = Field(None, ge=300, description="line speed; by default the protocol's")
+    transport: Literal["pty", "socket"] = Field("pty", description="how the gauges' lines are simulated")
     misalignment_deg: NotNegative = Field(0.0, description="of the triad at each station, 1 sigma")
-    placing_mm: NotNegative = Field(
-        0.4, description="how far from the middle of their travel they are put, 1 sigma"
-    )
+    placing_mm: NotNegative = Field(0.4, description="how far from mid-travel they are placed, 1 sigma")
 
 
 class SimulatedEncoders(Section):
@@ -36,13 +34,13 @@ class SimulatedMotion(Section):
 
     speed_mm_s: Positive = Field(100.0, description="of the fastest slider")
     minimum_s: NotNegative = Field(0.3, description="shortest duration of a move")
-    ringing_mm: NotNegative = Field(0.2, description="amplitude of the ball's swing on arrival")
+    ringing_mm: NotNegative = Field(0.2, description="amplitude of the ball's oscillation on arrival")
     ringing_s: Positive = Field(0.15, description="time constant of its decay")
     repeatability_mm: NotNegative = Field(0.0, description="scatter of each slider's stop, 1 sigma")
 
 
 class SimulatedFault(Section):
-    """Something that goes wrong at a given moment, and perhaps comes right again."""
+    """A fault that begins at a given time and may end."""
 
     kind: Literal[
         "emergency stop",
@@ -54,26 +52,26 @@ class SimulatedFault(Section):
         "off its plate",
         "frozen",
         "alarm",
-    ] = Field(description="what goes wrong")
+    ] = Field(description="kind of fault")
     device: str = Field(
         "", description="a gauge's name, encoder 1 to encoder 6, or controller; empty where there is one"
     )
     at_move: int | None = Field(
-        None, ge=1, description="during this move, the first being 1; without it, from the beginning"
+        None, ge=1, description="during this move, counted from 1; without it, from the start"
     )
-    after_s: NotNegative = Field(0.0, description="so long after that, in the cell's time")
-    lasts_s: Positive | None = Field(None, description="until it is put right; without it, for ever")
+    after_s: NotNegative = Field(0.0, description="delay after that, in cell time")
+    lasts_s: Positive | None = Field(None, description="its duration; without it, permanent")
 
 
 class SimulationSettings(Section):
-    """The simulated twin of a cell."""
+    """The simulation of a cell."""
 
-    geometry: GeometryValues = Field(description="the true geometry, hidden from everything else")
-    seed: int = Field(1, ge=0, description="of every random number the cell draws")
+    geometry: GeometryValues = Field(description="the true geometry, known to the simulation only")
+    seed: int = Field(1, ge=0, description="random seed of the simulation")
     station_reach_mm: Positive = Field(
-        30.0, description="farther than this from the gauges at rest, they are carried to the ball"
+        30.0, description="at rest farther than this from the gauges, the gauges are moved to the ball"
     )
     gauges: SimulatedGauges = SimulatedGauges()
     encoders: SimulatedEncoders = SimulatedEncoders()
     motion: SimulatedMotion = SimulatedMotion()
-    faults: tuple[SimulatedFault, ...] = Field((), description="what goes wrong, and when")
+    faults: tuple[SimulatedFault, ...] = Field((), description="faults and their times")

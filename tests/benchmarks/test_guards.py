@@ -23,8 +23,8 @@ from drivers.simulated.fault_schedule import FaultKind
 from drivers.wire_trace import WireTrace
 from hexacell.application.device_setup import devices_of
 from hexacell.cell.bundled import bundled_config
+from hexacell.cell.limits import GuardSettings
 from hexacell.cell.loader import Cell, load_cell
-from hexacell.cell.model import GuardSettings
 from hexacell.cell.simulation import SimulatedFault
 from hexacell.clock import CellClock
 from hexacell.controller_config.toml_format import NativeToml

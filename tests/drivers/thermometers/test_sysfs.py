@@ -13,7 +13,7 @@ import pytest
 from drivers.interfaces import DeviceIdentity, TemperatureReading
 from drivers.thermometers import sysfs
 from drivers.thermometers.sysfs import SysfsThermometer
-from hexacell.cell.model import ThermometerSettings
+from hexacell.cell.devices import ThermometerSettings
 from hexacell.errors import DeviceError
 
 

@@ -10,7 +10,7 @@ import pytest
 from hexacell.application.calibration_run import preflight
 from hexacell.application.device_setup import require_drivers
 from hexacell.application.replay_run import replay
-from hexacell.cell.model import ThermometerSettings
+from hexacell.cell.devices import ThermometerSettings
 from hexacell.errors import UsageError
 from procedures.calibration.workflow import Mode
 from procedures.replay.replayer import Scope

@@ -7,7 +7,7 @@ from typing import Any
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hexacell.cell import devices, fields, model, simulation
+from hexacell.cell import calibration, devices, fields, limits, model, simulation
 from hexacell.cell.loader import describe, dump, schema
 
 finite = st.floats(allow_nan=False, allow_infinity=False)
@@ -63,16 +63,16 @@ cells = st.builds(
         offset_mm=six,
         serial_numbers=st.none() | st.tuples(*[st.integers(0, 2**32 - 1)] * 6),
     ),
-    limits=st.builds(devices.LimitSettings, tilt_deg=st.floats(1e-300, 80)),
+    limits=st.builds(limits.LimitSettings, tilt_deg=st.floats(1e-300, 80)),
     identification=st.builds(
-        model.IdentificationSettings,
+        calibration.IdentificationSettings,
         points=st.lists(points, min_size=2, max_size=4).map(tuple),
         orientations=st.integers(2, 10**30),
     ),
     verification=st.builds(
-        model.VerificationSettings, points=st.lists(points, min_size=1, max_size=2).map(tuple)
+        calibration.VerificationSettings, points=st.lists(points, min_size=1, max_size=2).map(tuple)
     ),
-    task=st.builds(model.TaskSettings, poses=st.lists(six, max_size=2).map(tuple)),
+    task=st.builds(calibration.TaskSettings, poses=st.lists(six, max_size=2).map(tuple)),
     simulation=st.builds(
         simulation.SimulationSettings,
         geometry=geometries,

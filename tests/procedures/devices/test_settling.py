@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from drivers.gauges.errors import GaugeAtEnd, GaugeSilent, GaugeUnsteady
-from hexacell.cell.devices import TimingSettings
+from hexacell.cell.limits import TimingSettings
 from hexacell.errors import DeviceError, ExitCode, SeveralErrors
 from procedures.devices.settling import LEAST_WINDOWS, read_all, settle
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from contextlib import ExitStack
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from types import TracebackType
@@ -119,7 +120,7 @@ def _physics(
 def _rack(
     settings: CellSettings, simulation: SimulationSettings, physics: RobotPhysics, clock: CellClock
 ) -> SimulatedGaugeBank:
-    plungers = {gauge.name: _Plunger(physics, gauge) for gauge in settings.gauges}
+    plungers = {gauge.name: partial(_plunger_position, physics, gauge) for gauge in settings.gauges}
     return SimulatedGaugeBank(settings.gauges, plungers, simulation.gauges, clock, seed=simulation.seed)
 
 
@@ -142,12 +143,6 @@ def _controller(settings: CellSettings, machine: SimulatedMachine, config: Path)
     )
 
 
-class _Plunger:
-    """What one gauge's plunger does, in the instrument's own direction."""
-
-    def __init__(self, physics: RobotPhysics, gauge: GaugeSettings) -> None:
-        self._physics = physics
-        self._gauge = gauge
-
-    def __call__(self) -> float:
-        return self._gauge.sign * self._physics.gauge_displacement(self._gauge.axis)
+def _plunger_position(physics: RobotPhysics, gauge: GaugeSettings) -> float:
+    """The position of one gauge's plunger, mm, in the instrument's own direction."""
+    return gauge.mounting.reading(physics.gauge_displacement(gauge.axis))

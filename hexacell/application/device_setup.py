@@ -92,7 +92,7 @@ def devices_of(
         UsageError: a protocol that no driver speaks.
     """
     gauges = tuple(
-        MountedGauge(load(Group.GAUGES, gauge.protocol)(gauge, links), "xyz".index(gauge.axis), gauge.sign)
+        MountedGauge(load(Group.GAUGES, gauge.protocol)(gauge, links), gauge.mounting)
         for gauge in settings.gauges
     )
     encoders = load(Group.ENCODERS, settings.encoders.protocol)(settings.encoders, trace=trace)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Annotated, Any, Literal
 
 from pydantic import Field, field_validator
@@ -10,6 +11,34 @@ from hexacell.cell.fields import Positive, Section, SixNumbers, broken_rule
 
 NodeId = Annotated[int, Field(ge=1, le=127)]
 Direction = Literal[1, -1]
+
+
+@dataclass(frozen=True, slots=True)
+class GaugeAxis:
+    """The base axis a gauge measures along, and the direction in which its reading grows.
+
+    A reading is in the instrument's own zero and direction. A coordinate is the same length along
+    the base axis: coordinate = sign x reading. Both are mm.
+
+    Attributes:
+        index: 0, 1 or 2 for x, y or z.
+        sign: 1 where the reading grows along the positive axis, else -1.
+    """
+
+    index: int
+    sign: int
+
+    def coordinate(self, reading_mm: float) -> float:
+        """The coordinate along the base axis that a reading means, from the instrument's zero."""
+        return self.sign * reading_mm
+
+    def reading(self, coordinate_mm: float) -> float:
+        """What the instrument shows at a coordinate; the inverse of :meth:`coordinate`."""
+        return self.sign * coordinate_mm
+
+    def deviation(self, reading_mm: float, zero_mm: float) -> float:
+        """How far a reading is from a zero that is given as a coordinate, along the base axis."""
+        return self.coordinate(reading_mm) - zero_mm
 
 
 class GaugeSettings(Section):
@@ -26,6 +55,11 @@ class GaugeSettings(Section):
     channel: int = Field(1, ge=1, description="input of a multiplexer")
     timeout_s: Positive = Field(0.5, description="longest wait for an answer")
     travel_mm: Positive = Field(12.5, description="the instrument's own measuring range")
+
+    @property
+    def mounting(self) -> GaugeAxis:
+        """The axis and sign as one value."""
+        return GaugeAxis("xyz".index(self.axis), self.sign)
 
 
 class EncoderSettings(Section):

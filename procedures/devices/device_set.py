@@ -9,6 +9,7 @@ from typing import TypeVar
 
 from drivers.interfaces import Controller, DeviceIdentity, EncoderBank, Gauge, StopInput
 from drivers.stop_input.stop_input import CombinedStopInput
+from hexacell.cell.devices import GaugeAxis
 from hexacell.errors import HexacellError, SeveralErrors, flatten_errors
 
 Result = TypeVar("Result")
@@ -16,11 +17,10 @@ Result = TypeVar("Result")
 
 @dataclass(frozen=True, slots=True)
 class MountedGauge:
-    """A gauge and how it stands: which base axis its plunger moves along, and which way it counts."""
+    """A gauge and the axis it is mounted on."""
 
     gauge: Gauge
-    axis: int
-    sign: int
+    axis: GaugeAxis
 
 
 @dataclass(frozen=True, slots=True)

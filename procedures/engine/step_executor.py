@@ -190,8 +190,8 @@ def _reading(
     means, spreads = settled.gauge_means(), settled.gauge_spread()
     on_axes, spread = np.zeros(3), np.zeros(3)
     for row, mounted in enumerate(devices.gauges):
-        on_axes[mounted.axis] = mounted.sign * means[row]
-        spread[mounted.axis] = spreads[row]
+        on_axes[mounted.axis.index] = mounted.axis.coordinate(means[row])
+        spread[mounted.axis.index] = spreads[row]
     q1, q2, q3, q4, q5, q6 = (float(value) for value in settled.joint_means())
     return events.Reading(
         gauges_mm=_three(on_axes),

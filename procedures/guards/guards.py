@@ -1,10 +1,10 @@
-"""Which devices are watched during which kind of step, and against which limits.
+"""Which devices are supervised during which kind of step, and against which limits.
 
-Gauges are watched only within a set: after its reference was taken, on moves between its own poses.
-On the way to another point the ball leaves the plates, plungers spring to their ends and gauges may
-be carried; nothing that they show then means anything, and asking would only void their zero.
-The controller is watched wherever it must stay on, which is not while it is being prepared or reads
-its config again: there the driver itself verifies every step.
+Gauges are supervised only within a set: after its reference was taken, on moves between its poses. On
+the way to another point the ball leaves the gauge plates, plungers extend to their ends and gauges
+may be carried; their readings then mean nothing.
+The controller is supervised whenever it must stay enabled. That is not the case while it is prepared
+or reloads its config: there the driver itself verifies every step.
 """
 
 from __future__ import annotations
@@ -34,12 +34,13 @@ from procedures.run.trips import GuardTripped, Trip
 Result = TypeVar("Result")
 
 POLL_PAUSE_S = 0.02
-"""Between two questions to one device, s on the wall."""
+"""Pause between two polls of one device, s of real time."""
 
 STOP_GRACE_S = 0.5
-"""How long a motion may take to end when it was told to, s on the wall; then its driver is told."""
+"""How long a motion may take to end after a stop before it is cancelled, s of real time."""
 
 STUCK_GAUGE_SIGMAS = 5.0
+"""An expected displacement is reduced by so many standard deviations before a gauge counts as stuck."""
 
 
 class Guards:
@@ -51,64 +52,64 @@ class Guards:
         self.supervisor = MotionSupervisor(devices.controller, clock, folder, settings.guards.free_disk_mb)
 
     async def prepare(self) -> None:
-        """Make the controller ready to move; whoever decides to do so has seen to what is latched.
+        """Make the controller ready to move; releases the latch.
 
         Raises:
-            GuardTripped: motion is forbidden, an encoder is not to be trusted, or the disk is full.
+            GuardTripped: motion is forbidden, an encoder has a fault, or the disk is full.
         """
         self.supervisor.clear()
         await self.supervisor.supervise(
-            self._devices.controller.prepare, self._lanes(), self._limits(), STOP_GRACE_S
+            self._devices.controller.prepare, self._pollers(), self._limits(), STOP_GRACE_S
         )
 
     async def move(self, step: Move, state: RunState, commanded: Callable[[], Array]) -> None:
-        """Send the robot where a step says; ``commanded`` gives the sliders (6,), mm, for its pose.
+        """Move to the target of a step; ``commanded`` gives the slider positions (6,), mm, at its pose.
 
         Raises:
-            GuardTripped: a guard tripped before, on, or at the end of the way.
+            GuardTripped: a guard tripped before, during or at the end of the move.
         """
-        plungers = self._plungers(step, state)
-        lanes = self._lanes(controller=True, plungers=plungers)
+        gauges = self._watched_gauges(step, state)
+        pollers = self._pollers(controller=True, gauges=gauges)
         reached = await self.supervisor.supervise(
-            lambda: self._go(step), lanes, self._limits(), STOP_GRACE_S
+            lambda: self._go(step), pollers, self._limits(), STOP_GRACE_S
         )
         limit = self._settings.guards.following_mm
         trip = rules.following_error(
             await asyncio.to_thread(commanded), np.array(reached.positions_mm), limit
         )
-        if trip := trip or _frozen(step, state, plungers):
+        if trip := trip or _stuck_gauge(step, state, gauges):
             raise await self.supervisor.stop(trip)
 
     async def at_standstill(self, action: Supervised[Result]) -> Result:
-        """Do something at the robot, which must not move.
+        """Run an action during which the robot must stay at standstill.
 
         Raises:
-            GuardTripped: it did, or may no longer.
+            GuardTripped: it moved, or motion is forbidden.
         """
         limits = self._limits(rest_mm=self._settings.guards.following_mm)
-        return await self.supervisor.supervise(action, self._lanes(controller=True), limits)
+        return await self.supervisor.supervise(action, self._pollers(controller=True), limits)
 
     async def during_readings(self, action: Supervised[Result]) -> Result:
-        """Take readings; the devices that are read are left to who reads them.
+        """Run an action that reads gauges and encoders, which are therefore not polled.
 
         Raises:
-            GuardTripped: the robot may no longer move.
+            GuardTripped: motion is forbidden, or the controller was disabled.
         """
-        lanes = self._lanes(controller=True, encoders=False)
-        return await self.supervisor.supervise(action, lanes, self._limits())
+        pollers = self._pollers(controller=True, encoders=False)
+        return await self.supervisor.supervise(action, pollers, self._limits())
 
     async def reload(self) -> None:
-        """Make the controller read its config again.
+        """Make the controller reload its config.
 
         Raises:
-            GuardTripped: motion is forbidden, or an encoder is not to be trusted.
+            GuardTripped: motion is forbidden, or an encoder has a fault.
         """
         await self.supervisor.supervise(
-            self._devices.controller.reload, self._lanes(), self._limits(), STOP_GRACE_S
+            self._devices.controller.reload, self._pollers(), self._limits(), STOP_GRACE_S
         )
 
     def drift(self, point: str, drift_mm: ThreeNumbers) -> GuardTripped | None:
-        """The error to raise where a set's reference drifted too far; it is not latched: nothing moved."""
+        """The error to raise if the reference of a set drifted too far; not latched, as nothing moved."""
         trip = rules.reference_drift(point, drift_mm, self._settings.acceptance.drift_mm)
         return None if trip is None else trip.as_error()
 
@@ -121,16 +122,16 @@ class Guards:
         plate_mm = self._settings.limits.gauge_travel_mm + guards.plate_margin_mm
         return GuardLimits(guards.stale_s, plate_mm, rest_mm)
 
-    def _lanes(
+    def _pollers(
         self,
         *,
         controller: bool = False,
         encoders: bool = True,
-        plungers: tuple[WatchedGauge, ...] = (),
+        gauges: tuple[WatchedGauge, ...] = (),
     ) -> DevicePollers:
         devices = self._devices
         return DevicePollers(
-            gauges=self._gauge_lanes(plungers),
+            gauges=self._gauge_pollers(gauges),
             encoders=DevicePoller("encoders", devices.encoders.read, POLL_PAUSE_S) if encoders else None,
             controller=DevicePoller("controller", devices.controller.status, POLL_PAUSE_S)
             if controller
@@ -138,52 +139,55 @@ class Guards:
             stop_input=DevicePoller(STOP_LINE, self._forbidden, POLL_PAUSE_S),
         )
 
-    def _gauge_lanes(self, plungers: tuple[WatchedGauge, ...]) -> tuple[DevicePoller[GaugeDeviation], ...]:
-        """Gauges behind one multiplexer share a port, and with it a line."""
-        ports = {f"gauge {gauge.name}": gauge.port or gauge.name for gauge in self._settings.gauges}
+    def _gauge_pollers(self, gauges: tuple[WatchedGauge, ...]) -> tuple[DevicePoller[GaugeDeviation], ...]:
+        """One poller a gauge; gauges behind one multiplexer share a port and so a line."""
+        ports = {f"gauge {one.name}": one.port or one.name for one in self._settings.gauges}
         lines: defaultdict[str, LineActivity] = defaultdict(LineActivity)
         return tuple(
-            DevicePoller(plunger.device, plunger.read_deviation, POLL_PAUSE_S, lines[ports[plunger.device]])
-            for plunger in plungers
+            DevicePoller(gauge.device, gauge.read_deviation, POLL_PAUSE_S, lines[ports[gauge.device]])
+            for gauge in gauges
         )
 
     async def _forbidden(self) -> str:
         return await self._devices.stop_input.active_reason() or ""
 
-    def _plungers(self, step: Move, state: RunState) -> tuple[WatchedGauge, ...]:
+    def _watched_gauges(self, step: Move, state: RunState) -> tuple[WatchedGauge, ...]:
         samples = state.set(step.at).samples
         if not samples:
             return ()
         reference = samples[0].reading.gauges_mm
-        return tuple(WatchedGauge(mounted, reference[mounted.axis]) for mounted in self._devices.gauges)
+        return tuple(
+            WatchedGauge(mounted, reference[mounted.axis.index]) for mounted in self._devices.gauges
+        )
 
 
 class WatchedGauge:
-    """A mounted gauge within a set, and all that it showed."""
+    """A mounted gauge within a set, and every value it displayed since the move began."""
 
     def __init__(self, mounted: MountedGauge, reference_mm: float) -> None:
         self.device = f"gauge {mounted.gauge.name}"
-        self.axis = mounted.axis
-        self.shown: list[str] = []
+        self.axis = mounted.axis.index
+        self.displayed: list[str] = []
         self._mounted = mounted
         self._reference_mm = reference_mm
 
     async def read_deviation(self) -> GaugeDeviation:
-        """How far the plunger is from the set's reference now."""
+        """The present deviation from the reference of the set."""
         reading = await self._mounted.gauge.read_once()
-        self.shown.append(reading.raw)
-        on_axis = self._mounted.sign * reading.value_mm
-        return GaugeDeviation(self.axis, on_axis - self._reference_mm)
+        self.displayed.append(reading.raw)
+        deviation_mm = self._mounted.axis.deviation(reading.value_mm, self._reference_mm)
+        return GaugeDeviation(self.axis, deviation_mm)
 
 
-def _frozen(step: Move, state: RunState, plungers: tuple[WatchedGauge, ...]) -> Trip | None:
-    """A gauge that did not follow a ball which, as far as is known, has moved a good way."""
+def _stuck_gauge(step: Move, state: RunState, gauges: tuple[WatchedGauge, ...]) -> Trip | None:
+    """A gauge whose display did not change although its ball must have moved a certain distance."""
     samples = state.set(step.at).samples
     if step.expected is None or state.standing != (step.at, len(samples)):
         return None
-    for plunger in plungers:
-        way = step.expected.deviation_mm[plunger.axis] - samples[-1].deviation_mm[plunger.axis]
-        surely = max(0.0, abs(way) - STUCK_GAUGE_SIGMAS * step.expected.sigma_mm[plunger.axis])
-        if trip := rules.stuck_gauge(plunger.device, tuple(plunger.shown), float(np.copysign(surely, way))):
+    for gauge in gauges:
+        expected = step.expected.deviation_mm[gauge.axis] - samples[-1].deviation_mm[gauge.axis]
+        sure = max(0.0, abs(expected) - STUCK_GAUGE_SIGMAS * step.expected.sigma_mm[gauge.axis])
+        trip = rules.stuck_gauge(gauge.device, tuple(gauge.displayed), float(np.copysign(sure, expected)))
+        if trip is not None:
             return trip
     return None

@@ -1,6 +1,10 @@
-"""Asking one device again and again, without waiting for the others.
+"""Polling of the supervised devices, and the monitor that evaluates the guards.
 
-Watching all devices at once while something else goes on.
+- :class:`DevicePoller`, one task a device: read it, keep the latest report, pause, read again.
+- :class:`LineActivity`, one a communication line: the time since the last answer on it. Devices on
+  one line are read one after the other, so an answer of one shows that the line works for all.
+- :class:`GuardMonitor`: runs the pollers and a timer. After each answer and each tick it evaluates
+  the rules on a snapshot of all reports and keeps the first trip.
 """
 
 from __future__ import annotations
@@ -23,73 +27,76 @@ from procedures.run.trips import Guard, Trip
 T = TypeVar("T")
 
 RECOVERY_S = FRAME_GAP_S
-"""How long a line is left alone after an answer that made no sense, before anything is asked again."""
+"""Silence that the driver requires after a garbled answer; it does not count against the device."""
+
+TICK_S = 0.01
+"""Period of the timer that looks for silent devices, s of real time."""
+
+MAX_DELAY_S = 0.02
+"""Longest scheduling delay of this process that counts as silence of a device, s of real time."""
 
 
 @dataclass(slots=True, eq=False)
 class LineActivity:
-    """What answers come over, and how long none has, s on the wall.
-
-    Devices on one line are answered one after the other: while any of them is, none is silent.
-    """
+    """Time since the last answer on a communication line, s of real time."""
 
     silent_s: float = 0.0
 
 
 class DevicePoller(Generic[T]):
-    """One device under watch: what was heard of it, and in ``looks`` how often that made sense.
+    """Polls one device.
 
-    ``ask`` gives the value now or raises.
+    Attributes:
+        answer_count: how many answers were not garbled.
+        line: the line on which the device answers.
     """
 
     def __init__(
-        self, device: str, ask: Callable[[], Awaitable[T]], pause_s: float, line: LineActivity | None = None
+        self,
+        device: str,
+        read: Callable[[], Awaitable[T]],
+        pause_s: float,
+        line: LineActivity | None = None,
     ) -> None:
         self.answer_count = 0
         self.line = line or LineActivity()
-        self._heard: DeviceReport[T] = DeviceReport(device)
-        self._ask = ask
+        self._report: DeviceReport[T] = DeviceReport(device)
+        self._read = read
         self._pause_s = pause_s
 
     @property
     def report(self) -> DeviceReport[T]:
-        """The latest of it."""
-        return replace(self._heard, silent_s=self.line.silent_s)
+        """The latest report."""
+        return replace(self._report, silent_s=self.line.silent_s)
 
-    async def run(self, clock: CellClock, news: Callable[[], None]) -> None:
-        """Ask until cancelled; ``news`` is called after every answer and every failure."""
+    async def run(self, clock: CellClock, on_report: Callable[[], None]) -> None:
+        """Poll until cancelled; ``on_report`` is called after every answer and every failure."""
         while True:
-            self._heard = await self._look()
-            self.answer_count += not self._heard.garbled_count
-            news()
+            self._report = await self._poll()
+            self.answer_count += not self._report.garbled_count
+            on_report()
             await clock.sleep(self._pause_s * clock.factor)
 
-    async def _look(self) -> DeviceReport[T]:
+    async def _poll(self) -> DeviceReport[T]:
+        last = self._report
         try:
-            value = await self._ask()
+            value = await self._read()
         except WrongAnswer as error:
             self.line.silent_s = -RECOVERY_S
-            return replace(self._heard, error=error, garbled_count=self._heard.garbled_count + 1)
+            return replace(last, error=error, garbled_count=last.garbled_count + 1)
         except GaugeAtEnd as error:
             self.line.silent_s = 0.0
-            return replace(self._heard, error=error, garbled_count=0)
+            return replace(last, error=error, garbled_count=0)
         except HexacellError as error:
-            return replace(self._heard, error=error, garbled_count=0)
+            return replace(last, error=error, garbled_count=0)
         self.line.silent_s = 0.0
-        first = value if self._heard.first is None else self._heard.first
-        return replace(self._heard, value=value, first=first, error=None, garbled_count=0)
-
-
-TICK_S = 0.01
-"""How often silence is looked for, s on the wall."""
-
-MAX_DELAY_S = 0.02
-"""The longest that this process may be late and still be sure that it would have heard an answer."""
+        first = value if last.first is None else last.first
+        return replace(last, value=value, first=first, error=None, garbled_count=0)
 
 
 @dataclass(frozen=True, slots=True)
 class DevicePollers:
-    """What is watched; a lane that is not there is not."""
+    """The pollers of one action; a device without a poller is not supervised."""
 
     gauges: tuple[DevicePoller[GaugeDeviation], ...] = ()
     encoders: DevicePoller[EncoderSample] | None = None
@@ -97,46 +104,46 @@ class DevicePollers:
     stop_input: DevicePoller[str] | None = None
 
     def all(self) -> tuple[DevicePoller[Any], ...]:
-        """All that are there."""
-        rest = (self.encoders, self.controller, self.stop_input)
-        return (*self.gauges, *(lane for lane in rest if lane is not None))
+        """Every poller there is."""
+        others = (self.encoders, self.controller, self.stop_input)
+        return (*self.gauges, *(poller for poller in others if poller is not None))
 
     def snapshot(self) -> Snapshot:
-        """What they have heard by now."""
+        """The latest reports of all devices."""
         return Snapshot(
-            gauges=tuple(lane.report for lane in self.gauges),
-            encoders=_heard(self.encoders),
-            controller=_heard(self.controller),
-            stop_input=_heard(self.stop_input),
+            gauges=tuple(poller.report for poller in self.gauges),
+            encoders=_report(self.encoders),
+            controller=_report(self.controller),
+            stop_input=_report(self.stop_input),
         )
 
 
-def _heard(lane: DevicePoller[T] | None) -> DeviceReport[T] | None:
-    return None if lane is None else lane.report
+def _report(poller: DevicePoller[T] | None) -> DeviceReport[T] | None:
+    return None if poller is None else poller.report
 
 
 @dataclass(eq=False)
 class GuardMonitor:
-    """Keeps asking from ``async with`` to its end; ``trip`` is the first guard that tripped.
+    """Polls within ``async with``; ``trip`` is the first guard that tripped.
 
-    A process that gets no turn for a while is deaf, but its devices are not silent: of the time that
-    has passed between two ticks no more counts than ``TURN_S`` beyond one.
+    If this process itself was not scheduled for a while, its devices are not to blame: between two
+    ticks at most ``TICK_S + MAX_DELAY_S`` count as silence.
     """
 
     pollers: DevicePollers
     limits: GuardLimits
     clock: CellClock
     trip: Trip | None = None
-    _news: asyncio.Event = field(default_factory=asyncio.Event)
-    _tripped: asyncio.Event = field(default_factory=asyncio.Event)
-    _broken: BaseException | None = None
+    _updated: asyncio.Event = field(default_factory=asyncio.Event)
+    _ended: asyncio.Event = field(default_factory=asyncio.Event)  # a guard tripped, or a task failed
+    _failure: BaseException | None = None
     _tasks: tuple[asyncio.Task[None], ...] = ()
 
     async def __aenter__(self) -> Self:
-        runs = [lane.run(self.clock, self._judge) for lane in self.pollers.all()]
-        self._tasks = tuple(asyncio.ensure_future(run) for run in (*runs, self._tick()))
+        polling = [poller.run(self.clock, self._evaluate) for poller in self.pollers.all()]
+        self._tasks = tuple(asyncio.ensure_future(task) for task in (*polling, self._measure_silence()))
         for task in self._tasks:
-            task.add_done_callback(self._end_of)
+            task.add_done_callback(self._on_task_end)
         return self
 
     async def __aexit__(
@@ -146,57 +153,58 @@ class GuardMonitor:
             task.cancel()
         await asyncio.gather(*self._tasks, return_exceptions=True)
 
-    async def wait_for(self, doing: asyncio.Future[Any]) -> None:
-        """Wait until something is done or a guard trips; raises what broke the patrol itself."""
-        tripping = asyncio.ensure_future(self._tripped.wait())
+    async def wait_for(self, action: asyncio.Future[Any]) -> None:
+        """Wait until the action ends or a guard trips; raises an error of the monitor itself."""
+        ended = asyncio.ensure_future(self._ended.wait())
         try:
-            await asyncio.wait([doing, tripping], return_when=asyncio.FIRST_COMPLETED)
+            await asyncio.wait([action, ended], return_when=asyncio.FIRST_COMPLETED)
         finally:
-            tripping.cancel()
-        self._raise_broken()
+            ended.cancel()
+        self._raise_failure()
 
     async def poll_all(self) -> Trip | None:
-        """Wait until each device was asked once more, or one stays silent; the trip, if there is one.
+        """Wait until every device has answered once more, or one is silent; the trip, if any.
 
-        Nothing moves meanwhile, so what trips first is not in a hurry: it is named with all the rest.
+        The robot is at a standstill meanwhile, so the rules are evaluated once more when all
+        reports are in: the trip then names every faulty device, not only the first one.
         """
-        marks = [(lane, lane.answer_count) for lane in self.pollers.all()]
-        while not self._is_over() and any(lane.answer_count <= mark for lane, mark in marks):
-            self._news.clear()
-            await self._news.wait()
-        self._raise_broken()
+        before = [(poller, poller.answer_count) for poller in self.pollers.all()]
+        while not self._is_waiting_useless() and any(poller.answer_count <= n for poller, n in before):
+            self._updated.clear()
+            await self._updated.wait()
+        self._raise_failure()
         self.trip = first_trip(self.pollers.snapshot(), self.limits) or self.trip
         return self.trip
 
-    async def _tick(self) -> None:
+    async def _measure_silence(self) -> None:
         before = self.clock.now()
         while True:
             await self.clock.sleep(TICK_S * self.clock.factor)
             now = self.clock.now()
-            passed = min(self.clock.on_the_wall(now - before), TICK_S + MAX_DELAY_S)
+            elapsed = min(self.clock.on_the_wall(now - before), TICK_S + MAX_DELAY_S)
             before = now
-            for line in {lane.line for lane in self.pollers.all()}:
-                line.silent_s += passed
-            self._judge()
+            for line in {poller.line for poller in self.pollers.all()}:
+                line.silent_s += elapsed
+            self._evaluate()
 
-    def _is_over(self) -> bool:
-        """Whether waiting is in vain: a device is silent, or the patrol itself broke."""
-        return self._broken is not None or (self.trip is not None and self.trip.guard is Guard.STALE)
-
-    def _judge(self) -> None:
+    def _evaluate(self) -> None:
         if self.trip is None:
             self.trip = first_trip(self.pollers.snapshot(), self.limits)
         if self.trip is not None:
-            self._tripped.set()
-        self._news.set()
+            self._ended.set()
+        self._updated.set()
 
-    def _raise_broken(self) -> None:
-        if self._broken is not None:
-            raise self._broken
+    def _is_waiting_useless(self) -> bool:
+        """Whether a device is silent, or the monitor itself failed."""
+        return self._failure is not None or (self.trip is not None and self.trip.guard is Guard.STALE)
 
-    def _end_of(self, task: asyncio.Task[None]) -> None:
-        """A lane that broke must not leave anybody waiting for it."""
+    def _raise_failure(self) -> None:
+        if self._failure is not None:
+            raise self._failure
+
+    def _on_task_end(self, task: asyncio.Task[None]) -> None:
+        """Release everybody who waits if a task has failed."""
         if not task.cancelled() and (error := task.exception()) is not None:
-            self._broken = self._broken or error
-            self._tripped.set()
-            self._news.set()
+            self._failure = self._failure or error
+            self._ended.set()
+            self._updated.set()

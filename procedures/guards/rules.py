@@ -1,9 +1,8 @@
-"""The guards: each a function of a snapshot that says what is wrong, or nothing.
+"""The guard rules: each is a function of a snapshot and gives a trip or nothing.
 
-They are asked in the order of ``RULES``, so that the plainest cause is named: a machine that was
-switched off by the emergency stop, not the encoder that lost its supply with it.
-
-How much room is left where a run is kept.
+``RULES`` lists the continuously evaluated ones in order of evaluation: a cause comes before its
+effects. An emergency stop, for example, comes before the encoder that lost its supply with it. The
+other rules are evaluated once, before or after a move.
 """
 
 from __future__ import annotations
@@ -22,61 +21,61 @@ from procedures.guards.snapshot import DeviceReport, GuardLimits, Snapshot
 from procedures.run.trips import Guard, Trip
 
 MAX_GARBLED = 3
-"""So many answers in a row that make no sense are a broken device, fewer a noisy line."""
+"""So many garbled answers in a row are a device fault; fewer are noise on the line."""
 
 STUCK_GAUGE_MM = 1.0
-"""A plunger that should have moved farther than this, and shows the same to the last digit, has not."""
+"""A gauge is stuck if its display did not change over an expected displacement larger than this."""
 
 Rule = Callable[[Snapshot, GuardLimits], Trip | None]
 
 
 def first_trip(snapshot: Snapshot, limits: GuardLimits) -> Trip | None:
-    """What trips first, if anything does."""
+    """The first trip, in the order of ``RULES``."""
     return next((trip for rule in RULES if (trip := rule(snapshot, limits))), None)
 
 
 def stop_requested(snapshot: Snapshot, _limits: GuardLimits) -> Trip | None:
-    """Somebody forbids motion."""
+    """A stop input forbids motion."""
     line = snapshot.stop_input
     return None if line is None or not line.value else motion_forbidden(line.value)
 
 
 def controller_not_ready(snapshot: Snapshot, _limits: GuardLimits) -> Trip | None:
-    """The controller is in emergency stop, off, or complains of a following error."""
-    heard = snapshot.controller
-    if heard is None or heard.value is None or heard.value.may_move:
+    """The controller is in emergency stop, off, or reports a following error."""
+    report = snapshot.controller
+    if report is None or report.value is None or report.value.may_move:
         return None
-    status = heard.value
+    status = report.value
     said = "; ".join(status.error_messages)
     if any("following error" in complaint.lower() for complaint in status.error_messages):
         action = "Look for what blocks that leg, then switch on and resume"
-        return Trip(Guard.FOLLOWING, heard.device, f"switched itself off: {said}", action)
+        return Trip(Guard.FOLLOWING, report.device, f"switched itself off: {said}", action)
     problem = "is in emergency stop" if status.estop else "was switched off"
     release = "release the emergency stop" if status.estop else "see to it"
     action = f"Find out why, {release}, then resume"
-    return Trip(Guard.CONTROLLER, heard.device, f"{problem}: {said}" if said else problem, action)
+    return Trip(Guard.CONTROLLER, report.device, f"{problem}: {said}" if said else problem, action)
 
 
 def encoder_fault(snapshot: Snapshot, _limits: GuardLimits) -> Trip | None:
-    """An encoder has an alarm, restarted, or a round stayed incomplete."""
-    heard = snapshot.encoders
-    return None if heard is None or heard.error is None else _reported(Guard.ENCODERS, heard)
+    """An encoder has an alarm or restarted, or a sample is incomplete."""
+    report = snapshot.encoders
+    return None if report is None or report.error is None else _fault_trip(Guard.ENCODERS, report)
 
 
 def gauge_at_end(snapshot: Snapshot, _limits: GuardLimits) -> Trip | None:
-    """A plunger has come to an end of its travel; one that was there from the beginning may leave it."""
+    """A plunger reached an end of its travel; one that started there may leave it."""
     for gauge in snapshot.gauges:
         if isinstance(gauge.error, GaugeAtEnd) and gauge.value is not None:
-            return _reported(Guard.GAUGE_END, gauge)
+            return _fault_trip(Guard.GAUGE_END, gauge)
     return None
 
 
 def device_faults(snapshot: Snapshot, _limits: GuardLimits) -> Trip | None:
-    """Devices say themselves that something is wrong with them, or only nonsense; all are named."""
+    """Devices report a fault, or only garbled answers; all of them are named."""
     trips = [
-        _reported(Guard.DEVICE, heard)
-        for heard in _all(snapshot)
-        if heard.error is not None and not isinstance(heard.error, GaugeAtEnd) and _counts(heard)
+        _fault_trip(Guard.DEVICE, report)
+        for report in _all(snapshot)
+        if report.error is not None and not isinstance(report.error, GaugeAtEnd) and _is_fault(report)
     ]
     if not trips:
         return None
@@ -87,20 +86,20 @@ def device_faults(snapshot: Snapshot, _limits: GuardLimits) -> Trip | None:
 
 
 def device_silent(snapshot: Snapshot, limits: GuardLimits) -> Trip | None:
-    """A device has not answered for too long."""
-    for heard in _all(snapshot):
-        if heard.silent_s > limits.stale_s:
+    """A device is silent for longer than allowed."""
+    for report in _all(snapshot):
+        if report.silent_s > limits.stale_s:
             return Trip(
                 Guard.STALE,
-                heard.device,
-                f"has not answered for {heard.silent_s:.2g} s while it was needed",
+                report.device,
+                f"has not answered for {report.silent_s:.2g} s while it was needed",
                 "Check its cable and supply, then resume",
             )
     return None
 
 
 def ball_off_gauge(snapshot: Snapshot, limits: GuardLimits) -> Trip | None:
-    """The ball is leaving the plate: farther off than allowed, and than it was in the beginning."""
+    """The ball leaves the gauge plate: its deviation exceeds the limit and its first value."""
     for gauge in snapshot.gauges:
         if gauge.value is None or gauge.first is None:
             continue
@@ -117,13 +116,13 @@ def ball_off_gauge(snapshot: Snapshot, limits: GuardLimits) -> Trip | None:
 
 
 def unexpected_motion(snapshot: Snapshot, limits: GuardLimits) -> Trip | None:
-    """A slider moves although nothing was commanded."""
-    heard = snapshot.encoders
-    if limits.rest_mm is None or heard is None or heard.value is None or heard.first is None:
+    """A slider moved during standstill."""
+    report = snapshot.encoders
+    if limits.rest_mm is None or report is None or report.value is None or report.first is None:
         return None
-    moved = np.subtract(heard.value.positions_mm, heard.first.positions_mm)
+    moved = np.subtract(report.value.positions_mm, report.first.positions_mm)
     words = f"moved by {{:+.2f}} mm while the robot had to stand still (limit {limits.rest_mm:g} mm)"
-    return _off(moved, limits.rest_mm, words)
+    return _slider_trip(moved, limits.rest_mm, words)
 
 
 RULES: tuple[Rule, ...] = (
@@ -139,7 +138,7 @@ RULES: tuple[Rule, ...] = (
 
 
 def motion_forbidden(reason: str) -> Trip:
-    """The stop line is pressed, for this reason."""
+    """The trip for an active stop input."""
     return Trip(
         Guard.STOP_LINE,
         STOP_LINE,
@@ -149,25 +148,25 @@ def motion_forbidden(reason: str) -> Trip:
 
 
 def following_error(commanded: Array, measured: Array, limit_mm: float) -> Trip | None:
-    """At the end of a move: sliders (6,), mm, are where the controller was told to send them."""
+    """After a move: a slider (6,), mm, is too far from its commanded position."""
     words = f"is {{:+.3f}} mm from where the controller was told to send it (limit {limit_mm:g} mm)"
-    return _off(np.subtract(measured, commanded), limit_mm, words)
+    return _slider_trip(np.subtract(measured, commanded), limit_mm, words)
 
 
-def stuck_gauge(gauge: str, shown: tuple[str, ...], expected_mm: float) -> Trip | None:
-    """At the end of a move: a gauge that showed one value all the way, while its ball had to move."""
-    if len(shown) < MAX_GARBLED or len(set(shown)) > 1 or abs(expected_mm) <= STUCK_GAUGE_MM:
+def stuck_gauge(gauge: str, displayed: tuple[str, ...], expected_mm: float) -> Trip | None:
+    """After a move: a gauge displayed one value all the time although its ball must have moved."""
+    if len(displayed) < MAX_GARBLED or len(set(displayed)) > 1 or abs(expected_mm) <= STUCK_GAUGE_MM:
         return None
     return Trip(
         Guard.STALE,
         gauge,
-        f"shows {shown[0]} unchanged although the ball should have moved {expected_mm:+.2f} mm",
+        f"shows {displayed[0]} unchanged although the ball should have moved {expected_mm:+.2f} mm",
         "See whether its plunger is free and its display alive, then resume",
     )
 
 
 def reference_drift(point: str, drift_mm: tuple[float, ...], limit_mm: float) -> Trip | None:
-    """Back at a set's reference: the gauges show what they did."""
+    """Back at the reference of a set: the gauge readings changed by more than allowed."""
     if max(map(abs, drift_mm)) <= limit_mm:
         return None
     words = ", ".join(f"{axis} {value:+.3f}" for axis, value in zip("xyz", drift_mm, strict=True))
@@ -180,7 +179,7 @@ def reference_drift(point: str, drift_mm: tuple[float, ...], limit_mm: float) ->
 
 
 def low_disk_space(folder: str, free_bytes: int, limit_mb: float) -> Trip | None:
-    """There is room for what will be written."""
+    """The free disk space is below its limit."""
     free_mb = free_bytes / 1e6
     if free_mb >= limit_mb:
         return None
@@ -193,23 +192,23 @@ def low_disk_space(folder: str, free_bytes: int, limit_mb: float) -> Trip | None
 
 
 def _all(snapshot: Snapshot) -> Iterator[DeviceReport[object]]:
-    for heard in (*snapshot.gauges, snapshot.encoders, snapshot.controller, snapshot.stop_input):
-        if heard is not None:
-            yield heard
+    for report in (*snapshot.gauges, snapshot.encoders, snapshot.controller, snapshot.stop_input):
+        if report is not None:
+            yield report
 
 
-def _counts(heard: DeviceReport[object]) -> bool:
-    return heard.garbled_count == 0 or heard.garbled_count >= MAX_GARBLED
+def _is_fault(report: DeviceReport[object]) -> bool:
+    return report.garbled_count == 0 or report.garbled_count >= MAX_GARBLED
 
 
-def _reported(guard: Guard, heard: DeviceReport[object]) -> Trip:
-    assert heard.error is not None  # noqa: S101 - callers see to it
-    error = heard.error
+def _fault_trip(guard: Guard, report: DeviceReport[object]) -> Trip:
+    assert report.error is not None  # noqa: S101 - callers see to it
+    error = report.error
     action = error.action or "Check it, then resume"
-    return Trip(guard, error.subject or heard.device, error.problem, action, (error,))
+    return Trip(guard, error.subject or report.device, error.problem, action, (error,))
 
 
-def _off(difference: Array, limit_mm: float, words: str) -> Trip | None:
+def _slider_trip(difference: Array, limit_mm: float, words: str) -> Trip | None:
     leg = int(np.argmax(np.abs(difference)))
     if abs(difference[leg]) <= limit_mm:
         return None
@@ -222,10 +221,10 @@ def _off(difference: Array, limit_mm: float, words: str) -> Trip | None:
 
 
 def free_bytes(folder: Path) -> int:
-    """Free bytes on the file system of a folder that may not exist yet.
+    """Free bytes on the file system of a folder, which need not exist yet.
 
     Raises:
-        FileError: nobody can tell.
+        FileError: it cannot be determined.
     """
     there = next((path for path in (folder, *folder.parents) if path.exists()), folder)
     try:

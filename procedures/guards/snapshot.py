@@ -1,4 +1,4 @@
-"""What guards judge: how long ago each device was heard, and what it said."""
+"""The input of the guard rules: the latest report of each device, and the limits in force."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ T_co = TypeVar("T_co", covariant=True)
 
 @dataclass(frozen=True, slots=True)
 class DeviceReport(Generic[T_co]):
-    """The latest of one device.
+    """The latest state of one device.
 
     Attributes:
-        device: its name, as errors have it.
-        silent_s: how long ago it last answered anything, s on the wall.
-        value: what it said last; nothing if it has not yet.
-        first: what it said first.
-        error: why the latest question had no value for an answer.
-        garbled: how many answers in a row made no sense.
+        device: its name, as in error messages.
+        silent_s: time since the last answer on its line, s of real time.
+        value: the latest value; none before the first answer.
+        first: the first value.
+        error: the error of the latest poll, if it gave no value.
+        garbled_count: how many answers in a row were garbled.
     """
 
     device: str
@@ -34,7 +34,7 @@ class DeviceReport(Generic[T_co]):
 
 @dataclass(frozen=True, slots=True)
 class GaugeDeviation:
-    """A gauge in the middle of a set: how far its plunger is from the set's reference, mm."""
+    """The deviation of a gauge from the reference of its set, mm along base axis ``axis`` (0 to 2)."""
 
     axis: int
     deviation_mm: float
@@ -42,23 +42,23 @@ class GaugeDeviation:
 
 @dataclass(frozen=True, slots=True)
 class Snapshot:
-    """All that is watched, in one moment; what is not watched is empty."""
+    """The reports of all supervised devices at one moment; a device that is not supervised has none."""
 
     gauges: tuple[DeviceReport[GaugeDeviation], ...] = ()
     encoders: DeviceReport[EncoderSample] | None = None
     controller: DeviceReport[ControllerStatus] | None = None
     stop_input: DeviceReport[str] | None = None
-    """Its value is why motion is forbidden; empty while it is not."""
+    """Its value is the reason why motion is forbidden; empty while motion is allowed."""
 
 
 @dataclass(frozen=True, slots=True)
 class GuardLimits:
-    """What a snapshot is held against during one action.
+    """The limits of one action.
 
     Attributes:
-        stale_s: longest silence, s on the wall.
+        stale_s: longest silence of a device, s of real time.
         plate_mm: largest deviation from the set's reference along any axis.
-        rest_mm: largest way of a slider where the robot must stand still; none where it moves.
+        rest_mm: largest slider displacement at standstill; none while the robot moves.
     """
 
     stale_s: float

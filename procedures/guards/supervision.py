@@ -1,4 +1,15 @@
-"""Doing something under watch: it begins only if all is well, and ends when something is not."""
+"""Supervision of one action: it starts only if no guard trips, and is stopped when one does.
+
+::
+
+    latched? --yes--> refuse
+       | no
+    start the monitor; every device must answer once --trip--> latch, refuse
+       |
+    start the action; wait for its end or a trip
+       |- action ended      -> its result; an error is replaced by a trip that explains it
+       |- a guard tripped   -> stop the robot, latch, wait for the action's end, cancel it
+"""
 
 from __future__ import annotations
 
@@ -22,10 +33,10 @@ Supervised = Callable[[], Awaitable[Result]]
 
 
 class MotionSupervisor:
-    """Watches actions. What trips is latched: nothing begins any more until ``clear`` is called.
+    """Supervises actions. A trip is latched: no further action starts until ``clear`` is called.
 
     Attributes:
-        latched: what tripped, while it keeps everything from beginning.
+        latched: the latched trip, if any.
     """
 
     def __init__(self, controller: Controller, clock: CellClock, folder: Path, free_disk_mb: float) -> None:
@@ -36,14 +47,14 @@ class MotionSupervisor:
         self._free_disk_mb = free_disk_mb
 
     def clear(self) -> None:
-        """Somebody has seen to what tripped; all is looked at again before anything moves."""
+        """Release the latch; the next action evaluates all guards again before it starts."""
         self.latched = None
 
     def check(self) -> None:
-        """Refuse to begin while something is latched or the disk is filling up.
+        """Refuse to start while a trip is latched or the disk is nearly full.
 
         Raises:
-            GuardTripped: what it is.
+            GuardTripped: the reason.
         """
         if self.latched is not None:
             raise self.latched.as_error()
@@ -51,12 +62,12 @@ class MotionSupervisor:
             raise self.latch(trip)
 
     def latch(self, trip: Trip) -> GuardTripped:
-        """Let nothing begin any more; the error to raise."""
+        """Latch a trip; returns the error to raise."""
         self.latched = trip
         return trip.as_error()
 
     async def stop(self, trip: Trip) -> GuardTripped:
-        """Stop the robot, however often the waiting is cancelled, and latch; the error to raise."""
+        """Stop the robot, even if cancelled meanwhile, and latch; returns the error to raise."""
         try:
             await shielded(self._controller.stop())
         except HexacellError as error:
@@ -64,44 +75,48 @@ class MotionSupervisor:
         return self.latch(trip)
 
     async def supervise(
-        self, action: Supervised[Result], lanes: DevicePollers, limits: GuardLimits, ending_s: float = 0.0
+        self,
+        action: Supervised[Result],
+        pollers: DevicePollers,
+        limits: GuardLimits,
+        stop_grace_s: float = 0.0,
     ) -> Result:
-        """Watch over an action; it begins once every device under watch has answered.
+        """Run an action under supervision; it starts once every supervised device has answered.
 
-        When a guard trips the robot is stopped, and the action has so many seconds of the wall to
-        end by itself before it is cancelled.
+        When a guard trips, the robot is stopped. The action then has ``stop_grace_s`` of real time to
+        end before it is cancelled.
 
         Raises:
-            GuardTripped: a guard tripped; the robot stands, and the action has ended.
-            HexacellError: the action failed by itself, and no guard knows why.
+            GuardTripped: a guard tripped; the robot is at a standstill and the action has ended.
+            HexacellError: the action failed, and no guard explains it.
         """
         self.check()
-        async with GuardMonitor(lanes, limits, self._clock) as patrol:
-            if trip := await patrol.poll_all():
+        async with GuardMonitor(pollers, limits, self._clock) as monitor:
+            if trip := await monitor.poll_all():
                 raise self.latch(trip)
-            doing = asyncio.ensure_future(action())
+            task = asyncio.ensure_future(action())
             try:
-                await patrol.wait_for(doing)
-                if patrol.trip is None:
-                    return await self._result(doing, patrol)
-                tripped = await self.stop(patrol.trip)
-                await asyncio.wait([doing], timeout=ending_s)
+                await monitor.wait_for(task)
+                if monitor.trip is None:
+                    return await self._result(task, monitor)
+                tripped = await self.stop(monitor.trip)
+                await asyncio.wait([task], timeout=stop_grace_s)
                 raise tripped
             finally:
-                await shielded(_see_off(doing))
+                await shielded(_cancel_and_wait(task))
 
-    async def _result(self, done: asyncio.Future[Result], patrol: GuardMonitor) -> Result:
+    async def _result(self, task: asyncio.Future[Result], monitor: GuardMonitor) -> Result:
         try:
-            return await done
+            return await task
         except HexacellError as error:
-            if trip := await patrol.poll_all():
+            if trip := await monitor.poll_all():
                 raise await self.stop(trip) from error
             raise
 
 
-async def _see_off(doing: asyncio.Future[Any]) -> None:
-    """Wait for the end of something that nobody wants to hear of any more."""
-    doing.cancel()
-    await asyncio.wait([doing])
-    if not doing.cancelled():
-        doing.exception()
+async def _cancel_and_wait(task: asyncio.Future[Any]) -> None:
+    """End a task whose result is no longer needed."""
+    task.cancel()
+    await asyncio.wait([task])
+    if not task.cancelled():
+        task.exception()

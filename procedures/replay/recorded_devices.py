@@ -1,6 +1,6 @@
-"""Devices, an operator and a clock that live by the journal.
+"""Devices, operator and clock of a replay: they answer from the journal.
 
-A recorded robot does not move, so nothing can happen to it: its guards look away.
+No robot moves, so there is nothing to supervise: the guards of a replay only evaluate numbers.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from typing import TypeVar
 
 from drivers.gauges.errors import GaugeAtEnd
 from drivers.interfaces import ControllerStatus, DeviceIdentity, EncoderSample, GaugeReading
+from hexacell.cell.devices import GaugeSettings
 from hexacell.cell.model import CellSettings
 from hexacell.clock import CellClock
 from hexacell.errors import DeviceError
@@ -32,11 +33,14 @@ PROTOCOL = "recorded"
 
 
 class RecordedOutcome:
-    """What came of the step that is being replayed, and how far it was read.
+    """The recorded outcome of the step being replayed, as the source of all device readings.
 
-    A record keeps the mean and the range of its window, not each reading in it: readings are made up
-    that have both, the first two at the ends of the range. Time stands still but for what makes the
-    window as long as it must be.
+    A record keeps the mean and the range of its window of readings, not each reading. Readings with
+    the same mean and range are generated: the first two are at the ends of the range. The clock
+    advances only as far as the window must be long.
+
+    Attributes:
+        samples_read: how many readings of the window have been given out.
     """
 
     def __init__(self, window_s: float) -> None:
@@ -46,25 +50,25 @@ class RecordedOutcome:
         self.samples_read = 0
 
     def load(self, outcome: events.Event) -> None:
-        """The outcome that the devices are to bring about from now on."""
+        """Set the outcome that the devices must reproduce from now on."""
         self.begun_s = self.now()
         self.outcome = outcome
         self.samples_read = 0
 
     def now(self) -> float:
-        """Seconds: all readings of a window at once, but for the first and the last."""
-        passed = 0.5 * min(self.samples_read, 1)
+        """Time, s: all readings of a window come at the same time, except the first and the last."""
+        elapsed = 0.5 * min(self.samples_read, 1)
         if self.samples_read and self.samples_read >= self._length - 1:
-            passed = 1.0 + 1e-6
-        return self.begun_s + passed * self._window_s
+            elapsed = 1.0 + 1e-6
+        return self.begun_s + elapsed * self._window_s
 
     @property
     def reading(self) -> events.Reading | None:
-        """The settled window behind the outcome, where there was one."""
+        """The recorded reading of the outcome, if it has one."""
         return getattr(self.outcome, "reading", None)
 
     def required_reading(self) -> events.Reading:
-        """The same; raises ``DeviceError`` when more is asked for than there is."""
+        """The same; raises ``DeviceError`` if all of its samples have been read."""
         if self.reading is None or self.samples_read >= self._length:
             raise DeviceError("the journal has no further reading", subject="the recorded devices")
         return self.reading
@@ -75,184 +79,185 @@ class RecordedOutcome:
 
 
 class RecordedClock(CellClock):
-    """The tape's time; waiting takes none."""
+    """The time of the recorded outcome; waiting takes none."""
 
-    def __init__(self, tape: RecordedOutcome) -> None:
+    def __init__(self, recorded: RecordedOutcome) -> None:
         super().__init__()
-        self._tape = tape
+        self._recorded = recorded
 
     def now(self) -> float:
-        """Seconds on the tape."""
-        return self._tape.now()
+        """Time, s."""
+        return self._recorded.now()
 
     async def sleep(self, seconds: float) -> None:
-        """Nothing to wait for."""
+        """Return at once."""
 
     def wait(self, seconds: float, until: threading.Event | None = None) -> bool:
-        """Nothing to wait for."""
+        """Return at once."""
         del seconds
         return until is not None and until.is_set()
 
 
 class RecordedGauge:
-    """A gauge that shows what one showed; ``row`` is its place in the cell file."""
+    """A gauge that gives recorded readings; ``row`` is its index in the cell file."""
 
-    def __init__(self, tape: RecordedOutcome, row: int, mount: tuple[str, int, int]) -> None:
-        self._tape = tape
+    def __init__(self, recorded: RecordedOutcome, row: int, settings: GaugeSettings) -> None:
+        self.name = settings.name
+        self._recorded = recorded
         self._row = row
-        self.name, self._axis, self._sign = mount
+        self._axis = settings.mounting
 
     async def open(self) -> DeviceIdentity:
-        """Nothing to connect to."""
+        """Nothing to connect."""
         return DeviceIdentity(self.name, PROTOCOL, "a gauge in a journal")
 
     async def read(self) -> GaugeReading:
-        """The next reading of the window, or that the plunger is at its end, if it was."""
-        outcome = self._tape.outcome
+        """The next reading of the window; raises ``GaugeAtEnd`` where the recorded gauge did."""
+        outcome = self._recorded.outcome
         if isinstance(outcome, events.RecordRejected) and outcome.reading is None:
             return self._at_end(outcome.reason)
-        reading, look = self._tape.required_reading(), self._tape.samples_read
-        mean, half = reading.gauges_mm[self._axis], reading.spread_mm[self._axis] / 2
-        offset = {0: half, 1: -half}.get(look, 0.0)
-        return GaugeReading(self._sign * (mean + offset), reading.answers[look][self._row])
+        reading, sample = self._recorded.required_reading(), self._recorded.samples_read
+        index = self._axis.index
+        mean, half = reading.gauges_mm[index], reading.spread_mm[index] / 2
+        offset = {0: half, 1: -half}.get(sample, 0.0)
+        return GaugeReading(self._axis.reading(mean + offset), reading.answers[sample][self._row])
 
     async def read_once(self) -> GaugeReading:
-        """The same as a reading."""
+        """The same as ``read``."""
         return await self.read()
 
     async def check(self) -> None:
-        """Its zero is as good as it was."""
+        """Its settings have not changed."""
 
     async def close(self) -> None:
-        """Nothing to let go."""
+        """Nothing to release."""
 
     def _at_end(self, reason: str) -> GaugeReading:
-        if self._row == 0:  # one of them says it for all
+        if self._row == 0:  # one gauge raises it for all
             raise GaugeAtEnd(reason)
         return GaugeReading(0.0, "")
 
 
 @dataclass(frozen=True, slots=True)
 class RecordedEncoders:
-    """Encoders that count what they counted."""
+    """Encoders that give the recorded counts."""
 
-    tape: RecordedOutcome
+    recorded: RecordedOutcome
 
     async def open(self) -> tuple[DeviceIdentity, ...]:
-        """Nothing to connect to."""
+        """Nothing to connect."""
         return (DeviceIdentity("encoders", PROTOCOL, "encoders in a journal"),)
 
     async def read(self) -> EncoderSample:
-        """The next round of the window."""
-        reading = self.tape.required_reading()
-        self.tape.samples_read += 1
-        return EncoderSample(reading.counts[self.tape.samples_read - 1], reading.joints_mm)
+        """The next sample of the window."""
+        reading = self.recorded.required_reading()
+        self.recorded.samples_read += 1
+        return EncoderSample(reading.counts[self.recorded.samples_read - 1], reading.joints_mm)
 
     async def close(self) -> None:
-        """Nothing to let go."""
+        """Nothing to release."""
 
 
 @dataclass(frozen=True, slots=True)
 class RecordedController:
-    """A controller whose moves all arrive: those that did not are no arrivals in the journal."""
+    """A controller whose moves all arrive; a move that did not arrive has no arrival in the journal."""
 
-    tape: RecordedOutcome
+    recorded: RecordedOutcome
 
     async def open(self) -> DeviceIdentity:
-        """Nothing to connect to."""
+        """Nothing to connect."""
         return DeviceIdentity("controller", PROTOCOL, "a controller in a journal")
 
     async def prepare(self) -> None:
-        """It is ready."""
+        """Nothing to do."""
 
     async def move(self, pose: Pose) -> None:
-        """It is there."""
+        """Nothing to do."""
 
     async def pose(self) -> Pose:
-        """Where the outcome says the robot is."""
-        pose = getattr(self.tape.outcome, "pose", None)
+        """The pose in the outcome."""
+        pose = getattr(self.recorded.outcome, "pose", None)
         if pose is None:
-            raise DeviceError("the journal does not say where the robot stood", subject="controller")
+            raise DeviceError("the journal has no pose for this step", subject="controller")
         return Pose(*pose)
 
     async def status(self) -> ControllerStatus:
-        """It may move."""
+        """Enabled."""
         return ControllerStatus(estop=False, enabled=True)
 
     async def stop(self) -> None:
-        """It stands."""
+        """Nothing to do."""
 
     async def reload(self) -> None:
-        """It has read its config."""
+        """Nothing to do."""
 
     async def close(self) -> None:
-        """Nothing to let go."""
+        """Nothing to release."""
 
 
 @dataclass(frozen=True, slots=True)
 class RecordedOperator:
-    """A person who answers what somebody answered."""
+    """An operator who gives the recorded answers."""
 
-    tape: RecordedOutcome
+    recorded: RecordedOutcome
 
     async def ask(self, question: Question) -> str | None:
         """Who approved a change, if anybody did; a question about a failure is never asked here."""
-        if isinstance(self.tape.outcome, events.Committed):
-            return self.tape.outcome.approved_by
+        if isinstance(self.recorded.outcome, events.Committed):
+            return self.recorded.outcome.approved_by
         return question.default
 
 
 class RecordedThermometers(Thermometers):
-    """Thermometers that show what they showed."""
+    """Thermometers that give the recorded temperatures."""
 
-    def __init__(self, tape: RecordedOutcome) -> None:
+    def __init__(self, recorded: RecordedOutcome) -> None:
         super().__init__()
-        self._tape = tape
+        self._recorded = recorded
 
     async def read(self) -> tuple[events.Temperature, ...]:
-        """What stands in the record."""
-        return self._tape.reading.temperatures if self._tape.reading is not None else ()
+        """The temperatures of the record."""
+        return self._recorded.reading.temperatures if self._recorded.reading is not None else ()
 
 
-def recorded_devices(settings: CellSettings, tape: RecordedOutcome) -> Devices:
-    """The devices of a cell as its journal knows them."""
-    mounts = [(gauge.name, "xyz".index(gauge.axis), int(gauge.sign)) for gauge in settings.gauges]
+def recorded_devices(settings: CellSettings, recorded: RecordedOutcome) -> Devices:
+    """The devices of a cell, answering from the journal."""
     gauges = tuple(
-        MountedGauge(RecordedGauge(tape, row, mount), mount[1], mount[2])
-        for row, mount in enumerate(mounts)
+        MountedGauge(RecordedGauge(recorded, row, gauge), gauge.mounting)
+        for row, gauge in enumerate(settings.gauges)
     )
-    return Devices(gauges, RecordedEncoders(tape), RecordedController(tape))
+    return Devices(gauges, RecordedEncoders(recorded), RecordedController(recorded))
 
 
 Result = TypeVar("Result")
 
 
 class InactiveGuards(Guards):
-    """Guards that let everything be done; what they judge by numbers alone, drift, they still judge."""
+    """Guards without supervision; the drift of a reference, which needs no device, is still evaluated."""
 
     async def prepare(self) -> None:
-        """It is ready."""
+        """Nothing to do."""
 
     async def move(self, step: Move, state: RunState, commanded: Callable[[], Array]) -> None:
-        """It is there."""
+        """Nothing to do."""
         del step, state, commanded
 
     async def stand(self, action: Supervised[Result]) -> Result:
-        """Do it."""
+        """Run it."""
         return await action()
 
     async def sample(self, action: Supervised[Result]) -> Result:
-        """Take them."""
+        """Run it."""
         return await action()
 
     async def reload(self) -> None:
-        """It has read its config."""
+        """Nothing to do."""
 
 
 class RecordedStepExecutor(StepExecutor):
-    """A performer whose devices are those of a journal."""
+    """A step executor with the devices of a journal."""
 
     @cached_property
     def guards(self) -> Guards:
-        """None."""
+        """No supervision."""
         return InactiveGuards(self.cell.settings, self.devices, self.clock, self.folder.path)

@@ -120,7 +120,7 @@ async def reference(devices: Devices) -> RunState:
     shown = [await mounted.gauge.read() for mounted in devices.gauges]
     on_axes = [0.0, 0.0, 0.0]
     for mounted, answer in zip(devices.gauges, shown, strict=True):
-        on_axes[mounted.axis] = mounted.sign * answer.value_mm
+        on_axes[mounted.axis.index] = mounted.axis.coordinate(answer.value_mm)
     reading = events.Reading(
         gauges_mm=(on_axes[0], on_axes[1], on_axes[2]),
         spread_mm=(0.0, 0.0, 0.0),

@@ -11,6 +11,7 @@ from drivers.gauges.errors import GaugeAtEnd
 from drivers.interfaces import ControllerStatus, DeviceIdentity, EncoderSample, GaugeReading
 from drivers.simulated.robot import SimulatedMachine
 from hexacell.acceptance.gates import AcceptanceGate
+from hexacell.cell.devices import GaugeAxis
 from hexacell.cell.recovery import Action
 from hexacell.clock import CellClock
 from hexacell.errors import HexacellError
@@ -181,5 +182,5 @@ class Bench:
         self.gauges = tuple(FakeGauge(name, lambda: 0.0) for name in "xyz")
         self.encoders = FakeEncoders(lambda: (0.0,) * 6)
         self.controller = FakeController()
-        mounted = tuple(MountedGauge(gauge, axis, 1) for axis, gauge in enumerate(self.gauges))
+        mounted = tuple(MountedGauge(gauge, GaugeAxis(axis, 1)) for axis, gauge in enumerate(self.gauges))
         self.devices = Devices(mounted, self.encoders, self.controller)

@@ -22,7 +22,11 @@ async def test_drivers_are_those_that_the_file_names(make_site) -> None:
     settings = make_site().simulated.settings
     links = SharedSerialPorts()
     devices = devices_of(settings, links, WireTrace())
-    assert [(mounted.axis, mounted.sign) for mounted in devices.gauges] == [(0, 1), (1, 1), (2, 1)]
+    assert [(mounted.axis.index, mounted.axis.sign) for mounted in devices.gauges] == [
+        (0, 1),
+        (1, 1),
+        (2, 1),
+    ]
     assert isinstance(devices.gauges[1].gauge, Mux10Gauge)
     assert isinstance(devices.encoders, Cia406Bank)
     await links.close()
@@ -38,7 +42,11 @@ def test_axes_and_signs_are_the_files(make_site) -> None:
     )
     settings = site.simulated.settings.model_copy(update={"gauges": turned})
     devices = devices_of(settings, SharedSerialPorts(), WireTrace())
-    assert [(mounted.axis, mounted.sign) for mounted in devices.gauges] == [(2, -1), (1, 1), (0, 1)]
+    assert [(mounted.axis.index, mounted.axis.sign) for mounted in devices.gauges] == [
+        (2, -1),
+        (1, 1),
+        (0, 1),
+    ]
 
 
 @pytest.mark.parametrize("section", ["encoders", "controller"])

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from drivers.gauges.errors import GaugeAtEnd, GaugeSilent, ZeroVoid
+from hexacell.cell.devices import GaugeAxis
 from hexacell.errors import DeviceError, HexacellError, LimitError, SeveralErrors
 from hexacell.kinematics.pose import Pose
 from procedures.devices.device_set import Devices, MountedGauge
@@ -33,7 +34,7 @@ class Station:
 
     def mount(self, *axes_and_signs: tuple[int, int]) -> None:
         mounted = zip(self.rig.gauges, axes_and_signs, strict=True)
-        gauges = tuple(MountedGauge(gauge, axis, sign) for gauge, (axis, sign) in mounted)
+        gauges = tuple(MountedGauge(gauge, GaugeAxis(axis, sign)) for gauge, (axis, sign) in mounted)
         devices = Devices(gauges, self.rig.bench.encoders, self.rig.controller)
         object.__setattr__(self.rig.performer, "devices", devices)
 

@@ -315,7 +315,7 @@ async def test_errors_of_a_lane_do_not_hide_what_it_said() -> None:
     lane = DevicePoller("g", ask, 0.0)
     seen = []
     for _ in range(4):
-        lane._heard = await lane._look()
+        lane._report = await lane._poll()
         seen.append((lane.report.value, lane.report.first, str(lane.report.error or "")))
     assert seen == [(1.0, 1.0, ""), (1.0, 1.0, "g: end"), (1.0, 1.0, "g: off"), (2.0, 1.0, "")]
     assert np.isclose(lane.report.silent_s, 0.0)

@@ -13,7 +13,7 @@ from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.geometry import PARAMETER_NAMES, Geometry
 from hexacell.presentation.layout import blocks, wrapped
 from hexacell.reporting.assessment import Assessment
-from hexacell.reporting.findings import findings, pair_sentences
+from hexacell.reporting.findings import findings, noise_sentence, pair_sentences, residual_sentence
 
 PARAMETER_HEADER = f"{'mm':4}{'drawing':>10}{'identified':>12}{'change':>9}{'sigma':>8}"
 
@@ -90,7 +90,7 @@ def residual_line(found: Identification, goodness: ChiSquareTest) -> str:
     shown = f"{probability:.2g}" if probability >= 1e-4 else "below 0.0001"
     return wrapped(
         f"Residual {found.residual_rms_mm:.4f} mm rms; chi-square {goodness.chi2:.1f}, expected "
-        f"{goodness.expected:.1f} (probability {shown}). {goodness.sentence}"
+        f"{goodness.expected:.1f} (probability {shown}). {residual_sentence(goodness)}"
     )
 
 
@@ -99,7 +99,7 @@ def noise_table(noise: NoiseLevels | None) -> str:
     if noise is None:
         return ""
     if not noise.are_separable:
-        return wrapped(noise.sentence)
+        return wrapped(noise_sentence(noise))
     rows = (("encoders", noise.encoder), ("gauges", noise.gauge))
     lines = [f"  {name:10}{level.stated:9.4f}  {_noise_estimate(level)}" for name, level in rows]
     return "\n".join([f"{'Noise, mm':12}{'stated':>9}  estimated from the residuals", *lines])

@@ -1,4 +1,4 @@
-"""Everything that is said of an identification beyond its numbers: can it be trusted, how good is it."""
+"""The assessment of an identification: can it be trusted, and how accurate is the robot with it?"""
 
 from __future__ import annotations
 
@@ -21,30 +21,30 @@ from hexacell.measurements.records import MeasurementSet
 from hexacell.robot_model import Robot
 
 CONTRADICTED_RATIO = 10.0
-"""Residuals over the stated noise from which on no noise explains them, but something false."""
+"""Residuals over the stated noise from which noise cannot explain them, only a wrong model or data."""
 
-PAIRS_TO_PART = 5
-"""Of the strongest correlations, for which a measurement is looked for."""
+SEPARATED_PAIRS = 5
+"""How many of the strongest correlations a measurement is searched for."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Assessment:
-    """The checks of a model against its data, and what they promise.
+    """The checks of an identification against its data, and the accuracy they predict.
 
     Attributes:
         goodness: residuals against the stated noise.
-        noise: noise levels seen in the residuals; none without redundancy.
+        noise: noise levels estimated from the residuals; none without redundancy.
         repeatability: none where no pose was visited twice.
-        record_noise_mm: what the stated noise makes a deviation scatter by (root mean square
-            distance), to compare the repeatability with.
-        correlated: pairs of parameters found only together, the strongest first.
-        partings: for the first of these pairs, the record that would part them; commands as the
-            controller takes them.
-        task: poses at which the accuracy is stated, as the controller takes them.
+        record_noise_mm: scatter of a deviation by the stated noise (root mean square distance), to
+            compare the repeatability with.
+        correlated: strongly correlated pairs of parameters, the strongest first.
+        decorrelating_poses: for the first of these pairs, the record that would separate them; the
+            command is in the controller's frames.
+        task: poses at which the accuracy is predicted, in the controller's frames.
         task_named: whether the cell file names them; else they span the workspace.
-        accuracy: at these poses; none where the robot can take none of them. Where the residuals
-            are larger than the stated noise, so is the error to be expected afterwards.
-        tolerance_violations: parameters that the data push out of the drawing's tolerances.
+        accuracy: at these poses; none where the robot can reach none of them. Where the residuals
+            are larger than the stated noise, the predicted error is as well.
+        tolerance_violations: parameters beyond the drawing's tolerances.
     """
 
     goodness: ChiSquareTest
@@ -52,7 +52,7 @@ class Assessment:
     repeatability: Repeatability | None
     record_noise_mm: float
     correlated: tuple[CorrelatedPair, ...]
-    partings: tuple[DecorrelatingPose | None, ...]
+    decorrelating_poses: tuple[DecorrelatingPose | None, ...]
     task: tuple[Pose, ...]
     task_named: bool
     accuracy: Accuracy | None
@@ -60,13 +60,13 @@ class Assessment:
 
     @property
     def refused(self) -> bool:
-        """Whether the geometry must not be used, however well everything else looks."""
+        """Whether the geometry must not be used, whatever the other checks say."""
         contradicted = self.goodness.ratio > CONTRADICTED_RATIO and not self.does_not_repeat
         return contradicted or bool(self.tolerance_violations)
 
     @property
     def does_not_repeat(self) -> bool:
-        """Whether the machine's scatter exceeds the error that calibrating would remove."""
+        """Whether the machine's scatter exceeds the error that a calibration would remove."""
         if self.repeatability is None or self.accuracy is None:
             return False
         return self.repeatability.dominates(self.accuracy.removable_mm)
@@ -75,32 +75,32 @@ class Assessment:
 def assess(
     settings: CellSettings, robot: Robot, measurements: MeasurementSet, found: Identification
 ) -> Assessment:
-    """Check an identification of some measurements, and predict what it is good for."""
+    """Check an identification of some measurements, and predict the accuracy with it."""
     model = LinearizedSolution.at(found)
     pairs = strongly_correlated(found)
     left_out = {record for record, _ in found.left_out}
-    fitting = goodness(model)
+    tested = goodness(model)
     task, accuracy = _accuracy(settings, robot, found)
     return Assessment(
-        goodness=fitting,
+        goodness=tested,
         noise=noise_levels(model),
         repeatability=repeatability(measurements, left_out),
         record_noise_mm=model.record_noise_mm,
         correlated=pairs,
-        partings=_partings(robot, found, pairs[:PAIRS_TO_PART]),
+        decorrelating_poses=_decorrelating_poses(robot, found, pairs[:SEPARATED_PAIRS]),
         task=tuple(robot.to_command(task.pose(row)) for row in range(len(task))),
         task_named=bool(settings.task.poses),
-        accuracy=accuracy and replace(accuracy, after=accuracy.after.times(fitting.noise_factor)),
+        accuracy=accuracy and replace(accuracy, after=accuracy.after.times(tested.noise_factor)),
         tolerance_violations=tolerance_violations(found, robot.drawing, robot.tolerances),
     )
 
 
-def _partings(
+def _decorrelating_poses(
     robot: Robot, found: Identification, pairs: Sequence[CorrelatedPair]
 ) -> tuple[DecorrelatingPose | None, ...]:
     return tuple(
-        part and replace(part, command=robot.to_command(part.command))
-        for part in decorrelating_poses(robot.belief(found), found, pairs)
+        pose and replace(pose, command=robot.to_command(pose.command))
+        for pose in decorrelating_poses(robot.belief(found), found, pairs)
     )
 
 

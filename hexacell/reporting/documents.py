@@ -1,4 +1,4 @@
-"""What an identification says, for programs (the ``fit --json`` document) and in one line."""
+"""An identification for programs: the ``fit --json`` document, and the outcome of a run in one line."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def _outlier(record: RecordId, fault: DataFault) -> dict[str, Any]:
 
 
 def assessment_document(found: Identification, assessed: Assessment) -> dict[str, Any]:
-    """What ``hexacell fit --json`` adds: whether the result can be trusted, and how good it is."""
+    """What ``hexacell fit --json`` adds: the checks of the result and its predicted accuracy."""
     return {
         "findings": list(findings(found, assessed)),
         "goodness": _goodness(assessed.goodness),
@@ -69,7 +69,7 @@ def assessment_document(found: Identification, assessed: Assessment) -> dict[str
         "correlated": _correlated(assessed),
         "accuracy": _accuracy(assessed),
         "refused": assessed.refused,
-        "beyond_tolerance": [asdict(excess) for excess in assessed.tolerance_violations],
+        "beyond_tolerance": [asdict(violation) for violation in assessed.tolerance_violations],
     }
 
 
@@ -112,27 +112,24 @@ def _repeatability(assessed: Assessment) -> dict[str, Any] | None:
 
 
 def _correlated(assessed: Assessment) -> list[dict[str, Any]]:
-    parts = zip_longest(assessed.correlated, assessed.partings)
     return [
         {
             "parameters": [pair.first, pair.second],
             "correlation": pair.correlation,
-            "measure": _parting(part),
+            "measure": pose and _decorrelating_pose(pose),
         }
-        for pair, part in parts
+        for pair, pose in zip_longest(assessed.correlated, assessed.decorrelating_poses)
         if pair
     ]
 
 
-def _parting(part: DecorrelatingPose | None) -> dict[str, Any] | None:
-    if part is None:
-        return None
+def _decorrelating_pose(pose: DecorrelatingPose) -> dict[str, Any]:
     return {
-        "point": part.point,
-        "axis": part.axis,
-        "angle_deg": part.degrees,
-        "pose": _pose(part.command),
-        "correlation": part.correlation,
+        "point": pose.point,
+        "axis": pose.axis,
+        "angle_deg": pose.degrees,
+        "pose": _pose(pose.command),
+        "correlation": pose.correlation,
     }
 
 

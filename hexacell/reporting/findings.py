@@ -1,26 +1,30 @@
-"""What an identification and its assessment mean, in sentences for people; the gravest first."""
+"""The meaning of an identification and its assessment, in sentences for people; the most serious first."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
 from hexacell.identification.diagnostics.tolerance_check import ToleranceViolation
+from hexacell.identification.diagnostics.variance_components import NoiseLevel, NoiseLevels
 from hexacell.identification.solver.chi_square import ChiSquareTest, ChiSquareVerdict
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.mechanism import FrameConvention
 from hexacell.kinematics.parameter_names import display_name
 from hexacell.reporting.assessment import Assessment
 
-RETURNS_BADLY = 2.0
-"""Scatter on returning over that of the stated noise, from which on it is worth a sentence."""
+POOR_REPEATABILITY = 2.0
+"""Scatter of repeated poses over that of the stated noise from which it is a finding."""
+
+NAMED_PARAMETERS = 4
+"""More undetermined parameters than these are counted, not named."""
 
 
 def findings(found: Identification, assessed: Assessment) -> tuple[str, ...]:
-    """The verdict, what it promises, and whatever else a person should know before using the result."""
+    """The verdict, the accuracy, and everything else to know before the result is used."""
     sentences = (
         _verdict(found, assessed),
-        _promise(assessed),
-        _returns_badly(assessed),
+        _accuracy(assessed),
+        _poor_repeatability(assessed),
         _noise(assessed),
         _unreachable(assessed),
         *map(str, found.data_faults),
@@ -29,20 +33,53 @@ def findings(found: Identification, assessed: Assessment) -> tuple[str, ...]:
 
 
 def pair_sentences(found: Identification, assessed: Assessment) -> tuple[str, ...]:
-    """For the strongest correlations: the pair, and the measurement that would part it."""
+    """For the strongest correlations: the pair, and the measurement that would separate it."""
     convention = found.problem.mechanism.convention
     sentences = []
-    for pair, part in zip(assessed.correlated, assessed.partings, strict=False):
+    for pair, pose in zip(assessed.correlated, assessed.decorrelating_poses, strict=False):
         first, second = (display_name(name, convention) for name in (pair.first, pair.second))
-        fact = f"{first} and {second} cannot be told apart from these poses"
-        way = (
-            "no single tilt at these points would part them"
-            if part is None
-            else f"{'turn' if part.axis == 'z' else 'tilt'} {part.degrees:+.0f} deg about {part.axis} "
-            f"at point {part.point}"
+        fact = f"{first} and {second} cannot be separated from these poses"
+        remedy = (
+            "no single tilt at these points would separate them"
+            if pose is None
+            else f"{'turn' if pose.axis == 'z' else 'tilt'} {pose.degrees:+.0f} deg about {pose.axis} "
+            f"at point {pose.point}"
         )
-        sentences.append(f"{fact} ({pair.correlation:+.2f}): {way}")
+        sentences.append(f"{fact} ({pair.correlation:+.2f}): {remedy}")
     return tuple(sentences)
+
+
+def residual_sentence(test: ChiSquareTest) -> str:
+    """What the chi-square test says of the residuals."""
+    match test.agreement:
+        case ChiSquareVerdict.NOT_EVALUATED:
+            return "There are no more records than unknowns: the residuals prove nothing."
+        case ChiSquareVerdict.AGREES:
+            return "The residuals agree with the stated noise."
+        case ChiSquareVerdict.TOO_LARGE:
+            return (
+                f"The residuals are {test.ratio:.1f} times the stated noise: the machine does not "
+                "repeat, a gauge has moved, or the noise is stated too small."
+            )
+        case ChiSquareVerdict.TOO_SMALL:
+            return (
+                f"The residuals are only {test.ratio:.2f} times the stated noise: it is stated too "
+                "large, and every sigma with it."
+            )
+
+
+def noise_sentence(levels: NoiseLevels) -> str:
+    """The noise levels that the residuals show."""
+    if not levels.are_separable:
+        return "The noise of the encoders and of the gauges cannot be separated with these records."
+    encoders, gauges = _noise_level("encoders", levels.encoder), _noise_level("gauges", levels.gauge)
+    return f"Noise by the residuals: {encoders}; {gauges}."
+
+
+def _noise_level(kind: str, level: NoiseLevel) -> str:
+    if not level.is_resolved:
+        return f"{kind} below {level.at_most:.4f} mm (stated {level.stated:g})"
+    return f"{kind} {level.estimated:.4f} +- {level.standard_error:.4f} mm (stated {level.stated:g})"
 
 
 def _verdict(found: Identification, assessed: Assessment) -> str:
@@ -51,23 +88,23 @@ def _verdict(found: Identification, assessed: Assessment) -> str:
     if assessed.tolerance_violations:
         return _beyond_tolerance(assessed.tolerance_violations, found.problem.mechanism.convention)
     if assessed.does_not_repeat:
-        return _recalibrating_will_not_help(assessed)
+        return _no_gain(assessed)
     if assessed.refused:
         return _contradicted(assessed.goodness)
     if found.undetermined:
         return f"Incomplete: {_undetermined(found)} not determined by these data."
-    return _by_residuals(assessed.goodness)
+    return _residual_verdict(assessed.goodness)
 
 
-def _beyond_tolerance(beyond: Sequence[ToleranceViolation], convention: FrameConvention) -> str:
+def _beyond_tolerance(violations: Sequence[ToleranceViolation], convention: FrameConvention) -> str:
     names = ", ".join(
         f"{display_name(one.name, convention)} is {one.change_mm:+.2f} mm from the drawing "
         f"(tolerance {one.tolerance_mm:g}, sigma {one.sigma_mm:.2g})"
-        for one in beyond
+        for one in violations
     )
     return (
         f"Refused: {names}. A good residual is no proof: measure that on the machine, and correct the "
-        "drawing or its tolerance in the cell file, or look for what else is wrong."
+        "drawing or its tolerance in the cell file, or find the other cause."
     )
 
 
@@ -75,19 +112,19 @@ def _contradicted(goodness: ChiSquareTest) -> str:
     return (
         f"Refused: the residuals are {goodness.ratio:.0f} times the stated noise, and no single mistake "
         "explains them. Check that the drawing, the controller's config and the branch are this machine's, "
-        "and that the ball and the gauges sit tight."
+        "and that the ball and the gauges are clamped."
     )
 
 
-def _by_residuals(goodness: ChiSquareTest) -> str:
+def _residual_verdict(goodness: ChiSquareTest) -> str:
     match goodness.agreement:
         case ChiSquareVerdict.TOO_LARGE:
-            scale = f"Every parameter's sigma is really {goodness.ratio:.1f} times as large."
-            return f"Doubtful: {_lower(goodness.sentence)} {scale}"
+            scale = f"Every parameter's sigma is in fact {goodness.ratio:.1f} times as large."
+            return f"Doubtful: {_lower(residual_sentence(goodness))} {scale}"
         case ChiSquareVerdict.NOT_EVALUATED:
-            return f"Not proven: {_lower(goodness.sentence)}"
+            return f"Not proven: {_lower(residual_sentence(goodness))}"
         case ChiSquareVerdict.TOO_SMALL:
-            return f"Good: the records determine every parameter. {goodness.sentence}"
+            return f"Good: the records determine every parameter. {residual_sentence(goodness)}"
         case ChiSquareVerdict.AGREES:
             return "Good: the records determine every parameter, and agree with the stated noise."
 
@@ -96,59 +133,60 @@ def _undetermined(found: Identification) -> str:
     convention = found.problem.mechanism.convention
     free = convention.free_names()
     names = [display_name(name, convention) for name in found.undetermined if name in free]
-    if len(names) > 4:
+    if len(names) > NAMED_PARAMETERS:
         return f"{len(names)} of {len(free)} parameters are"
     return f"{', '.join(names)} {'is' if len(names) == 1 else 'are'}"
 
 
-def _promise(assessed: Assessment) -> str:
+def _accuracy(assessed: Assessment) -> str:
     accuracy = assessed.accuracy
     if accuracy is None:
-        return "The robot can take none of the task poses: no accuracy can be stated."
+        return "The robot can reach none of the task poses: no accuracy can be stated."
     where = "task poses" if assessed.task_named else "poses across the workspace"
     before, after = accuracy.before, accuracy.after
     return (
-        f"At {len(accuracy.poses)} {where} the robot now errs by {before.position_rms_mm:.3g} mm (rms), "
-        f"with the identified geometry by {after.position_rms_mm:.2g} mm (one sigma)."
+        f"At {len(accuracy.poses)} {where} the position error is now {before.position_rms_mm:.3g} mm "
+        f"(rms), and {after.position_rms_mm:.2g} mm with the identified geometry (one sigma)."
     )
 
 
-def _recalibrating_will_not_help(assessed: Assessment) -> str:
+def _no_gain(assessed: Assessment) -> str:
     scatter, accuracy = assessed.repeatability, assessed.accuracy
     if scatter is None or accuracy is None:
         return ""
     return (
-        f"Recalibrating will not help: the machine comes back only to within {scatter.distance_mm:.3f} mm, "
-        f"and a better geometry would take away {accuracy.removable_mm:.3f} mm."
+        f"Recalibrating will not help: the machine repeats only to within {scatter.distance_mm:.3f} mm, "
+        f"and a better geometry would remove {accuracy.removable_mm:.3f} mm."
     )
 
 
-def _returns_badly(assessed: Assessment) -> str:
-    scatter, explained_mm = assessed.repeatability, assessed.record_noise_mm
-    if scatter is None or assessed.does_not_repeat or not scatter.dominates(RETURNS_BADLY * explained_mm):
+def _poor_repeatability(assessed: Assessment) -> str:
+    scatter, noise_mm = assessed.repeatability, assessed.record_noise_mm
+    if scatter is None or assessed.does_not_repeat or not scatter.dominates(POOR_REPEATABILITY * noise_mm):
         return ""
     return (
         f"On returning to a pose the ball is {scatter.distance_mm:.3f} mm off, "
-        f"{scatter.distance_mm / explained_mm:.1f} times what the stated noise explains: look for play, "
-        "for slip at the gauges, for warming."
+        f"{scatter.distance_mm / noise_mm:.1f} times what the stated noise explains: look for play, "
+        "slipping gauges or thermal drift."
     )
 
 
 def _noise(assessed: Assessment) -> str:
-    """Levels that are surely not the stated ones; where the residuals are right, there is no need."""
+    """The noise levels, where the residuals contradict the stated ones."""
     if assessed.noise is None or assessed.goodness.agreement in {
         ChiSquareVerdict.AGREES,
         ChiSquareVerdict.NOT_EVALUATED,
     }:
         return ""
-    return assessed.noise.sentence
+    return noise_sentence(assessed.noise)
 
 
 def _unreachable(assessed: Assessment) -> str:
     if assessed.accuracy is None or assessed.accuracy.reachable.all():
         return ""
-    places = [str(place) for place, fits in enumerate(assessed.accuracy.reachable, start=1) if not fits]
-    return f"Task poses that the robot cannot take are left out: {', '.join(places)}."
+    numbered = enumerate(assessed.accuracy.reachable, start=1)
+    unreachable = ", ".join(str(number) for number, is_reachable in numbered if not is_reachable)
+    return f"Task poses that the robot cannot reach are left out: {unreachable}."
 
 
 def _lower(sentence: str) -> str:

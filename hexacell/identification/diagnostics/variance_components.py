@@ -71,13 +71,6 @@ class NoiseLevels:
         """Whether the residuals separate the two kinds of noise."""
         return self.correlation > CLOSE_CORRELATION and (self.encoder.is_resolved or self.gauge.is_resolved)
 
-    @property
-    def sentence(self) -> str:
-        """Both levels for people."""
-        if not self.are_separable:
-            return "The noise of encoders and that of gauges cannot be told apart from these records."
-        return f"Noise seen: {_words('encoders', self.encoder)}; {_words('gauges', self.gauge)}."
-
 
 def noise_levels(model: LinearizedSolution) -> NoiseLevels | None:
     """The noise levels that the residuals show; none without more records than unknowns."""
@@ -175,9 +168,3 @@ class _Estimation:
         residuals = centring.centred(model.residuals) + jacobian @ step
         taken = centring.nuisance_covariance() + jacobian @ covariance @ np.swapaxes(jacobian, -1, -2)
         return residuals, taken
-
-
-def _words(kind: str, level: NoiseLevel) -> str:
-    if not level.is_resolved:
-        return f"{kind} below {level.at_most:.4f} mm (stated {level.stated:g})"
-    return f"{kind} {level.estimated:.4f} +- {level.standard_error:.4f} mm (stated {level.stated:g})"

@@ -1,9 +1,9 @@
-"""Whether the residuals are as large as the stated noise makes them.
+"""Chi-square test: are the residuals as large as the stated noise makes them?
 
-The chi-square of the residuals has, in the mean, one unit for each record's coordinate, less one
-for each unknown of a station, less the trace of C M for the parameters (C their covariance, M the
-data's information). That trace is the number of parameters where the data alone determine them; a
-parameter that the prior holds takes up less, and the residuals stay larger by that.
+The expected chi-square of the residuals is the number of measured coordinates, less the unknown
+constants of the stations, less the trace of C M for the parameters (C their covariance, M the
+information of the data). Where the data alone determine the parameters, that trace is their number
+and the expected chi-square the degrees of freedom. A parameter that the prior determines counts less.
 """
 
 from __future__ import annotations
@@ -19,11 +19,11 @@ from hexacell.identification.solver.nuisance_parameters import NuisanceEliminati
 
 SMALLEST_PROBABILITY = 1e-3
 RATIOS_THAT_MATTER = (0.9, 1.1)
-"""With very many records a percent of noise too much is certain, and of no importance."""
+"""Ratios in between agree: with very many records a percent too much is significant but irrelevant."""
 
 
 class ChiSquareVerdict(Enum):
-    """What the residuals say about the stated noise."""
+    """Whether the residuals agree with the stated noise."""
 
     AGREES = "agrees"
     TOO_LARGE = "too large"
@@ -46,12 +46,12 @@ class ChiSquareTest:
 
     @property
     def probability(self) -> float:
-        """Of residuals as large as these or larger, if model and stated noise are right."""
+        """Probability of residuals at least this large, if model and stated noise are right."""
         return float(chdtrc(self.expected, self.chi2)) if self.expected > 0.0 else 1.0
 
     @property
     def ratio(self) -> float:
-        """How many times the stated noise the residuals are."""
+        """The residuals over the stated noise."""
         return float(np.sqrt(self.chi2 / self.expected)) if self.expected > 0.0 else 1.0
 
     @property
@@ -68,32 +68,13 @@ class ChiSquareTest:
 
     @property
     def noise_factor(self) -> float:
-        """What to multiply every standard deviation by: it is surely larger than by the stated noise."""
+        """Factor for every standard deviation, above 1 where the residuals are significantly too large."""
         return self.ratio if self.agreement is ChiSquareVerdict.TOO_LARGE else 1.0
-
-    @property
-    def sentence(self) -> str:
-        """The verdict for people."""
-        match self.agreement:
-            case ChiSquareVerdict.NOT_EVALUATED:
-                return "There are no more records than unknowns: the residuals prove nothing."
-            case ChiSquareVerdict.AGREES:
-                return "The residuals agree with the stated noise."
-            case ChiSquareVerdict.TOO_LARGE:
-                return (
-                    f"The residuals are {self.ratio:.1f} times the stated noise: the machine does not "
-                    "repeat, a gauge is not as it was, or the noise is stated too small."
-                )
-            case ChiSquareVerdict.TOO_SMALL:
-                return (
-                    f"The residuals are only {self.ratio:.2f} times the stated noise: it is stated too "
-                    "large, and every sigma with it."
-                )
 
 
 def goodness(model: LinearizedSolution) -> ChiSquareTest:
-    """The chi-square of an identification and what it should be."""
+    """The chi-square test of an identification."""
     problem = model.problem
     system = model.system(NuisanceElimination(problem, model.weights()))
-    taken = float(np.sum(model.covariance * system.information()))
-    return ChiSquareTest(system.cost(), 3.0 * (problem.records - problem.points) - taken)
+    trace = float(np.sum(model.covariance * system.information()))
+    return ChiSquareTest(system.cost(), 3.0 * (problem.records - problem.points) - trace)

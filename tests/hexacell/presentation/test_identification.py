@@ -88,7 +88,7 @@ def test_a_second_visit_gives_a_repeatability(fit, clean):
 
 def test_pairs_are_named_and_the_rest_counted(fit, clean):
     words = " ".join(fit(clean).out.split())
-    assert "leg 2 length and leg 3 length cannot be told apart from these poses (+0.9" in words
+    assert "leg 2 length and leg 3 length cannot be separated from these poses (+0.9" in words
 
 
 def test_json_is_one_document_with_the_keys_programs_rely_on(fit, clean):

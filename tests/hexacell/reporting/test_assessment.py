@@ -67,12 +67,12 @@ def visited_twice(measurements, scatter_mm, seed=0):
     return MeasurementSet((*measurements.records, *again))
 
 
-def test_a_good_result_says_so_first_and_then_what_it_is_worth(good):
+def test_a_good_result_has_the_verdict_first_and_then_the_accuracy(good):
     found, assessed = good
-    verdict, promise, *more = findings(found, assessed)
+    verdict, accuracy, *more = findings(found, assessed)
     assert verdict.startswith("Good: the records determine every parameter")
-    assert "At 6 task poses the robot now errs by 19 mm (rms)" in promise
-    assert f"by {assessed.accuracy.after.position_rms_mm:.2g} mm (one sigma)" in promise
+    assert "At 6 task poses the position error is now 19 mm (rms)" in accuracy
+    assert f"{assessed.accuracy.after.position_rms_mm:.2g} mm with the identified geometry" in accuracy
     assert more == []
 
 
@@ -123,7 +123,7 @@ def test_where_repeatability_dominates_recalibrating_will_not_help(visit, assess
     assert assessed.repeatability.degrees_of_freedom == 55
     assert assessed.repeatability.distance_mm == pytest.approx(0.3 * np.sqrt(3 / 2), rel=0.2)
     assert assessed.accuracy.removable_mm < 0.3
-    assert findings(found, assessed)[0].startswith("Recalibrating will not help: the machine comes back")
+    assert findings(found, assessed)[0].startswith("Recalibrating will not help: the machine repeats")
     assert assessment_document(found, assessed)["repeatability"]["recalibrating_helps"] is False
 
 
@@ -178,7 +178,7 @@ def test_task_poses_out_of_reach_are_numbered_as_in_the_cell_file(visit, assesse
     poses = ((0.0, 0.0, 550.0, 0.0, 0.0, 0.0), (0.0, 900.0, 550.0, 0.0, 0.0, 0.0))
     task = settings.model_copy(update={"task": TaskSettings(poses=poses)})
     found, assessed = assessed_of(visit(seed=2).measured(0.01, seed=1), settings=task)
-    assert "Task poses that the robot cannot take are left out: 2." in findings(found, assessed)
+    assert "Task poses that the robot cannot reach are left out: 2." in findings(found, assessed)
     document = assessment_document(found, assessed)["accuracy"]
     assert document["reachable"] == [True, False]
     assert document["poses"][1]["y"] == pytest.approx(900.0)
@@ -233,7 +233,11 @@ def test_the_frames_of_the_controller_s_config_do_not_matter(good, visit, assess
         np.testing.assert_allclose(mine.angles, other.angles, rtol=1e-4)
     for pose, (x, y, z, *_) in zip(assessed.task, elsewhere.task.poses, strict=True):
         np.testing.assert_allclose(pose.position, [x, y, z])
-    parts = [pair for pair in zip(assessed.partings, before.partings, strict=True) if pair[1]]
+    parts = [
+        pair
+        for pair in zip(assessed.decorrelating_poses, before.decorrelating_poses, strict=True)
+        if pair[1]
+    ]
     assert parts
     for here, there in parts:
         assert here is not None
@@ -242,14 +246,14 @@ def test_the_frames_of_the_controller_s_config_do_not_matter(good, visit, assess
         np.testing.assert_allclose(here.command.as_tuple(), expected.as_tuple(), atol=1e-3)
 
 
-def test_pairs_are_named_with_the_measurement_that_parts_them(good):
+def test_pairs_are_named_with_the_measurement_that_separates_them(good):
     found, assessed = good
     assert assessed.correlated[0].first == "l2"
     sentences = pair_sentences(found, assessed)
     assert sentences
-    assert all("cannot be told apart from these poses" in sentence for sentence in sentences)
-    assert sentences[0].startswith("leg 2 length and leg 3 length cannot be told apart")
-    named = [part for part in assessed.partings if part]
+    assert all("cannot be separated from these poses" in sentence for sentence in sentences)
+    assert sentences[0].startswith("leg 2 length and leg 3 length cannot be separated")
+    named = [part for part in assessed.decorrelating_poses if part]
     for part in named:
         way = "turn" if part.axis == "z" else "tilt"
         words = f"{way} {part.degrees:+.0f} deg about {part.axis} at point {part.point}"

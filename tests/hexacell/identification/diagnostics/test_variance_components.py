@@ -14,6 +14,7 @@ from hexacell.identification.estimator import identify
 from hexacell.identification.problem.problem import Noise
 from hexacell.identification.solver.linearized_solution import LinearizedSolution
 from hexacell.measurements.records import MeasurementSet
+from hexacell.reporting.findings import noise_sentence
 
 REPETITIONS = 30
 
@@ -159,11 +160,11 @@ def test_few_records_do_not_tell_the_two_apart(visit, make_problem):
     assert levels is None or not (levels.encoder.is_resolved and levels.gauge.is_resolved)
 
 
-def test_what_is_not_told_apart_is_said_so():
+def test_the_sentence_names_noise_that_cannot_be_separated():
     vague = NoiseLevel(stated=0.01, estimated=0.01, standard_error=0.008, at_most=0.03)
     sharp = NoiseLevel(stated=0.01, estimated=0.02, standard_error=0.001, at_most=0.022)
-    assert "cannot be told apart" in NoiseLevels(vague, vague, -0.5).sentence
-    assert "cannot be told apart" in NoiseLevels(sharp, sharp, -0.95).sentence
-    one = NoiseLevels(sharp, vague, -0.5).sentence
+    assert "cannot be separated" in noise_sentence(NoiseLevels(vague, vague, -0.5))
+    assert "cannot be separated" in noise_sentence(NoiseLevels(sharp, sharp, -0.95))
+    one = noise_sentence(NoiseLevels(sharp, vague, -0.5))
     assert "encoders 0.0200 +- 0.0010 mm (stated 0.01)" in one
     assert "gauges below 0.0300 mm" in one

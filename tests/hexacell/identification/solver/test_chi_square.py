@@ -9,6 +9,7 @@ from hexacell.identification.estimator import identify
 from hexacell.identification.problem.problem import Noise
 from hexacell.identification.solver.chi_square import ChiSquareTest, ChiSquareVerdict, goodness
 from hexacell.identification.solver.linearized_solution import LinearizedSolution
+from hexacell.reporting.findings import residual_sentence
 
 
 def test_probability_is_the_table_s():
@@ -86,14 +87,14 @@ def test_more_noise_than_stated_is_said_with_its_factor(visit, make_problem):
     tested = goodness(LinearizedSolution.at(found))
     assert tested.agreement is ChiSquareVerdict.TOO_LARGE
     assert 2.5 < tested.ratio < 3.5
-    assert f"{tested.ratio:.1f} times the stated noise" in tested.sentence
+    assert f"{tested.ratio:.1f} times the stated noise" in residual_sentence(tested)
 
 
 def test_less_noise_than_stated_is_said_too(visit, make_problem):
     found = identify(make_problem(visit(seed=2).measured(0.003, seed=5)))
     tested = goodness(LinearizedSolution.at(found))
     assert tested.agreement is ChiSquareVerdict.TOO_SMALL
-    assert "only 0." in tested.sentence
+    assert "only 0." in residual_sentence(tested)
 
 
 def test_a_percent_too_much_noise_is_no_disagreement_however_certain():
@@ -105,4 +106,4 @@ def test_a_percent_too_much_noise_is_no_disagreement_however_certain():
 def test_without_more_records_than_unknowns_nothing_is_proven():
     tested = ChiSquareTest(chi2=0.0, expected=1e-9)
     assert tested.agreement is ChiSquareVerdict.NOT_EVALUATED
-    assert "prove nothing" in tested.sentence
+    assert "prove nothing" in residual_sentence(tested)

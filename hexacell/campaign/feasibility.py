@@ -16,7 +16,8 @@ from hexacell.identification.belief import RobotBelief
 from hexacell.identification.solver.result import UNDETERMINED_RATIO
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.motion.path_check import is_clear, start_state
-from hexacell.virtual_robot.virtual_robot import VirtualRobot, drawn_robots
+from hexacell.virtual_robot.random_robots import robots_within_tolerances
+from hexacell.virtual_robot.virtual_robot import VirtualRobot
 
 DRAWN = 32
 TOO_MANY = 0.5
@@ -121,10 +122,10 @@ def plan_failures(plan: Plan) -> Iterator[list[HexacellError]]:
 def unreachable_share(plan: Plan) -> dict[int, float]:
     """At each point the share of robots within the tolerances that cannot stand there."""
     references = plan.robot.from_commands([plan.reference_pose(point) for point in plan.points])
-    robots = drawn_robots(plan.robot, DRAWN, plan.settings.identification.seed)
-    stands = np.array([VirtualRobot(plan.robot, truth).actual_poses(references)[1] for truth in robots])
-    lost = 1.0 - stands.mean(axis=0)
-    return dict(zip(plan.points, lost.tolist(), strict=True))
+    robots = robots_within_tolerances(plan.robot, DRAWN, plan.settings.identification.seed)
+    can_take = np.array([VirtualRobot(plan.robot, truth).can_take(references) for truth in robots])
+    unreachable = 1.0 - can_take.mean(axis=0)
+    return dict(zip(plan.points, unreachable.tolist(), strict=True))
 
 
 def _points_lost(plan: Plan) -> Iterator[HexacellError]:

@@ -1,164 +1,102 @@
-"""The plan carried out on a robot that is known exactly: what would be measured, without hardware.
+"""A campaign on a virtual robot that moves as a real one does.
 
-The machine moves as a real one does, along the controller's straight lines and on its own geometry,
-so that the plan's care for travel and singularities is put to the test and not assumed.
+It moves along the controller's straight lines and on its own geometry, so that the plan's limits of
+travel and singularity margin are put to the test and not assumed.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
 import numpy as np
 
-from hexacell.campaign.decisions import CampaignState, Finished, FinishPoint, MeasurePose, StartPoint
-from hexacell.campaign.planner import Plan, joints_of
+from hexacell.campaign.decisions import MeasurePose, StartPoint
+from hexacell.campaign.planner import Plan
+from hexacell.campaign.virtual_campaign import VirtualCampaign
 from hexacell.cell.model import CellSettings
 from hexacell.errors import LimitError
+from hexacell.identification.belief import RobotBelief
 from hexacell.kinematics.geometry import Geometry
-from hexacell.kinematics.pose import Pose, PoseBatch
-from hexacell.kinematics.rotations import Array
-from hexacell.measurements.records import MeasurementSet, Record
+from hexacell.kinematics.pose import Pose
+from hexacell.motion.return_path import next_return_move
 from hexacell.motion.route_search import find_route
-from hexacell.motion.waypoint_planner import PathPlanner
 from hexacell.robot_model import Robot
-from hexacell.virtual_robot.virtual_robot import StudiedMachine
+from hexacell.virtual_robot.virtual_robot import VirtualRobot
 
 
-@dataclass(eq=False)
-class AdaptiveCampaign:
-    """One campaign, from the first reference to the end of the plan.
+class SimulatedCampaign(VirtualCampaign):
+    """One campaign, with all its moves.
 
-    Attributes:
-        lend: whether the controller is lent the estimate once the robot is known well enough.
-        outside: records at which the ball left the travel; they are not taken.
-        largest_mm: the largest deviation, of records taken or not.
-        reason: why the plan ended.
+    Args:
+        settings: of the cell.
+        robot: what is known of the robot before.
+        truth: its geometry, in the mechanism's frame convention.
+        random: of the noise.
+        provisional: whether the controller commands with the estimate once the robot is known well enough.
     """
 
-    settings: CellSettings
-    robot: Robot
-    truth: Geometry
-    random: np.random.Generator
-    lend: bool = False
-    outside: int = 0
-    largest_mm: float = 0.0
-    reason: str = ""
-    machine: StudiedMachine = field(init=False)
-    state: CampaignState = field(init=False)
-
-    def __post_init__(self) -> None:
-        self.machine = StudiedMachine(self.robot, self.truth)
-        self.state = CampaignState()
-        self._plan = Plan(self.settings, self.robot, with_forecast=False)
-        self._zero: Array = np.zeros(3)
-        self._standing: Pose | None = None
-        self._trail: list[Pose] = []
+    def __init__(
+        self,
+        settings: CellSettings,
+        robot: Robot,
+        truth: Geometry,
+        random: np.random.Generator,
+        provisional: bool = False,
+    ) -> None:
+        plan = Plan(settings, robot, with_forecast=False)
+        super().__init__(plan, VirtualRobot(robot, truth, random))
+        self._provisional = provisional
+        self._trail: list[tuple[Pose, bool]] = []
 
     @property
-    def measurements(self) -> MeasurementSet:
-        """The records taken so far."""
-        return self.state.measurements
+    def robot(self) -> Robot:
+        """What is known of the robot, beside its records."""
+        return self.plan.robot
 
-    def carry_out(self) -> None:
-        """Measure all that the plan asks for.
+    def _go_to_point(self, start: StartPoint) -> None:
+        """Go to another point, over level poses if the straight line is not clear."""
+        if not self._trail:
+            self.virtual_robot.place(start.pose)
+        elif start.pose != self.virtual_robot.command:
+            here = self.virtual_robot.command
+            level = [replace(pose, a=0.0, b=0.0, c=0.0) for pose in (here, start.pose)]
+            commands = [self.robot.from_commands([pose]) for pose in (here, start.pose, *level)]
+            route = find_route(self._belief, commands[0], commands[1], commands[2:])
+            if route is None:
+                raise LimitError(f"no safe path leads from {here} to {start.pose}")
+            for pose in (*(level[row] for row in route), start.pose):
+                self.virtual_robot.move(pose)
+        self._trail = [(start.pose, True)]
 
-        Raises:
-            HexacellError: the robot cannot be calibrated so.
-        """
-        while self.step():
-            pass
+    def _go_to_pose(self, measure: MeasurePose) -> None:
+        for pose in measure.via:
+            self._move(pose)
+        self._move(measure.pose, is_measured=True)
 
-    def step(self) -> bool:
-        """Do one thing; false at the end.
+    def _return_to(self, reference: Pose) -> None:
+        zero = self.plan.estimate(self.state).gauge_zero(self.state.point or 0)
+        while self.virtual_robot.command != reference:
+            trail = self.robot.from_commands(pose for pose, _ in self._trail)
+            departure = max(row for row, (_, measured) in enumerate(self._trail) if measured)
+            move = next_return_move(self._belief, zero.reference, trail, departure)
+            self._move(self._trail[move][0] if isinstance(move, int) else self.robot.to_command(move))
 
-        Raises:
-            HexacellError: it cannot be done.
-        """
-        match self._plan.decide(self.state):
-            case StartPoint() as opening:
-                self._open(opening)
-            case MeasurePose() as visit:
-                self._visit(visit)
-            case FinishPoint(point=point):
-                self._close(point)
-            case Finished(reason=reason):
-                self.reason = reason
-                return False
-        return True
-
-    def _open(self, opening: StartPoint) -> None:
-        if self._standing is not None:
-            self._onward(opening.pose)
-        self._go(opening.pose)
-        self._trail = [opening.pose]
-        self._zero = self.machine.ball
-        self._take(opening.point, 1, opening.pose)
-
-    def _visit(self, visit: MeasurePose) -> None:
-        for pose in (*visit.via, visit.pose):
-            self._go(pose)
-        away = float(np.abs(self.machine.ball - self._zero).max())
-        self.largest_mm = max(self.largest_mm, away)
-        if away > self.robot.limits.gauge_travel_mm:
-            self.outside += 1
-            self.state = replace(self.state, present=visit.pose, refusals=self.state.refusals + 1)
-        else:
-            self._take(visit.point, visit.orientation, visit.pose)
-
-    def _take(self, point: int, orientation: int, pose: Pose) -> None:
-        noise = self.robot.noise
-        joints = self.machine.joints + noise.encoder_mm * self.random.standard_normal(6)
-        shown = self.machine.ball - self._zero + noise.gauge_mm * self.random.standard_normal(3)
-        x, y, z = (float(value) for value in shown)
-        record = Record(point, orientation, pose, joints_of(joints), (x, y, z))
-        records = (*self.state.measurements.records, record)
-        self.state = replace(self.state, measurements=MeasurementSet(records), point=point, present=pose)
-
-    def _close(self, point: int) -> None:
-        reference = self._plan.estimate(self.state).gauge_zero(point).reference
-        self._back(reference)
-        done = self.state.done | {point}
-        self.state = CampaignState(self.state.measurements, done=done)
-        if self.lend and not self.robot.uses_provisional and self._plan.allows_provisional(self.state):
-            self._lend()
-
-    def _lend(self) -> None:
-        known = self._plan.estimate(self.state)
-        geometry = known.belief.estimate
-        self.machine.load(geometry)
-        self._standing = self.robot.to_command(self.machine.believed)
-        self.robot = replace(self.robot, provisional=(geometry,), uses_provisional=True)
-        self._plan = Plan(self.settings, self.robot, with_forecast=False)
-
-    def _onward(self, goal: Pose) -> None:
-        """To another point by lines that the estimate finds clear, over untilted poses if need be."""
-        if self._standing is None or goal == self._standing:
+    def _leave_point(self) -> None:
+        """Let the controller command with the estimate, if that is wanted and safe."""
+        if not self._provisional or self.robot.uses_provisional:
             return
-        level = [replace(pose, a=0.0, b=0.0, c=0.0) for pose in (self._standing, goal)]
-        held = [self._held(pose) for pose in level]
-        belief = self._plan.estimate(self.state).belief
-        way = find_route(belief, self._held(self._standing), self._held(goal), held)
-        if way is None:
-            raise LimitError(f"no safe way leads from {self._standing} to {goal}")
-        for row in way:
-            self._go(level[row])
+        if self.plan.allows_provisional(self.state):
+            geometry = self._belief.estimate
+            robot = replace(self.robot, provisional=(geometry,), uses_provisional=True)
+            self.virtual_robot.load(robot)
+            self.plan = replace(self.plan, robot=robot)
 
-    def _back(self, reference: Array) -> None:
-        """To the point's reference as straight as is safe, or else the way that the robot came."""
-        start, *trail = reversed(self._trail)
-        belief = self._plan.estimate(self.state).belief
-        home = self._held(self._trail[0])
-        (way,) = PathPlanner(belief, self._held(start), None, reference).plan(home)
-        stops = trail if way is None else [self.robot.to_command(pose) for pose in way.waypoints]
-        for pose in (*stops, self._trail[0]):
-            self._go(pose)
+    @property
+    def _belief(self) -> RobotBelief:
+        return self.plan.estimate(self.state).belief
 
-    def _go(self, pose: Pose) -> None:
-        self.machine.go(self._held(pose).pose(0))
-        self._standing = pose
-        # What lies on the way that it came is gone back over, and need not be again.
-        passed = self._trail.index(pose) if pose in self._trail else len(self._trail)
-        self._trail = [*self._trail[:passed], pose]
-
-    def _held(self, pose: Pose) -> PoseBatch:
-        return self.robot.from_commands([pose])
+    def _move(self, pose: Pose, *, is_measured: bool = False) -> None:
+        """Move along a straight line; what is left of the trail is the path from the reference."""
+        self.virtual_robot.move(pose)
+        passed = next((row for row, (other, _) in enumerate(self._trail) if other == pose), None)
+        self._trail = [*self._trail, (pose, is_measured)] if passed is None else self._trail[: passed + 1]

@@ -16,7 +16,7 @@ from multiprocessing import get_context
 import numpy as np
 import pytest
 
-from hexacell.campaign.decisions import CampaignState
+from hexacell.campaign.decisions import CampaignState, Finished
 from hexacell.campaign.planner import Plan
 from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import Cell, load_cell
@@ -26,9 +26,9 @@ from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.pose import Pose
 from hexacell.measurements.records import MeasurementSet
 from hexacell.robot_model import Robot, robot_of
-from hexacell.study.simulated_campaign import AdaptiveCampaign
+from hexacell.study.simulated_campaign import SimulatedCampaign
 from hexacell.virtual_robot.random_robots import random_robot
-from hexacell.virtual_robot.virtual_robot import StudiedMachine
+from hexacell.virtual_robot.virtual_robot import VirtualRobot
 
 Say = Callable[[str, str, str], None]
 
@@ -86,13 +86,15 @@ def truth_of(cell: Cell, robot: Robot, number: int) -> Geometry:
 
 def can_stand_everywhere(cell: Cell, robot: Robot, truth: Geometry) -> bool:
     """Whether the real robot gets to all points level, as its controller would send it there."""
-    machine = StudiedMachine(robot, truth)
+    virtual_robot = VirtualRobot(robot, truth)
+    first, *others = (Pose(*point) for point in cell.settings.identification.points)
     try:
-        for point in cell.settings.identification.points:
-            machine.go(robot.from_commands([Pose(*point)]).pose(0))
+        virtual_robot.place(first)
+        for point in others:
+            virtual_robot.move(point)
     except HexacellError:
         return False
-    return machine.smallest_margin >= robot.limits.singularity_margin
+    return virtual_robot.smallest_margin >= robot.limits.singularity_margin
 
 
 def measured(job: tuple[int, Manner]) -> Outcome:
@@ -101,8 +103,8 @@ def measured(job: tuple[int, Manner]) -> Outcome:
     truth = truth_of(cell, robot, number)
     if not can_stand_everywhere(cell, robot, truth):
         return Outcome(reason="cannot stand at all points")
-    campaign = AdaptiveCampaign(
-        cell.settings, robot, truth, np.random.default_rng([5, number]), lend=manner.lend
+    campaign = SimulatedCampaign(
+        cell.settings, robot, truth, np.random.default_rng([5, number]), provisional=manner.lend
     )
     try:
         campaign.carry_out()
@@ -114,13 +116,13 @@ def measured(job: tuple[int, Manner]) -> Outcome:
         after_33_mm=error(campaign, truth, RECORDS_FOR_PAPER),
         records=len(campaign.measurements),
         outside=campaign.outside,
-        margin=campaign.machine.smallest_margin,
+        margin=campaign.virtual_robot.smallest_margin,
         points=len(np.unique(campaign.measurements.points)),
         reason=campaign.reason,
     )
 
 
-def error(campaign: AdaptiveCampaign, truth: Geometry, records: int) -> float:
+def error(campaign: SimulatedCampaign, truth: Geometry, records: int) -> float:
     some = MeasurementSet(campaign.measurements.records[:records])
     found = identify(campaign.robot.problem(some))
     return found.geometry.largest_difference(truth)
@@ -178,10 +180,10 @@ def costs_of(number: int) -> dict[int, float]:
     """What deciding on a pose cost, s, by how many records there were, on one robot."""
     cell, robot = cell_and_robot(45.0)
     truth = truth_of(cell, robot, number)
-    campaign = AdaptiveCampaign(cell.settings, robot, truth, np.random.default_rng(6))
+    campaign = SimulatedCampaign(cell.settings, robot, truth, np.random.default_rng(6))
     costs: dict[int, float] = {}
     plan = Plan(cell.settings, robot)
-    while campaign.step():
+    while not isinstance(campaign.step(), Finished):
         state: CampaignState = campaign.state
         if state.point is None or len(state.measurements) in costs:
             continue

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -11,10 +11,10 @@ import pytest
 
 from hexacell.campaign.decisions import CampaignState, Decision, Finished, FinishPoint
 from hexacell.campaign.planner import Plan
+from hexacell.campaign.virtual_campaign import VirtualCampaign
 from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import load_cell
 from hexacell.kinematics.geometry import Geometry
-from hexacell.measurements.records import MeasurementSet
 from hexacell.robot_model import config_format, make_robot
 from hexacell.virtual_robot.virtual_robot import VirtualRobot
 
@@ -54,23 +54,20 @@ class Campaign:
 
     def run(self, most: int = 200) -> list[Taken]:
         random = np.random.default_rng(self.seed)
-        built, state, zero = VirtualRobot(self.plan.robot, self.truth), CampaignState(), None
+        campaign = VirtualCampaign(self.plan, VirtualRobot(self.plan.robot, self.truth, random))
         taken: list[Taken] = []
         while len(taken) < most:
-            decision = self.plan.decide(state)
-            taken.append(Taken(state, decision))
+            state, decision = campaign.state, campaign.step()
+            if not is_return(self.plan, state, decision):
+                taken.append(Taken(state, decision))
             if isinstance(decision, Finished):
                 break
-            if isinstance(decision, FinishPoint):
-                done = state.done | {decision.point}
-                state, zero = CampaignState(state.measurements, done=done), None
-                continue
-            label = (decision.point, decision.orientation)
-            record, shown = built.measured(label, decision.pose, zero, random)
-            zero = shown if zero is None else zero
-            measurements = MeasurementSet((*state.measurements.records, record))
-            state = replace(state, measurements=measurements, point=decision.point, present=decision.pose)
         return taken
+
+
+def is_return(plan: Plan, state: CampaignState, decision: Decision) -> bool:
+    """Whether a decision to finish only takes the robot back to the reference."""
+    return isinstance(decision, FinishPoint) and state.present != plan.reference_pose(decision.point)
 
 
 @pytest.fixture(scope="session")

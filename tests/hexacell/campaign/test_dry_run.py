@@ -7,7 +7,7 @@ import pytest
 
 from hexacell.campaign.dry_run import dry_run
 from hexacell.robot_model import make_robot
-from hexacell.virtual_robot.virtual_robot import drawn_robots
+from hexacell.virtual_robot.random_robots import robots_within_tolerances
 
 TWO_POINTS = ((100.0, -100.0, 500.0), (-100.0, 100.0, 500.0))
 SMALL = {
@@ -54,7 +54,9 @@ def test_robots_that_cannot_be_measured_do_not_count(make_plan):
 def test_robots_are_within_the_tolerances_and_fill_them(make_plan):
     plan = make_plan(tolerances__l_mm=2.0)
     drawing = plan.robot.drawing.vector()
-    errors = np.array([robot.vector() - drawing for robot in drawn_robots(plan.robot, 64, seed=3)])
+    errors = np.array(
+        [robot.vector() - drawing for robot in robots_within_tolerances(plan.robot, 64, seed=3)]
+    )
     assert np.abs(errors[:, -6:]).max() <= 2.0
     assert np.abs(errors).max() <= 7.0
     assert np.abs(errors[:, -6:]).max() > 1.9
@@ -63,7 +65,9 @@ def test_robots_are_within_the_tolerances_and_fill_them(make_plan):
 
 def test_a_common_offset_of_the_ball_is_common(make_plan):
     plan = make_plan(tolerances__ball_mm=30.0, tolerances__B_mm=0.001)
-    B = np.array([robot.B - plan.robot.drawing.B for robot in drawn_robots(plan.robot, 16, seed=3)])
+    B = np.array(
+        [robot.B - plan.robot.drawing.B for robot in robots_within_tolerances(plan.robot, 16, seed=3)]
+    )
     assert np.ptp(B, axis=1).max() < 0.01
     assert np.abs(B).max() > 20.0
 
@@ -74,5 +78,5 @@ def test_a_robot_calibrated_before_is_near_what_its_controller_has(make_plan, pa
     format_of = type("Held", (), {"geometry": controller, "branch": paper.branch})()
     robot = make_robot(plan.settings, format_of)
     centre = robot.belief().controller.vector()
-    errors = np.array([one.vector() - centre for one in drawn_robots(robot, 16, seed=3)])
+    errors = np.array([one.vector() - centre for one in robots_within_tolerances(robot, 16, seed=3)])
     assert 0.5 < np.abs(errors).max() <= 0.7

@@ -30,12 +30,10 @@ def robot_number(plan, number):
 
 def measured(plan, truth, poses):
     """The records of some poses at the first point, without noise."""
-    built, random, zero = VirtualRobot(plan.robot, truth), np.random.default_rng(0), None
-    records = []
+    virtual_robot, records = VirtualRobot(plan.robot, truth, np.random.default_rng(0)), []
     for number, pose in enumerate(poses, start=1):
-        record, shown = built.measured((1, number), pose, zero, random)
-        zero = shown if zero is None else zero
-        records.append(record)
+        virtual_robot.place(pose)
+        records.append(virtual_robot.measure(1, number))
     return MeasurementSet(tuple(records))
 
 
@@ -47,11 +45,12 @@ def test_no_robot_within_the_tolerances_leaves_the_travel_on_its_first_step(plan
     assert isinstance(first, MeasurePose)
     margin, moved = plan.robot.limits.singularity_margin, []
     for number in range(1, 301):
-        built = VirtualRobot(plan.robot, robot_number(plan, number))
-        poses, stands = built.actual_poses(plan.robot.from_commands([reference, first.pose]))
-        if built.margin(plan.robot.from_commands([reference])) >= margin:
-            assert stands.all()
-            moved.append(np.abs(poses.positions[1] - poses.positions[0]).max())
+        virtual_robot = VirtualRobot(plan.robot, robot_number(plan, number))
+        commands = plan.robot.from_commands([reference, first.pose])
+        if virtual_robot.margins(commands)[0] >= margin:
+            assert virtual_robot.can_take(commands).all()
+            positions = virtual_robot.actual_poses(commands).poses.positions
+            moved.append(np.abs(positions[1] - positions[0]).max())
     assert len(moved) > 200
     assert max(moved) < TRAVEL_MM
     assert np.median(moved) > 0.05  # or it would tell nothing

@@ -29,16 +29,13 @@ def plan(make_plan):
 def test_a_set_tells_what_the_estimator_then_knows(plan):
     """The robot as drawn visits the sets; its records give the covariance that was foretold."""
     belief = plan.robot.belief()
-    built = VirtualRobot(plan.robot, belief.estimate)
-    random = np.random.default_rng(0)
+    virtual_robot = VirtualRobot(plan.robot, belief.estimate, np.random.default_rng(0))
     records = []
     for point, poses in enumerate(plan.planned_sets.sets, start=1):
-        zero = None
+        virtual_robot.zero_gauges()
         for row in range(len(poses)):
-            command = plan.robot.to_command(poses.pose(row))
-            record, shown = built.measured((point, row + 1), command, zero, random)
-            zero = shown if zero is None else zero
-            records.append(record)
+            virtual_robot.place(plan.robot.to_command(poses.pose(row)))
+            records.append(virtual_robot.measure(point, row + 1))
     found = estimate_online(plan.robot.problem(MeasurementSet(tuple(records))))
     seen = plan.planned_sets.information_under(belief)
     foretold = add_information(belief.covariance, seen.information(1, 8) + seen.information(2, 8))

@@ -1,12 +1,13 @@
-"""One calibration, from a cell file to its end: lock, connect, check, then let the engine run."""
+"""One calibration run of a cell: lock, connect, check, then run the engine."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
+from drivers.interfaces import DeviceIdentity
 from hexacell import __version__
 from hexacell.application.device_setup import Connected, device_addresses, open_devices, with_settings
 from hexacell.campaign.pose_list import pose_list_of
@@ -22,6 +23,7 @@ from hexacell.storage.atomic_files import read_text, remove_stale_temporaries, w
 from hexacell.storage.cell_lock import cell_lock
 from procedures.calibration.preflight import device_failures, plan_failures, raise_all, start_failures
 from procedures.calibration.workflow import Calibration, Mode
+from procedures.devices.live_values import LiveValues
 from procedures.devices.reconnection import require_known
 from procedures.engine.config_transactions import holds_provisional
 from procedures.engine.engine import Engine, Listener
@@ -36,7 +38,7 @@ from procedures.run.state import fold
 
 @dataclass(frozen=True)
 class RunRequest:
-    """What is to be done: one run of a cell, new or resumed, in a folder."""
+    """One run of a cell, new or resumed, and the folder that keeps it."""
 
     cell: Cell
     folder: RunFolder
@@ -46,8 +48,8 @@ class RunRequest:
     resume: bool = False
 
 
-async def preflight(cell: Cell, mode: Mode, *, unattended: bool) -> tuple[events.Identity, ...]:
-    """Check everything that must hold before motion; nothing moves.
+async def preflight(cell: Cell, mode: Mode, *, unattended: bool) -> tuple[DeviceIdentity, ...]:
+    """Check everything that must hold before motion; nothing moves. Gives the devices that answered.
 
     Raises:
         HexacellError: every failure, in one report.
@@ -55,40 +57,48 @@ async def preflight(cell: Cell, mode: Mode, *, unattended: bool) -> tuple[events
     calibration = Calibration(cell.settings, robot_of(cell), mode, pose_list_of(cell))
     with cell_lock(cell.config_path):
         failures = await _plan_failures(calibration, unattended=unattended)
-        with _joined(failures), device_addresses(cell) as settings:
-            async with open_devices(settings, cell.path.parent) as cell_now:
-                failures.extend(await _begin_failures(cell, cell_now, runs_folder(cell)))
-                return _identities(cell_now)
+        with _one_report(failures), device_addresses(cell) as settings:
+            async with open_devices(settings, cell.path.parent) as connected:
+                failures.extend(await _start_failures(cell, connected, runs_folder(cell)))
+                return connected.identities
 
 
 async def calibrate(
-    order: RunRequest, listeners: Sequence[Listener] = (), inbox: CommandQueue | None = None
+    request: RunRequest,
+    listeners: Sequence[Listener] = (),
+    queue: CommandQueue | None = None,
+    live: LiveValues | None = None,
 ) -> events.Ended:
-    """Measure, identify, verify, propose, write back: as far as the mode and the results go.
+    """Measure, identify, verify, propose and write back, as far as the mode and the results allow.
 
-    What is put into the ``inbox`` (:mod:`procedures.run.commands`) is heeded while the engine runs.
+    Args:
+        request: the run.
+        listeners: called with every event.
+        queue: commands for the engine (:mod:`procedures.run.commands`).
+        live: gets what the devices show while the run goes on.
 
     Raises:
         Interruption: a command ended it.
-        HexacellError: it could not begin, or a step could not be done.
+        HexacellError: it could not begin, or a step failed.
     """
-    cell = order.cell
+    cell = request.cell
     with cell_lock(cell.config_path):
         remove_stale_temporaries(cell.config_path)
-        started = _started(order) if order.resume else None
+        started = _resumed_start(request) if request.resume else None
         if started is None:
             _require_own_geometry(cell)
         robot = robot_of(cell) if started is None else robot_of_run(cell, started)
-        calibration = Calibration(cell.settings, robot, order.mode, pose_list_of(cell))
-        failures = await _plan_failures(calibration, unattended=order.unattended)
-        with _joined(failures), device_addresses(cell) as settings:
-            async with open_devices(settings, cell.path.parent) as cell_now:
-                failures.extend(await _begin_failures(cell, cell_now, order.folder.path))
+        calibration = Calibration(cell.settings, robot, request.mode, pose_list_of(cell))
+        failures = await _plan_failures(calibration, unattended=request.unattended)
+        with _one_report(failures), device_addresses(cell) as settings:
+            async with open_devices(settings, cell.path.parent) as connected:
+                failures.extend(await _start_failures(cell, connected, request.folder.path))
                 raise_all(failures)
-                require_known(cell_now.identities, started.devices if started else ())
-                return await _run(
-                    order, with_settings(cell, settings), calibration, cell_now, listeners, inbox
-                )
+                require_known(connected.identities, started.devices if started else ())
+                devices = connected.devices if live is None else live.observe(connected.devices)
+                observed = replace(connected, devices=devices)
+                request = replace(request, cell=with_settings(cell, settings))
+                return await _run(request, calibration, observed, listeners, queue)
 
 
 def is_unverified(folder: RunFolder) -> bool:
@@ -100,7 +110,7 @@ def is_unverified(folder: RunFolder) -> bool:
 
 
 def _require_own_geometry(cell: Cell) -> None:
-    """Refuse to begin while the controller has what an interrupted run lent it.
+    """Refuse to begin while the config holds the provisional geometry of an interrupted run.
 
     Raises:
         UsageError: names that run.
@@ -115,62 +125,61 @@ def _require_own_geometry(cell: Cell) -> None:
             )
 
 
-async def _begin_failures(cell: Cell, cell_now: Connected, folder: Path) -> list[HexacellError]:
-    """What the connected devices, the stop line and the disk have against a run kept in ``folder``."""
-    guards = cell.settings.guards
+async def _start_failures(cell: Cell, connected: Connected, folder: Path) -> list[HexacellError]:
+    """What the devices, the stop input and the disk of ``folder`` have against a run."""
     return [
-        *await device_failures(cell_now.devices),
-        *await start_failures(cell_now.devices, folder, guards.free_disk_mb),
+        *await device_failures(connected.devices),
+        *await start_failures(connected.devices, folder, cell.settings.guards.free_disk_mb),
     ]
 
 
 async def _run(
-    order: RunRequest,
-    cell: Cell,
+    request: RunRequest,
     calibration: Calibration,
-    cell_now: Connected,
+    connected: Connected,
     listeners: Sequence[Listener],
-    inbox: CommandQueue | None,
+    queue: CommandQueue | None,
 ) -> events.Ended:
-    if not order.resume:
-        order.folder.create(cell)
-    broker = QuestionBroker(order.operator)
-    policy = RecoveryPolicy.of(cell.settings.recovery, attended=not order.unattended)
-    performer = StepExecutor(
+    cell, folder = request.cell, request.folder
+    if not request.resume:
+        folder.create(cell)
+    broker = QuestionBroker(request.operator)
+    policy = RecoveryPolicy.of(cell.settings.recovery, attended=not request.unattended)
+    executor = StepExecutor(
         cell,
         calibration,
-        cell_now.devices,
-        cell_now.clock,
+        connected.devices,
+        connected.clock,
         broker,
-        order.folder,
-        cell_now.thermometers,
+        folder,
+        connected.thermometers,
     )
     try:
-        with Journal(order.folder.journal) as journal:
-            remove_stale_temporaries(order.folder.path)
-            engine = Engine(performer, journal, listeners, queue=inbox, broker=broker, policy=policy)
+        with Journal(folder.journal) as journal:
+            remove_stale_temporaries(folder.path)
+            engine = Engine(executor, journal, listeners, queue=queue, broker=broker, policy=policy)
             if engine.state.started is None:
-                engine.record(_beginning(cell, calibration, cell_now))
+                engine.record(run_started(cell, calibration, connected.identities))
             engine.reopen_sets()
             return await engine.run()
     finally:
-        # A help in the search for faults: whether it can be kept never decides how a run ends.
+        # The trace only helps to find faults: whether it can be kept does not decide how a run ends.
         with suppress(FileError):
-            write_atomically(order.folder.new_wire(), cell_now.trace.text().encode())
+            write_atomically(folder.new_wire(), connected.trace.text().encode())
 
 
 async def _plan_failures(calibration: Calibration, *, unattended: bool) -> list[HexacellError]:
-    """What is wrong with the plan, for the report that the devices' failures join."""
+    """What is wrong with the plan; reported together with the failures of the devices."""
     failures = await plan_failures(calibration, unattended=unattended)
     if calibration.settings.simulation is not None:
-        # A simulated cell stands at its first point, and cannot be served if that is out of reach.
+        # A simulated robot starts at its first point and cannot be served if that is out of reach.
         raise_all(failures)
     return failures
 
 
 @contextmanager
-def _joined(failures: list[HexacellError]) -> Iterator[None]:
-    """One report of ``failures`` and of those that are found while the context lasts."""
+def _one_report(failures: list[HexacellError]) -> Iterator[None]:
+    """Raise ``failures`` and those found within the context in one report."""
     try:
         yield
     except HexacellError as error:
@@ -180,7 +189,10 @@ def _joined(failures: list[HexacellError]) -> Iterator[None]:
     raise_all(failures)
 
 
-def _beginning(cell: Cell, calibration: Calibration, cell_now: Connected) -> events.RunStarted:
+def run_started(
+    cell: Cell, calibration: Calibration, identities: tuple[DeviceIdentity, ...]
+) -> events.RunStarted:
+    """The first event of a new run."""
     robot = calibration.robot
     return events.RunStarted(
         software=f"hexacell {__version__}",
@@ -197,41 +209,29 @@ def _beginning(cell: Cell, calibration: Calibration, cell_now: Connected) -> eve
             }
         ),
         branch=robot.branch,
-        devices=_identities(cell_now),
+        devices=identities,
         pose_list=None if calibration.listed is None else read_text(calibration.listed.path),
     )
 
 
-def _identities(cell_now: Connected) -> tuple[events.Identity, ...]:
-    return tuple(
-        events.Identity(
-            name=found.name,
-            protocol=found.protocol,
-            description=found.description,
-            serial_number=found.serial_number,
-        )
-        for found in cell_now.identities
-    )
-
-
-def _started(order: RunRequest) -> events.RunStarted:
-    """The beginning of the run that is to be resumed.
+def _resumed_start(request: RunRequest) -> events.RunStarted:
+    """The first event of the run to resume.
 
     Raises:
-        UsageError: it is over, or the cell file is no longer the one it was begun with.
+        UsageError: it is over, or the cell file has changed since it began.
         FileError: its journal cannot be read.
     """
-    state = fold(read_journal(order.folder.journal))
+    state = fold(read_journal(request.folder.journal))
     if state.started is None:
-        raise FileError("the journal is empty", subject=order.folder.journal, action="Begin a new run")
+        raise FileError("the journal is empty", subject=request.folder.journal, action="Begin a new run")
     if state.ended is not None:
-        raise UsageError(f"the run {order.folder.path} is over: {state.ended.line}")
-    if state.started.cell_text != order.cell.text:
+        raise UsageError(f"the run {request.folder.path} is over: {state.ended.line}")
+    if state.started.cell_text != request.cell.text:
         raise UsageError(
-            f"{order.cell.path} has changed since the run began",
+            f"{request.cell.path} has changed since the run began",
             action="Undo the change, or begin a new run",
         )
-    if state.started.mode != order.mode.value:
+    if state.started.mode != request.mode.value:
         raise UsageError(
             f"the run was begun in the mode {state.started.mode}", action="Resume it in that mode"
         )
@@ -239,7 +239,7 @@ def _started(order: RunRequest) -> events.RunStarted:
 
 
 def robot_of_run(cell: Cell, started: events.RunStarted) -> Robot:
-    """The robot with the geometry that commanded the run's measurements, whatever is written by now."""
+    """The robot with the geometry that the controller had when the run began."""
     values = started.controller
     geometry = ControllerGeometry(Geometry(values.S, values.B, values.l), started.branch)
     return make_robot(cell.settings, geometry)

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import asdict
 from typing import Any
 
+from drivers.interfaces import DeviceIdentity
 from hexacell.application.calibration_run import RunRequest
 from hexacell.application.fit import FitResult
 from hexacell.application.planning import NextPose, PlanTrial
@@ -70,12 +72,12 @@ def _remainder(forecast: Forecast) -> dict[str, Any]:
     }
 
 
-def preflight_document(devices: Sequence[events.Identity], trial: PlanTrial) -> dict[str, Any]:
+def preflight_document(devices: Sequence[DeviceIdentity], trial: PlanTrial) -> dict[str, Any]:
     """What ``preflight --json`` prints."""
     result = trial.result
     return {
         "ready": True,
-        "devices": [identity.model_dump() for identity in devices],
+        "devices": [asdict(identity) for identity in devices],
         "expected": {
             "drawn": result.drawn,
             "robots": result.robots,

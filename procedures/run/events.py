@@ -10,6 +10,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field
 
+from drivers.interfaces import DeviceIdentity
 from hexacell.acceptance.gates import AcceptanceGate
 from hexacell.acceptance.validation import Verdict
 from hexacell.cell.fields import GeometryValues
@@ -28,15 +29,6 @@ def place_of(step: Step | None) -> str:
     return step.key if key is None else str(key)
 
 
-class Identity(Frozen):
-    """A device that answered when the run began."""
-
-    name: str
-    protocol: str
-    description: str
-    serial_number: str = ""
-
-
 class RunStarted(Frozen):
     """The run's first record."""
 
@@ -49,7 +41,7 @@ class RunStarted(Frozen):
     config_sha256: str
     controller: GeometryValues
     branch: Branch
-    devices: tuple[Identity, ...]
+    devices: tuple[DeviceIdentity, ...]
     pose_list: str | None = None
 
 

@@ -7,7 +7,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -16,7 +15,7 @@ from drivers.simulated import robot as machine_module
 from drivers.simulated.cell import _physics
 from drivers.simulated.physics import RobotPhysics
 from drivers.simulated.robot import SimulatedMachine
-from hexacell.application.calibration_run import _beginning
+from hexacell.application.calibration_run import run_started
 from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import Cell, dump, load_cell
 from hexacell.controller_config.toml_format import NativeToml
@@ -69,8 +68,7 @@ class Rig:
         return self.cell.config_path.read_bytes()
 
     def started(self) -> events.RunStarted:
-        nobody: Any = SimpleNamespace(identities=())
-        return _beginning(self.cell, self.calibration, nobody)
+        return run_started(self.cell, self.calibration, ())
 
     async def run(self, *listeners: Listener, policy: RecoveryPolicy = GIVE_UP) -> events.Ended:
         """Begin, or go on where the folder's journal ends; ``engine`` is the one that does."""

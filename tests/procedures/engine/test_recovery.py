@@ -11,6 +11,7 @@ import pytest
 from drivers.controllers.errors import ConnectionLost, MotionInterrupted, MoveRefused, ResponseTimeout
 from drivers.encoders.errors import BusError, InvalidSampleError, RestartedNodeError, SilentNodeError
 from drivers.gauges.errors import GaugeAtEnd, GaugeSilent, GaugeUnsteady, WrongUnit, ZeroVoid
+from drivers.interfaces import DeviceIdentity
 from drivers.serial.errors import PortLost, port_lost
 from hexacell.cell.recovery import Action, FailureKind, RecoverySettings
 from hexacell.errors import (
@@ -256,7 +257,7 @@ async def test_drift_redoes_the_set(at_second_point) -> None:
 
 async def test_another_device_in_its_place_is_refused(at_second_point) -> None:
     rig = at_second_point
-    known = events.Identity(name="y", protocol="fake", description="a device", serial_number="17")
+    known = DeviceIdentity(name="y", protocol="fake", description="a device", serial_number="17")
     history = list(read_journal(rig.folder.journal))
     history[0] = history[0].model_copy(update={"devices": (known,)})
     rig.folder.journal.unlink()

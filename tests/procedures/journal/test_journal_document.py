@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, is_dataclass
 from enum import Enum
 from pathlib import Path
 from types import NoneType, UnionType
-from typing import Annotated, Any, Literal, Union, get_args, get_origin
+from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_type_hints
 
 import pytest
 from pydantic import BaseModel
@@ -42,33 +42,49 @@ def sections() -> dict[str, list[Row]]:
     return found
 
 
-def models() -> dict[str, type[BaseModel]]:
+def models() -> dict[str, type[Any]]:
     """Every event by its kind, and every model within them by its name."""
-    found = {event.model_fields["kind"].default: event for event in EVENTS}
+    found: dict[str, type[Any]] = {event.model_fields["kind"].default: event for event in EVENTS}
     for event in EVENTS:
         for part in parts_of(event):
             found[heading_of(part)] = part
     return found
 
 
-def parts_of(model: type[BaseModel]) -> Iterator[type[BaseModel]]:
-    for field in model.model_fields.values():
-        for part in models_in(field.annotation):
+def fields_of(model: type[Any]) -> dict[str, Any]:
+    """The types of a model's or a dataclass's fields."""
+    if is_dataclass(model):
+        return get_type_hints(model)
+    return {name: field.annotation for name, field in model.model_fields.items()}
+
+
+def is_model(annotation: Any) -> bool:
+    return isinstance(annotation, type) and (issubclass(annotation, BaseModel) or is_dataclass(annotation))
+
+
+def parts_of(model: type[Any]) -> Iterator[type[Any]]:
+    for annotation in fields_of(model).values():
+        for part in models_in(annotation):
             yield part
             yield from parts_of(part)
 
 
-def models_in(annotation: Any) -> Iterator[type[BaseModel]]:
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+def models_in(annotation: Any) -> Iterator[type[Any]]:
+    if is_model(annotation):
         yield annotation
     for argument in get_args(annotation):
         yield from models_in(argument)
 
 
-def heading_of(model: type[BaseModel]) -> str:
+def kind_of(model: type[Any]) -> str | None:
+    """The word that says which event it is, where it is one of several."""
+    kind = None if is_dataclass(model) else model.model_fields.get("kind")
+    return kind.default if kind is not None and type(kind.default) is str else None
+
+
+def heading_of(model: type[Any]) -> str:
     """Its kind where it has one of its own, else its name."""
-    kind = model.model_fields.get("kind")
-    return kind.default if kind is not None and type(kind.default) is str else model.__name__
+    return kind_of(model) or model.__name__
 
 
 def words(annotation: Any) -> str:  # noqa: PLR0911 - a case a kind of type
@@ -87,20 +103,18 @@ def words(annotation: Any) -> str:  # noqa: PLR0911 - a case a kind of type
         return f"{len(arguments)} x {words(arguments[0])}"
     if isinstance(annotation, type) and issubclass(annotation, Enum):
         return " or ".join(f"`{one.value}`" for one in annotation)
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+    if is_model(annotation):
         return heading_of(annotation)
     plain = {float: "number", int: "whole number", str: "text", bool: "true or false"}
     return plain.get(annotation, "object")
 
 
-def required(model: type[BaseModel]) -> list[tuple[str, str]]:
+def required(model: type[Any]) -> list[tuple[str, str]]:
     """Name and type of every field; ``kind`` says which event it is and is left out."""
-    fields = model.model_fields.items()
-    return [(name, words(field.annotation)) for name, field in fields if not is_kind(name, model)]
-
-
-def is_kind(name: str, model: type[BaseModel]) -> bool:
-    return name == "kind" and type(model.model_fields[name].default) is str
+    fields = fields_of(model).items()
+    return [
+        (name, words(annotation)) for name, annotation in fields if name != "kind" or not kind_of(model)
+    ]
 
 
 def test_every_event_and_every_part_has_its_section() -> None:

@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydantic import TypeAdapter, ValidationError
 
+from drivers.interfaces import DeviceIdentity
 from hexacell.acceptance.gates import AcceptanceGate
 from hexacell.acceptance.validation import Verdict
 from hexacell.cell.fields import GeometryValues
@@ -121,7 +122,7 @@ some_event: st.SearchStrategy[Any] = st.one_of(
         controller=geometry,
         branch=st.tuples(*[st.sampled_from([-1, 1])] * 6),
         devices=st.lists(
-            st.builds(events.Identity, name=text, protocol=text, description=text), max_size=2
+            st.builds(DeviceIdentity, name=text, protocol=text, description=text), max_size=2
         ).map(tuple),
     ),
     st.builds(events.StepBegun, step=some_step),

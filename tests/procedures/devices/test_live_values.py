@@ -8,7 +8,7 @@ import math
 import pytest
 
 from drivers.interfaces import ControllerStatus
-from hexacell.cell.devices import TimingSettings
+from hexacell.cell.limits import TimingSettings
 from hexacell.errors import DeviceError
 from procedures.devices.live_values import LiveValues
 from procedures.devices.settling import settle

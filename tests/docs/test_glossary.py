@@ -12,6 +12,7 @@ import pytest
 ROOT = Path(__file__).parents[2]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 QUOTED = re.compile(r"`([^`]+)`")
+SYMBOL = re.compile(r"`((?:hexacell|drivers|procedures)(?:\.[a-z_0-9]+)+)\.([A-Z]\w+)`")
 PATH = re.compile(r"`((?:hexacell|drivers|procedures|tests|docs|configs)/[\w./-]*)`")
 
 
@@ -33,12 +34,21 @@ def names(body: list[ast.stmt], prefix: str = "") -> Iterator[str]:
             case ast.ClassDef():
                 yield prefix + node.name
                 yield from names(node.body, f"{prefix}{node.name}.")
+                yield from (f"{prefix}{node.name}.{name}" for name in instance_attributes(node))
             case ast.FunctionDef() | ast.AsyncFunctionDef():
                 yield prefix + node.name
             case ast.AnnAssign(target=ast.Name(id=name)):
                 yield prefix + name
             case ast.Assign():
                 yield from (prefix + target.id for target in node.targets if isinstance(target, ast.Name))
+
+
+def instance_attributes(node: ast.ClassDef) -> Iterator[str]:
+    """Names that methods assign to ``self``."""
+    for part in ast.walk(node):
+        match part:
+            case ast.Attribute(value=ast.Name(id="self"), attr=name, ctx=ast.Store()):
+                yield name
 
 
 @pytest.mark.parametrize(("symbols", "files"), rows(), ids=lambda value: value[0])
@@ -57,6 +67,12 @@ def test_no_term_has_two_rows() -> None:
 def test_every_path_that_a_page_names_exists(page: Path) -> None:
     missing = [path for path in PATH.findall(page.read_text()) if not (ROOT / path).exists()]
     assert missing == []
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
+def test_every_dotted_name_exists(page: Path) -> None:
+    found = SYMBOL.findall(page.read_text())
+    assert [pair for pair in found if pair[1] not in defined(pair[0].replace(".", "/") + ".py")] == []
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)

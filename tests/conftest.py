@@ -29,12 +29,6 @@ settings.register_profile(
 settings.load_profile("hexacell")
 
 
-def pytest_configure() -> None:
-    """Let a terminal that goes be noticed, also where the tests were begun with nohup."""
-    if threading.current_thread() is threading.main_thread():
-        signal.signal(signal.SIGHUP, signal.SIG_DFL)
-
-
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Whatever lies in tests/benchmarks is a benchmark."""
     for item in items:

@@ -21,6 +21,7 @@ import pytest
 from hexacell.cli.app import main
 from procedures.journal.journal import Journal, read_journal
 from procedures.run import events
+from tests.signals import terminal_signals
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 CELL = "simulated-hexaglide.toml"
@@ -165,15 +166,16 @@ def surroundings(temporary: Path) -> dict[str, str]:
 def run_command(folder: Path, *arguments: object) -> Outcome:
     """Run a command in ``folder`` without a terminal, and wait until it ends."""
     temporary = folder / f"temporary-{secrets.token_hex(4)}"
-    ended = subprocess.run(
-        command(*arguments),
-        cwd=folder,
-        env=surroundings(temporary),
-        stdin=subprocess.DEVNULL,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    with terminal_signals():
+        ended = subprocess.run(
+            command(*arguments),
+            cwd=folder,
+            env=surroundings(temporary),
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            text=True,
+            check=False,
+        )
     assert "Traceback" not in ended.stderr, ended.stderr
     temporary.rmdir()  # which fails where something was left in it
     return Outcome(ended.returncode, ended.stdout, ended.stderr)
@@ -302,7 +304,7 @@ class Processes:
         out, err, temporary = (
             self._folder / f"{name}-{len(self._processes)}" for name in ("out", "err", "temporary")
         )
-        with out.open("w") as to_out, err.open("w") as to_err:
+        with out.open("w") as to_out, err.open("w") as to_err, terminal_signals():
             popen = subprocess.Popen(
                 [*(["sh", "-c", through, "sh"] if through else []), *command(*arguments)],
                 cwd=self._folder,

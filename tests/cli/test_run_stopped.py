@@ -17,6 +17,7 @@ import pytest
 from procedures.journal.journal import read_journal
 from procedures.run import events
 from procedures.run.steps import Phase
+from tests.signals import terminal_signals
 
 STOPPED_S = 2.0
 
@@ -157,22 +158,15 @@ def test_a_closed_output_does_not_stop_it(start, good_cell):
 
 @pytest.mark.parametrize("arguments", [["cell", "schema"], ["--help"]], ids=" ".join)
 def test_a_reader_that_leaves_early_gets_no_traceback(arguments, tmp_path):
-    shell = subprocess.run(
-        [
-            "bash",
-            "-c",
-            'set -o pipefail; "$@" | true',
-            "bash",
-            sys.executable,
-            "-m",
-            "hexacell",
-            *arguments,
-        ],
-        capture_output=True,
-        text=True,
-        cwd=tmp_path,
-        check=False,
-    )
+    script = ["bash", "-c", 'set -o pipefail; "$@" | true', "bash"]
+    with terminal_signals():
+        shell = subprocess.run(
+            [*script, sys.executable, "-m", "hexacell", *arguments],
+            capture_output=True,
+            text=True,
+            cwd=tmp_path,
+            check=False,
+        )
     assert (shell.returncode, shell.stderr) == (0, "")
 
 

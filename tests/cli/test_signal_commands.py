@@ -17,13 +17,15 @@ from hexacell.cli.signal_commands import ENDING_SIGNALS, SignalCommands
 from hexacell.errors import Interruption
 from procedures.run.cancellation import shielded
 from procedures.run.commands import Abort, Command, Stop
+from tests.signals import terminal_signals
 
 
 @pytest.fixture(autouse=True)
-def handlers_are_put_back() -> Iterator[None]:
-    before = [signal.getsignal(number) for number in ENDING_SIGNALS]
-    yield
-    assert [signal.getsignal(number) for number in ENDING_SIGNALS] == before
+def handlers_are_restored() -> Iterator[None]:
+    with terminal_signals():
+        before = [signal.getsignal(number) for number in ENDING_SIGNALS]
+        yield
+        assert [signal.getsignal(number) for number in ENDING_SIGNALS] == before
 
 
 @pytest.fixture

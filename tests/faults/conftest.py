@@ -24,6 +24,7 @@ from tests.faults.cell import NEVER_GOOD_ENOUGH, PROVISIONAL, Site, make_site
 from tests.faults.driver import UNEXPECTED, Order
 from tests.faults.interception import Call
 from tests.faults.matrix import PROPERTY, Case
+from tests.signals import terminal_signals
 
 ROOT = Path(__file__).parents[2]
 MEMORY = Path("/dev/shm")
@@ -75,13 +76,15 @@ class Program:
 
 @pytest.fixture(scope="session")
 def program(session_ground: Path) -> Iterator[Program]:
-    with subprocess.Popen(
-        [sys.executable, "-m", "tests.faults.driver"],
-        cwd=ROOT,
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        text=True,
-    ) as server:
+    with terminal_signals():
+        starting = subprocess.Popen(
+            [sys.executable, "-m", "tests.faults.driver"],
+            cwd=ROOT,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+        )
+    with starting as server:
         session_ground.chmod(0o777)
         yield Program(server, session_ground)
         assert server.stdin is not None

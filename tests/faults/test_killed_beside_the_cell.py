@@ -15,6 +15,7 @@ from tests.faults.conftest import ROOT
 from tests.faults.killing import KILLED, after, finish, history_of, places
 from tests.faults.matrix import STEPS, step_of
 from tests.faults.promises import require_identical
+from tests.signals import terminal_signals
 
 STEPS_OF_A_RUN = [step for step in STEPS if step not in {"beginning", "revisiting", "ending"}]
 """Those that begin in a run that nothing has disturbed yet."""
@@ -25,12 +26,14 @@ def served(site: Site) -> Iterator[None]:
     """Have another process serve the site's cell; its cell file leads there."""
     own = site.folder / "own.toml"
     site.cell_path.rename(own)
-    with subprocess.Popen(
-        [sys.executable, "-m", "hexacell", "simulate", own, "--output", site.cell_path],
-        cwd=ROOT,
-        stderr=subprocess.PIPE,
-        text=True,
-    ) as process:
+    with terminal_signals():
+        simulating = subprocess.Popen(
+            [sys.executable, "-m", "hexacell", "simulate", own, "--output", site.cell_path],
+            cwd=ROOT,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+    with simulating as process:
         try:
             assert process.stderr is not None
             assert "serving" in process.stderr.readline()

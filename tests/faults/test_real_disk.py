@@ -22,6 +22,7 @@ from tests.faults.conftest import ROOT, Program
 from tests.faults.killing import finish, history_of
 from tests.faults.matrix import step_of
 from tests.faults.promises import require_identical
+from tests.signals import terminal_signals
 
 NOBODY = 65534
 IN_A_NAMESPACE = ["unshare", "--mount", "--propagation", "private", "sh", "-c"]
@@ -44,13 +45,15 @@ def small_disk(tmp_path: Path, ground: Path) -> Iterator[Callable[[int], SmallDi
     if shutil.which("unshare") is None or subprocess.run([*IN_A_NAMESPACE, "true"], check=False).returncode:
         pytest.skip("no file system can be mounted here")
     server = [sys.executable, "-m", "tests.faults.driver"]
-    with subprocess.Popen(
-        [*IN_A_NAMESPACE, MOUNTED, "sh", str(SIZE), tmp_path, *server],
-        cwd=ROOT,
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        text=True,
-    ) as process:
+    with terminal_signals():
+        starting = subprocess.Popen(
+            [*IN_A_NAMESPACE, MOUNTED, "sh", str(SIZE), tmp_path, *server],
+            cwd=ROOT,
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+        )
+    with starting as process:
         program = Program(process, ground)
         # The namespace's folder under a name that leads there from everywhere.
         disk = Path(f"/proc/{process.pid}/root{tmp_path}")

@@ -15,6 +15,7 @@ import pytest
 
 from hexacell.errors import CellBusy, ExitCode, FileError
 from hexacell.storage.cell_lock import cell_lock, lock_path
+from tests.signals import terminal_signals
 
 HOLD = """
 import sys
@@ -36,9 +37,10 @@ def config(tmp_path: Path) -> Path:
 @contextmanager
 def another_process(config: Path) -> Iterator[subprocess.Popen[str]]:
     """A process that holds the cell until its standard input closes."""
-    with subprocess.Popen(
-        [sys.executable, "-c", HOLD, str(config)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
-    ) as process:
+    command = [sys.executable, "-c", HOLD, str(config)]
+    with terminal_signals():
+        holder = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+    with holder as process:
         assert process.stdout is not None
         assert process.stdout.readline() == "held\n"
         yield process

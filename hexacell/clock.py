@@ -1,7 +1,7 @@
-"""The cell's clock: seconds as the cell lives them.
+"""The cell's clock.
 
-A real cell lives at the speed of the wall. A simulated one may run faster by the factor that its
-cell file names; then windows, latencies and moves all shrink together and nothing else changes.
+In a real cell it runs in real time. In a simulated one it may run faster by the factor in the cell file;
+then windows, latencies and moves all become shorter by that factor and nothing else changes.
 """
 
 from __future__ import annotations
@@ -12,27 +12,27 @@ import time
 
 
 class CellClock:
-    """Monotonic seconds of the cell, ``factor`` of them to a second on the wall."""
+    """Monotonic cell seconds, ``factor`` of them in one second of real time."""
 
     def __init__(self, factor: float = 1.0) -> None:
         self.factor = factor
         self._start = time.monotonic()
 
     def now(self) -> float:
-        """Cell seconds since this clock was made."""
+        """Cell seconds since this clock was created."""
         return (time.monotonic() - self._start) * self.factor
 
-    def on_the_wall(self, seconds: float) -> float:
-        """How long ``seconds`` of the cell last on the wall, s."""
+    def real_seconds(self, seconds: float) -> float:
+        """The duration of ``seconds`` of the cell in real time, s."""
         return seconds / self.factor
 
     async def sleep(self, seconds: float) -> None:
-        """Let ``seconds`` of the cell pass."""
-        await asyncio.sleep(self.on_the_wall(seconds))
+        """Wait for ``seconds`` of the cell."""
+        await asyncio.sleep(self.real_seconds(seconds))
 
     def wait(self, seconds: float, until: threading.Event | None = None) -> bool:
-        """The same for a thread; returns early and true when ``until`` is set."""
+        """The same for a thread; returns early, with True, when ``until`` is set."""
         if until is not None:
-            return until.wait(self.on_the_wall(seconds))
-        time.sleep(self.on_the_wall(seconds))
+            return until.wait(self.real_seconds(seconds))
+        time.sleep(self.real_seconds(seconds))
         return False

@@ -1,4 +1,4 @@
-"""The one error root, and the exit codes that every face shares."""
+"""The root of all errors, and the exit codes of every command."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import ClassVar
 
 
 class ExitCode(IntEnum):
-    """What the process tells its caller; stable, see ``docs/interface.md``."""
+    """The exit status of the process; stable, see ``docs/interface.md``."""
 
     DONE = 0
     OUT_OF_LIMITS = 1
@@ -53,19 +53,19 @@ class HexacellError(Exception):
 
 
 class UsageError(HexacellError):
-    """The command asks for something that cannot be done as asked."""
+    """The command asks for something that cannot be done."""
 
 
 class FileError(HexacellError):
-    """A file is absent, unreadable, or does not say what it must."""
+    """A file is absent, unreadable, or has wrong content."""
 
 
 class ReachError(HexacellError):
-    """A pose that the mechanism cannot take; the message names the leg."""
+    """A pose that the mechanism cannot reach; the message names the leg."""
 
 
 class ConvergenceError(HexacellError):
-    """A numerical solution that was not found; never kept silently."""
+    """A numerical solution was not found."""
 
     exit_code = ExitCode.OUT_OF_LIMITS
 
@@ -83,13 +83,13 @@ class LimitError(HexacellError):
 
 
 class DeviceError(HexacellError):
-    """A device or the line to it does not do what it must; ``subject`` is the device's name."""
+    """A device or its connection failed; ``subject`` is the device's name."""
 
     exit_code = ExitCode.HARDWARE
 
 
 class AnswerNeeded(HexacellError):
-    """A person has to answer or approve, and nobody is there."""
+    """A person must answer or approve, and nobody is there."""
 
     exit_code = ExitCode.ANSWER_NEEDED
 
@@ -101,19 +101,19 @@ class CellBusy(HexacellError):
 
 
 class Interruption(HexacellError):
-    """Somebody ended the run before it was over; it can be resumed."""
+    """The run was stopped before its end; it can be resumed."""
 
     exit_code = ExitCode.INTERRUPTED
 
 
 class WriteBackUndone(HexacellError):
-    """Writing the controller's config failed; the file is as it was."""
+    """Writing the controller's config failed; the file is unchanged."""
 
     exit_code = ExitCode.WRITE_BACK_UNDONE
 
 
 class SeveralErrors(HexacellError):
-    """Every failure at once, in one indented report; its exit code is that of the gravest."""
+    """Several failures at once, in one indented report, with the exit code of the most serious."""
 
     def __init__(self, problem: str, errors: list[HexacellError]) -> None:
         self.errors = errors
@@ -121,7 +121,7 @@ class SeveralErrors(HexacellError):
 
     @property
     def worst(self) -> ExitCode:
-        """The exit code to leave with: hardware before usage before the rest."""
+        """The exit code: busy before hardware before usage before the rest."""
         codes = [error.exit_code for error in self.errors]
         for code in (ExitCode.BUSY, ExitCode.HARDWARE, ExitCode.USAGE):
             if code in codes:
@@ -133,12 +133,12 @@ class SeveralErrors(HexacellError):
 
 
 def consists_only_of(error: HexacellError, *kinds: type[HexacellError]) -> bool:
-    """Whether an error, or each of several that came at once, is of these kinds."""
+    """Whether an error, or each of several at once, is of these kinds."""
     return all(isinstance(one, kinds) for one in flatten_errors(error))
 
 
 def flatten_errors(error: HexacellError) -> list[HexacellError]:
-    """The errors that one report is made of."""
+    """The single errors in a report."""
     return error.errors if isinstance(error, SeveralErrors) else [error]
 
 

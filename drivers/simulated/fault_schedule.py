@@ -233,5 +233,5 @@ class FaultSchedule:
                 if left is not None and left <= 0.0:
                     _, _, on, fault = heapq.heappop(self._due)
                     return on, fault
-                self._news.wait(None if left is None else self._clock.on_the_wall(left))
+                self._news.wait(None if left is None else self._clock.real_seconds(left))
         return None

@@ -1,7 +1,4 @@
-"""A change of the controller's config, complete and reviewable, before anything is written.
-
-Records that have a JSON file of their own in the run folder.
-"""
+"""A change of the controller's config, complete and reviewable, before anything is written."""
 
 from __future__ import annotations
 
@@ -44,16 +41,16 @@ class JsonRecord(BaseModel):
             return cls.model_validate_json(atomic_files.read_bytes(path))
         except ValidationError as error:
             first = error.errors(include_url=False)[0]
-            where = ".".join(str(key) for key in first["loc"]) or "the whole"
+            where = ".".join(str(key) for key in first["loc"]) or "the file"
             problem = f"this is not a {cls.noun}: {where}: {first['msg']}"
             raise FileError(problem, subject=path, action="Restore the file") from error
 
 
 class ConfigChange(JsonRecord):
-    """A new geometry for a controller, and exactly the text it would put into the config.
+    """A new geometry for a controller, and the exact text that it puts into the config.
 
-    It holds all that a person must see and all that a commit needs, so that what is written is what
-    was approved, whatever happens to the program in between.
+    It holds everything that a person reviews and everything that a commit needs. What is written is what
+    was approved, even if the program restarts in between.
     """
 
     noun: ClassVar[str] = "config change"
@@ -69,12 +66,12 @@ class ConfigChange(JsonRecord):
 
     @model_validator(mode="after")
     def _texts_are_whole(self) -> Self:
-        for words, text, expected in (
+        for name, text, expected in (
             ("text_before", self.text_before, self.sha256_before),
             ("text_after", self.text_after, self.sha256_after),
         ):
             if atomic_files.sha256(text.encode()) != expected:
-                raise ValueError(f"{words} does not have the checksum stated for it")
+                raise ValueError(f"{name} does not have the checksum stated for it")
         return self
 
     @property
@@ -84,7 +81,7 @@ class ConfigChange(JsonRecord):
 
 
 def fingerprint(path: Path) -> str:
-    """The SHA-256 of a config, to be taken when a run begins; raises ``FileError``."""
+    """The SHA-256 of a config, for the start of a run; raises ``FileError``."""
     return atomic_files.sha256(atomic_files.read_bytes(path))
 
 
@@ -98,11 +95,11 @@ def propose(
         config_format: how to read and rewrite it.
         format_name: the name of that format in the cell file.
         after: the identified geometry.
-        fingerprint_at_start: :func:`fingerprint` of the config when the run began; measurements were
-            commanded with that geometry, and with another one they mean something else.
+        fingerprint_at_start: :func:`fingerprint` of the config when the run began. The measurements were
+            commanded with that geometry and are meaningless with another one.
 
     Raises:
-        FileError: the config changed since, or is none.
+        FileError: the config changed since, or is invalid.
     """
     data = atomic_files.read_bytes(path)
     require_fingerprint(path, data, fingerprint_at_start)
@@ -122,7 +119,7 @@ def propose(
 
 
 def require_fingerprint(path: Path, data: bytes, expected: str) -> None:
-    """Raise ``FileError`` if ``data``, the content of ``path``, is not what the run began with."""
+    """Raise ``FileError`` if ``data``, the content of ``path``, changed since the run began."""
     if atomic_files.sha256(data) != expected:
         raise FileError(
             "the config changed since the run began; the new geometry does not belong to it",
@@ -132,7 +129,7 @@ def require_fingerprint(path: Path, data: bytes, expected: str) -> None:
 
 
 def diff(before: str, after: str) -> str:
-    """The exact text change as a unified diff; ``patch`` accepts it. Empty if there is none."""
+    """The text change as a unified diff that ``patch`` accepts; empty if there is none."""
     lines = difflib.unified_diff(_lines(before), _lines(after), "config-before", "config-after")
     return "".join(
         line if line.endswith("\n") else f"{line}\n\\ No newline at end of file\n" for line in lines
@@ -140,7 +137,7 @@ def diff(before: str, after: str) -> str:
 
 
 def _lines(text: str) -> list[str]:
-    # str.splitlines also splits at form feeds and other characters that end no line in a file.
+    # str.splitlines also splits at form feeds and other characters that do not end a line in a file.
     return list(io.StringIO(text, newline="\n"))
 
 

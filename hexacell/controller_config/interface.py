@@ -1,4 +1,4 @@
-"""What the program must know about a kind of controller config, and nothing more."""
+"""A kind of controller config: what the program needs from it."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ Branch = tuple[Sign, Sign, Sign, Sign, Sign, Sign]
 
 @dataclass(frozen=True, slots=True)
 class ControllerGeometry:
-    """The geometry that a controller computes with.
+    """The geometry that a controller uses.
 
     Attributes:
         geometry: the 42 numbers as the config states them, mm.
-        branch: for each leg, which of the two solutions of the inverse kinematics the robot is in.
+        branch: for each leg, which of the two solutions of the inverse kinematics the robot uses.
     """
 
     geometry: Geometry
@@ -26,20 +26,20 @@ class ControllerGeometry:
 
 
 class ConfigFormat(Protocol):
-    """A kind of controller config; a plug-in's class is made without arguments."""
+    """A kind of controller config; a plug-in's class takes no arguments."""
 
     def read(self, path: Path) -> ControllerGeometry:
         """The geometry in the file.
 
         Raises:
-            FileError: with file and line: absent, unreadable, or not what the controller needs.
+            FileError: with file and line: absent, unreadable, or not a config that :meth:`rewrite` accepts.
         """
         ...
 
     def rewrite(self, text: str, geometry: Geometry) -> str:
-        """``text`` with the values of ``geometry`` in it, and every other character as it was.
+        """``text`` with the values of ``geometry``; every other character is kept.
 
         Raises:
-            FileError: ``text`` is no such config, or ``geometry`` is none that it can hold.
+            FileError: ``text`` is not such a config, or cannot hold ``geometry``.
         """
         ...

@@ -1,4 +1,4 @@
-"""What a commit leaves in the run folder, so that it can be undone at any later time."""
+"""What a commit keeps in the run folder, so that it can be undone at any later time."""
 
 from __future__ import annotations
 
@@ -12,11 +12,11 @@ from hexacell.storage import atomic_files
 BEFORE = "config-before"
 AFTER = "config-after"
 RECEIPT = "write-back.json"
-STRANGER = "config-found"
+FOUND = "config-found"
 
 
 class Receipt(JsonRecord):
-    """What a commit did, and where the way back is.
+    """What a commit did, and where the backup is.
 
     ``backup_folder`` is where the receipt was found; a run folder may be moved.
     """
@@ -35,13 +35,13 @@ class Receipt(JsonRecord):
         return cls.load(folder / RECEIPT).model_copy(update={"backup_folder": folder.absolute()})
 
     @classmethod
-    def for_proposal(cls, proposal: ConfigChange, backup_folder: Path) -> Receipt:
-        """The receipt that a commit of ``proposal`` leaves in ``backup_folder``."""
+    def for_change(cls, change: ConfigChange, backup_folder: Path) -> Receipt:
+        """The receipt that a commit of ``change`` keeps in ``backup_folder``."""
         return cls(
-            path=proposal.path,
-            format=proposal.format,
-            sha256_before=proposal.sha256_before,
-            sha256_after=proposal.sha256_after,
+            path=change.path,
+            format=change.format,
+            sha256_before=change.sha256_before,
+            sha256_after=change.sha256_after,
             backup_folder=backup_folder.absolute(),
         )
 
@@ -52,6 +52,6 @@ class Receipt(JsonRecord):
             raise FileError(
                 "the backup is damaged",
                 subject=self.backup_folder / BEFORE,
-                action="Restore it from elsewhere",
+                action="Restore it from another backup",
             )
         return data

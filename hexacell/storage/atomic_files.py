@@ -1,9 +1,9 @@
 """Whole files: read with plain errors, replaced in one step that survives a power cut.
 
-A replacement is written to a temporary file in the same folder, forced to the disk, renamed over
-the old file, and the folder is forced to the disk too. POSIX ``rename`` is atomic: whoever opens
-the file sees the old text or the new one, never a mixture. A process that dies in between leaves its
-temporary file, ``.hexacell-*.tmp``; who next holds the cell removes it.
+A replacement is written to a temporary file in the same folder, synced to the disk, and renamed over
+the old file; then the folder is synced too. POSIX ``rename`` is atomic: a reader gets the old content or
+the new one, never a mixture. A process that dies in between leaves its temporary file,
+``.hexacell-*.tmp``; the next process that holds the cell removes it.
 """
 
 from __future__ import annotations
@@ -20,14 +20,14 @@ from pathlib import Path
 
 from hexacell.errors import FileError
 
-_WORDS: dict[int, tuple[str, str]] = {
+_REASONS: dict[int, tuple[str, str]] = {
     errno.ENOENT: ("it does not exist", "Check the path"),
     errno.ENOTDIR: ("a part of the path is not a folder", "Check the path"),
     errno.EISDIR: ("it is a folder", "Name a file"),
     errno.EEXIST: ("something else has that name", "Choose another name"),
-    errno.ELOOP: ("its symbolic links go round in a circle", "Repair the link"),
-    errno.EACCES: ("permission denied", "Run as a user who may, or change the permissions"),
-    errno.EPERM: ("permission denied", "Run as a user who may, or change the permissions"),
+    errno.ELOOP: ("its symbolic links form a loop", "Repair the link"),
+    errno.EACCES: ("permission denied", "Run as another user, or change the permissions"),
+    errno.EPERM: ("permission denied", "Run as another user, or change the permissions"),
     errno.EROFS: ("the file system is read-only", "Mount it writable, or move the file"),
     errno.ENOSPC: ("the disk is full", "Free some space and try again"),
     errno.EDQUOT: ("the disk quota is used up", "Free some space and try again"),
@@ -44,10 +44,10 @@ def sha256(data: bytes) -> str:
 
 
 def read_bytes(path: Path) -> bytes:
-    """The content of a regular file; a pipe or a device is refused instead of waited for.
+    """The content of a regular file; a pipe or a device is refused, as reading it could block.
 
     Raises:
-        FileError: absent, unreadable, or no regular file.
+        FileError: absent, unreadable, or not a regular file.
     """
     try:
         _require_regular(path, path.stat())
@@ -68,7 +68,7 @@ def read_if_present(path: Path) -> bytes | None:
 
 
 def read_text(path: Path) -> str:
-    """The content of a UTF-8 file, line ends and byte order mark as they are.
+    """The content of a UTF-8 file, with its line ends and byte order mark.
 
     Raises:
         FileError: as for :func:`read_bytes`, or not UTF-8; then with the line.
@@ -89,16 +89,16 @@ def decode(data: bytes, path: Path) -> str:
 def write_atomically(path: Path, data: bytes, *, expected: bytes | None = None) -> None:
     """Replace the content of ``path``, or create it, in one step that survives a power cut.
 
-    A symbolic link is followed and stays. Mode, owner and extended attributes (access control
-    lists among them) stay too; where the owner cannot be kept, nothing is written. If ``expected``
-    is given, the file must still hold exactly that in the moment before it is replaced.
+    A symbolic link is kept; the file it points to is replaced. Mode, owner and extended attributes (with
+    access control lists) are kept; where the owner cannot be kept, nothing is written. If ``expected`` is
+    given, the file must hold exactly that just before it is replaced.
 
     Raises:
-        FileError: the file is as it was, and no temporary file is left. Only if the message says
-            that the file was replaced, it holds the new content, but a power cut may undo that.
+        FileError: the file is unchanged, and no temporary file is left. Only if the message says that the
+            file was replaced, it holds the new content, but a power cut may undo that.
     """
     try:
-        target = _followed(path)
+        target = _resolved(path)
         with _temporary_beside(target) as temporary:
             _write_like(target, temporary, data)
             _require_content(target, expected)
@@ -108,13 +108,13 @@ def write_atomically(path: Path, data: bytes, *, expected: bytes | None = None) 
     try:
         sync_folder(target.parent)
     except OSError as error:
-        raise os_error_to_file_error("was replaced, but perhaps not for good", path, error) from error
+        raise os_error_to_file_error("was replaced, but a power cut may undo that", path, error) from error
 
 
 def sync_folder(folder: Path) -> None:
-    """Force the names in ``folder`` to the disk; raises ``OSError``.
+    """Sync the names in ``folder`` to the disk; raises ``OSError``.
 
-    Some network file systems know no such call and answer ``EINVAL``; there is nothing to do then.
+    Some network file systems do not support this and report ``EINVAL``, which is ignored.
     """
     descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
     try:
@@ -125,46 +125,46 @@ def sync_folder(folder: Path) -> None:
 
 
 def create_folder_durably(folder: Path) -> None:
-    """Create ``folder`` and the folders above it where absent, for good; raises ``FileError``."""
+    """Create ``folder`` and its missing parents, synced to the disk; raises ``FileError``."""
     try:
         absent = [parent for parent in (folder, *folder.parents) if not parent.exists()]
         folder.mkdir(parents=True, exist_ok=True)
-        # Each is a name in the one above: were a single one lost, so would be all below it.
-        for made in absent or [folder]:
-            sync_folder(made.parent)
+        # Each folder is a name in its parent: if one name is lost, all below it is lost too.
+        for created in absent or [folder]:
+            sync_folder(created.parent)
     except OSError as error:
         raise os_error_to_file_error("the folder cannot be made", folder, error) from error
 
 
 def os_error_to_file_error(what: str, path: Path, error: OSError) -> FileError:
-    """``error`` in plain words: what failed with which file, why, and what to do."""
-    why, action = _WORDS.get(error.errno or 0, (error.strerror or str(error), "Try again"))
+    """``error`` in plain words: what failed, with which file, why, and what to do."""
+    why, action = _REASONS.get(error.errno or 0, (error.strerror or str(error), "Try again"))
     return FileError(f"{what}: {why}", subject=path, action=action)
 
 
-def _followed(path: Path) -> Path:
+def _resolved(path: Path) -> Path:
     try:
-        # Strict: where a link cannot be read for a moment, the link itself would be replaced.
+        # Strict: otherwise a link that cannot be read for a moment would itself be replaced.
         return Path(os.path.realpath(path, strict=True))
     except FileNotFoundError:
         return Path(os.path.realpath(path))
 
 
 def remove_stale_temporaries(path: Path) -> None:
-    """Remove temporary files that processes left when they died in :func:`write_atomically`.
+    """Remove the temporary files of processes that died in :func:`write_atomically`.
 
-    Those for the file ``path``, or all in it if it is a folder. Only for who alone may write there now:
-    a temporary file that somebody is still writing looks no different.
+    Those of the file ``path``, or all in it if it is a folder. The caller must be the only writer there: a
+    temporary file that another process is writing looks the same.
     """
-    target = _followed(path)
+    target = _resolved(path)
     folder, own = (target, "*") if target.is_dir() else (target.parent, f"{_mark(target)}-*")
     for temporary in folder.glob(f".hexacell-{own}.tmp"):
-        with suppress(OSError):  # untidy, but nobody reads it
+        with suppress(OSError):  # it does no harm, as nobody reads it
             temporary.unlink()
 
 
 def _mark(target: Path) -> str:
-    """Of a file's temporaries; not its name, which may already have the greatest length allowed."""
+    """What names a file's temporaries; the file's own name may already have the greatest length."""
     return sha256(os.fsencode(target.name))[:8]
 
 
@@ -180,7 +180,7 @@ def _temporary_beside(target: Path) -> Iterator[Path]:
 
 def _write_like(target: Path, temporary: Path, data: bytes) -> None:
     status = _status(target)
-    # Whoever may not read the old file must not read the new one, not even while it is written.
+    # Who may not read the old file must not read the new one, not even while it is written.
     mode = 0o666 if status is None else 0o600
     with open(temporary, "xb", opener=partial(os.open, mode=mode)) as stream:
         stream.write(data)
@@ -196,7 +196,7 @@ def _status(target: Path) -> os.stat_result | None:
     except FileNotFoundError:
         return None
     _require_regular(target, status)
-    # A rename asks only the folder; an owner who protects the file itself means it.
+    # A rename needs write permission for the folder only; a protected file must not be replaced.
     if not os.access(target, os.W_OK, effective_ids=os.access in os.supports_effective_ids):
         raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
     return status
@@ -210,7 +210,7 @@ def _require_regular(path: Path, status: os.stat_result) -> None:
 def _require_content(target: Path, expected: bytes | None) -> None:
     if expected is not None and target.read_bytes() != expected:
         raise FileError(
-            "the file was changed by somebody else in this moment and is left as it is",
+            "the file was changed by somebody else just now and is left unchanged",
             subject=target,
             action="Run again",
         )

@@ -181,7 +181,7 @@ class GuardMonitor:
         while True:
             await self.clock.sleep(TICK_S * self.clock.factor)
             now = self.clock.now()
-            elapsed = min(self.clock.on_the_wall(now - before), TICK_S + MAX_DELAY_S)
+            elapsed = min(self.clock.real_seconds(now - before), TICK_S + MAX_DELAY_S)
             before = now
             for line in {poller.line for poller in self.pollers.all()}:
                 line.silent_s += elapsed

@@ -101,7 +101,7 @@ class SimulatedEncoderBank:
         data = DeviceData(
             settings.nodes[leg - 1], serial_number, round(settings.measuring_step_nm), settings.signed
         )
-        return SimulatedEncoder(self.bus, self._makers[leg - 1], data, self._clock.on_the_wall)
+        return SimulatedEncoder(self.bus, self._makers[leg - 1], data, self._clock.real_seconds)
 
     def _on_sync(self, _can_id: int, _data: bytearray, _timestamp: float) -> None:
         self._sample()
@@ -113,7 +113,7 @@ class SimulatedEncoderBank:
 
     def _send_later(self, encoder: SimulatedEncoder, cob_id: int, data: bytes, delay_s: float) -> None:
         if delay_s:
-            self.bus.call_later(self._clock.on_the_wall(delay_s), lambda: encoder.send(cob_id, data))
+            self.bus.call_later(self._clock.real_seconds(delay_s), lambda: encoder.send(cob_id, data))
         else:
             encoder.send(cob_id, data)
 

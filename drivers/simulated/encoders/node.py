@@ -40,7 +40,7 @@ class SimulatedEncoder:
     """A device on the line. ``counts`` is the position of its last sample."""
 
     def __init__(
-        self, line: SimulatedCanBus, maker: Vendor, data: DeviceData, on_the_wall: Callable[[float], float]
+        self, line: SimulatedCanBus, maker: Vendor, data: DeviceData, real_seconds: Callable[[float], float]
     ) -> None:
         self.data = data
         self.counts = 0
@@ -48,7 +48,7 @@ class SimulatedEncoder:
         self.delay_s = 0.0
         self._line = line
         self._maker = maker
-        self._on_the_wall = on_the_wall
+        self._real_seconds = real_seconds
         self._event_timers: list[Timer] = []
         self._syncs = 0
         objects = object_dictionary.build(
@@ -142,7 +142,7 @@ class SimulatedEncoder:
             is_on = not self._value(0x1800 + number - 1, 1) & object_dictionary.TPDO_OFF
             period_ms = self._value(0x1800 + number - 1, 5)
             if is_on and period_ms and self._value(0x1800 + number - 1, 2) not in _SYNCHRONOUS:
-                self._repeat(number, self._on_the_wall(period_ms / 1000))
+                self._repeat(number, self._real_seconds(period_ms / 1000))
 
     def _repeat(self, number: int, period_s: float) -> None:
         def send() -> None:

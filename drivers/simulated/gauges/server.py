@@ -154,7 +154,7 @@ class GaugeLineServer:
     def _until_next_answer_s(self) -> float | None:
         if not self._answers:
             return None
-        return max(0.0, self._clock.on_the_wall(self._answers[0][0] - self._clock.now()))
+        return max(0.0, self._clock.real_seconds(self._answers[0][0] - self._clock.now()))
 
     def _send_due(self) -> None:
         while self._answers and self._answers[0][0] <= self._clock.now():

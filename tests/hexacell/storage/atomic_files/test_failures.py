@@ -85,7 +85,7 @@ def test_a_folder_that_does_not_reach_the_disk_is_told(path: Path, monkeypatch: 
         raise OSError(errno.EIO, "x")
 
     monkeypatch.setattr(atomic_files, "sync_folder", fail)
-    with pytest.raises(FileError, match="was replaced, but perhaps not for good"):
+    with pytest.raises(FileError, match="was replaced, but a power cut may undo that"):
         atomic_files.write_atomically(path, b"new")
     assert path.read_bytes() == b"new"
 

@@ -1,9 +1,11 @@
-"""Where a campaign of measurements stands, and what is to be done about it."""
+"""The state of a campaign of measurements, and the decisions that are made on it."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
 from typing import Literal
+
+from pydantic import BaseModel, ConfigDict
 
 from hexacell.kinematics.pose import Pose
 from hexacell.measurements.records import Joints, MeasurementSet
@@ -16,8 +18,8 @@ class CampaignState:
     """All that a decision depends on.
 
     Attributes:
-        measurements: the records so far, point after point as they were measured.
-        point: the point at which the gauges stand, as people count them; none between points.
+        measurements: the records so far, in the order they were measured.
+        point: the point at which the gauges are, counted from 1; none between points.
         done: points that are not to be measured any more.
         present: the pose last commanded, in the controller's frames; none if it is not known.
         refusals: records of the present point that could not be taken.
@@ -40,19 +42,17 @@ class CampaignState:
         return len(begun if self.point is None else begun | {self.point})
 
 
-@dataclass(frozen=True, slots=True)
-class Forecast:
-    """What a record would do to the predicted error at the task poses, and what going on would.
-
-    Errors are one standard deviation at the worst task pose, mm; none where the robot can take no
-    task pose.
+class Forecast(BaseModel):
+    """The predicted error at the worst task pose, 1 sigma, mm: now, after this record, at the end.
 
     Attributes:
         now_mm: by the records so far.
-        next_mm: with the proposed one.
+        next_mm: with the proposed record.
         end_mm: once everything that is still planned is measured.
-        records: that are still planned, and the ``minutes`` they will take.
+        records: that are still planned, the proposed one included, and the ``minutes`` they will take.
     """
+
+    model_config = ConfigDict(frozen=True, extra="forbid", ser_json_inf_nan="constants")
 
     now_mm: float
     next_mm: float
@@ -86,13 +86,13 @@ class MeasurePose:
     """Measure the present point in one more orientation.
 
     Attributes:
-        orientation: as people count them; the reference is the first.
+        orientation: counted from 1; the reference is the first.
         pose: what to command, in the controller's frames.
         joints: joint variables that the controller will go to, mm.
         deviation: what the gauges should show, mm along base x, y, z, and ``sigma``.
         gain: information on the parameters, nat.
-        via: poses to pass on the way without measuring, in the controller's frames.
-        outlook: none where there are no task poses to predict errors at.
+        forecast: none where there are no task poses to predict errors at.
+        via: poses to pass on the path without measuring, in the controller's frames.
     """
 
     point: int
@@ -108,7 +108,7 @@ class MeasurePose:
 
 @dataclass(frozen=True, slots=True)
 class FinishPoint:
-    """The present point is done, and why."""
+    """Nothing more is to be measured at the present point, and why."""
 
     point: int
     reason: str

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from hexacell.campaign.decisions import Forecast
 from hexacell.presentation.planning import run_forecast_line
 from procedures.run import events
 from procedures.run.state import RunState
-from procedures.run.steps import Compute, Move, Phase, RunForecast, SetKey
+from procedures.run.steps import Compute, Move, Phase, SetKey
 
 SET_NAMES = {
     Phase.IDENTIFY: "point {}",
@@ -34,7 +35,7 @@ class EventFormatter:
     """Turns the events of one run, in their order, into lines of text."""
 
     def __init__(self) -> None:
-        self._forecast: RunForecast | None = None
+        self._forecast: Forecast | None = None
 
     def lines(self, event: events.Event, state: RunState) -> list[str]:
         """Text of an event; ``state`` includes the event. Empty where there is nothing to report."""

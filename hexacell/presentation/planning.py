@@ -6,7 +6,6 @@ from collections.abc import Iterator
 
 from hexacell.application.planning import NextPose, PlanTrial
 from hexacell.campaign.decisions import Finished, Forecast, MeasurePose, StartPoint
-from procedures.run.steps import RunForecast
 
 
 def next_pose_text(proposed: NextPose) -> tuple[str, str]:
@@ -46,7 +45,7 @@ def forecast_text(forecast: Forecast | None) -> str:
     )
 
 
-def run_forecast_line(forecast: RunForecast) -> str:
+def run_forecast_line(forecast: Forecast) -> str:
     """The predicted error after the record that was forecast, and what the remaining records gain."""
     line = f"  predicted error at the task {forecast.next_mm:.3f} mm"
     left = forecast.records - 1

@@ -8,7 +8,7 @@ its resumption and its replay.
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from functools import cached_property
 
@@ -42,7 +42,6 @@ from procedures.run.steps import (
     Phase,
     Place,
     Revisit,
-    RunForecast,
     Sample,
     SetKey,
     SixNumbers,
@@ -369,10 +368,9 @@ def _require_zero(key: SetKey, measured: SetState) -> None:
 
 
 def _expectation(visit: MeasurePose) -> Expectation:
-    outlook = visit.forecast
     return Expectation(
         deviation_mm=visit.deviation,
         sigma_mm=visit.sigma,
         gain=visit.gain,
-        forecast=None if outlook is None else RunForecast(**asdict(outlook)),
+        forecast=visit.forecast,
     )

@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from hexacell.campaign.decisions import Forecast
 from hexacell.kinematics.pose import Pose
 
 SixNumbers = tuple[float, float, float, float, float, float]
@@ -37,26 +38,13 @@ class SetKey(Frozen):
         return f"{self.phase.value}{self.point}"
 
 
-class RunForecast(Frozen):
-    """The predicted error at the worst task pose, 1 sigma, mm: now, after this record, at the end.
-
-    The end is ``records`` more away, this one included, and that many ``minutes``.
-    """
-
-    now_mm: float
-    next_mm: float
-    end_mm: float
-    records: int
-    minutes: float
-
-
 class Expectation(Frozen):
     """What the gauges should show (mm, base x y z), one sigma, and what is learnt (nat)."""
 
     deviation_mm: ThreeNumbers
     sigma_mm: ThreeNumbers
     gain: float
-    forecast: RunForecast | None = None
+    forecast: Forecast | None = None
 
 
 class Locate(Frozen):

@@ -6,21 +6,22 @@ from typing import Any, get_args
 
 import pytest
 
+from hexacell.campaign.decisions import Forecast
 from hexacell.cell.recovery import Action, FailureKind
 from hexacell.presentation.events import COMPUTATIONS, CONFIG_CHANGES, EventFormatter, activity, event_text
 from procedures.run import events
 from procedures.run.state import RunState, fold
-from procedures.run.steps import Compute, Expectation, Move, Phase, RunForecast, SetKey
+from procedures.run.steps import Compute, Expectation, Move, Phase, SetKey
 
 POSE = (0.0,) * 6
 ZERO = (0.0, 0.0, 0.0)
 POINT = SetKey(phase=Phase.IDENTIFY, point=2)
 HELD_OUT = SetKey(phase=Phase.BEFORE, point=1)
-FORECAST = RunForecast(now_mm=0.31, next_mm=0.29, end_mm=0.06, records=24, minutes=12.4)
+FORECAST = Forecast(now_mm=0.31, next_mm=0.29, end_mm=0.06, records=24, minutes=12.4)
 READING = events.Reading(gauges_mm=ZERO, spread_mm=ZERO, joints_mm=POSE, answers=(), counts=())
 
 
-def move(at: SetKey, orientation: int, forecast: RunForecast | None = None) -> events.StepBegun:
+def move(at: SetKey, orientation: int, forecast: Forecast | None = None) -> events.StepBegun:
     expected = Expectation(deviation_mm=ZERO, sigma_mm=ZERO, gain=1.0, forecast=forecast)
     step = Move(at=at, orientation=orientation, pose=POSE, expected=expected if forecast else None)
     return events.StepBegun(step=step)

@@ -16,11 +16,10 @@ from hexacell.presentation.planning import (
     plan_trial_lines,
     run_forecast_line,
 )
-from procedures.run.steps import RunForecast
 
 ZERO = (0.0,) * 6
 FORECAST = Forecast(now_mm=0.31, next_mm=0.29, end_mm=0.06, records=24, minutes=12.4)
-RUN_FORECAST = RunForecast(now_mm=0.31, next_mm=0.29, end_mm=0.06, records=24, minutes=12.4)
+RUN_FORECAST = Forecast(now_mm=0.31, next_mm=0.29, end_mm=0.06, records=24, minutes=12.4)
 MEASURE = MeasurePose(2, 7, Pose(1.0, 2.0, 3.0), ZERO, (0.1, -0.2, 0.0), (0.5, 0.6, 0.7), 1.8, None)
 
 
@@ -44,7 +43,9 @@ def test_what_the_remaining_records_gain():
     text = forecast_text(FORECAST)
     assert text.startswith("Predicted error at the worst task pose 0.310 mm (one sigma);")
     assert text.endswith("continuing gains 0.250 mm in 24 records, about 12 minutes.")
-    assert forecast_text(Forecast(0.06, 0.06, 0.06, 0, 0.0)).endswith("0.060 mm (one sigma).")
+    assert forecast_text(Forecast(now_mm=0.06, next_mm=0.06, end_mm=0.06, records=0, minutes=0.0)).endswith(
+        "0.060 mm (one sigma)."
+    )
     assert "none of the task poses" in forecast_text(None)
 
 

@@ -1,0 +1,52 @@
+"""A campaign on a virtual robot that moves as a real one does."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from hexacell.campaign.decisions import Finished
+from hexacell.cell.bundled import bundled_config
+from hexacell.cell.loader import load_cell
+from hexacell.identification.estimator import identify
+from hexacell.robot_model import robot_of
+from hexacell.study.simulated_campaign import SimulatedCampaign
+
+
+@pytest.fixture
+def make_campaign(paper):
+    cell = load_cell(bundled_config("simulated-hexaglide"))
+    identification = cell.settings.identification.model_copy(update={"orientations": 6})
+    settings = cell.settings.model_copy(update={"identification": identification})
+    robot = robot_of(cell)
+    truth, _ = robot.mechanism.normalize_frames(paper.actual)
+
+    def make(**options):
+        return SimulatedCampaign(settings, robot, truth, np.random.default_rng(5), **options)
+
+    return make
+
+
+@pytest.mark.parametrize("provisional", [False, True])
+def test_it_measures_all_poses_safely_and_identifies_the_robot(make_campaign, provisional):
+    campaign = make_campaign(provisional=provisional)
+    campaign.carry_out()
+    limits = campaign.robot.limits
+    assert campaign.reason == "all 5 points are measured"
+    assert len(campaign.measurements) == 30
+    assert campaign.outside == 0
+    assert 0.1 < campaign.largest_mm <= limits.gauge_travel_mm
+    assert campaign.virtual_robot.smallest_margin > 0.5 * limits.singularity_margin
+    assert campaign.robot.uses_provisional == provisional
+    found = identify(campaign.robot.problem(campaign.measurements)).geometry
+    truth = campaign.virtual_robot.truth
+    assert found.largest_difference(truth) < 0.2 * campaign.robot.drawing.largest_difference(truth)
+
+
+def test_every_point_ends_at_its_reference(make_campaign):
+    campaign = make_campaign()
+    while not isinstance(campaign.step(), Finished):
+        if campaign.state.point is None:
+            done = max(campaign.state.done)
+            assert campaign.virtual_robot.command == campaign.plan.reference_pose(done)
+    assert campaign.state.done == {1, 2, 3, 4, 5}

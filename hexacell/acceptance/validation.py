@@ -1,4 +1,4 @@
-"""The held-out verdict: how far the ball strays at points that took no part in the fit."""
+"""Validation: deviations of the ball at held-out points, before and after calibration."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from hexacell.kinematics.rotations import Array
 
 
 class Verdict(StrEnum):
-    """What the held-out measurements say."""
+    """The verdict of the held-out measurements."""
 
     PASS = "pass"  # noqa: S105 - a verdict, not a password
     OUT_OF_LIMITS = "out of limits"
@@ -22,7 +22,7 @@ class Verdict(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class DeviationStatistics:
-    """Distances of the ball from each point's reference: mean and largest, mm, over ``poses``."""
+    """Mean and largest distance of the ball from its point's reference, mm, over a number of poses."""
 
     mean_mm: float
     largest_mm: float
@@ -30,7 +30,7 @@ class DeviationStatistics:
 
     @classmethod
     def of(cls, deviations: ArrayLike) -> DeviationStatistics | None:
-        """Of deviations (n, 3), mm, references left out; nothing where one is missing or not finite."""
+        """Of deviations (n, 3), mm, without the references; none without any, or if one is not finite."""
         distances: Array = np.linalg.norm(np.reshape(np.asarray(deviations, dtype=float), (-1, 3)), axis=-1)
         if not len(distances) or not np.isfinite(distances).all():
             return None
@@ -44,7 +44,7 @@ def validate(
     mean_mm: float,
     largest_mm: float,
 ) -> Verdict:
-    """The verdict under limits on the mean and the largest distance, mm; no evidence is no pass."""
+    """The verdict under limits on the mean and the largest distance, mm; missing data never pass."""
     if before is None or after is None:
         return Verdict.NOT_EVALUATED
     if after.mean_mm > before.mean_mm:

@@ -1,8 +1,8 @@
 """Measurements as a CSV file.
 
-One row a record, under the header ``point,orientation,x,y,z,a,b,c,q1,...,q6,dx,dy,dz``: the pose as
-commanded, mm and deg, the encoders, mm, and the deviation from the point's first row, mm. Columns
-may stand in any order and more of them may follow; these are ignored.
+One row per record, with the header ``point,orientation,x,y,z,a,b,c,q1,...,q6,dx,dy,dz``: the pose as
+commanded, mm and deg, the encoder positions, mm, and the deviation from the point's first row, mm.
+The order of the columns is free, and other columns are ignored.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from pathlib import Path
 
 from hexacell.errors import FileError
 from hexacell.kinematics.pose import Pose
-from hexacell.measurements.records import MeasurementSet, Record
+from hexacell.measurements.records import MeasurementSet, Record, RecordId
 from hexacell.storage.atomic_files import read_text, write_atomically
 
 COUNTS = ("point", "orientation")
@@ -25,36 +25,35 @@ NUMBERS = (*"xyzabc", "q1", "q2", "q3", "q4", "q5", "q6", "dx", "dy", "dz")
 HEADER = (*COUNTS, *NUMBERS)
 POSE_HEADER = HEADER[:8]
 LARGEST_COUNT = 1_000_000
-Label = tuple[int, int]
 
 
 def read_measurements(path: Path, *, allow_partial: bool = False) -> MeasurementSet:
     """Read a measurement file.
 
-    ``allow_partial`` accepts what a calibration still under way may leave: a file without rows, or
-    without even a header, and points with one row.
+    ``allow_partial`` accepts the file of an unfinished calibration: without rows, or even without a
+    header, and with one row at a point.
 
     Raises:
-        FileError: The file cannot be read, a column is missing, a cell is no number, a record
-            stands twice, or there are too few; with the line.
+        FileError: the file cannot be read, a column is missing, a cell is no number, a record occurs
+            twice, or there are too few; with the line.
     """
     text = read_text(path).removeprefix("\N{BYTE ORDER MARK}")
     if allow_partial and not text.strip():
         return MeasurementSet(())
-    records = _by_label(path, _Table(path, text, HEADER))
+    records = _by_id(path, _Table(path, text, HEADER))
     if not allow_partial:
-        _require_two_rows_a_point(path, {label: line for label, (line, _) in records.items()})
+        _require_two_rows_a_point(path, {record: line for record, (line, _) in records.items()})
     return MeasurementSet(tuple(record for _, record in records.values()))
 
 
 def read_poses(path: Path) -> list[tuple[int, int, Pose]]:
-    """Read only the poses of such a file: line, point and pose of each row.
+    """Read only the poses of a measurement file: line, point and pose of each row.
 
     Raises:
-        FileError: as for a measurement file, but columns other than the poses' need not be there.
+        FileError: as for a measurement file, but only the columns of the poses are required.
     """
     table = _Table(path, read_text(path).removeprefix("\N{BYTE ORDER MARK}"), POSE_HEADER)
-    records = _by_label(path, table).values()
+    records = _by_id(path, table).values()
     return [(line, record.point, record.pose) for line, record in records]
 
 
@@ -62,7 +61,7 @@ def write_measurements(path: Path, measurements: MeasurementSet) -> None:
     """Write a measurement file; every number reads back exactly.
 
     Raises:
-        FileError: The file cannot be written; an older one is then still there.
+        FileError: the file cannot be written; an older one is then unchanged.
     """
     text = io.StringIO()
     rows = csv.writer(text, lineterminator="\n")
@@ -73,23 +72,22 @@ def write_measurements(path: Path, measurements: MeasurementSet) -> None:
 
 def _row(record: Record) -> list[str]:
     numbers = (*record.pose.as_tuple(), *record.joints, *record.deviation)
-    # float: a numpy number's repr names its type.
+    # float(): the repr of a numpy number contains its type.
     return [str(record.point), str(record.orientation), *(repr(float(number)) for number in numbers)]
 
 
-def _by_label(path: Path, table: _Table) -> dict[Label, tuple[int, Record]]:
-    """The records of a table, each with its line, in their order."""
-    found: dict[Label, tuple[int, Record]] = {}
+def _by_id(path: Path, table: _Table) -> dict[RecordId, tuple[int, Record]]:
+    """The records of a table, each with its line, in the order of the file."""
+    found: dict[RecordId, tuple[int, Record]] = {}
     for line, record in table.records():
-        label = (record.point, record.orientation)
-        if label in found:
-            raise _stands_twice(path, label, found[label][0], line)
-        found[label] = (line, record)
+        if record.id in found:
+            raise _duplicate(path, record.id, found[record.id][0], line)
+        found[record.id] = (line, record)
     return found
 
 
 class _Table:
-    """The rows of one file, and where the columns are that count: the first ones of ``HEADER``."""
+    """The rows of one file, and the positions of the wanted columns: the first ones of ``HEADER``."""
 
     def __init__(self, path: Path, text: str, wanted: tuple[str, ...]) -> None:
         self._path = path
@@ -121,7 +119,7 @@ class _Table:
 
 
 def _filled_rows(path: Path, text: str) -> Iterator[tuple[int, list[str]]]:
-    """Rows in which anything stands, each with its line."""
+    """The rows that are not empty, each with its line."""
     reader = csv.reader(io.StringIO(text, newline=""), strict=True)
     try:
         for row in reader:
@@ -134,7 +132,7 @@ def _filled_rows(path: Path, text: str) -> Iterator[tuple[int, list[str]]]:
 
 
 def _columns(path: Path, line: int, header: list[str], wanted: tuple[str, ...]) -> list[int]:
-    """The place of each column wanted in the file."""
+    """The position in the file of each wanted column."""
     names = [name.strip() for name in header]
     missing = [name for name in wanted if name not in names]
     twice = [name for name in wanted if names.count(name) > 1]
@@ -145,15 +143,15 @@ def _columns(path: Path, line: int, header: list[str], wanted: tuple[str, ...]) 
     elif missing:
         problem = f"columns are missing: {', '.join(missing)}"
     elif twice:
-        problem = f"columns stand twice: {', '.join(twice)}"
+        problem = f"columns occur twice: {', '.join(twice)}"
     else:
         return [names.index(name) for name in wanted]
     raise FileError(problem, subject=path, line=line, action=f"The header must be {','.join(wanted)}")
 
 
 def _record(cells: tuple[str, ...]) -> Record | None:
-    """The record in the cells of ``HEADER``, or none if one of them is unfit."""
-    # Python's numbers may have underscores, a CSV file's may not.
+    """The record in the cells of ``HEADER``, or none if one of them is invalid."""
+    # Python accepts underscores in numbers; a CSV file must not have them.
     if "_" in "".join(cells):
         return None
     try:
@@ -169,7 +167,7 @@ def _record(cells: tuple[str, ...]) -> Record | None:
 
 
 def _bad_cell(path: Path, line: int, cells: tuple[str, ...]) -> FileError:
-    """Which cell made :func:`_record` give up."""
+    """The error for the cell that :func:`_record` does not accept."""
     good = ("1", "1", *("0" for _ in NUMBERS))
     alone = ((*good[:place], cell, *good[place + 1 :]) for place, cell in enumerate(cells))
     place = [_record(candidate) is None for candidate in alone].index(True)
@@ -181,17 +179,17 @@ def _bad_cell(path: Path, line: int, cells: tuple[str, ...]) -> FileError:
     )
 
 
-def _stands_twice(path: Path, label: Label, first: int, line: int) -> FileError:
-    point, orientation = label
+def _duplicate(path: Path, record: RecordId, first: int, line: int) -> FileError:
+    point, orientation = record
     return FileError(
-        f"point {point}, orientation {orientation} stands here and in line {first}",
+        f"point {point}, orientation {orientation} is here and in line {first}",
         subject=path,
         line=line,
         action="Remove one of the two rows",
     )
 
 
-def _require_two_rows_a_point(path: Path, lines: dict[Label, int]) -> None:
+def _require_two_rows_a_point(path: Path, lines: dict[RecordId, int]) -> None:
     if not lines:
         raise FileError("there are no measurements in it", subject=path, action="Measure some first")
     rows = Counter(point for point, _ in lines)

@@ -1,8 +1,9 @@
-"""What calibration starts from: records of joint variables and of how far the ball moved."""
+"""Measurements: records of joint variables and of the deviation of the ball from a reference."""
 
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TypeVar
@@ -26,11 +27,11 @@ class Record:
     """One settled measurement.
 
     Attributes:
-        point: which of the cell's points the gauges stand at, from 1.
-        orientation: which pose at this point, from 1.
-        pose: what was commanded, under the geometry that the controller then had.
+        point: at which of the cell's points the gauges are placed, from 1.
+        orientation: the pose at this point, from 1.
+        pose: as commanded, under the geometry in the controller at that time.
         joints: slider positions q1 to q6 from the encoders, mm.
-        deviation: of the ball from where the point's gauges were zeroed, along base x, y, z, mm.
+        deviation: of the ball from its position when the gauges were zeroed, along base x, y, z, mm.
     """
 
     point: int
@@ -39,13 +40,18 @@ class Record:
     joints: Joints
     deviation: Deviation
 
+    @property
+    def id(self) -> RecordId:
+        """Point and orientation."""
+        return self.point, self.orientation
+
 
 @dataclass(frozen=True)
 class MeasurementSet:
-    """Records in the order of measurement, and the same as arrays of n rows.
+    """Records in the order of measurement, and as arrays of n rows, which are read-only.
 
-    Deviations compare only within one point. Its reference, where the gauges were zeroed, is its
-    first record. The arrays are computed once and read-only.
+    Deviations are comparable within one point only. Its reference, at which the gauges were zeroed, is
+    its first record.
 
     Raises:
         UsageError: two records have the same point and orientation.
@@ -54,7 +60,7 @@ class MeasurementSet:
     records: tuple[Record, ...]
 
     def __post_init__(self) -> None:
-        twice = [label for label, n in Counter(map(_label, self.records)).items() if n > 1]
+        twice = [record for record, count in Counter(self._ids).items() if count > 1]
         if twice:
             point, orientation = twice[0]
             raise UsageError(f"there are two records of point {point}, orientation {orientation}")
@@ -62,19 +68,23 @@ class MeasurementSet:
     def __len__(self) -> int:
         return len(self.records)
 
+    @property
+    def _ids(self) -> Iterator[RecordId]:
+        return (record.id for record in self.records)
+
     @cached_property
     def labels(self) -> NDArray[np.int_]:
-        """Point and orientation (n, 2) of each record, as people count them."""
-        return _frozen(np.array([*map(_label, self.records)], dtype=np.int_).reshape(-1, 2))
+        """Point and orientation (n, 2) of each record, counted from 1."""
+        return _frozen(np.array([*self._ids], dtype=np.int_).reshape(-1, 2))
 
     @property
     def points(self) -> NDArray[np.int_]:
-        """The point (n,) of each record, as people count them."""
+        """The point (n,) of each record, counted from 1."""
         return self.labels[:, 0]
 
     @cached_property
     def group(self) -> NDArray[np.intp]:
-        """The point (n,) of each record, counted 0 to m-1 in the order of first appearance."""
+        """The point (n,) of each record, numbered 0 to m-1 in the order of first appearance."""
         places = {point: place for place, point in enumerate(dict.fromkeys(self.points.tolist()))}
         return _frozen(np.array([places[record.point] for record in self.records], dtype=np.intp))
 
@@ -83,16 +93,6 @@ class MeasurementSet:
         """The commanded poses."""
         poses = PoseBatch.of(record.pose for record in self.records)
         return PoseBatch(_frozen(poses.positions), _frozen(poses.rotations))
-
-    @property
-    def positions(self) -> Array:
-        """Commanded ball centres (n, 3), mm."""
-        return self.poses.positions
-
-    @property
-    def rotations(self) -> Array:
-        """Commanded rotation matrices (n, 3, 3), platform frame to base frame."""
-        return self.poses.rotations
 
     @cached_property
     def joints(self) -> Array:
@@ -103,10 +103,6 @@ class MeasurementSet:
     def deviations(self) -> Array:
         """Deviations (n, 3) from the point's reference, mm."""
         return _frozen(np.array([record.deviation for record in self.records], dtype=float).reshape(-1, 3))
-
-
-def _label(record: Record) -> tuple[int, int]:
-    return record.point, record.orientation
 
 
 def _frozen(array: NDArray[Scalar]) -> NDArray[Scalar]:

@@ -109,7 +109,7 @@ MISTAKES = {
         ":1: columns are missing: q6, dy",
     ),
     "no header": (lambda r: r[1:], ":1: columns are missing: point, orientation"),
-    "duplicate row": (lambda r: [*r, r[7]], ":57: point 1, orientation 7 stands here and in line 8"),
+    "duplicate row": (lambda r: [*r, r[7]], ":57: point 1, orientation 7 is here and in line 8"),
     "point with one row": (lambda r: r[:13], ":13: point 2 has one row, and at least two are needed"),
     "header only": (lambda r: r[:1], "m.csv: there are no measurements in it"),
     "empty": (lambda _: [], "m.csv:1: is empty"),

@@ -120,7 +120,7 @@ LISTS: dict[str, tuple[Callable[[list[str]], list[str]], tuple[str, ...]]] = {
     "a point without poses": (lambda rows: rows[:44], ("point 5 has no pose",)),
     "a point with one pose": (lambda rows: rows[:45], ("point 5 has one pose",)),
     "text": (lambda rows: [rows[0], rows[1].replace(",550,", ",up,"), *rows[2:]], (':3: z is "up"',)),
-    "twice": (lambda rows: [*rows, rows[3]], (":57: point 1, orientation 4 stands here and in line 5",)),
+    "twice": (lambda rows: [*rows, rows[3]], (":57: point 1, orientation 4 is here and in line 5",)),
     "too few": (
         lambda rows: [row for row in rows if int(row.split(",")[1]) <= 3],
         ("30 equations for 35 parameters", "at least 4 orientations"),

@@ -71,7 +71,7 @@ def _visits(measurements: MeasurementSet, left_out: Collection[tuple[int, int]])
     """Rows of each pose commanded at each point."""
     visits: defaultdict[tuple[float, ...], list[int]] = defaultdict(list)
     for row, record in enumerate(measurements.records):
-        if (record.point, record.orientation) not in left_out:
+        if record.id not in left_out:
             command = (round(value, SAME_DIGITS) for value in record.pose.as_tuple())
             visits[record.point, *command].append(row)
     return visits.values()

@@ -1,4 +1,4 @@
-"""The model linearised where an identification ended: what the checks of it start from."""
+"""The measurement model linearized at an identified geometry, for the checks of the result."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from hexacell.kinematics.sensitivity import pose_sensitivity
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LinearizedSolution:
-    """The records to first order in the parameters and in the noise.
+    """The records, to first order in the parameters and in the noise.
 
     Attributes:
         problem: the records that were used.
         covariance: of the free parameters (p, p), mm^2.
         from_centre: the free parameters less the prior's centre (p,), mm.
-        residuals: (n, 3), mm, each point's unknown constant still in them.
+        residuals: (n, 3), mm, not centred: they contain each point's unknown constant.
         jacobian: (n, 3, p) of the residuals by the free parameters.
         by_joints: (n, 3, 6) of the ball's position by the joint variables.
     """
@@ -50,7 +50,7 @@ class LinearizedSolution:
 
     @property
     def record_noise_mm(self) -> float:
-        """Root mean square distance by which the stated noise displaces a record."""
+        """Root mean square distance, mm, by which the stated noise displaces a record."""
         covariance = record_covariance(self.by_joints, self.problem.noise)
         return float(np.sqrt(np.mean(np.trace(covariance, axis1=-2, axis2=-1))))
 
@@ -70,11 +70,10 @@ class LinearizedSolution:
         return centring.system(self.residuals, self.jacobian)
 
     def active_prior(self) -> Array:
-        """Precision (p, p), 1/mm^2, of the prior as far as it took part.
+        """Precision (p, p), 1/mm^2, of the prior in the directions in which the fit used it.
 
-        It did so in full in some directions and not at all in the others, in coordinates in which
-        the prior's covariance is the identity: this is told by the difference of the result's
-        precision and the data's information, and freed from its rounding errors.
+        Where the prior's covariance is the identity, the precision of the result less the information
+        of the data has only the eigenvalues 1 (used) and 0 (released), up to rounding.
         """
         information = self.system(NuisanceElimination(self.problem, self.weights())).information()
         factor = np.linalg.cholesky(self.problem.prior.covariance)

@@ -1,8 +1,8 @@
-"""Other robots at which a search may begin, where the drawing led it astray.
+"""Random multistart: other start points for the solver where the drawing leads to a wrong minimum.
 
-With few records, and near a singularity at the drawing, the truth may lie beyond that singularity:
-no way down the cost leads there. Robots are drawn from what the tolerances allow, and those that the
-records contradict least are where a search has the best prospects.
+With few records, and a pose near a singularity at the drawing, the true geometry may lie beyond that
+singularity, where no descent from the drawing ends. Geometries are drawn from the tolerance prior,
+and those of lowest cost are the start points.
 """
 
 from __future__ import annotations
@@ -19,23 +19,23 @@ from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array
 
-DRAWN = 240
-MOST_PROMISING = 12
+DRAWS = 240
+START_POINTS = 12
 
 
 def start_points(problem: Problem) -> Iterator[tuple[Array, PoseBatch]]:
-    """Free parameters (p,), mm, the most promising first, and the poses that close them."""
+    """Free parameters (p,), mm, that of lowest cost first, and the poses that close them."""
     root = np.linalg.cholesky(problem.prior.covariance)
-    draws = np.random.default_rng(0).standard_normal((DRAWN, len(root)))
+    draws = np.random.default_rng(0).standard_normal((DRAWS, len(root)))
     costs = np.array([_cost(problem, problem.initial_parameters + root @ draw) for draw in draws])
-    order = np.argsort(costs, kind="stable")[:MOST_PROMISING]
+    order = np.argsort(costs, kind="stable")[:START_POINTS]
     for row in order[np.isfinite(costs[order])]:
         free = problem.initial_parameters + root @ draws[row]
         yield free, _poses(problem, free)[0]
 
 
 def _cost(problem: Problem, free: Array) -> float:
-    """The weighted squares of the residuals; infinite where a record cannot be taken or says nothing."""
+    """The chi-square of the residuals; infinite where a pose is not found or next to a singularity."""
     poses, found = _poses(problem, free)
     if not found:
         return np.inf
@@ -46,5 +46,5 @@ def _cost(problem: Problem, free: Array) -> float:
 
 
 def _poses(problem: Problem, free: Array) -> tuple[PoseBatch, bool]:
-    followed = problem.commands.solve_poses(Geometry.from_vector(problem.basis @ free), problem.joints)
-    return followed.poses, bool(followed.found.all())
+    result = problem.commands.solve_poses(Geometry.from_vector(problem.basis @ free), problem.joints)
+    return result.poses, bool(result.found.all())

@@ -1,10 +1,10 @@
-"""Around the singularities that lie between the drawing and the solution.
+"""The solver around singularities that lie between the start and the solution.
 
-On the way from the drawing a record may come next to a singularity although it is far from one at
-both ends; or one may lie between the geometry that commanded it and the drawing, so that it cannot
-even begin there. Held in the sum, such a record stops the whole iteration. It is therefore set
-aside, the others lead the way, and it is taken back at their solution, where its pose is followed
-from the commanded one by continuation. A record that cannot be taken back stays out.
+During the iteration the pose of a record may come next to a singularity although it is far from one
+at the start and at the solution. Or a singularity lies between the geometry that commanded the
+record and the start, so that the record has no start pose. Such a record would stop the iteration.
+It is therefore set aside, the others are solved, and it is restored at their solution, where its pose
+is continued from the commanded one. A record that cannot be restored is left out.
 """
 
 from __future__ import annotations
@@ -25,13 +25,13 @@ from hexacell.kinematics.sensitivity import pose_sensitivity
 def solve_around_singularities(
     problem: Problem, precision: Array, *, free: Array, poses: PoseBatch, manner: SolverOptions = COARSE
 ) -> tuple[Problem, Solution]:
-    """As :func:`levenberg_marquardt.solve`; also gives the records that took part in the end.
+    """As :func:`levenberg_marquardt.solve`; returns the problem of the records used as well.
 
-    ``poses`` counts where ``problem.has_start_pose`` says so.
+    ``poses`` of the n records are valid where ``problem.has_start_pose``.
     """
     used = problem.has_start_pose.copy()
     poses = poses[used]
-    taken_back = np.zeros(problem.records, dtype=bool)
+    restored = np.zeros(problem.records, dtype=bool)
     for search in itertools.count(1):
         kept = problem.subset(used)
         solution = levenberg_marquardt.solve(kept, precision, free=free, poses=poses, manner=manner)
@@ -42,20 +42,20 @@ def solve_around_singularities(
             used[np.flatnonzero(used)[solution.singular]] = False
             poses = poses[~solution.singular]
             continue
-        aside = ~used & ~taken_back
+        aside = ~used & ~restored
         if not aside.any():
             break
-        returning, everywhere = _returning(problem, free, aside)
-        if not returning.any():
+        restorable, their_poses = _restorable(problem, free, aside)
+        if not restorable.any():
             break
-        poses = _merged(problem.records, used, poses, returning, everywhere)
-        used, taken_back = used | returning, taken_back | returning
+        poses = _merged(problem.records, used, poses, restorable, their_poses)
+        used, restored = used | restorable, restored | restorable
         poses = poses[used]
     return kept, solution
 
 
-def _returning(problem: Problem, free: Array, aside: Mask) -> tuple[Mask, PoseBatch]:
-    """Which of the records set aside stand clear of singularities at a geometry, and their poses."""
+def _restorable(problem: Problem, free: Array, aside: Mask) -> tuple[Mask, PoseBatch]:
+    """Which of the records set aside are clear of singularities at a geometry, and their poses."""
     geometry = Geometry.from_vector(problem.basis @ free)
     rows = np.flatnonzero(aside)
     found = problem.commands[rows].solve_poses(geometry, problem.joints[rows])
@@ -63,13 +63,14 @@ def _returning(problem: Problem, free: Array, aside: Mask) -> tuple[Mask, PoseBa
         :, :3
     ]
     clear = np.linalg.norm(by_joints, axis=(-2, -1)) < levenberg_marquardt.LARGEST_AMPLIFICATION
-    returning = np.zeros(problem.records, dtype=bool)
-    returning[rows] = found.found & clear
-    return returning, found.poses[found.found & clear]
+    restorable = np.zeros(problem.records, dtype=bool)
+    restorable[rows] = found.found & clear
+    return restorable, found.poses[found.found & clear]
 
 
-def _merged(records: int, used: Mask, poses: PoseBatch, returning: Mask, back: PoseBatch) -> PoseBatch:
+def _merged(records: int, used: Mask, poses: PoseBatch, others: Mask, other_poses: PoseBatch) -> PoseBatch:
+    """The poses of all records (n,), those of neither mask zero."""
     positions, rotations = np.zeros((records, 3)), np.zeros((records, 3, 3))
     positions[used], rotations[used] = poses.positions, poses.rotations
-    positions[returning], rotations[returning] = back.positions, back.rotations
+    positions[others], rotations[others] = other_poses.positions, other_poses.rotations
     return PoseBatch(positions, rotations)

@@ -112,7 +112,7 @@ MISTAKES = [
     (HEADER, HEADER.replace("q3,", ""), "columns are missing: q3", 1),
     (HEADER, HEADER.replace("point,", "Point,"), "columns are missing: point", 1),
     (HEADER, HEADER.replace("dx,dy", "dx,dx"), "columns are missing: dy", 1),
-    (HEADER, HEADER + ",q1", "columns stand twice: q1", 1),
+    (HEADER, HEADER + ",q1", "columns occur twice: q1", 1),
     (HEADER + "\n", "", "columns are missing: point, orientation, x", 1),
     (GOOD, GOOD.replace(",", ";"), "separated by semicolons, not by commas", 1),
     (GOOD, GOOD.replace(",", "\t"), "separated by tabs, not by commas", 1),
@@ -133,7 +133,7 @@ MISTAKES = [
     (ROWS[1], f"1,-2,{NUMBERS}", 'orientation is "-2", but must be a whole number from 1', 3),
     (ROWS[1], f"1,{'9' * 30},{NUMBERS}", "but must be a whole number from 1", 3),
     (ROWS[1], f"1,{'9' * 5000},{NUMBERS}", "but must be a whole number from 1", 3),
-    (ROWS[1], ROWS[0], "point 1, orientation 1 stands here and in line 2", 3),
+    (ROWS[1], ROWS[0], "point 1, orientation 1 is here and in line 2", 3),
     (ROWS[3] + "\n", "", "point 4 has one row", 4),
     (ROWS[1], f'1,2,"0"5{NUMBERS[1:]}', "not valid CSV", 3),
     (ROWS[3], f'4,2,"{NUMBERS}', "not valid CSV", 5),
@@ -173,7 +173,7 @@ def test_a_point_just_opened_may_have_one_row(read):
 
 
 def test_other_mistakes_count_in_partial_files_too(read):
-    with pytest.raises(FileError, match="stands here"):
+    with pytest.raises(FileError, match="is here"):
         read(f"{HEADER}\n{ROWS[0]}\n{ROWS[0]}\n", allow_partial=True)
 
 
@@ -194,7 +194,7 @@ def test_spoilt_files_give_plain_errors_or_sound_records(read, edits):
     except FileError as error:
         assert error.action  # noqa: PT017 - reading may also succeed
         return
-    for array in (measurements.joints, measurements.deviations, measurements.positions):
+    for array in (measurements.joints, measurements.deviations, measurements.poses.positions):
         assert np.isfinite(array).all()
     assert (measurements.labels >= 1).all()
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from operator import attrgetter
+
 import numpy as np
 import pytest
 
@@ -20,8 +22,8 @@ def test_records_as_arrays():
     assert len(measurements) == 2
     np.testing.assert_array_equal(measurements.labels, [[1, 1], [1, 2]])
     np.testing.assert_array_equal(measurements.points, [1, 1])
-    np.testing.assert_array_equal(measurements.positions, [[1, 2, 550], [1, 2, 500]])
-    np.testing.assert_array_equal(measurements.rotations[1], b.pose.rotation)
+    np.testing.assert_array_equal(measurements.poses.positions, [[1, 2, 550], [1, 2, 500]])
+    np.testing.assert_array_equal(measurements.poses.rotations[1], b.pose.rotation)
     np.testing.assert_array_equal(measurements.joints, [[1, 2, 3, 4, 5, 6]] * 2)
     np.testing.assert_array_equal(measurements.deviations, [[0.1, 0.2, 0.3]] * 2)
     assert measurements.joints.dtype == float
@@ -38,8 +40,8 @@ def test_empty_set_has_empty_arrays():
     assert len(measurements) == 0
     assert measurements.labels.shape == (0, 2)
     assert measurements.group.shape == (0,)
-    assert measurements.positions.shape == (0, 3)
-    assert measurements.rotations.shape == (0, 3, 3)
+    assert measurements.poses.positions.shape == (0, 3)
+    assert measurements.poses.rotations.shape == (0, 3, 3)
     assert measurements.joints.shape == (0, 6)
     assert measurements.deviations.shape == (0, 3)
 
@@ -49,9 +51,11 @@ def test_the_same_record_twice_is_refused():
         MeasurementSet((record(2, 3), record(2, 4), record(2, 3, z=0.0)))
 
 
-@pytest.mark.parametrize("name", ["labels", "group", "positions", "rotations", "joints", "deviations"])
+@pytest.mark.parametrize(
+    "name", ["labels", "group", "poses.positions", "poses.rotations", "joints", "deviations"]
+)
 def test_arrays_cannot_be_changed(name):
-    array = getattr(MeasurementSet((record(1, 1),)), name)
+    array = attrgetter(name)(MeasurementSet((record(1, 1),)))
     with pytest.raises(ValueError, match="read-only"):
         array[0] = 0
 

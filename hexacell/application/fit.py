@@ -27,7 +27,7 @@ class FitResult:
         return self.identified.converged and not self.assessed.refused
 
 
-def fit(cell: Cell, measurements: MeasurementSet) -> FitResult:
+def fit_measurements(cell: Cell, measurements: MeasurementSet) -> FitResult:
     """Identify the geometry of a cell's robot from records.
 
     Raises:

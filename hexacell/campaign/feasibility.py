@@ -104,10 +104,10 @@ def _records_needed(plan: Plan, unknowns: int) -> int:
     return records
 
 
-def plan_failures(plan: Plan) -> Iterator[list[HexacellError]]:
-    """All that stands in the way of a plan whose poses can be reached.
+def optimisation_failures(plan: Plan) -> Iterator[list[HexacellError]]:
+    """What prevents a plan whose poses can be reached from choosing its orientations.
 
-    Yields what each piece of the work found, often nothing, so that whoever asks may stop in between.
+    Yields the failures of each part of the work, often none, so that the caller can stop in between.
     """
     yield [*_points_lost(plan)]
     yield [*_ways(plan)]

@@ -104,7 +104,7 @@ def propose(
     data = atomic_files.read_bytes(path)
     require_fingerprint(path, data, fingerprint_at_start)
     before = config_format.read(path).geometry
-    text_before = atomic_files.decode(data, path)
+    text_before = atomic_files.decode_utf8(data, path)
     text_after = config_format.rewrite(text_before, after)
     return ConfigChange(
         path=path.absolute(),

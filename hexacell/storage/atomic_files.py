@@ -73,10 +73,10 @@ def read_text(path: Path) -> str:
     Raises:
         FileError: as for :func:`read_bytes`, or not UTF-8; then with the line.
     """
-    return decode(read_bytes(path), path)
+    return decode_utf8(read_bytes(path), path)
 
 
-def decode(data: bytes, path: Path) -> str:
+def decode_utf8(data: bytes, path: Path) -> str:
     """``data`` as UTF-8 text; ``path`` and the line appear in the ``FileError`` if it is not."""
     try:
         return data.decode()

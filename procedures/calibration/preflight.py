@@ -37,7 +37,7 @@ def _plan_failures(calibration: Calibration, *, unattended: bool) -> Iterator[li
         too_few = [*feasibility.too_few_records(calibration.plan)]
         yield too_few
         if not unreachable and not too_few:
-            yield from feasibility.plan_failures(calibration.plan)
+            yield from feasibility.optimisation_failures(calibration.plan)
     if unattended and calibration.settings.stations.placement == "by-hand":
         yield [_nobody_to_place_gauges()]
 

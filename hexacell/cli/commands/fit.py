@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from hexacell.application.fit import fit
+from hexacell.application.fit import fit_measurements
 from hexacell.cell.loader import load_cell
 from hexacell.cli.console import Console
 from hexacell.errors import ExitCode
@@ -17,7 +17,7 @@ def main(options: argparse.Namespace) -> ExitCode:
     """Identify and report all that is known of the result."""
     console = Console(options.json)
     cell = load_cell(options.cell)
-    result = fit(cell, read_measurements(options.measurements))
+    result = fit_measurements(cell, read_measurements(options.measurements))
     console.document(fit_document(result))
     if not options.json:
         console.print(identification_report(result))

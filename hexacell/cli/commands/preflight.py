@@ -10,7 +10,7 @@ from hexacell.application.planning import try_plan
 from hexacell.cell.loader import load_cell
 from hexacell.cli.console import Console
 from hexacell.errors import ExitCode
-from hexacell.presentation.devices import device_line
+from hexacell.presentation.devices import preflight_lines
 from hexacell.presentation.documents import preflight_document
 from hexacell.presentation.layout import wrapped
 from hexacell.presentation.planning import plan_trial_lines
@@ -22,10 +22,8 @@ def main(options: argparse.Namespace) -> ExitCode:
     console = Console(options.json)
     cell = load_cell(options.cell)
     devices = asyncio.run(preflight(cell, Mode.OPTIMISE, unattended=options.unattended))
-    for identity in devices:
-        console.print(wrapped(f"ok  {device_line(identity)}", indent=6))
-    console.print("ok  all points can be reached, all devices answer; nothing was moved")
-    console.print("Trying the plan on simulated robots within the tolerances, some seconds ...")
+    for line in preflight_lines(devices):
+        console.print(wrapped(line, indent=6))
     trial = try_plan(cell)
     console.document(preflight_document(devices, trial))
     for line in plan_trial_lines(trial):

@@ -6,9 +6,9 @@ from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from types import TracebackType
-from typing import Any, Self
+from typing import Any
 
+from drivers.simulated.closeable import Closeable
 from drivers.simulated.encoders import SimulatedEncoderBank
 from drivers.simulated.fault_schedule import CellFaults, FaultSchedule
 from drivers.simulated.gauges.rack import SimulatedGaugeBank
@@ -26,7 +26,7 @@ from hexacell.kinematics.mechanism import Mechanism
 from hexacell.kinematics.pose import Pose, PoseBatch
 
 
-class SimulatedCell:
+class SimulatedCell(Closeable):
     """The cell that a cell file's ``[simulation]`` describes; serves until it is closed.
 
     ``faults`` makes things go wrong at once, ``schedule`` at a moment that is to come.
@@ -79,14 +79,6 @@ class SimulatedCell:
     def close(self) -> None:
         """Stop serving; twice is harmless."""
         self._served.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
 
 def _stop_file(settings: CellSettings, served: ExitStack) -> Path:

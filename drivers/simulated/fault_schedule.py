@@ -9,8 +9,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
-from typing import Self
 
+from drivers.simulated.closeable import Closeable
 from drivers.simulated.encoders import SimulatedEncoderBank
 from drivers.simulated.gauges.faults import InjectedGaugeFault
 from drivers.simulated.gauges.rack import SimulatedGaugeBank
@@ -144,7 +144,7 @@ class InjectedFault:
     at_s: float
 
 
-class FaultSchedule:
+class FaultSchedule(Closeable):
     """Strikes and lifts planned faults at their moments, on a thread of its own.
 
     Attributes:
@@ -203,12 +203,6 @@ class FaultSchedule:
             self._news.notify_all()
         if self._thread is not None:
             self._thread.join()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
 
     def _expect(self, fault: SimulatedFault, since_s: float) -> None:
         strikes_at = since_s + fault.after_s

@@ -1,6 +1,6 @@
 """A CAN adapter that speaks slcan, the ASCII protocol of LAWICEL and CANable class devices.
 
-It puts a ``virtual`` CAN bus of this process within reach of others. Commands end with CR and are
+It makes a ``virtual`` CAN bus of this process available to other processes. Commands end with CR and are
 answered with CR, or BEL for an error; frames are ``t`` (11-bit id), ``T`` (29-bit), and ``r`` and
 ``R`` for remote requests: id in hexadecimal, number of bytes, bytes.
 """
@@ -8,19 +8,24 @@ answered with CR, or BEL for an error; frames are ``t`` (11-bit id), ``T`` (29-b
 from __future__ import annotations
 
 import re
+import select
 import threading
 from collections.abc import Callable
-from types import TracebackType
-from typing import Any, Literal, Self
+from typing import Any, Literal
 
 import can
 
-from drivers.simulated.transports.can_lines import PtyLine, SerialLine, SocketLine
+from drivers.simulated.closeable import Closeable
+from drivers.simulated.transports.interface import Transport
+from drivers.simulated.transports.pty import PtyTransport
+from drivers.simulated.transports.tcp import SocketTransport
 
 SLICE_S = 0.02
 CLIENT_TIMEOUT_S = 0.05
 BITRATE = 500_000
-LONGEST_COMMAND = 32
+MAX_COMMAND_BYTES = 32
+SEND_TIMEOUT_S = 0.2
+"""How long a client may leave its buffer full before frames are dropped."""
 
 _OK = b"\r"
 _ERROR = b"\a"
@@ -41,7 +46,7 @@ def encode(message: can.Message) -> bytes:
 
 
 def decode(command: str) -> can.Message | None:
-    """The frame in a command (without CR), or none if it is no proper one."""
+    """The frame in a command (without CR); none if the command is no valid frame."""
     match = _FRAME.fullmatch(command)
     if match is None:
         return None
@@ -63,7 +68,7 @@ def decode(command: str) -> can.Message | None:
 
 
 class SlcanAdapter:
-    """The adapter's answers; it carries frames only while its channel ``is_open``."""
+    """The adapter's command interpreter; it transmits frames only while its channel ``is_open``."""
 
     def __init__(self, transmit: Callable[[can.Message], None]) -> None:
         self.is_open = False
@@ -71,7 +76,7 @@ class SlcanAdapter:
         self._transmit = transmit
 
     def answer(self, command: str) -> bytes:
-        """Do what one command (without CR) says and return the answer."""
+        """Execute one command (without CR) and return the answer."""
         if command in ("O", "L"):
             return self._open(may_transmit=command == "O")
         if command == "C":
@@ -96,10 +101,10 @@ class SlcanAdapter:
         return (b"Z" if message.is_extended_id else b"z") + _OK
 
 
-class SlcanServer:
-    """An adapter between a virtual CAN channel and a serial line, on two threads of its own."""
+class SlcanServer(Closeable):
+    """An adapter between a virtual CAN channel and a serial line, with one thread for each direction."""
 
-    def __init__(self, channel: str, line: SerialLine) -> None:
+    def __init__(self, channel: str, line: Transport) -> None:
         self._url = line.url
         self._line = line
         self._bus = can.Bus(channel, interface="virtual")
@@ -108,7 +113,7 @@ class SlcanServer:
         self._closing = threading.Event()
         self._threads = [
             threading.Thread(target=target, name=f"slcan {self._url}", daemon=True)
-            for target in (self._carry_commands, self._carry_frames)
+            for target in (self._receive_commands, self._send_frames)
         ]
         for thread in self._threads:
             thread.start()
@@ -125,7 +130,7 @@ class SlcanServer:
         }
 
     def close(self) -> None:
-        """Unplug the adapter; closing twice is harmless."""
+        """End both threads and release line and bus; closing twice is harmless."""
         if self._closing.is_set():
             return
         self._closing.set()
@@ -134,30 +139,19 @@ class SlcanServer:
         self._line.close()
         self._bus.shutdown()
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
-        self.close()
-
-    def _carry_commands(self) -> None:
-        pending = b""
+    def _receive_commands(self) -> None:
+        client, pending = 0, b""
         while not self._closing.is_set():
-            data = self._line.read(SLICE_S)
-            if data is None:
-                self._adapter.is_open, pending = False, b""
-                continue
+            ready, _, _ = select.select(self._line.descriptors(), [], [], SLICE_S)
+            data = self._line.receive(ready)
+            if self._line.connections != client:  # a new client finds the channel closed
+                client, self._adapter.is_open, pending = self._line.connections, False, b""
             *commands, pending = (pending + data).split(b"\r")
-            pending = pending[-LONGEST_COMMAND:]
+            pending = pending[-MAX_COMMAND_BYTES:]
             for command in commands:
                 self._write(self._adapter.answer(command.decode("ascii", "replace")))
 
-    def _carry_frames(self) -> None:
+    def _send_frames(self) -> None:
         while not self._closing.is_set():
             message = self._bus.recv(SLICE_S)
             if message is not None and self._adapter.is_open:
@@ -165,9 +159,9 @@ class SlcanServer:
 
     def _write(self, data: bytes) -> None:
         with self._writing:
-            self._line.write(data)
+            self._line.send(data, SEND_TIMEOUT_S)
 
 
 def serve_slcan(channel: str, transport: Literal["pty", "socket"]) -> SlcanServer:
     """Put the virtual CAN ``channel`` behind an slcan adapter on a pty or a loopback socket."""
-    return SlcanServer(channel, PtyLine() if transport == "pty" else SocketLine())
+    return SlcanServer(channel, PtyTransport("slcan") if transport == "pty" else SocketTransport())

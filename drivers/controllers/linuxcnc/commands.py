@@ -1,4 +1,4 @@
-"""What linuxcncrsh can be asked and told, as typed calls that raise in the controller's own words."""
+"""The get and set commands of linuxcncrsh as typed calls; errors carry the controller's own messages."""
 
 from __future__ import annotations
 
@@ -13,49 +13,49 @@ from hexacell.kinematics.pose import Pose
 
 T = TypeVar("T")
 
-_MOST_ERRORS = 100
-_MOST_TOLD = 4
+_MAX_ERRORS = 100
+_MAX_SHOWN = 4
 
 
 class ControllerCommands:
-    """Questions and orders over one connection."""
+    """Get and set commands over one connection."""
 
     def __init__(self, connection: Connection, subject: str) -> None:
         self.connection = connection
         self.subject = subject
 
     async def get(self, what: str) -> str:
-        """The words after ``WHAT``.
+        """The text after ``WHAT``.
 
         Raises:
             CommandRefused: The server does not know ``what``.
         """
-        answer = await self._got(what)
-        if not answer.accepted:
+        response = await self._query(what)
+        if not response.accepted:
             raise CommandRefused(f"'get {what}'", "it does not know that", subject=self.subject)
-        return answer.text
+        return response.text
 
     async def get_if_known(self, what: str) -> str:
-        """The same, and no words from a server that does not know ``what``."""
-        return (await self._got(what)).text
+        """The same; empty if the server does not know ``what``."""
+        return (await self._query(what)).text
 
-    async def set(self, what: str, patience_s: float | None = None) -> None:
-        """Have the controller do something; its acknowledgement is no proof that it did.
+    async def set(self, what: str, timeout_s: float | None = None) -> None:
+        """Send a set command; its acknowledgement does not prove an effect.
 
         Raises:
-            CommandRefused: It says no; the reason is in its own words.
+            CommandRefused: It is refused; the reason is the controller's own.
         """
-        answer = await self.connection.ask(f"set {what}", patience_s)
-        if not answer.accepted:
-            raise await self._refusal(what, answer)
+        response = await self.connection.request(f"set {what}", timeout_s)
+        if not response.accepted:
+            raise await self._refusal(what, response)
 
     async def pose(self) -> Pose:
-        """The pose that the controller believes in, mm and deg, from the joints as they are."""
-        return self._understood(parse_pose, await self.get("abs_act_pos"))
+        """The actual pose, mm and deg, by the controller's own kinematics."""
+        return self._parsed(parse_pose, await self.get("abs_act_pos"))
 
     async def joints(self) -> tuple[float, ...]:
-        """The six joints as they are, mm."""
-        return self._understood(parse_positions, await self.get("joint_pos"))
+        """The six actual joint positions, mm."""
+        return self._parsed(parse_positions, await self.get("joint_pos"))
 
     async def all_homed(self) -> bool:
         """Whether every joint is homed."""
@@ -67,31 +67,31 @@ class ControllerCommands:
         return (await self.get(what)).upper() == "ON"
 
     async def errors(self) -> list[str]:
-        """What the controller has to complain about, oldest first; the queue is empty afterwards.
+        """The controller's error messages, oldest first; its queue is empty afterwards.
 
-        It holds what came before as well: whoever starts something anew empties it first.
+        The queue also holds older messages: empty it before an order whose errors matter.
         """
         found: dict[str, None] = {}
-        for _ in range(_MOST_ERRORS):
+        for _ in range(_MAX_ERRORS):
             if (text := await self.get("error")).upper() == "OK":
                 break
             found[text] = None
         return list(found)
 
-    async def reason(self, remarks: tuple[str, ...] = ()) -> str:
-        """Why something did not happen: the controller's complaints, or the state that it is in."""
-        complaints = [*remarks, *await self.errors()]
-        if len(complaints) > _MOST_TOLD:
-            complaints[_MOST_TOLD:] = [f"and {len(complaints) - _MOST_TOLD} more"]
-        return "; ".join(complaints) or await self._state()
+    async def reason(self, explanations: tuple[str, ...] = ()) -> str:
+        """Why a command had no effect: the controller's error messages, else its state."""
+        messages = [*explanations, *await self.errors()]
+        if len(messages) > _MAX_SHOWN:
+            messages[_MAX_SHOWN:] = [f"and {len(messages) - _MAX_SHOWN} more"]
+        return "; ".join(messages) or await self._state()
 
-    async def _got(self, what: str) -> Response:
-        # LinuxCNC 2.9 reads the commands of all clients with one strtok(): two that speak at the same
-        # moment garble each other's. A question can be asked again; an order is left to the caller.
-        answer = await self.connection.ask(f"get {what}")
-        return answer if answer.accepted else await self.connection.ask(f"get {what}")
+    async def _query(self, what: str) -> Response:
+        # Another program's client may garble our command (see send_arbiter). A query can be repeated
+        # safely; a set command is left to the caller.
+        response = await self.connection.request(f"get {what}")
+        return response if response.accepted else await self.connection.request(f"get {what}")
 
-    async def _refusal(self, what: str, answer: Response) -> CommandRefused:
+    async def _refusal(self, what: str, response: Response) -> CommandRefused:
         if (await self.get_if_known("enable")).upper() == "OFF":
             return CommandRefused(
                 f"'set {what}'",
@@ -99,14 +99,16 @@ class ControllerCommands:
                 subject=self.subject,
                 action="See that nobody else moves the robot, then prepare it again",
             )
-        return CommandRefused(f"'set {what}'", await self.reason(answer.explanations), subject=self.subject)
+        return CommandRefused(
+            f"'set {what}'", await self.reason(response.explanations), subject=self.subject
+        )
 
     async def _state(self) -> str:
         if await self.is_on("estop"):
             return "it is in emergency stop"
         return "it is on, and gives no reason" if await self.is_on("machine") else "it is switched off"
 
-    def _understood(self, parse: Callable[[str], T], text: str) -> T:
+    def _parsed(self, parse: Callable[[str], T], text: str) -> T:
         try:
             return parse(text)
         except ValueError as error:

@@ -1,4 +1,4 @@
-"""One conversation with linuxcncrsh: the greeting, questions one at a time, never out of step."""
+"""One connection to linuxcncrsh: greeting, then one command and one response at a time."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import contextlib
 import os
 import time
 from collections import deque
+from collections.abc import Callable
 from typing import Self
 
 from drivers.controllers.errors import ConnectionLost, ResponseTimeout
@@ -17,7 +18,6 @@ from drivers.controllers.linuxcnc.protocol import (
     parse_explanation,
     parse_response,
 )
-from drivers.controllers.linuxcnc.send_arbiter import SendArbiter
 from drivers.controllers.linuxcnc.settings import Address, Timeouts
 from drivers.wire_trace import TraceEntry, TraceRecorder, TrafficDirection
 from hexacell.errors import DeviceError, UsageError
@@ -28,51 +28,52 @@ _SHOWN = 80
 
 
 class Connection:
-    """A connected, greeted client that has taken control.
+    """A connected and greeted client.
 
-    The caller asks one question at a time. When a wait is cancelled or runs out, the answer is
-    still owed: ``catch_up`` collects it before the next question, so that a late answer is never
-    taken for that of another command. While ``may_speak`` is cleared, nothing is asked, and
-    connections that share a ``floor`` are never heard at the same moment.
+    The caller sends one command at a time. When its wait is cancelled or times out, the response is
+    outstanding: ``collect_late_response`` receives it before the next command, so that it is never
+    taken for the response to another one.
+
+    Attributes:
+        server: name and version of the server.
+        send_turn: entered to send a command; see :class:`SendArbiter`. Unrestricted at first.
     """
 
     def __init__(
         self,
         address: Address,
-        patience: Timeouts,
+        timeouts: Timeouts,
         recorder: TraceRecorder | None,
         reader: asyncio.StreamReader,
         writer: asyncio.StreamWriter,
     ) -> None:
         self.server = ""
-        self.may_speak = asyncio.Event()
-        self.may_speak.set()
-        self.floor = SendArbiter()
+        self.send_turn: Callable[[], contextlib.AbstractAsyncContextManager[None]] = contextlib.nullcontext
         self._recorder = recorder
         self._address = address
-        self._patience = patience
+        self._timeouts = timeouts
         self._reader = reader
         self._writer = writer
         self._buffer = LineBuffer()
         self._lines: deque[str] = deque()
-        self._owed: str | None = None
+        self._outstanding: str | None = None
 
     @classmethod
     async def open(
         cls,
         address: Address,
-        patience: Timeouts,
+        timeouts: Timeouts,
         recorder: TraceRecorder | None = None,
         *,
         commanding: bool = True,
     ) -> Self:
-        """Connect, greet, silence the echo, ask for acknowledgements and, if ``commanding``, take control.
+        """Connect, greet, switch echo off and verbose on and, if ``commanding``, take control.
 
         Raises:
-            ConnectionLost: Nothing listens there, or it says nothing.
+            ConnectionLost: Nothing listens there, or it does not respond.
             DeviceError: Something else listens there, or a password is wrong.
         """
-        connection = cls(address, patience, recorder, *await _connect(address, patience))
+        connection = cls(address, timeouts, recorder, *await _connect(address, timeouts))
         try:
             await connection._greet()
             if commanding:
@@ -82,38 +83,37 @@ class Connection:
             raise
         return connection
 
-    async def ask(self, command: str, patience_s: float | None = None) -> Response:
-        """The answer to one command, a refusal included.
+    async def request(self, command: str, timeout_s: float | None = None) -> Response:
+        """Send one command; its response, a refusal included.
 
         Raises:
-            ResponseTimeout: It did not come within ``patience_s``.
-            ConnectionLost: The line broke.
+            ResponseTimeout: No response within ``timeout_s``.
+            ConnectionLost: The connection broke.
         """
         line = self._encoded(command)
-        await self.may_speak.wait()
-        async with self.floor.taken():
-            self._owed = command
+        async with self.send_turn():
+            self._outstanding = command
             await self._write(line)
-            return await self._owed_answer(patience_s or self._patience.answer)
+            return await self._outstanding_response(timeout_s or self._timeouts.answer)
 
     async def collect_late_response(self) -> None:
-        """Collect an answer that nobody waited for to the end.
+        """Receive the outstanding response, if there is one.
 
         Raises:
-            ConnectionLost: It does not come either, or the server is gone: open another connection.
+            ConnectionLost: It does not come, or the server is gone: open another connection.
         """
-        if self._owed is not None:
-            await self._owed_answer(self._patience.answer)
+        if self._outstanding is not None:
+            await self._outstanding_response(self._timeouts.answer)
         if self._reader.at_eof():
             raise ConnectionLost("closed the connection", subject=self._address.name)
 
-    async def take_control(self, patience_s: float | None = None) -> None:
-        """Become the client that may command; on LinuxCNC 2.9 the one before loses control.
+    async def take_control(self, timeout_s: float | None = None) -> None:
+        """Become the client that may command; on LinuxCNC 2.9 the previous one loses control.
 
         Raises:
             DeviceError: The password is wrong.
         """
-        answer = await self.ask(f"set enable {self._address.enable_password}", patience_s)
+        answer = await self.request(f"set enable {self._address.enable_password}", timeout_s)
         if not answer.accepted:
             raise DeviceError(
                 "refuses the enable password",
@@ -122,7 +122,7 @@ class Connection:
             )
 
     async def close(self) -> None:
-        """Let the line go; closing twice is harmless."""
+        """Close the connection; closing twice is harmless."""
         self._writer.transport.abort()
         with contextlib.suppress(OSError):
             await self._writer.wait_closed()
@@ -131,20 +131,20 @@ class Connection:
         await self._write(self._encoded(f"hello {self._address.connect_password} {_CLIENT}"))
         self.server = self._server_in(await self._first_line())
         await self._write(self._encoded("set echo off"))
-        with contextlib.suppress(TimeoutError):  # answered by its echo alone, if at all
-            await self._line(_now() + self._patience.explanation)
-        await self.ask("set verbose on")
+        with contextlib.suppress(TimeoutError):  # the only response, if any, is the echo
+            await self._line(_now() + self._timeouts.explanation)
+        await self.request("set verbose on")
 
     async def _first_line(self) -> str:
-        give_up = _now() + self._patience.answer
+        deadline = _now() + self._timeouts.answer
         try:
-            while (line := await self._line(give_up)).lower().startswith("warning:"):
+            while (line := await self._line(deadline)).lower().startswith("warning:"):
                 pass
         except TimeoutError:
             if self._buffer.rest:
-                raise self._stranger(self._buffer.rest) from None
+                raise self._not_linuxcncrsh(self._buffer.rest) from None
             raise ResponseTimeout(
-                "takes the connection but says nothing",
+                "accepts the connection but does not respond",
                 subject=self._address.name,
                 action="Check that linuxcncrsh listens there, and restart LinuxCNC if it hangs",
             ) from None
@@ -160,9 +160,9 @@ class Connection:
                     subject=self._address.name,
                     action="Set controller.connect_password to linuxcncrsh's own (--connectpw)",
                 )
-        raise self._stranger(line)
+        raise self._not_linuxcncrsh(line)
 
-    def _stranger(self, said: str) -> DeviceError:
+    def _not_linuxcncrsh(self, said: str) -> DeviceError:
         return DeviceError(
             f"is no linuxcncrsh, it says {said[:_SHOWN]!r}",
             subject=self._address.name,
@@ -183,34 +183,34 @@ class Connection:
         except OSError as error:
             raise ConnectionLost("closed the connection", subject=self._address.name) from error
 
-    async def _owed_answer(self, patience_s: float) -> Response:
-        assert self._owed is not None  # noqa: S101 - both callers see to it
-        answer = await self._answer_to(self._owed, patience_s)
-        self._owed = None
-        return answer
+    async def _outstanding_response(self, timeout_s: float) -> Response:
+        assert self._outstanding is not None  # noqa: S101 - both callers make sure
+        response = await self._response_to(self._outstanding, timeout_s)
+        self._outstanding = None
+        return response
 
-    async def _answer_to(self, command: str, patience_s: float) -> Response:
-        give_up = _now() + patience_s
+    async def _response_to(self, command: str, timeout_s: float) -> Response:
+        deadline = _now() + timeout_s
         remarks: list[str] = []
         try:
-            while (answer := parse_response(line := await self._line(give_up), command)) is None:
+            while (answer := parse_response(line := await self._line(deadline), command)) is None:
                 if explanation := parse_explanation(line):
                     remarks.append(explanation)
-                    give_up = min(give_up, _now() + self._patience.explanation)
+                    deadline = min(deadline, _now() + self._timeouts.explanation)
         except TimeoutError:
-            if remarks:  # 2.10 refuses what another client's motion holds up without a NAK
+            if remarks:  # 2.10 refuses without a NAK while another client moves the machine
                 return Response(accepted=False, explanations=tuple(remarks))
             asked = " ".join(command.split()[:2])  # no passwords in messages
             raise ResponseTimeout(
-                f"did not answer '{asked}' within {patience_s:g} s",
+                f"did not answer '{asked}' within {timeout_s:g} s",
                 subject=self._address.name,
                 action="Check that LinuxCNC still runs",
             ) from None
         return Response(answer.accepted, answer.text, tuple(remarks))
 
-    async def _line(self, give_up: float) -> str:
+    async def _line(self, deadline: float) -> str:
         while not self._lines:
-            async with asyncio.timeout_at(give_up):
+            async with asyncio.timeout_at(deadline):
                 data = await self._read()
             self._lines.extend(self._buffer.feed(data))
         return self._lines.popleft()
@@ -231,22 +231,22 @@ class Connection:
         if self._recorder is None or not data:
             return
         for password in (self._address.connect_password, self._address.enable_password):
-            data = data.replace(f" {password}".encode(), b" ***")  # traces are passed around
+            data = data.replace(f" {password}".encode(), b" ***")  # traces are handed to others
         self._recorder(TraceEntry(time.time(), self._address.name, direction, data))
 
 
 async def _connect(
-    address: Address, patience: Timeouts
+    address: Address, timeouts: Timeouts
 ) -> tuple[asyncio.StreamReader, asyncio.StreamWriter]:
     start = "Start LinuxCNC with DISPLAY = linuxcncrsh --port N, or correct controller.host and .port"
     try:
-        async with asyncio.timeout(patience.connect):
+        async with asyncio.timeout(timeouts.connect):
             return await asyncio.open_connection(address.host, address.port)
     except TimeoutError:
-        problem = f"cannot be reached within {patience.connect:g} s"
+        problem = f"cannot be reached within {timeouts.connect:g} s"
         raise ConnectionLost(problem, subject=address.name, action=start) from None
     except OSError as error:
-        number = error.errno or 0  # negative from getaddrinfo, which brings its own words
+        number = error.errno or 0  # negative from getaddrinfo, which has its own text
         reason = os.strerror(number) if number > 0 else error.strerror
         problem = f"cannot be reached: {reason or error}"
         raise ConnectionLost(problem, subject=address.name, action=start) from error

@@ -1,6 +1,6 @@
-"""The linuxcncrsh language as pure functions: what to send, and what an answer means.
+"""The linuxcncrsh protocol as pure functions: encoding commands, parsing responses.
 
-A client says ``get <what>`` or ``set <what> <value>``, one line each. ``get`` answers
+A client sends ``get <what>`` or ``set <what> <value>``, one line each. ``get`` answers
 ``<WHAT> <words>``, ``set`` answers ``SET <WHAT> ACK`` once verbose is on, and both answer ``NAK``
 when refused. LinuxCNC 2.9 ends lines with CR LF after ``get`` and with LF CR after ``set``, and
 adds a blank line after some refusals; 2.10 ends all with CR LF and explains a refusal in
@@ -15,20 +15,20 @@ from dataclasses import dataclass
 from hexacell.kinematics.pose import Pose
 
 MAX_LINE_BYTES = 255
-"""Bytes of one command with its line end; the server of LinuxCNC 2.9 overruns its buffer beyond."""
+"""Longest command with its line end; a longer one overruns the buffer of LinuxCNC 2.9."""
 
 _LEGS = 6
 _EXPLANATION = "error:"
-_OTHER_NAME = {"SET_WAIT": "WAIT_MODE"}
+_RESPONSE_NAME = {"SET_WAIT": "WAIT_MODE"}
 _DECIMALS = 8
 
 
 @dataclass(frozen=True, slots=True)
 class Response:
-    """What the controller said to one command.
+    """The response to one command.
 
-    ``text`` is what follows the name of what was asked for, empty after ``set``. ``remarks`` are
-    the explanations that came along with it.
+    ``text`` follows the queried name, and is empty after ``set``. ``explanations`` are the error lines
+    that came with it.
     """
 
     accepted: bool
@@ -37,19 +37,19 @@ class Response:
 
 
 class LineBuffer:
-    """Bytes in, lines out, whatever mixture of CR and LF ends them; blank lines are dropped."""
+    """Splits received bytes into lines at any mixture of CR and LF; drops blank lines."""
 
     def __init__(self) -> None:
         self._rest = b""
 
     def feed(self, data: bytes) -> list[str]:
-        """The lines that ``data`` completes; undecodable bytes become replacement characters."""
+        """The lines completed by ``data``; undecodable bytes become replacement characters."""
         *complete, self._rest = (self._rest + data).replace(b"\r", b"\n").split(b"\n")
         return [line.decode("utf-8", "replace").strip() for line in complete if line.strip()]
 
     @property
     def rest(self) -> str:
-        """What came without a line end so far."""
+        """The received part of an incomplete line."""
         return self._rest.decode("utf-8", "replace").strip()
 
 
@@ -68,7 +68,7 @@ def encode(command: str) -> bytes:
 
 
 def rapid_move(pose: Pose) -> str:
-    """The block that moves to ``pose``, finer than the six decimals in which positions come back.
+    """The block that moves to ``pose``, with more decimals than the six of reported positions.
 
     Raises:
         ValueError: A coordinate is not a finite number.
@@ -85,9 +85,9 @@ def parse_explanation(line: str) -> str:
 
 
 def parse_response(line: str, command: str) -> Response | None:
-    """What ``line`` says to ``command``, or nothing if it is no answer to it, such as an echo."""
+    """The response to ``command`` in ``line``; none if the line is something else, such as an echo."""
     verb, name = (word.upper() for word in command.split()[:2])
-    names = (name, _OTHER_NAME.get(name, name))
+    names = (name, _RESPONSE_NAME.get(name, name))
     match line.upper().split():
         case [said, "NAK"] if said == verb:
             return Response(accepted=False)

@@ -1,11 +1,29 @@
-"""Keeping one usable connection, and a second one for looking on and for stopping."""
+"""The session with one linuxcncrsh server: its connections, and who has control of the machine.
+
+::
+
+                 open                    stop, or in_control
+      CLOSED -----------> IN_CONTROL --------------------------> CONTROL_LOST
+        ^                  |      ^                                 |    |
+        +------- close ----+      +--- synchronized: takes control -+    |
+        +------- close --------------------------------------------------+
+
+Three connections exist at most: one for commands, one for status (:class:`StatusConnection`), and one
+for a stop, which takes over the status connection if that is idle. LinuxCNC gives control to the
+client that asked for it last. A stop therefore takes control away from the command connection, and
+the next command takes it back. Which connection may send is decided by :class:`SendArbiter`.
+
+Locks, outermost first: the order lock of the controller (one order at a time), the query lock of the
+status connection (one status query at a time), the two locks of the arbiter.
+"""
 
 from __future__ import annotations
 
 import asyncio
+from enum import Enum, auto
 
 from drivers.controllers.errors import ConnectionLost
-from drivers.controllers.linuxcnc import startup as readiness
+from drivers.controllers.linuxcnc import startup
 from drivers.controllers.linuxcnc.commands import ControllerCommands
 from drivers.controllers.linuxcnc.connection import Connection
 from drivers.controllers.linuxcnc.send_arbiter import SendArbiter
@@ -17,117 +35,122 @@ from drivers.wire_trace import TraceRecorder
 from hexacell.errors import DeviceError
 
 
+class SessionState(Enum):
+    """Whether the session is open, and whether its command connection has control."""
+
+    CLOSED = auto()
+    IN_CONTROL = auto()
+    CONTROL_LOST = auto()
+
+
 class Session:
-    """From the first connection to the last; a line that broke is replaced by the next ``in_step``.
+    """The connections from ``open`` to ``close``; a broken one is replaced by ``synchronized``.
 
     Attributes:
-        stops: how often ``stop`` was called; whoever waits for a motion compares.
+        stop_count: how often ``stop`` was called; a waiting motion compares it.
     """
 
-    def __init__(self, address: Address, patience: Timeouts, trace: TraceRecorder | None) -> None:
+    def __init__(self, address: Address, timeouts: Timeouts, trace: TraceRecorder | None) -> None:
         self.stop_count = 0
         self._address = address
-        self._patience = patience
+        self._timeouts = timeouts
         self._trace = trace
+        self._state = SessionState.CLOSED
         self._commands: ControllerCommands | None = None
-        self._is_open = False
-        self._has_control = True
-        self._stop_turn = asyncio.Lock()
-        self._may_speak = asyncio.Event()
-        self._may_speak.set()
-        self._floor = SendArbiter()
-        self._lookout = StatusConnection(address, patience, self._floor, trace)
+        self._arbiter = SendArbiter()
+        self._status = StatusConnection(address, timeouts, self._arbiter, trace)
 
     async def open(self) -> ControllerCommands:
-        """The first connection; nothing is left behind if there is none."""
-        was_open, self._is_open = self._is_open, True
+        """Open the command connection; the session stays closed if that fails."""
+        was_closed = self._state is SessionState.CLOSED
+        if was_closed:
+            self._state = SessionState.IN_CONTROL
         try:
             return await self.synchronized()
         except BaseException:
-            self._is_open = was_open
+            if was_closed:
+                self._state = SessionState.CLOSED
             raise
 
     async def synchronized(self) -> ControllerCommands:
-        """A connection on which no answer is owed, and which has control unless another took it.
+        """The command connection, without an outstanding response, and in control.
 
         Raises:
-            DeviceError: The session is not open, or there is no connection to be had.
+            DeviceError: The session is closed, or no connection is possible.
         """
-        self._expect_open()
-        await self._may_speak.wait()
+        self._require_open()
+        await self._arbiter.stop_ended()
         if self._commands is not None:
             try:
                 await self._commands.connection.collect_late_response()
             except ConnectionLost:
                 await self._drop()
         if self._commands is None:
-            self._commands = await self._connected()
-        elif not self._has_control:
+            self._commands = await self._connect()
+        elif self._state is SessionState.CONTROL_LOST:
             await self._commands.connection.take_control()
-        self._has_control = True
+        self._set_state(SessionState.IN_CONTROL)
         return self._commands
 
     async def in_control(self) -> ControllerCommands:
-        """The same, after taking control from whoever has it."""
-        self._has_control = False
-        self._lookout.reset_complaints()
+        """The same, after taking control in any case."""
+        self._set_state(SessionState.CONTROL_LOST)
+        self._status.reset_errors()
         return await self.synchronized()
 
     async def reconnect(self) -> ControllerCommands:
-        """The same, once a controller that may be starting anew can be reached.
+        """The same, as soon as a controller that may be restarting can be reached.
 
         Raises:
-            ConnectionLost: It cannot, for as long as ``patience.comeback``.
+            ConnectionLost: It cannot be reached within ``timeouts.reconnect``.
         """
-        give_up = _now() + self._patience.reconnect
+        deadline = _now() + self._timeouts.reconnect
         while True:
             try:
                 return await self.synchronized()
             except ConnectionLost:
-                if _now() > give_up:
+                if _now() > deadline:
                     raise
-                await asyncio.sleep(self._patience.poll)
+                await asyncio.sleep(self._timeouts.poll)
 
     async def status(self) -> ControllerStatus:
-        """How the machine is, over a connection of its own: the first one may be waiting for a move.
+        """The machine's status, over a connection of its own: the other one may wait for a move.
 
         Raises:
-            DeviceError: The session is not open, or it cannot be asked.
+            DeviceError: The session is closed, or the status cannot be read.
         """
-        self._expect_open()
-        await self._may_speak.wait()
-        return await self._lookout.status()
+        self._require_open()
+        await self._arbiter.stop_ended()
+        return await self._status.read()
 
     async def stop(self, tolerance_mm: float) -> None:
-        """Stop motion over a connection of its own; the first one is silent meanwhile.
+        """Stop the motion over a connection of its own; no command is sent meanwhile.
 
         Raises:
-            DeviceError: The machine could not be stopped, or it is not known whether it was.
+            DeviceError: The machine could not be stopped, or that is unknown.
         """
         self.stop_count += 1
-        async with self._stop_turn:
-            self._may_speak.clear()
+        async with self._arbiter.stopping():
             try:
-                ready = await self._lookout.hand_over()
-                await stop_in_place(self._address, self._patience, tolerance_mm, self._trace, ready)
+                ready = await self._status.release_connection()
+                await stop_in_place(self._address, self._timeouts, tolerance_mm, self._trace, ready)
             finally:
-                self._has_control = False
-                self._may_speak.set()
+                self._set_state(SessionState.CONTROL_LOST)
 
     async def close(self) -> None:
-        """Let the line go; closing twice is harmless."""
-        self._is_open = False
-        await self._lookout.close()
+        """Close all connections; closing twice is harmless."""
+        self._state = SessionState.CLOSED
+        await self._status.close()
         await self._drop()
 
-    async def _connected(self) -> ControllerCommands:
-        async with self._floor.kept():
-            connection = await Connection.open(self._address, self._patience, self._trace)
-        connection.may_speak, connection.floor = self._may_speak, self._floor
+    async def _connect(self) -> ControllerCommands:
+        async with self._arbiter.exclusive():
+            connection = await Connection.open(self._address, self._timeouts, self._trace)
+        connection.send_turn = self._arbiter.command_turn
         commands = ControllerCommands(connection, self._address.name)
         try:
-            await readiness.acknowledge_on_completion(commands)
-            self._expect_open()  # it may have been closed in the meantime
+            await startup.acknowledge_on_completion(commands)
+            self._require_open()  # it may have been closed meanwhile
         except BaseException:
             await connection.close()
             raise
@@ -138,8 +161,13 @@ class Session:
         if commands is not None:
             await commands.connection.close()
 
-    def _expect_open(self) -> None:
-        if not self._is_open:
+    def _set_state(self, state: SessionState) -> None:
+        """Change the state of an open session; a closed one stays closed."""
+        if self._state is not SessionState.CLOSED:
+            self._state = state
+
+    def _require_open(self) -> None:
+        if self._state is SessionState.CLOSED:
             raise DeviceError("is not connected", subject=self._address.name, action="Open it first")
 
 

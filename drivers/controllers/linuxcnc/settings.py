@@ -1,4 +1,4 @@
-"""Where a linuxcncrsh listens, its two passwords, and how long to wait for it."""
+"""Address, passwords and timeouts of a linuxcncrsh server."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from hexacell.errors import UsageError
 
 @dataclass(frozen=True, slots=True)
 class Address:
-    """A server and the passwords it was started with; they travel in clear text."""
+    """A server and the passwords it was started with; they are sent in clear text."""
 
     host: str
     port: int
@@ -31,16 +31,16 @@ class Address:
 
     @property
     def name(self) -> str:
-        """What messages call the controller."""
+        """The subject of error messages."""
         return f"controller {self.host}:{self.port}"
 
 
 @dataclass(frozen=True, slots=True)
 class Timeouts:
-    """Longest waits on the wall, s; a move's own limit is in the cell file.
+    """Longest waits, s of real time; the limit of a move is in the cell file.
 
-    Measured on LinuxCNC 2.9: a question is answered in 1 ms, a switch in 0.4 s at most, an abort
-    in 0.6 s, and a 2.10 refusal comes together with its explanation.
+    Measured on LinuxCNC 2.9: a query is answered in 1 ms, switching takes at most 0.4 s, an
+    abort 0.6 s; a refusal of 2.10 comes together with its explanation.
     """
 
     connect: float = 3.0

@@ -1,6 +1,6 @@
-"""From whatever state LinuxCNC is in to one in which it takes moves, each step verified.
+"""From any state of LinuxCNC to one in which it accepts moves; each step is verified.
 
-An acknowledgement says that a command arrived: ``set machine on`` in emergency stop and
+An acknowledgement means only that a command arrived: ``set machine on`` in emergency stop and
 ``set mode mdi`` before homing are both acknowledged and both do nothing.
 """
 
@@ -22,9 +22,9 @@ _OFFSET_MM = 1e-6
 
 
 async def acknowledge_on_completion(commands: ControllerCommands) -> None:
-    """Let orders be answered when they are done rather than when they arrive.
+    """Have commands acknowledged when they are completed, not when they are received.
 
-    Global and lasting in 2.9, the connection's own in 2.10, which calls it ``wait_mode``.
+    A permanent setting of the server in 2.9; one of the connection in 2.10, called ``wait_mode``.
     """
     try:
         await commands.set("set_wait done")
@@ -32,16 +32,16 @@ async def acknowledge_on_completion(commands: ControllerCommands) -> None:
         await commands.set("wait_mode done")
 
 
-async def leave_emergency_stop(commands: ControllerCommands, patience: Timeouts) -> None:
+async def leave_emergency_stop(commands: ControllerCommands, timeouts: Timeouts) -> None:
     """Reset the emergency stop if it is on.
 
     Raises:
-        DeviceError: It stays on, because a switch is still pressed for instance.
+        DeviceError: It stays on, for example because a switch is still pressed.
     """
     if not await commands.is_on("estop"):
         return
     await commands.set("estop off")
-    if not await _comes_true(lambda: _is(commands, "estop", on=False), patience):
+    if not await _becomes_true(lambda: _is(commands, "estop", on=False), timeouts):
         raise DeviceError(
             f"stays in emergency stop: {await commands.reason()}",
             subject=commands.subject,
@@ -49,66 +49,66 @@ async def leave_emergency_stop(commands: ControllerCommands, patience: Timeouts)
         )
 
 
-async def switch_machine(commands: ControllerCommands, patience: Timeouts, *, on: bool) -> None:
+async def switch_machine(commands: ControllerCommands, timeouts: Timeouts, *, on: bool) -> None:
     """Switch the machine on or off.
 
     Raises:
-        DeviceError: It does not follow.
+        DeviceError: Its state does not change.
     """
     state = "on" if on else "off"
     await commands.set(f"machine {state}")
-    if not await _comes_true(lambda: _is(commands, "machine", on=on), patience):
+    if not await _becomes_true(lambda: _is(commands, "machine", on=on), timeouts):
         raise DeviceError(
             f"does not switch {state}: {await commands.reason()}",
             subject=commands.subject,
-            action="See what the controller's own screen says",
+            action="Look for a message on the controller's own screen",
         )
 
 
 async def home_joints(
-    commands: ControllerCommands, patience_s: float, poll_s: float, stopped: Stopped
+    commands: ControllerCommands, timeout_s: float, poll_s: float, stopped: Stopped
 ) -> None:
-    """Home all joints that are not; the machine moves.
+    """Home all joints that are not homed; the machine moves.
 
-    LinuxCNC homes in joint mode only, and is in teleoperation once it has been homed before.
+    LinuxCNC homes in joint mode only; after an earlier homing it is in teleoperation mode.
 
     Raises:
-        MotionInterrupted: ``stopped`` came true.
+        MotionInterrupted: ``stopped`` became true.
         DeviceError: Some joint is not homed in time.
     """
     await commands.set("mode manual")
     if (await commands.get_if_known("teleop_enable")).upper() in ("YES", "ON"):
         await commands.set("teleop_enable off")
     await commands.errors()
-    _go_on_unless(stopped, commands)
-    await commands.set("home -1", patience_s)
-    give_up = _now() + patience_s
+    _raise_if_stopped(stopped, commands)
+    await commands.set("home -1", timeout_s)
+    deadline = _now() + timeout_s
     while not await commands.all_homed():
-        _go_on_unless(stopped, commands)
-        if _now() > give_up:
-            problem = f"is not homed after {patience_s:g} s: {await commands.reason()}"
+        _raise_if_stopped(stopped, commands)
+        if _now() > deadline:
+            problem = f"is not homed after {timeout_s:g} s: {await commands.reason()}"
             raise DeviceError(problem, subject=commands.subject, action="Home it at the machine")
         await asyncio.sleep(poll_s)
 
 
-async def enter_mdi_mode(commands: ControllerCommands, patience: Timeouts) -> None:
-    """Enter the mode in which it takes single commands.
+async def enter_mdi_mode(commands: ControllerCommands, timeouts: Timeouts) -> None:
+    """Enter MDI mode, in which single blocks are executed.
 
     Raises:
         DeviceError: It stays in another mode.
     """
     await commands.set("mode mdi")
 
-    async def chosen() -> bool:
+    async def is_mdi() -> bool:
         return (await commands.get("mode")).upper() == "MDI"
 
-    if not await _comes_true(chosen, patience):
+    if not await _becomes_true(is_mdi, timeouts):
         problem = f"does not enter MDI mode: {await commands.reason()}"
         raise DeviceError(problem, subject=commands.subject)
 
 
 async def check_coordinate_system(commands: ControllerCommands) -> None:
-    """Refuse units, offsets and modes under which ``G0 X1`` is not 1 mm in machine coordinates.
+    """Check that ``G0 X1`` means 1 mm in machine coordinates: units, modal codes, offsets.
 
     Raises:
         DeviceError: Inches, relative moves, a tool length or an offset is active.
@@ -145,7 +145,7 @@ async def _refuse_offsets(commands: ControllerCommands) -> None:
         )
 
 
-def _go_on_unless(stopped: Stopped, commands: ControllerCommands) -> None:
+def _raise_if_stopped(stopped: Stopped, commands: ControllerCommands) -> None:
     if stopped():
         raise MotionInterrupted("was stopped before it was ready", subject=commands.subject)
 
@@ -154,12 +154,12 @@ async def _is(commands: ControllerCommands, what: str, *, on: bool) -> bool:
     return await commands.is_on(what) is on
 
 
-async def _comes_true(condition: Callable[[], Awaitable[bool]], patience: Timeouts) -> bool:
-    give_up = _now() + patience.switch
+async def _becomes_true(condition: Callable[[], Awaitable[bool]], timeouts: Timeouts) -> bool:
+    deadline = _now() + timeouts.switch
     while not await condition():
-        if _now() > give_up:
+        if _now() > deadline:
             return False
-        await asyncio.sleep(patience.poll)
+        await asyncio.sleep(timeouts.poll)
     return True
 
 

@@ -1,8 +1,9 @@
-"""A second connection that looks on while the first one waits for a move, and stops it if need be."""
+"""The status connection: it reads the machine's status while the command connection waits for a move."""
 
 from __future__ import annotations
 
 import asyncio
+from contextlib import nullcontext
 
 from drivers.controllers.errors import ConnectionLost
 from drivers.controllers.linuxcnc.commands import ControllerCommands
@@ -12,87 +13,87 @@ from drivers.controllers.linuxcnc.settings import Address, Timeouts
 from drivers.interfaces import ControllerStatus
 from drivers.wire_trace import TraceRecorder
 
-HANDOVER_S = 0.05
-"""Longest wait for a question that is being asked; an answer takes a millisecond."""
+RELEASE_TIMEOUT_S = 0.05
+"""Longest wait for a query in progress; it is answered within a millisecond."""
 
 
 class StatusConnection:
-    """Asks how the machine is; it takes control from nobody, for questions need none.
+    """Reads the machine's status without taking control, which queries do not need.
 
-    Complaints are asked for only of a machine that was seen on and no longer is, for whoever asks takes
-    them out of the queue. ``forget`` begins anew: somebody is about to switch it on.
+    Reading the machine's error messages removes them from its queue. They are therefore read only
+    after the machine was seen enabled and then disabled; ``reset_errors`` forgets that it was enabled.
     """
 
     def __init__(
-        self, address: Address, patience: Timeouts, floor: SendArbiter, trace: TraceRecorder | None
+        self, address: Address, timeouts: Timeouts, arbiter: SendArbiter, trace: TraceRecorder | None
     ) -> None:
         self._address = address
-        self._patience = patience
-        self._floor = floor
+        self._timeouts = timeouts
+        self._arbiter = arbiter
         self._trace = trace
         self._commands: ControllerCommands | None = None
-        self._complaints: tuple[str, ...] = ()
-        self._was_on = False
-        self._turn = asyncio.Lock()
+        self._errors: tuple[str, ...] = ()
+        self._was_enabled = False
+        self._query = asyncio.Lock()
 
-    async def status(self) -> ControllerStatus:
-        """How the machine is now.
+    async def read(self) -> ControllerStatus:
+        """The machine's status now.
 
         Raises:
-            DeviceError: It cannot be asked.
+            DeviceError: It cannot be read.
         """
-        async with self._turn:
-            commands = await self._in_step()
+        async with self._query:
+            commands = await self._synchronized()
             try:
-                return await self._asked(commands)
+                return await self._read(commands)
             except ConnectionLost:
                 await self._drop()
                 raise
 
-    def reset_complaints(self) -> None:
-        """Leave complaints to whoever switches it on now."""
-        self._was_on, self._complaints = False, ()
+    def reset_errors(self) -> None:
+        """Leave error messages to the order that is about to enable the machine."""
+        self._was_enabled, self._errors = False, ()
 
-    async def hand_over(self) -> Connection | None:
-        """The connection, for stopping; none if it is not to be had at once."""
+    async def release_connection(self) -> Connection | None:
+        """Give the connection away for a stop; none if a query occupies it for too long."""
         try:
-            async with asyncio.timeout(HANDOVER_S):
-                await self._turn.acquire()
+            async with asyncio.timeout(RELEASE_TIMEOUT_S):
+                await self._query.acquire()
         except TimeoutError:
             return None
         try:
             commands, self._commands = self._commands, None
         finally:
-            self._turn.release()
+            self._query.release()
         if commands is None:
             return None
-        commands.connection.floor = SendArbiter()  # a stop waits for nobody
+        commands.connection.send_turn = nullcontext
         return commands.connection
 
     async def close(self) -> None:
-        """Let the line go; closing twice is harmless."""
+        """Close the connection; closing twice is harmless."""
         await self._drop()
 
-    async def _asked(self, commands: ControllerCommands) -> ControllerStatus:
+    async def _read(self, commands: ControllerCommands) -> ControllerStatus:
         estop, enabled = await commands.is_on("estop"), await commands.is_on("machine")
         if enabled and not estop:
-            self._was_on, self._complaints = True, ()
-        elif self._was_on:
-            self._complaints += tuple(await commands.errors())
-        return ControllerStatus(estop, enabled, self._complaints)
+            self._was_enabled, self._errors = True, ()
+        elif self._was_enabled:
+            self._errors += tuple(await commands.errors())
+        return ControllerStatus(estop, enabled, self._errors)
 
-    async def _in_step(self) -> ControllerCommands:
+    async def _synchronized(self) -> ControllerCommands:
         if self._commands is not None:
             try:
                 await self._commands.connection.collect_late_response()
             except ConnectionLost:
                 await self._drop()
         if self._commands is None:
-            async with self._floor.kept():
+            async with self._arbiter.exclusive():
                 connection = await Connection.open(
-                    self._address, self._patience, self._trace, commanding=False
+                    self._address, self._timeouts, self._trace, commanding=False
                 )
-            connection.floor = self._floor
+            connection.send_turn = self._arbiter.query_turn
             self._commands = ControllerCommands(connection, self._address.name)
         return self._commands
 

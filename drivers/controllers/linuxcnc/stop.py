@@ -1,4 +1,4 @@
-"""Stopping a machine whose own connection is busy, and making sure that it stands."""
+"""Stopping the machine over a connection of its own, and verifying its standstill."""
 
 from __future__ import annotations
 
@@ -12,45 +12,45 @@ from drivers.wire_trace import TraceRecorder
 from hexacell.errors import DeviceError
 
 _ATTEMPTS = 3
-_ALIKE = 3
-"""Successive positions that must agree before the machine counts as standing."""
+_EQUAL_POSES = 3
+"""Successive poses that must agree before the machine is considered at standstill."""
 
-_PROMPT_S = 0.3
-"""Longest wait for an answer over a connection that was open already; a new one is tried then."""
+_QUICK_TIMEOUT_S = 0.3
+"""Longest wait for a response over an existing connection; then a new one is opened."""
 
 
 async def stop_in_place(
     address: Address,
-    patience: Timeouts,
+    timeouts: Timeouts,
     tolerance_mm: float,
     recorder: TraceRecorder | None = None,
     ready: Connection | None = None,
 ) -> None:
-    """Abort over a connection of its own until successive positions agree within ``tolerance_mm``.
+    """Send abort until successive poses agree within ``tolerance_mm``.
 
-    A connection that is ``ready`` spares the time of opening one; it is closed in the end.
+    A ``ready`` connection saves the time to open one; it is closed afterwards.
 
     Raises:
-        DeviceError: There is no way to it, or it still moves after ``patience.stop``.
+        DeviceError: It cannot be reached, or it still moves after ``timeouts.stop``.
     """
     try:
-        async with asyncio.timeout(patience.stop):
-            if ready is None or not await _stopped_at_once(ready, address, patience, tolerance_mm):
-                await _try_to_stop(address, patience, tolerance_mm, recorder)
+        async with asyncio.timeout(timeouts.stop):
+            if ready is None or not await _stopped_over(ready, address, timeouts, tolerance_mm):
+                await _try_to_stop(address, timeouts, tolerance_mm, recorder)
     except TimeoutError:
-        problem = f"does not stand still {patience.stop:g} s after it was told to stop"
-        raise _unstopped(problem, address) from None
+        problem = f"still moves {timeouts.stop:g} s after the stop command"
+        raise _not_stopped(problem, address) from None
     except DeviceError as error:
-        raise _unstopped(f"could not be stopped: it {error.problem}", address) from error
+        raise _not_stopped(f"could not be stopped: it {error.problem}", address) from error
 
 
-async def _stopped_at_once(
-    ready: Connection, address: Address, patience: Timeouts, tolerance_mm: float
+async def _stopped_over(
+    ready: Connection, address: Address, timeouts: Timeouts, tolerance_mm: float
 ) -> bool:
     try:
-        await ready.take_control(_PROMPT_S)
-        await ready.ask("set abort", _PROMPT_S)
-        return await _stands(ControllerCommands(ready, address.name), patience.poll, tolerance_mm)
+        await ready.take_control(_QUICK_TIMEOUT_S)
+        await ready.request("set abort", _QUICK_TIMEOUT_S)
+        return await _is_at_standstill(ControllerCommands(ready, address.name), timeouts.poll, tolerance_mm)
     except DeviceError:
         return False
     finally:
@@ -58,15 +58,15 @@ async def _stopped_at_once(
 
 
 async def _try_to_stop(
-    address: Address, patience: Timeouts, tolerance_mm: float, recorder: TraceRecorder | None
+    address: Address, timeouts: Timeouts, tolerance_mm: float, recorder: TraceRecorder | None
 ) -> None:
-    """Try again whatever went wrong: commands of two clients that coincide garble each other."""
+    """Repeat after any error: another program's client may have garbled the command."""
     for attempt in range(1, _ATTEMPTS + 1):
         try:
-            connection = await Connection.open(address, patience, recorder)
+            connection = await Connection.open(address, timeouts, recorder)
             try:
                 await _abort_until_still(
-                    ControllerCommands(connection, address.name), patience, tolerance_mm
+                    ControllerCommands(connection, address.name), timeouts, tolerance_mm
                 )
             finally:
                 await connection.close()
@@ -77,24 +77,24 @@ async def _try_to_stop(
             return
 
 
-async def _abort_until_still(commands: ControllerCommands, patience: Timeouts, tolerance_mm: float) -> None:
-    """One abort may come before the motion that it is meant for, or without having control."""
+async def _abort_until_still(commands: ControllerCommands, timeouts: Timeouts, tolerance_mm: float) -> None:
+    """Repeat the abort: the first one may precede the motion, or be sent without control."""
     while True:
-        # Refused when the machine is off, which is as good, or when another client took control.
-        await commands.connection.ask("set abort")
-        if await _stands(commands, patience.poll, tolerance_mm):
+        # Refused while the machine is off, which is fine, or after another client took control.
+        await commands.connection.request("set abort")
+        if await _is_at_standstill(commands, timeouts.poll, tolerance_mm):
             return
         await commands.connection.take_control()
 
 
-async def _stands(commands: ControllerCommands, poll_s: float, tolerance_mm: float) -> bool:
+async def _is_at_standstill(commands: ControllerCommands, poll_s: float, tolerance_mm: float) -> bool:
     first = await commands.pose()
-    for _ in range(_ALIKE - 1):
+    for _ in range(_EQUAL_POSES - 1):
         await asyncio.sleep(poll_s)
         if max(pose_difference(first, await commands.pose())) > tolerance_mm:
             return False
     return True
 
 
-def _unstopped(problem: str, address: Address) -> DeviceError:
+def _not_stopped(problem: str, address: Address) -> DeviceError:
     return DeviceError(problem, subject=address.name, action="Press the emergency stop")

@@ -7,9 +7,9 @@ from __future__ import annotations
 
 import uuid
 from collections.abc import Callable, Sequence
-from types import TracebackType
 from typing import Any, Self
 
+from drivers.simulated.closeable import Closeable
 from drivers.simulated.encoders.can_bus import SimulatedCanBus
 from drivers.simulated.encoders.node import DeviceData, SimulatedEncoder
 from drivers.simulated.encoders.vendors import EVENTS_AND_SYNC, Vendor
@@ -23,7 +23,7 @@ _ALL_BITS = 1 << 32
 FIRST_SERIAL_NUMBER = 1001
 
 
-class SimulatedEncoderBank:
+class SimulatedEncoderBank(Closeable):
     """Six encoders on a virtual CAN bus of their own; use it as a context, or start and close it.
 
     ``positions`` gives the six joint variables now, mm, with their noise; it is called at the
@@ -77,14 +77,6 @@ class SimulatedEncoderBank:
     def __enter__(self) -> Self:
         self.start()
         return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        traceback: TracebackType | None,
-    ) -> None:
-        self.close()
 
     def encoder(self, leg: int) -> SimulatedEncoder:
         """The encoder of a leg, from 1."""

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
-from typing import Self
 
+from drivers.simulated.closeable import Closeable
 from drivers.simulated.gauges.cdi import CdiDevice
 from drivers.simulated.gauges.device import Device
 from drivers.simulated.gauges.faults import InjectedGaugeFault
@@ -40,7 +40,7 @@ def simulated_device(protocol: str, indicators: Mapping[int, Indicator]) -> Devi
     return DEVICES[protocol](indicators)
 
 
-class SimulatedGaugeBank:
+class SimulatedGaugeBank(Closeable):
     """The gauges of a simulated cell, each on a line that is served until the rack is closed.
 
     ``plungers`` are by gauge name: mm from the middle of the travel, in the instrument's own
@@ -104,12 +104,6 @@ class SimulatedGaugeBank:
     def close(self) -> None:
         """End every line; twice is harmless."""
         self._served.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
 
 
 def _channel(gauge: GaugeSettings) -> int:

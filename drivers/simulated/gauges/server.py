@@ -10,8 +10,9 @@ import threading
 from collections import deque
 from collections.abc import Callable
 from concurrent.futures import Future
-from typing import Literal, Self
+from typing import Literal
 
+from drivers.simulated.closeable import Closeable
 from drivers.simulated.gauges.device import Device
 from drivers.simulated.gauges.faults import InjectedGaugeFault, WireFaults, apply_fault
 from drivers.simulated.gauges.indicator import Indicator
@@ -27,7 +28,7 @@ LONGEST_WAIT_S = 5.0
 _log = logging.getLogger(__name__)
 
 
-class GaugeLineServer:
+class GaugeLineServer(Closeable):
     """A device on a transport, answered for by a thread of its own until it is closed.
 
     An answer leaves ``latency_s`` and the time that question and answer take on the wire after the
@@ -95,12 +96,6 @@ class GaugeLineServer:
         self._transport.close()
         os.close(self._woken)
         os.close(self._waker)
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
 
     def _do(self, job: Callable[[], None]) -> None:
         """Have the thread do it, so that nothing is touched by two at once."""

@@ -6,8 +6,8 @@ import socket
 import socketserver
 import threading
 from contextlib import suppress
-from typing import Self
 
+from drivers.simulated.closeable import Closeable
 from drivers.simulated.linuxcnc.client import Client
 from drivers.simulated.linuxcnc.faults import ControllerFaults
 from drivers.simulated.linuxcnc.machine import Machine
@@ -20,7 +20,7 @@ _CHUNK = 1600
 _POLL_S = 0.05
 
 
-class SimulatedController:
+class SimulatedController(Closeable):
     """Answers clients until it is closed, each in a thread of its own, as the real one does.
 
     Attributes:
@@ -68,12 +68,6 @@ class SimulatedController:
         self._server.cut_all()
         self._server.server_close()
         self._thread.join()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_exception: object) -> None:
-        self.close()
 
 
 class _Server(socketserver.ThreadingTCPServer):

@@ -1,4 +1,4 @@
-"""A line that is a TCP port on the loopback interface."""
+"""A simulated serial line on a TCP port of the loopback interface."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import socket
 from collections.abc import Sequence
 from contextlib import suppress
 
-from drivers.simulated.transports.interface import CHUNK
+from drivers.simulated.transports.interface import CHUNK, write_or_drop
 
 LOOPBACK = "127.0.0.1"
 
@@ -20,6 +20,7 @@ class SocketTransport:
         self._port = self._listener.getsockname()[1]
         self._client: socket.socket | None = None
         self._plugged = False
+        self.connections = 0
         self.plug_in()
 
     @property
@@ -28,39 +29,40 @@ class SocketTransport:
         return f"socket://{LOOPBACK}:{self._port}"
 
     def plug_in(self) -> None:
-        """Let clients in."""
+        """Accept clients."""
         self._listener.listen(1)
         self._plugged = True
 
     def unplug(self) -> None:
-        """Drop the client, and keep the port without letting anybody in."""
+        """Drop the client; keep the port without accepting clients."""
         self.close()
         self._plugged = False
         self._listener = self._bound()
 
     def descriptors(self) -> list[int]:
-        """The listener, unless it lets nobody in, and the client."""
+        """The listener while plugged in, and the client."""
         listening = [self._listener] if self._plugged else []
         connected = [self._client] if self._client else []
         return [each.fileno() for each in (*listening, *connected)]
 
     def receive(self, ready: Sequence[int]) -> bytes:
-        """Bytes from the client; lets one in if there is none."""
+        """Bytes from the client; accepts one if there is none."""
         data = b""
         if self._client is not None and self._client.fileno() in ready:
             data = self._read(self._client)
         if self._listener.fileno() in ready:
-            self._let_in()
+            self._accept()
         return data
 
-    def send(self, data: bytes) -> None:
-        """Send it to the client, if there is one."""
-        if self._client is not None:
-            with suppress(OSError):
-                self._client.sendall(data)
+    def send(self, data: bytes, wait_s: float = 0.0) -> None:
+        """Send to the client, if there is one."""
+        client = self._client
+        if client is not None:
+            with suppress(OSError, ValueError):  # the client may be dropped meanwhile
+                write_or_drop(client.fileno(), data, wait_s)
 
     def close(self) -> None:
-        """Drop the client and the port."""
+        """Drop the client and close the port."""
         self._drop()
         self._listener.close()
 
@@ -70,13 +72,15 @@ class SocketTransport:
         listener.bind((LOOPBACK, self._port))
         return listener
 
-    def _let_in(self) -> None:
+    def _accept(self) -> None:
         client, _ = self._listener.accept()
-        if self._client is not None:  # as a serial port: the second one to open it is refused
+        if self._client is not None:  # a serial port refuses a second client too
             client.close()
             return
+        client.setblocking(False)
         client.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         self._client = client
+        self.connections += 1
 
     def _read(self, client: socket.socket) -> bytes:
         try:

@@ -168,7 +168,7 @@ class Play:
     ) -> LinuxcncrshController:
         """A driver for whatever is at ``port``; keywords are controller settings."""
         values = ControllerSettings.model_validate({"config": "machine.ini", "port": port, **settings})
-        self._drivers.append(LinuxcncrshController(values, trace=trace, patience=self.patience))
+        self._drivers.append(LinuxcncrshController(values, trace=trace, timeouts=self.patience))
         return self._drivers[-1]
 
     async def end(self) -> None:

@@ -132,7 +132,7 @@ async def test_a_host_that_does_not_exist(monkeypatch):
 async def test_a_host_that_takes_no_notice(monkeypatch):
     monkeypatch.setattr(asyncio, "open_connection", lambda *_where: asyncio.sleep(60))
     settings = ControllerSettings(config="x", host="far", port=5007)
-    driver = LinuxcncrshController(settings, patience=Timeouts(connect=0.01))
+    driver = LinuxcncrshController(settings, timeouts=Timeouts(connect=0.01))
     with pytest.raises(ConnectionLost, match=r"far:5007: cannot be reached within 0\.01 s"):
         await driver.open()
 
@@ -140,7 +140,7 @@ async def test_a_host_that_takes_no_notice(monkeypatch):
 async def test_a_mute_server(play):
     play.patience = play.IMPATIENT
     driver = await play.driver([(HELLO, play.SILENCE)])
-    with pytest.raises(ResponseTimeout, match="takes the connection but says nothing"):
+    with pytest.raises(ResponseTimeout, match="accepts the connection but does not respond"):
         await driver.open()
 
 

@@ -122,34 +122,34 @@ async def test_it_is_silent_while_the_machine_is_being_stopped(play) -> None:
 
 
 async def test_two_never_speak_at_once_but_a_long_order_keeps_nobody_waiting() -> None:
-    floor = SendArbiter()
+    arbiter = SendArbiter()
     said: list[str] = []
 
     async def order() -> None:
-        async with floor.taken():
+        async with arbiter.query_turn():
             said.append("order")
             await asyncio.sleep(10 * PARSED_S)
             said.append("order done")
 
     async def question() -> None:
-        async with floor.taken():
+        async with arbiter.query_turn():
             said.append("question")
 
     await asyncio.gather(order(), question())
     assert said == ["order", "question", "order done"]
 
 
-async def test_whoever_keeps_the_floor_keeps_it() -> None:
-    floor = SendArbiter()
+async def test_whoever_keeps_the_arbiter_keeps_it() -> None:
+    arbiter = SendArbiter()
     said: list[str] = []
 
     async def opening() -> None:
-        async with floor.kept():
+        async with arbiter.exclusive():
             await asyncio.sleep(3 * PARSED_S)
             said.append("opened")
 
     async def question() -> None:
-        async with floor.taken():
+        async with arbiter.query_turn():
             said.append("question")
 
     await asyncio.gather(opening(), question())
@@ -176,5 +176,5 @@ async def test_a_stop_that_came_while_it_moved_is_told_by_the_move(play) -> None
     await asyncio.sleep(0.05)
     await driver.stop()
     stopped.set()
-    with pytest.raises(MotionInterrupted, match="it was told to"):
+    with pytest.raises(MotionInterrupted, match="it was stopped on request"):
         await moving

@@ -34,7 +34,7 @@ async def test_stopping_goes_over_a_second_connection_while_the_first_is_mute(pl
     await asyncio.sleep(0.01)
     await driver.stop()
     aborted.set()
-    with pytest.raises(MotionInterrupted, match=r"stopped at X5\.000 .*: it was told to"):
+    with pytest.raises(MotionInterrupted, match=r"stopped at X5\.000 .*: it was stopped on request"):
         await moving
     await driver.move(TARGET)
 
@@ -92,7 +92,7 @@ async def test_a_machine_that_does_not_stop(play):
         "set abort": b"SET ABORT ACK\n\r",
         "get abs_act_pos": [f"ABS_ACT_POS {n} 0 0 0 0 0\r\n".encode() for n in range(100_000)],
     }
-    with pytest.raises(DeviceError, match=r"does not stand still 0\.6 s after .*Press the emergency stop"):
+    with pytest.raises(DeviceError, match=r"still moves 0\.6 s after .*Press the emergency stop"):
         await driver.stop()
 
 

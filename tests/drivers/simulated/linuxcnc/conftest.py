@@ -179,6 +179,6 @@ def driver(simulated: SimulatedController) -> Callable[..., LinuxcncrshControlle
 
     def make(patience: Timeouts = QUICK, **settings: object) -> LinuxcncrshController:
         values = {"config": "machine.ini", "port": simulated.port, **settings}
-        return LinuxcncrshController(ControllerSettings.model_validate(values), patience=patience)
+        return LinuxcncrshController(ControllerSettings.model_validate(values), timeouts=patience)
 
     return make

@@ -6,12 +6,12 @@ import asyncio
 import os
 import signal
 import sys
-import time
 
 import pytest
 
 from drivers.controllers import reload_command
 from hexacell.errors import DeviceError
+from tests.waiting import until
 
 
 def python(program: str) -> tuple[str, ...]:
@@ -25,17 +25,15 @@ async def test_one_that_cannot_be_run(tmp_path):
 
 
 async def test_one_that_takes_too_long_is_killed(tmp_path):
-    begun = time.monotonic()
     with pytest.raises(DeviceError, match=r"took longer than 0\.3 s"):
         await reload_command.run(_saying_who(tmp_path), "controller", 0.3)
-    assert time.monotonic() - begun < 5.0
-    _expect_gone(tmp_path)
+    if (tmp_path / "pid").exists():  # else it was killed before it could say
+        _expect_gone(tmp_path)
 
 
 async def test_a_cancelled_one_is_killed(tmp_path):
-    running = asyncio.create_task(reload_command.run(_saying_who(tmp_path), "controller", 60.0))
-    while not (tmp_path / "pid").exists():  # noqa: ASYNC110 - another process writes it
-        await asyncio.sleep(0.01)
+    running = asyncio.create_task(reload_command.run(_saying_who(tmp_path), "controller", 1800.0))
+    await until((tmp_path / "pid").exists)
     running.cancel()
     with pytest.raises(asyncio.CancelledError):
         await running
@@ -43,10 +41,8 @@ async def test_a_cancelled_one_is_killed(tmp_path):
 
 
 async def test_a_daemon_that_it_leaves_behind_does_not_hold_us_up(tmp_path):
-    begun = time.monotonic()
-    await reload_command.run(("sh", "-c", f"sleep 30 & echo $! > {tmp_path}/pid"), "controller", 25.0)
+    await reload_command.run(("sh", "-c", f"sleep 3600 & echo $! > {tmp_path}/pid"), "controller", 1800.0)
     os.kill(int((tmp_path / "pid").read_text()), signal.SIGKILL)
-    assert time.monotonic() - begun < 20.0
 
 
 async def test_only_the_last_words_of_a_talkative_one_are_shown():
@@ -57,7 +53,7 @@ async def test_only_the_last_words_of_a_talkative_one_are_shown():
 
 
 def _saying_who(folder):
-    return ("sh", "-c", f"echo $$ > {folder}/new; mv {folder}/new {folder}/pid; exec sleep 60")
+    return ("sh", "-c", f"echo $$ > {folder}/new; mv {folder}/new {folder}/pid; exec sleep 3600")
 
 
 def _expect_gone(folder):

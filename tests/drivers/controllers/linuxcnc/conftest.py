@@ -28,7 +28,15 @@ class Then(Enum):
     HANG_UP = auto()
 
 
-Step = bytes | asyncio.Event | Then
+class Pause(asyncio.Event):
+    """A place in a script at which the server waits until the test sets it."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.reached = asyncio.Event()
+
+
+Step = bytes | Pause | Then
 Exchange = tuple[str, Step] | tuple[str, Step, Step] | tuple[str, Step, Step, Step]
 
 GREETING: list[Exchange] = [
@@ -113,7 +121,8 @@ class ScriptedServer:
         for step in steps:
             if step is Then.HANG_UP:
                 return False
-            if isinstance(step, asyncio.Event):
+            if isinstance(step, Pause):
+                step.reached.set()
                 await step.wait()
             elif isinstance(step, bytes):
                 writer.write(step)
@@ -135,6 +144,7 @@ class Play:
     AT_REST = AT_REST
     SILENCE = Then.SAY_NOTHING
     HANG_UP = Then.HANG_UP
+    Pause = Pause
     IMPATIENT = IMPATIENT
 
     def __init__(self) -> None:

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import asyncio
-import time
 
 import pytest
 
 from drivers.controllers.errors import MoveRefused, ResponseTimeout
+from drivers.controllers.linuxcnc.settings import Timeouts
 from hexacell.errors import DeviceError
 from tests.drivers.controllers.linuxcnc.motion_dialogue import (
     ACK,
@@ -18,16 +18,17 @@ from tests.drivers.controllers.linuxcnc.motion_dialogue import (
     NO_ERROR,
     TARGET,
 )
+from tests.waiting import until
 
 
 async def test_a_cancelled_move_is_stopped_and_its_late_answer_is_not_mistaken(play):
-    aborted = asyncio.Event()
+    aborted = play.Pause()
     driver = await play.opened(
         [(MDI, aborted, ACK), AGAIN_IN_CONTROL, (MDI, ACK), ("get abs_act_pos", ARRIVED)],
         play.STOPPING,
     )
     moving = asyncio.create_task(driver.move(TARGET))
-    await asyncio.sleep(0.01)
+    await aborted.reached.wait()
     moving.cancel()
     with pytest.raises(asyncio.CancelledError):
         await moving
@@ -36,22 +37,22 @@ async def test_a_cancelled_move_is_stopped_and_its_late_answer_is_not_mistaken(p
 
 
 async def test_a_cancelled_move_stays_cancelled_though_it_cannot_be_stopped(play):
-    never = asyncio.Event()
+    never = play.Pause()
     driver = await play.opened([(MDI, never)], *[[("hello EMC hexacell 1.0", play.HANG_UP)]] * 3)
     moving = asyncio.create_task(driver.move(TARGET))
-    await asyncio.sleep(0.01)
+    await never.reached.wait()
     moving.cancel()
     with pytest.raises(asyncio.CancelledError):
         await moving
 
 
 async def test_a_move_cancelled_before_its_turn_stops_nothing(play):
-    answer = asyncio.Event()
+    answer = play.Pause()
     driver = await play.opened([("get joint_pos", answer, b"JOINT_POS 1 2 3 4 5 6\r\n")])
     asking = asyncio.create_task(driver.joint_positions())
     await asyncio.sleep(0)
     moving = asyncio.create_task(driver.move(TARGET))
-    await asyncio.sleep(0.01)
+    await answer.reached.wait()
     moving.cancel()
     answer.set()
     assert await asking == (1.0, 2.0, 3.0, 4.0, 5.0, 6.0)
@@ -60,7 +61,7 @@ async def test_a_move_cancelled_before_its_turn_stops_nothing(play):
 
 
 async def test_a_cancelled_question_leaves_the_line_in_step(play):
-    late = asyncio.Event()
+    late = play.Pause()
     driver = await play.opened(
         [
             ("get joint_pos", late, b"JOINT_POS 1 2 3 4 5 6\r\n"),
@@ -68,7 +69,7 @@ async def test_a_cancelled_question_leaves_the_line_in_step(play):
         ]
     )
     asking = asyncio.create_task(driver.joint_positions())
-    await asyncio.sleep(0.01)
+    await late.reached.wait()
     asking.cancel()
     with pytest.raises(asyncio.CancelledError):
         await asking
@@ -78,7 +79,7 @@ async def test_a_cancelled_question_leaves_the_line_in_step(play):
 
 async def test_an_overdue_answer_leaves_the_line_in_step(play):
     play.patience = play.IMPATIENT
-    late = asyncio.Event()
+    late = play.Pause()
     driver = await play.opened(
         [("get abs_act_pos", late, ARRIVED), ("get abs_act_pos", HALF_WAY)],
     )
@@ -104,7 +105,7 @@ async def test_a_server_that_was_started_anew_is_connected_to_again(play):
         [*play.OPENING[:-1], ("get abs_act_pos", HALF_WAY)],
     )
     assert (await driver.pose()).x == 10.0
-    await asyncio.sleep(0.02)
+    await until(driver._session._commands.connection._reader.at_eof)
     assert (await driver.pose()).x == 5.0
 
 
@@ -125,11 +126,11 @@ async def test_a_garbled_question_is_asked_again_and_an_order_is_not(play):
 
 
 async def test_closing_while_an_answer_is_awaited(play):
-    driver = await play.opened([("get joint_pos", play.SILENCE)])
+    play.patience = Timeouts(answer=3600.0)
+    never = play.Pause()
+    driver = await play.opened([("get joint_pos", never)])
     asking = asyncio.create_task(driver.joint_positions())
-    await asyncio.sleep(0.01)
-    begun = time.monotonic()
+    await never.reached.wait()
     await driver.close()
     with pytest.raises(DeviceError):
         await asking
-    assert time.monotonic() - begun < 0.1

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
-
 import pytest
 
 from drivers.controllers.errors import ConnectionLost, MotionInterrupted, MoveRefused
@@ -126,7 +124,7 @@ async def test_a_pose_that_is_none_is_not_sent(play):
 
 
 async def test_a_move_that_takes_too_long_is_stopped_and_its_late_answer_is_not_mistaken(play):
-    stopped = asyncio.Event()
+    stopped = play.Pause()
     driver = await play.opened(
         [
             (MDI, stopped, ACK),

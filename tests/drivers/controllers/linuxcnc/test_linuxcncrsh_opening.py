@@ -66,10 +66,10 @@ async def test_a_server_without_echo_and_with_the_alias(play):
 
 
 async def test_answers_that_come_in_pieces(play):
-    gap = asyncio.Event()
+    gap = play.Pause()
     driver = await play.opened([("get joint_pos", b"JOINT_POS 1 2 3 ", gap, b"4 5 6\r\n")])
     asking = asyncio.create_task(driver.joint_positions())
-    await asyncio.sleep(0.01)
+    await gap.reached.wait()
     gap.set()
     assert await asking == (1.0, 2.0, 3.0, 4.0, 5.0, 6.0)
 
@@ -130,7 +130,7 @@ async def test_a_host_that_does_not_exist(monkeypatch):
 
 
 async def test_a_host_that_takes_no_notice(monkeypatch):
-    monkeypatch.setattr(asyncio, "open_connection", lambda *_where: asyncio.sleep(60))
+    monkeypatch.setattr(asyncio, "open_connection", lambda *_where: asyncio.Event().wait())
     settings = ControllerSettings(config="x", host="far", port=5007)
     driver = LinuxcncrshController(settings, timeouts=Timeouts(connect=0.01))
     with pytest.raises(ConnectionLost, match=r"far:5007: cannot be reached within 0\.01 s"):
@@ -186,21 +186,22 @@ async def test_closing_twice_and_without_opening(play):
 
 
 async def test_a_cancelled_opening_leaves_nothing_behind(play):
-    driver = await play.driver([*play.GREETING[:2], ("set verbose on", play.SILENCE)])
+    never = play.Pause()
+    driver = await play.driver([*play.GREETING[:2], ("set verbose on", never)])
     opening = asyncio.create_task(driver.open())
-    await asyncio.sleep(0.02)
+    await never.reached.wait()
     opening.cancel()
     with pytest.raises(asyncio.CancelledError):
         await opening
 
 
 async def test_closing_while_it_connects(play):
-    greeted = asyncio.Event()
+    greeted = play.Pause()
     driver = await play.driver(
         [*play.GREETING[:2], ("set verbose on", greeted, b"SET VERBOSE ACK\n\r"), *play.OPENING[3:5]]
     )
     opening = asyncio.create_task(driver.open())
-    await asyncio.sleep(0.02)
+    await greeted.reached.wait()
     await driver.close()
     greeted.set()
     with pytest.raises(DeviceError, match="is not connected"):

@@ -242,7 +242,7 @@ async def test_a_refusal_of_2_10_without_a_nak(play):
 
 
 async def test_a_stop_while_preparing_keeps_it_from_homing(play):
-    stopped = asyncio.Event()
+    stopped = play.Pause()
     driver = await play.opened(
         [
             *UNTIL_HOMED,
@@ -254,7 +254,7 @@ async def test_a_stop_while_preparing_keeps_it_from_homing(play):
         play.STOPPING,
     )
     preparing = asyncio.create_task(driver.prepare())
-    await asyncio.sleep(0.05)
+    await stopped.reached.wait()
     await driver.stop()
     stopped.set()
     with pytest.raises(MotionInterrupted, match="was stopped before it was ready"):

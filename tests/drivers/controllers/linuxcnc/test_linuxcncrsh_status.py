@@ -55,14 +55,14 @@ async def test_complaints_of_a_machine_that_was_never_on_are_left_to_who_switche
 
 
 async def test_it_is_answered_while_a_move_is_under_way(play) -> None:
-    arrived = asyncio.Event()
+    arrived = play.Pause()
     there = b"ABS_ACT_POS 1.000000 2.000000 3.000000 0.000000 0.000000 0.000000\r\n"
     block = "set mdi G0 X1.00000000 Y2.00000000 Z3.00000000 A0.00000000 B0.00000000 C0.00000000"
     main = [(block, arrived, b"SET MDI ACK\n\r"), ("get abs_act_pos", there)]
     driver = await play.opened(main, [*GREETING, *asked()])
     moving = asyncio.create_task(driver.move(Pose(1.0, 2.0, 3.0)))
-    await asyncio.sleep(0.05)
-    assert await asyncio.wait_for(driver.status(), 1.0) == ON
+    await arrived.reached.wait()
+    assert await driver.status() == ON
     assert not moving.done()
     arrived.set()
     await moving
@@ -108,13 +108,13 @@ async def test_after_closing_it_cannot_be_asked(play) -> None:
 
 
 async def test_it_is_silent_while_the_machine_is_being_stopped(play) -> None:
-    at_rest = asyncio.Event()
+    at_rest = play.Pause()
     stopping = [*play.STOPPING[:-1], ("get abs_act_pos", at_rest, play.AT_REST)]
     driver = await play.opened([], stopping, [*GREETING, *asked()])
     stop = asyncio.create_task(driver.stop())
-    await asyncio.sleep(0.05)
+    await asyncio.sleep(0)
     looking = asyncio.create_task(driver.status())
-    await asyncio.sleep(0.05)
+    await at_rest.reached.wait()
     assert play.servers[0].connections == 2
     at_rest.set()
     await stop
@@ -124,16 +124,18 @@ async def test_it_is_silent_while_the_machine_is_being_stopped(play) -> None:
 async def test_two_never_speak_at_once_but_a_long_order_keeps_nobody_waiting() -> None:
     arbiter = SendArbiter()
     said: list[str] = []
+    asked = asyncio.Event()
 
     async def order() -> None:
         async with arbiter.query_turn():
             said.append("order")
-            await asyncio.sleep(10 * PARSED_S)
+            await asked.wait()
             said.append("order done")
 
     async def question() -> None:
         async with arbiter.query_turn():
             said.append("question")
+            asked.set()
 
     await asyncio.gather(order(), question())
     assert said == ["order", "question", "order done"]
@@ -158,7 +160,7 @@ async def test_whoever_keeps_the_arbiter_keeps_it() -> None:
 
 async def test_a_stop_that_came_while_it_moved_is_told_by_the_move(play) -> None:
     """The order that was under way fails by itself; the watch over it needs no second stop."""
-    stopped = asyncio.Event()
+    stopped = play.Pause()
     block = "set mdi G0 X1.00000000 Y2.00000000 Z3.00000000 A0.00000000 B0.00000000 C0.00000000"
     main = [(block, stopped, b"SET MDI ACK\n\r"), ("get abs_act_pos", play.AT_REST)]
     driver = await play.opened(
@@ -173,7 +175,7 @@ async def test_a_stop_that_came_while_it_moved_is_told_by_the_move(play) -> None
     )
     await driver.status()
     moving = asyncio.create_task(driver.move(Pose(1.0, 2.0, 3.0)))
-    await asyncio.sleep(0.05)
+    await stopped.reached.wait()
     await driver.stop()
     stopped.set()
     with pytest.raises(MotionInterrupted, match="it was stopped on request"):

@@ -19,7 +19,7 @@ from tests.drivers.controllers.linuxcnc.motion_dialogue import (
 
 
 async def test_stopping_goes_over_a_second_connection_while_the_first_is_mute(play):
-    aborted = asyncio.Event()
+    aborted = play.Pause()
     driver = await play.opened(
         [
             (MDI, aborted, ACK),
@@ -31,7 +31,7 @@ async def test_stopping_goes_over_a_second_connection_while_the_first_is_mute(pl
         [*play.GREETING, ("set abort", b"SET ABORT ACK\n\r"), *[("get abs_act_pos", HALF_WAY)] * 3],
     )
     moving = asyncio.create_task(driver.move(TARGET))
-    await asyncio.sleep(0.01)
+    await aborted.reached.wait()
     await driver.stop()
     aborted.set()
     with pytest.raises(MotionInterrupted, match=r"stopped at X5\.000 .*: it was stopped on request"):
@@ -41,7 +41,7 @@ async def test_stopping_goes_over_a_second_connection_while_the_first_is_mute(pl
 
 async def test_one_client_is_silent_while_the_other_speaks(play):
     """LinuxCNC 2.9 garbles commands of two clients that coincide."""
-    speak = asyncio.Event()
+    speak = play.Pause()
     driver = await play.opened(
         [(MDI, ACK), ("get abs_act_pos", HALF_WAY)],
         [*play.GREETING, ("set abort", speak, b"SET ABORT ACK\n\r"), *play.STOPPING[-3:]],
@@ -49,7 +49,7 @@ async def test_one_client_is_silent_while_the_other_speaks(play):
     moving = asyncio.create_task(driver.move(TARGET))
     await asyncio.sleep(0)
     stopping = asyncio.create_task(driver.stop())
-    await asyncio.sleep(0.05)
+    await speak.reached.wait()
     silent_so_far = not moving.done()
     speak.set()
     await stopping
@@ -107,11 +107,11 @@ async def test_stopping_without_a_connection_works_all_the_same(play):
 
 
 async def test_two_stops_at_once_do_not_disturb_each_other(play):
-    speak = asyncio.Event()
+    speak = play.Pause()
     first = [*play.GREETING, ("set abort", speak, b"SET ABORT ACK\n\r"), *play.STOPPING[-3:]]
     driver = await play.opened([], first, play.STOPPING)
     stopping = [asyncio.create_task(driver.stop()) for _ in range(2)]
-    await asyncio.sleep(0.03)
+    await speak.reached.wait()
     connections_so_far = play.servers[0].connections
     speak.set()
     await asyncio.gather(*stopping)
@@ -119,7 +119,7 @@ async def test_two_stops_at_once_do_not_disturb_each_other(play):
 
 
 async def test_nothing_is_connected_to_again_while_a_stop_is_under_way(play):
-    speak = asyncio.Event()
+    speak = play.Pause()
     joints = ("get joint_pos", b"JOINT_POS 1 2 3 4 5 6\r\n")
     driver = await play.opened(
         [(*joints, play.HANG_UP)],
@@ -129,7 +129,7 @@ async def test_nothing_is_connected_to_again_while_a_stop_is_under_way(play):
     await driver.joint_positions()
     stopping = asyncio.create_task(driver.stop())
     asking = asyncio.create_task(driver.joint_positions())
-    await asyncio.sleep(0.03)
+    await speak.reached.wait()
     connections_so_far = play.servers[0].connections
     speak.set()
     await asyncio.gather(stopping, asking)
@@ -137,15 +137,18 @@ async def test_nothing_is_connected_to_again_while_a_stop_is_under_way(play):
 
 
 async def test_a_move_that_waits_for_its_turn_is_not_begun_after_a_stop(play):
-    answer = asyncio.Event()
+    answer = play.Pause()
+    abort = play.Pause()
     driver = await play.opened(
-        [("get joint_pos", answer, b"JOINT_POS 1 2 3 4 5 6\r\n"), AGAIN_IN_CONTROL], play.STOPPING
+        [("get joint_pos", answer, b"JOINT_POS 1 2 3 4 5 6\r\n"), AGAIN_IN_CONTROL],
+        [*play.GREETING, ("set abort", abort, b"SET ABORT ACK\n\r"), *play.STOPPING[-3:]],
     )
     asking = asyncio.create_task(driver.joint_positions())
     moving = asyncio.create_task(driver.move(TARGET))
-    await asyncio.sleep(0.01)
+    await answer.reached.wait()
     stopping = asyncio.create_task(driver.stop())
-    await asyncio.sleep(0.01)
+    await abort.reached.wait()
+    abort.set()
     answer.set()
     await asking
     with pytest.raises(MotionInterrupted, match="was stopped before it moved"):

@@ -1,9 +1,9 @@
-# Everything a newcomer or CI types. Each target sets up .venv by itself; once that is done it takes
-# milliseconds and no network.
+# All commands of a newcomer or of CI. Each target sets up .venv first, which takes milliseconds and no
+# network once it is done.
 #
 #   make demo | test | test-full | lint | bench | clean
-#   make test ARGS="-k gauges"       more arguments for what is run
-#   make PYTHON=python3.12 test      which Python .venv is made with, the first time
+#   make test ARGS="-k gauges"       more arguments for the program
+#   make PYTHON=python3.12 test      the Python for .venv, the first time
 
 PYTHON = python3
 ARGS =
@@ -11,13 +11,13 @@ ARGS =
 THREE_AT_A_TIME = -n 3 --dist loadfile
 RUN = .venv/bin/python -m
 
-# What other software puts on these paths would be found before what is pinned here.
+# Packages of other software on these paths would take precedence over the pinned ones.
 unexport PYTHONPATH PYTHONHOME
 
-# Tests start a hundred processes, which need not compile the same files again and again.
+# Tests start a hundred processes, which should not compile the same files each time.
 unexport PYTHONDONTWRITEBYTECODE
 
-# Our matrices are small: threads of the linear algebra only get into each other's way.
+# The matrices are small: threads of the linear algebra only slow them down.
 export OPENBLAS_NUM_THREADS = 1
 
 .PHONY: demo test test-full lint bench clean venv

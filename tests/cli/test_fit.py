@@ -43,10 +43,13 @@ def test_the_document_is_as_documented(typed, demo):
     document = outcome.document
     # A set ends early where no orientation is surely safe any more, and the noise differs every time.
     rows = (demo.run / "measurements.csv").read_text().splitlines()[1:]
-    assert 50 <= document["records"] == len(rows) <= 55
+    assert 50 <= len(rows) <= 55
+    # In one file of a hundred a good record is rejected by chance.
+    assert len(document["outliers"]) <= 1
+    assert document["records"] == len(rows) - len(document["outliers"])
     assert (document["points"], document["converged"]) == (5, True)
     assert document["frame"] == "paper"
-    assert document["undetermined"] == document["outliers"] == []
+    assert document["undetermined"] == []
     covariance = np.array(document["covariance"])
     sigma = np.concatenate([np.ravel(document["sigma"][name]) for name in "SBl"])
     assert covariance.shape == (42, 42)
@@ -59,8 +62,10 @@ def test_the_document_is_as_documented(typed, demo):
 def test_the_text_has_a_line_for_every_free_parameter(typed_here, demo):
     outcome = typed_here("fit", demo.cell, "--measurements", demo.run / "measurements.csv")
     assert (outcome.code, outcome.err) == (0, "")
-    records = len((demo.run / "measurements.csv").read_text().splitlines()) - 1
-    assert f"35 parameters from {records} records at 5 points" in outcome.out
+    rows = len((demo.run / "measurements.csv").read_text().splitlines()) - 1
+    text = " ".join(outcome.out.split())
+    records = rows - text.count("the record is left out")
+    assert f"35 parameters from {records} records at 5 points" in text
     assert max(map(len, outcome.out.splitlines())) <= 80
     rows = re.findall(r"^([SB][1-6][xyz]|l[1-6]) +(\S+) +(\S+) +(\S+)", outcome.out, flags=re.MULTILINE)
     assert len({name for name, *_ in rows}) == len(rows) == 42 - 4

@@ -62,9 +62,9 @@ def test_the_document_is_as_documented(typed, demo):
 def test_the_text_has_a_line_for_every_free_parameter(typed_here, demo):
     outcome = typed_here("fit", demo.cell, "--measurements", demo.run / "measurements.csv")
     assert (outcome.code, outcome.err) == (0, "")
-    rows = len((demo.run / "measurements.csv").read_text().splitlines()) - 1
     text = " ".join(outcome.out.split())
-    records = rows - text.count("the record is left out")
+    measured = len((demo.run / "measurements.csv").read_text().splitlines()) - 1
+    records = measured - text.count("the record is left out")
     assert f"35 parameters from {records} records at 5 points" in text
     assert max(map(len, outcome.out.splitlines())) <= 80
     rows = re.findall(r"^([SB][1-6][xyz]|l[1-6]) +(\S+) +(\S+) +(\S+)", outcome.out, flags=re.MULTILINE)

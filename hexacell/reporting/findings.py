@@ -15,6 +15,9 @@ from hexacell.reporting.assessment import Assessment
 POOR_REPEATABILITY = 2.0
 """Scatter of repeated poses over that of the stated noise from which it is a finding."""
 
+NEGLIGIBLE_MM = 0.001
+"""No smaller error is printed: it is that of the numbers in a config."""
+
 NAMED_PARAMETERS = 4
 """More undetermined parameters than these are counted, not named."""
 
@@ -143,10 +146,11 @@ def _accuracy(assessed: Assessment) -> str:
     if accuracy is None:
         return "The robot can reach none of the task poses: no accuracy can be stated."
     where = "task poses" if assessed.task_named else "poses across the workspace"
-    before, after = accuracy.before, accuracy.after
+    before, after = accuracy.before.position_rms_mm, accuracy.after.position_rms_mm
+    now = f"{before:.3g}" if before >= NEGLIGIBLE_MM else f"below {NEGLIGIBLE_MM:g}"
     return (
-        f"At {len(accuracy.poses)} {where} the position error is now {before.position_rms_mm:.3g} mm "
-        f"(rms), and {after.position_rms_mm:.2g} mm with the identified geometry (one sigma)."
+        f"At {len(accuracy.poses)} {where} the position error is now {now} mm (rms), and {after:.2g} mm "
+        "with the identified geometry (one sigma)."
     )
 
 

@@ -41,13 +41,12 @@ def fit(tmp_path, capsys):
 
 
 def test_the_verdict_comes_first_and_the_table_after(fit, clean):
-    words = fit(clean).out
-    assert words.startswith(
+    text = fit(clean).out
+    assert text.startswith(
         "Good: the records determine every parameter, and agree with the stated noise.\n"
     )
     places = [
-        words.index(part)
-        for part in ("Predicted error at 6 task poses", "drawing  identified", "Noise, mm")
+        text.index(part) for part in ("Predicted error at 6 task poses", "drawing  identified", "Noise, mm")
     ]
     assert places == sorted(places)
 
@@ -68,27 +67,27 @@ def test_every_free_parameter_has_its_line_and_says_how_far_it_moved(fit, clean)
     [({"seed": 2}, 0.01), ({"seed": 2}, 0.05), ({"points": 2, "orientations": 9, "degrees": 3.0}, 0.01)],
 )
 def test_nothing_is_wider_than_eighty_columns(fit, visit, how, noise_mm):
-    words = fit(visit(**how).measured(noise_mm)).out
-    assert max(map(len, words.splitlines())) <= 80
+    text = fit(visit(**how).measured(noise_mm)).out
+    assert max(map(len, text.splitlines())) <= 80
 
 
-def test_what_the_data_do_not_say_is_said(fit, visit):
-    words = fit(visit(points=2, orientations=9, degrees=3.0).measured(0.01)).out
-    assert words.startswith("Incomplete: ")
-    assert words.count("not determined by these data") > 10
+def test_undetermined_parameters_are_reported(fit, visit):
+    text = fit(visit(points=2, orientations=9, degrees=3.0).measured(0.01)).out
+    assert text.startswith("Incomplete: ")
+    assert text.count("not determined by these data") > 10
 
 
 def test_a_second_visit_gives_a_repeatability(fit, clean):
     assert "Repeatability: not evaluated, no pose was measured twice." in fit(clean).out
     again = replace(clean.records[1], orientation=99)
-    words = " ".join(fit(MeasurementSet((*clean.records, again))).out.split())
-    assert "Repeatability: on returning to 1 pose the ball scatters by x 0.0000" in words
-    assert "(1 degree of freedom)" in words
+    text = " ".join(fit(MeasurementSet((*clean.records, again))).out.split())
+    assert "Repeatability: on returning to 1 pose the ball scatters by x 0.0000" in text
+    assert "(1 degree of freedom)" in text
 
 
 def test_pairs_are_named_and_the_rest_counted(fit, clean):
-    words = " ".join(fit(clean).out.split())
-    assert "leg 2 length and leg 3 length cannot be separated from these poses (+0.9" in words
+    text = " ".join(fit(clean).out.split())
+    assert "leg 2 length and leg 3 length cannot be separated from these poses (+0.9" in text
 
 
 def test_json_is_one_document_with_the_keys_programs_rely_on(fit, clean):

@@ -1,4 +1,4 @@
-"""A cell file to spoil, and how to load what became of it."""
+"""A valid cell file, and loaders for changed texts of it."""
 
 from __future__ import annotations
 

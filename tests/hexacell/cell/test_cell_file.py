@@ -300,7 +300,7 @@ def _edits(draw: st.DrawFn) -> list[tuple[float, int, bytes]]:
 
 
 @given(edits=_edits())
-def test_spoilt_files_give_plain_errors_only(cell_text, cell_path, edits):
+def test_damaged_files_give_plain_errors_only(cell_text, cell_path, edits):
     raw = cell_text.encode()
     for where, length, piece in edits:
         start = int(where * len(raw))

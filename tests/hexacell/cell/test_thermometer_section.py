@@ -31,7 +31,7 @@ def test_what_one_says(load_text, cell_text) -> None:
         (ROOM.replace("room", ""), "text that is not empty"),
     ],
 )
-def test_mistakes_are_told_with_their_line(load_text, cell_text, section: str, words: str) -> None:
+def test_mistakes_are_reported_with_their_line(load_text, cell_text, section: str, words: str) -> None:
     with pytest.raises(Exception, match=words) as refusal:
         load_text(cell_text + section)
     errors = getattr(refusal.value, "errors", [refusal.value])

@@ -177,7 +177,7 @@ def test_read_gives_geometry_and_branch(config: Path, geometry: Geometry) -> Non
     assert found.branch == (1, 1, 1, -1, -1, -1)
 
 
-def test_the_branch_may_stand_at_the_top(config: Path) -> None:
+def test_the_branch_may_be_at_the_top(config: Path) -> None:
     lines = config.read_text().splitlines(keepends=True)
     [branch] = [line for line in lines if line.startswith("branch")]
     lines.remove(branch)

@@ -106,7 +106,7 @@ def test_whatever_fails_in_a_row_the_config_is_old_or_new_and_the_words_are_true
     assert found == {bench.before, bench.after}
 
 
-def test_a_power_cut_leaves_the_old_config_or_the_new_one_with_its_way_back(bench: Bench) -> None:
+def test_a_power_cut_leaves_the_old_config_or_the_new_one_with_its_backup(bench: Bench) -> None:
     ends = []
     for name, run, raised in bench.attempts(bench.reset, bench.commit, width=math.inf, error=PowerCut):
         text = bench.config.read_bytes()

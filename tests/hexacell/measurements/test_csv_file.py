@@ -185,7 +185,7 @@ pieces = st.sampled_from(
 @given(
     edits=st.lists(st.tuples(st.integers(0, len(GOOD)), st.integers(0, 9), st.text() | pieces), max_size=3)
 )
-def test_spoilt_files_give_plain_errors_or_sound_records(read, edits):
+def test_damaged_files_give_plain_errors_or_sound_records(read, edits):
     text = GOOD
     for start, length, piece in edits:
         text = text[:start] + piece + text[start + length :]

@@ -28,7 +28,7 @@ def folder(tmp_path: Path) -> RunFolder:
 
 
 class Noon(datetime):
-    """A clock that stands at noon."""
+    """A clock that is fixed at noon."""
 
     @classmethod
     def now(cls, tz=None):

@@ -1,4 +1,4 @@
-"""What cannot be written or read is told in plain words, and left as it was."""
+"""Failures to write or read are reported in plain words; the file stays unchanged."""
 
 import errno
 import os
@@ -12,7 +12,7 @@ from hexacell.storage import atomic_files
 from tests.hexacell.storage.atomic_files.ownership import names
 
 
-def test_a_read_only_folder_is_told(ordinary_folder: Path) -> None:
+def test_a_read_only_folder_is_reported(ordinary_folder: Path) -> None:
     path = ordinary_folder / "controller.toml"
     path.write_bytes(b"old")
     ordinary_folder.chmod(0o500)
@@ -33,7 +33,7 @@ def test_a_write_protected_file_is_left_alone(ordinary_folder: Path) -> None:
     assert names(ordinary_folder) == [path.name]
 
 
-def test_an_unreadable_file_is_told(ordinary_folder: Path) -> None:
+def test_an_unreadable_file_is_reported(ordinary_folder: Path) -> None:
     path = ordinary_folder / "controller.toml"
     path.write_bytes(b"old")
     path.chmod(0o000)
@@ -65,7 +65,7 @@ def test_a_write_that_the_kernel_cuts_short_leaves_nothing(path: Path, tmp_path:
     ],
 )
 @pytest.mark.parametrize("name", ["replace", "fchmod"])
-def test_failures_are_told_in_plain_words(
+def test_failures_are_reported_in_plain_words(
     path: Path, monkeypatch: pytest.MonkeyPatch, name: str, code: int, words: str
 ) -> None:
     def fail(*_: object) -> None:
@@ -79,7 +79,9 @@ def test_failures_are_told_in_plain_words(
     assert names(path.parent) == [path.name]
 
 
-def test_a_folder_that_does_not_reach_the_disk_is_told(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_folder_that_does_not_reach_the_disk_is_reported(
+    path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     def fail(folder: Path) -> None:
         assert folder == path.parent
         raise OSError(errno.EIO, "x")

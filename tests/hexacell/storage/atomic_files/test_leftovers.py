@@ -43,7 +43,7 @@ class TestLeftovers:
         atomic_files.remove_stale_temporaries(other)
         assert names(path.parent) == [path.name]
 
-    def test_a_link_leads_to_those_of_its_file(self, path: Path, tmp_path: Path, died: Any) -> None:
+    def test_a_link_means_the_temporaries_of_its_file(self, path: Path, tmp_path: Path, died: Any) -> None:
         link = tmp_path / "elsewhere" / "link.toml"
         link.parent.mkdir()
         link.symlink_to(path)

@@ -100,7 +100,7 @@ def test_a_file_system_without_extended_attributes_is_no_failure(
     assert path.read_bytes() == b"new"
 
 
-def test_links_are_followed_and_stay(path: Path, tmp_path: Path) -> None:
+def test_links_are_kept_and_their_target_is_replaced(path: Path, tmp_path: Path) -> None:
     folder = tmp_path / "elsewhere"
     folder.mkdir()
     (folder / "second").symlink_to(path)
@@ -118,7 +118,7 @@ def test_a_link_to_nowhere_makes_the_file(tmp_path: Path) -> None:
     assert (tmp_path / "absent").read_bytes() == b"new"
 
 
-def test_a_circle_of_links_is_told(tmp_path: Path) -> None:
+def test_a_loop_of_links_is_reported(tmp_path: Path) -> None:
     (tmp_path / "a").symlink_to("b")
     (tmp_path / "b").symlink_to("a")
     for call in (lambda path: atomic_files.write_atomically(path, b"new"), atomic_files.read_bytes):

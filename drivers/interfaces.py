@@ -1,20 +1,23 @@
-"""What the procedures may ask of hardware: small protocols, no word on how it is done.
+"""The device interfaces that procedures use. Drivers and simulations implement them.
 
-Every call is a coroutine, so that a slow device never holds up the others or an abort. Every
-failure is a :class:`hexacell.errors.DeviceError` whose subject is the device's name.
+Every device has the same life cycle: ``open`` connects and identifies it, then it is read or operated,
+``close`` releases it; it can be opened again. Every call is a coroutine, so a slow device never blocks
+the others or a stop. Every failure is a :class:`hexacell.errors.DeviceError` that names the device.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, TypeVar
 
 from hexacell.kinematics.pose import Pose
+
+Identity_co = TypeVar("Identity_co", covariant=True)
 
 
 @dataclass(frozen=True, slots=True)
 class DeviceIdentity:
-    """Who answered: kept with every run, compared whenever a device comes back."""
+    """The identity of a device: recorded with every run, compared after every reconnection."""
 
     name: str
     protocol: str
@@ -24,7 +27,7 @@ class DeviceIdentity:
 
 @dataclass(frozen=True, slots=True)
 class GaugeReading:
-    """One agreed reading of a dial indicator: its value, mm, and the answer it came in."""
+    """One reading of a dial indicator: its value, mm, and the raw answer."""
 
     value_mm: float
     raw: str
@@ -32,7 +35,7 @@ class GaugeReading:
 
 @dataclass(frozen=True, slots=True)
 class EncoderSample:
-    """Six slider positions taken at one SYNC: raw counts, and mm along the rails."""
+    """Six slider positions sampled at one SYNC: raw counts, and mm along the rails."""
 
     counts: tuple[int, ...]
     positions_mm: tuple[float, ...]
@@ -40,7 +43,7 @@ class EncoderSample:
 
 @dataclass(frozen=True, slots=True)
 class ControllerStatus:
-    """What a controller says of itself: whether it may move, and what it complains about."""
+    """A controller's status: emergency stop, enabled, and its error messages."""
 
     estop: bool
     enabled: bool
@@ -48,28 +51,36 @@ class ControllerStatus:
 
     @property
     def may_move(self) -> bool:
-        """Whether nothing keeps it from moving."""
+        """Whether it can move."""
         return self.enabled and not self.estop
 
 
 @dataclass(frozen=True, slots=True)
 class TemperatureReading:
-    """A temperature, deg C, and the answer it came in."""
+    """A temperature, deg C, and the raw answer."""
 
     celsius: float
     raw: str
 
 
-class Gauge(Protocol):
-    """A dial indicator. Its zero is kept in software; the instrument's own zero is not touched."""
+class Device(Protocol[Identity_co]):
+    """The life cycle of every device."""
+
+    async def open(self) -> Identity_co:
+        """Connect, and check that it is the expected device in usable settings; nothing moves."""
+        ...
+
+    async def close(self) -> None:
+        """Release the connection; closing twice is harmless."""
+        ...
+
+
+class Gauge(Device[DeviceIdentity], Protocol):
+    """A dial indicator. Its zero is kept in software; the instrument's own zero is not changed."""
 
     @property
     def name(self) -> str:
-        """The name the cell file gives it."""
-        ...
-
-    async def open(self) -> DeviceIdentity:
-        """Connect and refuse a device in a unit or mode that would falsify readings."""
+        """Its name in the cell file."""
         ...
 
     async def read(self) -> GaugeReading:
@@ -77,106 +88,70 @@ class Gauge(Protocol):
         ...
 
     async def read_once(self) -> GaugeReading:
-        """What it shows in this moment, moving or not: asked once, agreed with nothing.
+        """The displayed value at this moment, from a single query, also during motion.
 
-        For watching a motion, never for a record. An answer that is garbled raises
-        :class:`drivers.gauges.errors.WrongAnswer`; the next one may be whole.
+        For supervision only, never for a record. A garbled answer raises
+        :class:`drivers.gauges.errors.WrongAnswer`.
         """
         ...
 
     async def check(self) -> None:
-        """Raise if unit, preset, direction or hold changed since ``open``: the zero is void."""
-        ...
-
-    async def close(self) -> None:
-        """Let the line go; closing twice is harmless."""
+        """Raise if unit, preset, direction or hold changed since ``open``: the zero is then void."""
         ...
 
 
-class EncoderBank(Protocol):
-    """Six slider encoders sampled together."""
-
-    async def open(self) -> tuple[DeviceIdentity, ...]:
-        """Connect, compare identities and measuring steps, configure and start the nodes."""
-        ...
+class EncoderBank(Device[tuple[DeviceIdentity, ...]], Protocol):
+    """Six slider encoders that are sampled simultaneously."""
 
     async def read(self) -> EncoderSample:
-        """One complete round: all six at the same instant, or an error."""
-        ...
-
-    async def close(self) -> None:
-        """Let the bus go; closing twice is harmless."""
+        """One complete sample of all six encoders at the same instant, or an error."""
         ...
 
 
-class Controller(Protocol):
-    """The robot's own controller, driven as its owner configured it."""
-
-    async def open(self) -> DeviceIdentity:
-        """Connect; nothing moves."""
-        ...
+class Controller(Device[DeviceIdentity], Protocol):
+    """The robot's own controller."""
 
     async def prepare(self) -> None:
-        """Make it ready to move: out of estop, on, homed. May move the machine."""
+        """Make it ready to move: out of emergency stop, enabled, homed. May move the machine."""
         ...
 
     async def move(self, pose: Pose) -> None:
-        """Go to ``pose`` and return once there; an acknowledgement alone is not arrival."""
+        """Move to ``pose``; returns on arrival, not on acknowledgement."""
         ...
 
     async def pose(self) -> Pose:
-        """The pose the controller believes the platform to have."""
+        """The actual pose by the controller's own kinematics."""
         ...
 
     async def status(self) -> ControllerStatus:
-        """Whether it is in emergency stop, whether it is on; also while ``move`` waits."""
+        """Emergency stop, enabled, and error messages; also during ``move``."""
         ...
 
     async def stop(self) -> None:
-        """Stop motion in place, at once, also while ``move`` waits."""
+        """Stop the motion in place, at once, also during ``move``."""
         ...
 
     async def reload(self) -> None:
-        """Make it read its config again; sliders must not move."""
-        ...
-
-    async def close(self) -> None:
-        """Let the connection go; closing twice is harmless."""
+        """Make it reload its config; sliders must not move."""
         ...
 
 
-class StopInput(Protocol):
-    """A contact or a file by which anybody may forbid motion."""
-
-    async def open(self) -> DeviceIdentity | None:
-        """Get ready to look at it; gives the device that it is, if it is one."""
-        ...
+class StopInput(Device[DeviceIdentity | None], Protocol):
+    """A contact or a file that forbids motion; without hardware it has no identity."""
 
     async def active_reason(self) -> str | None:
-        """Why nothing may move now, in words, or nothing. Fails safe: a lost line forbids."""
-        ...
-
-    async def close(self) -> None:
-        """Let it go; closing twice is harmless."""
+        """Why motion is forbidden, or nothing. Fail-safe: a lost line forbids motion."""
         ...
 
 
-class Thermometer(Protocol):
-    """Something that knows how warm it is. A run goes on without it."""
+class Thermometer(Device[DeviceIdentity], Protocol):
+    """A temperature sensor. A run continues without it."""
 
     @property
     def name(self) -> str:
-        """The name the cell file gives it."""
-        ...
-
-    async def open(self) -> DeviceIdentity:
-        """Connect."""
+        """Its name in the cell file."""
         ...
 
     async def read(self) -> TemperatureReading:
-        """The temperature now, or a ``DeviceError`` within the time that the cell file allows."""
-        ...
-
-    async def close(self) -> None:
-        """Let it go; closing twice is harmless."""
+        """The temperature now, or a ``DeviceError`` within the time-out of the cell file."""
         ...

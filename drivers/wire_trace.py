@@ -1,4 +1,4 @@
-"""The wire trace: every byte that went over a line, both ways, with its time."""
+"""The wire trace: every byte sent and received on the lines to the devices, with its time."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ CAPACITY_BYTES = 4 << 20
 
 
 class TrafficDirection(StrEnum):
-    """Which way bytes went, seen from here."""
+    """Direction of bytes, from the point of view of this program."""
 
     SENT = ">"
     RECEIVED = "<"
@@ -20,7 +20,7 @@ class TrafficDirection(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class TraceEntry:
-    """Bytes that were seen together: seconds since the epoch, the line's URL, the way they went."""
+    """Bytes that were transferred together: seconds since the epoch, URL of the line, direction."""
 
     time_s: float
     line: str
@@ -35,13 +35,14 @@ class TraceEntry:
 
 
 TraceRecorder = Callable[[TraceEntry], None]
-"""Takes entries in a line's thread; it must neither block nor raise."""
+"""Receives entries in the thread of a line; it must neither block nor raise."""
 
 
 class WireTrace:
-    """A recorder that keeps the latest entries, at most ``capacity`` bytes of traffic.
+    """A recorder that keeps the latest entries, at most ``capacity`` bytes of traffic. Thread-safe.
 
-    Several links may record into it from their threads at once.
+    Attributes:
+        dropped: how many older entries were dropped.
     """
 
     def __init__(self, capacity: int = CAPACITY_BYTES) -> None:
@@ -52,7 +53,7 @@ class WireTrace:
         self._lock = threading.Lock()
 
     def __call__(self, entry: TraceEntry) -> None:
-        """Keep ``entry``; the oldest ones make room for it and are counted in ``forgotten``."""
+        """Keep ``entry``; the oldest entries are dropped if necessary."""
         with self._lock:
             self._entries.append(entry)
             self._size += len(entry.data)
@@ -61,12 +62,12 @@ class WireTrace:
                 self.dropped += 1
 
     def entries(self) -> tuple[TraceEntry, ...]:
-        """What is kept, oldest first."""
+        """The kept entries, oldest first."""
         with self._lock:
             return tuple(self._entries)
 
     def text(self) -> str:
-        """The trace as a file's text, one entry a line; the first line says what was forgotten."""
+        """The trace as text, one entry a line; the first line says how many were dropped."""
         entries = self.entries()
         head = [f"# {self.dropped} earlier entries were forgotten"] if self.dropped else []
         return "".join(f"{line}\n" for line in (*head, *entries))

@@ -1,4 +1,4 @@
-"""What can go wrong with a robot controller, whichever protocol it speaks."""
+"""Errors of robot controllers, whatever their protocol."""
 
 from __future__ import annotations
 
@@ -6,15 +6,15 @@ from hexacell.errors import DeviceError
 
 
 class ConnectionLost(DeviceError):
-    """There is no line to the controller, or it broke."""
+    """There is no connection to the controller, or it broke."""
 
 
 class ResponseTimeout(ConnectionLost):
-    """Nothing came over the line in time; it may still come."""
+    """No response in time; it may still come."""
 
 
 class CommandRefused(DeviceError):
-    """The controller understood a command and did not do it, for ``reason``."""
+    """The controller refused a command, for ``reason``."""
 
     def __init__(self, command: str, reason: str, *, subject: str, action: str | None = None) -> None:
         self.reason = reason
@@ -22,8 +22,8 @@ class CommandRefused(DeviceError):
 
 
 class MoveRefused(CommandRefused):
-    """The controller did not accept a target; nothing moved."""
+    """The controller refused a target; nothing moved."""
 
 
 class MotionInterrupted(DeviceError):
-    """A motion ended, or was stopped, somewhere other than at its target."""
+    """A motion ended, or was stopped, before its target."""

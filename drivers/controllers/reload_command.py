@@ -1,4 +1,4 @@
-"""The command that makes a controller read its config again."""
+"""The command that makes a controller reload its config."""
 
 from __future__ import annotations
 
@@ -8,31 +8,30 @@ from typing import IO
 
 from hexacell.errors import DeviceError
 
-_SHOWN = 400
+_SHOWN_CHARACTERS = 400
 
 
-async def run(command: tuple[str, ...], subject: str, patience_s: float) -> None:
-    """Run ``command`` to its end; it is killed when this is cancelled.
+async def run(command: tuple[str, ...], subject: str, timeout_s: float) -> None:
+    """Run ``command`` to its end; kill it on cancellation.
 
-    What it writes goes to a file and not a pipe: a daemon that it leaves behind would hold the
-    pipe open for ever.
+    Its output goes to a file, not to a pipe: a daemon that it starts would hold a pipe open for ever.
 
     Raises:
-        DeviceError: It cannot be run, fails (its own last words are shown) or takes too long.
+        DeviceError: It cannot be run, fails (the end of its output is shown) or takes too long.
     """
     with tempfile.TemporaryFile() as output:
         process = await _start(command, subject, output)
         try:
-            async with asyncio.timeout(patience_s):
+            async with asyncio.timeout(timeout_s):
                 status = await process.wait()
         except TimeoutError:
-            raise _failure(f"took longer than {patience_s:g} s", command, subject) from None
+            raise _failure(f"took longer than {timeout_s:g} s", command, subject) from None
         finally:
             if process.returncode is None:
                 process.kill()
                 await process.wait()
         if status != 0:
-            raise _failure(f"failed with status {status}{_last_words(output)}", command, subject)
+            raise _failure(f"failed with status {status}{_end_of_output(output)}", command, subject)
 
 
 async def _start(command: tuple[str, ...], subject: str, output: IO[bytes]) -> asyncio.subprocess.Process:
@@ -53,7 +52,7 @@ def _failure(problem: str, command: tuple[str, ...], subject: str) -> DeviceErro
     )
 
 
-def _last_words(output: IO[bytes]) -> str:
+def _end_of_output(output: IO[bytes]) -> str:
     output.seek(0)
-    text = output.read().decode("utf-8", "replace").strip()[-_SHOWN:]
+    text = output.read().decode("utf-8", "replace").strip()[-_SHOWN_CHARACTERS:]
     return f": {text}" if text else ""

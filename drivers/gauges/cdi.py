@@ -1,9 +1,9 @@
 """CDI and Starrett indicators with the serial ASCII command protocol.
 
-Line 9600 8N1. ``R`` asks for the value: sign, eight characters of digits, point and blanks, ``, ``,
-and ``IN`` or ``MM``. ``?pXXX`` asks for parameter XXX (Starrett IQ manual, page 17): p011 mode 0 ABS,
-1 TIR, 2 INCR; p013 unit 1 in, 2 mm; p019 reversed; p021 hold; p040 ratio. The manual does not show the
-answer to it: the bare number and ``pXXX=number`` are both accepted. Older indicators know ``R`` only.
+Line 9600 8N1. ``R`` requests the value: sign, eight characters of digits, point and blanks, ``, ``,
+and ``IN`` or ``MM``. ``?pXXX`` requests parameter XXX (Starrett IQ manual, page 17): p011 mode 0 ABS,
+1 TIR, 2 INCR; p013 unit 1 in, 2 mm; p019 reversed; p021 hold; p040 ratio. The manual does not show its
+answer: the bare number and ``pXXX=number`` are both accepted. Older indicators only know ``R``.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ MODES = {0: "ABS", 1: "TIR", 2: "INCR"}
 
 
 class CdiError(Enum):
-    """What the instrument says instead of an answer."""
+    """The error frames of the instrument."""
 
     NOT_FOUND = b"NOT FOUND\r"
     NO_ACCESS = b"NO ACCESS\r"
@@ -35,7 +35,7 @@ class CdiError(Enum):
 
 
 class Parameter(IntEnum):
-    """The configuration parameters that can falsify readings."""
+    """The configuration parameters that can make readings wrong."""
 
     MODE = 11
     UNIT = 13
@@ -45,10 +45,10 @@ class Parameter(IntEnum):
 
 
 def parse_value(frame: bytes) -> DisplayedValue | CdiError:
-    """What an answer to ``R`` says.
+    """The value or the error in an answer to ``R``.
 
     Raises:
-        FrameRejected: The frame is neither a value nor a refusal, to the last byte.
+        FrameRejected: The frame is neither, to the last byte.
     """
     if match := VALUE_FRAME.fullmatch(frame):
         return DisplayedValue.of(match[1], match[2], frame, UNITS[match[3]])
@@ -59,10 +59,10 @@ def parse_value(frame: bytes) -> DisplayedValue | CdiError:
 
 
 def parse_parameter(frame: bytes, parameter: Parameter) -> int | None:
-    """The value of ``parameter`` in the answer to its question; None if there is no such one.
+    """The value of ``parameter`` in the answer; None if the instrument has no such parameter.
 
     Raises:
-        FrameRejected: The frame is neither, or names another parameter.
+        FrameRejected: The frame is something else, or names another parameter.
     """
     if frame in {CdiError.NOT_FOUND.value, CdiError.NO_ACCESS.value}:
         return None
@@ -84,10 +84,10 @@ class CdiGauge(SerialGauge):
 
     @property
     def value_request(self) -> bytes:
-        """What asks for the value shown."""
+        """The request for the displayed value."""
         return VALUE_REQUEST
 
-    def _understand(self, frame: bytes) -> DisplayedValue:
+    def _parse_value(self, frame: bytes) -> DisplayedValue:
         answer = parse_value(frame)
         if isinstance(answer, DisplayedValue):
             return answer
@@ -97,9 +97,9 @@ class CdiGauge(SerialGauge):
                 subject=self.subject,
                 action="Move the gauge or the ball",
             )
-        raise FrameRejected(frame)  # our question did not reach it as sent
+        raise FrameRejected(frame)  # the request was garbled on its way
 
-    async def _inspect(self) -> GaugeState:
+    async def _read_state(self) -> GaugeState:
         unit = await self._unit()
         mode = await self._parameter(Parameter.MODE)
         return GaugeState(
@@ -112,13 +112,13 @@ class CdiGauge(SerialGauge):
 
     async def _unit(self) -> Unit | None:
         try:
-            return (await self._shown()).unit
+            return (await self._read_value()).unit
         except GaugeAtEnd:
             number = await self._parameter(Parameter.UNIT)
             return None if number is None else UNIT_NUMBERS.get(number)
 
     async def _parameter(self, parameter: Parameter) -> int | None:
-        """Its value; None if the instrument has none, or has never answered for any."""
+        """Its value; None if the instrument does not have it, or knows no parameters at all."""
         if self._knows_parameters is False:
             return None
         try:

@@ -1,4 +1,4 @@
-"""What a dial indicator can do wrong, as kinds that procedures can tell apart."""
+"""Errors of dial indicators, one class for each kind of reaction."""
 
 from __future__ import annotations
 
@@ -6,27 +6,27 @@ from hexacell.errors import DeviceError
 
 
 class GaugeSilent(DeviceError):
-    """Nothing came back at all."""
+    """No answer."""
 
 
 class WrongAnswer(DeviceError):
-    """Something came back, and it is not what the protocol says."""
+    """An answer that does not conform to the protocol."""
 
 
 class WrongUnit(DeviceError):
-    """The instrument shows inches; its readings are never converted."""
+    """The instrument displays inches; its readings are never converted."""
 
 
 class WrongMode(DeviceError):
-    """Hold, a peak mode, scaling or a low battery: readings mean nothing, or soon will not."""
+    """Hold, a peak mode, scaling or a low battery: readings are invalid, or soon will be."""
 
 
 class GaugeAtEnd(DeviceError):
-    """The plunger is at an end of its travel: this record is invalid, the zero is not."""
+    """The plunger is at an end of its travel: this record is invalid, the zero remains valid."""
 
 
 class GaugeUnsteady(DeviceError):
-    """Readings in a row do not agree: the plunger moves, or the line is noisy."""
+    """Consecutive readings do not agree: the plunger moves, or the line is noisy."""
 
 
 class ZeroVoid(DeviceError):
@@ -34,7 +34,7 @@ class ZeroVoid(DeviceError):
 
 
 class FrameRejected(Exception):
-    """A frame that does not match its protocol in full; asked again, never shown to a person."""
+    """A frame that does not fully match the protocol; the request is repeated. Never shown to users."""
 
     def __init__(self, frame: bytes) -> None:
         self.frame = frame

@@ -1,6 +1,7 @@
-"""Mitutoyo MUX-10 frames: one of up to several indicators behind a multiplexer.
+"""Mitutoyo MUX-10 frames: one of several indicators behind a multiplexer.
 
-Line 9600 8N1. The channel's number asks: ``0``, channel, ``A``, sign, eight of digits and point. An
+Line 9600 8N1. The channel number requests its value: ``0``, channel, ``A``, sign, eight
+characters of digits and point. An
 error is three digits beginning with 9: the last is 1 if no gauge answered, 8 if the multiplexer is
 busy. The second is 1 in the sources seen; the channel is accepted too. Nothing says the unit: five
 decimals are inches. Hold, direction and preset cannot be asked for.
@@ -29,7 +30,7 @@ BUSY_TRIES = 20
 
 
 class MultiplexerBusy(Exception):
-    """Error 918: ask again in a moment."""
+    """Error 918: repeat the request after a pause."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,7 +41,7 @@ class MultiplexerError:
 
 
 def parse_value(frame: bytes, channel: int) -> DisplayedValue | MultiplexerError:
-    """What an answer to the question for ``channel`` says.
+    """The value or the error in an answer for ``channel``.
 
     Raises:
         FrameRejected: The frame is neither a value of this channel nor an error, to the last byte.
@@ -55,10 +56,10 @@ def parse_value(frame: bytes, channel: int) -> DisplayedValue | MultiplexerError
 
 
 def parse_identification(frame: bytes) -> str:
-    """The multiplexer's description of itself, which is free text.
+    """The identification of the multiplexer, which is free text.
 
     Raises:
-        FrameRejected: It is no text of a likely length, or a value.
+        FrameRejected: It is no text of a plausible length, or it is a value.
     """
     match = IDENTIFICATION_FRAME.fullmatch(frame)
     if match is None or VALUE_FRAME.fullmatch(frame):
@@ -80,11 +81,11 @@ class Mux10Gauge(SerialGauge):
 
     @property
     def value_request(self) -> bytes:
-        """What asks for the value shown."""
+        """The request for the displayed value."""
         return b"%d\r" % self.channel
 
     async def read_once(self) -> GaugeReading:
-        """As :meth:`SerialGauge.glance`; a multiplexer that is busy has not answered it."""
+        """As :meth:`SerialGauge.read_once`; a busy multiplexer counts as a garbled answer."""
         try:
             return await super().read_once()
         except MultiplexerBusy:
@@ -94,10 +95,10 @@ class Mux10Gauge(SerialGauge):
                 action="Disconnect the foot switch and other triggers",
             ) from None
 
-    async def _shown(self) -> DisplayedValue:
+    async def _read_value(self) -> DisplayedValue:
         for _ in range(BUSY_TRIES):
             try:
-                return await super()._shown()
+                return await super()._read_value()
             except MultiplexerBusy:
                 await asyncio.sleep(BUSY_PAUSE_S)
         raise DeviceError(
@@ -106,38 +107,38 @@ class Mux10Gauge(SerialGauge):
             action="Disconnect the foot switch and other triggers",
         )
 
-    def _understand(self, frame: bytes) -> DisplayedValue:
+    def _parse_value(self, frame: bytes) -> DisplayedValue:
         answer = parse_value(frame, self.channel)
         if isinstance(answer, DisplayedValue):
             return answer
         if answer.code == BUSY:
             raise MultiplexerBusy
-        shown = frame.decode("ascii").strip()
+        displayed = frame.decode("ascii").strip()
         if answer.code == NO_GAUGE:
             raise GaugeSilent(
-                f"does not answer its multiplexer ({shown})",
+                f"does not answer its multiplexer ({displayed})",
                 subject=self.subject,
                 action="Switch it on, check its cable, and channel in the cell file",
             )
         raise GaugeAtEnd(
-            f"shows an error instead of a value ({shown}), as at an end of its travel",
+            f"shows an error instead of a value ({displayed}), as at an end of its travel",
             subject=self.subject,
             action="Move the gauge or the ball",
         )
 
-    async def _inspect(self) -> GaugeState:
-        shown: DisplayedValue | None
+    async def _read_state(self) -> GaugeState:
+        displayed: DisplayedValue | None
         try:
-            shown = await self._shown()
+            displayed = await self._read_value()
         except GaugeAtEnd:
-            shown = None
-        about = self._state.identification if self._state else await self._about()
-        if shown is None:
-            return GaugeState(identification=about)
-        return GaugeState(about, shown.apparent_unit, shown.decimals)
+            displayed = None
+        identification = self._state.identification if self._state else await self._identification()
+        if displayed is None:
+            return GaugeState(identification=identification)
+        return GaugeState(identification, displayed.apparent_unit, displayed.decimals)
 
-    async def _about(self) -> str | None:
-        """What the multiplexer says of itself, if it does."""
+    async def _identification(self) -> str | None:
+        """The identification of the multiplexer, if it gives one."""
         try:
             return await self._query(b"V\r", parse_identification)
         except (GaugeSilent, WrongAnswer):

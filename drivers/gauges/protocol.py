@@ -1,9 +1,4 @@
-"""How a protocol looks on the line, and what to say when something else is heard.
-
-What a dial indicator shows, as its answer says it.
-
-What an instrument is set to, as far as its protocol tells.
-"""
+"""What a gauge protocol defines: the serial line, the display, the settings, and its error messages."""
 
 from __future__ import annotations
 
@@ -14,7 +9,7 @@ from enum import StrEnum
 from drivers.gauges.errors import GaugeSilent, WrongAnswer
 
 BIT_7 = 0x80
-TERMINATOR = b"\r"  # of every question, and the first line end of every answer
+TERMINATOR = b"\r"  # ends every request, and is the first line end of every answer
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,7 +24,7 @@ class LineSettings:
     rts: bool = True
     exclusive: bool = True
 
-    def overlaid(self, settings: Mapping[str, object]) -> dict[str, object]:
+    def merged_with(self, settings: Mapping[str, object]) -> dict[str, object]:
         """These defaults with the cell file's ``serial`` table over them."""
         return {**asdict(self), **settings}
 
@@ -39,19 +34,19 @@ class LineSettings:
 
 @dataclass(frozen=True, slots=True)
 class ProtocolSpec:
-    """One protocol: its name in the cell file, its makers, its line, and a typical answer."""
+    """One protocol: its name in the cell file, its vendors, its line, and a typical answer."""
 
     protocol: str
-    makers: str
+    vendors: str
     line: LineSettings
     example: str
 
 
 def silent_gauge(subject: str, port: str, timeout_s: float, *, echo: bool) -> GaugeSilent:
-    """Nothing came; with ``echo``, nothing but our own question."""
+    """The error for no answer; with ``echo``, only the request itself came back."""
     if echo:
         return GaugeSilent(
-            f"only our own question comes back from port {port}",
+            f"only the echo of the request comes back from port {port}",
             subject=subject,
             action="Switch the gauge on and check that the cable is not looped",
         )
@@ -62,16 +57,16 @@ def silent_gauge(subject: str, port: str, timeout_s: float, *, echo: bool) -> Ga
     )
 
 
-def unexpected_answer(subject: str, dialect: ProtocolSpec, received: bytes) -> WrongAnswer:
-    """Something came that is no frame of the protocol, again and again."""
+def unexpected_answer(subject: str, spec: ProtocolSpec, received: bytes) -> WrongAnswer:
+    """The error for repeated answers that are no frames of the protocol."""
     if any(byte & BIT_7 for byte in received):
         return WrongAnswer(
             f"answers {received!r}, bytes with bit 7 set",
             subject=subject,
-            action=f"Check parity settings and baud rate: {dialect.protocol} uses {dialect.line}",
+            action=f"Check parity settings and baud rate: {spec.protocol} uses {spec.line}",
         )
     return WrongAnswer(
-        f"answers {received!r} where protocol {dialect.protocol} has answers like {dialect.example!r}",
+        f"answers {received!r} where protocol {spec.protocol} has answers like {spec.example!r}",
         subject=subject,
         action="Correct protocol or port in the cell file",
     )
@@ -81,7 +76,7 @@ INCH_DECIMALS = 5  # no instrument resolves 10 nm, so this many decimals are inc
 
 
 class Unit(StrEnum):
-    """The unit an instrument is switched to."""
+    """The unit an instrument is set to."""
 
     MM = "mm"
     INCH = "inch"
@@ -89,7 +84,7 @@ class Unit(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class DisplayedValue:
-    """A number on the display: in ``unit``, or in one that the answer does not name."""
+    """A displayed number; ``unit`` is none if the answer does not name it."""
 
     value: float
     decimals: int
@@ -98,7 +93,7 @@ class DisplayedValue:
 
     @classmethod
     def of(cls, sign: bytes, digits: bytes, frame: bytes, unit: Unit | None = None) -> DisplayedValue:
-        """From an answer's sign, ``+``, ``-`` or blank, and its digits with one decimal point."""
+        """From the sign (``+``, ``-`` or blank) and the digits of an answer."""
         number = digits.strip().decode("ascii")
         value = float(number)
         decimals = len(number.partition(".")[2])
@@ -106,16 +101,16 @@ class DisplayedValue:
 
     @property
     def apparent_unit(self) -> Unit:
-        """The unit named in the answer, else the one that its decimals give away."""
+        """The unit named in the answer, else the one inferred from the number of decimals."""
         guess = Unit.INCH if self.decimals >= INCH_DECIMALS else Unit.MM
         return self.unit or guess
 
 
 @dataclass(frozen=True, slots=True)
 class GaugeState:
-    """The settings that falsify readings if they are wrong, or the zero if they change.
+    """The settings that make readings wrong, or the zero void if they change.
 
-    None where the protocol, or this instrument, does not say.
+    None where the protocol or the instrument does not report a setting.
     """
 
     identification: str | None = None
@@ -129,7 +124,7 @@ class GaugeState:
     battery_low: bool | None = field(default=None, compare=False)
 
     def changes_since(self, before: GaugeState) -> tuple[str, ...]:
-        """Each setting that differs from what was known ``before``, in words."""
+        """Each setting that differs from the known one ``before``, as text."""
         found = []
         for setting in fields(self):
             old, new = getattr(before, setting.name), getattr(self, setting.name)

@@ -1,4 +1,4 @@
-"""What all dial indicators on serial lines share: opening, agreed readings, checks."""
+"""Base class of all dial indicators on serial lines: opening, reading twice, checking settings."""
 
 from __future__ import annotations
 
@@ -22,17 +22,17 @@ from drivers.serial.shared_port import SharedSerialPort, SharedSerialPorts
 from hexacell.cell.devices import GaugeSettings
 from hexacell.errors import DeviceError, FileError
 
-AGREEMENT_MM = 0.05  # readings in a row closer than this agree: noise, no flipped digit
-MAX_READINGS = 12  # enough for a ball that still swings to come to rest
+AGREEMENT_MM = 0.05  # consecutive readings closer than this agree; a garbled digit differs by more
+MAX_READINGS = 12  # enough for an oscillating ball to come to rest
 TRIES = 3
 
 Parsed = TypeVar("Parsed")
 
 
 class SerialGauge(ABC):
-    """A :class:`drivers.interfaces.Gauge` on a serial line. A protocol is a subclass.
+    """A :class:`drivers.interfaces.Gauge` on a serial line; each protocol is a subclass.
 
-    Values are what the instrument shows, mm, in its own zero and direction.
+    Values are as displayed, mm, in the instrument's own zero and direction.
     """
 
     spec: ClassVar[ProtocolSpec]
@@ -41,77 +41,77 @@ class SerialGauge(ABC):
     def __init__(self, settings: GaugeSettings, ports: SharedSerialPorts) -> None:
         self.settings = settings
         self.subject = f"gauge {settings.name}"
-        self._links = ports
-        self._link: SharedSerialPort | None = None
+        self._ports = ports
+        self._port: SharedSerialPort | None = None
         self._session = 0
         self._state: GaugeState | None = None
         self._void: ZeroVoid | None = None
 
     @property
     def name(self) -> str:
-        """The name the cell file gives it."""
+        """Its name in the cell file."""
         return self.settings.name
 
     @property
     def channel(self) -> int | None:
-        """Its input of a multiplexer whose line it shares; None if the line is its own."""
+        """Its input of a shared multiplexer; None if it uses the line alone."""
         return None
 
     @property
     @abstractmethod
     def value_request(self) -> bytes:
-        """What asks for the value shown."""
+        """The request for the displayed value."""
 
     @abstractmethod
-    def _understand(self, frame: bytes) -> DisplayedValue:
-        """The value in an answer to the question; raises FrameRejected or a DeviceError."""
+    def _parse_value(self, frame: bytes) -> DisplayedValue:
+        """The value in the answer; raises FrameRejected or a DeviceError."""
 
     @abstractmethod
-    async def _inspect(self) -> GaugeState:
-        """Ask the instrument what it is set to."""
+    async def _read_state(self) -> GaugeState:
+        """Query the settings of the instrument."""
 
     async def open(self) -> DeviceIdentity:
         """Connect, identify, and refuse inches, hold, peak modes and a low battery.
 
         Raises:
-            DeviceError: The port or the instrument is absent, wrongly set, or no such instrument.
-            FileError: The port's settings are refused, or another gauge has the port.
+            DeviceError: The port or the instrument is absent, has wrong settings, or is of another type.
+            FileError: The settings of the port are refused, or another gauge uses it.
         """
         self._state = self._void = None
         try:
             await self._connect()
-            state = await self._inspect_awake()
-            self._refuse(state)
+            state = await self._read_state_when_awake()
+            self._require_usable(state)
         except BaseException:
             await self.close()
             raise
         self._state = state
-        description = state.identification or self.spec.makers
+        description = state.identification or self.spec.vendors
         return DeviceIdentity(self.name, self.spec.protocol, description)
 
     async def read(self) -> GaugeReading:
-        """The value shown, mm, once two readings in a row agree.
+        """The displayed value, mm, as soon as two consecutive readings agree.
 
         Raises:
             GaugeAtEnd: The plunger is at an end of its travel.
-            GaugeUnsteady: No two readings in a row agree.
-            ZeroVoid: The instrument or its port was off in between; open it again.
-            DeviceError: It is silent, answers nonsense or in inches, or is not open.
+            GaugeUnsteady: No two consecutive readings agree.
+            ZeroVoid: The instrument or its port was off meanwhile; open it again.
+            DeviceError: No answer, a garbled one, inches, or not open.
         """
         self._opened_state()
-        readings = [self._in_mm(await self._shown())]
+        readings = [self._in_mm(await self._read_value())]
         while len(readings) < MAX_READINGS:
-            readings.append(self._in_mm(await self._shown()))
+            readings.append(self._in_mm(await self._read_value()))
             if abs(readings[-1].value - readings[-2].value) <= AGREEMENT_MM:
                 return GaugeReading(readings[-1].value, readings[-1].text)
         raise GaugeUnsteady(
-            f"readings do not agree: {', '.join(shown.text for shown in readings)}",
+            f"readings do not agree: {', '.join(displayed.text for displayed in readings)}",
             subject=self.subject,
             action="Wait until it stands still; if it does, check its cable",
         )
 
     async def read_once(self) -> GaugeReading:
-        """The value shown in this moment, mm, moving or not: one question, no second opinion.
+        """The value displayed at this moment, mm, from a single query.
 
         Raises:
             GaugeAtEnd: The plunger is at an end of its travel.
@@ -120,83 +120,83 @@ class SerialGauge(ABC):
         """
         self._opened_state()
         try:
-            shown = self._in_mm(self._understand(await self._ask(self.value_request)))
+            displayed = self._in_mm(self._parse_value(await self._ask(self.value_request)))
         except FrameRejected as rejection:
-            self._distrust()
+            self._require_silence()
             raise unexpected_answer(self.subject, self.spec, rejection.frame) from rejection
-        return GaugeReading(shown.value, shown.text)
+        return GaugeReading(displayed.value, displayed.text)
 
     async def check(self) -> None:
-        """Ask for the settings again and compare them with those found by ``open``.
+        """Query the settings again and compare them with those found by ``open``.
 
         Raises:
-            ZeroVoid: One of them has changed, or the instrument was off in between.
-            DeviceError: It is silent, or now in a unit or mode that falsifies readings.
+            ZeroVoid: One of them has changed, or the instrument was off meanwhile.
+            DeviceError: No answer, or a unit or mode that makes readings wrong.
         """
         before = self._opened_state()
-        now = await self._inspect()
-        self._refuse(now)
+        now = await self._read_state()
+        self._require_usable(now)
         if changes := now.changes_since(before):
             raise self._voided(f"was set differently: {', '.join(changes)}")
 
     async def close(self) -> None:
-        """Let the line go; closing twice is harmless."""
-        link, self._link, self._state = self._link, None, None
-        if link is not None:
-            await self._links.release(link.url, self.name)
+        """Release the port; closing twice is harmless."""
+        port, self._port, self._state = self._port, None, None
+        if port is not None:
+            await self._ports.release(port.url, self.name)
 
     async def _connect(self) -> None:
         if self.settings.port is None:
             raise FileError("has no port", subject=self.subject, action="Name it in the cell file")
-        serial = self.spec.line.overlaid(self.settings.serial)
-        link = self._links.acquire(self.settings.port, self.name, serial, channel=self.channel)
-        self._link = link
-        self._session = await link.open()
-        link.take_unsolicited()
+        serial = self.spec.line.merged_with(self.settings.serial)
+        port = self._ports.acquire(self.settings.port, self.name, serial, channel=self.channel)
+        self._port = port
+        self._session = await port.open()
+        port.take_unsolicited()
 
-    async def _inspect_awake(self) -> GaugeState:
+    async def _read_state_when_awake(self) -> GaugeState:
         try:
-            return await self._inspect()
-        except ZeroVoid:  # our question has switched it on; nothing is zeroed yet
+            return await self._read_state()
+        except ZeroVoid:  # the request has switched it on; it is not zeroed yet
             self._void = None
-            return await self._inspect()
+            return await self._read_state()
 
-    async def _shown(self) -> DisplayedValue:
-        return await self._query(self.value_request, self._understand)
+    async def _read_value(self) -> DisplayedValue:
+        return await self._query(self.value_request, self._parse_value)
 
     async def _query(self, request: bytes, parse: Callable[[bytes], Parsed]) -> Parsed:
-        """What ``parse`` finds in the answer; asked again if it rejects the frame."""
+        """The parsed answer; the request is repeated if ``parse`` rejects the frame."""
         received = b""
         for _ in range(TRIES):
             try:
                 return parse(await self._ask(request))
             except FrameRejected as rejection:
                 received = rejection.frame
-                self._distrust()
-        raise self._nonsense(received)
+                self._require_silence()
+        raise self._garbled(received)
 
     async def _ask(self, request: bytes) -> bytes:
-        link = self._live_link()
+        port = self._open_port()
         try:
-            return await link.exchange(request, TERMINATOR, self.settings.timeout_s)
+            return await port.exchange(request, TERMINATOR, self.settings.timeout_s)
         except NoAnswer as missing:
-            if beside := missing.received.replace(request, b"").strip():
-                raise FrameRejected(beside) from missing
+            if other_bytes := missing.received.replace(request, b"").strip():
+                raise FrameRejected(other_bytes) from missing
             echo = bool(missing.received)
-            raise silent_gauge(self.subject, link.url, self.settings.timeout_s, echo=echo) from missing
+            raise silent_gauge(self.subject, port.url, self.settings.timeout_s, echo=echo) from missing
 
-    def _distrust(self) -> None:
-        self._live_link().require_silence()
+    def _require_silence(self) -> None:
+        self._open_port().require_silence()
 
-    def _nonsense(self, received: bytes) -> DeviceError:
+    def _garbled(self, received: bytes) -> DeviceError:
         return unexpected_answer(self.subject, self.spec, received)
 
-    def _in_mm(self, shown: DisplayedValue) -> DisplayedValue:
-        if shown.apparent_unit is Unit.INCH:
+    def _in_mm(self, displayed: DisplayedValue) -> DisplayedValue:
+        if displayed.apparent_unit is Unit.INCH:
             raise self._inch()
-        return shown
+        return displayed
 
-    def _refuse(self, state: GaugeState) -> None:
+    def _require_usable(self, state: GaugeState) -> None:
         if state.unit is Unit.INCH:
             raise self._inch()
         if state.hold:
@@ -215,21 +215,21 @@ class SerialGauge(ABC):
         return WrongMode(problem, subject=self.subject, action=action)
 
     def _voided(self, problem: str) -> ZeroVoid:
-        """The error to raise, now and at every later reading until it is opened again."""
+        """The error to raise, now and by every later reading until it is opened again."""
         self._void = ZeroVoid(problem, subject=self.subject, action="Open it again and zero anew")
         return self._void
 
     def _opened_state(self) -> GaugeState:
-        self._live_link()
+        self._open_port()
         if self._state is None:
             raise DeviceError("is not open", subject=self.subject)
         return self._state
 
-    def _live_link(self) -> SharedSerialPort:
-        if self._link is None:
+    def _open_port(self) -> SharedSerialPort:
+        if self._port is None:
             raise DeviceError("is not open", subject=self.subject)
         if self._void is not None:
             raise self._void
-        if self._link.open_count != self._session:
-            raise self._voided("lost its port in between")
-        return self._link
+        if self._port.open_count != self._session:
+            raise self._voided("lost its port meanwhile")
+        return self._port

@@ -1,10 +1,10 @@
 """Sylvac opto-RS duplex: also Kaefer, Teclock and TESA indicators with that interface.
 
-Line 4800 baud 7E2. ``?`` asks for the value: sign or blank, digits, and ``<``, ``=`` or ``>`` while
-tolerances are shown. The unit is not part of it and is asked with ``UNI?``. ``ERR0`` is overspeed or
-the sensor, ``ERR1`` an unknown command, ``ERR2`` wrong parity, ``ERR3`` a plunger out of its range
-(Sylvac opto-RS instructions; the settings' answers from the Z-Cal, Hi-Cal and S-Mike manuals). An
-identification that nobody asked for follows switching on.
+Line 4800 baud 7E2. ``?`` requests the value: sign or blank, digits, and ``<``, ``=`` or ``>`` while
+tolerances are displayed. The unit is not part of it and is requested with ``UNI?``. ``ERR0`` is
+overspeed or the sensor, ``ERR1`` an unknown command, ``ERR2`` wrong parity, ``ERR3`` a plunger out of
+its range (Sylvac opto-RS instructions; the answers to settings from the Z-Cal, Hi-Cal and S-Mike
+manuals). After switching on, the instrument sends its identification without a request.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ POWER_UP = re.compile(rb"(?<![A-Z])[A-Z]{2}\d{2,}[\w.]*\r")  # maker, instrument
 
 
 class SylvacError(Enum):
-    """An error that the instrument reports instead of an answer."""
+    """The error frames of the instrument."""
 
     SENSOR = b"ERR0\r"
     COMMAND = b"ERR1\r"
@@ -38,7 +38,7 @@ ERROR_FRAMES = frozenset(fault.value for fault in SylvacError)
 
 @dataclass(frozen=True, slots=True)
 class Query:
-    """A setting: what asks for it, and its answer with the setting as the only group."""
+    """A setting: its request, and the pattern of its answer with the setting as the only group."""
 
     command: bytes
     answer: re.Pattern[bytes]
@@ -47,7 +47,7 @@ class Query:
         """The setting in ``frame``; None if the instrument does not know the command.
 
         Raises:
-            FrameRejected: The frame is no answer to this query.
+            FrameRejected: The frame is no answer to this request.
         """
         if frame == SylvacError.COMMAND.value:
             return None
@@ -67,7 +67,7 @@ BATTERY = Query(b"BAT?\r", re.compile(rb"(?:BAT ?)?([01])\r"))
 
 
 def parse_value(frame: bytes) -> DisplayedValue | SylvacError:
-    """What an answer to ``?`` says.
+    """The value or the error in an answer to ``?``.
 
     Raises:
         FrameRejected: The frame is neither a value nor an error, to the last byte.
@@ -83,7 +83,7 @@ def parse_value(frame: bytes) -> DisplayedValue | SylvacError:
 class SylvacGauge(SerialGauge):
     """A dial indicator that speaks Sylvac's opto-RS duplex protocol."""
 
-    # duplex cables are fed by DTR high and RTS low
+    # duplex cables are powered by DTR high and RTS low
     spec: ClassVar[ProtocolSpec] = ProtocolSpec(
         "sylvac", "Sylvac opto-RS indicator", LineSettings(4800, 7, "E", 2, rts=False), "+12.345\r"
     )
@@ -91,23 +91,23 @@ class SylvacGauge(SerialGauge):
 
     @property
     def value_request(self) -> bytes:
-        """What asks for the value shown."""
+        """The request for the displayed value."""
         return VALUE_REQUEST
 
-    def _understand(self, frame: bytes) -> DisplayedValue:
+    def _parse_value(self, frame: bytes) -> DisplayedValue:
         match parse_value(frame):
-            case DisplayedValue() as shown:
-                return shown
+            case DisplayedValue() as displayed:
+                return displayed
             case SylvacError.RANGE:
                 raise GaugeAtEnd(
                     "plunger at its end (ERR3)", subject=self.subject, action="Move the gauge or the ball"
                 )
             case SylvacError.SENSOR:
                 raise self._voided("moved too fast or its sensor fails (ERR0)")
-            case _:  # our question did not reach it as sent
+            case _:  # the request was garbled on its way
                 raise FrameRejected(frame)
 
-    async def _inspect(self) -> GaugeState:
+    async def _read_state(self) -> GaugeState:
         unit = await self._query(UNIT.command, UNIT.parse)
         if unit is None:
             raise DeviceError(
@@ -126,21 +126,21 @@ class SylvacGauge(SerialGauge):
 
     async def _ask(self, request: bytes) -> bytes:
         frame = await super()._ask(request)
-        unasked = self._live_link().take_unsolicited()
-        unasked += frame if request != IDENTIFICATION.command else b""
-        if power_up := POWER_UP.search(unasked):
-            self._distrust()
+        unsolicited = self._open_port().take_unsolicited()
+        unsolicited += frame if request != IDENTIFICATION.command else b""
+        if power_up := POWER_UP.search(unsolicited):
+            self._require_silence()
             raise self._voided(f"was switched on again ({power_up[0]!r})")
         return frame
 
-    def _nonsense(self, received: bytes) -> DeviceError:
+    def _garbled(self, received: bytes) -> DeviceError:
         if received == SylvacError.PARITY.value:
             return WrongAnswer(
-                "hears our questions with wrong parity (ERR2)",
+                "receives requests with wrong parity (ERR2)",
                 subject=self.subject,
                 action=f"Check parity settings: {self.spec.protocol} uses {self.spec.line}",
             )
-        return super()._nonsense(received)
+        return super()._garbled(received)
 
 
 def _flag(setting: str | None, when: str) -> bool | None:

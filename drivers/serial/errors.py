@@ -1,4 +1,4 @@
-"""What can be wrong with a port, in words that say what to do next."""
+"""Errors of serial ports: each function builds one, with the next action."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _CAUSES = {
 
 
 class PortLost(DeviceError):
-    """There is no line to a device, or it broke."""
+    """A port is not available, or was lost."""
 
 
 def port_open_failed(subject: str, url: str, error: BaseException) -> DeviceError:
@@ -31,7 +31,7 @@ def port_open_failed(subject: str, url: str, error: BaseException) -> DeviceErro
 
 
 def settings_rejected(subject: str, url: str, error: BaseException) -> FileError:
-    """The URL or one of the settings means nothing to pyserial."""
+    """The URL or one of the settings is not accepted by pyserial."""
     return FileError(
         f"port {url} or its serial settings are refused: {error}",
         subject=subject,
@@ -40,7 +40,7 @@ def settings_rejected(subject: str, url: str, error: BaseException) -> FileError
 
 
 def port_lost(subject: str, url: str, reason: str) -> DeviceError:
-    """The port was there and is no longer."""
+    """An open port is gone."""
     return PortLost(
         f"port {url} was lost ({reason})",
         subject=subject,
@@ -49,12 +49,12 @@ def port_lost(subject: str, url: str, reason: str) -> DeviceError:
 
 
 def port_closed(subject: str, url: str) -> DeviceError:
-    """The port is being closed, by ourselves."""
+    """The port is closed, or being closed, by this program."""
     return PortLost(f"port {url} is closed", subject=subject)
 
 
 def line_not_silent(subject: str, url: str) -> DeviceError:
-    """The device never falls silent, so no answer can be told from the rest."""
+    """The device sends continuously, so an answer cannot be recognised."""
     return DeviceError(
         f"the device on {url} keeps sending unasked",
         subject=subject,

@@ -1,9 +1,7 @@
-"""The blocking side of a serial line. All of it runs in the line's one owner thread.
+"""A serial port with blocking request-response exchanges; all calls come from one thread.
 
-Nothing here waits longer than :data:`SLICE_S` at a time without looking whether the line is to be
-closed, except the opening of a network port, which pyserial bounds to five seconds.
-
-Cutting frames out of what a line delivers; pure functions on bytes.
+No wait is longer than :data:`SLICE_S` without a check whether the port is to be closed, except the
+opening of a network port, which pyserial limits to five seconds.
 """
 
 from __future__ import annotations
@@ -34,12 +32,12 @@ WORST_LATENCY_S = 2.0
 FRAME_GAP_S = 0.1
 FRAME_LIMIT = 256
 CHUNK_LIMIT = 4096
-PATIENCE = 5  # how many times the silence it needs a line may take to fall silent
+SILENCE_ATTEMPTS = 5  # a line may take this many times the required silence to become silent
 OPEN_TRIES = 5
 
 
 class NoAnswer(DeviceError):
-    """No whole frame came in time; ``received`` is what did come, the command's echo included."""
+    """No complete frame in time; ``received`` is what came, the echo of the request included."""
 
     def __init__(self, problem: str, *, subject: str, received: bytes) -> None:
         self.received = received
@@ -47,7 +45,7 @@ class NoAnswer(DeviceError):
 
 
 class SerialPort:
-    """One serial port: questions and answers, kept in step.
+    """One serial port: requests and their responses, kept synchronized.
 
     An answer that comes too late must never pass for the answer to the next question. So after a
     time-out nothing is asked until the line has been silent for ``worst_latency_s`` since, and
@@ -73,39 +71,39 @@ class SerialPort:
         self._asked_at = 0.0
         self._last_traffic = 0.0
         self._silence_s = 0.0
-        self._early = b""
+        self._surplus = b""
 
     def open(self) -> int:
-        """Open the port unless it is open and alive; the number of its session, counted from 1.
+        """Open the port unless it is open and usable; how often it has been opened.
 
         Raises:
             DeviceError: The port is absent, in use, or refused.
-            FileError: pyserial does not know the URL or a setting.
+            FileError: pyserial does not accept the URL or a setting.
         """
         if self._port is not None and not self._is_alive(self._port):
             self.close()
         if self._port is None:
             self._port = self._opened()
             self.open_count += 1
-            self._silence_s, self._early = 0.0, b""
+            self._silence_s, self._surplus = 0.0, b""
         return self.open_count
 
     def exchange(self, request: bytes, terminator: bytes, timeout_s: float) -> bytes:
-        """Send ``request``; the first whole frame that answers it, ``terminator`` included.
+        """Send ``request``; the first complete frame after it, ``terminator`` included.
 
         Raises:
-            NoAnswer: Nothing, or no whole frame, within ``timeout_s``.
+            NoAnswer: No complete frame within ``timeout_s``.
             DeviceError: The port is not open, was lost, or is being closed.
         """
         if self._port is None:
             raise port_lost(self.subject, self.url, "it is not open")
-        with self._losing_the_port():
+        with self._port_errors():
             self._resynchronise(self._port)
             self._send(self._port, request)
             return self._frame(self._port, request, terminator, timeout_s)
 
     def require_silence(self) -> None:
-        """Have the line fall silent for a moment before the next question."""
+        """Wait for a short silence of the line before the next request."""
         self._silence_s = max(self._silence_s, FRAME_GAP_S)
 
     def close(self) -> None:
@@ -115,21 +113,21 @@ class SerialPort:
             self._port = None
 
     def _is_alive(self, port: serial.Serial) -> bool:
-        """Whether it is still there: a port may have been unplugged while nobody used it."""
+        """Whether it still exists: it may have been unplugged while it was not used."""
         try:
-            if port.in_waiting:  # also what a connection says that the far side has ended
-                self._put_aside(self._read(port))
+            if port.in_waiting:  # also true where the other end closed the connection
+                self._keep_unsolicited(self._read(port))
         except (OSError, termios.error):
             return False
         return True
 
     def _opened(self) -> serial.Serial:
-        tries = 0
+        attempts = 0
         try:
             port = self._configured()
             while not port.is_open:
-                tries += 1
-                self._try_to_open(port, last=tries == OPEN_TRIES)
+                attempts += 1
+                self._try_to_open(port, last=attempts == OPEN_TRIES)
         except (ValueError, TypeError) as error:
             raise settings_rejected(self.subject, self.url, error) from error
         except (OSError, termios.error) as error:
@@ -142,7 +140,7 @@ class SerialPort:
         except termios.error as error:
             if last or not _refuses_parity(error):
                 raise
-            self._pause(SLICE_S)
+            self._sleep(SLICE_S)
 
     def _configured(self) -> serial.Serial:
         lines = {name: value for name, value in self._settings.items() if name in {"dtr", "rts"}}
@@ -155,17 +153,17 @@ class SerialPort:
         return port
 
     def _resynchronise(self, port: serial.Serial) -> None:
-        """Read away what nobody asked for, until it is certain that no more of it comes."""
-        self._put_aside(self._early)
-        self._early = b""
-        give_up_at = time.monotonic() + PATIENCE * max(self._silence_s, FRAME_GAP_S)
+        """Read unsolicited bytes until the line has been silent as long as required."""
+        self._keep_unsolicited(self._surplus)
+        self._surplus = b""
+        deadline = time.monotonic() + SILENCE_ATTEMPTS * max(self._silence_s, FRAME_GAP_S)
         while self._since_traffic_s() < self._silence_s or port.in_waiting:
-            if time.monotonic() > give_up_at:
+            if time.monotonic() > deadline:
                 raise line_not_silent(self.subject, self.url)
-            self._put_aside(self._read(port))
+            self._keep_unsolicited(self._read(port))
         self._silence_s = 0.0
 
-    def _put_aside(self, data: bytes) -> None:
+    def _keep_unsolicited(self, data: bytes) -> None:
         if data.strip(LINE_ENDS):
             self.unsolicited.append(data)
             self.require_silence()
@@ -178,7 +176,7 @@ class SerialPort:
         while len(received) <= FRAME_LIMIT and time.monotonic() < self._asked_at + timeout_s:
             received += self._read(port)
             if cut := cut_frame(received, request, terminator):
-                frame, self._early = cut
+                frame, self._surplus = cut
                 return frame
         self._silence_s = self._worst_latency_s
         raise NoAnswer(
@@ -186,7 +184,7 @@ class SerialPort:
         )
 
     def _read(self, port: serial.Serial) -> bytes:
-        """Whatever comes within one slice, perhaps nothing."""
+        """The bytes that come within one slice, possibly none."""
         if self.closing.is_set():
             raise port_closed(self.subject, self.url)
         data = port.read(1)
@@ -197,7 +195,7 @@ class SerialPort:
         return data
 
     def _waiting(self, port: serial.Serial) -> bytes:
-        """What has come already."""
+        """The bytes that are in the buffer already."""
         data = b""
         while len(data) < CHUNK_LIMIT and (count := port.in_waiting):
             data += port.read(count)
@@ -208,8 +206,8 @@ class SerialPort:
             raise port_closed(self.subject, self.url)
         self._record(TrafficDirection.SENT, request)
         self._asked_at = self._last_traffic = time.monotonic()
-        # pyserial raises it also where all was sent and this thread then got no turn for so long;
-        # whether anybody heard, the answer tells.
+        # pyserial also raises it if all was sent and this thread was then not scheduled for so long;
+        # the response shows whether the request arrived.
         with suppress(serial.SerialTimeoutException):
             port.write(request)
 
@@ -217,12 +215,12 @@ class SerialPort:
         if data and self._recorder is not None:
             self._recorder(TraceEntry(time.time(), self.url, direction, data))
 
-    def _pause(self, seconds: float) -> None:
+    def _sleep(self, seconds: float) -> None:
         if self.closing.wait(seconds):
             raise port_closed(self.subject, self.url)
 
     @contextmanager
-    def _losing_the_port(self) -> Iterator[None]:
+    def _port_errors(self) -> Iterator[None]:
         try:
             yield
         except (OSError, termios.error) as error:
@@ -231,7 +229,7 @@ class SerialPort:
 
 
 def _refuses_parity(error: termios.error) -> bool:
-    """A pseudo-terminal carries no parity and says so until its server has reset its speed.
+    """Whether a pseudo-terminal refused parity, as it does until its server has reset its speed.
 
     glibc's ``tcsetattr`` succeeds if it changed anything at all, so the first open passes and the
     next one, with nothing left to change, fails (pyserial issue 196).
@@ -252,10 +250,10 @@ LINE_ENDS = b"\r\n"
 
 
 def cut_frame(received: bytes, request: bytes, terminator: bytes) -> tuple[bytes, bytes] | None:
-    """The first whole frame in ``received``, ``terminator`` included, and the bytes behind it.
+    """The first complete frame in ``received``, ``terminator`` included, and the bytes after it.
 
-    Line ends before the frame are left out (some devices end lines with more than they document),
-    and so is the echo of ``request`` that some devices send. None as long as no frame is whole.
+    Line ends before the frame are removed, since some devices send more of them than documented, and
+    so is the echo of ``request`` that some devices send. None as long as no frame is complete.
     """
     body = received.lstrip(LINE_ENDS).removeprefix(request).lstrip(LINE_ENDS)
     head, end, rest = body.partition(terminator)

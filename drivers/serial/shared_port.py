@@ -1,4 +1,4 @@
-"""Serial lines behind coroutines: one owner thread a port, shared by the gauges on it."""
+"""Serial ports as coroutines: one worker thread a port, shared by the gauges on it."""
 
 from __future__ import annotations
 
@@ -18,14 +18,13 @@ Result = TypeVar("Result")
 
 
 class SharedSerialPort:
-    """A serial port that one thread owns and any coroutine of one event loop may use.
+    """A serial port used by one thread, on behalf of any coroutine of one event loop.
 
-    ``url`` is anything that ``serial.serial_for_url`` takes, ``serial_settings`` go to it unchanged,
-    except ``dtr`` and ``rts``, which set those lines, and time-outs, which are this class's own.
+    ``url`` and ``serial_settings`` are passed to ``serial.serial_for_url``, except ``dtr`` and ``rts``,
+    which set those lines. Time-outs are set by this class.
 
-    Exchanges run one after the other. A coroutine that is cancelled leaves its exchange to run out
-    in the thread before the next one begins, so the line stays in step; one that had not begun never
-    does.
+    Exchanges run one after another. If a coroutine is cancelled, its exchange still ends in the thread
+    before the next one begins, so the line stays synchronized; a waiting exchange is dropped.
     """
 
     def __init__(
@@ -37,115 +36,115 @@ class SharedSerialPort:
         **serial_settings: object,
     ) -> None:
         self.url = url
-        self._wire = SerialPort(url, serial_settings, trace, worst_latency_s)
-        self._owner = ThreadPoolExecutor(1, thread_name_prefix=f"serial {url}")
+        self._port = SerialPort(url, serial_settings, trace, worst_latency_s)
+        self._worker = ThreadPoolExecutor(1, thread_name_prefix=f"serial {url}")
         self._closed = False
 
     @property
     def subject(self) -> str:
-        """Who is named when the port fails."""
-        return self._wire.subject
+        """The subject of error messages."""
+        return self._port.subject
 
     @subject.setter
     def subject(self, subject: str) -> None:
-        self._wire.subject = subject
+        self._port.subject = subject
 
     @property
     def open_count(self) -> int:
-        """How often the port has been opened: it grows when it was lost and opened again."""
-        return self._wire.open_count
+        """How often the port has been opened; it grows with every reconnection."""
+        return self._port.open_count
 
     async def open(self) -> int:
-        """Open the port unless it is open and alive; the number of its session.
+        """Open the port unless it is open and usable; how often it has been opened.
 
         Raises:
             DeviceError: The port is absent, in use, or refused.
-            FileError: The URL or a setting means nothing to pyserial.
+            FileError: pyserial does not accept the URL or a setting.
         """
-        return await self._run(self._wire.open)
+        return await self._run(self._port.open)
 
     async def exchange(self, request: bytes, terminator: bytes, timeout_s: float) -> bytes:
-        """Send ``request`` and return the first whole frame, ``terminator`` included.
+        """Send ``request`` and return the first complete frame, ``terminator`` included.
 
-        Leading line ends and an echo of the request are left out.
+        Leading line ends and an echo of the request are removed.
 
         Raises:
-            NoAnswer: Nothing, or no whole frame, within ``timeout_s``. The next exchange then waits
-                until nothing more can come of this one.
-            DeviceError: The port was lost, or is closed, or never falls silent.
+            NoAnswer: No complete frame within ``timeout_s``. The next exchange then waits until no
+                late response can come.
+            DeviceError: The port was lost or is closed, or the device sends continuously.
         """
-        return await self._run(partial(self._wire.exchange, request, terminator, timeout_s))
+        return await self._run(partial(self._port.exchange, request, terminator, timeout_s))
 
     def require_silence(self) -> None:
-        """Have the line fall silent for a moment before the next exchange: the last frame was bad."""
+        """Wait for a short silence before the next exchange, after a garbled frame."""
         if not self._closed:
-            self._owner.submit(self._wire.require_silence)
+            self._worker.submit(self._port.require_silence)
 
     def take_unsolicited(self) -> bytes:
-        """What came unasked or too late since this was last called; the latest bytes only."""
-        strays = self._wire.unsolicited
+        """The bytes that came without a request or too late since the last call; the latest ones only."""
+        strays = self._port.unsolicited
         return b"".join(strays.popleft() for _ in range(len(strays)))
 
     async def close(self) -> None:
-        """Close the port and end its thread, at the latest after 200 ms; twice is harmless."""
+        """Close the port and end its thread within 200 ms; closing twice is harmless."""
         if self._closed:
             return
         self._closed = True
-        self._wire.closing.set()
-        finished = self._owner.submit(self._wire.close)
-        self._owner.shutdown(wait=False)
+        self._port.closing.set()
+        finished = self._worker.submit(self._port.close)
+        self._worker.shutdown(wait=False)
         await asyncio.shield(asyncio.wrap_future(finished))
-        self._owner.shutdown()
+        self._worker.shutdown()
 
     async def _run(self, job: Callable[[], Result]) -> Result:
         if self._closed:
             raise port_closed(self.subject, self.url)
-        return await asyncio.wrap_future(self._owner.submit(job))
+        return await asyncio.wrap_future(self._worker.submit(job))
 
 
 @dataclass(slots=True)
-class _Shared:
-    """A link, the settings it was made with, and the channel of every gauge that holds it."""
+class _PortUsers:
+    """A port, its settings, and the channel of every gauge that uses it."""
 
-    link: SharedSerialPort
+    port: SharedSerialPort
     settings: Mapping[str, object]
     channels: dict[str, int | None] = field(default_factory=dict)
 
     def name_subject(self) -> None:
         names = sorted(self.channels)
-        self.link.subject = f"gauge {names[0]}" if len(names) == 1 else f"gauges {', '.join(names)}"
+        self.port.subject = f"gauge {names[0]}" if len(names) == 1 else f"gauges {', '.join(names)}"
 
 
 class SharedSerialPorts:
-    """The links of one cell: gauges on one port share one link."""
+    """The serial ports of one cell; gauges behind one multiplexer share a port."""
 
     def __init__(
         self, *, trace: TraceRecorder | None = None, worst_latency_s: float = WORST_LATENCY_S
     ) -> None:
         self._trace = trace
         self._worst_latency_s = worst_latency_s
-        self._shared: dict[str, _Shared] = {}
+        self._shared: dict[str, _PortUsers] = {}
 
     def acquire(
         self, url: str, gauge: str, settings: Mapping[str, object], *, channel: int | None = None
     ) -> SharedSerialPort:
-        """The link to ``url``, not yet opened if ``gauge`` is the first to ask for it.
+        """The port at ``url``, not opened yet if ``gauge`` is the first one to use it.
 
-        ``channel`` tells gauges that share a multiplexer apart; None means the port is the gauge's
-        alone. To be followed by :meth:`release`.
+        ``channel`` is the gauge's input of a multiplexer; None if the gauge uses the port alone. Must be
+        followed by :meth:`release`.
 
         Raises:
-            FileError: Another gauge has the port with other settings, alone, or on this channel.
+            FileError: Another gauge uses the port with other settings, alone, or on this channel.
         """
-        shared = self._shared.get(url) or _Shared(self._make(url, settings), settings)
-        self._refuse_conflict(url, shared, gauge, settings, channel)
+        shared = self._shared.get(url) or _PortUsers(self._make(url, settings), settings)
+        self._require_no_conflict(url, shared, gauge, settings, channel)
         self._shared[url] = shared
         shared.channels[gauge] = channel
         shared.name_subject()
-        return shared.link
+        return shared.port
 
     async def release(self, url: str, gauge: str) -> None:
-        """Give the link back; the last gauge to do so closes it. Twice is harmless."""
+        """Stop using the port; the last gauge closes it. Releasing twice is harmless."""
         shared = self._shared.get(url)
         if shared is None or gauge not in shared.channels:
             return
@@ -153,25 +152,25 @@ class SharedSerialPorts:
         if shared.channels:
             shared.name_subject()
         else:
-            await self._shared.pop(url).link.close()
+            await self._shared.pop(url).port.close()
 
     async def close(self) -> None:
-        """Close every link, whoever still holds it."""
-        links = [shared.link for shared in self._shared.values()]
+        """Close every port, used or not."""
+        ports = [shared.port for shared in self._shared.values()]
         self._shared.clear()
-        await asyncio.gather(*(link.close() for link in links))
+        await asyncio.gather(*(port.close() for port in ports))
 
     def _make(self, url: str, settings: Mapping[str, object]) -> SharedSerialPort:
         try:
             return SharedSerialPort(
                 url, trace=self._trace, worst_latency_s=self._worst_latency_s, **settings
             )
-        except TypeError as error:  # a setting has the name of one of ours
+        except TypeError as error:  # a setting has the name of an own parameter
             raise settings_rejected(f"port {url}", url, error) from error
 
     @staticmethod
-    def _refuse_conflict(
-        url: str, shared: _Shared, gauge: str, settings: Mapping[str, object], channel: int | None
+    def _require_no_conflict(
+        url: str, shared: _PortUsers, gauge: str, settings: Mapping[str, object], channel: int | None
     ) -> None:
         others = {name: taken for name, taken in shared.channels.items() if name != gauge}
         if not others:

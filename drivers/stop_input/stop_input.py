@@ -1,9 +1,9 @@
-"""The stop line: a contact or a file by which anybody may forbid motion.
+"""Stop inputs: a contact or a file that forbids motion.
 
-The contact joins an output of an otherwise unused serial port with one of its inputs, DTR with DSR
-(or RTS with CTS), and is closed while motion is allowed, as in an emergency stop's chain. A button
-that opens it, a broken wire and an adapter that was pulled out are then the same: stop. The file is
-for other programs, and for cells without such a contact: while it exists, nothing moves.
+The contact connects an output of an otherwise unused serial port with one of its inputs, DTR with DSR
+(or RTS with CTS). It is closed while motion is allowed, as in an emergency stop circuit: a button
+that opens it, a broken wire and an unplugged adapter all forbid motion. The file is for other
+programs, and for cells without such a contact: while it exists, nothing moves.
 """
 
 from __future__ import annotations
@@ -26,25 +26,25 @@ _OUTPUTS = {"dsr": "DTR", "cts": "RTS"}
 
 
 class StopSource(Protocol):
-    """One way to forbid motion; ``device`` is what it is wired to, if it is wired at all."""
+    """One source that can forbid motion; ``device`` is the port and line it is wired to, if any."""
 
     device: str
 
     def open(self) -> None:
-        """Get ready."""
+        """Connect."""
         ...
 
     def active_reason(self) -> str | None:
-        """Why nothing may move, or nothing."""
+        """Why motion is forbidden, or nothing."""
         ...
 
     def close(self) -> None:
-        """Let it go."""
+        """Release it."""
         ...
 
 
 class StopFile:
-    """Forbids motion while a file exists, or while nobody can tell whether it does."""
+    """Forbids motion while a file exists, or while that cannot be determined."""
 
     device = ""
 
@@ -55,13 +55,13 @@ class StopFile:
         """Nothing to do."""
 
     def active_reason(self) -> str | None:
-        """Whether the file is there."""
+        """The reason, if the file exists."""
         try:
             self._path.lstat()
         except FileNotFoundError:
             return None
         except OSError as error:
-            return f"{self._path} cannot be looked at: {error.strerror}"
+            return f"{self._path} cannot be checked: {error.strerror}"
         return f"{self._path} exists"
 
     def close(self) -> None:
@@ -78,11 +78,11 @@ class StopContact:
         self._port: serial.Serial | None = None
 
     def open(self) -> None:
-        """Open the port and feed the contact.
+        """Open the port and set its outputs.
 
         Raises:
             DeviceError: The port is absent, in use, or has no such lines.
-            FileError: The URL means nothing to pyserial.
+            FileError: pyserial does not accept the URL.
         """
         self.close()
         try:
@@ -98,7 +98,7 @@ class StopContact:
             raise port_open_failed(SUBJECT, self._url, error) from error
 
     def active_reason(self) -> str | None:
-        """Whether the contact is open, or the port was lost. The question is one system call."""
+        """The reason, if the contact is open or the port was lost. It takes one system call."""
         if self._port is None:
             return f"its port {self._url} is not open"
         try:
@@ -109,7 +109,7 @@ class StopContact:
         return None if closed else f"the contact between {wire} of {self._url} is open"
 
     def close(self) -> None:
-        """Let the port go; twice is harmless."""
+        """Close the port; closing twice is harmless."""
         port, self._port = self._port, None
         if port is not None:
             with suppress(OSError, termios.error):
@@ -117,42 +117,42 @@ class StopContact:
 
 
 class CombinedStopInput:
-    """A :class:`drivers.interfaces.StopInput` made of contacts: any of them forbids motion."""
+    """A :class:`drivers.interfaces.StopInput` made of several sources: any of them forbids motion."""
 
-    def __init__(self, contacts: Sequence[StopSource] = ()) -> None:
-        self._contacts = tuple(contacts)
+    def __init__(self, sources: Sequence[StopSource] = ()) -> None:
+        self._sources = tuple(sources)
 
     async def open(self) -> DeviceIdentity | None:
-        """Get ready to look at all of them; it may be pressed already. Gives what is wired.
+        """Connect all of them, active or not; the identity names those that are wired.
 
         Raises:
-            HexacellError: One is not to be had.
+            HexacellError: One cannot be connected.
         """
         try:
-            for contact in self._contacts:
-                contact.open()
+            for source in self._sources:
+                source.open()
         except HexacellError:
             await self.close()
             raise
-        devices = [contact.device for contact in self._contacts if contact.device]
+        devices = [source.device for source in self._sources if source.device]
         return DeviceIdentity(SUBJECT, "contact", ", ".join(devices)) if devices else None
 
     async def active_reason(self) -> str | None:
-        """Why nothing may move now, or nothing."""
-        reasons = [contact.active_reason() for contact in self._contacts]
+        """Why motion is forbidden now, or nothing."""
+        reasons = [source.active_reason() for source in self._sources]
         return "; ".join(reason for reason in reasons if reason) or None
 
     async def close(self) -> None:
-        """Let all of them go; twice is harmless."""
-        for contact in self._contacts:
-            contact.close()
+        """Release all of them; closing twice is harmless."""
+        for source in self._sources:
+            source.close()
 
 
 def stop_input_of(settings: GuardSettings, folder: Path) -> CombinedStopInput:
-    """What a cell file in ``folder`` says under [guards]."""
-    contacts: list[StopSource] = []
+    """The stop input of a cell file in ``folder``, from its section [guards]."""
+    sources: list[StopSource] = []
     if settings.stop_file is not None:
-        contacts.append(StopFile(folder / settings.stop_file))
+        sources.append(StopFile(folder / settings.stop_file))
     if settings.stop_port is not None:
-        contacts.append(StopContact(settings.stop_port, settings.stop_contact))
-    return CombinedStopInput(contacts)
+        sources.append(StopContact(settings.stop_port, settings.stop_contact))
+    return CombinedStopInput(sources)

@@ -1,7 +1,7 @@
-"""Whatever the Linux kernel shows as a file with a temperature in millidegrees Celsius.
+"""Thermometers that the Linux kernel provides as files, in millidegrees Celsius.
 
-That is ``temp1_input`` and its like below /sys/class/hwmon (the kernel's
-Documentation/hwmon/sysfs-interface.rst) and ``temperature`` of a DS18B20 and its like below
+Such files are ``temp1_input`` below /sys/class/hwmon (the kernel's
+Documentation/hwmon/sysfs-interface.rst) and ``temperature`` of a DS18B20 below
 /sys/bus/w1/devices (Documentation/w1/slaves/w1_therm.rst). Reading the latter makes the sensor measure,
 which takes up to 750 ms; the file is empty while another measurement is under way.
 """
@@ -23,9 +23,9 @@ PLAUSIBLE_C = (-100.0, 300.0)
 
 
 class SysfsThermometer:
-    """A thermometer behind a file; implements :class:`drivers.interfaces.Thermometer`.
+    """A thermometer read from a file; implements :class:`drivers.interfaces.Thermometer`.
 
-    The kernel may let a read wait. Each thermometer has a thread for that, and one read at a time.
+    A read may block in the kernel. Each thermometer has its own thread, with one read at a time.
     """
 
     def __init__(self, settings: ThermometerSettings) -> None:
@@ -35,7 +35,7 @@ class SysfsThermometer:
 
     @property
     def name(self) -> str:
-        """The name the cell file gives it."""
+        """Its name in the cell file."""
         return self._settings.name
 
     async def open(self) -> DeviceIdentity:
@@ -64,7 +64,7 @@ class SysfsThermometer:
         return TemperatureReading(self._celsius(raw), raw)
 
     async def close(self) -> None:
-        """Let the file go; closing twice is harmless."""
+        """End the thread; closing twice is harmless."""
         thread, self._thread = self._thread, None
         if thread is not None:
             thread.shutdown(wait=self._reading is None or self._reading.done(), cancel_futures=True)
@@ -84,7 +84,7 @@ class SysfsThermometer:
             raise self._error(f"gives no number but {raw!r}") from None
         low, high = PLAUSIBLE_C
         if not low <= celsius <= high:
-            raise self._error(f"gives {celsius:g} deg C, which no thermometer here can have")
+            raise self._error(f"gives {celsius:g} deg C, which is implausible")
         return celsius
 
     def _error(self, problem: str) -> DeviceError:
@@ -94,7 +94,7 @@ class SysfsThermometer:
 
 
 def _content(path: Path) -> str:
-    # Without waiting, should somebody name a pipe; files of the kernel do not mind.
+    # Non-blocking, in case the path is a pipe; it makes no difference for kernel files.
     descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK)
     try:
         return os.read(descriptor, MAX_BYTES).decode("ascii", errors="replace").strip()

@@ -237,7 +237,7 @@ async def test_a_line_lost_and_opened_again_voids_the_zero_of_every_gauge_on_it(
     dialogue.broken = None
     dialogue.expect(first, OPENING[1])
     await one.open()
-    with pytest.raises(ZeroVoid, match="gauge g2: lost its port in between"):
+    with pytest.raises(ZeroVoid, match="gauge g2: lost its port meanwhile"):
         await two.read()
     dialogue.expect(second, OPENING[1], second, second)
     await two.open()

@@ -75,7 +75,7 @@ async def test_a_link_that_leads_nowhere_is_a_file_too(tmp_path: Path) -> None:
 
 async def test_a_file_that_cannot_be_looked_for_forbids(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
-    assert "cannot be looked at" in (StopFile(tmp_path / "file" / "stop").active_reason() or "")
+    assert "cannot be checked" in (StopFile(tmp_path / "file" / "stop").active_reason() or "")
 
 
 @pytest.mark.parametrize("contact", ["dsr", "cts"])

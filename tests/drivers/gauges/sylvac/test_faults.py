@@ -22,7 +22,7 @@ async def test_a_silent_gauge_is_named_with_what_to_do(dialogue, gauge):
 
 async def test_an_echo_alone_is_silence(dialogue, gauge):
     dialogue.expect((b"UNI?\r", b"UNI?\r"))
-    with pytest.raises(GaugeSilent, match="only our own question comes back"):
+    with pytest.raises(GaugeSilent, match="only the echo of the request comes back"):
         await gauge.open()
 
 

@@ -132,7 +132,7 @@ async def test_a_socket_ended_unnoticed_is_opened_again():
         made.rack.clear("x", InjectedGaugeFault.UNPLUGGED)
         await made.gauges["x"].open()
         assert (await made.gauges["x"].read()).value_mm == 1.0
-        with pytest.raises(ZeroVoid, match="gauge y: lost its port in between"):
+        with pytest.raises(ZeroVoid, match="gauge y: lost its port meanwhile"):
             await made.gauges["y"].read()
 
 

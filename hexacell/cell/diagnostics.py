@@ -7,7 +7,7 @@ sentence: what the file says, what it must say, and what to do.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 from pydantic import ValidationError
@@ -41,10 +41,11 @@ Errors = dict[KeyPath, FileError]
 def unsupported_values(document: TomlDocument) -> Errors:
     """Values that TOML allows and a cell file does not: NaN, infinities, dates and times."""
     errors: Errors = {}
-    for path, value in _leaves((), document.data):
+    for path in document.lines:
+        value = document.value(path)
         if isinstance(value, float) and not math.isfinite(value):
             errors[path] = _mismatch(document, path, "a finite number")
-        elif not isinstance(value, str | int | float):
+        elif not isinstance(value, str | int | float | list | dict):
             errors[path] = _mismatch(document, path, "a number or text in quotes")
     return errors
 
@@ -59,17 +60,6 @@ def explain_refusal(document: TomlDocument, refusal: ValidationError) -> Errors:
         context = {"problem": detail["msg"], "action": "Correct it", **detail.get("ctx", {})}
         errors.setdefault(path, _explain_one(document, path, kind, context))
     return errors
-
-
-def _leaves(path: KeyPath, value: object) -> Iterator[tuple[KeyPath, object]]:
-    if isinstance(value, dict):
-        for key, inner in value.items():
-            yield from _leaves((*path, key), inner)
-    elif isinstance(value, list):
-        for number, inner in enumerate(value):
-            yield from _leaves((*path, number), inner)
-    else:
-        yield path, value
 
 
 def _explain_one(document: TomlDocument, path: KeyPath, kind: str, context: Mapping[str, Any]) -> FileError:

@@ -85,8 +85,8 @@ def update_estimate(problem: Problem, before: Identification | None) -> Identifi
     if before is None or poses is None:
         return estimate_online(problem)
     # Undamped steps lead some robots astray while the records leave much open.
-    manner = INCREMENTAL if is_determined(problem) else COARSE
-    found = estimate_online(problem, free=before.free, poses=poses, manner=manner)
+    options = INCREMENTAL if is_determined(problem) else COARSE
+    found = estimate_online(problem, free=before.free, poses=poses, options=options)
     others = _begun_elsewhere(problem)
     while not _is_healthy(problem, found) and (another := next(others, None)):
         better = (another.records, -cost(another)) > (found.records, -cost(found))

@@ -40,7 +40,7 @@ def estimate_online(
     *,
     free: Array | None = None,
     poses: PoseBatch | None = None,
-    manner: SolverOptions = COARSE,
+    options: SolverOptions = COARSE,
 ) -> Identification:
     """Estimate the geometry from the records so far, with the full prior and without any check.
 
@@ -51,7 +51,7 @@ def estimate_online(
     if free is None or poses is None:
         free, poses = problem.initial_parameters, problem.start
     kept, solution = singular_records.solve_around_singularities(
-        problem, precision, free=free, poses=poses, manner=manner
+        problem, precision, free=free, poses=poses, options=options
     )
     covariance = np.linalg.inv(solution.information + precision)
     return _result(kept, solution, covariance)

@@ -72,12 +72,12 @@ class CorrectedFit:
     @classmethod
     def uncorrected(cls, problem: Problem) -> CorrectedFit:
         """The fit of all records as measured."""
-        return cls(problem, problem, regularized_fit.fit(problem, manner=QUICK))
+        return cls(problem, problem, regularized_fit.fit(problem, options=QUICK))
 
     def corrected_for(self, hypothesis: FaultHypothesis) -> CorrectedFit:
         """The fit after correction for one more fault."""
         problem = hypothesis.corrected(self.problem)
-        fit = regularized_fit.fit(problem, manner=QUICK)
+        fit = regularized_fit.fit(problem, options=QUICK)
         return replace(self, problem=problem, fit=fit, faults=(*self.faults, hypothesis))
 
     def converged(self) -> CorrectedFit:

@@ -1,8 +1,8 @@
-"""Parameters that the data determine only together.
+"""Strongly correlated parameters, which the data determine only together.
 
-Two estimates with a correlation near one say: their sum (or difference) is known well, each of
-them is not. The geometry as a whole may be accurate all the same; a change found in one of the two
-may, however, really be in the other.
+With a correlation near one, the sum or difference of two parameters is known well and each of them
+is not. The geometry may be accurate nevertheless, but a change found in one of the two may in fact be
+a change of the other.
 """
 
 from __future__ import annotations

@@ -1,14 +1,14 @@
-"""What a choice of frames can and cannot mend in the errors of poses.
+"""Frame alignment: pose errors less what another choice of base and platform frame removes.
 
-Where the base frame lies and how the platform frame is turned is a choice, made anew whenever a
-fixture or a tool is taught. Errors of poses are therefore compared only after both frames are
-chosen best. To first order a base frame moved by t and turned by f, and a platform frame turned by
-p about the ball, change a pose (P, R) by
+The base frame and the rotation of the platform frame are conventions, set whenever a fixture or a
+tool is taught. Pose errors are therefore compared after both frames are fitted. To first order a base
+frame shifted by t and rotated by f, and a platform frame rotated by p about the ball, change a pose
+(P, R) by
 
     dP = t + f x P,    dr = f + R p,
 
-with dr the rotation vector in the base frame. The best (t, f, p) minimise the sum of squares over
-poses that span the workspace; rotations are weighed by a length, the platform's radius.
+with dr the rotation vector in the base frame. The best (t, f, p) minimize the sum of squares over
+poses that span the workspace, with rotations weighted by a length, the platform's radius.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from hexacell.kinematics.rotations import Array
 
 ROUNDS = 20
 SETTLED = 1e-12
-"""Of the last round's turn, rad, and of its shift over the length."""
+"""Largest rotation, rad, and shift over the length, of the last round."""
 
 
 def pose_errors(reached: PoseBatch, commanded: PoseBatch) -> Array:
@@ -35,17 +35,17 @@ def pose_errors(reached: PoseBatch, commanded: PoseBatch) -> Array:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FrameFit:
-    """The best frames over some poses (n), rotations weighed by ``length``, mm."""
+    """The best frames over n poses, rotations weighted by ``length``, mm."""
 
     workspace: PoseBatch
     length: float
 
     def coefficients(self, errors: Array) -> Array:
-        """The (t, f, p) (9, ...), mm and rad, that explain errors (n, 6, ...) best."""
+        """The best (t, f, p) (9, ...), mm and rad, for errors (n, 6, ...)."""
         scale = np.repeat([1.0, self.length], 3)
         design = (_design(self.workspace) * scale[:, None]).reshape(-1, 9)
         values = (errors.reshape(len(errors), 6, -1) * scale[:, None]).reshape(len(design), -1)
-        # One pose, or many alike, leave a frame open: then the smallest change will do.
+        # One pose, or several equal ones, do not determine a frame: lstsq then gives the smallest change.
         best: Array = np.linalg.lstsq(design, values)[0]
         return best.reshape(9, *errors.shape[2:])
 
@@ -55,7 +55,7 @@ class FrameFit:
         return errors - explained
 
     def aligned(self, reached: PoseBatch, others: PoseBatch) -> PoseBatch:
-        """Poses ``others``, seen in the frames that bring ``reached`` nearest to the workspace."""
+        """Poses ``others`` in the frames that bring ``reached`` nearest to the workspace."""
         for _ in range(ROUNDS):
             best = self.coefficients(pose_errors(reached, self.workspace))
             change = _undoing(best)

@@ -1,16 +1,16 @@
-"""How far the robot goes from where it is sent, before and after.
+"""Predicted pose accuracy: the error of commanded poses before and after calibration.
 
-A controller with geometry c, told to take a pose X, sets the joint variables of X under c; the
-machine with geometry m then stands where these joint variables bring m.
+A controller with geometry c computes the joint variables of a commanded pose X under c. The machine
+with geometry m takes the pose that these joint variables give under m.
 
-Before: c is what the controller has now and m the estimate. The difference is computed in full, by
-continuation. After: c is the estimate, and m the truth, which differs from it by a random error of
-the estimate's covariance C. To first order the pose errs by ``H dx`` with H the implicit derivative
-of the pose by the parameters, so its covariance is ``H C H^T``.
+Before: c is the controller's present geometry and m the estimate. The difference is computed without
+approximation, by continuation. After: c is the estimate and m the true geometry, which differs from it
+by a random error with the covariance C of the estimate. To first order the pose error is ``H dx`` with
+H the implicit derivative of the pose by the parameters, so its covariance is ``H C H^T``.
 
-In both, base and platform frames are the ones that fit best over the workspace
-(:mod:`~hexacell.identification.diagnostics.frame_alignment`): what is left cannot be taught away.
-The machine's own repeatability is not in these figures.
+In both, base and platform frames are fitted over the workspace
+(:mod:`~hexacell.identification.diagnostics.frame_alignment`), so the remaining errors cannot be removed
+by teaching. The repeatability of the machine is not included.
 """
 
 from __future__ import annotations
@@ -79,9 +79,9 @@ class Accuracy:
 
     @property
     def removable_mm(self) -> float:
-        """Root mean square distance that the identified geometry would take away.
+        """Root mean square distance that the identified geometry removes.
 
-        The difference from the controller's geometry holds the estimate's own error, too.
+        The difference from the controller's geometry contains the error of the estimate, too.
         """
         squares = self.before.position_rms_mm**2 - self.after.position_rms_mm**2
         return float(np.sqrt(max(squares, 0.0)))

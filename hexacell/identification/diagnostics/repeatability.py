@@ -1,7 +1,7 @@
-"""How well the machine comes back, where the same pose was commanded more than once.
+"""Repeatability: the scatter of deviations where the same pose was commanded more than once.
 
-No geometry enters: visits of one commanded pose at one point should show the same deviation. What
-they scatter by is what no calibration can take away.
+It does not depend on a geometry: all visits of a commanded pose at a point have the same deviation,
+up to the scatter of the machine, which no calibration can remove.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from hexacell.kinematics.rotations import Array
 from hexacell.measurements.records import MeasurementSet
 
 SAME_DIGITS = 6
-"""Digits after the point, mm and deg, in which two commands agree that are the same."""
+"""Decimal digits, mm and deg, in which equal commands agree."""
 CONFIDENCE = 0.95
 
 
@@ -28,7 +28,7 @@ class Repeatability:
     Attributes:
         per_axis_mm: pooled standard deviations along x, y and z.
         degrees_of_freedom: of each of them: visits less poses.
-        poses: how many were visited more than once.
+        poses: the number of poses visited more than once.
     """
 
     per_axis_mm: tuple[float, float, float]
@@ -42,12 +42,12 @@ class Repeatability:
 
     @property
     def at_least_mm(self) -> float:
-        """What the distance is above, with 95 % confidence: few visits prove little."""
+        """Lower limit of the distance, with 95 % confidence."""
         freedom = 3 * self.degrees_of_freedom
         return self.distance_mm * float(np.sqrt(freedom / chdtri(freedom, 1.0 - CONFIDENCE)))
 
     def dominates(self, error_mm: float) -> bool:
-        """Whether an error (root mean square distance, mm) is surely smaller than the scatter."""
+        """Whether an error (root mean square distance, mm) is significantly smaller than the scatter."""
         return self.at_least_mm > error_mm
 
 

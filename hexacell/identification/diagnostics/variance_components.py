@@ -1,17 +1,18 @@
-"""How noisy encoders and gauges really were, told by the residuals.
+"""Variance components: the noise of the encoders and of the gauges, estimated from the residuals.
 
-A record's covariance is ``V = s1 Q1 + s2 Q2``: the encoders' variance s1 through the machine,
-``Q1 = Gq Gq^T``, and the gauges' s2, ``Q2 = I``. The two differ because Gq changes from pose to
-pose and is not alike in x, y and z. Restricted maximum likelihood asks that for both
+A record's covariance is ``V = s1 Q1 + s2 Q2``: the variance s1 of the encoders, propagated through
+the machine, ``Q1 = Gq Gq^T``, and the variance s2 of the gauges, ``Q2 = I``. They are separable
+because Gq changes from pose to pose and differs in x, y and z. Restricted maximum likelihood
+(REML) requires for both
 
     r^T W Qk W r = tr(P Qk),    P = W - W X C X^T W,
 
-with the residuals r, their weights W = V^-1, and P what is left of W once the unknowns X are taken
-up. Both sides are sums over the records (P is needed in its diagonal blocks only), so a step costs
-as much as a step of the identification. The steps are Fisher's scoring of the logarithms, which
-cannot become negative. The information matrix is taken from the same blocks and scaled so that the
-noise as a whole has the standard error that its degrees of freedom give it; of 55 records that is
-within a twentieth of the exact one.
+with the residuals r, their weights W = V^-1, and P, which is W less the part that the unknowns X
+explain. Both sides are sums over the records and need only the diagonal blocks of P, so a step costs
+as much as a step of the identification. The steps are Fisher scoring of the logarithms, so that the
+variances stay positive. The information matrix is computed from the same blocks and scaled so that
+the total noise has the standard error of its degrees of freedom; with 55 records that is within 5 %
+of the exact one.
 
 Source of the equation: Patterson and Thompson 1971; its fixed point is that of the almost unbiased
 iteration ``s_k <- s_k r^T W Qk W r / tr(P Qk)`` (Horn, Horn and Duncan 1975).
@@ -31,7 +32,7 @@ STEPS = 60
 LONGEST_STEP = 1.5
 SETTLED = 1e-5
 SMALLEST_SHARE = 1e-2
-"""Of the stated standard deviation: nobody can see a noise smaller than that."""
+"""Of the stated standard deviation: the smallest noise that is estimated."""
 LARGEST_RELATIVE_ERROR = 0.4
 CLOSE_CORRELATION = -0.9
 
@@ -44,7 +45,7 @@ class NoiseLevel:
         stated: in the cell file.
         estimated: from the residuals.
         standard_error: of ``estimated``.
-        at_most: what it is below, two standard errors of its variance granted.
+        at_most: upper limit, two standard errors of the variance above the estimate.
     """
 
     stated: float
@@ -54,13 +55,13 @@ class NoiseLevel:
 
     @property
     def is_resolved(self) -> bool:
-        """Whether the residuals say more than an upper limit."""
+        """Whether the residuals give more than an upper limit."""
         return self.standard_error < LARGEST_RELATIVE_ERROR * self.estimated
 
 
 @dataclass(frozen=True, slots=True)
 class NoiseLevels:
-    """The noise of encoders and gauges, and how the two estimates depend on each other."""
+    """The noise of encoders and gauges, and the correlation of the two estimates."""
 
     encoder: NoiseLevel
     gauge: NoiseLevel
@@ -73,7 +74,7 @@ class NoiseLevels:
 
 
 def noise_levels(model: LinearizedSolution) -> NoiseLevels | None:
-    """The noise levels that the residuals show; none without more records than unknowns."""
+    """The noise levels by the residuals; none without more records than unknowns."""
     noise = model.problem.noise
     stated = np.array([noise.encoder_mm, noise.gauge_mm]) ** 2
     estimation = _Estimation.of(model)
@@ -106,11 +107,11 @@ class _Equations:
 
     @property
     def redundancy(self) -> float:
-        """Degrees of freedom left to the residuals."""
+        """Degrees of freedom of the residuals."""
         return float(self.variances @ self.expected)
 
     def step(self) -> Array:
-        """Fisher's scoring step of the logarithms of the variances."""
+        """The Fisher scoring step of the logarithms of the variances."""
         gradient = 0.5 * self.variances * (self.found - self.expected)
         information = np.outer(self.variances, self.variances) * self.information
         step: Array = np.linalg.solve(information, gradient)
@@ -121,7 +122,7 @@ class _Equations:
 class _Estimation:
     model: LinearizedSolution
     shapes: tuple[Array, Array]
-    held: Array
+    active_prior: Array
 
     @classmethod
     def of(cls, model: LinearizedSolution) -> _Estimation:
@@ -141,12 +142,12 @@ class _Estimation:
         return variances
 
     def equations(self, variances: Array) -> _Equations:
-        """The estimating equation at some variances (2,), the parameters being refitted under them."""
+        """The estimating equation at some variances (2,), with the parameters refitted under them."""
         weights = self.model.weights(variances)
         residuals, taken = self._refitted(weights)
         weighted = np.einsum("nij,nj->ni", weights, residuals)
-        left = weights - weights @ taken @ weights
-        products = [left @ shape for shape in self.shapes]
+        projected = weights - weights @ taken @ weights
+        products = [projected @ shape for shape in self.shapes]
         information = np.array([[np.einsum("nij,nji->", a, b) for b in products] for a in products])
         expected = np.array([np.einsum("nii->", product) for product in products])
         redundancy = variances @ expected
@@ -158,12 +159,12 @@ class _Estimation:
         )
 
     def _refitted(self, weights: Array) -> tuple[Array, Array]:
-        """Centred residuals (n, 3), mm, and what the unknowns take up (n, 3, 3), mm^2."""
+        """Centred residuals (n, 3), mm, and the covariance (n, 3, 3), mm^2, that the unknowns explain."""
         model = self.model
         centring = NuisanceElimination(model.problem, weights)
         system = model.system(centring)
-        covariance = np.linalg.inv(system.information() + self.held)
-        step = -covariance @ (system.gradient() + self.held @ model.from_centre)
+        covariance = np.linalg.inv(system.information() + self.active_prior)
+        step = -covariance @ (system.gradient() + self.active_prior @ model.from_centre)
         jacobian = centring.centred(model.jacobian)
         residuals = centring.centred(model.residuals) + jacobian @ step
         taken = centring.nuisance_covariance() + jacobian @ covariance @ np.swapaxes(jacobian, -1, -2)

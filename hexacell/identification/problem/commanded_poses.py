@@ -1,9 +1,8 @@
-"""Where the forward kinematics of each record begins: at the commanded pose.
+"""The commanded poses of records, from which their forward kinematics starts.
 
-A pose belongs to the geometry that commanded it. That is the controller's, unless the records are
-older than its last calibration; then it was, as a rule, the drawing's. Each record is believed to
-come from the geometry whose inverse kinematics is nearest to its encoders, and is followed from
-there to any other geometry.
+A pose is commanded under a geometry: that of the controller, or of the drawing if the records are
+older than the last calibration. Each record is attributed to the geometry whose inverse kinematics is
+nearest to its encoders. From there its pose is continued to any other geometry.
 """
 
 from __future__ import annotations
@@ -21,18 +20,18 @@ from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array, Mask
 
 AT_HOME = (1, *CONTINUATION_STAGES)
-"""Stages of the continuation where the geometry stays: joint variables differ little from the commanded."""
+"""Stages of the continuation under the commanding geometry: joint variables are near the commanded."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CommandedPoses:
-    """What n records were commanded with.
+    """The commands of n records.
 
     Attributes:
-        poses: as the controller was told.
+        poses: as commanded.
         candidate_geometries: geometries that may have commanded them.
-        choice: (n,) which of these did.
-        joints: (n, 6), mm, that it computed; NaN where none of them reaches the pose.
+        choice: (n,) the index of the one that did.
+        joints: (n, 6), mm, its inverse kinematics; NaN where no candidate reaches the pose.
     """
 
     mechanism: Mechanism

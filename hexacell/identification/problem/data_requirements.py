@@ -1,4 +1,4 @@
-"""Data that cannot identify a geometry, whatever they say: what is missing, and what would supply it."""
+"""Data requirements: are there enough records, points and rotations to identify a geometry?"""
 
 from __future__ import annotations
 
@@ -9,19 +9,19 @@ from hexacell.identification.problem.problem import Problem
 from hexacell.kinematics import rotations
 from hexacell.kinematics.rotations import Array
 
-SAME_AXIS = 0.02
-"""Of the largest turns: below that, turns about other axes are not meant as such."""
+SAME_AXIS_RATIO = 0.02
+"""Of the largest rotations: smaller rotations about other axes are not intended."""
 
-TURNED = 1e-3
-"""rad, root mean square: below that, the platform was not turned."""
+SMALLEST_ROTATION = 1e-3
+"""rad, root mean square: below it the platform was not rotated."""
 
-POSES_WORTH_COUNTING = 1000
-"""With more records, there are enough different ones among them."""
+MOST_COUNTED_POSES = 1000
+"""With more records than these, different poses are not counted."""
 
 
 def equations(problem: Problem) -> int:
-    """Three for each different pose, less three for each point's unknown reference."""
-    return 3 * (_poses(problem) - problem.points)
+    """The number of equations: three for each different pose, less three for each point's reference."""
+    return 3 * (_different_poses(problem) - problem.points)
 
 
 def is_determined(problem: Problem) -> bool:
@@ -30,10 +30,10 @@ def is_determined(problem: Problem) -> bool:
 
 
 def require_enough_records(problem: Problem) -> None:
-    """Raise where the number of records or points, or their poses, show that nothing can be identified.
+    """Require enough points and different poses to determine the parameters.
 
     Raises:
-        IdentifiabilityError: says what is missing, and what measurement would supply it.
+        IdentifiabilityError: what is missing, and what to measure.
     """
     parameters = len(problem.prior.covariance)
     if problem.points < 2:
@@ -44,7 +44,7 @@ def require_enough_records(problem: Problem) -> None:
     found = equations(problem)
     if found < parameters:
         missing = -(-(parameters - found) // 3)
-        repeated = problem.records - _poses(problem)
+        repeated = problem.records - _different_poses(problem)
         but = f", {repeated} of them of a pose measured before," if repeated else ""
         raise IdentifiabilityError(
             f"{problem.records} records at {problem.points} points{but} give {found} equations for "
@@ -54,46 +54,46 @@ def require_enough_records(problem: Problem) -> None:
 
 
 def require_rotation_diversity(problem: Problem) -> None:
-    """Raise where the commanded orientations of all points differ by turns about a single axis.
+    """Require that the orientations at the points differ by rotations about more than one axis.
 
     Raises:
-        IdentifiabilityError: names the axis, and the turns that are missing.
+        IdentifiabilityError: the axis, and the rotations that are missing.
     """
-    turns = _turns(problem)
-    squares, axes = np.linalg.eigh(turns.T @ turns)
-    if squares[-1] < len(turns) * TURNED**2:
+    rotation_vectors = _rotations(problem)
+    squares, axes = np.linalg.eigh(rotation_vectors.T @ rotation_vectors)
+    if squares[-1] < len(rotation_vectors) * SMALLEST_ROTATION**2:
         raise IdentifiabilityError(
-            "the platform stands in one orientation in all records of a point",
+            "the platform has one orientation in all records of a point",
             action="Measure each point in orientations tilted about x and about y, and turned about z",
         )
-    if squares[-2] < SAME_AXIS**2 * squares[-1]:
-        axis, missing = _in_words(axes[:, -1])
+    if squares[-2] < SAME_AXIS_RATIO**2 * squares[-1]:
+        axis, missing = _axis_and_missing(axes[:, -1])
         raise IdentifiabilityError(
             f"all orientations turn about {axis} only, and so they cannot determine all parameters",
             action=f"Measure orientations that {missing}",
         )
 
 
-def _turns(problem: Problem) -> Array:
+def _rotations(problem: Problem) -> Array:
     """Rotation vectors (n, 3), rad, in the gauges' frame, from each point's first commanded orientation."""
     commanded = problem.commands.poses.rotations
     first = problem.per_record(commanded[problem.first_rows])
     return rotations.to_vector(commanded @ np.swapaxes(first, -1, -2)) @ problem.gauges
 
 
-def _in_words(direction: Array) -> tuple[str, str]:
-    ways = {"x": "tilt about x", "y": "tilt about y", "z": "turn about z"}
+def _axis_and_missing(direction: Array) -> tuple[str, str]:
+    rotations_about = {"x": "tilt about x", "y": "tilt about y", "z": "turn about z"}
     nearest = int(np.argmax(np.abs(direction)))
     if np.abs(direction[nearest]) < np.cos(0.1):
         x, y, z = direction * np.sign(direction[nearest])
         return f"the axis ({x:.2f}, {y:.2f}, {z:.2f})", "turn about axes across it too"
     axis = "xyz"[nearest]
-    return axis, " and ".join(way for name, way in ways.items() if name != axis) + " too"
+    return axis, " and ".join(words for name, words in rotations_about.items() if name != axis) + " too"
 
 
-def _poses(problem: Problem) -> int:
-    """How many different poses were measured."""
-    if problem.records > POSES_WORTH_COUNTING:
+def _different_poses(problem: Problem) -> int:
+    """The number of different poses."""
+    if problem.records > MOST_COUNTED_POSES:
         return problem.records
     poses = problem.commands.poses
     turned = poses.rotations.reshape(-1, 9)

@@ -1,9 +1,9 @@
-"""Whether joint variables belong to the commanded poses.
+"""Encoder consistency: do the joint variables belong to the commanded poses?
 
-A controller goes where its geometry sends it: q is the inverse kinematics of the commanded pose
-under the geometry that the controller had then. Which one that was need not be known, an earlier
-calibration may have written it; but it lay within the drawing's tolerances, and they change q by no
-more than the sum of what each parameter of a leg changes it by at either end of its tolerance.
+The joint variables q are the inverse kinematics of the commanded pose under the geometry in the
+controller at that time. That geometry may be unknown, but it was within the drawing's tolerances.
+These change q by at most the sum, over the parameters of a leg, of the change at either end of the
+tolerance.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from hexacell.kinematics.mechanism import Branch
 from hexacell.kinematics.rotations import Array, Mask
 
 UNSUSPICIOUS_MM = 1.0
-"""Machines go where they are sent more exactly than that: nearer q need no closer look."""
+"""Smaller differences are those of any working machine."""
 
 FEW = 0.2
 """Of the records."""

@@ -1,10 +1,12 @@
 """Levenberg-Marquardt on the free parameters, with a Gaussian prior and reweighting.
 
-Minimised is ``sum r~^T W r~ + (d - d0)^T L (d - d0)``: centred residuals r~ and the prior's
-precision L. A trial step is judged under the weights it was made with; an accepted one brings new
-weights. The damping follows the ratio of actual to predicted gain (Nielsen's rule: cubic decrease,
-doubling increase), scaled by the diagonal of the normal matrix. Where the steps end, the gradient
-under the weights of that very point is zero: the weighted estimating equation is solved.
+The cost is ``sum r~^T W r~ + (d - d0)^T L (d - d0)`` with the centred residuals r~ and the precision
+L of the prior. A trial step is evaluated with the weights of the current iterate; an accepted step
+updates the weights. The damping, scaled by the diagonal of the normal matrix, depends on the ratio of
+actual to predicted gain (Nielsen's rule: cubic decrease, doubling increase). At the end the gradient
+under the weights of the last iterate is zero, which solves the weighted estimating equation.
+
+Sources: Marquardt 1963; Nielsen, Damping Parameter in Marquardt's Method, IMM-REP-1999-05, 1999.
 """
 
 from __future__ import annotations
@@ -19,20 +21,20 @@ from hexacell.identification.solver import measurement_model, nuisance_parameter
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array, Mask
 
-CAUTIOUS_DAMPING = 1e-4
-NEARLY_NO_DAMPING = 1e-9
+INITIAL_DAMPING = 1e-4
+SMALL_DAMPING = 1e-9
 SMALLEST_DAMPING = 1e-12
 LARGEST_DAMPING = 1e12
 FINAL_STEP_MM = 1e-9
 ITERATIONS = 200
 SEARCHES = 1000
-REFUSALS_BEFORE_SINGULAR = 6
+REJECTIONS_BEFORE_SINGULAR = 6
 LARGEST_AMPLIFICATION = 100.0
-"""mm of ball a mm of slider: beyond it a record says nothing, and its linearisation little."""
+"""mm of the ball per mm of a slider. Beyond it a record has no information and its linearization fails."""
 
 
 class Termination(Enum):
-    """Why the iteration ended, in a sentence for people."""
+    """Why the iteration ended, for people."""
 
     STEP = "the parameters no longer change"
     PRECISION = "the cost cannot be lowered within the precision of the numbers"
@@ -42,13 +44,13 @@ class Termination(Enum):
 
     @property
     def converged(self) -> bool:
-        """Whether the end is a solution."""
+        """Whether the iteration ended at a minimum."""
         return self in {Termination.STEP, Termination.PRECISION}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Solution:
-    """Where the iteration ended.
+    """The last iterate.
 
     Attributes:
         prediction: the model at the solution.
@@ -72,13 +74,13 @@ class Solution:
 
 @dataclass(frozen=True, slots=True)
 class SolverOptions:
-    """How to search, and when to give up.
+    """Options of the solver.
 
     Attributes:
-        damping: to begin with.
-        step_mm: that counts as none.
-        iterations: at most, in one search.
-        searches: at most, around singularities (see :mod:`.detour`).
+        damping: initial damping.
+        step_mm: the iteration ends when the largest step is below this.
+        iterations: the largest number of iterations in one search.
+        searches: the largest number of searches around singularities (:mod:`.singular_records`).
     """
 
     damping: float
@@ -87,34 +89,34 @@ class SolverOptions:
     searches: int = SEARCHES
 
 
-COARSE = SolverOptions(CAUTIOUS_DAMPING, 1e-3)
-"""From the drawing, millimetres away, to the neighbourhood of the solution."""
+COARSE = SolverOptions(INITIAL_DAMPING, 1e-3)
+"""From the drawing, millimetres away, to near the solution."""
 
-INCREMENTAL = SolverOptions(NEARLY_NO_DAMPING, 1e-3)
-"""From the solution of all records but the last."""
+INCREMENTAL = SolverOptions(SMALL_DAMPING, 1e-3)
+"""From the solution without the last record."""
 
-FINE = SolverOptions(NEARLY_NO_DAMPING, FINAL_STEP_MM)
-"""From the neighbourhood to the solution itself: Gauss-Newton steps unless one fails."""
+FINE = SolverOptions(SMALL_DAMPING, FINAL_STEP_MM)
+"""From near the solution to the solution: Gauss-Newton steps unless one fails."""
 
 
 def solve(
-    problem: Problem, precision: Array, *, free: Array, poses: PoseBatch, manner: SolverOptions = COARSE
+    problem: Problem, precision: Array, *, free: Array, poses: PoseBatch, options: SolverOptions = COARSE
 ) -> Solution:
-    """Minimise from the free parameters (p,), mm, and poses that close that geometry.
+    """Minimize the cost from the free parameters (p,), mm, and poses that close that geometry.
 
     Args:
         problem: the records and the prior's centre.
         precision: (p, p) of the prior, 1/mm^2; zero for none.
-        free: where to start.
+        free: the start.
         poses: the platform at each record under ``free``.
-        manner: of the search.
+        options: of the solver.
     """
-    search = _Search(problem, precision, manner, measurement_model.predict(problem, free, poses))
+    search = _Search(problem, precision, options, measurement_model.predict(problem, free, poses))
     iterations = 0
     ended: Termination | None = None
     while ended is None:
         iterations += 1
-        ended = search.advance() if iterations <= manner.iterations else Termination.ITERATIONS
+        ended = search.advance() if iterations <= options.iterations else Termination.ITERATIONS
     final = search.linear()
     return Solution(search.now, final.information(), final.cost(), iterations, ended, search.singular)
 
@@ -123,17 +125,21 @@ class _Search:
     """The iterate, its damping, and one step at a time."""
 
     def __init__(
-        self, problem: Problem, precision: Array, manner: SolverOptions, start: measurement_model.Prediction
+        self,
+        problem: Problem,
+        precision: Array,
+        options: SolverOptions,
+        start: measurement_model.Prediction,
     ) -> None:
         self.problem = problem
         self.precision = precision
         self.centre = problem.mechanism.convention.free_parameters(problem.prior.centre)
         self.now = start
         self.centring = nuisance_parameters.NuisanceElimination(problem, start.weights)
-        self.manner = manner
-        self.damping = manner.damping
+        self.options = options
+        self.damping = options.damping
         self.growth = 2.0
-        self.refusals = 0
+        self.rejections = 0
         self.singular = start.amplification > LARGEST_AMPLIFICATION
 
     def linear(self) -> nuisance_parameters.ReducedSystem:
@@ -141,15 +147,15 @@ class _Search:
         return self.centring.system(self.now.residuals, self.now.jacobian)
 
     def advance(self) -> Termination | None:
-        """Try one step; says so when the search has ended."""
+        """Try one step; returns why the search has ended, if it has."""
         if self.singular.any():
             return Termination.SINGULAR
         step = _Step.of(self.linear(), self.precision, self.now.free - self.centre, self.damping)
-        if np.abs(step.free).max() < self.manner.step_mm and self.damping <= self.manner.damping:
+        if np.abs(step.free).max() < self.options.step_mm and self.damping <= self.options.damping:
             return Termination.STEP
         trial = measurement_model.evaluate_step(self.problem, self.now, step.free)
         if not trial.found.all():
-            return self._refuse(trial.found)
+            return self._reject(trial.found)
         gain = self._gain(trial.residuals, step)
         if gain.actual > 0.0:
             self._accept(step, trial.poses, gain)
@@ -161,12 +167,12 @@ class _Search:
         self.centring = nuisance_parameters.NuisanceElimination(self.problem, self.now.weights)
         self.damping *= max(0.1, 1.0 - (2.0 * gain.ratio - 1.0) ** 3)
         self.damping = max(self.damping, SMALLEST_DAMPING)
-        self.growth, self.refusals = 2.0, 0
+        self.growth, self.rejections = 2.0, 0
         self.singular = self.now.amplification > LARGEST_AMPLIFICATION
 
-    def _refuse(self, found: Mask) -> Termination | None:
-        self.refusals += 1
-        if self.refusals >= REFUSALS_BEFORE_SINGULAR:
+    def _reject(self, found: Mask) -> Termination | None:
+        self.rejections += 1
+        if self.rejections >= REJECTIONS_BEFORE_SINGULAR:
             self.singular = ~found
         return self._damp()
 

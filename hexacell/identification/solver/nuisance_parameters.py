@@ -1,12 +1,12 @@
-"""What a station does not tell, eliminated exactly.
+"""Nuisance parameters of the stations, eliminated exactly.
 
-A record says ``P - d = c + w x d - k * d + noise``: where the ball was when the point's gauges were
-zeroed (c), how the gauges' triad stands against the base (w, a small rotation), and the gauges'
-scale errors (k). All of them enter linearly, so for given weights the best ones are computed and
-subtracted and never become parameters: c and w for each point, with a prior on w, and k once for
-all points, with a prior too. With equal weights and no w or k this is centring each point by its
-mean, which has the same minimum as all the pairs of eq. 5-8 of Abtahi et al. 2010, at 2/(k-1) of
-the rows. Everything is linear in the number of records.
+A record satisfies ``P - d = c + w x d - k * d + noise``, with the position c of the ball when the
+point's gauges were zeroed, the small rotation w of the gauges against the base, and the scale errors
+k of the gauges. All of them are linear, so for given weights their best values are computed and
+subtracted, and they never become parameters (variable projection; Golub and Pereyra 1973): c and w
+for each point, with a prior on w, and k once for all points, with a prior as well. With equal weights
+and without w and k this subtracts the mean of each point, which has the same minimum as all the pairs
+of eq. 5-8 of Abtahi et al. 2010, with 2/(k-1) of the rows. The cost is linear in the number of records.
 """
 
 from __future__ import annotations
@@ -63,7 +63,7 @@ class NuisanceElimination:
             self._scale_normal = np.linalg.inv(normal + np.eye(3) / problem.noise.gauge_scale**2)
 
     def centred(self, values: Array) -> Array:
-        """Values (n, 3, ...) less what the stations and the gauges' scale explain."""
+        """Values (n, 3, ...) less the best c, w and k."""
         return self._reduced(values)[0]
 
     def system(self, residuals: Array, jacobian: Array) -> ReducedSystem:
@@ -116,7 +116,7 @@ class NuisanceElimination:
         return reduced, turned.reshape(-1, values.shape[-1])
 
     def _gram(self, values: Array, penalties: Array) -> Array:
-        """Weighted products (3, k) of the gauges' scale with values that are free of stations."""
+        """Weighted products (3, k) of the design of k with values that contain no c and w."""
         products: Array = np.einsum("nai,nab,nbj->ij", self._scale_design, self._weights, values)
         return products + self._scale_rows.T @ penalties
 
@@ -127,7 +127,7 @@ def centred(problem: Problem, weights: Array, values: Array) -> Array:
 
 
 def _local_design(problem: Problem) -> Array:
-    """Derivatives (n, 3, 3 or 6) of a record by its station's c and, where it may be turned, w."""
+    """Derivatives (n, 3, 3 or 6) of a record by c and, if the stations may be rotated, w."""
     constant = np.broadcast_to(np.eye(3), (problem.records, 3, 3))
     if problem.noise.alignment == 0.0:
         return constant

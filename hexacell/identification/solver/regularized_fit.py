@@ -1,8 +1,11 @@
-"""One fit of a problem: from the drawing, the prior released where the data speak.
+"""A regularized fit: with the tolerance prior, which is released where the data determine the parameters.
 
-The tolerance prior keeps the solver on the road from the drawing and holds what the data do not
-determine. In a direction that the data determine much better than the drawing does, it would only
-bias the result toward the drawing; there it is released, and the estimate is the data's alone.
+The prior keeps the solver near the drawing and determines what the data do not. In a direction that
+the data determine much better than the drawing does, it would only bias the result toward the
+drawing. There it is released in a second solution, and the estimate depends on the data alone. The
+directions are the eigenvectors of the data's information in coordinates in which the covariance of
+the prior is the identity (as in truncated Tikhonov regularization; Hansen, Rank-Deficient and
+Discrete Ill-Posed Problems, 1998).
 """
 
 from __future__ import annotations
@@ -15,9 +18,9 @@ from hexacell.identification.problem.problem import Problem
 from hexacell.identification.solver import singular_records
 from hexacell.identification.solver.chi_square import ChiSquareTest
 from hexacell.identification.solver.levenberg_marquardt import (
-    CAUTIOUS_DAMPING,
     COARSE,
     FINE,
+    INITIAL_DAMPING,
     Solution,
     SolverOptions,
     solve,
@@ -26,25 +29,24 @@ from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array
 
 RELEASE_RATIO = 9.0
-"""Data information over prior information from which on the data speak alone (sigma a third)."""
+"""Data information over prior information from which the prior is released (sigma: a third)."""
 
 LEAST_REDUNDANCY = 10
-"""Equations beyond the unknowns from which on residuals tell the noise."""
+"""Equations beyond the unknowns from which the residuals give an estimate of the noise."""
 
 SMALLEST_CHI2 = 1e-6
 
-
-QUICK = SolverOptions(CAUTIOUS_DAMPING, 1e-3, iterations=60, searches=12)
-"""Twice what records that agree with each other need; others are not worth more."""
+QUICK = SolverOptions(INITIAL_DAMPING, 1e-3, iterations=60, searches=12)
+"""Twice the iterations that consistent records need."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Fit:
-    """A solution, and what it was reached with.
+    """A solution, with the records and the prior that it used.
 
     Attributes:
-        problem: the records that took part in the end.
-        active_prior: precision (p, p), 1/mm^2, of the prior as far as it took part.
+        problem: the records that were used.
+        active_prior: precision (p, p), 1/mm^2, of the prior where it was not released.
         covariance: of the free parameters (p, p), mm^2.
     """
 
@@ -55,36 +57,38 @@ class Fit:
 
     @property
     def goodness(self) -> ChiSquareTest:
-        """The residuals against the stated noise."""
-        taken = float(np.sum(self.covariance * self.solution.information))
-        return ChiSquareTest(self.solution.chi2, 3.0 * (self.problem.records - self.problem.points) - taken)
+        """The chi-square test of the residuals."""
+        trace = float(np.sum(self.covariance * self.solution.information))
+        return ChiSquareTest(self.solution.chi2, 3.0 * (self.problem.records - self.problem.points) - trace)
 
 
-def fit(problem: Problem, *, manner: SolverOptions = COARSE) -> Fit:
-    """The geometry that explains the records, from where the problem says on."""
-    return _released(problem, problem.initial_parameters, problem.start, manner)
+def fit(problem: Problem, *, options: SolverOptions = COARSE) -> Fit:
+    """Fit the records, from the initial parameters of the problem."""
+    return _released(problem, problem.initial_parameters, problem.start, options)
 
 
 def refit(problem: Problem, free: Array, poses: PoseBatch) -> Fit:
-    """The same from free parameters (p,), mm, that are nearly right, and poses that close them."""
+    """Fit the records from free parameters (p,), mm, near the solution, and poses that close them."""
     return _released(problem, free, poses, FINE)
 
 
-def _released(problem: Problem, free: Array, poses: PoseBatch, manner: SolverOptions) -> Fit:
+def _released(problem: Problem, free: Array, poses: PoseBatch, options: SolverOptions) -> Fit:
     precision = np.linalg.inv(problem.prior.covariance)
-    kept, cautious = singular_records.solve_around_singularities(
-        problem, precision, free=free, poses=poses, manner=manner
+    kept, regularized = singular_records.solve_around_singularities(
+        problem, precision, free=free, poses=poses, options=options
     )
-    information = _quieter_than_stated(kept, cautious) * cautious.information
-    held = _precision_where_silent(information, problem.prior.covariance)
-    solution = solve(kept, held, free=cautious.free, poses=cautious.prediction.poses, manner=FINE)
-    return Fit(kept, solution, held, np.linalg.inv(solution.information + held))
+    information = _noise_correction(kept, regularized) * regularized.information
+    active_prior = _unreleased_precision(information, problem.prior.covariance)
+    solution = solve(
+        kept, active_prior, free=regularized.free, poses=regularized.prediction.poses, options=FINE
+    )
+    return Fit(kept, solution, active_prior, np.linalg.inv(solution.information + active_prior))
 
 
-def _quieter_than_stated(problem: Problem, solution: Solution) -> float:
-    """How many times the stated information the records hold, their residuals being that small; at least 1.
+def _noise_correction(problem: Problem, solution: Solution) -> float:
+    """The factor of the stated information that residuals below the stated noise justify; at least 1.
 
-    Without it, records with hardly any noise would be held by a prior that they outweigh by far.
+    Without it, a prior would bias records with hardly any noise, which have far more information.
     """
     redundancy = 3 * (problem.records - problem.points) - len(solution.free)
     if redundancy < LEAST_REDUNDANCY:
@@ -92,10 +96,10 @@ def _quieter_than_stated(problem: Problem, solution: Solution) -> float:
     return max(1.0, redundancy / max(solution.chi2, SMALLEST_CHI2))
 
 
-def _precision_where_silent(information: Array, prior_covariance: Array) -> Array:
-    """The prior's precision in the directions that the data leave open, zero in the others."""
+def _unreleased_precision(information: Array, prior_covariance: Array) -> Array:
+    """The prior's precision in the directions that the data do not determine, zero in the others."""
     factor = np.linalg.cholesky(prior_covariance)
     ratios, directions = np.linalg.eigh(factor.T @ information @ factor)
-    silent = directions[:, ratios < RELEASE_RATIO]
-    back = np.linalg.solve(factor.T, silent)
+    undetermined = directions[:, ratios < RELEASE_RATIO]
+    back = np.linalg.solve(factor.T, undetermined)
     return back @ back.T

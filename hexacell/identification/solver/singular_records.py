@@ -23,7 +23,7 @@ from hexacell.kinematics.sensitivity import pose_sensitivity
 
 
 def solve_around_singularities(
-    problem: Problem, precision: Array, *, free: Array, poses: PoseBatch, manner: SolverOptions = COARSE
+    problem: Problem, precision: Array, *, free: Array, poses: PoseBatch, options: SolverOptions = COARSE
 ) -> tuple[Problem, Solution]:
     """As :func:`levenberg_marquardt.solve`; returns the problem of the records used as well.
 
@@ -34,8 +34,8 @@ def solve_around_singularities(
     restored = np.zeros(problem.records, dtype=bool)
     for search in itertools.count(1):
         kept = problem.subset(used)
-        solution = levenberg_marquardt.solve(kept, precision, free=free, poses=poses, manner=manner)
-        if search == manner.searches:
+        solution = levenberg_marquardt.solve(kept, precision, free=free, poses=poses, options=options)
+        if search == options.searches:
             break
         free, poses = solution.free, solution.prediction.poses
         if solution.termination is Termination.SINGULAR and not solution.singular.all():

@@ -43,7 +43,7 @@ def test_the_pairwise_minimum_is_the_unweighted_centred_one(noisy, make_problem,
         np.zeros((parameters, parameters)),
         free=unweighted.mechanism.convention.free_parameters(unweighted.prior.centre),
         poses=unweighted.start,
-        manner=FINE,
+        options=FINE,
     )
     assert centred.termination.converged
     pairwise = problem.mechanism.convention.free_parameters(reference_solvers.gauss_newton(problem))

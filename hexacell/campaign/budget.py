@@ -1,4 +1,4 @@
-"""What measuring costs, and how much of it may be spent."""
+"""What measuring costs in records and time, and how much of it may be spent."""
 
 from __future__ import annotations
 
@@ -8,36 +8,36 @@ from dataclasses import dataclass
 from hexacell.cell.model import CellSettings
 
 MOVES = 4.7
-MOVES_LENT = 1.9
-"""A record chosen, on the average of six random robots with 55 records each."""
+MOVES_PROVISIONAL = 1.9
+"""Moves a selected record takes, waypoints included: means over six random robots with 55 records each.
+Most waypoints are needed because the controller commands with its own, wrong geometry."""
 
 
 @dataclass(frozen=True, slots=True)
 class TimeModel:
-    """How long things take: minutes to bring the gauges to a point, seconds to move and settle."""
+    """Durations: minutes to bring the gauges to a point, seconds to move and settle for a record."""
 
     point_minutes: float
     record_seconds: float
 
     @classmethod
     def of(cls, settings: CellSettings, moves: float | None = None) -> TimeModel:
-        """The pace that a cell file states, with so many ``moves`` a record, or as they are chosen."""
+        """The durations that a cell file states, with ``moves`` a record, or as many as usual."""
         by_hand = settings.stations.placement == "by-hand"
         stated = settings.identification.seconds_per_record
-        moves = _moves_a_record(settings) if moves is None else moves
+        moves = _usual_moves(settings) if moves is None else moves
         usual = moves * settings.timing.move_s + settings.timing.window_s
         return cls(settings.identification.minutes_per_station if by_hand else 0.0, stated or usual)
 
-    def minutes(self, records: int, stations: int) -> float:
+    def minutes(self, records: int, points: int) -> float:
         """Of some records at some points; at its end each point's reference is read once more."""
-        return stations * self.point_minutes + (records + stations) * self.record_seconds / 60.0
+        return points * self.point_minutes + (records + points) * self.record_seconds / 60.0
 
 
-def _moves_a_record(settings: CellSettings) -> float:
-    """Stops on the way included; most are needed because the controller's own geometry is wrong."""
+def _usual_moves(settings: CellSettings) -> float:
     if settings.identification.poses is not None:
         return 1.0
-    return MOVES_LENT if settings.identification.provisional else MOVES
+    return MOVES_PROVISIONAL if settings.identification.provisional else MOVES
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,17 +54,17 @@ class Budget:
         plan = settings.identification
         return cls(plan.budget_records, plan.budget_minutes, TimeModel.of(settings))
 
-    def records_left(self, records: int, stations: int) -> float:
+    def records_left(self, records: int, points: int) -> float:
         """How many more records can be paid after some records at some points; infinite if all."""
         left = math.inf if self.records is None else float(self.records - records)
         if self.minutes is not None:
-            seconds = 60.0 * (self.minutes - self.time_model.minutes(records, stations))
+            seconds = 60.0 * (self.minutes - self.time_model.minutes(records, points))
             left = min(left, math.floor(seconds / self.time_model.record_seconds + 1e-9))
         return max(left, 0.0)
 
     @property
     def description(self) -> str:
-        """The limits for people."""
+        """The limits in words."""
         limits = []
         if self.records is not None:
             limits.append(f"{self.records} records")

@@ -15,13 +15,15 @@ from hexacell.experiment_design.gauge_zero import GaugeZero, estimate_gauge_zero
 from hexacell.identification.belief import RobotBelief
 from hexacell.identification.solver.result import UNDETERMINED_RATIO
 from hexacell.kinematics.pose import Pose, PoseBatch
-from hexacell.motion.path_check import is_clear, start_state
+from hexacell.motion.path_check import is_clear
 from hexacell.virtual_robot.random_robots import robots_within_tolerances
 from hexacell.virtual_robot.virtual_robot import VirtualRobot
 
-DRAWN = 32
-TOO_MANY = 0.5
-"""Share of the robots within the tolerances that cannot stand at a point: it is out of the question."""
+ROBOTS = 32
+"""Number of robots drawn within the tolerances."""
+
+LARGEST_SHARE = 0.5
+"""Of these robots, that may be unable to take the reference of a point."""
 
 NAMES_SHOWN = 4
 
@@ -29,11 +31,12 @@ CANDIDATES = 128
 """Enough to see whether there is any orientation."""
 
 UNDETERMINED_SHARE = 0.25
-"""Of all parameters: a few that stay as uncertain as drawn are said afterwards, this many before."""
+"""Of all parameters. If fewer stay as uncertain as drawn, the result reports them; if more, the plan is
+refused."""
 
 
 def reach_failures(plan: Plan) -> Iterator[HexacellError]:
-    """Poses named by the cell, points or a list, that the controller cannot take within the limits."""
+    """Poses stated by the cell, points or a list, that the controller cannot take within the limits."""
     for point in plan.points:
         yield from pose_failures(plan, f"identification point {point}", plan.reference_pose(point))
         for number, pose in enumerate(plan.poses_at(point)[1:], start=2):
@@ -42,7 +45,7 @@ def reach_failures(plan: Plan) -> Iterator[HexacellError]:
 
 
 def pose_failures(plan: Plan, name: str, pose: Pose) -> Iterator[HexacellError]:
-    """Why the controller cannot take a pose, if it cannot."""
+    """Why the controller cannot take a pose within the limits, if it cannot."""
     try:
         plan.robot.require_reach(name, pose)
     except HexacellError as error:
@@ -54,7 +57,7 @@ def pose_failures(plan: Plan, name: str, pose: Pose) -> Iterator[HexacellError]:
 
 
 def _out_of_travel(plan: Plan, name: str, point: int, pose: Pose) -> Iterator[HexacellError]:
-    """A pose elsewhere than its point: measured files have the robot's error in their positions."""
+    """A listed pose too far from its reference. Positions of measured files contain the robot's error."""
     travel = plan.settings.limits.gauge_travel_mm
     stated = plan.settings.tolerances
     error = stated.S_mm + stated.B_mm + stated.l_mm + stated.ball_mm
@@ -105,32 +108,32 @@ def _records_needed(plan: Plan, unknowns: int) -> int:
 
 
 def optimisation_failures(plan: Plan) -> Iterator[list[HexacellError]]:
-    """What prevents a plan whose poses can be reached from choosing its orientations.
+    """What prevents a plan whose poses can be reached from selecting its poses.
 
-    Yields the failures of each part of the work, often none, so that the caller can stop in between.
+    Yields what each piece of the work found, often nothing, so that the caller may stop in between.
     """
-    yield [*_points_lost(plan)]
-    yield [*_ways(plan)]
-    some = False
-    for found in _no_orientation(plan):
-        some = some or bool(found)
+    yield [*_unreachable_points(plan)]
+    yield [*_blocked_lines(plan)]
+    any_failure = False
+    for found in _points_without_poses(plan):
+        any_failure = any_failure or bool(found)
         yield found
-    if not some:
-        yield [*_undetermined(plan)]
+    if not any_failure:
+        yield [*_undetermined_parameters(plan)]
 
 
 def unreachable_share(plan: Plan) -> dict[int, float]:
-    """At each point the share of robots within the tolerances that cannot stand there."""
+    """At each point the share of robots within the tolerances that cannot take its reference."""
     references = plan.robot.from_commands([plan.reference_pose(point) for point in plan.points])
-    robots = robots_within_tolerances(plan.robot, DRAWN, plan.settings.identification.seed)
+    robots = robots_within_tolerances(plan.robot, ROBOTS, plan.settings.identification.seed)
     can_take = np.array([VirtualRobot(plan.robot, truth).can_take(references) for truth in robots])
     unreachable = 1.0 - can_take.mean(axis=0)
     return dict(zip(plan.points, unreachable.tolist(), strict=True))
 
 
-def _points_lost(plan: Plan) -> Iterator[HexacellError]:
+def _unreachable_points(plan: Plan) -> Iterator[HexacellError]:
     for point, share in unreachable_share(plan).items():
-        if share > TOO_MANY:
+        if share > LARGEST_SHARE:
             yield UsageError(
                 f"{share:.0%} of the robots within the tolerances cannot stand there, though the "
                 "controller takes it for reachable",
@@ -139,52 +142,50 @@ def _points_lost(plan: Plan) -> Iterator[HexacellError]:
             )
 
 
-def _ways(plan: Plan) -> Iterator[HexacellError]:
-    """Straight lines between points, and between the poses of a list, that may have to be gone."""
+def _blocked_lines(plan: Plan) -> Iterator[HexacellError]:
+    """Straight lines between points, and between the poses of a list, that are not clear."""
     belief = plan.robot.belief()
-    poses = {point: plan.robot.from_commands([plan.reference_pose(point)]) for point in plan.points}
+    references = {point: plan.robot.from_commands([plan.reference_pose(point)]) for point in plan.points}
     any_order = plan.settings.identification.choose_points
     for start, end in combinations(plan.points, 2) if any_order else pairwise(plan.points):
-        if not is_clear(belief, poses[start], poses[end]):
-            yield _no_way(f"identification points {start} and {end}")
+        if not is_clear(belief, references[start], references[end]):
+            yield _blocked_line(f"identification points {start} and {end}")
     for point in plan.points if plan.pose_list is not None else ():
         listed = plan.robot.from_commands(plan.poses_at(point))
         for row in range(1, len(listed)):
             if not is_clear(belief, listed[[row - 1]], listed[[row]]):
-                yield _no_way(f"point {point}, poses {row} and {row + 1} of the list")
+                yield _blocked_line(f"point {point}, poses {row} and {row + 1} of the list")
 
 
-def _no_way(between: str) -> ReachError:
+def _blocked_line(ends: str) -> ReachError:
     return ReachError(
         "the straight line between them leaves the joint ranges or comes next to a singularity",
-        subject=between,
+        subject=ends,
         action="Put one between them, or change their order",
     )
 
 
-def _no_orientation(plan: Plan) -> Iterator[list[HexacellError]]:
-    """Points at which nothing can be measured safely: the first as things are, the others later on."""
+def _points_without_poses(plan: Plan) -> Iterator[list[HexacellError]]:
+    """Points at which no pose is safe: the first ones as known now, the others as known later."""
     plan = replace(plan, candidates=min(plan.candidates, CANDIDATES))
-    first_known = plan.robot.belief()
-    later_known = plan.predicted_belief()
-    refused: dict[int, HexacellError | None] = {}
+    now, later = plan.robot.belief(), plan.predicted_belief()
+    failures: dict[int, HexacellError | None] = {}
     for point in plan.points:
-        refused[point] = _refusal(plan, first_known, point)
+        failures[point] = _no_safe_pose(plan, now, point)
         yield []
-    any_order = plan.settings.identification.choose_points
-    beginnings = list(plan.points) if any_order else [1]
-    if all(refused[point] for point in beginnings):
-        yield [error for point in beginnings if (error := refused[point])]
+    first_points = list(plan.points) if plan.settings.identification.choose_points else [1]
+    if all(failures[point] for point in first_points):
+        yield [error for point in first_points if (error := failures[point])]
     for point in plan.points:
-        if point not in beginnings and refused[point]:
-            yield [error for error in [_refusal(plan, later_known, point)] if error]
+        if point not in first_points and failures[point]:
+            yield [error for error in [_no_safe_pose(plan, later, point)] if error]
 
 
-def _refusal(plan: Plan, belief: RobotBelief, point: int) -> HexacellError | None:
-    """Why no record can follow a point's reference, with the robot known so well."""
+def _no_safe_pose(plan: Plan, belief: RobotBelief, point: int) -> HexacellError | None:
+    """Why no record can follow a point's reference, if none can."""
+    state = CampaignState(point=point, present=plan.reference_pose(point))
     try:
-        at = _zeroed(plan, belief, point)
-        plan.chooser.choose(belief, at, CampaignState(point=point, present=plan.reference_pose(point)))
+        plan.chooser.choose(belief, _expected_zero(plan, belief, point), state)
     except LimitError as error:
         travel = plan.settings.limits.gauge_travel_mm
         return UsageError(
@@ -196,31 +197,26 @@ def _refusal(plan: Plan, belief: RobotBelief, point: int) -> HexacellError | Non
     return None
 
 
-def _zeroed(plan: Plan, belief: RobotBelief, point: int) -> GaugeZero:
-    """Where the gauges are after the reference was measured, by the estimate as it is."""
-    command = plan.robot.from_commands([plan.reference_pose(point)])
-    really = start_state(belief, command).actual
-    if really is None:
+def _expected_zero(plan: Plan, belief: RobotBelief, point: int) -> GaugeZero:
+    """The gauges' zero after the reference was measured, if the robot is as estimated."""
+    actual = belief.commanded.actual_poses(plan.robot.from_commands([plan.reference_pose(point)]))
+    if not actual.found[0]:
         raise LimitError("the robot as drawn cannot stand where the controller would send it")
-    joints = belief.mechanism.inverse(belief.controller, belief.branch, command)
-    return estimate_gauge_zero(belief, really, joints, np.zeros((1, 3)))
+    return estimate_gauge_zero(belief, actual.poses, actual.joints, np.zeros((1, 3)))
 
 
-def _undetermined(plan: Plan) -> Iterator[HexacellError]:
-    """That even well spread poses within the limits would leave parameters as uncertain as drawn."""
+def _undetermined_parameters(plan: Plan) -> Iterator[HexacellError]:
+    """That even well spread poses within the limits leave many parameters as uncertain as drawn."""
     names = plan.robot.mechanism.convention.free_names()
     before = np.sqrt(np.diag(plan.robot.prior.covariance))
     after = np.sqrt(np.diag(plan.predicted_belief().covariance))
-    silent = [
-        name
-        for name, then, now in zip(names, after, before, strict=True)
-        if then > UNDETERMINED_RATIO * now
-    ]
-    if len(silent) > UNDETERMINED_SHARE * len(names):
-        more = ", ..." if len(silent) > NAMES_SHOWN else ""
+    rows = np.flatnonzero(after > UNDETERMINED_RATIO * before)
+    if len(rows) > UNDETERMINED_SHARE * len(names):
+        shown = ", ".join(names[row] for row in rows[:NAMES_SHOWN])
+        more = ", ..." if len(rows) > NAMES_SHOWN else ""
         yield UsageError(
-            f"points, orientations and limits leave {len(silent)} of {len(names)} parameters undetermined "
-            f"({', '.join(silent[:NAMES_SHOWN])}{more})",
+            f"points, orientations and limits leave {len(rows)} of {len(names)} parameters undetermined "
+            f"({shown}{more})",
             subject="[identification]",
             action="Allow more tilt, more orientations, or points farther apart",
         )

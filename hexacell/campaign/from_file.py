@@ -1,4 +1,4 @@
-"""Where a campaign stands, by its measurement file alone."""
+"""The state of a campaign, and the next decision, by its measurement file alone."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from hexacell.measurements.records import MeasurementSet
 
 
 def state_of_records(plan: Plan, measurements: MeasurementSet, *, refusals: int = 0) -> CampaignState:
-    """The state after the last record: the gauges stand at its point, all others are done.
+    """The state after the last record: the gauges are at its point, all other points are done.
 
     Raises:
         UsageError: a record is of a point that the plan does not have.
@@ -30,15 +30,15 @@ def state_of_records(plan: Plan, measurements: MeasurementSet, *, refusals: int 
 
 
 def decide(plan: Plan, state: CampaignState) -> StartPoint | MeasurePose | Finished:
-    """What to measure now; a point that is done is left for the next one.
+    """What to measure now; where a point is done, at the next one.
 
     Raises:
-        HexacellError: the records cannot be understood.
+        HexacellError: no geometry fits the records.
     """
     decision = plan.decide(state)
     if isinstance(decision, FinishPoint):
         leaving = replace(state, point=None, done=state.done | {decision.point}, present=None, refusals=0)
         decision = plan.decide(leaving)
-    if isinstance(decision, FinishPoint):  # between points there is none to close
+    if isinstance(decision, FinishPoint):  # impossible: between points there is none to finish
         raise TypeError(decision)
     return decision

@@ -1,9 +1,9 @@
-"""A fixed list of poses instead of chosen ones: read from a file, visited where it is safe.
+"""A fixed list of poses instead of selected ones: read from a file, visited where it is safe.
 
 The file has the columns ``point,orientation,x,y,z,a,b,c`` of a measurement file, in the controller's
 frames, mm and deg. Points are those of the cell file; a point's first row is its reference. The
-other rows are visited in their order, but a pose at which the ball is not yet sure to stay inside
-the travel waits until more is known.
+other rows are visited in their order. A pose at which the ball may leave the travel by what is known
+so far is postponed until more is known.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from hexacell.kinematics.pose import Pose
 from hexacell.measurements.csv_file import read_poses
 
 SAME_MM_DEG = 1e-6
-"""Numbers of a pose that differ by less are the same number, written down once more."""
+"""Numbers of a pose that differ by less are the same, written and read again."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,7 +38,7 @@ class PoseList:
 
 
 def pose_list_of(cell: Cell) -> PoseList | None:
-    """The list that a cell file names, relative to itself; none if poses are to be chosen.
+    """The list that a cell file names, relative to itself; none if poses are to be selected.
 
     Raises:
         FileError: it cannot be read, or its points are not those of the cell file.
@@ -74,5 +74,5 @@ def without_visited(poses: tuple[Pose, ...], visited: list[Pose]) -> tuple[Pose,
 
 
 def is_same_pose(one: Pose, other: Pose) -> bool:
-    """Whether two poses are one, but for rounding."""
+    """Whether two poses are the same up to rounding."""
     return bool(np.abs(np.subtract(one.as_tuple(), other.as_tuple())).max() < SAME_MM_DEG)

@@ -1,8 +1,8 @@
-"""The estimate while measuring: each continues the one before it.
+"""The estimate while measuring: each one starts from the one before it.
 
-What a record more does to the estimate is small, so that the former one is where the search starts.
-The estimate of n records is defined as the n-th of this chain, from the drawing on. Keeping the last
-link saves its computation and changes nothing: without it the chain is computed again.
+One more record changes the estimate little, so that the search starts at the former estimate. The estimate
+of n records is defined as the n-th of this chain, which begins at the drawing. Keeping the last one saves
+its computation and changes nothing: without it the chain is computed again.
 """
 
 from __future__ import annotations
@@ -25,8 +25,8 @@ from hexacell.kinematics.pose import PoseBatch
 from hexacell.measurements.records import MeasurementSet, Record
 from hexacell.robot_model import Robot
 
-IMPLAUSIBLE = 3.0
-"""Times the number of residuals: a cost beyond it is looked into, from the drawing on."""
+IMPLAUSIBLE_COST = 3.0
+"""Per residual. A larger cost may be that of a local minimum, and other starts are tried."""
 
 FEW_RESIDUALS = 30.0
 """Added to their number, since few of them may be large by chance."""
@@ -34,7 +34,7 @@ FEW_RESIDUALS = 30.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class OnlineEstimate:
-    """What the records so far say of the robot; ``estimate`` is none before the first."""
+    """What the records so far say of the robot; ``identification`` is none before the first."""
 
     belief: RobotBelief
     identification: Identification | None
@@ -43,20 +43,20 @@ class OnlineEstimate:
         """Where a point's gauges were zeroed.
 
         Raises:
-            LimitError: the records do not say so.
+            LimitError: there are no records of the point.
         """
         found = self.identification
         if found is None or point not in found.problem.labels[:, 0]:
             raise LimitError("the records of this point say nothing about where the ball is")
-        records = found.problem
-        rows = np.flatnonzero(records.labels[:, 0] == point)
+        problem = found.problem
+        rows = np.flatnonzero(problem.labels[:, 0] == point)
         return estimate_gauge_zero(
-            self.belief, found.poses[rows], records.joints[rows], records.deviations[rows]
+            self.belief, found.poses[rows], problem.joints[rows], problem.deviations[rows]
         )
 
 
 class OnlineEstimator:
-    """Gives the estimate of any records, quickly where they continue the last ones asked for."""
+    """Estimates from any records, quickly where they continue the last ones asked for."""
 
     def __init__(self, robot: Robot) -> None:
         self._robot = robot
@@ -80,54 +80,54 @@ class OnlineEstimator:
 
 
 def update_estimate(problem: Problem, before: Identification | None) -> Identification:
-    """The estimate from the one of all records but the last; from the drawing if that is astray."""
-    poses = None if before is None else _poses_under(problem, before)
+    """The estimate from that of all records but the last; from other starts if it is implausible."""
+    poses = None if before is None else _start_poses(problem, before)
     if before is None or poses is None:
         return estimate_online(problem)
-    # Undamped steps lead some robots astray while the records leave much open.
+    # While the records leave much open, undamped steps may diverge.
     options = INCREMENTAL if is_determined(problem) else COARSE
     found = estimate_online(problem, free=before.free, poses=poses, options=options)
-    others = _begun_elsewhere(problem)
-    while not _is_healthy(problem, found) and (another := next(others, None)):
-        better = (another.records, -cost(another)) > (found.records, -cost(found))
-        found = another if better else found
+    others = _from_other_starts(problem)
+    while not _is_plausible(problem, found) and (other := next(others, None)):
+        is_better = (other.records, -cost(other)) > (found.records, -cost(found))
+        found = other if is_better else found
     return found
 
 
-def _is_healthy(problem: Problem, found: Identification) -> bool:
+def cost(found: Identification) -> float:
+    """What the estimate minimized: squared residuals and distance from the drawing, both by sigma."""
+    prior = found.problem.prior
+    moved = found.free - found.problem.mechanism.convention.free_parameters(prior.centre)
+    return float(found.chi2 + moved @ np.linalg.solve(prior.covariance, moved))
+
+
+def _is_plausible(problem: Problem, found: Identification) -> bool:
     residuals = 3 * (found.records - found.points)
-    plausible = cost(found) <= IMPLAUSIBLE * residuals + FEW_RESIDUALS
-    return found.converged and found.records == problem.records and plausible
+    is_small = cost(found) <= IMPLAUSIBLE_COST * residuals + FEW_RESIDUALS
+    return found.converged and found.records == problem.records and is_small
 
 
-def _begun_elsewhere(problem: Problem) -> Iterator[Identification]:
-    """Searches from the drawing, and from robots that may have been built instead.
+def _from_other_starts(problem: Problem) -> Iterator[Identification]:
+    """Estimates from the drawing, and from random geometries within the tolerances.
 
-    With few records one of these may lie beyond a singularity for all of them.
+    With few records, one of them may be beyond a singularity for all robots near the drawing.
     """
     yield estimate_online(problem)
     for free, poses in start_points(problem):
         yield estimate_online(problem, free=free, poses=poses)
 
 
-def cost(found: Identification) -> float:
-    """What the estimate minimised: squared residuals and distance from the drawing, by sigma."""
-    prior = found.problem.prior
-    moved = found.free - found.problem.mechanism.convention.free_parameters(prior.centre)
-    return float(found.chi2 + moved @ np.linalg.solve(prior.covariance, moved))
-
-
-def _poses_under(problem: Problem, before: Identification) -> PoseBatch | None:
-    """Poses that close the former estimate where a search may start; none if one is not found."""
-    rows = {tuple(label): row for row, label in enumerate(before.problem.labels.tolist())}
-    known = [rows.get(tuple(label)) for label in problem.labels.tolist()]
-    new = np.array([row for row, place in enumerate(known) if place is None], dtype=np.intp)
-    followed = problem.commands[new].solve_poses(before.geometry, problem.joints[new])
-    if not followed.found[problem.has_start_pose[new]].all():
+def _start_poses(problem: Problem, before: Identification) -> PoseBatch | None:
+    """Poses that close the former estimate, to start the search; none if one is not found."""
+    former_rows = {tuple(label): row for row, label in enumerate(before.problem.labels.tolist())}
+    former = [former_rows.get(tuple(label)) for label in problem.labels.tolist()]
+    new = np.array([row for row, place in enumerate(former) if place is None], dtype=np.intp)
+    solved = problem.commands[new].solve_poses(before.geometry, problem.joints[new])
+    if not solved.found[problem.has_start_pose[new]].all():
         return None
-    old = np.array([row for row, place in enumerate(known) if place is not None], dtype=np.intp)
-    places = np.array([place for place in known if place is not None], dtype=np.intp)
+    old = np.array([row for row, place in enumerate(former) if place is not None], dtype=np.intp)
+    places = np.array([place for place in former if place is not None], dtype=np.intp)
     positions, rotations = np.empty((problem.records, 3)), np.empty((problem.records, 3, 3))
-    positions[new], rotations[new] = followed.poses.positions, followed.poses.rotations
+    positions[new], rotations[new] = solved.poses.positions, solved.poses.rotations
     positions[old], rotations[old] = before.poses.positions[places], before.poses.rotations[places]
     return PoseBatch(positions, rotations)

@@ -1,4 +1,4 @@
-"""The predicted error where the robot will work: what all measuring is for."""
+"""The predicted error at the poses where the robot will work."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ from hexacell.robot_model import Robot
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TaskError:
-    """How the error at n task poses follows from an error of the free parameters.
+    """How errors of the free parameters change the position at n task poses.
 
     Attributes:
-        jacobian: (n, 3, p) of positions, mm, what the best frames explain left out.
+        jacobian: (n, 3, p) of positions, mm, without what another choice of frames would explain.
     """
 
     jacobian: Array
@@ -32,7 +32,7 @@ class TaskError:
         return squares
 
     def weight(self) -> Array:
-        """What the variances of the free parameters count (p, p): theirs is the mean square error."""
+        """Weight W (p, p) of the parameters' covariance C: ``tr(W C)`` is the mean square error."""
         weight: Array = np.einsum("nap,naq->pq", self.jacobian, self.jacobian, optimize=True)
         return weight / len(self.jacobian)
 
@@ -47,9 +47,10 @@ class TaskError:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Task:
-    """Task poses, and poses across the workspace over which the frames are chosen.
+    """Task poses, and poses across the workspace over which the frames are fitted.
 
-    Both are in the mechanism's frame convention. Where a cell names no task, the workspace is it.
+    Both are in the mechanism's frame convention. Where a cell states no task poses, the workspace
+    poses are the task.
     """
 
     poses: PoseBatch
@@ -60,12 +61,12 @@ class Task:
         """The task of a cell."""
         points = PoseBatch.of(Pose(*point) for point in settings.identification.points)
         workspace = workspace_poses(robot.belief(), robot.frames.poses(points).positions)
-        named = robot.from_commands(Pose(*pose) for pose in settings.task.poses)
-        poses = named if len(named) else workspace
+        stated = robot.from_commands(Pose(*pose) for pose in settings.task.poses)
+        poses = stated if len(stated) else workspace
         return cls(poses, workspace if len(workspace) else poses)
 
     def error(self, belief: RobotBelief) -> TaskError | None:
-        """How it depends on the parameters; none if the estimated robot can take no task pose."""
+        """How the error depends on the parameters; none if the estimated robot can take no task pose."""
         task, by_task = _derivatives(belief, self.poses)
         workspace, by_workspace = _derivatives(belief, self.workspace)
         if not len(task) or not len(workspace):
@@ -75,7 +76,7 @@ class Task:
 
 
 def _derivatives(belief: RobotBelief, poses: PoseBatch) -> tuple[PoseBatch, Array]:
-    """The poses that the estimated robot reaches, and theirs (n, 6, p) by the free parameters."""
+    """The poses that the estimated robot reaches, and their derivatives (n, 6, p)."""
     joints = belief.mechanism.inverse(belief.estimate, belief.branch, poses)
     rows = np.flatnonzero(np.isfinite(joints).all(axis=-1))
     reached = poses[rows]

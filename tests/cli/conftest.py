@@ -215,7 +215,7 @@ def one_robot(monkeypatch: pytest.MonkeyPatch) -> None:
 def few_candidates(monkeypatch: pytest.MonkeyPatch) -> None:
     """Choose among few poses in this process, and check the plan on few; neither is under test."""
     monkeypatch.setattr("hexacell.campaign.feasibility.CANDIDATES", 8)
-    monkeypatch.setattr("hexacell.campaign.feasibility.DRAWN", 4)
+    monkeypatch.setattr("hexacell.campaign.feasibility.ROBOTS", 4)
     monkeypatch.setattr("procedures.calibration.workflow.CANDIDATES", 64)
     monkeypatch.setattr("procedures.calibration.workflow.HELD_OUT_CANDIDATES", 128)
 

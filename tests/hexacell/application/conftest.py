@@ -90,7 +90,7 @@ def few_candidates() -> Iterator[None]:
         patch.setattr(calibration_module, "CANDIDATES", 64)
         patch.setattr(calibration_module, "HELD_OUT_CANDIDATES", 128)
         patch.setattr(feasibility, "CANDIDATES", 8)
-        patch.setattr(feasibility, "DRAWN", 4)
+        patch.setattr(feasibility, "ROBOTS", 4)
         patch.setattr(machine_module, "LINE_STEPS", 8)
         yield
 

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from hexacell.campaign.decisions import CampaignState, Finished, FinishPoint, MeasurePose, StartPoint
-from hexacell.campaign.planner import REFUSALS, Plan
+from hexacell.campaign.planner import Plan
+from hexacell.campaign.stopping_rules import REFUSALS
 from hexacell.controller_config.interface import ControllerGeometry
 from hexacell.errors import IdentifiabilityError
 from hexacell.measurements.records import MeasurementSet

@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from hexacell.campaign.decisions import CampaignState, Finished, FinishPoint, MeasurePose, StartPoint
-from hexacell.campaign.planner import REFUSALS
 from hexacell.campaign.pose_list import PoseList, pose_list_of
+from hexacell.campaign.stopping_rules import REFUSALS
 from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import load_cell
 from hexacell.errors import FileError

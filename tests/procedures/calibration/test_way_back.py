@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from hexacell.campaign.planner import REFUSALS
+from hexacell.campaign.stopping_rules import REFUSALS
 from hexacell.errors import IdentifiabilityError
 from hexacell.kinematics.forward import continue_solution
 from hexacell.kinematics.inverse import inverse_kinematics

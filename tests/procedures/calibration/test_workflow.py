@@ -14,7 +14,7 @@ from hexacell.acceptance.validation import Verdict
 from hexacell.campaign import planner as module
 from hexacell.campaign import pose_chooser
 from hexacell.campaign.decisions import MeasurePose
-from hexacell.campaign.planner import REFUSALS
+from hexacell.campaign.stopping_rules import REFUSALS
 from hexacell.errors import LimitError
 from hexacell.kinematics.pose import Pose
 from hexacell.motion.route_search import find_route
@@ -187,7 +187,7 @@ class Choices:
     def __init__(self, monkeypatch: pytest.MonkeyPatch, refusal: LimitError | None = None) -> None:
         self.made = 0
         self._refusal = refusal
-        monkeypatch.setattr(module.Plan, "_visit", self._choose)
+        monkeypatch.setattr(module.Plan, "_next_pose", self._choose)
         monkeypatch.setattr(path_planning, "next_return_move", lambda *_: 0)
         monkeypatch.setattr(Calibration, "_known", lambda *_: (None, SimpleNamespace(reference=None)))
 

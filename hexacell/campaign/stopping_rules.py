@@ -1,0 +1,83 @@
+"""When a campaign ends, and when it leaves a point: budget, accuracy reached, another point worth more."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from hexacell.campaign.budget import Budget
+from hexacell.campaign.decisions import CampaignState, MeasurePose
+from hexacell.campaign.gain_forecast import Forecaster
+from hexacell.campaign.recursive_estimator import OnlineEstimator
+from hexacell.cell.model import CellSettings
+from hexacell.identification.problem.data_requirements import is_determined
+
+REFUSALS = 3
+"""Records of one point that may leave the travel before the point is given up."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class StoppingRules:
+    """The rules of one plan. Each gives the reason to stop, or none."""
+
+    settings: CellSettings
+    budget: Budget
+    forecaster: Forecaster
+    estimator: OnlineEstimator
+
+    def end_of_campaign(self, state: CampaignState) -> str | None:
+        """Between points: why no other point is to be begun, whichever it is."""
+        sizes, count = self.forecaster.sizes, len(self.forecaster.sizes)
+        if all(state.records_at(point) >= size for point, size in sizes.items()):
+            return f"all {count} points are measured"
+        if reason := self._budget_used(state, points=1, records=2) or self._target_reached(state):
+            return reason
+        if state.done.issuperset(sizes):
+            return f"all {count} points are measured as far as they could be"
+        return None
+
+    def end_of_point(self, state: CampaignState, point: int) -> str | None:
+        """At a point: why no more records are to be taken there, whichever they are."""
+        size = self.forecaster.sizes[point]
+        if state.records_at(point) >= size:
+            return f"all its {size} orientations are measured"
+        if state.refusals > REFUSALS:
+            return f"the ball left the gauges' travel {state.refusals} times"
+        return (
+            self._budget_used(state, points=0, records=1)
+            or self._target_reached(state)
+            or self._another_point(state, point)
+        )
+
+    def little_gain(self, proposed: MeasurePose) -> str | None:
+        """Why a proposed record is not worth its time."""
+        least, forecast = self.settings.identification.least_gain_mm, proposed.forecast
+        if forecast is None or forecast.now_mm - forecast.next_mm >= least:
+            return None
+        return f"no record here would gain {least:g} mm at the task poses"
+
+    def _budget_used(self, state: CampaignState, *, points: int, records: int) -> str | None:
+        """That so many more points and records cannot be paid."""
+        left = self.budget.records_left(len(state.measurements), state.begun_points + points)
+        return None if left >= records else f"the budget of {self.budget.description} is used"
+
+    def _target_reached(self, state: CampaignState) -> str | None:
+        """That the accuracy asked for is reached."""
+        target = self.settings.identification.target_mm
+        if target is None or not len(state.measurements):
+            return None
+        estimate = self.estimator.estimate(state.measurements)
+        if estimate.identification is None or not is_determined(estimate.identification.problem):
+            return None
+        worst = self.forecaster.worst_error(estimate)
+        if worst is None or worst > target:
+            return None
+        return f"the predicted error at the task poses is {worst:.3f} mm, within {target:g}"
+
+    def _another_point(self, state: CampaignState, point: int) -> str | None:
+        """That another point is worth more, if points are to be chosen."""
+        others = [other for other in self.forecaster.sizes if other not in state.done and other != point]
+        if not self.settings.identification.choose_points or not others:
+            return None
+        estimate = self.estimator.estimate(state.measurements)
+        best = self.forecaster.rank_points(state, estimate, [point, *others]).best
+        return None if best == point else f"point {best} tells more in the same time"

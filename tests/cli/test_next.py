@@ -179,7 +179,7 @@ def test_text_for_users(typed_here, cell_folder, stranger):
     stranger.measure(asking(typed_here, cell_folder, stranger.file)())
     outcome = typed_here("next", cell_folder.cell, "--measurements", stranger.file)
     assert "Point 1, orientation 2: go to X" in outcome.out
-    assert "going on" in outcome.out
+    assert "continuing" in outcome.out
     assert max(map(len, outcome.out.splitlines())) <= 80
 
 

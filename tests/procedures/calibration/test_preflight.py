@@ -82,7 +82,9 @@ async def test_a_stop_is_heeded_before_the_next_piece_of_work(make_rig, monkeypa
     rig = make_rig()
     calls: list[object] = []
     monkeypatch.setattr(feasibility, piece, stopped_in_its_first_call(getattr(feasibility, piece), calls))
-    monkeypatch.setattr(feasibility, "_undetermined_parameters", lambda _plan: pytest.fail("the check went on"))
+    monkeypatch.setattr(
+        feasibility, "_undetermined_parameters", lambda _plan: pytest.fail("the check went on")
+    )
     with pytest.raises(asyncio.CancelledError):
         await plan_failures(rig.calibration, unattended=True)
     assert len(calls) == 1

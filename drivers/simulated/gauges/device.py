@@ -9,7 +9,7 @@ from typing import ClassVar
 from drivers.simulated.gauges.indicator import Indicator
 
 
-class Device(ABC):
+class LineDevice(ABC):
     """An instrument, or a multiplexer with several, that answers commands.
 
     ``indicators`` are by channel, counted from 1; all but a multiplexer have channel 1 only.
@@ -30,7 +30,7 @@ class Device(ABC):
         return b""
 
 
-class SingleDevice(Device):
+class SingleDevice(LineDevice):
     """A device that is one indicator."""
 
     @property

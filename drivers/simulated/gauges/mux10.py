@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from drivers.simulated.gauges.device import Device
+from drivers.simulated.gauges.device import LineDevice
 from drivers.simulated.gauges.indicator import Indicator
 
 NO_GAUGE = b"911\r"
@@ -19,7 +19,7 @@ def format_value(channel: int, value: float, *, inch: bool) -> bytes:
     return b"0%dA%s%08.*f\r" % (channel, sign, 5 if inch else 3, abs(value))
 
 
-class Mux10Device(Device):
+class Mux10Device(LineDevice):
     """Answers a channel's number with its indicator's value. ``busy`` is how often it is, first."""
 
     def __init__(self, indicators: Mapping[int, Indicator]) -> None:

@@ -7,7 +7,7 @@ from contextlib import ExitStack
 
 from drivers.simulated.closeable import Closeable
 from drivers.simulated.gauges.cdi import CdiDevice
-from drivers.simulated.gauges.device import Device
+from drivers.simulated.gauges.device import LineDevice
 from drivers.simulated.gauges.faults import InjectedGaugeFault
 from drivers.simulated.gauges.indicator import Indicator, PlungerPosition
 from drivers.simulated.gauges.mux10 import Mux10Device
@@ -18,7 +18,7 @@ from hexacell.cell.simulation import SimulatedGauges
 from hexacell.clock import CellClock
 from hexacell.errors import FileError
 
-DEVICES: dict[str, Callable[[Mapping[int, Indicator]], Device]] = {
+DEVICES: dict[str, Callable[[Mapping[int, Indicator]], LineDevice]] = {
     "sylvac": SylvacDevice,
     "mux10": Mux10Device,
     "cdi": CdiDevice,
@@ -26,7 +26,7 @@ DEVICES: dict[str, Callable[[Mapping[int, Indicator]], Device]] = {
 MULTIPLEXED = frozenset({"mux10"})
 
 
-def simulated_device(protocol: str, indicators: Mapping[int, Indicator]) -> Device:
+def simulated_device(protocol: str, indicators: Mapping[int, Indicator]) -> LineDevice:
     """A device that speaks ``protocol``, with ``indicators`` by channel.
 
     Raises:

@@ -13,7 +13,7 @@ from concurrent.futures import Future
 from typing import Literal
 
 from drivers.simulated.closeable import Closeable
-from drivers.simulated.gauges.device import Device
+from drivers.simulated.gauges.device import LineDevice
 from drivers.simulated.gauges.faults import InjectedGaugeFault, WireFaults, apply_fault
 from drivers.simulated.gauges.indicator import Indicator
 from drivers.simulated.transports.interface import Transport
@@ -37,7 +37,7 @@ class GaugeLineServer(Closeable):
 
     def __init__(
         self,
-        device: Device,
+        device: LineDevice,
         transport: Transport,
         clock: CellClock,
         *,
@@ -181,7 +181,7 @@ class GaugeLineServer(Closeable):
 
 
 def serve_gauges(
-    device: Device,
+    device: LineDevice,
     transport: Literal["pty", "socket"],
     clock: CellClock,
     *,

@@ -1,4 +1,4 @@
-"""The encoders' CAN bus: opened, read by one thread, and every wait on it bounded."""
+"""The CAN bus of the encoders: one receiving thread, and a time limit on every wait."""
 
 from __future__ import annotations
 
@@ -16,23 +16,23 @@ from drivers.encoders.errors import BusError
 from drivers.wire_trace import TraceEntry, TraceRecorder, TrafficDirection
 
 SLICE_S = 0.03
-"""Longest uninterrupted wait."""
+"""Longest wait without a check for cancellation."""
 
 SEND_TIMEOUT_S = 0.2
-"""Longest wait for an interface to take a frame."""
+"""Longest wait for an interface to accept a frame."""
 JOIN_TIMEOUT_S = 1.0
-"""Longest wait for the receiving thread, should an interface ignore the time it is given."""
+"""Longest wait for the receiving thread to end, for interfaces that ignore their time-out."""
 
-# Failures leave this package as errors; without a handler canopen would also print them.
+# Failures are raised as errors; without a handler canopen would also print them.
 logging.getLogger("canopen").addHandler(logging.NullHandler())
 
 
 class EncoderBus:
-    """A CANopen network whose frames one thread receives and hands to the subscribers.
+    """A CANopen network whose frames one thread receives and passes to the subscribers.
 
-    Subscribers run on that thread with ``news`` held, and notify it when they have something
-    that a waiting thread should look at. ``guard`` is called at every look; it raises when
-    waiting on would be in vain. ``trace`` gets every frame as candump writes it: ``181#00C40900``.
+    Subscribers run on that thread with ``condition`` held, and notify it about a change that a waiting
+    thread must see. ``health_check`` is called at every wake-up and raises if the wait cannot
+    succeed. ``trace`` gets every frame in the format of candump: ``181#00C40900``.
 
     Raises:
         BusError: The bus cannot be opened.
@@ -54,14 +54,14 @@ class EncoderBus:
         self._receiver.start()
 
     def check(self) -> None:
-        """Raise if the bus has died, the job was interrupted, or the guard objects.
+        """Raise if the bus has failed, the job was cancelled, or the health check fails.
 
         Raises:
             DeviceError: What is wrong.
         """
         with self.condition:
             if self._failure is not None:
-                raise self._error("has died", self._failure) from self._failure
+                raise self._error("has failed", self._failure) from self._failure
             if self._interrupted.is_set():
                 raise BusError("was interrupted", subject=self.name, action="Read again")
             self.health_check()
@@ -83,7 +83,7 @@ class EncoderBus:
         return True
 
     def listen(self, seconds: float) -> None:
-        """Let ``seconds`` pass while frames come in.
+        """Receive frames for ``seconds``.
 
         Raises:
             DeviceError: As :meth:`check`.
@@ -91,7 +91,7 @@ class EncoderBus:
         self.wait_for(lambda: False, seconds)
 
     def close(self) -> None:
-        """End the receiving thread and let the bus go, dead or alive."""
+        """End the receiving thread and close the bus, even if it has failed."""
         self._closing.set()
         self._receiver.join(JOIN_TIMEOUT_S)
         _shut_down(self._bus)
@@ -100,9 +100,9 @@ class EncoderBus:
     def _connect(self, settings: Mapping[str, Any]) -> can.BusABC:
         try:
             return can.Bus(**settings)
-        except Exception as error:  # the many interfaces of python-can raise whatever they like
+        except Exception as error:  # the interfaces of python-can raise errors of any class
             raise BusError(
-                f"cannot be opened: {_in_words(error)}",
+                f"cannot be opened: {_text(error)}",
                 subject=self.name,
                 action="Plug the CAN adapter in, or correct `bus` under [encoders] in the cell file",
             ) from error
@@ -111,9 +111,9 @@ class EncoderBus:
         try:
             while not self._closing.is_set():
                 message = self._bus.recv(SLICE_S)
-                if message is not None and _concerns_canopen(message):
+                if message is not None and _is_canopen(message):
                     self._deliver(message)
-        except Exception as error:  # whatever it is, it must reach whoever waits
+        except Exception as error:  # any error must reach the waiting thread
             with self.condition:
                 self._failure = error
                 self.condition.notify_all()
@@ -128,7 +128,7 @@ class EncoderBus:
         try:
             self._bus.send(message, timeout=SEND_TIMEOUT_S)
         except Exception as error:
-            raise self._error("does not take a frame", error) from error
+            raise self._error("does not accept a frame", error) from error
 
     def _record(self, direction: TrafficDirection, message: can.Message) -> None:
         if self._trace is not None:
@@ -137,7 +137,7 @@ class EncoderBus:
 
     def _error(self, what: str, cause: Exception) -> BusError:
         return BusError(
-            f"{what}: {_in_words(cause)}",
+            f"{what}: {_text(cause)}",
             subject=self.name,
             action="Check the CAN adapter, its cable, supply and termination, then open the encoders "
             "again; the set that was being measured is void",
@@ -145,7 +145,7 @@ class EncoderBus:
 
 
 class _Network(canopen.Network):
-    """A canopen network that others receive for, and whose sending is bounded."""
+    """A canopen network without a receiving thread of its own, and with a time limit on sending."""
 
     def __init__(self, bus: can.BusABC, send: Callable[[can.Message], None]) -> None:
         super().__init__(bus)
@@ -155,7 +155,7 @@ class _Network(canopen.Network):
         """Send one frame.
 
         Raises:
-            BusError: The bus does not take it.
+            BusError: The bus does not accept it.
         """
         frame = can.Message(
             arbitration_id=can_id, data=data, is_extended_id=False, is_remote_frame=remote, is_rx=False
@@ -164,8 +164,8 @@ class _Network(canopen.Network):
             self._send(frame)
 
 
-def _concerns_canopen(message: can.Message) -> bool:
-    """Whether it is a data frame of somebody else's with an 11-bit id."""
+def _is_canopen(message: can.Message) -> bool:
+    """Whether it is a data frame with an 11-bit id, sent by another participant."""
     return message.is_rx and not (
         message.is_error_frame or message.is_remote_frame or message.is_extended_id
     )
@@ -176,15 +176,14 @@ def _name_of(settings: Mapping[str, Any]) -> str:
     return " ".join(["encoder bus", *(str(word) for word in words if word is not None)])
 
 
-def _in_words(error: Exception) -> str:
-    """The message, and what is behind it: python-can wraps the errors of what it is built on."""
-    behind = "" if error.__cause__ is None else str(error.__cause__)
-    return str(error) if behind in str(error) else f"{error} ({behind})"
+def _text(error: Exception) -> str:
+    """The message, and that of its cause: python-can wraps the errors of the libraries it uses."""
+    cause = "" if error.__cause__ is None else str(error.__cause__)
+    return str(error) if cause in str(error) else f"{error} ({cause})"
 
 
 def _shut_down(bus: can.BusABC) -> None:
-    # On a dead line, python-can's slcan stops before it closes its port, and pyserial's socket://
-    # before it closes its socket.
+    # After an error, python-can's slcan does not close its port, nor pyserial's socket:// its socket.
     port = getattr(bus, "serialPortOrig", None)
     connection = getattr(port, "_socket", None)
     for part in (bus.shutdown, getattr(port, "close", None), getattr(connection, "close", None)):

@@ -1,6 +1,6 @@
-"""One encoder as a CANopen node: its dictionary entries, read and written, and its state.
+"""One encoder as a CANopen node: NMT commands, and its object dictionary over SDO.
 
-SDO requests that can be interrupted, and that notice a second device answering.
+The SDO client can be interrupted, and detects a second device under the same node id.
 """
 
 from __future__ import annotations
@@ -25,14 +25,14 @@ _NMT = 0x000
 
 
 class NmtCommand(IntEnum):
-    """What the network manager tells a node (CiA 301)."""
+    """NMT commands (CiA 301)."""
 
     START = 0x01
     ENTER_PRE_OPERATIONAL = 0x80
 
 
 class EncoderNode:
-    """The node of one leg's encoder. Integers in the dictionary are taken as unsigned."""
+    """The CANopen node of one leg's encoder. Integers are read and written as unsigned."""
 
     def __init__(self, leg: Leg, bus: EncoderBus, timeout_s: float) -> None:
         self.leg = leg
@@ -40,18 +40,18 @@ class EncoderNode:
         self._bus = bus
 
     def command(self, command: NmtCommand) -> None:
-        """Change the node's state; nodes do not acknowledge that.
+        """Send an NMT command; nodes do not acknowledge it.
 
         Raises:
-            BusError: The bus does not take the frame.
+            BusError: The bus does not accept the frame.
         """
         self._bus.network.send_message(_NMT, bytes((command, self.leg.node)))
 
     def read(self, entry: ObjectEntry) -> int:
-        """The value of an entry that must be there.
+        """The value of a mandatory entry.
 
         Raises:
-            NodeError: It is not, or nobody answers.
+            NodeError: The entry does not exist, or the node does not respond.
         """
         value = self.read_optional(entry)
         if value is None:
@@ -61,49 +61,51 @@ class EncoderNode:
         return value
 
     def read_optional(self, entry: ObjectEntry) -> int | None:
-        """The value of an entry; none if the device says that it has no such thing.
+        """The value of an entry; none if the device does not have it.
 
         Raises:
-            NodeError: Nobody answers, or two do.
+            NodeError: No response, or two.
         """
         try:
             return int.from_bytes(self.sdo.upload(entry.index, entry.subindex), "little")
         except SdoAbortedError:
             return None
         except SdoCommunicationError as error:
-            raise self._no_sense(entry, error) from error
+            raise self._communication_error(entry, error) from error
 
     def write(self, entry: ObjectEntry, value: int) -> None:
         """Write an entry.
 
         Raises:
-            NodeError: The device refuses, nobody answers, or two do.
+            NodeError: The device refuses, or there is no response, or two.
         """
         try:
             self.sdo.download(entry.index, entry.subindex, value.to_bytes(entry.size, "little"))
         except SdoAbortedError as error:
             raise ConfigurationError(
-                f"does not let {entry} be set to {value:#x}: {error}",
+                f"refuses to set {entry} to {value:#x}: {error}",
                 self.leg,
-                action="Set it with the maker's tool, or use another device",
+                action="Set it with the vendor's tool, or use another device",
             ) from error
         except SdoCommunicationError as error:
-            raise self._no_sense(entry, error) from error
+            raise self._communication_error(entry, error) from error
 
     def check_alone(self) -> None:
-        """Raise if a second device answered under this node id.
+        """Raise if a second device responded under this node id.
 
         Raises:
-            DuplicatedNodeError: One did.
+            DuplicatedNodeError: It did.
         """
         if self.sdo.has_surplus_response:
-            raise duplicated_node("answered one request twice", self.leg)
+            raise duplicated_node("responded twice to one request", self.leg)
 
-    def _no_sense(self, entry: ObjectEntry, error: Exception) -> DuplicatedNodeError | SilentNodeError:
+    def _communication_error(
+        self, entry: ObjectEntry, error: Exception
+    ) -> DuplicatedNodeError | SilentNodeError:
         if self.sdo.has_surplus_response:
-            return duplicated_node("answered one request twice", self.leg)
+            return duplicated_node("responded twice to one request", self.leg)
         return SilentNodeError(
-            f"does not answer for {entry}: {error}",
+            f"does not respond for {entry}: {error}",
             self.leg,
             action="Check its supply and cable, then open the encoders again",
         )
@@ -124,13 +126,14 @@ _UPLOAD_DEVICE_TYPE = bytes((0x40, 0x00, 0x10, 0, 0, 0, 0, 0))
 
 
 class CountingSdoClient(SdoClient):
-    """canopen's SDO client, waiting on the bus's terms and counting requests and answers.
+    """canopen's SDO client with interruptible waits and a count of outstanding responses.
 
-    ``surplus`` is set once there were more answers than requests: two devices share the node id.
-    ``answered`` says whether anybody ever answered.
+    Attributes:
+        has_surplus_response: there were more responses than requests: two devices share the node id.
+        has_responded: there was a response.
     """
 
-    RESPONSE_TIMEOUT = 0.0  # the wait has happened before canopen looks
+    RESPONSE_TIMEOUT = 0.0  # read_response waits before canopen does
 
     def __init__(self, bus: EncoderBus, node: int, timeout_s: float) -> None:
         dictionary = ObjectDictionary()  # type: ignore[no-untyped-call]
@@ -140,44 +143,44 @@ class CountingSdoClient(SdoClient):
         self.has_responded = False
         self._bus = bus
         self._timeout_s = timeout_s
-        self._owed = 0
+        self._outstanding = 0
         bus.network.subscribe(self.tx_cobid, self.on_response)
 
     def probe(self) -> None:
-        """Ask for the device type without waiting; the answer shows in ``answered``."""
-        self._owed += 1
+        """Request the device type without waiting; a response sets ``has_responded``."""
+        self._outstanding += 1
         self.send_request(_UPLOAD_DEVICE_TYPE)  # type: ignore[no-untyped-call]
 
     def on_response(self, can_id: int, data: bytearray, timestamp: float) -> None:
-        """Take an answer that came in; too short a frame is none."""
+        """Handle a received response; a frame that is too short is ignored."""
         if len(data) != 8:
             return
         self.has_responded = True
-        self._owed -= 1
-        self.has_surplus_response = self.has_surplus_response or self._owed < 0
+        self._outstanding -= 1
+        self.has_surplus_response = self.has_surplus_response or self._outstanding < 0
         super().on_response(can_id, data, timestamp)  # type: ignore[no-untyped-call]
         self._bus.condition.notify_all()
 
     def request_response(self, sdo_request: bytes) -> bytes:
-        """Send one request and return its answer, once no earlier answer is under way.
+        """Send one request and return its response, after any outstanding earlier one.
 
         Raises:
             DeviceError: As :meth:`EncoderBus.check`.
-            canopen.SdoError: No answer, an abort, or nonsense.
+            canopen.SdoError: No response, an abort, or an invalid response.
         """
-        self._bus.wait_for(lambda: self._owed <= 0, self._timeout_s)
+        self._bus.wait_for(lambda: self._outstanding <= 0, self._timeout_s)
         with self._bus.condition:
-            self._owed = 1
-        answer: bytes = super().request_response(sdo_request)  # type: ignore[no-untyped-call]
-        return answer
+            self._outstanding = 1
+        response: bytes = super().request_response(sdo_request)  # type: ignore[no-untyped-call]
+        return response
 
     def read_response(self) -> bytes:
-        """Wait for the answer in bounded slices.
+        """Wait for the response.
 
         Raises:
             DeviceError: As :meth:`EncoderBus.check`.
-            canopen.SdoError: No answer, or an abort.
+            canopen.SdoError: No response, or an abort.
         """
         self._bus.wait_for(lambda: not self.responses.empty(), self._timeout_s)
-        answer: bytes = super().read_response()  # type: ignore[no-untyped-call]
-        return answer
+        response: bytes = super().read_response()  # type: ignore[no-untyped-call]
+        return response

@@ -1,4 +1,4 @@
-"""Six CANopen encoders after CiA 406, sampled together: one SYNC, six positions."""
+"""Six CANopen encoders (CiA 406), sampled simultaneously: one SYNC, six positions."""
 
 from __future__ import annotations
 
@@ -16,49 +16,49 @@ from hexacell.errors import DeviceError
 class Cia406Bank:
     """The encoder bank of a cell; implements :class:`drivers.interfaces.EncoderBank`.
 
-    Any interface of python-can will do: ``settings.bus`` is passed to ``can.Bus`` as it is.
-    ``trace`` is called from the bus's threads with every CANopen frame. Every failure is a
+    ``settings.bus`` is passed unchanged to ``can.Bus``, so every interface of python-can works.
+    ``trace`` is called with every CANopen frame, from the threads of the bus. Every failure is a
     ``DeviceError``, those of the bus and of nodes one of :mod:`drivers.encoders.errors`.
     """
 
     def __init__(self, settings: EncoderSettings, trace: TraceRecorder | None = None) -> None:
         self._settings = settings
         self._trace = trace
-        self._owner: WorkerThread | None = None
+        self._worker: WorkerThread | None = None
         self._session: EncoderSession | None = None
 
     async def open(self) -> tuple[DeviceIdentity, ...]:
-        """Connect, compare, configure and start the nodes; an open bank is opened afresh.
+        """Connect, identify, configure and start the nodes; an open bank is closed first.
 
         Returns:
-            Who answered, legs 1 to 6.
+            The identities, legs 1 to 6.
 
         Raises:
-            DeviceError: What is wrong; nothing is left open then.
+            DeviceError: The reason of the failure; nothing is left open.
         """
         await self.close()
-        self._owner = WorkerThread("encoders")
+        self._worker = WorkerThread("encoders")
         try:
-            return await self._owner.run(partial(self._open, self._owner.cancelled))
+            return await self._worker.run(partial(self._open, self._worker.cancelled))
         except BaseException:
             await self.close()
             raise
 
     async def read(self) -> EncoderSample:
-        """One complete round: all six positions at the same instant.
+        """One complete sample: all six positions at the same instant.
 
         Raises:
-            DeviceError: What is wrong.
+            DeviceError: The sample is incomplete or not valid.
         """
-        if self._owner is None:
+        if self._worker is None:
             raise _not_open()
-        return await self._owner.run(self._read)
+        return await self._worker.run(self._read)
 
     async def close(self) -> None:
-        """Let the bus go and end its threads; a read in progress fails. Closing twice is harmless."""
-        owner, self._owner = self._owner, None
-        if owner is not None:
-            await owner.finish(self._close)
+        """Close the bus and end its threads; a read in progress fails. Closing twice is harmless."""
+        worker, self._worker = self._worker, None
+        if worker is not None:
+            await worker.finish(self._close)
 
     def _open(self, interrupted: threading.Event) -> tuple[DeviceIdentity, ...]:
         self._session = EncoderSession(self._settings, interrupted, self._trace)

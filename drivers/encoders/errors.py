@@ -1,7 +1,4 @@
-"""What can go wrong between the encoders and us; every one a ``DeviceError`` with a next action.
-
-How an encoder is named: the leg it belongs to and the node id it answers under.
-"""
+"""Errors of the encoders, each with a next action, and the legs that they name."""
 
 from __future__ import annotations
 
@@ -12,11 +9,11 @@ from hexacell.errors import DeviceError
 
 
 class BusError(DeviceError):
-    """The CAN bus cannot be opened, has died, or is not ours alone."""
+    """The CAN bus cannot be opened, has failed, or is used by another master."""
 
 
 class NodeError(DeviceError):
-    """A problem of one encoder or several; ``legs`` are those concerned."""
+    """A problem of one or more encoders, those of ``legs``."""
 
     def __init__(self, problem: str, *legs: Leg, action: str) -> None:
         self.legs = legs
@@ -24,31 +21,31 @@ class NodeError(DeviceError):
 
 
 class MissingNodeError(NodeError):
-    """Nobody answers under a node id that the cell file names."""
+    """No device responds under a node id of the cell file."""
 
 
 class DuplicatedNodeError(NodeError):
-    """Two devices answer under one node id."""
+    """Two devices respond under one node id."""
 
 
 class WrongDeviceError(NodeError):
-    """Somebody answers, but not the device that the cell file describes."""
+    """The device that responds is not the one described in the cell file."""
 
 
 class ConfigurationError(NodeError):
-    """The device does not take the settings that one sample per SYNC needs."""
+    """The device refuses a setting that is needed for one sample per SYNC."""
 
 
 class SilentNodeError(NodeError):
-    """A configured node no longer answers SYNC, SDO requests, or sends no heartbeat."""
+    """A configured node no longer responds to SYNC or SDO requests, or its heartbeat is missing."""
 
 
 class RestartedNodeError(NodeError):
-    """A node lost its configuration in the middle of a run: the set is void."""
+    """A node restarted and lost its configuration during a run: the set is void."""
 
 
 class InvalidSampleError(NodeError):
-    """A node reports an error that falsifies its position, until it says that it is gone."""
+    """A node reports an error that makes its position invalid, until it reports that it is gone."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,6 +60,6 @@ class Leg:
 
 
 def subject_of(legs: Sequence[Leg]) -> str:
-    """The words that begin an error message about one leg or several."""
+    """The subject of an error message about one or more legs."""
     noun = "encoder of" if len(legs) == 1 else "encoders of"
     return f"{noun} {', '.join(str(leg) for leg in legs)}"

@@ -1,4 +1,4 @@
-"""Who answers: every leg's node must be there, alone, and the device the cell file describes."""
+"""Identification of the nodes: each must respond, be the only one with its id, and match the cell file."""
 
 from __future__ import annotations
 
@@ -23,15 +23,15 @@ from drivers.interfaces import DeviceIdentity
 from hexacell.cell.devices import EncoderSettings
 
 SECOND_RESPONSE_S = 0.03
-"""How long a second device may take to answer the same request."""
+"""How long a second device may take to respond to the same request."""
 
 
 def detect_nodes(nodes: Sequence[EncoderNode], bus: EncoderBus, timeout_s: float) -> None:
-    """Ask all nodes at once whether they are there.
+    """Probe all nodes at once.
 
     Raises:
-        MissingNodeError: Some do not answer within ``timeout_s``.
-        DuplicatedNodeError: More than one device answers under one node id.
+        MissingNodeError: Some do not respond within ``timeout_s``.
+        DuplicatedNodeError: More than one device responds under one node id.
     """
     for node in nodes:
         node.sdo.probe()
@@ -41,45 +41,45 @@ def detect_nodes(nodes: Sequence[EncoderNode], bus: EncoderBus, timeout_s: float
         node.check_alone()
     missing = [node for node in nodes if not node.sdo.has_responded]
     if missing:
-        raise _missing(missing, _strangers(nodes, bus))
+        raise _missing(missing, _unexpected_nodes(nodes, bus))
 
 
 def read_device_type(node: EncoderNode) -> DeviceType:
-    """The kind of encoder that answers.
+    """The device type of a node.
 
     Raises:
-        WrongDeviceError: It is no absolute linear encoder.
+        WrongDeviceError: It is not an absolute linear encoder.
     """
     value = node.read(DEVICE_TYPE)
     try:
         return DeviceType(value)
     except ValueError as error:
         raise WrongDeviceError(
-            f"is no absolute linear encoder: its device type is {_device_type_in_words(value)}",
+            f"is no absolute linear encoder: its device type is {_device_type_text(value)}",
             node.leg,
             action="Check `nodes` under [encoders] in the cell file against the devices' node ids",
         ) from error
 
 
 def check_measuring_step(node: EncoderNode, step_nm: float) -> None:
-    """Compare the length of one count with the cell file's.
+    """Compare the measuring step with the cell file.
 
     Raises:
-        WrongDeviceError: It differs, or the device does not tell.
+        WrongDeviceError: It differs, or the device does not report it.
     """
     found = node.read_optional(MEASURING_STEP_SETTING)
     if found is None:
         found = node.read(MEASURING_STEP)
     if not math.isclose(found, step_nm, rel_tol=1e-9):
         raise WrongDeviceError(
-            f"counts in steps of {found} nm, the cell file says {step_nm:g} nm",
+            f"has a measuring step of {found} nm, the cell file says {step_nm:g} nm",
             node.leg,
-            action="Correct `measuring_step_nm` under [encoders], or set the device with its maker's tool",
+            action="Correct `measuring_step_nm` under [encoders], or set the device with its vendor's tool",
         )
 
 
 def read_identity(node: EncoderNode, kind: DeviceType) -> DeviceIdentity:
-    """The device's own identity (1018h); parts that it does not have are left out."""
+    """The identity object of the device (1018h), without the entries that it does not have."""
     words = [f"CiA {ENCODER_PROFILE} {kind.description}"]
     for name, entry in (("vendor", VENDOR), ("product", PRODUCT), ("revision", REVISION)):
         value = node.read_optional(entry)
@@ -94,10 +94,10 @@ def read_identity(node: EncoderNode, kind: DeviceType) -> DeviceIdentity:
 
 
 def check_serial_number(node: EncoderNode, identity: DeviceIdentity, settings: EncoderSettings) -> None:
-    """Compare the serial number with the cell file's, if that states any.
+    """Compare the serial number with the cell file, if that has one.
 
     Raises:
-        WrongDeviceError: Another device answers.
+        WrongDeviceError: It differs.
     """
     if settings.serial_numbers is None:
         return
@@ -111,9 +111,9 @@ def check_serial_number(node: EncoderNode, identity: DeviceIdentity, settings: E
         )
 
 
-def _missing(missing: Sequence[EncoderNode], strangers: Sequence[int]) -> MissingNodeError:
-    found = ", ".join(str(node) for node in strangers)
-    hint = f"; node {found} is on the bus but belongs to no leg" if strangers else ""
+def _missing(missing: Sequence[EncoderNode], unexpected: Sequence[int]) -> MissingNodeError:
+    found = ", ".join(str(node) for node in unexpected)
+    hint = f"; node {found} is on the bus but belongs to no leg" if unexpected else ""
     return MissingNodeError(
         f"nobody answers{hint}",
         *(node.leg for node in missing),
@@ -121,14 +121,14 @@ def _missing(missing: Sequence[EncoderNode], strangers: Sequence[int]) -> Missin
     )
 
 
-def _strangers(nodes: Sequence[EncoderNode], bus: EncoderBus) -> list[int]:
-    """Nodes that answer although no leg has them: often a factory-set node id."""
+def _unexpected_nodes(nodes: Sequence[EncoderNode], bus: EncoderBus) -> list[int]:
+    """Nodes that respond but belong to no leg: often with a node id from the factory."""
     bus.network.scanner.search()
     bus.listen(SECOND_RESPONSE_S)
     return sorted(set(bus.network.scanner.nodes) - {node.leg.node for node in nodes})
 
 
-def _device_type_in_words(value: int) -> str:
+def _device_type_text(value: int) -> str:
     profile, kind = value & 0xFFFF, value >> 16
     if profile == ENCODER_PROFILE:
         return f"0x{value:08X} (an encoder, but of class {kind}; linear ones are 8 and 10)"

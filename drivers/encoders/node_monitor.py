@@ -1,6 +1,6 @@
-"""What nodes say of themselves unasked: boot-ups, heartbeats and emergencies (CiA 301).
+"""Monitoring of the nodes: boot-up, heartbeat and emergency messages (CiA 301), and alarm entries.
 
-Errors that a device keeps in its dictionary: 1001h and 6503h, looked at now and then.
+Alarms that a device signals without an emergency message are found by reading 1001h and 6503h.
 """
 
 from __future__ import annotations
@@ -22,15 +22,15 @@ HEARTBEAT = 0x700
 EMERGENCY = 0x080
 
 MAX_MISSED_HEARTBEATS = 3
-"""So many in a row are a loss."""
+"""So many consecutive missing heartbeats are a failure."""
 JITTER_S = 0.2
-"""What a PC may be late by in looking."""
+"""Scheduling delay that is tolerated on the PC."""
 
 _KNOWN_EMERGENCIES = {0xFF00: "no magnet", 0x8130: "its heartbeat monitoring tripped"}
 
 
 class NodeState(IntEnum):
-    """What a heartbeat carries; a boot-up message is the one with 0."""
+    """The NMT state in a heartbeat; 0 is the boot-up message."""
 
     BOOT_UP = 0x00
     STOPPED = 0x04
@@ -39,11 +39,12 @@ class NodeState(IntEnum):
 
 
 class NodeMonitor:
-    """Follows one node from the moment that it is about to be configured.
+    """Monitors one node, from before its configuration.
 
-    ``restarted`` stays set once the node has booted or left OPERATIONAL. ``emergency`` is the
-    error, in words, that the node has reported and not taken back; ``emergencies`` counts all
-    that it ever reported.
+    Attributes:
+        restarted: the node has booted or left OPERATIONAL; remains set.
+        emergency: the reported error, until the node reports that it is gone.
+        emergencies: the number of reported errors.
     """
 
     def __init__(self, leg: Leg, bus: EncoderBus, heartbeat_ms: int) -> None:
@@ -53,31 +54,31 @@ class NodeMonitor:
         self.emergencies = 0
         self.timeout_s = MAX_MISSED_HEARTBEATS * heartbeat_ms / 1000 + JITTER_S
         self._heartbeat_ms = heartbeat_ms
-        self._heard: float | None = None
+        self._last_heartbeat: float | None = None
         self._was_operational = False
-        self._news = bus.condition
+        self._condition = bus.condition
         bus.network.subscribe(HEARTBEAT + leg.node, self._on_heartbeat)
         bus.network.subscribe(EMERGENCY + leg.node, self._on_emergency)
 
     @property
     def is_silent(self) -> bool:
         """Whether its heartbeat is overdue."""
-        return self._heard is not None and time.monotonic() - self._heard > self.timeout_s
+        return self._last_heartbeat is not None and time.monotonic() - self._last_heartbeat > self.timeout_s
 
     def start_heartbeat_timeout(self) -> None:
-        """From now on silence is a fault, unless heartbeats are off."""
+        """From now on a missing heartbeat is a fault, unless heartbeats are off."""
         if self._heartbeat_ms:
-            self._heard = time.monotonic()
+            self._last_heartbeat = time.monotonic()
 
     def _on_heartbeat(self, _can_id: int, data: bytearray, _timestamp: float) -> None:
-        if self._heard is not None:
-            self._heard = time.monotonic()
+        if self._last_heartbeat is not None:
+            self._last_heartbeat = time.monotonic()
         state = data[0] & 0x7F if data else NodeState.BOOT_UP
         if state == NodeState.OPERATIONAL:
             self._was_operational = True
         elif state == NodeState.BOOT_UP or self._was_operational:
             self.restarted = True
-            self._news.notify_all()
+            self._condition.notify_all()
 
     def _on_emergency(self, _can_id: int, data: bytearray, timestamp: float) -> None:
         error = _unpack_emergency(data, timestamp)
@@ -85,31 +86,31 @@ class NodeMonitor:
             self.emergency = None
             return
         self.emergencies += 1
-        self.emergency = _in_words(error)
-        self._news.notify_all()
+        self.emergency = _text(error)
+        self._condition.notify_all()
 
 
-def check_nodes(watches: Sequence[NodeMonitor]) -> None:
-    """Raise if some node cannot be relied on.
+def check_nodes(monitors: Sequence[NodeMonitor]) -> None:
+    """Raise if a node has failed.
 
     Raises:
         RestartedNodeError: It lost its configuration.
         SilentNodeError: Its heartbeat is overdue.
-        InvalidSampleError: It reports an error that it has not taken back.
+        InvalidSampleError: It reports an error.
     """
-    restarted = [watch.leg for watch in watches if watch.restarted]
+    restarted = [monitor.leg for monitor in monitors if monitor.restarted]
     if restarted:
         raise _restarted(restarted)
-    silent = [watch for watch in watches if watch.is_silent]
+    silent = [monitor for monitor in monitors if monitor.is_silent]
     if silent:
-        raise _silent(silent, everybody=len(silent) == len(watches))
-    for watch in watches:
-        if watch.emergency is not None:
-            raise invalid_sample(f"reports {watch.emergency}", watch.leg)
+        raise _silent(silent, all_legs=len(silent) == len(monitors))
+    for monitor in monitors:
+        if monitor.emergency is not None:
+            raise invalid_sample(f"reports {monitor.emergency}", monitor.leg)
 
 
 def invalid_sample(what: str, leg: Leg) -> InvalidSampleError:
-    """The error for positions that the device itself does not vouch for."""
+    """The error for positions that the device itself reports as invalid."""
     return InvalidSampleError(
         f"{what}; its position cannot be trusted",
         leg,
@@ -117,44 +118,44 @@ def invalid_sample(what: str, leg: Leg) -> InvalidSampleError:
     )
 
 
-def silence_action(*, everybody: bool) -> str:
-    """Where to look when one leg is silent, or when all are."""
-    where = "the CAN adapter, supply and termination" if everybody else "its supply and cable"
+def silence_action(*, all_legs: bool) -> str:
+    """The next action when some legs are silent, or all."""
+    where = "the CAN adapter, supply and termination" if all_legs else "its supply and cable"
     return f"Check {where}, then open the encoders again; the set that was being measured is void"
 
 
 def _restarted(legs: Sequence[Leg]) -> RestartedNodeError:
     return RestartedNodeError(
-        "restarted, or was stopped, in the middle of the run and lost its configuration: the set is void",
+        "restarted, or was stopped, during the run and lost its configuration: the set is void",
         *legs,
         action="Check its supply, open the encoders again and repeat the set",
     )
 
 
-def _silent(watches: Sequence[NodeMonitor], *, everybody: bool) -> SilentNodeError:
+def _silent(monitors: Sequence[NodeMonitor], *, all_legs: bool) -> SilentNodeError:
     return SilentNodeError(
-        f"no heartbeat for {watches[0].timeout_s:.2g} s",
-        *(watch.leg for watch in watches),
-        action=silence_action(everybody=everybody),
+        f"no heartbeat for {monitors[0].timeout_s:.2g} s",
+        *(monitor.leg for monitor in monitors),
+        action=silence_action(all_legs=all_legs),
     )
 
 
 def _unpack_emergency(data: bytearray, timestamp: float) -> EmcyError:
-    """Code, error register and the maker's five bytes; what is cut off counts as an error."""
+    """Code, error register and the vendor's five bytes; missing bytes count as an error."""
     code, register, details = struct.unpack("<HB5s", bytes(data[:8]).ljust(8, b"\xff"))
     return EmcyError(code, register, details, timestamp)
 
 
-def _in_words(error: EmcyError) -> str:
+def _text(error: EmcyError) -> str:
     known = _KNOWN_EMERGENCIES.get(error.code) or error.get_desc().lower()
     return f"emergency {error.code:04X} ({known}, error register {error.register:#04x})"
 
 
 ALARM_POLL_S = 0.1
-"""A device that raises an alarm without an emergency message is found out after so long."""
+"""Period at which the alarm entries are read."""
 
 _COMMUNICATION = 0x10
-"""Bit of the error register that says nothing about positions."""
+"""Bit of the error register for communication errors, which do not concern positions."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -164,15 +165,15 @@ class _Supported:
 
 
 class AlarmPoll:
-    """Reads the error entries of all nodes: at once, then every ``PERIOD_S`` and after emergencies.
+    """Reads the alarm entries of all nodes: at first, then every ``PERIOD_S`` and after emergencies.
 
     Raises:
         NodeError: As :meth:`check`.
     """
 
-    def __init__(self, nodes: Sequence[EncoderNode], watches: Sequence[NodeMonitor]) -> None:
-        self._watches = watches
-        self._seen = -1
+    def __init__(self, nodes: Sequence[EncoderNode], monitors: Sequence[NodeMonitor]) -> None:
+        self._monitors = monitors
+        self._emergencies_seen = -1
         self._due = 0.0
         self._supported = [
             _Supported(node, tuple(entry for entry in (ERROR_REGISTER, ALARMS) if _has(node, entry)))
@@ -181,18 +182,18 @@ class AlarmPoll:
         self.check()
 
     def check(self) -> None:
-        """Look if it is time to.
+        """Read the alarm entries if they are due.
 
         Raises:
             InvalidSampleError: A device has an alarm.
-            NodeError: It does not answer.
+            NodeError: It does not respond.
         """
-        emergencies = sum(watch.emergencies for watch in self._watches)
-        if time.monotonic() < self._due and emergencies == self._seen:
+        emergencies = sum(monitor.emergencies for monitor in self._monitors)
+        if time.monotonic() < self._due and emergencies == self._emergencies_seen:
             return
         for supported in self._supported:
             _check(supported)
-        self._seen = emergencies
+        self._emergencies_seen = emergencies
         self._due = time.monotonic() + ALARM_POLL_S
 
 

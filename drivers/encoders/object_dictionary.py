@@ -1,4 +1,4 @@
-"""Entries of the object dictionary that the driver uses (CiA 301 and CiA 406)."""
+"""The object dictionary entries used by the driver (CiA 301 and CiA 406)."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from enum import IntEnum
 
 @dataclass(frozen=True, slots=True)
 class ObjectEntry:
-    """One entry: ``size`` is what a write sends, bytes."""
+    """One entry; ``size`` is the length of its value in a write, bytes."""
 
     index: int
     subindex: int
@@ -19,20 +19,20 @@ class ObjectEntry:
 
 
 class DeviceType(IntEnum):
-    """Values of 1000h that this driver knows: profile 406 and the class of encoder above it."""
+    """The supported values of 1000h: profile 406 and the encoder class."""
 
     ABSOLUTE_LINEAR = 0x0008_0196
     SEVERAL_MAGNETS = 0x000A_0196
 
     @property
     def description(self) -> str:
-        """What a device of this type is called."""
+        """The name of this type."""
         one = "absolute linear encoder"
         return one if self is DeviceType.ABSOLUTE_LINEAR else f"{one} for several magnets"
 
     @property
     def position(self) -> ObjectEntry:
-        """Where a device of this type keeps the position of its (first) magnet."""
+        """The entry with the position of the (first) magnet."""
         return POSITION if self is DeviceType.ABSOLUTE_LINEAR else POSITION_OF_MAGNET_1
 
 
@@ -67,7 +67,7 @@ def tpdo_cob_id(number: int) -> ObjectEntry:
 
 
 def tpdo_transmission_type(number: int) -> ObjectEntry:
-    """When it is sent: 1 to 240 with every n-th SYNC, 254 and 255 on events."""
+    """Its transmission type: 1 to 240 with every n-th SYNC, 254 and 255 on events."""
     return tpdo_parameter(number, 2, 1)
 
 
@@ -77,5 +77,5 @@ def tpdo_event_timer(number: int) -> ObjectEntry:
 
 
 def tpdo_mapping(number: int, slot: int) -> ObjectEntry:
-    """What it carries in ``slot`` (from 1); slot 0 is how many there are."""
+    """Its mapping in ``slot`` (from 1); slot 0 is the number of mapped entries."""
     return ObjectEntry(0x1A00 + number - 1, slot, 4 if slot else 1)

@@ -1,6 +1,6 @@
-"""Make a node send its position once per SYNC, and nothing else, and a heartbeat.
+"""Configuration of a node: one TPDO with its position at every SYNC, no other TPDO, and a heartbeat.
 
-To be done in PRE-OPERATIONAL. Nothing is stored in the device: a power cycle undoes it.
+Requires PRE-OPERATIONAL. Nothing is stored in the device: a power cycle restores its settings.
 """
 
 from __future__ import annotations
@@ -25,13 +25,13 @@ from drivers.encoders.object_dictionary import (
 
 WITH_EVERY_SYNC = 1
 _OFF = 1 << 31
-_NO_REMOTE_REQUESTS = 1 << 30
+_NO_RTR = 1 << 30
 _POSITION_BITS = 32
 
 
 @dataclass(frozen=True, slots=True)
 class MappedEntry:
-    """One entry of a TPDO: which, and how many bits of it."""
+    """One mapped entry of a TPDO."""
 
     index: int
     subindex: int
@@ -49,13 +49,13 @@ class MappedEntry:
 
     @property
     def is_position(self) -> bool:
-        """Whether it is a whole position value."""
+        """Whether it is a complete position."""
         return self in (_mapped(POSITION), _mapped(POSITION_OF_MAGNET_1))
 
 
 @dataclass(frozen=True, slots=True)
 class Tpdo:
-    """A transmit PDO as the device has it."""
+    """A transmit PDO as configured in the device."""
 
     number: int
     cob_id: int
@@ -64,7 +64,7 @@ class Tpdo:
 
     @property
     def position_offset(self) -> int | None:
-        """Where the position begins in it, bits; none if it is not mapped."""
+        """The offset of the position in its data, bits; none if it is not mapped."""
         bits = 0
         for entry in self.mapping:
             if entry.is_position:
@@ -99,10 +99,10 @@ def configure_position_tpdo(node: EncoderNode, kind: DeviceType, heartbeat_ms: i
     tpdos = [tpdo for number in range(1, TPDO_COUNT + 1) if (tpdo := _read(node, number)) is not None]
     if not tpdos:
         raise _refused(node, "has no transmit PDO")
-    chosen = _choose(tpdos)
+    selected = _select(tpdos)
     for tpdo in tpdos:
         node.write(tpdo_cob_id(tpdo.number), tpdo.cob_id | _OFF)
-    channel = _set_up(node, chosen, kind)
+    channel = _set_up(node, selected, kind)
     if heartbeat_ms or node.read_optional(PRODUCER_HEARTBEAT):
         node.write(PRODUCER_HEARTBEAT, heartbeat_ms)
     return channel
@@ -121,8 +121,8 @@ def _read(node: EncoderNode, number: int) -> Tpdo | None:
     )
 
 
-def _choose(tpdos: Sequence[Tpdo]) -> Tpdo:
-    """The one that needs the least change: position mapped, synchronous, lowest number."""
+def _select(tpdos: Sequence[Tpdo]) -> Tpdo:
+    """The TPDO that needs the fewest changes: position mapped, synchronous, lowest number."""
     return min(
         tpdos,
         key=lambda tpdo: (tpdo.position_offset is None, tpdo.transmission_type > 240, tpdo.number),
@@ -140,8 +140,8 @@ def _set_up(node: EncoderNode, tpdo: Tpdo, kind: DeviceType) -> PositionChannel:
     if node.read_optional(tpdo_event_timer(tpdo.number)):
         node.write(tpdo_event_timer(tpdo.number), 0)
     cob_id = 0x80 + 0x100 * tpdo.number + node.leg.node
-    node.write(tpdo_cob_id(tpdo.number), cob_id | tpdo.cob_id & _NO_REMOTE_REQUESTS)
-    _check_kept(node, tpdo.number)
+    node.write(tpdo_cob_id(tpdo.number), cob_id | tpdo.cob_id & _NO_RTR)
+    _verify(node, tpdo.number)
     return PositionChannel(cob_id, offset // 8)
 
 
@@ -151,8 +151,8 @@ def _map_only(node: EncoderNode, number: int, position: ObjectEntry) -> None:
     node.write(tpdo_mapping(number, 0), 1)
 
 
-def _check_kept(node: EncoderNode, number: int) -> None:
-    """Some devices acknowledge what they do not do."""
+def _verify(node: EncoderNode, number: int) -> None:
+    """Read back: some devices acknowledge a write without effect."""
     if node.read(tpdo_transmission_type(number)) != WITH_EVERY_SYNC:
         raise _refused(node, f"acknowledges, but does not keep, TPDO {number} with every SYNC")
     if node.read(tpdo_cob_id(number)) & _OFF:
@@ -164,4 +164,4 @@ def _mapped(entry: ObjectEntry) -> MappedEntry:
 
 
 def _refused(node: EncoderNode, what: str) -> ConfigurationError:
-    return ConfigurationError(what, node.leg, action="Set it with the maker's tool, or use another device")
+    return ConfigurationError(what, node.leg, action="Set it with the vendor's tool, or use another device")

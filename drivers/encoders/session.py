@@ -1,4 +1,4 @@
-"""An open bank of encoders, seen from the thread that owns its bus."""
+"""An open encoder bank, as used by its worker thread."""
 
 from __future__ import annotations
 
@@ -27,10 +27,10 @@ NM_TO_MM = 1e-6
 
 
 class EncoderSession:
-    """Opened, compared, configured and started; then read round by round.
+    """Opens, identifies, configures and starts the nodes; then takes samples.
 
     Raises:
-        DeviceError: Anything that keeps the bank from being relied on; the bus is closed again.
+        DeviceError: A step failed; the bus is closed again.
     """
 
     def __init__(
@@ -46,23 +46,23 @@ class EncoderSession:
 
     @property
     def identities(self) -> tuple[DeviceIdentity, ...]:
-        """Who answered, legs 1 to 6."""
+        """The identities, legs 1 to 6."""
         return self._identities
 
     def read(self) -> EncoderSample:
-        """One complete round; kept only if nothing was wrong after it either.
+        """One complete sample; valid only if no fault is found after it.
 
         Raises:
-            DeviceError: What is wrong.
+            DeviceError: The fault.
         """
         self._bus.check()
-        counts = self._rounds.sample(signed=self._settings.signed)
+        counts = self._sampler.sample(signed=self._settings.signed)
         self._alarms.check()
         self._bus.check()
         return EncoderSample(counts, positions_mm(counts, self._settings))
 
     def close(self) -> None:
-        """Let the bus go."""
+        """Close the bus."""
         self._bus.close()
 
     def _start(self) -> None:
@@ -72,25 +72,25 @@ class EncoderSession:
         for node in nodes:
             node.command(NmtCommand.ENTER_PRE_OPERATIONAL)
         detect_nodes(nodes, self._bus, settings.timeout_s)
-        watches = tuple(NodeMonitor(leg, self._bus, settings.heartbeat_ms) for leg in legs)
-        kinds = tuple(read_device_type(node) for node in nodes)
-        self._identities = tuple(map(self._identify, nodes, kinds))
+        monitors = tuple(NodeMonitor(leg, self._bus, settings.heartbeat_ms) for leg in legs)
+        device_types = tuple(read_device_type(node) for node in nodes)
+        self._identities = tuple(map(self._identify, nodes, device_types))
         channels = tuple(
-            configure_position_tpdo(node, kind, settings.heartbeat_ms)
-            for node, kind in zip(nodes, kinds, strict=True)
+            configure_position_tpdo(node, device_type, settings.heartbeat_ms)
+            for node, device_type in zip(nodes, device_types, strict=True)
         )
-        for watch in watches:
-            watch.start_heartbeat_timeout()
-        self._rounds = SyncSampler(legs, channels, self._bus, settings.timeout_s)
-        self._bus.health_check = partial(_check_all, nodes, watches, self._rounds)
-        self._alarms = AlarmPoll(nodes, watches)
+        for monitor in monitors:
+            monitor.start_heartbeat_timeout()
+        self._sampler = SyncSampler(legs, channels, self._bus, settings.timeout_s)
+        self._bus.health_check = partial(_check_all, nodes, monitors, self._sampler)
+        self._alarms = AlarmPoll(nodes, monitors)
         for node in nodes:
             node.command(NmtCommand.START)
-        self._rounds.self_test(signed=settings.signed)
+        self._sampler.self_test(signed=settings.signed)
 
-    def _identify(self, node: EncoderNode, kind: DeviceType) -> DeviceIdentity:
+    def _identify(self, node: EncoderNode, device_type: DeviceType) -> DeviceIdentity:
         check_measuring_step(node, self._settings.measuring_step_nm)
-        identity = read_identity(node, kind)
+        identity = read_identity(node, device_type)
         check_serial_number(node, identity, self._settings)
         return identity
 
@@ -103,18 +103,18 @@ def positions_mm(counts: tuple[int, ...], settings: EncoderSettings) -> tuple[fl
 
 
 def _check_all(
-    nodes: tuple[EncoderNode, ...], watches: tuple[NodeMonitor, ...], rounds: SyncSampler
+    nodes: tuple[EncoderNode, ...], monitors: tuple[NodeMonitor, ...], sampler: SyncSampler
 ) -> None:
     for node in nodes:
         node.check_alone()
-    check_nodes(watches)
-    rounds.check()
+    check_nodes(monitors)
+    sampler.check()
 
 
 def _bus_settings(settings: EncoderSettings) -> dict[str, object]:
     if settings.bus is None:
         raise BusError(
-            "is not named in the cell file",
+            "is not configured in the cell file",
             subject="encoder bus",
             action="State `bus` under [encoders], for example "
             '{ interface = "slcan", channel = "/dev/ttyACM0", bitrate = 500000 }',

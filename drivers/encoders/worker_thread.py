@@ -1,4 +1,4 @@
-"""One thread that owns a link: blocking jobs run on it one at a time, behind coroutines."""
+"""A worker thread: blocking jobs run on it one at a time, on behalf of coroutines."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ Result = TypeVar("Result")
 
 
 class WorkerThread:
-    """Runs blocking jobs in order; a cancelled one is told to stop and is seen to its end.
+    """Runs blocking jobs in order; cancelling a coroutine cancels its job and waits for its end.
 
-    A job looks at ``interrupted`` at least every 200 ms and raises when it is set, so that a
-    cancelled coroutine returns soon and never leaves a job talking behind its back.
+    A job checks ``cancelled`` at least every 200 ms and raises if it is set. A cancelled coroutine
+    therefore returns soon, and its job no longer uses the device.
     """
 
     def __init__(self, name: str) -> None:
@@ -29,10 +29,10 @@ class WorkerThread:
         self._executor = ThreadPoolExecutor(1, thread_name_prefix=name)
 
     async def run(self, job: Callable[[], Result]) -> Result:
-        """Run ``job`` when its turn comes and return what it returns.
+        """Run ``job`` after the jobs before it, and return its result.
 
         Raises:
-            DeviceError: The link was closed meanwhile; or whatever ``job`` raises.
+            DeviceError: The thread was ended meanwhile; or any error of ``job``.
         """
         async with self._turn:
             if self._finished:
@@ -41,11 +41,11 @@ class WorkerThread:
             try:
                 return await asyncio.shield(future)
             except asyncio.CancelledError:
-                await self._see_off(future)
+                await self._cancel_job(future)
                 raise
 
     async def finish(self, job: Callable[[], None]) -> None:
-        """Interrupt the job that runs, run ``job`` as the last one, and end the thread."""
+        """Cancel the running job, run ``job`` as the last one, and end the thread."""
         self._finished = True
         self.cancelled.set()
         try:
@@ -53,7 +53,7 @@ class WorkerThread:
         finally:
             self._executor.shutdown()
 
-    async def _see_off(self, future: asyncio.Future[Result]) -> None:
+    async def _cancel_job(self, future: asyncio.Future[Result]) -> None:
         self.cancelled.set()
         try:
             await asyncio.wait([future])

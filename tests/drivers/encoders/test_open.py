@@ -127,7 +127,7 @@ async def test_another_kind_of_device_is_refused_and_named(raw, bank, value, wor
 
 async def test_another_measuring_step_is_refused(raw, bank):
     raw.nodes[1].objects[0x6005, 1] = (5000).to_bytes(4, "little")
-    with pytest.raises(WrongDeviceError, match=r"leg 1.*steps of 5000 nm, the cell file says 1000 nm"):
+    with pytest.raises(WrongDeviceError, match=r"leg 1.*step of 5000 nm, the cell file says 1000 nm"):
         await bank.open()
 
 
@@ -184,7 +184,7 @@ async def test_position_is_mapped_where_no_tpdo_has_it(raw, bank):
 
 async def test_a_write_refused_names_object_and_leg(raw, bank):
     raw.nodes[5].refuses[0x1801, 2] = 0x0601_0002
-    with pytest.raises(ConfigurationError, match=r"leg 5.*object 1801h:2 be set to 0x1.*read only"):
+    with pytest.raises(ConfigurationError, match=r"leg 5.*object 1801h:2 to 0x1.*read only"):
         await bank.open()
 
 
@@ -252,7 +252,7 @@ async def test_nonsense_in_answer_to_a_request_is_an_error_with_a_name(raw, bank
         ({"interface": "no-such-interface", "channel": "x"}, "no-such-interface"),
         ({"interface": "slcan", "channel": "socket://127.0.0.1:1", "sleep_after_open": 0}, "refused"),
         ({"interface": "slcan", "channel": ""}, "serial port"),
-        (None, "not named in the cell file.*encoders"),
+        (None, "not configured in the cell file.*encoders"),
     ],
 )
 async def test_a_bus_that_cannot_be_opened_says_what_to_do(bus, words):

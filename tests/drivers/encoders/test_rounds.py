@@ -79,7 +79,7 @@ async def test_a_silent_leg_is_named_after_bounded_tries(raw, bank, hurry):
     raw.nodes[5].answers_sync = lambda _: []
     begin, before = time.monotonic(), raw.syncs
     with pytest.raises(
-        SilentNodeError, match=r"encoder of leg 5 \(node 5\): no answer to SYNC.*its supply"
+        SilentNodeError, match=r"encoder of leg 5 \(node 5\): no response to SYNC.*its supply"
     ):
         await bank.read()
     assert raw.syncs - before == MAX_SYNCS
@@ -134,7 +134,7 @@ async def test_somebody_elses_sync_is_an_error(raw, bank):
     await bank.open()
     raw.send(0x80)
     await asyncio.sleep(0.05)
-    with pytest.raises(BusError, match="somebody else sends SYNC"):
+    with pytest.raises(BusError, match="another master sends SYNC"):
         await bank.read()
 
 

@@ -138,6 +138,6 @@ def hurry() -> Callable[..., None]:
 
     def shorten(bank: Cia406Bank, timeout_s: float = 0.04) -> None:
         assert bank._session is not None
-        bank._session._rounds._timeout_s = timeout_s
+        bank._session._sampler._timeout_s = timeout_s
 
     return shorten

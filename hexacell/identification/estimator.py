@@ -11,6 +11,7 @@ from hexacell.identification.problem.data_requirements import (
 )
 from hexacell.identification.problem.problem import Problem
 from hexacell.identification.solver import nuisance_parameters, singular_records
+from hexacell.identification.solver.chi_square import chi_square_test
 from hexacell.identification.solver.levenberg_marquardt import COARSE, Solution, SolverOptions
 from hexacell.identification.solver.result import DataFault, Identification
 from hexacell.kinematics.geometry import Geometry
@@ -74,7 +75,7 @@ def _result(
         problem=problem,
         poses=solution.prediction.poses,
         residual_rms_mm=float(np.sqrt(np.mean(residuals**2))),
-        chi2=solution.chi2,
+        goodness=chi_square_test(problem, solution.chi2, covariance, solution.information),
         dof=3 * (problem.records - problem.points) - len(solution.free),
         iterations=solution.iterations,
         termination=solution.termination,

@@ -13,7 +13,7 @@ from hexacell.identification.diagnostics.pose_accuracy import Accuracy, predicte
 from hexacell.identification.diagnostics.repeatability import Repeatability, repeatability
 from hexacell.identification.diagnostics.tolerance_check import ToleranceViolation, tolerance_violations
 from hexacell.identification.diagnostics.variance_components import NoiseLevels, noise_levels
-from hexacell.identification.solver.chi_square import ChiSquareTest, goodness
+from hexacell.identification.solver.chi_square import ChiSquareTest
 from hexacell.identification.solver.linearized_solution import LinearizedSolution
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.pose import Pose, PoseBatch
@@ -79,10 +79,9 @@ def assess(
     model = LinearizedSolution.at(found)
     pairs = strongly_correlated(found)
     left_out = {record for record, _ in found.left_out}
-    tested = goodness(model)
     task, accuracy = _accuracy(settings, robot, found)
     return Assessment(
-        goodness=tested,
+        goodness=found.goodness,
         noise=noise_levels(model),
         repeatability=repeatability(measurements, left_out),
         record_noise_mm=model.record_noise_mm,
@@ -90,7 +89,7 @@ def assess(
         decorrelating_poses=_decorrelating_poses(robot, found, pairs[:SEPARATED_PAIRS]),
         task=tuple(robot.to_command(task.pose(row)) for row in range(len(task))),
         task_named=bool(settings.task.poses),
-        accuracy=accuracy and replace(accuracy, after=accuracy.after.times(tested.noise_factor)),
+        accuracy=accuracy and replace(accuracy, after=accuracy.after.times(found.goodness.noise_factor)),
         tolerance_violations=tolerance_violations(found, robot.drawing, robot.tolerances),
     )
 

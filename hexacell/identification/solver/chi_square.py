@@ -14,8 +14,8 @@ from enum import Enum
 import numpy as np
 from scipy.special import chdtr, chdtrc
 
-from hexacell.identification.solver.linearized_solution import LinearizedSolution
-from hexacell.identification.solver.nuisance_parameters import NuisanceElimination
+from hexacell.identification.problem.problem import Problem
+from hexacell.kinematics.rotations import Array
 
 SMALLEST_PROBABILITY = 1e-3
 RATIOS_THAT_MATTER = (0.9, 1.1)
@@ -72,9 +72,7 @@ class ChiSquareTest:
         return self.ratio if self.agreement is ChiSquareVerdict.TOO_LARGE else 1.0
 
 
-def goodness(model: LinearizedSolution) -> ChiSquareTest:
-    """The chi-square test of an identification."""
-    problem = model.problem
-    system = model.system(NuisanceElimination(problem, model.weights()))
-    trace = float(np.sum(model.covariance * system.information()))
-    return ChiSquareTest(system.cost(), 3.0 * (problem.records - problem.points) - trace)
+def chi_square_test(problem: Problem, chi2: float, covariance: Array, information: Array) -> ChiSquareTest:
+    """The test of a solution with the parameters' covariance (p, p) and the data's information (p, p)."""
+    trace = float(np.sum(covariance * information))
+    return ChiSquareTest(chi2, 3.0 * (problem.records - problem.points) - trace)

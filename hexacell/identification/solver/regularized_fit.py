@@ -16,7 +16,7 @@ import numpy as np
 
 from hexacell.identification.problem.problem import Problem
 from hexacell.identification.solver import singular_records
-from hexacell.identification.solver.chi_square import ChiSquareTest
+from hexacell.identification.solver.chi_square import ChiSquareTest, chi_square_test
 from hexacell.identification.solver.levenberg_marquardt import (
     COARSE,
     FINE,
@@ -58,8 +58,8 @@ class Fit:
     @property
     def goodness(self) -> ChiSquareTest:
         """The chi-square test of the residuals."""
-        trace = float(np.sum(self.covariance * self.solution.information))
-        return ChiSquareTest(self.solution.chi2, 3.0 * (self.problem.records - self.problem.points) - trace)
+        solution = self.solution
+        return chi_square_test(self.problem, solution.chi2, self.covariance, solution.information)
 
 
 def fit(problem: Problem, *, options: SolverOptions = COARSE) -> Fit:

@@ -10,6 +10,7 @@ import numpy as np
 
 from hexacell.errors import IdentifiabilityError
 from hexacell.identification.problem.problem import Problem
+from hexacell.identification.solver.chi_square import ChiSquareTest
 from hexacell.identification.solver.levenberg_marquardt import Termination
 from hexacell.kinematics.geometry import PARAMETER_NAMES, Geometry
 from hexacell.kinematics.pose import PoseBatch
@@ -109,7 +110,8 @@ class Identification:
         problem: the records that were used.
         poses: of the platform at each record, under the identified geometry.
         residual_rms_mm: of the centred residuals of the deviations.
-        chi2: weighted sum of squares of those residuals, to be compared with ``dof``.
+        goodness: the chi-square test of those residuals.
+        dof: equations less parameters: the expected chi-square if the data determine every parameter.
         data_faults: what is wrong with the records that were left out.
     """
 
@@ -121,7 +123,7 @@ class Identification:
     problem: Problem
     poses: PoseBatch
     residual_rms_mm: float
-    chi2: float
+    goodness: ChiSquareTest
     dof: int
     iterations: int
     termination: Termination
@@ -137,6 +139,11 @@ class Identification:
     def points(self) -> int:
         """At how many points."""
         return self.problem.points
+
+    @property
+    def chi2(self) -> float:
+        """Weighted sum of squares of the centred residuals."""
+        return self.goodness.chi2
 
     @property
     def converged(self) -> bool:

@@ -7,7 +7,7 @@ import pytest
 
 from hexacell.identification.estimator import identify
 from hexacell.identification.problem.problem import Noise
-from hexacell.identification.solver.chi_square import ChiSquareTest, ChiSquareVerdict, goodness
+from hexacell.identification.solver.chi_square import ChiSquareTest, ChiSquareVerdict
 from hexacell.identification.solver.linearized_solution import LinearizedSolution
 from hexacell.reporting.findings import residual_sentence
 
@@ -18,20 +18,18 @@ def test_probability_is_the_table_s():
 
 
 def test_chi_square_is_the_identification_s_and_expects_its_degrees_of_freedom(identified):
-    tested = goodness(LinearizedSolution.at(identified))
+    tested = identified.goodness
     assert tested.chi2 == pytest.approx(identified.chi2, rel=1e-9)
     assert tested.expected == pytest.approx(identified.dof, abs=1e-4)
 
 
 def test_probabilities_of_repeated_measurements_are_spread_evenly(repeated):
     """Kolmogorov's distance from the uniform distribution, at the level 0.001."""
-    found = np.sort([goodness(LinearizedSolution.at(one)).probability for one in repeated])
+    found = np.sort([one.goodness.probability for one in repeated])
     steps = np.arange(len(found) + 1) / len(found)
     distance = max(np.abs(found - steps[1:]).max(), np.abs(found - steps[:-1]).max())
     assert distance < 1.95 / np.sqrt(len(found))
-    assert all(
-        goodness(LinearizedSolution.at(one)).agreement is ChiSquareVerdict.AGREES for one in repeated
-    )
+    assert all(one.goodness.agreement is ChiSquareVerdict.AGREES for one in repeated)
 
 
 @pytest.mark.parametrize("stations", [Noise(0.01, 0.01), Noise(0.01, 0.01, np.radians(0.3), 0.002)])
@@ -54,7 +52,7 @@ def test_parameters_that_the_prior_holds_take_up_less(visit, make_problem, stati
     normal = np.linalg.inv(whitened.T @ whitened + prior)
     expected = 3 * n - np.sum(normal * (whitened.T @ whitened)) - np.sum(normal[p:, p:] * prior[p:, p:])
     expected += np.count_nonzero(_station_precision(found.problem))
-    assert goodness(model).expected == pytest.approx(expected, abs=1e-3)
+    assert found.goodness.expected == pytest.approx(expected, abs=1e-3)
     assert expected > found.dof + 3.0
 
 
@@ -84,7 +82,7 @@ def _station_precision(problem):
 
 def test_more_noise_than_stated_is_said_with_its_factor(visit, make_problem):
     found = identify(make_problem(visit(seed=2).measured(0.03, seed=5)))
-    tested = goodness(LinearizedSolution.at(found))
+    tested = found.goodness
     assert tested.agreement is ChiSquareVerdict.TOO_LARGE
     assert 2.5 < tested.ratio < 3.5
     assert f"{tested.ratio:.1f} times the stated noise" in residual_sentence(tested)
@@ -92,7 +90,7 @@ def test_more_noise_than_stated_is_said_with_its_factor(visit, make_problem):
 
 def test_less_noise_than_stated_is_said_too(visit, make_problem):
     found = identify(make_problem(visit(seed=2).measured(0.003, seed=5)))
-    tested = goodness(LinearizedSolution.at(found))
+    tested = found.goodness
     assert tested.agreement is ChiSquareVerdict.TOO_SMALL
     assert "only 0." in residual_sentence(tested)
 

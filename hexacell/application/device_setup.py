@@ -1,4 +1,4 @@
-"""Where the parts come together: the only place that knows which devices are real."""
+"""The devices of a cell, real or simulated: the only module that knows which."""
 
 from __future__ import annotations
 
@@ -26,10 +26,10 @@ from procedures.run.cancellation import shielded
 
 @contextmanager
 def device_addresses(cell: Cell, *, other_processes: bool = False) -> Iterator[CellSettings]:
-    """The cell's settings with an address for every device; a simulated cell answers meanwhile.
+    """The cell's settings with an address for every device; within this context a simulated cell runs.
 
     Raises:
-        HexacellError: a device speaks what no driver does, or the simulation cannot begin.
+        HexacellError: a protocol has no driver, or the simulation cannot start.
     """
     settings = cell.settings
     require_drivers(settings)
@@ -55,7 +55,7 @@ def require_drivers(settings: CellSettings) -> None:
     """Make sure that every device's protocol is known.
 
     Raises:
-        UsageError: one is not; the message has the nearest that is.
+        UsageError: one is not; the message names the most similar one.
         SeveralErrors: more than one.
     """
     protocols = {(Group.GAUGES, gauge.protocol) for gauge in settings.gauges} | {
@@ -74,7 +74,7 @@ def require_drivers(settings: CellSettings) -> None:
 
 @dataclass(frozen=True)
 class Connected:
-    """A cell's devices, open, and what goes over their wires."""
+    """A cell's open devices, and the trace of their traffic."""
 
     devices: Devices
     identities: tuple[DeviceIdentity, ...]
@@ -89,7 +89,7 @@ def devices_of(
     """The drivers that the settings name, not yet connected; ``folder`` has the cell file.
 
     Raises:
-        UsageError: a protocol that no driver speaks.
+        UsageError: a protocol has no driver.
     """
     gauges = tuple(
         MountedGauge(load(Group.GAUGES, gauge.protocol)(gauge, links), gauge.mounting)
@@ -102,9 +102,9 @@ def devices_of(
 
 @asynccontextmanager
 async def open_devices(settings: CellSettings, folder: Path | None = None) -> AsyncIterator[Connected]:
-    """The cell's devices, connected; they are let go at the end, whatever happens.
+    """Connect the cell's devices; they are closed at the end of this context.
 
-    ``folder`` has the cell file, to which the file of its stop line is relative.
+    ``folder`` has the cell file; the path of its stop file is relative to it.
 
     Raises:
         HexacellError: one or more devices do not answer as they must.
@@ -118,7 +118,7 @@ async def open_devices(settings: CellSettings, folder: Path | None = None) -> As
         clock = CellClock(settings.timing.clock_factor)
         yield Connected(devices, identities, clock, trace, thermometers)
     finally:
-        await shielded(_let_go(devices, links, thermometers))
+        await shielded(_close(devices, links, thermometers))
 
 
 def thermometers_of(settings: CellSettings) -> Thermometers:
@@ -126,12 +126,12 @@ def thermometers_of(settings: CellSettings) -> Thermometers:
     return Thermometers([load(Group.THERMOMETERS, one.protocol)(one) for one in settings.thermometers])
 
 
-async def _let_go(devices: Devices, links: SharedSerialPorts, thermometers: Thermometers) -> None:
+async def _close(devices: Devices, links: SharedSerialPorts, thermometers: Thermometers) -> None:
     await thermometers.close()
     await devices.close()
     await links.close()
 
 
 def with_settings(cell: Cell, settings: CellSettings) -> Cell:
-    """The cell under the settings that :func:`device_addresses` gave."""
+    """The cell with the settings of :func:`device_addresses`."""
     return replace(cell, settings=settings)

@@ -1,4 +1,4 @@
-"""A recorded run once more, in a folder that is thrown away: no device, no config of anybody's."""
+"""Replay of a recorded run in a temporary folder: without devices, and without any real config."""
 
 from __future__ import annotations
 
@@ -55,16 +55,16 @@ class Replay:
 
     @property
     def is_same_software(self) -> bool:
-        """Whether decisions must be the same; another version may have learnt to choose better."""
+        """Whether decisions must be the same; another version may decide better."""
         return self.recorded_by == self.replayed_by
 
     @property
     def is_same(self) -> bool:
-        """Whether everything that must be the same is."""
+        """Whether no difference counts."""
         return not any(self.counts(difference) for difference in self.tally.differences)
 
     def counts(self, difference: Difference) -> bool:
-        """Whether a difference makes the replay another run."""
+        """Whether a difference means that the replay failed; see ``docs/interface.md``."""
         match difference.aspect:
             case Aspect.WORDS:
                 return False
@@ -79,8 +79,8 @@ async def replay(run: Path, scope: Scope = Scope.ALL, tolerance: float = TOLERAN
 
     Args:
         run: a run folder, or a journal.
-        scope: what is done again.
-        tolerance: of every number, in its own unit, above 1 relative.
+        scope: what is repeated.
+        tolerance: allowed difference of a number, in its unit; relative above 1.
 
     Raises:
         FileError: the journal, or the cell file in it, cannot be read.
@@ -103,14 +103,14 @@ def _found(run: Path) -> tuple[RunFolder, Path]:
 def _started(journal: Path, entries: Sequence[Entry]) -> RunStarted:
     first = entries[0].event if entries else None
     if not isinstance(first, RunStarted):
-        raise FileError("the journal has no beginning", subject=journal, action="Copy the whole run folder")
+        raise FileError("the journal has no start", subject=journal, action="Copy the whole run folder")
     return first
 
 
 def _set_up(
     scratch: Path, folder: RunFolder, started: RunStarted, scope: Scope, tolerance: float
 ) -> tuple[Replayer, RunStarted]:
-    """The procedure with recorded devices, and the run's beginning with the config that it has here."""
+    """The procedure with recorded devices, and the run's start with the config of the temporary folder."""
     cell = _cell(scratch, started, folder.journal)
     text = _config_text(folder, started)
     settings = cell.settings.model_copy(
@@ -149,14 +149,14 @@ def _cell(scratch: Path, started: RunStarted, journal: Path) -> Cell:
         return load_cell(path)
     except HexacellError as error:
         raise FileError(
-            f"the cell file in it is none that this version reads ({error})",
+            f"this version cannot read the cell file in it ({error})",
             subject=journal,
             action=f"Replay it with {started.software}",
         ) from error
 
 
 def _identification(cell: Cell, started: RunStarted) -> IdentificationSettings:
-    """The plan, with the poses that it names in a file of our own."""
+    """The plan; a list of poses is written to a file in the temporary folder."""
     plan = cell.settings.identification
     if started.pose_list is None:
         return plan
@@ -173,6 +173,6 @@ def _config_text(folder: RunFolder, started: RunStarted) -> bytes | None:
 
 
 def _native_config(started: RunStarted) -> bytes:
-    """A config of our own with the geometry that commanded the run."""
+    """A config in the native format with the geometry that commanded the run."""
     geometry = to_toml(started.controller)
     return f"[geometry]\n{geometry}branch = {list(started.branch)}\n".encode()

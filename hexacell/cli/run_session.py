@@ -43,22 +43,22 @@ def execute_run(request: RunRequest, console: Console) -> events.Ended:
     signals = SignalCommands(console)
     try:
         with progress:
-            return signals.run(_calibrate(request, console, progress, signals.inbox))
+            return signals.run(_calibrate(request, console, progress, signals.queue))
     except HexacellError:
         _print_how_to_resume(request, console, has_started=progress.has_started)
         raise
 
 
 async def _calibrate(
-    request: RunRequest, console: Console, progress: RunProgress, inbox: CommandQueue
+    request: RunRequest, console: Console, progress: RunProgress, queue: CommandQueue
 ) -> events.Ended:
     """Calibrate; a person at a terminal may also type commands."""
     if not isinstance(request.operator, TerminalOperator):
-        return await calibrate(request, [progress], inbox)
-    keys = KeyboardCommands(console, inbox, sys.stdin)
+        return await calibrate(request, [progress], queue)
+    keys = KeyboardCommands(console, queue, sys.stdin)
     request.operator.before_question, request.operator.after_question = progress.hide, keys.listen
     console.print(HELP)
-    return await keys.listen_during(calibrate(request, [progress, keys], inbox))
+    return await keys.listen_during(calibrate(request, [progress, keys], queue))
 
 
 def _print_how_to_resume(request: RunRequest, console: Console, *, has_started: bool) -> None:

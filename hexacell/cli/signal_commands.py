@@ -23,14 +23,14 @@ class SignalCommands:
     """Turns signals into commands: the first is a clean stop, a second Ctrl-C stops motion at once."""
 
     def __init__(self, console: Console) -> None:
-        self.inbox = CommandQueue()
+        self.queue = CommandQueue()
         self._console = console
         self._stop_requested = False
 
     def run(self, work: Coroutine[Any, Any, Result]) -> Result:
         """``asyncio.run`` with signals turned into commands.
 
-        Before an engine reads the inbox, a signal cancels the work, which then cleans up. After the
+        Before an engine reads the queue, a signal cancels the work, which then cleans up. After the
         engine has ended, a signal has no effect.
 
         Raises:
@@ -51,18 +51,18 @@ class SignalCommands:
             return await task
 
     def _handle(self, number: signal.Signals, task: asyncio.Task[Any]) -> None:
-        if self.inbox.is_over:
+        if self.queue.is_over:
             return
-        if not self.inbox.is_attended:
+        if not self.queue.is_attended:
             task.cancel()
         elif self._stop_requested and number is signal.SIGINT:
-            self.inbox.put(Abort("interrupted"))
+            self.queue.put(Abort("interrupted"))
         else:
             self._stop(number)
 
     def _stop(self, number: signal.Signals) -> None:
         self._stop_requested = True
-        self.inbox.put(Stop("interrupted"))
+        self.queue.put(Stop("interrupted"))
         if number is signal.SIGINT:
             self._console.print("Stopping after this step; Ctrl-C again stops motion at once.")
 

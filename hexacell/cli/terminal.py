@@ -36,9 +36,9 @@ def is_interactive() -> bool:
 class KeyboardCommands:
     """Turns typed letters into commands; listens to the engine to know which set they refer to."""
 
-    def __init__(self, console: Console, inbox: CommandQueue, terminal: TextIO) -> None:
+    def __init__(self, console: Console, queue: CommandQueue, terminal: TextIO) -> None:
         self._console = console
-        self._inbox = inbox
+        self._queue = queue
         self._terminal = terminal
         self._at: SetKey | None = None
 
@@ -66,7 +66,7 @@ class KeyboardCommands:
             return
         make = self._commands().get(line.strip())
         if make is not None:
-            self._inbox.put(make())
+            self._queue.put(make())
         elif line.strip():
             self._console.print(HELP)
 

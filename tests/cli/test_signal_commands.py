@@ -40,9 +40,9 @@ def send(*numbers: signal.Signals) -> None:
 
 async def commands_after(signals: SignalCommands, *numbers: signal.Signals) -> list[Command]:
     """The commands that an engine receives."""
-    with signals.inbox.attended():
+    with signals.queue.attended():
         send(*numbers)
-        return [await signals.inbox.next() for _ in numbers]
+        return [await signals.queue.next() for _ in numbers]
 
 
 STOP, ABORT = Stop("interrupted"), Abort("interrupted")
@@ -65,11 +65,11 @@ def test_the_first_signal_stops_and_a_second_ctrl_c_aborts(signals, numbers: Any
 
 def test_ctrl_c_twice(signals, capsys) -> None:
     async def twice() -> list[Command]:
-        with signals.inbox.attended():
+        with signals.queue.attended():
             send(INT)
-            first = await signals.inbox.next()
+            first = await signals.queue.next()
             send(INT)
-            return [first, await signals.inbox.next()]
+            return [first, await signals.queue.next()]
 
     assert signals.run(twice()) == [STOP, ABORT]
     assert capsys.readouterr().out == "Stopping after this step; Ctrl-C again stops motion at once.\n"
@@ -98,7 +98,7 @@ def test_before_an_engine_runs_the_work_is_cancelled_and_cleans_up_undisturbed(s
 
 def test_when_the_engine_has_ended_a_signal_changes_nothing(signals) -> None:
     async def over() -> str:
-        with signals.inbox.attended():
+        with signals.queue.attended():
             pass
         send(INT, TERM)
         await asyncio.sleep(0.01)
@@ -111,10 +111,10 @@ def test_what_is_ignored_stays_ignored(signals) -> None:
     former = signal.signal(INT, signal.SIG_IGN)
 
     async def background_job() -> bool:
-        with signals.inbox.attended():
+        with signals.queue.attended():
             send(INT)
             await asyncio.sleep(0.01)
-            return list(signals.inbox.take()) == []
+            return list(signals.queue.take()) == []
 
     try:
         assert signals.run(background_job())

@@ -51,17 +51,17 @@ def test_a_good_identification_passes_every_gate(judged):
     }
 
 
-def test_only_the_two_that_are_matters_of_judgement_may_be_overruled(judged):
+def test_two_gates_may_be_overruled_by_a_person(judged):
     assert {name for name, gate in judged().items() if gate.needs_person} == {"determined", "small change"}
 
 
-def test_a_solver_that_did_not_end_at_a_solution(judged, identified):
+def test_a_solver_that_did_not_converge_fails_the_gate(judged, identified):
     gate = judged(replace(identified, termination=Termination.ITERATIONS))["converged"]
     assert not gate.passed
     assert gate.sentence == "The solver ended because the largest number of iterations was used."
 
 
-def test_parameters_that_the_data_left_open_are_named(judged, identified):
+def test_undetermined_parameters_are_named(judged, identified):
     covariance = identified.covariance.copy()
     for name in ("S4z", "l3"):
         row = PARAMETER_NAMES.index(name)
@@ -78,13 +78,13 @@ def test_a_rod_far_outside_its_tolerance_is_refused_by_name_and_sign(judged, shi
     assert gate.sentence == "Beyond the drawing's tolerance: S1y (+9.50 mm), l3 (-13.00 mm)."
 
 
-def test_outside_by_less_than_is_certain_is_not_outside(judged, shifted, identified):
+def test_a_violation_below_three_sigma_is_none(judged, shifted, identified):
     sigma = identified.sigma[PARAMETER_NAMES.index("B6x")]
     assert judged(shifted(B6x=7.0 + 2.9 * sigma))["within tolerance"].passed
     assert not judged(shifted(B6x=7.0 + 3.1 * sigma))["within tolerance"].passed
 
 
-def test_the_ball_may_sit_elsewhere_where_that_is_allowed(judged, identified, paper):
+def test_an_allowed_offset_of_the_ball_is_no_violation(judged, identified, paper):
     """As the paper's own did: 30 mm in z."""
     moved = replace(identified, geometry=paper.calibrated)
     assert not judged(moved, largest_change_mm=50.0)["within tolerance"].passed
@@ -99,7 +99,7 @@ def test_one_joint_is_not_excused_by_the_ball(judged, shifted):
     assert not judged(found, tolerances=replace(TOLERANCES, ball_mm=40.0))["within tolerance"].passed
 
 
-def test_the_change_is_from_what_the_controller_has_now(judged, identified, paper):
+def test_the_change_is_from_the_controllers_geometry(judged, identified, paper):
     change = identified.geometry.largest_difference(paper.nominal)
     assert judged(largest_change_mm=change + 0.01)["small change"].passed
     gate = judged(largest_change_mm=5.0)["small change"]
@@ -108,7 +108,7 @@ def test_the_change_is_from_what_the_controller_has_now(judged, identified, pape
     assert judged(largest_change_mm=1.0, before=identified.geometry)["small change"].passed
 
 
-def test_numbers_that_are_none_pass_no_gate_on_numbers(judged, identified):
+def test_nan_passes_no_gate(judged, identified):
     vector = identified.geometry.vector()
     vector[3 * 7] = np.nan
     broken = judged(replace(identified, geometry=Geometry.from_vector(vector)))

@@ -1,4 +1,4 @@
-"""The verdict on held-out poses: better, within limits, and never without evidence."""
+"""The verdict on held-out poses: better, within limits, and never without data."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ positive = st.floats(0.0, 100.0)
 spreads = st.builds(DeviationStatistics, positive, positive, st.integers(1, 50))
 
 
-def test_a_spread_is_of_distances_not_of_coordinates():
+def test_statistics_are_of_distances_not_of_coordinates():
     spread = DeviationStatistics.of([[3.0, 4.0, 0.0], [0.0, 0.0, -1.0]])
     assert spread == DeviationStatistics(mean_mm=3.0, largest_mm=5.0, poses=2)
 
@@ -29,7 +29,7 @@ def test_the_mean_never_exceeds_the_largest(deviations):
 
 
 @pytest.mark.parametrize("nothing", [[], np.empty((0, 3))])
-def test_no_deviations_are_no_spread(nothing):
+def test_no_deviations_give_no_statistics(nothing):
     assert DeviationStatistics.of(nothing) is None
 
 
@@ -57,7 +57,7 @@ def test_verdicts(before, after, verdict):
 
 
 @given(st.none() | spreads, st.none() | spreads)
-def test_a_pass_has_evidence_is_no_worse_and_within_both_limits(before, after):
+def test_a_pass_needs_data_no_increase_and_both_limits(before, after):
     if validate(before, after, **LIMITS) is Verdict.PASS:
         assert before is not None
         assert after is not None
@@ -67,7 +67,7 @@ def test_a_pass_has_evidence_is_no_worse_and_within_both_limits(before, after):
 
 
 @pytest.mark.parametrize("broken", [np.nan, np.inf, -np.inf])
-def test_numbers_that_are_none_are_no_evidence(broken):
+def test_nan_gives_no_statistics(broken):
     spread = DeviationStatistics.of([[0.01, 0.0, 0.0], [0.0, broken, 0.0]])
     assert validate(BEFORE, spread, **LIMITS) is Verdict.NOT_EVALUATED
     assert validate(spread, DeviationStatistics(0.01, 0.02, 1), **LIMITS) is Verdict.NOT_EVALUATED

@@ -1,4 +1,4 @@
-"""Measurement files: exact both ways, and plain about every mistake."""
+"""Measurement files: read and written exactly, every mistake named with its line."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def read(csv_path: Path) -> Callable[..., MeasurementSet]:
     return read_text
 
 
-def test_what_a_file_gives(read):
+def test_a_file_is_read_completely(read):
     first = read(GOOD).records[0]
     assert first == Record(
         1, 1, Pose(0, 0, 550), (-489.7, -485.2, -476.4, 476.4, 485.2, 489.7), (0.0, 0.0, 0.0)
@@ -76,7 +76,7 @@ def test_numpy_numbers_are_written_as_numbers(csv_path):
     assert read_measurements(csv_path).records == tuple(rows)
 
 
-def test_writing_where_no_folder_is_says_so(tmp_path):
+def test_writing_into_a_missing_folder_is_an_error(tmp_path):
     with pytest.raises(FileError, match="cannot be written"):
         write_measurements(tmp_path / "absent" / "m.csv", MeasurementSet(()))
 
@@ -94,7 +94,7 @@ def test_writing_where_no_folder_is_says_so(tmp_path):
     ],
     ids=["crlf", "bom", "blank lines", "blank cells", "no last line end", "blanks", "quotes"],
 )
-def test_what_other_programs_make_of_it_reads_the_same(read, text):
+def test_files_rewritten_by_other_programs_are_read_the_same(read, text):
     assert read(text) == read(GOOD)
 
 
@@ -164,7 +164,7 @@ def test_absent_file_is_refused(tmp_path):
 
 
 @pytest.mark.parametrize("text", ["", "\n", "\ufeff", HEADER, HEADER + "\n"])
-def test_a_calibration_not_yet_begun_is_a_valid_start(read, text):
+def test_an_empty_file_is_a_valid_partial_file(read, text):
     assert read(text, allow_partial=True) == MeasurementSet(())
 
 
@@ -199,7 +199,7 @@ def test_damaged_files_give_plain_errors_or_sound_records(read, edits):
     assert (measurements.labels >= 1).all()
 
 
-def test_ten_thousand_rows_are_no_burden(read, csv_path):
+def test_ten_thousand_rows_are_read_fast(read, csv_path):
     rows = [
         Record(n // 20 + 1, n % 20 + 1, Pose(0, 0, n / 7), (n / 3,) * 6, (0,) * 3) for n in range(10_000)
     ]

@@ -1,4 +1,4 @@
-"""Records as arrays, and what a set of them refuses."""
+"""Records as arrays, and invalid sets of them."""
 
 from __future__ import annotations
 

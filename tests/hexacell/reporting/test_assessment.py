@@ -1,4 +1,4 @@
-"""What is said of an identification: assembled for a cell, put into sentences and into JSON."""
+"""The assessment of an identification, its findings and its JSON document."""
 
 from __future__ import annotations
 
@@ -83,27 +83,27 @@ def test_far_too_much_noise_makes_it_doubtful_and_names_the_levels(visit, assess
     assert any("encoders 0.0" in sentence and "gauges 0.0" in sentence for sentence in more)
 
 
-def test_with_more_noise_the_error_to_be_expected_grows_too(visit, assessed_of, good):
+def test_more_noise_increases_the_predicted_error(visit, assessed_of, good):
     _, loud = assessed_of(visit(seed=2).measured(0.03, seed=1))
     _, quiet = good
     ratio = loud.accuracy.after.position_rms_mm / quiet.accuracy.after.position_rms_mm
     assert ratio == pytest.approx(loud.goodness.ratio, rel=0.1)
 
 
-def test_parameters_left_open_make_it_incomplete(visit, assessed_of):
+def test_undetermined_parameters_make_a_result_incomplete(visit, assessed_of):
     found, assessed = assessed_of(visit(points=2, orientations=9, degrees=3.0).measured(0.01))
     verdict = findings(found, assessed)[0]
     assert verdict.startswith("Incomplete: ")
     assert "of 35 parameters are not determined by these data" in verdict
 
 
-def test_a_few_open_parameters_are_named_in_words(good, monkeypatch):
+def test_a_few_undetermined_parameters_are_named(good, monkeypatch):
     found, assessed = good
     monkeypatch.setattr(type(found), "undetermined", ("B2z", "B3z", "B5z", "l3"))
     assert "B2/B3/B5 z, leg 3 length are not determined" in findings(found, assessed)[0]
 
 
-def test_a_search_without_an_end_is_no_result(good):
+def test_a_solver_that_did_not_converge_gives_no_result(good):
     found, assessed = good
     stuck = replace(found, termination=Termination.STUCK)
     assert findings(stuck, assessed)[0] == f"No result: the solver ended because {Termination.STUCK.value}."
@@ -127,7 +127,7 @@ def test_where_repeatability_dominates_recalibrating_will_not_help(visit, assess
     assert assessment_document(found, assessed)["repeatability"]["recalibrating_helps"] is False
 
 
-def test_play_beside_a_large_error_is_named_but_calibrating_helps(visit, assessed_of):
+def test_play_is_named_but_calibration_helps_where_the_error_is_larger(visit, assessed_of):
     found, assessed = assessed_of(visited_twice(visit(seed=2).measured(0.01), scatter_mm=0.3))
     assert not assessed.does_not_repeat
     sentences = findings(found, assessed)
@@ -135,7 +135,7 @@ def test_play_beside_a_large_error_is_named_but_calibrating_helps(visit, assesse
     assert any(sentence.startswith("On returning to a pose the ball is 0.") for sentence in sentences)
 
 
-def test_a_machine_that_repeats_is_not_accused(visit, assessed_of):
+def test_good_repeatability_is_no_finding(visit, assessed_of):
     found, assessed = assessed_of(visited_twice(visit(seed=2).measured(0.01), scatter_mm=0.01))
     assert not any("return" in sentence for sentence in findings(found, assessed))
     assert assessment_document(found, assessed)["repeatability"]["recalibrating_helps"] is True
@@ -260,7 +260,7 @@ def test_pairs_are_named_with_the_measurement_that_separates_them(good):
         assert any(words in sentence for sentence in sentences)
 
 
-def test_the_document_is_json_and_adds_to_what_was_there(good):
+def test_the_two_documents_are_json_and_share_no_key(good):
     found, assessed = good
     first, second = identification_document(found), assessment_document(found, assessed)
     assert not set(first) & set(second)

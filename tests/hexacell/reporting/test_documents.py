@@ -1,4 +1,4 @@
-"""What an identification says to programs, and in one line."""
+"""The JSON document of an identification, and the outcome of a run in one line."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def test_the_geometry_is_the_identified_one(document, identified, paper):
     assert np.abs(np.array(document["geometry"]["l"]) - paper.actual.l).max() < 1.0
 
 
-def test_outliers_and_what_is_left_open_are_named(visit, make_problem):
+def test_outliers_and_undetermined_parameters_are_named(visit, make_problem):
     measured = visit(degrees=4.0, seed=1).measured(0.01, seed=1)
     records = list(measured.records)
     bad = records[17]
@@ -84,7 +84,7 @@ def test_outliers_and_what_is_left_open_are_named(visit, make_problem):
     json.dumps(document, allow_nan=False)
 
 
-def test_a_record_that_nothing_can_follow_is_no_obstacle_to_json(noisy, make_problem):
+def test_a_record_without_a_pose_gives_valid_json(noisy, make_problem):
     records = list(noisy.records)
     bad = records[20]
     apart = tuple(np.add(bad.joints, [-300, -300, -300, 300, 300, 300]).tolist())
@@ -99,7 +99,7 @@ def test_a_record_that_nothing_can_follow_is_no_obstacle_to_json(noisy, make_pro
 COUNTS = (35, 55, 5)
 
 
-def test_the_one_line():
+def test_the_outcome_line():
     line = outcome_line(
         COUNTS,
         DeviationStatistics(3.412, 6.0, 10),
@@ -117,6 +117,6 @@ def test_the_one_line():
     ("before", "after"),
     [(None, None), (DeviationStatistics(3.4, 6.0, 10), None), (None, DeviationStatistics(0.01, 0.03, 10))],
 )
-def test_missing_evidence_is_said_and_is_no_pass(before, after):
+def test_missing_held_out_data_are_stated_and_do_not_pass(before, after):
     line = outcome_line(COUNTS, before, after, 0.05, Verdict.NOT_EVALUATED)
     assert line == "35 parameters, 55 records at 5 points; held-out points: not evaluated"

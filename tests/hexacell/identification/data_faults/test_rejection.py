@@ -31,9 +31,7 @@ def named(found):
         ((2, 9), {"joints": (20.0, 0, 0, 0, 0, -10.0)}),
     ],
 )
-def test_a_bad_record_is_named_and_the_rest_says_what_it_would_have_said(
-    noisy, spoil, make_problem, label, error
-):
+def test_a_bad_record_is_named_and_does_not_change_the_result(noisy, spoil, make_problem, label, error):
     found = identify(make_problem(spoil(noisy, label, **error)))
     assert named(found) == {label}
     assert found.data_faults[0].statistic > 100.0
@@ -44,7 +42,7 @@ def test_a_bad_record_is_named_and_the_rest_says_what_it_would_have_said(
     assert found.dof == clean.dof
 
 
-def test_a_record_written_down_at_the_wrong_pose_is_named(noisy, make_problem):
+def test_a_record_with_the_encoders_of_another_pose_is_named(noisy, make_problem):
     """The encoders of one orientation beside the deviation of another."""
     records = list(noisy.records)
     wrong = records[16]
@@ -55,7 +53,7 @@ def test_a_record_written_down_at_the_wrong_pose_is_named(noisy, make_problem):
     assert named(found) == {(wrong.point, wrong.orientation)}
 
 
-def test_sliders_where_no_machine_can_be_are_named_too(noisy, spoil, make_problem):
+def test_unreachable_joint_variables_are_named(noisy, spoil, make_problem):
     """Forward kinematics finds no pose there at all, so that there is not even a residual."""
     apart = spoil(noisy, (2, 4), joints=(-300, -300, -300, 300, 300, 300))
     found = identify(make_problem(apart))
@@ -95,7 +93,7 @@ def test_no_more_than_a_tenth_is_ever_left_out(noisy, spoil, make_problem):
     assert found.chi2 > 3 * found.dof
 
 
-def test_nothing_is_left_out_where_nobody_asked(noisy, spoil, make_problem):
+def test_nothing_is_left_out_without_screening(noisy, spoil, make_problem):
     spoilt = make_problem(spoil(noisy, (3, 7), deviation=(0.0, 0.0, 0.5)))
     found = identify(spoilt, find_outliers=False)
     assert found.data_faults == ()

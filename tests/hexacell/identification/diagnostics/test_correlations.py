@@ -1,4 +1,4 @@
-"""Parameters found only together."""
+"""Strongly correlated parameters."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Errors of poses after the best choice of frames."""
+"""Pose errors after frame alignment."""
 
 from __future__ import annotations
 

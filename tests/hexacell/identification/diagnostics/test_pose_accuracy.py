@@ -1,4 +1,4 @@
-"""Predicted errors of poses, against a machine of its own that is sent there."""
+"""Predicted pose errors, against a simulated machine."""
 
 from __future__ import annotations
 
@@ -97,7 +97,7 @@ def test_after_is_the_scatter_of_machines_that_the_covariance_allows(
     assert (standard_error < 0.2 * told).all()
 
 
-def test_repeated_measurements_err_as_told(repeated, paper, workspace):
+def test_repeated_measurements_have_the_predicted_errors(repeated, paper, workspace):
     """The truth stands in for the machine: its distance from each estimate is that estimate's error."""
     poses = PoseBatch.of(workspace)
     found = [
@@ -111,7 +111,7 @@ def test_repeated_measurements_err_as_told(repeated, paper, workspace):
     assert np.sqrt(seen) == pytest.approx(told.after.position_rms_mm, rel=0.25)
 
 
-def test_a_controller_that_has_the_estimate_errs_by_nothing(identified, paper, workspace):
+def test_a_controller_with_the_estimate_has_no_error(identified, paper, workspace):
     poses = PoseBatch.of(workspace)
     found = accuracy_of(identified, identified.geometry, paper.branch, task=poses, workspace=poses)
     assert found.before.position_largest_mm < 1e-8
@@ -119,7 +119,7 @@ def test_a_controller_that_has_the_estimate_errs_by_nothing(identified, paper, w
     assert 0.0 < found.after.position_rms_mm < 0.5
 
 
-def test_poses_out_of_reach_are_told_and_left_out(identified, paper, workspace, task):
+def test_unreachable_poses_are_named_and_left_out(identified, paper, workspace, task):
     far = Pose(0.0, 900.0, 550.0)
     found = accuracy_of(
         identified,

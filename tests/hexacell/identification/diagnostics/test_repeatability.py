@@ -1,4 +1,4 @@
-"""Scatter over visits of the same pose."""
+"""Repeatability: the scatter over visits of the same pose."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def test_commands_agree_to_a_millionth(apart, same):
     assert (repeatability(measured) is not None) == same
 
 
-def test_records_known_to_be_wrong_are_not_held_against_the_machine():
+def test_rejected_records_do_not_count():
     rows = [(1, n, 0.0, (0.01 * n, 0.0, 0.0)) for n in range(1, 5)]
     measured = visits(*rows, (1, 5, 0.0, (25.4, 0.0, 0.0)))
     spoilt, clean = repeatability(measured), repeatability(measured, {(1, 5)})

@@ -1,4 +1,4 @@
-"""Noise levels told from residuals, against known ones and against the likelihood itself."""
+"""Noise levels by the residuals, against known ones and against the likelihood itself."""
 
 from __future__ import annotations
 
@@ -152,7 +152,7 @@ def test_standard_errors_are_nearly_those_of_the_exact_information(modelled):
     assert found.correlation == pytest.approx(told, abs=0.1)
 
 
-def test_few_records_do_not_tell_the_two_apart(visit, make_problem):
+def test_few_records_do_not_separate_the_two(visit, make_problem):
     """14 records at 2 points: one equation more than parameters."""
     measured = with_noise(visit(seed=2, points=2, orientations=7), 0.01, 0.01, 0)
     found = identify(make_problem(measured), find_outliers=False)

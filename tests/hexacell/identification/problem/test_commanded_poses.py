@@ -1,4 +1,4 @@
-"""Each record begins at its commanded pose: under which geometry, in which frames, and how far."""
+"""Commanded poses: under which geometry, in which frames, and the start poses from them."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def test_records_may_be_older_than_the_last_calibration(paper, visit, make_probl
     assert found.records == 55
 
 
-def test_a_record_begins_under_the_geometry_that_commanded_it(paper, visit, make_problem):
+def test_a_record_starts_under_the_geometry_that_commanded_it(paper, visit, make_problem):
     """From the calibrated one some old records could not be followed to the drawing they came from."""
     old = visit(degrees=40.0, seed=0).measured(0.01, seed=0)
     assert make_problem(old, controller=paper.actual).has_start_pose.all()
@@ -60,7 +60,7 @@ def test_a_record_begins_under_the_geometry_that_commanded_it(paper, visit, make
     np.testing.assert_allclose(problem.commands.joints, problem.joints, atol=0.1)
 
 
-def test_old_and_new_records_may_stand_in_one_file(paper, visit, make_problem):
+def test_old_and_new_records_may_be_in_one_file(paper, visit, make_problem):
     old, new = visit(seed=2).measured(), visit(paper.actual, paper.actual, seed=3).measured()
     both = [r for r in old.records if r.point <= 2] + [r for r in new.records if r.point > 2]
     problem = make_problem(MeasurementSet(tuple(both)), controller=paper.actual, noise=Noise(1e-4, 1e-4))
@@ -85,7 +85,7 @@ def test_a_calibrated_machine_is_calibrated_again(paper, visit, make_problem, se
     assert found.data_faults == ()
 
 
-def test_what_was_lent_is_where_the_search_begins(paper, visit, make_problem):
+def test_the_solver_starts_at_the_provisional_geometry(paper, visit, make_problem):
     """Many records commanded by it cannot be followed to the drawing: none is lost for that."""
     before = visit(points=1, orientations=4, degrees=2.0, seed=5).measured()
     after = visit(paper.actual, paper.actual, degrees=55.0, seed=7).measured()

@@ -79,7 +79,7 @@ def test_a_drawing_of_another_machine_is_refused(paper, visit, make_problem):
         make_problem(visit(seed=2).measured(), drawing=other, controller=other)
 
 
-def test_deviations_of_something_else_never_look_like_a_good_fit(visit, make_problem):
+def test_meaningless_deviations_never_give_a_good_fit(visit, make_problem):
     measured = visit(seed=2).measured()
     random = np.random.default_rng(0)
     nonsense = [
@@ -90,5 +90,5 @@ def test_deviations_of_something_else_never_look_like_a_good_fit(visit, make_pro
 
 
 @pytest.mark.parametrize("end", Termination)
-def test_only_an_end_at_a_solution_counts_as_converged(end):
+def test_only_a_minimum_counts_as_converged(end):
     assert end.converged is (end in {Termination.STEP, Termination.PRECISION})

@@ -1,4 +1,4 @@
-"""The chi-square test of the residuals, and what it says."""
+"""The chi-square test of the residuals, and its sentence."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def test_probabilities_of_repeated_measurements_are_spread_evenly(repeated):
 
 
 @pytest.mark.parametrize("stations", [Noise(0.01, 0.01), Noise(0.01, 0.01, np.radians(0.3), 0.002)])
-def test_parameters_that_the_prior_holds_take_up_less(visit, make_problem, stations):
+def test_the_prior_reduces_the_degrees_of_freedom_of_parameters(visit, make_problem, stations):
     """Against the trace of the dense matrix that takes the records to their residuals."""
     measured = visit(points=2, orientations=9, degrees=3.0).measured(0.01)
     found = identify(make_problem(measured, noise=stations))
@@ -80,7 +80,7 @@ def _station_precision(problem):
     )
 
 
-def test_more_noise_than_stated_is_said_with_its_factor(visit, make_problem):
+def test_more_noise_than_stated_is_reported_with_its_factor(visit, make_problem):
     found = identify(make_problem(visit(seed=2).measured(0.03, seed=5)))
     tested = found.goodness
     assert tested.agreement is ChiSquareVerdict.TOO_LARGE
@@ -88,7 +88,7 @@ def test_more_noise_than_stated_is_said_with_its_factor(visit, make_problem):
     assert f"{tested.ratio:.1f} times the stated noise" in residual_sentence(tested)
 
 
-def test_less_noise_than_stated_is_said_too(visit, make_problem):
+def test_less_noise_than_stated_is_reported_too(visit, make_problem):
     found = identify(make_problem(visit(seed=2).measured(0.003, seed=5)))
     tested = found.goodness
     assert tested.agreement is ChiSquareVerdict.TOO_SMALL

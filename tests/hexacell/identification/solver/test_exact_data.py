@@ -32,14 +32,14 @@ def test_the_papers_robot_from_five_points_of_eleven_orientations(paper, visit, 
     assert found.dof == 3 * (55 - 5) - 35
 
 
-def test_the_papers_own_solvers_end_at_the_same_place(visit, make_problem):
+def test_the_papers_solvers_find_the_same_geometry(visit, make_problem):
     problem = make_problem(visit(seed=2).measured())
     ours = identify(problem).geometry
     assert reference_solvers.gauss_newton(problem).largest_difference(ours) < EXACT_MM
     assert reference_solvers.least_squares_without_jacobian(problem).largest_difference(ours) < EXACT_MM
 
 
-def test_some_of_these_data_need_the_way_round_a_singularity(visit, make_problem):
+def test_some_of_these_data_need_the_solver_around_singularities(visit, make_problem):
     """Without the detour the search stops where a record comes next to one; with it, it never does."""
     ends = []
     for seed in SEEDS:

@@ -1,4 +1,4 @@
-"""Stations are set up by hand: turned a little against the base, with gauges a little off scale."""
+"""Stations placed by hand: rotated slightly against the base, with gauges of slightly wrong scale."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def set_up(visit):
     return measured
 
 
-def test_errors_scatter_as_the_covariance_says_with_stations_set_up_badly(paper, set_up, make_problem):
+def test_the_covariance_predicts_the_errors_with_misaligned_stations(paper, set_up, make_problem):
     count = 12
     errors, chi_squares = [], []
     for seed in range(count):
@@ -60,7 +60,7 @@ def test_errors_scatter_as_the_covariance_says_with_stations_set_up_badly(paper,
         assert low < sum(values) < high
 
 
-def test_not_knowing_of_it_costs_accuracy_and_shows(paper, set_up, make_problem):
+def test_unmodelled_misalignment_costs_accuracy_and_fails_the_chi_square_test(paper, set_up, make_problem):
     knowing = identify(make_problem(set_up(0), noise=STATED))
     unaware = identify(make_problem(set_up(0), noise=Noise(0.01, 0.01)))
     assert unaware.chi2 > 10 * unaware.dof
@@ -68,7 +68,7 @@ def test_not_knowing_of_it_costs_accuracy_and_shows(paper, set_up, make_problem)
     assert ours < 0.5 * theirs
 
 
-def test_well_made_stations_lose_little_by_the_doubt(noisy, make_problem, identified):
+def test_the_alignment_prior_costs_little_where_stations_are_aligned(noisy, make_problem, identified):
     doubting = identify(make_problem(noisy, noise=STATED))
     assert doubting.sigma.max() > identified.sigma.max()
     assert doubting.data_faults == ()

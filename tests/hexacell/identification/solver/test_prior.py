@@ -1,4 +1,4 @@
-"""The drawing's tolerances: a hold where the data are silent, and no bias where they speak."""
+"""The tolerance prior: it determines what the data do not, and gives no bias elsewhere."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def test_the_balls_mounting_moves_all_platform_joints_together(hexaglide, paper)
             assert prior.covariance[n, m] == pytest.approx(own + (300.0 if together else 0.0))
 
 
-def test_where_the_data_speak_they_speak_alone(paper, visit, make_problem):
+def test_the_prior_is_released_where_the_data_determine_the_parameters(paper, visit, make_problem):
     """Exact data: whatever of the prior is left in pulls the estimate away from the truth."""
     problem = make_problem(visit(seed=2).measured())
     assert estimate_online(problem).geometry.largest_difference(paper.actual) > 1e-3
@@ -49,7 +49,7 @@ def small_tilts(visit, make_problem):
     return identify(make_problem(visit(degrees=3.0, seed=1).measured(0.01, seed=1)))
 
 
-def test_what_small_tilts_leave_open_is_named(small_tilts):
+def test_parameters_undetermined_by_small_tilts_are_named(small_tilts):
     assert small_tilts.converged
     assert len(small_tilts.undetermined) >= 5
     told = dict(zip(PARAMETER_NAMES, small_tilts.sigma / 7.0 * np.sqrt(3.0), strict=True))
@@ -63,7 +63,7 @@ def test_what_small_tilts_leave_open_is_named(small_tilts):
     assert all(told[name] <= 0.5 for name in determined)
 
 
-def test_what_small_tilts_leave_open_stays_near_the_drawing(small_tilts, paper, hexaglide):
+def test_parameters_undetermined_by_small_tilts_stay_near_the_drawing(small_tilts, paper, hexaglide):
     """And what is told of it holds: errors within a few of its sigmas, sigmas within the prior's."""
     free = hexaglide.convention.free_parameters
     error = small_tilts.free - free(paper.actual)
@@ -73,7 +73,7 @@ def test_what_small_tilts_leave_open_stays_near_the_drawing(small_tilts, paper, 
     assert np.abs(small_tilts.free - free(paper.nominal)).max() < 15.0
 
 
-def test_the_more_records_the_less_is_left_open(visit, make_problem):
+def test_more_records_leave_fewer_parameters_undetermined(visit, make_problem):
     exact = visit(seed=2)
     measured = exact.measured(0.01, seed=1)
     sigmas = []
@@ -83,7 +83,7 @@ def test_the_more_records_the_less_is_left_open(visit, make_problem):
     assert sigmas == sorted(sigmas, reverse=True)
 
 
-def test_tracking_begins_with_nothing_at_all(paper, visit, make_problem):
+def test_the_online_estimate_starts_without_records(paper, visit, make_problem):
     """After the first record nothing is known but the drawing, and that is what is said."""
     measured = visit(seed=2).measured()
     first = type(measured)(measured.records[:1])
@@ -93,7 +93,7 @@ def test_tracking_begins_with_nothing_at_all(paper, visit, make_problem):
     np.testing.assert_allclose(estimate.sigma, estimate.prior_sigma, rtol=1e-9)
 
 
-def test_tracking_goes_on_from_the_former_estimate(visit, make_problem):
+def test_the_online_estimate_continues_from_the_previous_one(visit, make_problem):
     problem = make_problem(visit(seed=2).measured(0.01, seed=1))
     cold = estimate_online(problem)
     warm = estimate_online(problem, free=cold.free, poses=cold.poses)

@@ -1,4 +1,4 @@
-"""What the identification says of its own accuracy, against many repetitions of one measurement."""
+"""The covariance of an identification, against many repetitions of one measurement."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def within(total, degrees, alarm=1e-4):
     return low < total < high
 
 
-def test_errors_scatter_as_the_covariance_says(repeated, truth):
+def test_the_covariance_predicts_the_errors(repeated, truth):
     total = 0.0
     for found in repeated:
         error = found.free - truth
@@ -31,7 +31,7 @@ def test_errors_scatter_as_the_covariance_says(repeated, truth):
     assert within(total, len(repeated) * len(truth))
 
 
-def test_no_parameter_is_more_certain_than_it_says(repeated, truth):
+def test_no_sigma_is_too_small(repeated, truth):
     errors = np.array([found.free - truth for found in repeated])
     told = np.sqrt(np.diag(repeated[0].free_covariance))
     low, high = np.sqrt(chi2.interval(1.0 - 1e-4, len(repeated)) / np.array(len(repeated)))
@@ -53,7 +53,7 @@ def test_clean_records_are_never_left_out(repeated):
 
 
 @pytest.mark.parametrize("factor", [0.2, 5.0])
-def test_a_wrong_statement_of_the_noise_shows_in_chi_square_and_leaves_nothing_out(
+def test_a_wrongly_stated_noise_fails_the_chi_square_test_and_rejects_no_record(
     noisy, make_problem, factor
 ):
     found = identify(make_problem(noisy, noise=Noise(0.01 * factor, 0.01 * factor)))

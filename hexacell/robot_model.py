@@ -1,4 +1,4 @@
-"""One robot as the mathematics sees it: what the cell file and the controller's config say together."""
+"""The model of one robot: what the cell file and the controller's config state together."""
 
 from __future__ import annotations
 
@@ -30,11 +30,13 @@ class Robot:
     """A mechanism, its drawing, and the geometry that its controller commands with.
 
     ``controller`` is as the config states it, in the config's own frames; ``drawing`` and all that
-    is computed are in the mechanism's frame convention. ``change`` leads from the first to the second.
+    is computed are in the mechanism's frame convention.
 
     Attributes:
-        lent: geometries, in the frame convention, that the controller was lent while measuring.
-        lending: whether it commands with the last of them now.
+        frames: from the controller's frames to the convention's.
+        provisional: geometries, in the frame convention, that the controller commanded with for a time
+            while measuring.
+        uses_provisional: whether it commands with the last of them now.
     """
 
     mechanism: Mechanism
@@ -65,7 +67,7 @@ class Robot:
         return Prior.of(self.mechanism, self.drawing, self.tolerances)
 
     def problem(self, measurements: MeasurementSet) -> Problem:
-        """The identification of records that were commanded with the controller's geometries."""
+        """The identification problem of records that were commanded with the controller's geometries."""
         return build_problem(
             self.mechanism,
             measurements,
@@ -88,7 +90,7 @@ class Robot:
         )
 
     def for_controller(self, geometry: Geometry) -> Geometry:
-        """A geometry of the convention in the frames of the controller's config."""
+        """A geometry in the convention's frames, in the frames of the controller's config."""
         return self.frames.inverse().geometry(geometry)
 
     def from_commands(self, commands: Iterable[Pose]) -> PoseBatch:
@@ -100,7 +102,7 @@ class Robot:
         return self.frames.inverse().poses(PoseBatch.of([pose])).pose(0)
 
     def require_reach(self, name: str, pose: Pose) -> None:
-        """Raise where the controller cannot take a pose within the limits.
+        """Check that the controller can take a pose within the limits.
 
         Raises:
             ReachError: names the pose, the leg and the limit.

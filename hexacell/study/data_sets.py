@@ -1,12 +1,14 @@
-"""Measurements that a known robot would give, noise not yet added.
+"""Measurements that a known robot would give, exact or with noise.
 
-Nothing here uses the derivatives that the estimator works with: poses are found by closing the
-legs, and deviations are differences of positions.
+Nothing here uses the derivatives that the estimator works with: poses are found by closing the legs, and
+deviations are differences of positions.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -22,18 +24,21 @@ from hexacell.measurements.records import MeasurementSet, Record
 from hexacell.robot_model import Robot
 
 BATCH = 64
-ROUNDS = 60
+BATCHES = 60
+
+TRAVEL_SHARE = 0.7
+"""Of the gauges' travel, for deviations aimed at."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Campaign:
-    """Poses at points, as commanded and as really taken.
+class DataSet:
+    """Poses at points, commanded and actual.
 
     Attributes:
         labels: point and orientation (n, 2).
-        commands: as the controller was told, in its own geometry.
-        joints: (n, 6), mm, exactly.
-        positions: (n, 3), mm: where the ball really was.
+        commands: poses in the controller's geometry.
+        joints: (n, 6), mm, exact.
+        positions: actual positions of the ball (n, 3), mm.
     """
 
     labels: Array
@@ -42,7 +47,7 @@ class Campaign:
     positions: Array
 
     def measured(self, noise_mm: float, random: np.random.Generator | None = None) -> MeasurementSet:
-        """The records, every number disturbed by ``noise_mm``, one standard deviation."""
+        """The records, with noise of ``noise_mm``, one standard deviation, on every number."""
         random = random or np.random.default_rng()
         first = np.searchsorted(self.labels[:, 0], self.labels[:, 0])
         joints = self.joints + noise_mm * random.standard_normal(self.joints.shape)
@@ -66,28 +71,23 @@ def unlimited_travel(
     random: np.random.Generator,
     *,
     margin: float | None = None,
-) -> Campaign:
+) -> DataSet:
     """Random angles within ``amplitude``, rad, at points (m, 3), mm, as in the paper's simulation.
 
-    Every pose is commanded at the point itself and may end far from it; gauges with any travel are
-    supposed. Poses keep the singularity ``margin``, by default the robot's limit; with 0 they only
-    have to be reached without crossing a singularity.
+    Every pose is commanded at the point itself and may end far from it, so that gauges of any travel are
+    assumed. Poses keep the singularity ``margin``, by default the robot's limit; with 0 they only have
+    to be reached without crossing a singularity.
 
     Raises:
         LimitError: too few of them can be.
     """
+    margin = robot.limits.singularity_margin if margin is None else margin
     sets = []
     for point in points:
-        chosen = _Chosen(robot, truth, robot.limits.singularity_margin if margin is None else margin)
-        for _ in range(ROUNDS):
-            angles = random.uniform(-amplitude, amplitude, (BATCH, 3))
-            chosen.offer(PoseBatch.at(point, rotations.from_angles(angles)), orientations)
-            if chosen.count >= orientations:
-                break
-        else:
-            raise _too_few(point)
-        sets.append(chosen)
-    return _campaign(sets, orientations)
+        poses = _PointPoses(robot, truth, point, margin)
+        poses.fill(orientations, partial(_random_poses, point, random, amplitude))
+        sets.append(poses)
+    return _data_set(sets, orientations)
 
 
 def within_travel(
@@ -97,69 +97,88 @@ def within_travel(
     orientations: int,
     amplitude: float,
     random: np.random.Generator,
-) -> Campaign:
-    """Random turns within ``amplitude``, rad, that keep the ball within the gauges' travel.
+) -> DataSet:
+    """Random rotations within ``amplitude``, rad, that keep the ball within the gauges' travel.
 
-    They are aimed with the true geometry, which a program does not know: this is for studies of
-    what can be identified from records that a machine with gauges can give at all.
+    They are aimed with the true geometry, which a program does not know. They show what can be identified
+    from records that a robot with gauges can give at all.
 
     Raises:
         LimitError: a point, or enough poses at it, cannot be reached without crossing a singularity.
     """
+    travel = TRAVEL_SHARE * robot.limits.gauge_travel_mm
     sets = []
-    travel = 0.7 * robot.limits.gauge_travel_mm
     for point in points:
-        chosen = _Chosen(robot, truth, robot.limits.singularity_margin)
-        chosen.offer(PoseBatch.at(point, np.eye(3)[None]), 1)
-        if chosen.count < 1:
-            raise _too_few(point)
-        reference = chosen.really[0]
-        for _ in range(ROUNDS):
-            turns = rotations.from_angles(random.uniform(-amplitude, amplitude, (BATCH, 3)))
+        poses = _PointPoses(robot, truth, point, robot.limits.singularity_margin)
+        poses.add(PoseBatch.at(point, np.eye(3)[None]), 1)
+        if poses.count < 1:
+            raise poses.too_few()
+        reference = poses.actual[0]
+
+        def commands(reference: PoseBatch = reference) -> PoseBatch:
+            rotated = _random_orientations(random, amplitude) @ reference.rotations[0]
             offsets = random.uniform(-travel, travel, (BATCH, 3))
-            targets = PoseBatch(reference.positions + offsets, turns @ reference.rotations[0])
-            chosen.offer(_commands(robot, truth, targets), orientations)
-            if chosen.count >= orientations:
-                break
-        else:
-            raise _too_few(point)
-        sets.append(chosen)
-    return _campaign(sets, orientations)
+            return _commands(robot, truth, PoseBatch(reference.positions + offsets, rotated))
+
+        poses.fill(orientations, commands)
+        sets.append(poses)
+    return _data_set(sets, orientations)
 
 
-def _too_few(point: Array) -> LimitError:
-    return LimitError(f"too few poses can be reached at {point} without crossing a singularity")
+def _random_poses(point: Array, random: np.random.Generator, amplitude: float) -> PoseBatch:
+    return PoseBatch.at(point, _random_orientations(random, amplitude))
 
 
-class _Chosen:
+def _random_orientations(random: np.random.Generator, amplitude: float) -> Array:
+    return rotations.from_angles(random.uniform(-amplitude, amplitude, (BATCH, 3)))
+
+
+class _PointPoses:
     """Poses at one point that the robot can be brought to without crossing a singularity."""
 
-    def __init__(self, robot: Robot, truth: Geometry, margin: float) -> None:
+    def __init__(self, robot: Robot, truth: Geometry, point: Array, margin: float) -> None:
         self._robot = robot
-        self._margin = margin
         self._truth = truth
+        self._point = point
+        self._margin = margin
         self.commands: list[PoseBatch] = []
         self.joints: list[Array] = []
-        self.really: list[PoseBatch] = []
+        self.actual: list[PoseBatch] = []
 
     @property
     def count(self) -> int:
         return sum(len(poses) for poses in self.commands)
 
-    def offer(self, commands: PoseBatch, wanted: int) -> None:
+    def fill(self, wanted: int, draw: Callable[[], PoseBatch]) -> None:
+        """Add drawn commands until there are as many poses as wanted.
+
+        Raises:
+            LimitError: too few of them can be reached.
+        """
+        for _ in range(BATCHES):
+            self.add(draw(), wanted)
+            if self.count >= wanted:
+                return
+        raise self.too_few()
+
+    def add(self, commands: PoseBatch, wanted: int) -> None:
+        """Add those of some commands that can be reached, up to the number wanted."""
         robot = self._robot
         actual = robot.commanded(self._truth).actual_poses(commands)
         rows = np.flatnonzero(actual.found & within_limits(robot.limits, commands, actual.joints))
-        commands, joints, really = commands[rows], actual.joints[rows], actual.poses[rows]
+        commands, joints, poses = commands[rows], actual.joints[rows], actual.poses[rows]
         margins = [
-            singularity_margin(robot.mechanism, geometry, poses, joints)
-            for geometry, poses in ((robot.commanding, commands), (self._truth, really))
+            singularity_margin(robot.mechanism, geometry, some, joints)
+            for geometry, some in ((robot.commanding, commands), (self._truth, poses))
         ]
         clear = np.min(margins, axis=0, initial=np.inf) >= self._margin
         kept = np.flatnonzero(clear)[: wanted - self.count]
         self.commands.append(commands[kept])
         self.joints.append(joints[kept])
-        self.really.append(really[kept])
+        self.actual.append(poses[kept])
+
+    def too_few(self) -> LimitError:
+        return LimitError(f"too few poses can be reached at {self._point} without crossing a singularity")
 
 
 def _commands(robot: Robot, truth: Geometry, targets: PoseBatch) -> PoseBatch:
@@ -170,15 +189,15 @@ def _commands(robot: Robot, truth: Geometry, targets: PoseBatch) -> PoseBatch:
     return commands.poses[np.flatnonzero(commands.found)]
 
 
-def _campaign(sets: list[_Chosen], orientations: int) -> Campaign:
+def _data_set(sets: list[_PointPoses], orientations: int) -> DataSet:
     labels = [(point, turn) for point in range(1, len(sets) + 1) for turn in range(1, orientations + 1)]
-    commands = [poses for chosen in sets for poses in chosen.commands]
-    return Campaign(
+    commands = [poses for one in sets for poses in one.commands]
+    return DataSet(
         np.array(labels),
         PoseBatch(
             np.concatenate([poses.positions for poses in commands]),
             np.concatenate([poses.rotations for poses in commands]),
         ),
-        np.concatenate([joints for chosen in sets for joints in chosen.joints]),
-        np.concatenate([poses.positions for chosen in sets for poses in chosen.really]),
+        np.concatenate([joints for one in sets for joints in one.joints]),
+        np.concatenate([poses.positions for one in sets for poses in one.actual]),
     )

@@ -51,7 +51,7 @@ def outcome(table_one) -> Outcome:
     return Outcome(np.array(errors), np.array(covered), bound, removed, SETS * len(campaign.joints))
 
 
-def cramer_rao_bound(robot, truth: Geometry, campaign: data_sets.Campaign) -> Array:
+def cramer_rao_bound(robot, truth: Geometry, campaign: data_sets.DataSet) -> Array:
     """Smallest standard deviations (35,) of an unbiased estimator, mm."""
     positions = _position_of(robot, truth, campaign)
     by_joints = _by_joints(lambda joints: positions(truth, joints), campaign.joints)

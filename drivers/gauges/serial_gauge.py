@@ -24,7 +24,7 @@ from hexacell.errors import DeviceError, FileError
 
 AGREEMENT_MM = 0.05  # consecutive readings closer than this agree; a garbled digit differs by more
 MAX_READINGS = 12  # enough for an oscillating ball to come to rest
-TRIES = 3
+MAX_REQUESTS = 3
 
 Parsed = TypeVar("Parsed")
 
@@ -167,7 +167,7 @@ class SerialGauge(ABC):
     async def _query(self, request: bytes, parse: Callable[[bytes], Parsed]) -> Parsed:
         """The parsed answer; the request is repeated if ``parse`` rejects the frame."""
         received = b""
-        for _ in range(TRIES):
+        for _ in range(MAX_REQUESTS):
             try:
                 return parse(await self._ask(request))
             except FrameRejected as rejection:

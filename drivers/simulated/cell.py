@@ -1,4 +1,4 @@
-"""A whole simulated cell: gauges, encoders and controller that answer on the wire."""
+"""A complete simulated cell: gauges, encoders and controller, served over their own protocols."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import Any
 from drivers.simulated.closeable import Closeable
 from drivers.simulated.encoders import SimulatedEncoderBank
 from drivers.simulated.fault_schedule import CellFaults, FaultSchedule
-from drivers.simulated.gauges.rack import SimulatedGaugeBank
+from drivers.simulated.gauges.bank import SimulatedGaugeBank
 from drivers.simulated.linuxcnc.server import SimulatedController
 from drivers.simulated.physics import RobotPhysics
 from drivers.simulated.robot import SimulatedMachine
@@ -27,14 +27,14 @@ from hexacell.kinematics.pose import Pose, PoseBatch
 
 
 class SimulatedCell(Closeable):
-    """The cell that a cell file's ``[simulation]`` describes; serves until it is closed.
+    """The cell described by ``[simulation]`` of a cell file; serves until it is closed.
 
-    ``faults`` makes things go wrong at once, ``schedule`` at a moment that is to come.
-    ``other_processes``: whether the encoders must be reachable from outside this process.
+    ``faults`` injects faults at once, ``schedule`` at a later time. ``other_processes``: whether the
+    encoders must be reachable from other processes.
 
     Raises:
         FileError: the controller's config cannot be read.
-        ReachError: the first point of the cell cannot be reached, by its config or by its truth.
+        ReachError: the first point of the cell is out of reach by its config or its true geometry.
     """
 
     def __init__(
@@ -53,8 +53,8 @@ class SimulatedCell(Closeable):
         self.machine = SimulatedMachine(mechanism, config_format, config, self.physics, clock, home)
         with ExitStack() as served:
             stop_file = _stop_file(settings, served)
-            self.gauges = served.enter_context(_rack(settings, simulation, self.physics, clock))
-            self.encoders = served.enter_context(_bank(settings, simulation, self.physics, clock))
+            self.gauges = served.enter_context(_gauge_bank(settings, simulation, self.physics, clock))
+            self.encoders = served.enter_context(_encoder_bank(settings, simulation, self.physics, clock))
             bus: dict[str, Any] = self.encoders.bus_settings
             if other_processes:
                 adapter = served.enter_context(serve_slcan(self.encoders.channel, "pty"))
@@ -82,7 +82,7 @@ class SimulatedCell(Closeable):
 
 
 def _stop_file(settings: CellSettings, served: ExitStack) -> Path:
-    """The cell's own stop file, or one in a folder that lasts as long as the cell is served."""
+    """The stop file of the cell, or one in a temporary folder that is removed at the end."""
     if settings.guards.stop_file is not None:
         return Path(settings.guards.stop_file)
     return Path(served.enter_context(TemporaryDirectory(prefix="hexacell-"))) / "stop"
@@ -109,14 +109,14 @@ def _physics(
     )
 
 
-def _rack(
+def _gauge_bank(
     settings: CellSettings, simulation: SimulationSettings, physics: RobotPhysics, clock: CellClock
 ) -> SimulatedGaugeBank:
     plungers = {gauge.name: partial(_plunger_position, physics, gauge) for gauge in settings.gauges}
     return SimulatedGaugeBank(settings.gauges, plungers, simulation.gauges, clock, seed=simulation.seed)
 
 
-def _bank(
+def _encoder_bank(
     settings: CellSettings, simulation: SimulationSettings, physics: RobotPhysics, clock: CellClock
 ) -> SimulatedEncoderBank:
     latency = simulation.encoders.latency_s

@@ -1,4 +1,4 @@
-"""What goes wrong with a simulated cell: at once, or at a moment named beforehand."""
+"""Faults of a simulated cell, injected at once or on schedule."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from pathlib import Path
 
 from drivers.simulated.closeable import Closeable
 from drivers.simulated.encoders import SimulatedEncoderBank
+from drivers.simulated.gauges.bank import SimulatedGaugeBank
 from drivers.simulated.gauges.faults import InjectedGaugeFault
-from drivers.simulated.gauges.rack import SimulatedGaugeBank
 from drivers.simulated.linuxcnc.faults import ControllerFault
 from drivers.simulated.linuxcnc.server import SimulatedController
 from hexacell.cell.simulation import SimulatedFault
@@ -22,7 +22,7 @@ from hexacell.errors import UsageError
 
 
 class FaultKind(StrEnum):
-    """What can be made to go wrong with a simulated cell, as its cell file names it."""
+    """The kinds of faults, as named in the cell file."""
 
     EMERGENCY_STOP = "emergency stop"
     FOLLOWING_ERROR = "following error"
@@ -37,15 +37,15 @@ class FaultKind(StrEnum):
 
 CONTROLLER = "controller"
 ENCODER = "encoder "
-_OF_GAUGES = {
+_GAUGE_FAULTS = {
     FaultKind.UNPLUGGED: InjectedGaugeFault.UNPLUGGED,
     FaultKind.SILENT: InjectedGaugeFault.SILENT,
     FaultKind.AT_END: InjectedGaugeFault.AT_END,
     FaultKind.OFF_PLATE: InjectedGaugeFault.PUSHED,
     FaultKind.FROZEN: InjectedGaugeFault.FROZEN,
 }
-_OF_ENCODERS = {FaultKind.UNPLUGGED, FaultKind.SILENT, FaultKind.ALARM}
-_OF_THE_CONTROLLER = {
+_ENCODER_FAULTS = {FaultKind.UNPLUGGED, FaultKind.SILENT, FaultKind.ALARM}
+_CONTROLLER_FAULTS = {
     FaultKind.EMERGENCY_STOP,
     FaultKind.FOLLOWING_ERROR,
     FaultKind.UNPLUGGED,
@@ -54,7 +54,7 @@ _OF_THE_CONTROLLER = {
 
 
 class CellFaults:
-    """Breaks and mends the devices of one cell, from any thread; a device is named as in a cell file."""
+    """Injects and clears faults of one cell, from any thread; devices are named as in the cell file."""
 
     def __init__(
         self,
@@ -69,19 +69,19 @@ class CellFaults:
         self._stop_file = stop_file
 
     def check(self, kind: FaultKind, device: str) -> None:
-        """Refuse what cannot go wrong.
+        """Check that a fault can be simulated.
 
         Raises:
-            UsageError: there is no such device, or it has no such fault.
+            UsageError: there is no such device, or not with such a fault.
         """
         if kind in {FaultKind.EMERGENCY_STOP, FaultKind.FOLLOWING_ERROR, FaultKind.STOP_LINE}:
             known = device in {"", CONTROLLER, "stop line"}
         elif device == CONTROLLER:
-            known = kind in _OF_THE_CONTROLLER
+            known = kind in _CONTROLLER_FAULTS
         elif device.startswith(ENCODER):
-            known = kind in _OF_ENCODERS and device[len(ENCODER) :] in set("123456")
+            known = kind in _ENCODER_FAULTS and device[len(ENCODER) :] in set("123456")
         else:
-            known = kind in _OF_GAUGES and device in self._gauges.indicators
+            known = kind in _GAUGE_FAULTS and device in self._gauges.indicators
         if not known:
             raise UsageError(
                 f"no fault '{kind}' can be simulated of '{device}'",
@@ -89,27 +89,27 @@ class CellFaults:
             )
 
     def inject(self, kind: FaultKind, device: str = "") -> None:
-        """Let something go wrong now; raises ``UsageError``."""
+        """Inject a fault now; raises ``UsageError``."""
         self._set(kind, device, on=True)
 
     def clear(self, kind: FaultKind, device: str = "") -> None:
-        """Put it right again; a machine that was switched off stays off. Raises ``UsageError``."""
+        """Clear a fault; a machine that was switched off stays off. Raises ``UsageError``."""
         self._set(kind, device, on=False)
 
     def _set(self, kind: FaultKind, device: str, *, on: bool) -> None:
         self.check(kind, device)
         if kind is FaultKind.STOP_LINE:
-            self._press(on=on)
-        elif kind in _OF_THE_CONTROLLER and device in {"", CONTROLLER}:
+            self._set_stop_file(on=on)
+        elif kind in _CONTROLLER_FAULTS and device in {"", CONTROLLER}:
             self._controller_fault(kind, on=on)
         elif device.startswith(ENCODER):
             self._encoder_fault(kind, int(device[len(ENCODER) :]), on=on)
         elif on:
-            self._gauges.inject(device, _OF_GAUGES[kind])
+            self._gauges.inject(device, _GAUGE_FAULTS[kind])
         else:
-            self._gauges.clear(device, _OF_GAUGES[kind])
+            self._gauges.clear(device, _GAUGE_FAULTS[kind])
 
-    def _press(self, *, on: bool) -> None:
+    def _set_stop_file(self, *, on: bool) -> None:
         if on:
             self._stop_file.touch()
         else:
@@ -138,21 +138,21 @@ class CellFaults:
 
 @dataclass(frozen=True, slots=True)
 class InjectedFault:
-    """A fault that struck, and when on the cell's clock."""
+    """An injected fault, and the time on the cell's clock."""
 
     fault: SimulatedFault
     at_s: float
 
 
 class FaultSchedule(Closeable):
-    """Strikes and lifts planned faults at their moments, on a thread of its own.
+    """Injects and clears scheduled faults, on a thread of its own.
 
     Attributes:
-        moves: how many moves have begun.
-        struck: what struck by now, in order.
+        move_count: how many moves have started.
+        injected: the faults injected so far, in order.
 
     Raises:
-        UsageError: a fault is planned that cannot be.
+        UsageError: a scheduled fault cannot be simulated.
     """
 
     def __init__(
@@ -165,51 +165,51 @@ class FaultSchedule(Closeable):
         self._waiting: list[SimulatedFault] = []
         self._due: list[tuple[float, int, bool, SimulatedFault]] = []
         self._numbers = itertools.count()
-        self._news = threading.Condition()
+        self._changed = threading.Condition()
         self._closing = False
         self._thread: threading.Thread | None = None
-        begun_s = clock.now()
+        start_s = clock.now()
         for fault in planned:
-            self.schedule(fault, begun_s)
+            self.schedule(fault, start_s)
 
     def schedule(self, fault: SimulatedFault, since_s: float | None = None) -> None:
-        """Have a fault strike later: in a move, or so long after ``since_s``, which is now by default.
+        """Schedule a fault: in a move, or some time after ``since_s``, by default now.
 
         Raises:
             UsageError: it cannot be simulated.
         """
         self._faults.check(FaultKind(fault.kind), fault.device)
-        with self._news:
+        with self._changed:
             if fault.at_move is not None:
                 self._waiting.append(fault)
             else:
-                self._expect(fault, self._clock.now() if since_s is None else since_s)
+                self._enqueue(fault, self._clock.now() if since_s is None else since_s)
             if self._thread is None:
                 self._thread = threading.Thread(target=self._serve, name="simulated faults")
                 self._thread.start()
 
     def on_motion_start(self) -> None:
-        """Another move has begun now."""
-        with self._news:
+        """Count a move, and schedule the faults that wait for it."""
+        with self._changed:
             self.move_count += 1
             for fault in [fault for fault in self._waiting if fault.at_move == self.move_count]:
                 self._waiting.remove(fault)
-                self._expect(fault, self._clock.now())
+                self._enqueue(fault, self._clock.now())
 
     def close(self) -> None:
-        """Let nothing strike any more; twice is harmless."""
-        with self._news:
+        """Inject no more faults; closing twice is harmless."""
+        with self._changed:
             self._closing = True
-            self._news.notify_all()
+            self._changed.notify_all()
         if self._thread is not None:
             self._thread.join()
 
-    def _expect(self, fault: SimulatedFault, since_s: float) -> None:
-        strikes_at = since_s + fault.after_s
-        heapq.heappush(self._due, (strikes_at, next(self._numbers), True, fault))
+    def _enqueue(self, fault: SimulatedFault, since_s: float) -> None:
+        injected_at = since_s + fault.after_s
+        heapq.heappush(self._due, (injected_at, next(self._numbers), True, fault))
         if fault.lasts_s is not None:
-            heapq.heappush(self._due, (strikes_at + fault.lasts_s, next(self._numbers), False, fault))
-        self._news.notify_all()
+            heapq.heappush(self._due, (injected_at + fault.lasts_s, next(self._numbers), False, fault))
+        self._changed.notify_all()
 
     def _serve(self) -> None:
         while (due := self._next()) is not None:
@@ -220,12 +220,12 @@ class FaultSchedule(Closeable):
             change(FaultKind(fault.kind), fault.device)
 
     def _next(self) -> tuple[bool, SimulatedFault] | None:
-        """Wait for the next one that is due; nothing when closing."""
-        with self._news:
+        """Wait for the next due fault; nothing when closing."""
+        with self._changed:
             while not self._closing:
                 left = self._due[0][0] - self._clock.now() if self._due else None
                 if left is not None and left <= 0.0:
                     _, _, on, fault = heapq.heappop(self._due)
                     return on, fault
-                self._news.wait(None if left is None else self._clock.real_seconds(left))
+                self._changed.wait(None if left is None else self._clock.real_seconds(left))
         return None

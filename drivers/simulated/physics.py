@@ -1,9 +1,8 @@
-"""How simulated sliders go from one place to another: smoothly, and stoppable on the way.
+"""The true state of a simulated cell: actual slider positions, actual ball position, and the sensors.
 
-The hidden truth of a simulated cell: where sliders and ball really are, and who sees what.
-# MERGED-DOC
-Sliders follow the motion they are given; the ball follows the true geometry, continued from where
-it was, so that the platform stays on its assembly mode. Gauges and encoders look through noise.
+Sliders move along given paths with a smooth velocity profile, and can be stopped on the way. The
+platform follows the true geometry by continuation, so it stays in its assembly mode. Gauges and
+encoders add noise.
 """
 
 from __future__ import annotations
@@ -28,13 +27,13 @@ from hexacell.kinematics.rotations import Array
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Motion:
-    """A path through joint vectors, timed by a smooth step.
+    """A motion of the sliders along a path, with a smooth-step time profile.
 
     Attributes:
-        path: (k, 6), mm, evenly spaced along the way.
-        begins_s: on the cell's clock.
-        duration_s: from rest to rest.
-        stopped_s: when it was cut short.
+        path: slider positions (k, 6), mm, evenly spaced.
+        start_s: time of the start, on the cell's clock.
+        duration_s: from standstill to standstill.
+        stopped_s: when it was stopped before its end.
     """
 
     path: Array
@@ -44,29 +43,29 @@ class Motion:
 
     @classmethod
     def stationary(cls, joints: Array) -> Motion:
-        """No motion: sliders standing at (6,), mm, for ever."""
+        """Standstill at slider positions (6,), mm."""
         return cls(np.stack([joints, joints]), -1e9, 0.0)
 
     @property
     def end_s(self) -> float:
-        """When the sliders stand again."""
+        """When the sliders reach standstill."""
         return min(self.start_s + self.duration_s, self.stopped_s)
 
     def fraction(self, now_s: float) -> float:
-        """How much of the way is done, 0 to 1."""
+        """The completed fraction of the path, 0 to 1."""
         elapsed = min(now_s, self.stopped_s) - self.start_s
         t = 1.0 if elapsed >= self.duration_s else max(0.0, elapsed / self.duration_s)
         return t * t * (3.0 - 2.0 * t)
 
     def path_position(self, now_s: float) -> float:
-        """Where on the path the sliders are, in rows of it."""
+        """The position on the path, in rows."""
         return self.fraction(now_s) * (len(self.path) - 1)
 
     def joints(self, now_s: float) -> Array:
-        """Slider positions (6,), mm, at a time."""
-        place = self.path_position(now_s)
-        below = min(int(place), len(self.path) - 2)
-        share = place - below
+        """The slider positions (6,), mm, at a time."""
+        position = self.path_position(now_s)
+        below = min(int(position), len(self.path) - 2)
+        share = position - below
         joints: Array = (1.0 - share) * self.path[below] + share * self.path[below + 1]
         return joints
 
@@ -76,12 +75,13 @@ RINGING_HZ = 8.0
 
 
 class RobotPhysics:
-    """The truth of one cell; safe to ask from several threads.
+    """The true state of one cell. Thread-safe.
 
-    ``on_travel`` is called whenever a move has begun; it must not take long.
+    Attributes:
+        on_motion_start: called when a motion has started; must return quickly.
 
     Raises:
-        ReachError: the true geometry cannot stand where it should begin.
+        ReachError: the true geometry cannot reach the start.
     """
 
     def __init__(
@@ -104,34 +104,34 @@ class RobotPhysics:
         self._lock = threading.RLock()
         self._motion = Motion.stationary(start_joints)
         self._joints = start_joints
-        self._passed = 0
+        self._rows_passed = 0
         first = change_geometry(mechanism, start_geometry, self._truth, start, start_joints[None])
         if not first.found[0]:
             raise ReachError(
-                f"the simulated machine cannot stand at {start.pose(0)}",
-                action="Correct [simulation.geometry], or begin at another point",
+                f"the simulated machine cannot reach {start.pose(0)}",
+                action="Correct [simulation.geometry], or start at another point",
             )
         self._pose = first.poses
-        self._station = self._placed(self._pose.positions[0])
-        self._triad = self._turned()
-        self._disturb()
+        self._station = self._misplaced(self._pose.positions[0])
+        self._triad = self._misaligned()
+        self._draw_noise()
 
     def start_motion(self, path: Array) -> Motion:
-        """Send the sliders along a path (k, 6), mm, that begins where they stand; returns at once."""
+        """Start a motion along a path (k, 6), mm, from the present positions; returns at once."""
         motion = self._settings.motion
         with self._lock:
-            longest = float(np.abs(np.diff(path, axis=0)).sum(axis=0).max())
+            distance = float(np.abs(np.diff(path, axis=0)).sum(axis=0).max())
             scatter = motion.repeatability_mm * self._random.standard_normal(6)
-            really = path + np.linspace(0.0, 1.0, len(path))[:, None] * scatter
-            really[0] = self._motion.joints(self._catch_up())
-            duration = max(motion.minimum_s, longest / motion.speed_mm_s)
-            self._motion, self._passed = Motion(really, self._clock.now(), duration), 0
-            self._disturb()
+            actual = path + np.linspace(0.0, 1.0, len(path))[:, None] * scatter
+            actual[0] = self._motion.joints(self._update())
+            duration = max(motion.minimum_s, distance / motion.speed_mm_s)
+            self._motion, self._rows_passed = Motion(actual, self._clock.now(), duration), 0
+            self._draw_noise()
             self.on_motion_start()
             return self._motion
 
     def stop(self) -> None:
-        """Stop the sliders where they are."""
+        """Stop the sliders at their present positions."""
         with self._lock:
             now = self._clock.now()
             if now < self._motion.end_s:
@@ -139,72 +139,74 @@ class RobotPhysics:
 
     @property
     def motion_end_s(self) -> float:
-        """When the sliders came, or will come, to rest, on the cell's clock."""
+        """When the sliders reached, or will reach, standstill, on the cell's clock."""
         with self._lock:
             return self._motion.end_s
 
     def progress(self) -> float:
-        """How much of the last way is done, 0 to 1."""
+        """The completed fraction of the last motion, 0 to 1."""
         with self._lock:
             return self._motion.fraction(self._clock.now())
 
     def encoder_positions(self) -> Array:
-        """What the encoders see (6,), mm."""
+        """The slider positions measured by the encoders (6,), mm."""
         with self._lock:
             flicker = self._settings.encoders.flicker_mm * self._random.standard_normal(6)
             return self._motion.joints(self._clock.now()) + self._encoder_noise + flicker
 
     def gauge_displacement(self, axis: str) -> float:
-        """What a gauge sees: the ball's way along its axis from the middle of its travel, mm."""
+        """The ball's displacement along a gauge's axis from the middle of its travel, with noise, mm."""
         with self._lock:
             ball = self._ball()
-            seen = self._triad @ (ball - self._station) + self._gauge_noise
+            displacement = self._triad @ (ball - self._station) + self._gauge_noise
             flicker = self._settings.gauges.flicker_mm * self._random.standard_normal()
-            return float(seen[AXES.index(axis)] + flicker)
+            return float(displacement[AXES.index(axis)] + flicker)
 
     def _ball(self) -> Array:
-        now = self._catch_up()
+        now = self._update()
         ball: Array = self._pose.positions[0]
         if now >= self._motion.end_s:
-            ball = ball + self._swinging(now - self._motion.end_s)
+            ball = ball + self._ringing(now - self._motion.end_s)
             if np.linalg.norm(ball - self._station) > self._settings.station_reach_mm:
-                self._station, self._triad = self._placed(ball), self._turned()
+                self._station, self._triad = self._misplaced(ball), self._misaligned()
         return ball
 
-    def _disturb(self) -> None:
-        self._swing = self._random.standard_normal(3)
+    def _draw_noise(self) -> None:
+        self._ringing_direction = self._random.standard_normal(3)
         self._gauge_noise = self._settings.gauges.noise_mm * self._random.standard_normal(3)
         self._encoder_noise = self._settings.encoders.noise_mm * self._random.standard_normal(6)
 
-    def _catch_up(self) -> float:
-        """Bring the platform along the way the sliders have gone since it was last looked at."""
+    def _update(self) -> float:
+        """Move the platform along the path of the sliders since the last update."""
         now = self._clock.now()
-        place = self._motion.path_position(now)
-        while self._passed + 1 <= place:
-            self._passed += 1
-            self._follow(self._motion.path[self._passed])
-        self._follow(self._motion.joints(now))
+        position = self._motion.path_position(now)
+        while self._rows_passed + 1 <= position:
+            self._rows_passed += 1
+            self._move_platform(self._motion.path[self._rows_passed])
+        self._move_platform(self._motion.joints(now))
         return now
 
-    def _follow(self, joints: Array) -> None:
+    def _move_platform(self, joints: Array) -> None:
         if np.array_equal(joints, self._joints):
             return
         found = forward_kinematics(self._mechanism, self._truth, joints[None], self._pose)
         self._joints = joints
         if found.found[0]:
             self._pose = found.poses
-        # Else: a platform driven into a singularity. Where a real one would go nobody knows; this
-        # one waits until the sliders are somewhere that it can follow from where it is.
+        # Otherwise the platform is at a singularity. Where a real one would go is unknown; this one
+        # waits until the sliders are where it can continue from its pose.
 
-    def _swinging(self, since_s: float) -> Array:
+    def _ringing(self, since_s: float) -> Array:
         motion = self._settings.motion
         decay = np.exp(-since_s / motion.ringing_s) * np.cos(2.0 * np.pi * RINGING_HZ * since_s)
-        swinging: Array = motion.ringing_mm * decay * self._swing / np.linalg.norm(self._swing)
-        return swinging
+        ringing: Array = (
+            motion.ringing_mm * decay * self._ringing_direction / np.linalg.norm(self._ringing_direction)
+        )
+        return ringing
 
-    def _placed(self, ball: Array) -> Array:
+    def _misplaced(self, ball: Array) -> Array:
         return ball + self._settings.gauges.placing_mm * self._random.standard_normal(3)
 
-    def _turned(self) -> Array:
+    def _misaligned(self) -> Array:
         tilt = np.radians(self._settings.gauges.misalignment_deg)
         return rotations.from_vector(tilt * self._random.standard_normal(3))

@@ -1,4 +1,4 @@
-"""The simulated robot as its controller drives it: with the geometry of the config, not the truth."""
+"""The simulated robot as its controller drives it, with the geometry of the config."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ from hexacell.kinematics.rotations import Array
 from hexacell.motion.trajectory import interpolate_line
 
 LINE_STEPS = 24
-"""Straight lines are cut into so many pieces, which is where joints are computed."""
+"""Number of segments of a straight line, at whose ends slider positions are computed."""
 
 
 class SimulatedMachine:
-    """Sliders under a controller that reads its geometry whenever it is switched on."""
+    """The machine behind a controller that reads its geometry whenever it is switched on."""
 
     def __init__(
         self,
@@ -41,82 +41,84 @@ class SimulatedMachine:
         self._physics = physics
         self._clock = clock
         self._geometry = config_format.read(config)
-        self._way = PoseBatch.of([home, home])
+        self._line = PoseBatch.of([home, home])
         self._lock = threading.Lock()
-        self._stops = 0
-        self._halt = threading.Event()
+        self._stop_count = 0
+        self._stopped = threading.Event()
 
     def move(self, pose: Pose) -> None:
-        """Go straight to a pose; returns at the end or when stopped.
+        """Move straight to a pose; returns at the end or when stopped.
 
         Raises:
-            KinematicsFailure: a leg cannot reach some place on the way.
+            KinematicsFailure: a pose on the line is out of reach.
         """
-        stops = self._stops
-        way = interpolate_line(PoseBatch.of([self.pose()]), PoseBatch.of([pose]), LINE_STEPS)
-        joints = self._joints(way)
+        stop_count = self._stop_count
+        line = interpolate_line(PoseBatch.of([self.pose()]), PoseBatch.of([pose]), LINE_STEPS)
+        joints = self._joints(line)
         if np.isnan(joints).any():
             raise KinematicsFailure("Linear move on line 0 fails kinematicsInverse")
         with self._lock:
-            if self._stops != stops:
+            if self._stop_count != stop_count:
                 return
-            self._halt.clear()
-            self._way = way
+            self._stopped.clear()
+            self._line = line
             motion = self._physics.start_motion(joints)
-        self._clock.wait(motion.duration_s, self._halt)
+        self._clock.wait(motion.duration_s, self._stopped)
 
     def stop(self) -> None:
         """Stop in place."""
         with self._lock:
-            self._stops += 1
+            self._stop_count += 1
             self._physics.stop()
-            self._halt.set()
+            self._stopped.set()
 
     def pose(self) -> Pose:
-        """Where the platform is by the controller's geometry."""
+        """The pose by the controller's geometry."""
         with self._lock:
-            return self._here().pose(0)
+            return self._pose_now().pose(0)
 
     def joints(self) -> tuple[float, ...]:
-        """The sliders (6,), mm, as the controller commands them."""
+        """The commanded slider positions (6,), mm."""
         return tuple(float(value) for value in self._joints(PoseBatch.of([self.pose()]))[0])
 
     def switch_on(self) -> None:
-        """Read the geometry again; the sliders stay, and so the believed pose changes.
+        """Read the geometry again; the sliders stay, so the controller's pose changes.
 
         Raises:
-            FileError: the config cannot be read, or no pose of its geometry belongs to the sliders.
+            FileError: the config cannot be read, or its geometry has no pose at the slider positions.
         """
         with self._lock:
-            here = self._here()
+            here = self._pose_now()
             joints = self._joints(here)
             new = self._format.read(self._config)
             found = change_geometry(self._mechanism, self._geometry.geometry, new.geometry, here, joints)
             if not found.found[0]:
-                raise FileError("with this geometry the sliders cannot stand so", subject=self._config)
+                raise FileError(
+                    "this geometry has no pose at the present slider positions", subject=self._config
+                )
             self._geometry = new
-            self._way = found.poses[[0, 0]]
+            self._line = found.poses[[0, 0]]
 
     def switch_off(self) -> None:
-        """Sliders hold by their brakes."""
+        """Brakes hold the sliders."""
 
     def home(self) -> None:
-        """The encoders are absolute: nothing to look for."""
+        """The encoders are absolute: nothing to do."""
 
-    def _here(self) -> PoseBatch:
-        return _between(self._way, self._physics.progress())
+    def _pose_now(self) -> PoseBatch:
+        return _between(self._line, self._physics.progress())
 
     def _joints(self, poses: PoseBatch) -> Array:
         geometry: ControllerGeometry = self._geometry
         return self._mechanism.inverse(geometry.geometry, geometry.branch, poses)
 
 
-def _between(way: PoseBatch, fraction: float) -> PoseBatch:
-    place = fraction * (len(way) - 1)
-    row = min(int(place), len(way) - 2)
+def _between(line: PoseBatch, fraction: float) -> PoseBatch:
+    place = fraction * (len(line) - 1)
+    row = min(int(place), len(line) - 2)
     if place - row >= 1.0:
-        return way[[row + 1]]
-    turn = rotations.to_vector(way.rotations[row + 1] @ way.rotations[row].T)
+        return line[[row + 1]]
+    turn = rotations.to_vector(line.rotations[row + 1] @ line.rotations[row].T)
     share = place - row
-    position = (1.0 - share) * way.positions[row] + share * way.positions[row + 1]
-    return PoseBatch(position[None], (rotations.from_vector(share * turn) @ way.rotations[row])[None])
+    position = (1.0 - share) * line.positions[row] + share * line.positions[row + 1]
+    return PoseBatch(position[None], (rotations.from_vector(share * turn) @ line.rotations[row])[None])

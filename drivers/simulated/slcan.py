@@ -34,8 +34,8 @@ _SET_UP = re.compile(r"S[0-9]|s[0-9A-Fa-f]{4}|Y[0-9]?|Z[01]|")
 _INFORMATION = {"V": "V1013", "v": "v1013", "N": "NHX01", "F": "F00"}
 
 
-def encode(message: can.Message) -> bytes:
-    """A frame as slcan writes it, with its CR."""
+def encode_frame(message: can.Message) -> bytes:
+    """A frame in slcan format, with its CR."""
     kind = "r" if message.is_remote_frame else "t"
     if message.is_extended_id:
         head = f"{kind.upper()}{message.arbitration_id:08X}"
@@ -45,7 +45,7 @@ def encode(message: can.Message) -> bytes:
     return f"{head}{message.dlc:d}{data}\r".encode()
 
 
-def decode(command: str) -> can.Message | None:
+def decode_frame(command: str) -> can.Message | None:
     """The frame in a command (without CR); none if the command is no valid frame."""
     match = _FRAME.fullmatch(command)
     if match is None:
@@ -94,7 +94,7 @@ class SlcanAdapter:
         return _OK
 
     def _send(self, command: str) -> bytes:
-        message = decode(command)
+        message = decode_frame(command)
         if message is None or not (self.is_open and self._may_transmit):
             return _ERROR
         self._transmit(message)
@@ -120,7 +120,7 @@ class SlcanServer(Closeable):
 
     @property
     def bus_settings(self) -> dict[str, Any]:
-        """What ``can.Bus`` needs to reach the bus from any process of this machine."""
+        """The settings for ``can.Bus`` to reach the bus from any process of this machine."""
         return {
             "interface": "slcan",
             "channel": self._url,
@@ -155,7 +155,7 @@ class SlcanServer(Closeable):
         while not self._closing.is_set():
             message = self._bus.recv(SLICE_S)
             if message is not None and self._adapter.is_open:
-                self._write(encode(message))
+                self._write(encode_frame(message))
 
     def _write(self, data: bytes) -> None:
         with self._writing:
@@ -163,5 +163,5 @@ class SlcanServer(Closeable):
 
 
 def serve_slcan(channel: str, transport: Literal["pty", "socket"]) -> SlcanServer:
-    """Put the virtual CAN ``channel`` behind an slcan adapter on a pty or a loopback socket."""
+    """Serve the virtual CAN ``channel`` over an slcan adapter on a pty or a loopback socket."""
     return SlcanServer(channel, PtyTransport("slcan") if transport == "pty" else SocketTransport())

@@ -1,4 +1,4 @@
-"""Two events side by side: what is not the same, field by field."""
+"""Comparison of a recorded and a replayed event, field by field."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ from hexacell.cell.devices import EncoderSettings
 from procedures.run.events import Reading
 
 TOLERANCE = 1e-9
-"""The largest difference that rounding may make: in a field's own unit, above 1 relative."""
+"""Largest difference that counts as rounding: absolute in the field's unit, above 1 relative."""
 
 WORDING_FIELDS = frozenset({"sentence", "line", "reason"})
-"""Fields for people; a later version may word them otherwise."""
+"""Text fields; a later version may word them differently."""
 
 
 class Aspect(StrEnum):
-    """What a difference is about."""
+    """The kind of a difference."""
 
     DECISION = "decision"
     RESULT = "result"
@@ -31,7 +31,7 @@ class Aspect(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Change:
-    """One field that is not the same; ``field`` is empty where nothing can be compared."""
+    """One field that differs; ``field`` is empty where the events cannot be compared."""
 
     field: str
     recorded: object
@@ -40,7 +40,7 @@ class Change:
 
 @dataclass(frozen=True, slots=True)
 class Difference:
-    """A change, and where: the journal's line, and the step or the kind of event."""
+    """A change, with the line of the journal and the step or kind of event."""
 
     line: int
     place: str
@@ -56,18 +56,18 @@ class Difference:
 
 
 def changes(recorded: BaseModel, replayed: BaseModel, tolerance: float) -> list[Change]:
-    """What differs in fields that the recorded one states; later versions may state more."""
+    """The differences in the recorded fields; later versions may have more fields."""
     stated = recorded.model_dump(mode="json", exclude_unset=True)
     return list(_changes("", stated, replayed.model_dump(mode="json"), tolerance))
 
 
 def is_wording(change: Change) -> bool:
-    """Whether nothing but the wording differs."""
+    """Whether only the wording differs."""
     return change.field.rpartition(".")[2] in WORDING_FIELDS
 
 
 def counts_mismatch(reading: Reading, encoders: EncoderSettings) -> Change | None:
-    """Slider positions that do not follow from the counts behind them, by more than half a count."""
+    """A difference of slider positions from their encoder counts by more than half a count."""
     means = np.mean([positions_mm(counts, encoders) for counts in reading.counts], axis=0)
     half_mm = encoders.measuring_step_nm * 0.5e-6
     if np.abs(means - reading.joints_mm).max() <= half_mm + TOLERANCE:

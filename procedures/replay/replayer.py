@@ -1,12 +1,8 @@
-"""Through a journal, event by event: is each decided and derived again as it was?
+"""Replay of a journal: every decision and every outcome is computed again and compared.
 
-Every decision and every outcome is made from the recorded state before it, so that one difference
-does not make all that follow differ.
-
-Which events of the journal are what came of a step, and which of those can be derived again.
-# MERGED-DOC
-Whatever is not listed here was caused from outside, by a person, a fault or a policy, and is taken
-as it stands.
+Each is computed from the recorded state before it, so that one difference does not cause others.
+``OUTCOME_KINDS`` lists which events are outcomes of which steps; all other events have external
+causes (a person, a fault, a policy) and are taken from the journal.
 """
 
 from __future__ import annotations
@@ -44,7 +40,7 @@ Outcome = TypeVar("Outcome")
 
 
 class Scope(StrEnum):
-    """What is done again."""
+    """What is computed again."""
 
     ALL = "all"
     DECISIONS = "decisions"
@@ -53,11 +49,11 @@ class Scope(StrEnum):
 
     @property
     def decides(self) -> bool:
-        """Whether decisions are."""
+        """Whether decisions are computed again."""
         return self in {Scope.ALL, Scope.DECISIONS}
 
     def derives(self, step: Step) -> bool:
-        """Whether the outcome of this step is."""
+        """Whether the outcome of this step is computed again."""
         return self in {Scope.ALL, Scope.RESULTS} or (
             self is Scope.IDENTIFICATION and step.kind == "identify"
         )
@@ -65,12 +61,12 @@ class Scope(StrEnum):
 
 @dataclass
 class ReplayReport:
-    """What was found by now.
+    """The findings so far.
 
     Attributes:
-        decisions: steps that were decided again.
-        results: outcomes that were derived again.
-        taken: other events, taken as they stand.
+        decisions: how many decisions were computed again.
+        results: how many outcomes were computed again.
+        taken: how many other events were taken from the journal.
     """
 
     decisions: int = 0
@@ -80,33 +76,34 @@ class ReplayReport:
 
 
 class Replayer:
-    """One recorded run and the procedure that it is put through.
+    """Replays one recorded run.
 
     Args:
-        performer: with the recorded devices of ``tape``, in a folder where it can do no harm.
-        scratch: a journal of its own, for the end of the run.
+        executor: executes steps with the recorded devices of ``recorded``, in a temporary folder.
+        recorded: the source of all device readings.
+        scratch: path of a temporary journal, for the end of the run.
     """
 
     def __init__(
         self,
-        performer: StepExecutor,
-        tape: RecordedOutcome,
+        executor: StepExecutor,
+        recorded: RecordedOutcome,
         scratch: Path,
         scope: Scope = Scope.ALL,
         tolerance: float = TOLERANCE,
     ) -> None:
-        self._performer = performer
-        self._tape = tape
+        self._executor = executor
+        self._recorded = recorded
         self._scratch = scratch
         self._scope = scope
         self._tolerance = tolerance
         self._state = RunState()
-        self._doing: Step | None = None
+        self._current_step: Step | None = None
         self._line = 0
         self.report = ReplayReport()
 
     async def replay(self, entries: Sequence[Entry]) -> ReplayReport:
-        """Go through all of them."""
+        """Replay all entries."""
         for place, entry in enumerate(entries):
             self._line = entry.number
             await self._compare(entry.event, entries[:place])
@@ -117,108 +114,108 @@ class Replayer:
         match event:
             case events.StepBegun():
                 await self._decision(event)
-                self._doing = event.step
+                self._current_step = event.step
                 return
             case events.Interrupted():
                 await self._interruption(event)
             case events.Ended():
                 await self._end(event, before)
-            case _ if self._doing is not None and is_outcome(self._doing, event):
-                await self._outcome(self._doing, event)
-                self._doing = None
+            case _ if self._current_step is not None and is_outcome(self._current_step, event):
+                await self._outcome(self._current_step, event)
+                self._current_step = None
             case _:
                 self.report.taken += 1
         if event.kind in CANCELLED:
-            self._doing = None
+            self._current_step = None
 
     async def _decision(self, event: events.StepBegun) -> None:
         if not self._scope.decides:
             return
         self.report.decisions += 1
         decided = await self._decided()
-        self._note(Aspect.DECISION, event.step.key, event.step, decided)
+        self._compare_with(Aspect.DECISION, event.step.key, event.step, decided)
 
     async def _decided(self) -> Step | Exception | None:
-        deciding = asyncio.to_thread(self._performer.calibration.next_step, self._state)
-        return await _or_error(deciding)
+        deciding = asyncio.to_thread(self._executor.calibration.next_step, self._state)
+        return await _result_or_error(deciding)
 
     async def _outcome(self, step: Step, event: events.Event) -> None:
         if not self._scope.derives(step):
             return
         self.report.results += 1
-        derived = await self._performed(step, event)
-        self._note(Aspect.RESULT, step.key, event, derived)
+        derived = await self._outcome_of(step, event)
+        self._compare_with(Aspect.RESULT, step.key, event, derived)
         if isinstance(event, events.RecordTaken):
-            encoders = self._performer.cell.settings.encoders
+            encoders = self._executor.cell.settings.encoders
             if change := counts_mismatch(event.reading, encoders):
-                self._differ(Aspect.RESULT, step.key, change)
+                self._add_difference(Aspect.RESULT, step.key, change)
 
-    async def _performed(self, step: Step, outcome: events.Event) -> events.Event | Exception:
-        self._tape.load(outcome)
-        return await _or_error(self._performer.perform(step, self._state))
+    async def _outcome_of(self, step: Step, outcome: events.Event) -> events.Event | Exception:
+        self._recorded.load(outcome)
+        return await _result_or_error(self._executor.perform(step, self._state))
 
     async def _interruption(self, event: events.Interrupted) -> None:
-        """A failure that needs no device and no disk comes again; any other is taken as it stands."""
+        """A failure without a device or the disk is computed again; any other is taken from the journal."""
         if event.exit_code != ExitCode.OUT_OF_LIMITS:
             self.report.taken += 1
-        elif self._doing is None:
+        elif self._current_step is None:
             await self._undecided(event)
-        elif self._doing.kind in COMPUTED_STEPS and self._scope.derives(self._doing):
+        elif self._current_step.kind in COMPUTED_STEPS and self._scope.derives(self._current_step):
             self.report.results += 1
-            derived = await self._performed(self._doing, event)
-            self._note(Aspect.RESULT, self._doing.key, event, derived)
+            derived = await self._outcome_of(self._current_step, event)
+            self._compare_with(Aspect.RESULT, self._current_step.key, event, derived)
         else:
             self.report.taken += 1
 
     async def _undecided(self, event: events.Interrupted) -> None:
-        """Deciding itself may have failed, or something between two steps."""
+        """A failure of a decision, or between two steps."""
         decided = await self._decided() if self._scope.decides else None
         if isinstance(decided, Exception):
             self.report.decisions += 1
-            self._note(Aspect.DECISION, "deciding", event, decided)
+            self._compare_with(Aspect.DECISION, "deciding", event, decided)
         else:
             self.report.taken += 1
 
     async def _end(self, event: events.Ended, before: Sequence[Entry]) -> None:
-        """The real engine finds nothing left to do and ends the run likewise."""
+        """The real engine must find no next step and end the run in the same way."""
         if self._scope is not Scope.ALL:
             self.report.taken += 1
             return
         self.report.results += 1
         left = await self._decided()
         if left is not None:
-            self._note(Aspect.DECISION, "end", event, left)
+            self._compare_with(Aspect.DECISION, "end", event, left)
             return
         self._scratch.write_bytes(b"".join(encode(entry) for entry in before))
         with Journal(self._scratch) as journal:
-            ended = await _or_error(Engine(self._performer, journal).run())
-        self._note(Aspect.RESULT, "end", event, ended)
+            ended = await _result_or_error(Engine(self._executor, journal).run())
+        self._compare_with(Aspect.RESULT, "end", event, ended)
 
-    def _note(self, aspect: Aspect, place: str, recorded: BaseModel, found: object) -> None:
+    def _compare_with(self, aspect: Aspect, place: str, recorded: BaseModel, found: object) -> None:
         if isinstance(recorded, events.Interrupted) and isinstance(found, Exception):
             if str(found) != recorded.reason:
-                self._differ(Aspect.WORDS, place, Change("reason", recorded.reason, str(found)))
+                self._add_difference(Aspect.WORDS, place, Change("reason", recorded.reason, str(found)))
             return
         if type(found) is not type(recorded) or not isinstance(found, BaseModel):
-            self._differ(aspect, place, Change("", _in_words(recorded), _in_words(found)))
+            self._add_difference(aspect, place, Change("", _describe(recorded), _describe(found)))
             return
         for change in changes(recorded, found, self._tolerance):
-            self._differ(Aspect.WORDS if is_wording(change) else aspect, place, change)
+            self._add_difference(Aspect.WORDS if is_wording(change) else aspect, place, change)
 
-    def _differ(self, aspect: Aspect, place: str, change: Change) -> None:
+    def _add_difference(self, aspect: Aspect, place: str, change: Change) -> None:
         self.report.differences.append(Difference(self._line, place, aspect, change))
 
 
-async def _or_error(work: Awaitable[Outcome]) -> Outcome | Exception:
-    """What it gives, or how it fails: an error of the program is what a bug report is about."""
+async def _result_or_error(work: Awaitable[Outcome]) -> Outcome | Exception:
+    """The result or the error; a programming error too, since bug reports are about those."""
     try:
         return await work
     except Exception as error:
         return error
 
 
-def _in_words(found: object) -> str:
-    """What an event, a step or a failure is, in a few words."""
+def _describe(found: object) -> str:
+    """A short description of an event, a step or a failure."""
     match found:
         case None:
             return "nothing left to do"
@@ -247,19 +244,19 @@ OUTCOME_KINDS: dict[str, frozenset[str]] = {
     "judge": frozenset({"judged"}),
     "roll back": frozenset({"rolled back"}),
 }
-"""Kinds of events by the kind of step."""
+"""The kinds of events that are outcomes, by kind of step."""
 
 MEASURED_KINDS = frozenset({"confirmed", "voided", "closed"})
-"""Kinds that can be derived again only from the reading that they hold; version 1 kept none."""
+"""Kinds that can be computed again only from their reading; journals of version 1 have none."""
 
 CANCELLED = frozenset({"interrupted", "failed", "paused"})
-"""After these the step that was being done is over without an outcome."""
+"""Kinds of events that end a step without an outcome."""
 
 COMPUTED_STEPS = frozenset({"lend", "take back", "identify", "propose", "commit", "judge"})
-"""Steps whose failure follows from what is recorded, unless it came from a device or the disk."""
+"""Steps whose failure can be computed again, unless a device or the disk caused it."""
 
 
 def is_outcome(step: Step, event: Event) -> bool:
-    """Whether an event is what came of a step, with all that it was made from."""
-    is_whole = event.kind not in MEASURED_KINDS or getattr(event, "reading", None) is not None
-    return is_whole and event.kind in OUTCOME_KINDS.get(step.kind, ())
+    """Whether an event is the outcome of a step, with all of its inputs."""
+    is_complete = event.kind not in MEASURED_KINDS or getattr(event, "reading", None) is not None
+    return is_complete and event.kind in OUTCOME_KINDS.get(step.kind, ())

@@ -200,7 +200,7 @@ def test_everything_at_once(typed_here, served, closed_port, command):
 @pytest.mark.parametrize(
     ("fault", "words"),
     [
-        ("duplicate", ("leg 3", "node 3")),
+        ("add_duplicate", ("leg 3", "node 3")),
         ("unplug", ("leg 3", "node 3")),
         ("alarm", ("leg 3",)),
     ],

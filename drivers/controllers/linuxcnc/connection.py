@@ -14,7 +14,7 @@ from drivers.controllers.errors import ConnectionLost, ResponseTimeout
 from drivers.controllers.linuxcnc.protocol import (
     LineBuffer,
     Response,
-    encode,
+    encode_command,
     parse_explanation,
     parse_response,
 )
@@ -171,7 +171,7 @@ class Connection:
 
     def _encoded(self, command: str) -> bytes:
         try:
-            return encode(command)
+            return encode_command(command)
         except ValueError as error:
             raise UsageError(str(error), subject=self._address.name) from error
 

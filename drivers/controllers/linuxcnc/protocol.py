@@ -53,7 +53,7 @@ class LineBuffer:
         return self._rest.decode("utf-8", "replace").strip()
 
 
-def encode(command: str) -> bytes:
+def encode_command(command: str) -> bytes:
     """The bytes of one command line.
 
     Raises:

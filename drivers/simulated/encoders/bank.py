@@ -1,7 +1,4 @@
-"""The simulated bank: positions in, sampled once per SYNC, counts out on the wire.
-
-What can be made to go wrong on the simulated encoder bus; legs count from 1.
-"""
+"""The simulated encoder bank: samples positions at every SYNC and sends counts; and its faults."""
 
 from __future__ import annotations
 
@@ -24,12 +21,11 @@ FIRST_SERIAL_NUMBER = 1001
 
 
 class SimulatedEncoderBank(Closeable):
-    """Six encoders on a virtual CAN bus of their own; use it as a context, or start and close it.
+    """Six encoders on a virtual CAN bus of their own; a context manager, or started and closed.
 
-    ``positions`` gives the six joint variables now, mm, with their noise; it is called at the
-    start, and then once for every SYNC on the bank's thread. Answers to a SYNC are spread over
-    ``latency_s`` of the cell's time. Serial numbers are the cell file's, or 1001 and up.
-    ``faults`` makes things go wrong.
+    ``positions`` gives the six joint variables now, mm, with noise; it is called at the start, and at
+    every SYNC on the thread of the bus. Responses to a SYNC are spread over ``latency_s`` of the cell's
+    time. Serial numbers are those of the cell file, or 1001 and up. ``faults`` injects faults.
     """
 
     def __init__(
@@ -48,16 +44,16 @@ class SimulatedEncoderBank(Closeable):
         self._positions = positions
         self._clock = clock
         self._latency_s = latency_s
-        self._makers = tuple(vendors)
+        self._vendors = tuple(vendors)
         serial_numbers = settings.serial_numbers or range(FIRST_SERIAL_NUMBER, FIRST_SERIAL_NUMBER + 6)
         self._encoders = tuple(
             self._make(leg, serial_number) for leg, serial_number in enumerate(serial_numbers, 1)
         )
-        self._twins: list[tuple[int, SimulatedEncoder]] = []
+        self._duplicates: list[tuple[int, SimulatedEncoder]] = []
 
     @property
     def bus_settings(self) -> dict[str, Any]:
-        """What ``can.Bus`` needs to reach the bank from this process."""
+        """The settings for ``can.Bus`` to reach the bank from this process."""
         return {"interface": "virtual", "channel": self.channel}
 
     def start(self) -> None:
@@ -71,7 +67,7 @@ class SimulatedEncoderBank(Closeable):
         self.bus.start()
 
     def close(self) -> None:
-        """Switch them off and let the channel go; closing twice is harmless."""
+        """Switch them off and close the channel; closing twice is harmless."""
         self.bus.close()
 
     def __enter__(self) -> Self:
@@ -83,21 +79,21 @@ class SimulatedEncoderBank(Closeable):
         return self._encoders[leg - 1]
 
     def add_duplicate(self, leg: int) -> None:
-        """Plug in a second device under a leg's node id."""
-        twin = self._make(leg, self.encoder(leg).data.serial_number + 1000)
-        self._twins.append((leg, twin))
-        twin.plug_in()
+        """Add a second device with the node id of a leg."""
+        duplicate = self._make(leg, self.encoder(leg).data.serial_number + 1000)
+        self._duplicates.append((leg, duplicate))
+        duplicate.plug_in()
 
     def _make(self, leg: int, serial_number: int) -> SimulatedEncoder:
         settings = self._settings
         data = DeviceData(
             settings.nodes[leg - 1], serial_number, round(settings.measuring_step_nm), settings.signed
         )
-        return SimulatedEncoder(self.bus, self._makers[leg - 1], data, self._clock.real_seconds)
+        return SimulatedEncoder(self.bus, self._vendors[leg - 1], data, self._clock.real_seconds)
 
     def _on_sync(self, _can_id: int, _data: bytearray, _timestamp: float) -> None:
         self._sample()
-        devices = [*self._encoders, *(twin for _, twin in self._twins)]
+        devices = [*self._encoders, *(duplicate for _, duplicate in self._duplicates)]
         for place, encoder in enumerate(devices, 1):
             delay_s = self._latency_s * place / len(devices) + encoder.delay_s
             for cob_id, data in encoder.on_sync():
@@ -113,11 +109,11 @@ class SimulatedEncoderBank(Closeable):
         positions = self._positions()
         for leg, (encoder, position) in enumerate(zip(self._encoders, positions, strict=True), 1):
             encoder.counts = self._counts(leg, position)
-        for leg, twin in self._twins:
-            twin.counts = self.encoder(leg).counts
+        for leg, duplicate in self._duplicates:
+            duplicate.counts = self.encoder(leg).counts
 
     def _counts(self, leg: int, position_mm: float) -> int:
-        """What a device shows there; beyond 32 bits it rolls over."""
+        """The counts at a position; they wrap around at 32 bits."""
         settings = self._settings
         step_mm = settings.measuring_step_nm * 1e-6
         from_zero = (position_mm - settings.offset_mm[leg - 1]) * settings.direction[leg - 1]
@@ -137,56 +133,56 @@ class EncoderFaults:
         self._bank = bank
 
     def unplug(self, leg: int) -> None:
-        """The node vanishes; before ``start`` it was never there."""
+        """The node disappears; before ``start``: it does not appear."""
         with self._bank.bus.lock:
             self._bank.encoder(leg).unplug()
             self._bank.unplugged.add(leg)
 
     def plug_in(self, leg: int) -> None:
-        """It comes back, without configuration."""
+        """The node comes back, without configuration."""
         with self._bank.bus.lock:
             self._bank.unplugged.discard(leg)
             self._bank.encoder(leg).plug_in()
 
-    def duplicate(self, leg: int) -> None:
+    def add_duplicate(self, leg: int) -> None:
         """A second device with the same node id and another serial number appears."""
         with self._bank.bus.lock:
             self._bank.add_duplicate(leg)
 
     def silence(self, leg: int, *, silent: bool = True) -> None:
-        """It no longer answers SYNC, but everything else."""
+        """The node no longer responds to SYNC, but to everything else."""
         with self._bank.bus.lock:
             self._bank.encoder(leg).is_silent = silent
 
     def emergency(self, leg: int, code: int = NO_MAGNET, register: int = POSITION_ERROR) -> None:
-        """It reports an error; ``clear_emergency`` takes it back."""
+        """The node reports an error; ``clear_emergency`` ends it."""
         with self._bank.bus.lock:
             self._bank.encoder(leg).emergency(code, register)
 
     def clear_emergency(self, leg: int) -> None:
-        """It reports that there is no error any more."""
+        """The node reports that the error is gone."""
         self.emergency(leg, 0, 0)
 
     def alarm(self, leg: int, bits: int = 1) -> None:
-        """It raises alarms in 6503h without a message; 0 takes them back."""
+        """The node sets alarms in 6503h without a message; 0 clears them."""
         with self._bank.bus.lock:
             self._bank.encoder(leg).set_alarms(bits)
 
     def reboot(self, leg: int) -> None:
-        """It restarts and loses its configuration."""
+        """The node restarts and loses its configuration."""
         with self._bank.bus.lock:
             self._bank.encoder(leg).boot()
 
     def stop_heartbeat(self, leg: int) -> None:
-        """Its heartbeat ends; it still answers."""
+        """The heartbeat of the node ends; it still responds."""
         with self._bank.bus.lock:
             self._bank.encoder(leg).stop_heartbeat()
 
     def delay(self, leg: int, seconds: float) -> None:
-        """Its answers come so much later, with what it sampled at their SYNC: stale rounds."""
+        """The responses of the node are delayed; they keep the sample of their SYNC."""
         with self._bank.bus.lock:
             self._bank.encoder(leg).delay_s = seconds
 
     def kill_bus(self) -> None:
-        """Every node falls silent for good."""
+        """All nodes become silent permanently."""
         self._bank.bus.stop()

@@ -1,4 +1,4 @@
-"""The simulated wire: one thread that takes frames in, keeps timers, and sends frames out."""
+"""The simulated CAN bus: one thread that receives frames, runs timers and sends frames."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ SLICE_S = 0.02
 
 @dataclass(order=True, slots=True)
 class Timer:
-    """Something to be done at a time; ``cancel`` it as long as it has not been."""
+    """An action at a time, which can be cancelled before."""
 
     due: float
     sequence: int
@@ -29,15 +29,14 @@ class Timer:
     cancelled: bool = field(default=False, compare=False)
 
     def cancel(self) -> None:
-        """Keep it from happening."""
+        """Cancel the action."""
         self.cancelled = True
 
 
 class SimulatedCanBus(canopen.Network):
     """A CANopen network for simulated nodes on python-can's ``virtual`` interface.
 
-    Everything that nodes do happens with ``lock`` held, on the line's own thread or on that of
-    whoever injects a fault.
+    Nodes act only with ``lock`` held, on the thread of the bus or on one that injects a fault.
     """
 
     def __init__(self, channel: str) -> None:
@@ -50,30 +49,30 @@ class SimulatedCanBus(canopen.Network):
         self._thread = threading.Thread(target=self._run, name="simulated encoders", daemon=True)
 
     def start(self) -> None:
-        """Begin to take frames in."""
+        """Start to receive frames."""
         self._thread.start()
 
     def stop(self) -> None:
-        """Fall silent for good; doing it twice is harmless."""
+        """Become silent permanently; stopping twice is harmless."""
         self._stopping.set()
         if self._thread.is_alive() and self._thread is not threading.current_thread():
             self._thread.join()
 
     def close(self) -> None:
-        """Stop, and let the channel go."""
+        """Stop, and close the channel."""
         self.stop()
         if self.bus is not None:
             self.bus.shutdown()
 
     def call_later(self, seconds: float, action: Callable[[], None]) -> Timer:
-        """Do ``action`` after so many seconds on the wall."""
+        """Run ``action`` after so many seconds of real time."""
         timer = Timer(time.monotonic() + seconds, next(self._sequence), action)
         with self.lock:
             heapq.heappush(self._timers, timer)
         return timer
 
     def send_message(self, can_id: int, data: bytes, remote: bool = False) -> None:
-        """Send one frame, unless the line has fallen silent."""
+        """Send one frame, unless the bus was stopped."""
         if not self._stopping.is_set():
             super().send_message(can_id, data, remote)
 
@@ -84,14 +83,14 @@ class SimulatedCanBus(canopen.Network):
         period: float,
         remote: bool = False,  # noqa: ARG002
     ) -> PeriodicFrame:
-        """Send a frame again and again from the line's thread, where canopen would start another."""
+        """Send a frame periodically from the thread of the bus; canopen would start another thread."""
         return PeriodicFrame(self, can_id, data, period)
 
     def _run(self) -> None:
         try:
             self._serve()
-        except Exception:  # the positions behind the encoders may fail: as loud as a broken cable
-            _log.exception("the simulated encoders have died")
+        except Exception:  # an error of the simulated physics appears as a silent bus
+            _log.exception("the simulated encoders have failed")
             self._stopping.set()
 
     def _serve(self) -> None:
@@ -119,17 +118,17 @@ class SimulatedCanBus(canopen.Network):
 
 
 class PeriodicFrame:
-    """A frame that repeats until stopped; what canopen's heartbeat asks of a periodic task."""
+    """A periodic frame, with the interface that canopen expects for its heartbeat."""
 
-    def __init__(self, line: SimulatedCanBus, can_id: int, data: bytes, period_s: float) -> None:
-        self._line = line
+    def __init__(self, bus: SimulatedCanBus, can_id: int, data: bytes, period_s: float) -> None:
+        self._bus = bus
         self._can_id = can_id
         self._data = data
         self._period_s = period_s
-        self._timer = line.call_later(period_s, self._send)
+        self._timer = bus.call_later(period_s, self._send)
 
     def update(self, data: bytes) -> None:
-        """Repeat other data from now on."""
+        """Send other data from now on."""
         self._data = data
 
     def stop(self) -> None:
@@ -137,5 +136,5 @@ class PeriodicFrame:
         self._timer.cancel()
 
     def _send(self) -> None:
-        self._timer = self._line.call_later(self._period_s, self._send)
-        self._line.send_message(self._can_id, self._data)
+        self._timer = self._bus.call_later(self._period_s, self._send)
+        self._bus.send_message(self._can_id, self._data)

@@ -1,4 +1,4 @@
-"""One simulated encoder: canopen's local node, and what that leaves out.
+"""One simulated encoder: canopen's local node with additions.
 
 Added are boot-up, NMT gating, TPDOs with SYNC and on event timers, emergencies, and the rules of
 CiA 301 for changing PDOs.
@@ -28,7 +28,7 @@ _WRONG_VALUE = 0x0609_0030
 
 @dataclass(frozen=True, slots=True)
 class DeviceData:
-    """What is engraved on one device and set in it."""
+    """Serial number and settings of one device."""
 
     node: int
     serial_number: int
@@ -37,26 +37,26 @@ class DeviceData:
 
 
 class SimulatedEncoder:
-    """A device on the line. ``counts`` is the position of its last sample."""
+    """A device on the bus. ``counts`` is the position of its last sample."""
 
     def __init__(
-        self, line: SimulatedCanBus, maker: Vendor, data: DeviceData, real_seconds: Callable[[float], float]
+        self, bus: SimulatedCanBus, vendor: Vendor, data: DeviceData, real_seconds: Callable[[float], float]
     ) -> None:
         self.data = data
         self.counts = 0
         self.is_silent = False
         self.delay_s = 0.0
-        self._line = line
-        self._maker = maker
+        self._bus = bus
+        self._vendor = vendor
         self._real_seconds = real_seconds
         self._event_timers: list[Timer] = []
         self._syncs = 0
         objects = object_dictionary.build(
-            maker, data.node, data.serial_number, data.step_nm, signed=data.signed
+            vendor, data.node, data.serial_number, data.step_nm, signed=data.signed
         )
         self._node = canopen.LocalNode(data.node, objects)
         self._node.add_read_callback(self._read_position)  # type: ignore[no-untyped-call]
-        self._node.add_write_callback(self._guard_pdo_rules)  # type: ignore[no-untyped-call]
+        self._node.add_write_callback(self._check_pdo_rules)  # type: ignore[no-untyped-call]
 
     @property
     def is_operational(self) -> bool:
@@ -64,22 +64,22 @@ class SimulatedEncoder:
         return self._node.has_network() and self._node.nmt.state == "OPERATIONAL"
 
     def plug_in(self) -> None:
-        """Appear on the line and boot, unless it is there already."""
+        """Connect to the bus and boot, unless connected."""
         if not self._node.has_network():
-            self._node.associate_network(self._line)
-            self._line.subscribe(_NMT, self._on_nmt)
+            self._node.associate_network(self._bus)
+            self._bus.subscribe(_NMT, self._on_nmt)
             self.boot()
 
     def unplug(self) -> None:
-        """Vanish from the line without a word."""
+        """Disconnect from the bus without a message."""
         if self._node.has_network():
             self._node.nmt.stop_heartbeat()  # type: ignore[no-untyped-call]
             self._stop_event_timers()
-            self._line.unsubscribe(_NMT, self._on_nmt)
+            self._bus.unsubscribe(_NMT, self._on_nmt)
             self._node.remove_network()
 
     def boot(self) -> None:
-        """Start with the maker's defaults: boot-up message, then PRE-OPERATIONAL."""
+        """Boot with default settings: boot-up message, then PRE-OPERATIONAL."""
         self._node.nmt.stop_heartbeat()  # type: ignore[no-untyped-call]
         self._stop_event_timers()
         self._node.data_store.clear()
@@ -88,31 +88,31 @@ class SimulatedEncoder:
         self._node.nmt.state = "PRE-OPERATIONAL"
 
     def on_sync(self) -> Iterator[tuple[int, bytes]]:
-        """The frames (COB-ID, data) that this SYNC calls for, with the sample as it is now."""
+        """The frames (COB-ID, data) sent at this SYNC, with the present sample."""
         self._syncs += 1
         if not self.is_operational or self.is_silent:
             return
-        for number in range(1, len(self._maker.tpdos) + 1):
-            kind = self._value(0x1800 + number - 1, 2)
-            if kind in _SYNCHRONOUS and self._syncs % kind == 0:
+        for number in range(1, len(self._vendor.tpdos) + 1):
+            transmission_type = self._value(0x1800 + number - 1, 2)
+            if transmission_type in _SYNCHRONOUS and self._syncs % transmission_type == 0:
                 yield from self._frames(number)
 
     def send(self, cob_id: int, data: bytes) -> None:
-        """Send a PDO, if that is still allowed."""
+        """Send a PDO, if the node is operational."""
         if self.is_operational:
-            self._line.send_message(cob_id, data)
+            self._bus.send_message(cob_id, data)
 
     def emergency(self, code: int, register: int) -> None:
-        """Report an error, or with code 0 that it is gone, and remember it."""
+        """Report an error (code 0: no error) and store it in the error register."""
         self._node.set_data(object_dictionary.ERROR_REGISTER, 0, bytes((register,)))
-        self._line.send_message(0x80 + self.data.node, struct.pack("<HB5x", code, register))
+        self._bus.send_message(0x80 + self.data.node, struct.pack("<HB5x", code, register))
 
     def set_alarms(self, bits: int) -> None:
-        """Raise alarms in 6503h without a message."""
+        """Set alarms in 6503h without a message."""
         self._node.set_data(object_dictionary.ALARMS, 0, struct.pack("<H", bits))
 
     def stop_heartbeat(self) -> None:
-        """Send no heartbeat any more; everything else goes on."""
+        """Send no more heartbeats."""
         self._node.nmt.stop_heartbeat()  # type: ignore[no-untyped-call]
 
     def _on_nmt(self, _can_id: int, data: bytearray, _timestamp: float) -> None:
@@ -138,7 +138,7 @@ class SimulatedEncoder:
         return int.from_bytes(self._node.get_data(index, subindex), "little")
 
     def _start_event_timers(self) -> None:
-        for number in range(1, len(self._maker.tpdos) + 1):
+        for number in range(1, len(self._vendor.tpdos) + 1):
             is_on = not self._value(0x1800 + number - 1, 1) & object_dictionary.TPDO_OFF
             period_ms = self._value(0x1800 + number - 1, 5)
             if is_on and period_ms and self._value(0x1800 + number - 1, 2) not in _SYNCHRONOUS:
@@ -151,7 +151,7 @@ class SimulatedEncoder:
                 self.send(cob_id, data)
             self._repeat(number, period_s)
 
-        timer = self._line.call_later(period_s, send)
+        timer = self._bus.call_later(period_s, send)
         self._event_timers.append(timer)
 
     def _stop_event_timers(self) -> None:
@@ -167,24 +167,24 @@ class SimulatedEncoder:
             return self.counts
         return None
 
-    def _guard_pdo_rules(self, index: int, subindex: int, od: ODVariable, data: bytes) -> None:
+    def _check_pdo_rules(self, index: int, subindex: int, od: ODVariable, data: bytes) -> None:
         """CiA 301: PDOs are changed in PRE-OPERATIONAL, COB-ID and mapping only while off."""
         del od
         if 0x1800 <= index < 0x1C00 and self.is_operational:
             raise SdoAbortedError(_NOT_NOW)
         value = int.from_bytes(data, "little")
         if 0x1800 <= index < 0x1A00 and subindex == 1:
-            self._guard_cob_id(self._value(index, 1), value)
+            self._check_cob_id(self._value(index, 1), value)
         if 0x1A00 <= index < 0x1C00:
-            self._guard_mapping(index, subindex)
+            self._check_mapping(index, subindex)
 
-    def _guard_cob_id(self, old: int, new: int) -> None:
+    def _check_cob_id(self, old: int, new: int) -> None:
         both_on = not (old | new) & object_dictionary.TPDO_OFF
         if both_on and old != new:
             raise SdoAbortedError(_WRONG_VALUE)
 
-    def _guard_mapping(self, index: int, subindex: int) -> None:
-        if not self._maker.mapping_writable:
+    def _check_mapping(self, index: int, subindex: int) -> None:
+        if not self._vendor.mapping_writable:
             raise SdoAbortedError(_READ_ONLY)
         if not self._value(index - 0x200, 1) & object_dictionary.TPDO_OFF:
             raise SdoAbortedError(_NOT_NOW)

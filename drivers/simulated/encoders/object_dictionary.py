@@ -34,39 +34,39 @@ class _Row:
     access: str = "ro"
 
 
-def build(maker: Vendor, node: int, serial_number: int, step_nm: int, *, signed: bool) -> ObjectDictionary:
-    """What the device answers for after power-on."""
+def build(vendor: Vendor, node: int, serial_number: int, step_nm: int, *, signed: bool) -> ObjectDictionary:
+    """The object dictionary of a device after power-on."""
     dictionary = ObjectDictionary()  # type: ignore[no-untyped-call]
     position = INTEGER32 if signed else UNSIGNED32
-    rows = [*_communication(maker, serial_number), *_profile(maker, step_nm, position)]
-    for number, tpdo in enumerate(maker.tpdos, 1):
+    rows = [*_communication(vendor, serial_number), *_profile(vendor, step_nm, position)]
+    for number, tpdo in enumerate(vendor.tpdos, 1):
         rows += _tpdo(number, tpdo, node)
     for row in rows:
         _add(dictionary, row)
     return dictionary
 
 
-def _communication(maker: Vendor, serial_number: int) -> Iterator[_Row]:
-    yield _Row(0x1000, 0, "device type", UNSIGNED32, maker.device_type)
+def _communication(vendor: Vendor, serial_number: int) -> Iterator[_Row]:
+    yield _Row(0x1000, 0, "device type", UNSIGNED32, vendor.device_type)
     yield _Row(ERROR_REGISTER, 0, "error register", UNSIGNED8, 0)
     yield _Row(0x1017, 0, "producer heartbeat time", UNSIGNED16, 0, "rw")
     yield _Row(0x1018, 0, "number of identity entries", UNSIGNED8, 4)
     yield _Row(0x1018, 1, "vendor", UNSIGNED32, 0x0000_0406)
-    yield _Row(0x1018, 2, "product code", UNSIGNED32, maker.device_type >> 16)
+    yield _Row(0x1018, 2, "product code", UNSIGNED32, vendor.device_type >> 16)
     yield _Row(0x1018, 3, "revision", UNSIGNED32, 0x0001_0000)
     yield _Row(0x1018, 4, "serial number in identity", UNSIGNED32, serial_number)
     yield _Row(0x650B, 0, "serial number", UNSIGNED32, serial_number)
 
 
-def _profile(maker: Vendor, step_nm: int, position: int) -> Iterator[_Row]:
+def _profile(vendor: Vendor, step_nm: int, position: int) -> Iterator[_Row]:
     yield _Row(0x6000, 0, "operating parameters", UNSIGNED16, 0, "rw")
-    if maker.magnets == 1:
+    if vendor.magnets == 1:
         yield _Row(POSITION, 0, "position", position, 0)
     else:
-        yield _Row(POSITION_OF_MAGNET, 0, "number of magnets", UNSIGNED8, maker.magnets)
-        for magnet in range(1, maker.magnets + 1):
+        yield _Row(POSITION_OF_MAGNET, 0, "number of magnets", UNSIGNED8, vendor.magnets)
+        for magnet in range(1, vendor.magnets + 1):
             yield _Row(POSITION_OF_MAGNET, magnet, f"position of magnet {magnet}", position, 0)
-    if maker.step_in_6005:
+    if vendor.step_in_6005:
         yield _Row(0x6005, 0, "number of step settings", UNSIGNED8, 2)
         yield _Row(0x6005, 1, "position step", UNSIGNED32, step_nm)
         yield _Row(0x6005, 2, "speed step", UNSIGNED32, 100)

@@ -1,4 +1,4 @@
-"""How makers differ: device type, where the step is kept, what the TPDOs do out of the box."""
+"""Differences between vendors: device type, entry of the measuring step, defaults of the TPDOs."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ class TpdoDefaults:
 
 @dataclass(frozen=True, slots=True)
 class Vendor:
-    """One make of encoder."""
+    """The encoders of one vendor."""
 
     device_type: int
     tpdos: tuple[TpdoDefaults, ...]

@@ -1,4 +1,4 @@
-"""What is at the far end of a simulated line."""
+"""The device on a simulated line."""
 
 from __future__ import annotations
 
@@ -23,25 +23,25 @@ class LineDevice(ABC):
 
     @abstractmethod
     def answer(self, command: bytes) -> bytes:
-        """What it sends back for ``command``, which comes without its carriage return."""
+        """The answer to ``command``, which has no carriage return."""
 
     def power_up(self) -> bytes:
-        """What it sends, unasked, when it is switched on."""
+        """What it sends when it is switched on."""
         return b""
 
 
 class SingleDevice(LineDevice):
-    """A device that is one indicator."""
+    """A device with one indicator."""
 
     @property
     def indicator(self) -> Indicator:
-        """The one it is."""
+        """Its indicator."""
         return self.indicators[1]
 
     def answer(self, command: bytes) -> bytes:
-        """What it sends back for ``command``; nothing while it is off."""
+        """The answer to ``command``; nothing while it is off."""
         return self.reply(command) if self.indicator.powered else b""
 
     @abstractmethod
     def reply(self, command: bytes) -> bytes:
-        """The same while it is on."""
+        """The answer while it is on."""

@@ -1,4 +1,4 @@
-"""What can be made to go wrong with a simulated gauge and its line."""
+"""Faults of a simulated gauge and its line."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ DATA_BITS = 7
 
 
 class InjectedGaugeFault(StrEnum):
-    """A fault, on the line, of the instrument, or of the plug."""
+    """A fault of the line, the instrument or the plug."""
 
     SILENT = "silent"
     LATE = "late"
@@ -31,7 +31,7 @@ class InjectedGaugeFault(StrEnum):
 
 
 def apply_fault(indicator: Indicator, fault: InjectedGaugeFault, *, on: bool) -> bool:
-    """Set an instrument's fault or take it away; false if ``fault`` is none of an instrument."""
+    """Set or clear a fault of an instrument; false if it is a fault of the line."""
     match fault:
         case InjectedGaugeFault.INCH:
             indicator.inch = on
@@ -55,13 +55,13 @@ def apply_fault(indicator: Indicator, fault: InjectedGaugeFault, *, on: bool) ->
 
 
 @dataclass(slots=True)
-class _Strike:
-    """How long a fault lasts: a number of answers, or for ever."""
+class _ActiveFault:
+    """An active fault: for a number of answers, or until cleared."""
 
     answers: int | None
     seconds: float
 
-    def strikes(self) -> bool:
+    def applies(self) -> bool:
         if self.answers is None:
             return True
         self.answers -= 1
@@ -69,30 +69,30 @@ class _Strike:
 
 
 class WireFaults:
-    """What happens to answers between the device and the line."""
+    """Faults that affect answers on the line."""
 
     def __init__(self, seed: int = 0) -> None:
         self._random = Random(seed)  # noqa: S311 - a simulation
-        self._active: dict[InjectedGaugeFault, _Strike] = {}
+        self._active: dict[InjectedGaugeFault, _ActiveFault] = {}
 
     def inject(self, fault: InjectedGaugeFault, *, answers: int | None, seconds: float) -> None:
-        """Let ``fault`` strike the next ``answers``, or all of them; ``seconds`` is how late."""
-        self._active[fault] = _Strike(answers, seconds)
+        """Activate ``fault`` for the next ``answers``, or all of them; ``seconds`` is the delay."""
+        self._active[fault] = _ActiveFault(answers, seconds)
 
     def clear(self, fault: InjectedGaugeFault) -> None:
-        """Let it strike no more."""
+        """Clear ``fault``."""
         self._active.pop(fault, None)
 
     def apply(self, answer: bytes) -> tuple[bytes, float]:
-        """What becomes of ``answer``: the bytes that leave, and how many seconds late."""
+        """The answer as changed by the active faults, and its delay, s."""
         delay = 0.0
-        for fault, strike in tuple(self._active.items()):
-            if not strike.strikes():
+        for fault, active in tuple(self._active.items()):
+            if not active.applies():
                 self.clear(fault)
             elif fault is InjectedGaugeFault.SILENT:
                 answer = b""
             elif fault is InjectedGaugeFault.LATE:
-                delay = strike.seconds
+                delay = active.seconds
             elif fault is InjectedGaugeFault.GARBLED_DIGIT:
                 answer = flip_digit(answer, self._random)
             else:

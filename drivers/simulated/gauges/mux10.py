@@ -20,7 +20,7 @@ def format_value(channel: int, value: float, *, inch: bool) -> bytes:
 
 
 class Mux10Device(LineDevice):
-    """Answers a channel's number with its indicator's value. ``busy`` is how often it is, first."""
+    """Answers a channel number with the value of its indicator; the first ``busy`` times with BUSY."""
 
     def __init__(self, indicators: Mapping[int, Indicator]) -> None:
         super().__init__(indicators)

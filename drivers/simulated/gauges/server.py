@@ -1,4 +1,4 @@
-"""A thread that serves one simulated line at the pace of a real one."""
+"""The server of one simulated gauge line, with the timing of a real one."""
 
 from __future__ import annotations
 
@@ -23,16 +23,16 @@ from hexacell.clock import CellClock
 
 COMMAND_END = b"\r"
 COMMAND_LIMIT = 256
-LONGEST_WAIT_S = 5.0
+JOB_TIMEOUT_S = 5.0
 
 _log = logging.getLogger(__name__)
 
 
 class GaugeLineServer(Closeable):
-    """A device on a transport, answered for by a thread of its own until it is closed.
+    """Serves a device on a transport, from a thread of its own, until it is closed.
 
-    An answer leaves ``latency_s`` and the time that question and answer take on the wire after the
-    question came, in seconds of the cell's clock. One answer follows the other, as on a cable.
+    An answer is sent after ``latency_s`` plus the transmission time of request and answer, in seconds
+    of the cell's clock. Answers are sent one after another, as on a cable.
     """
 
     def __init__(
@@ -52,10 +52,10 @@ class GaugeLineServer(Closeable):
         self._latency_s = latency_s
         self._byte_s = device.bits_a_byte / (baudrate or device.baudrate)
         self._faults = WireFaults(seed)
-        self._heard = b""
+        self._received = b""
         self._answers: deque[tuple[float, bytes]] = deque()
         self._jobs: queue.SimpleQueue[tuple[Callable[[], None], Future[None]]] = queue.SimpleQueue()
-        self._woken, self._waker = os.pipe()
+        self._wake_read, self._wake_write = os.pipe()
         self._stopping = False
         self._thread = threading.Thread(target=self._serve, name=f"gauges on {self.url}")
         self._thread.start()
@@ -68,60 +68,60 @@ class GaugeLineServer(Closeable):
         answers: int | None = None,
         seconds: float = 1.0,
     ) -> None:
-        """Let ``fault`` happen now.
+        """Inject ``fault`` now.
 
         Args:
-            fault: What goes wrong.
-            channel: Whose instrument, where the fault is one of an instrument; the first by default.
-            answers: How many answers a fault of the line strikes; None for all until it is cleared.
-            seconds: How late a late answer is, in the cell's time.
+            fault: The fault.
+            channel: The channel of the instrument for its faults; the first one by default.
+            answers: How many answers a fault of the line affects; None for all until cleared.
+            seconds: Delay of late answers, in the cell's time.
         """
-        self._do(lambda: self._begin(fault, channel, answers, seconds))
+        self._run_on_thread(lambda: self._inject(fault, channel, answers, seconds))
 
     def clear(self, fault: InjectedGaugeFault, *, channel: int | None = None) -> None:
-        """Undo :meth:`inject`: a plug is plugged in, an instrument is switched on again."""
-        self._do(lambda: self._end(fault, channel))
+        """Clear a fault: plug the line in, or switch the instrument on again."""
+        self._run_on_thread(lambda: self._clear(fault, channel))
 
     def send_unsolicited(self, data: bytes) -> None:
-        """Put ``data`` on the line now, as a data button or a foot switch does."""
-        self._do(lambda: self._transport.send(data))
+        """Send ``data`` now without a request, as a data button or a foot switch does."""
+        self._run_on_thread(lambda: self._transport.send(data))
 
     def close(self) -> None:
-        """End the thread and take the line away; twice is harmless."""
+        """End the thread and close the line; closing twice is harmless."""
         if self._stopping:
             return
         self._stopping = True
-        os.write(self._waker, b"x")
+        os.write(self._wake_write, b"x")
         self._thread.join()
         self._transport.close()
-        os.close(self._woken)
-        os.close(self._waker)
+        os.close(self._wake_read)
+        os.close(self._wake_write)
 
-    def _do(self, job: Callable[[], None]) -> None:
-        """Have the thread do it, so that nothing is touched by two at once."""
+    def _run_on_thread(self, job: Callable[[], None]) -> None:
+        """Run a job on the thread of the line, which avoids concurrent access."""
         if self._stopping:
             raise RuntimeError(f"{self.url} is closed")
         done: Future[None] = Future()
         self._jobs.put((job, done))
-        os.write(self._waker, b"x")
-        done.result(LONGEST_WAIT_S)
+        os.write(self._wake_write, b"x")
+        done.result(JOB_TIMEOUT_S)
 
     def _serve(self) -> None:
         try:
             self._serve_until_stopped()
-        except Exception:  # what is simulated behind the plunger may fail: as loud as a broken cable
-            _log.exception("the simulated gauges on %s have died", self.url)
+        except Exception:  # an error of the simulated physics appears as a broken line
+            _log.exception("the simulated gauges on %s have failed", self.url)
             self._unplug()
 
     def _serve_until_stopped(self) -> None:
         while not self._stopping:
-            watched = [self._woken, *self._transport.descriptors()]
+            watched = [self._wake_read, *self._transport.descriptors()]
             ready, _, _ = select.select(watched, [], [], self._until_next_answer_s())
-            if self._woken in ready:
-                os.read(self._woken, COMMAND_LIMIT)
+            if self._wake_read in ready:
+                os.read(self._wake_read, COMMAND_LIMIT)
                 self._do_jobs()
             else:
-                self._hear(self._transport.receive(ready))
+                self._receive(self._transport.receive(ready))
             self._send_due()
 
     def _do_jobs(self) -> None:
@@ -134,9 +134,9 @@ class GaugeLineServer(Closeable):
             else:
                 done.set_result(None)
 
-    def _hear(self, data: bytes) -> None:
-        *commands, self._heard = (self._heard + data).split(COMMAND_END)
-        self._heard = self._heard[-COMMAND_LIMIT:]
+    def _receive(self, data: bytes) -> None:
+        *commands, self._received = (self._received + data).split(COMMAND_END)
+        self._received = self._received[-COMMAND_LIMIT:]
         for command in commands:
             self._answer(command.strip(b"\n"))
 
@@ -155,7 +155,7 @@ class GaugeLineServer(Closeable):
         while self._answers and self._answers[0][0] <= self._clock.now():
             self._transport.send(self._answers.popleft()[1])
 
-    def _begin(
+    def _inject(
         self, fault: InjectedGaugeFault, channel: int | None, answers: int | None, seconds: float
     ) -> None:
         if fault is InjectedGaugeFault.UNPLUGGED:
@@ -163,7 +163,7 @@ class GaugeLineServer(Closeable):
         elif not apply_fault(self._indicator(channel), fault, on=True):
             self._faults.inject(fault, answers=answers, seconds=seconds)
 
-    def _end(self, fault: InjectedGaugeFault, channel: int | None) -> None:
+    def _clear(self, fault: InjectedGaugeFault, channel: int | None) -> None:
         if fault is InjectedGaugeFault.UNPLUGGED:
             self._transport.plug_in()
         elif not apply_fault(self._indicator(channel), fault, on=False):
@@ -172,7 +172,7 @@ class GaugeLineServer(Closeable):
             self._transport.send(self.device.power_up())
 
     def _unplug(self) -> None:
-        self._heard = b""
+        self._received = b""
         self._answers.clear()
         self._transport.unplug()
 
@@ -190,9 +190,9 @@ def serve_gauges(
     baudrate: int | None = None,
     seed: int = 0,
 ) -> GaugeLineServer:
-    """Serve ``device`` from now on; ``url`` says where, ``close`` ends it.
+    """Serve ``device`` at ``url`` until it is closed.
 
-    ``name`` is what a pseudo-terminal is called in its folder.
+    ``name`` is the name of a pseudo-terminal in its folder.
     """
     line = PtyTransport(name) if transport == "pty" else SocketTransport()
     return GaugeLineServer(device, line, clock, latency_s=latency_s, baudrate=baudrate, seed=seed)

@@ -1,7 +1,7 @@
-"""One client of a simulated controller: its lines in, the answers out, byte for byte.
+"""One client of the simulated controller: lines in, responses out, byte for byte.
 
-Answers to ``get`` end with CR LF, answers to ``set`` with LF CR, a refused ``get`` with two CR LF;
-what is received is echoed as it came once the client is greeted. (Traces of LinuxCNC 2.9.)
+Responses to ``get`` end with CR LF, responses to ``set`` with LF CR, a refused ``get`` with two CR LF;
+after the greeting, input is echoed unchanged. (Traces of LinuxCNC 2.9.)
 """
 
 from __future__ import annotations
@@ -30,28 +30,28 @@ class Client:
         access: ServerSettings,
         write: Callable[[bytes], None],
     ) -> None:
-        self._context = ClientSession(control, access)
+        self._session = ClientSession(control, access)
         self._faults = faults
         self._write = write
         self._rest = b""
 
     def receive(self, data: bytes) -> None:
-        """Take what came, and answer the lines that it completes.
+        """Process received bytes and respond to every completed line.
 
         Raises:
-            ConnectionCut: The client said ``quit``, overran the buffer, or met with a fault.
+            ConnectionCut: The client sent ``quit`` or a line that is too long, or a fault cuts it off.
         """
         if self._faults.triggers(ControllerFault.SILENT):
             return
-        if self._context.echo and self._context.greeted:
+        if self._session.echo and self._session.greeted:
             self._write(data)
         *lines, self._rest = _LINE_ENDS.split(self._rest + data)
         for line in lines:
             if len(line) > MAX_LINE_BYTES:
                 raise ConnectionCut
-            self._obey(line.decode("utf-8", "replace"))
+            self._execute(line.decode("utf-8", "replace"))
 
-    def _obey(self, line: str) -> None:
+    def _execute(self, line: str) -> None:
         verb, what, argument = (*line.split(maxsplit=2), "", "", "")[:3]
         match verb.upper():
             case "HELLO":
@@ -65,10 +65,10 @@ class Client:
 
     def _hello(self, password: str, name_and_version: str) -> None:
         refused = self._faults.triggers(ControllerFault.REFUSES_PASSWORD)
-        known = password == self._context.access.connect_password and len(name_and_version.split()) >= 2
+        known = password == self._session.settings.connect_password and len(name_and_version.split()) >= 2
         if known and not refused:
-            self._context.greeted = True
-            self._write(f"HELLO ACK {self._context.access.server}\r\n".encode())
+            self._session.greeted = True
+            self._write(f"HELLO ACK {self._session.settings.server}\r\n".encode())
         else:
             self._write(b"HELLO NAK\r\n")
 
@@ -76,24 +76,24 @@ class Client:
         if not what:
             self._write(b"GET NAK\r\n")
         elif what in GET_COMMANDS:
-            self._write(f"{what} {GET_COMMANDS[what](self._context)}\r\n".encode())
+            self._write(f"{what} {GET_COMMANDS[what](self._session)}\r\n".encode())
         else:
             self._write(f"GET {what} NAK\r\n\r\n".encode())
 
     def _set(self, what: str, argument: str) -> None:
-        if not self._context.greeted:
+        if not self._session.greeted:
             self._write(b"SET NAK\r\n")
         elif not what:
             self._write(b"SET NAK\n\r")
-        elif not (self._may(what) and SET_COMMANDS[what].execute(self._context, argument)):
+        elif not (self._is_permitted(what) and SET_COMMANDS[what].execute(self._session, argument)):
             self._write(f"SET {what} NAK\n\r".encode())
-        elif self._context.verbose:
+        elif self._session.verbose:
             self._write(f"SET {what} ACK\n\r".encode())
 
-    def _may(self, what: str) -> bool:
+    def _is_permitted(self, what: str) -> bool:
         if what not in SET_COMMANDS:
             return False
-        level = SET_COMMANDS[what].permission
-        return (level < Permission.COMMANDER or self._context.has_control) and (
-            level < Permission.ON or self._context.control.enabled
+        permission = SET_COMMANDS[what].permission
+        return (permission < Permission.COMMANDER or self._session.has_control) and (
+            permission < Permission.ON or self._session.state.enabled
         )

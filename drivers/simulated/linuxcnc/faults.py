@@ -1,4 +1,4 @@
-"""What a simulated controller can be told to do wrong."""
+"""Faults of the simulated controller."""
 
 from __future__ import annotations
 
@@ -8,43 +8,43 @@ from enum import Enum, auto
 
 
 class ControllerFault(Enum):
-    """Something that goes wrong, and the occasion on which it does."""
+    """A fault, and the occasion that triggers it."""
 
     SILENT = auto()
-    """A line is taken and not answered."""
+    """A line gets no response."""
     REFUSES_PASSWORD = auto()
-    """A greeting is answered with NAK."""
+    """A greeting gets NAK."""
     REFUSES_MOVE = auto()
-    """A move is answered with NAK, and the error says why."""
+    """A move gets NAK, with an error message."""
     DOES_NOT_MOVE = auto()
-    """A move is acknowledged and does not take place."""
+    """A move is acknowledged but not executed."""
     DROPS_CONNECTION = auto()
-    """In the middle of a move the connection that ordered it is cut; the machine goes on."""
+    """During a move its connection is cut; the machine continues."""
     EMERGENCY_STOP = auto()
-    """In the middle of a move somebody presses the emergency stop."""
+    """The emergency stop is pressed during a move."""
     FOLLOWING_ERROR = auto()
-    """In the middle of a move a slider lags behind: the machine is switched off."""
+    """A slider exceeds its following error during a move: the machine is switched off."""
 
 
 class ControllerFaults:
-    """The faults in force, each for so many occasions; safe to change while the server runs."""
+    """The active faults, each for a number of occasions. Thread-safe."""
 
     def __init__(self) -> None:
         self._left: dict[ControllerFault, float] = {}
         self._lock = threading.Lock()
 
     def inject(self, fault: ControllerFault, times: float = math.inf) -> None:
-        """Let ``fault`` strike on the next ``times`` occasions."""
+        """Activate ``fault`` for the next ``times`` occasions."""
         with self._lock:
             self._left[fault] = times
 
     def clear(self, fault: ControllerFault) -> None:
-        """End ``fault``."""
+        """Deactivate ``fault``."""
         with self._lock:
             self._left.pop(fault, None)
 
     def triggers(self, fault: ControllerFault) -> bool:
-        """Whether ``fault`` strikes on the occasion that this is."""
+        """Whether ``fault`` is active on this occasion, which is counted."""
         with self._lock:
             left = self._left.get(fault, 0)
             self._left[fault] = left - 1

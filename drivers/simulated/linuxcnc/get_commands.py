@@ -1,4 +1,4 @@
-"""What anybody may ``get``, greeted or not, and the words that answer it."""
+"""The ``get`` commands, permitted to every client, and their responses."""
 
 from __future__ import annotations
 
@@ -22,22 +22,22 @@ def _numbers(values: Iterable[float]) -> str:
 
 
 GET_COMMANDS: dict[str, Callable[[ClientSession], str]] = {
-    "ECHO": lambda context: _on_off(on=context.echo),
-    "VERBOSE": lambda context: _on_off(on=context.verbose),
-    "ENABLE": lambda context: _on_off(on=context.has_control),
-    "SET_WAIT": lambda context: context.control.wait_mode.value,
-    "ESTOP": lambda context: _on_off(on=context.control.estop),
-    "MACHINE": lambda context: _on_off(on=context.control.enabled),
-    "MODE": lambda context: context.control.mode.value,
-    "ERROR": lambda context: context.control.next_error(),
-    "TELEOP_ENABLE": lambda context: _yes_no(yes=context.control.teleop),
-    "JOINT_HOMED": lambda context: " ".join([_yes_no(yes=context.control.homed)] * 6),
-    "JOINT_POS": lambda context: _numbers(context.control.machine.joints()),
-    "ABS_ACT_POS": lambda context: _numbers(context.control.machine.pose().as_tuple()),
-    "POS_OFFSET": lambda _context: _numbers([0.0] * 6),
-    "PROGRAM_CODES": lambda _context: _MODAL_CODES,
-    "PROGRAM_UNITS": lambda _context: "MM",
-    "USER_LINEAR_UNITS": lambda _context: "MM",
-    "INIFILE": lambda context: context.access.config,
-    "PLAT": lambda _context: "Linux",
+    "ECHO": lambda session: _on_off(on=session.echo),
+    "VERBOSE": lambda session: _on_off(on=session.verbose),
+    "ENABLE": lambda session: _on_off(on=session.has_control),
+    "SET_WAIT": lambda session: session.state.wait_mode.value,
+    "ESTOP": lambda session: _on_off(on=session.state.estop),
+    "MACHINE": lambda session: _on_off(on=session.state.enabled),
+    "MODE": lambda session: session.state.mode.value,
+    "ERROR": lambda session: session.state.next_error(),
+    "TELEOP_ENABLE": lambda session: _yes_no(yes=session.state.teleop),
+    "JOINT_HOMED": lambda session: " ".join([_yes_no(yes=session.state.homed)] * 6),
+    "JOINT_POS": lambda session: _numbers(session.state.machine.joints()),
+    "ABS_ACT_POS": lambda session: _numbers(session.state.machine.pose().as_tuple()),
+    "POS_OFFSET": lambda _session: _numbers([0.0] * 6),
+    "PROGRAM_CODES": lambda _session: _MODAL_CODES,
+    "PROGRAM_UNITS": lambda _session: "MM",
+    "USER_LINEAR_UNITS": lambda _session: "MM",
+    "INIFILE": lambda session: session.settings.config,
+    "PLAT": lambda _session: "Linux",
 }

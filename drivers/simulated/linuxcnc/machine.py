@@ -1,4 +1,4 @@
-"""What a simulated controller drives."""
+"""The machine interface of the simulated controller."""
 
 from __future__ import annotations
 
@@ -8,17 +8,17 @@ from hexacell.kinematics.pose import Pose
 
 
 class KinematicsFailure(Exception):
-    """The geometry that the controller has cannot take the machine there."""
+    """The target is out of reach of the controller's geometry."""
 
 
 class Machine(Protocol):
-    """The machine behind the controller, called from several threads at once.
+    """The machine behind the controller, called from several threads.
 
     While ``move`` or ``home`` blocks in one thread, any other method may be called from another.
     """
 
     def move(self, pose: Pose) -> None:
-        """Go to ``pose``; returns when the motion has ended or was stopped.
+        """Move to ``pose``; returns when the motion has ended or was stopped.
 
         Raises:
             KinematicsFailure: The geometry cannot reach it; nothing moves.
@@ -30,15 +30,15 @@ class Machine(Protocol):
         ...
 
     def pose(self) -> Pose:
-        """Where the controller believes the platform to be, from the joints and its geometry."""
+        """The pose by the joint positions and the controller's geometry."""
         ...
 
     def joints(self) -> tuple[float, ...]:
-        """The six joints as they are, mm."""
+        """The six joint positions, mm."""
         ...
 
     def switch_on(self) -> None:
-        """Enable the drives; the geometry is read from the config file here, and only here.
+        """Enable the drives; the geometry is read from the config file here only.
 
         Raises:
             HexacellError: The config cannot be used; the machine stays off.
@@ -50,5 +50,5 @@ class Machine(Protocol):
         ...
 
     def home(self) -> None:
-        """Find the joints' references; returns when that has ended or was stopped."""
+        """Home the joints; returns when that has ended or was stopped."""
         ...

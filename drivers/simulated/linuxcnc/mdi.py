@@ -1,4 +1,4 @@
-"""One MDI block: the rapid moves that a robot controller needs, and LinuxCNC's words for the rest."""
+"""Parsing of one MDI block: rapid moves, and LinuxCNC's error messages for anything else."""
 
 from __future__ import annotations
 
@@ -10,20 +10,20 @@ _WORD = re.compile(r"([A-Za-z])([+-]?(?:\d+\.?\d*|\.\d+))")
 _AXES = "XYZABC"
 _MOVES = (0.0, 1.0)
 _MODES = (17.0, 21.0, 49.0, 54.0, 64.0, 90.0, 94.0)
-"""G codes that change nothing, because they are what this controller always does."""
+"""G codes of the modes that are always active here."""
 
 
 class BlockError(Exception):
-    """A block that the interpreter does not take, in LinuxCNC's words."""
+    """A block that the interpreter refuses, with LinuxCNC's message."""
 
 
 def parse_block(block: str, current: Pose) -> Pose | None:
-    """Where ``block`` leads from ``current``; words that are missing keep their values.
+    """The target of ``block`` from ``current``; missing words keep their values.
 
-    Returns nothing for a block without motion.
+    None for a block without motion.
 
     Raises:
-        BlockError: It says something else.
+        BlockError: It is no rapid move.
     """
     words = _words(block)
     coordinates = dict(zip(_AXES, current.as_tuple(), strict=True))

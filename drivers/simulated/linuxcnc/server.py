@@ -21,12 +21,12 @@ _POLL_S = 0.05
 
 
 class SimulatedController(Closeable):
-    """Answers clients until it is closed, each in a thread of its own, as the real one does.
+    """Serves clients until it is closed, each in a thread of its own, as the real one does.
 
     Attributes:
         port: where it listens, on 127.0.0.1.
-        faults: what goes wrong; may be changed at any time.
-        control: the state that its clients see.
+        faults: the active faults; may be changed at any time.
+        state: the state that its clients share.
     """
 
     def __init__(
@@ -53,12 +53,12 @@ class SimulatedController(Closeable):
         self._thread.start()
 
     def unplug(self) -> None:
-        """Cut every connection and take no other; the machine goes on with what it was told."""
+        """Cut every connection and accept no other; the machine continues."""
         self._server.unplugged = True
         self._server.cut_all()
 
     def plug_in(self) -> None:
-        """Take connections again."""
+        """Accept connections again."""
         self._server.unplugged = False
 
     def close(self) -> None:
@@ -100,7 +100,7 @@ class _Server(socketserver.ThreadingTCPServer):
         super().shutdown_request(request)
 
     def cut_all(self) -> None:
-        """Wake every handler from its wait for input."""
+        """Cut all connections, which ends the wait of every handler."""
         for connection in tuple(self._connections):
             with suppress(OSError):
                 connection.shutdown(socket.SHUT_RDWR)

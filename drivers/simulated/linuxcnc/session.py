@@ -1,4 +1,4 @@
-"""What a simulated controller keeps about one of its clients."""
+"""The state of one client of the simulated controller."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from drivers.simulated.linuxcnc.state import ControllerState
 
 @dataclass(frozen=True, slots=True)
 class ServerSettings:
-    """The passwords, and what a client is told about the server."""
+    """The passwords, and the server's identification."""
 
     connect_password: str
     enable_password: str
@@ -19,15 +19,15 @@ class ServerSettings:
 
 @dataclass(slots=True, eq=False)
 class ClientSession:
-    """One connection's own settings, beside the control that all share."""
+    """The settings of one connection, and the state that all of them share."""
 
-    control: ControllerState
-    access: ServerSettings
+    state: ControllerState
+    settings: ServerSettings
     greeted: bool = False
     echo: bool = True
     verbose: bool = False
 
     @property
     def has_control(self) -> bool:
-        """Whether this is the one client that may give orders."""
-        return self.control.commander is self
+        """Whether this client has control."""
+        return self.state.commander is self

@@ -1,4 +1,4 @@
-"""What a client may ``set``, and what it takes to be allowed to."""
+"""The ``set`` commands, and the permission that each requires."""
 
 from __future__ import annotations
 
@@ -14,82 +14,82 @@ SettingT = TypeVar("SettingT", TaskMode, WaitMode)
 
 
 class Permission(IntEnum):
-    """Who is allowed to."""
+    """Which client may send a command."""
 
     ANYBODY = 0
     COMMANDER = 1
     ON = 2
-    """The commander, while the machine is on."""
+    """The client in control, while the machine is on."""
 
 
 @dataclass(frozen=True, slots=True)
 class SetCommand:
-    """A word after ``set``: who may say it, and what it does; false becomes NAK."""
+    """A command after ``set``: its permission and its effect; false becomes NAK."""
 
     permission: Permission
     execute: Callable[[ClientSession, str], bool]
 
 
-def _echo(context: ClientSession, argument: str) -> bool:
+def _echo(session: ClientSession, argument: str) -> bool:
     if (on := _on_or_off(argument)) is not None:
-        context.echo = on
+        session.echo = on
     return on is not None
 
 
-def _verbose(context: ClientSession, argument: str) -> bool:
+def _verbose(session: ClientSession, argument: str) -> bool:
     if (on := _on_or_off(argument)) is not None:
-        context.verbose = on
+        session.verbose = on
     return on is not None
 
 
-def _enable(context: ClientSession, argument: str) -> bool:
-    if argument == context.access.enable_password:
-        context.control.commander = context
+def _enable(session: ClientSession, argument: str) -> bool:
+    if argument == session.settings.enable_password:
+        session.state.commander = session
         return True
     if argument.upper() == "OFF":
-        context.control.commander = None
+        session.state.commander = None
         return True
     return False
 
 
-def _set_wait(context: ClientSession, argument: str) -> bool:
+def _set_wait(session: ClientSession, argument: str) -> bool:
     if (choice := _one_of(WaitMode, argument)) is None:
         return False
-    context.control.wait_mode = choice
+    session.state.wait_mode = choice
     return True
 
 
-def _estop(context: ClientSession, argument: str) -> bool:
+def _estop(session: ClientSession, argument: str) -> bool:
     on = _on_or_off(argument)
-    return on is not None and context.control.set_estop(on=on)
+    return on is not None and session.state.set_estop(on=on)
 
 
-def _machine(context: ClientSession, argument: str) -> bool:
+def _machine(session: ClientSession, argument: str) -> bool:
     on = _on_or_off(argument)
-    return on is not None and context.control.set_machine(on=on)
+    return on is not None and session.state.set_machine(on=on)
 
 
-def _mode(context: ClientSession, argument: str) -> bool:
+def _mode(session: ClientSession, argument: str) -> bool:
     mode = _one_of(TaskMode, argument)
-    return mode is not None and context.control.set_mode(mode)
+    return mode is not None and session.state.set_mode(mode)
 
 
-def _teleop_enable(context: ClientSession, argument: str) -> bool:
+def _teleop_enable(session: ClientSession, argument: str) -> bool:
     if (on := _on_or_off(argument)) is not None:
-        context.control.teleop = on
+        session.state.teleop = on
     return on is not None
 
 
-def _home(context: ClientSession, argument: str) -> bool:
-    return argument == "-1" and context.control.home()
+def _home(session: ClientSession, argument: str) -> bool:
+    return argument == "-1" and session.state.home()
 
 
-def _mdi(context: ClientSession, argument: str) -> bool:
-    return context.control.mdi(argument)
+def _mdi(session: ClientSession, argument: str) -> bool:
+    return session.state.mdi(argument)
 
 
-def _abort(context: ClientSession, _argument: str) -> bool:
-    return context.control.abort()
+def _abort(session: ClientSession, _argument: str) -> bool:
+    return session.state.abort()
 
 
 def _on_or_off(argument: str) -> bool | None:

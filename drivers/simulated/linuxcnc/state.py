@@ -1,7 +1,7 @@
-"""The state that all clients of a simulated controller share, and what their orders do to it.
+"""The state of the simulated controller, shared by all clients, and the effects of commands on it.
 
-Names and texts are LinuxCNC's: task state, mode, teleoperation, and a queue of operator errors.
-Orders return whether they succeeded; that becomes ACK or NAK.
+Names and messages are LinuxCNC's: task state, mode, teleoperation, and a queue of operator errors.
+Commands return whether they succeeded, which becomes ACK or NAK.
 """
 
 from __future__ import annotations
@@ -18,13 +18,13 @@ from drivers.simulated.linuxcnc.mdi import BlockError, parse_block
 from hexacell.errors import HexacellError
 from hexacell.kinematics.pose import Pose
 
-MID_MOVE_S = 0.02
-"""When faults in the middle of a move strike, s after it began."""
+FAULT_DELAY_S = 0.02
+"""When faults during a move are triggered, s after its start."""
 
 FAULTY_JOINT = 3
-"""The joint whose following errors are simulated, as LinuxCNC counts them: from 0."""
+"""The joint with simulated following errors, counted from 0 as in LinuxCNC."""
 
-_AGAIN_S = 0.05
+_RETRY_S = 0.05
 
 
 class TaskMode(Enum):
@@ -36,18 +36,18 @@ class TaskMode(Enum):
 
 
 class WaitMode(Enum):
-    """When an order is answered."""
+    """When a command is acknowledged."""
 
     RECEIVED = "RECEIVED"
     DONE = "DONE"
 
 
 class ConnectionCut(Exception):
-    """The connection over which something was ordered is to be cut."""
+    """The connection of the command must be cut."""
 
 
 class ControllerState:
-    """One machine's controller; one thread of its own carries out motions, one after another."""
+    """The controller of one machine; a thread of its own executes motions one after another."""
 
     def __init__(self, machine: Machine, faults: ControllerFaults) -> None:
         self.estop = True
@@ -61,22 +61,22 @@ class ControllerState:
         self._faults = faults
         self._errors: deque[str] = deque()
         self._jobs: list[Future[bool]] = []
-        self._stops = 0
+        self._abort_count = 0
         self._closed = False
         self._lock = threading.RLock()
         self._motion = ThreadPoolExecutor(1, thread_name_prefix="simulated motion")
 
     def close(self) -> None:
-        """Stop everything; returns when the motion thread has ended."""
+        """Stop the machine and end the motion thread."""
         with self._lock:
             self._closed = True
         self.abort()
-        while wait(self._jobs, timeout=_AGAIN_S).not_done:  # one may only just have begun
+        while wait(self._jobs, timeout=_RETRY_S).not_done:  # a motion may have started just now
             self.abort()
         self._motion.shutdown()
 
     def next_error(self) -> str:
-        """The oldest operator error, which is gone then; OK if there is none."""
+        """Remove and return the oldest operator error; OK if there is none."""
         return self._errors.popleft() if self._errors else "OK"
 
     def set_estop(self, *, on: bool) -> bool:
@@ -88,13 +88,13 @@ class ControllerState:
         return True
 
     def exceed_following_error(self, joint: int = FAULTY_JOINT) -> None:
-        """A joint's following error exceeds its limit: the drives are switched off, and it says why."""
+        """A joint exceeds its following error: the machine is switched off, with an error message."""
         with self._lock:
             self._errors.append(following_error_message(joint))
             self._switch_off()
 
     def set_machine(self, *, on: bool) -> bool:
-        """Switch on or off; in emergency stop it is acknowledged and stays off."""
+        """Switch on or off; in emergency stop this is acknowledged without effect."""
         with self._lock:
             if not on:
                 self._switch_off()
@@ -103,7 +103,7 @@ class ControllerState:
         return True
 
     def set_mode(self, mode: TaskMode) -> bool:
-        """Change mode; MDI before homing is acknowledged and refused."""
+        """Change mode; MDI before homing is acknowledged without effect."""
         if mode is not TaskMode.MANUAL and not self.homed:
             self._errors.append("all joints must be homed before going into coordinated mode")
             return True
@@ -112,7 +112,7 @@ class ControllerState:
         return True
 
     def home(self) -> bool:
-        """Begin to home; acknowledged at once, and without effect outside joint mode."""
+        """Start homing; acknowledged at once, without effect outside joint mode."""
         if self.mode is not TaskMode.MANUAL:
             self._errors.append("can't do that (EMC_JOINT_HOME:123) in MDI mode")
         elif self.teleop:
@@ -122,9 +122,9 @@ class ControllerState:
         return True
 
     def abort(self) -> bool:
-        """Stop motion in place; blocks that wait are dropped."""
+        """Stop the motion in place; waiting blocks are dropped."""
         with self._lock:
-            self._stops += 1
+            self._abort_count += 1
             for job in self._jobs:
                 job.cancel()
             self.machine.stop()
@@ -134,11 +134,11 @@ class ControllerState:
         """Carry out one block; blocks until it has ended if ``answers`` says so.
 
         Raises:
-            ConnectionCut: A fault demands it, or the controller is being closed.
+            ConnectionCut: A fault requires it, or the controller is being closed.
         """
         try:
             target = parse_block(block, self.machine.pose())
-            self._expect_mdi()
+            self._require_mdi()
         except BlockError as error:
             return self._failed(str(error))
         if self._faults.triggers(ControllerFault.REFUSES_MOVE):
@@ -146,10 +146,10 @@ class ControllerState:
         if target is None or self._faults.triggers(ControllerFault.DOES_NOT_MOVE):
             return True
         job = self._start(lambda: self._travel(target))
-        self._strike_in_mid_move(job)
+        self._trigger_faults_during_move(job)
         return self.wait_mode is WaitMode.RECEIVED or _outcome(job)
 
-    def _expect_mdi(self) -> None:
+    def _require_mdi(self) -> None:
         if not self.homed:
             raise BlockError("Can't issue MDI command when not homed")
         if self.mode is not TaskMode.MDI:
@@ -159,12 +159,12 @@ class ControllerState:
         self._errors.extend(errors)
         return self.wait_mode is WaitMode.RECEIVED
 
-    def _strike_in_mid_move(self, job: Future[bool]) -> None:
+    def _trigger_faults_during_move(self, job: Future[bool]) -> None:
         drops = self._faults.triggers(ControllerFault.DROPS_CONNECTION)
         stops = self._faults.triggers(ControllerFault.EMERGENCY_STOP)
         lags = self._faults.triggers(ControllerFault.FOLLOWING_ERROR)
         if drops or stops or lags:
-            wait([job], timeout=MID_MOVE_S)
+            wait([job], timeout=FAULT_DELAY_S)
         if stops:
             self.set_estop(on=True)
         if lags:
@@ -193,9 +193,9 @@ class ControllerState:
         return True
 
     def _home(self) -> bool:
-        stops = self._stops
+        stops = self._abort_count
         self.machine.home()
-        self.homed = self._stops == stops
+        self.homed = self._abort_count == stops
         return self.homed
 
     def _switch_on(self) -> None:
@@ -214,12 +214,12 @@ class ControllerState:
 
 
 def following_error_message(joint: int) -> str:
-    """What LinuxCNC says when it switches the machine off for one."""
+    """LinuxCNC's message for a following error."""
     return f"joint {joint} following error"
 
 
 def _outcome(job: Future[bool]) -> bool:
-    """How a motion ended; one that was aborted counts as done, as in LinuxCNC."""
+    """Whether a motion succeeded; an aborted one did, as in LinuxCNC."""
     try:
         return job.result()
     except CancelledError:

@@ -125,7 +125,7 @@ async def test_a_stop_while_it_moves_is_said(bundled_cell) -> None:
             moving = asyncio.create_task(controller.move(Pose(0.0, -100.0, 550.0)))
             await under_way(cell)
             await controller.stop()
-            with pytest.raises(MotionInterrupted, match="told to"):
+            with pytest.raises(MotionInterrupted, match="stopped on request"):
                 await moving
 
 

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from drivers.controllers.linuxcnc.protocol import (
     LineBuffer,
     Response,
-    encode,
+    encode_command,
     parse_explanation,
     parse_homed,
     parse_pose,
@@ -50,7 +50,7 @@ def test_bytes_that_are_no_text_do_not_raise():
 @given(st.text())
 def test_an_encoded_command_fits_the_server_and_is_one_line(command):
     try:
-        line = encode(command)
+        line = encode_command(command)
     except ValueError:
         assert len(command.encode()) > 253 or "\r" in command or "\n" in command
     else:
@@ -60,9 +60,9 @@ def test_an_encoded_command_fits_the_server_and_is_one_line(command):
 
 
 def test_the_longest_command():
-    assert len(encode("x" * 253)) == 255
+    assert len(encode_command("x" * 253)) == 255
     with pytest.raises(ValueError, match="256 bytes is longer than the 255"):
-        encode("x" * 254)
+        encode_command("x" * 254)
 
 
 def test_a_rapid_move_word_for_word():
@@ -77,7 +77,7 @@ def test_a_rapid_move_says_the_pose_to_a_millionth_and_fits_a_line(pose):
     letters, values = zip(*((word[0], float(word[1:])) for word in rapid_move(pose).split()), strict=True)
     assert "".join(letters) == "GXYZABC"
     assert values[1:] == pytest.approx(pose.as_tuple(), abs=1e-7)
-    encode(f"set mdi {rapid_move(pose)}")
+    encode_command(f"set mdi {rapid_move(pose)}")
 
 
 @pytest.mark.parametrize("value", [float("nan"), float("inf"), float("-inf")])

@@ -99,7 +99,7 @@ async def test_a_missing_node(make_bank, reach, driver):
 
 async def test_a_duplicated_node(make_bank, reach, driver):
     simulated = make_bank()
-    simulated.faults.duplicate(4)
+    simulated.faults.add_duplicate(4)
     with pytest.raises(DuplicatedNodeError, match=r"leg 4 \(node 4\)"):
         await driver(reach(simulated)).open()
 
@@ -108,7 +108,7 @@ async def test_a_node_duplicated_in_the_middle_of_a_run(make_bank, driver):
     simulated = make_bank()
     bank = driver(simulated.bus_settings)
     await bank.open()
-    simulated.faults.duplicate(2)
+    simulated.faults.add_duplicate(2)
     await asyncio.sleep(SETTLE_S)
     with pytest.raises(RestartedNodeError, match="leg 2"):
         await bank.read()
@@ -230,7 +230,7 @@ async def test_positions_that_fail_are_as_loud_as_a_broken_cable(make_bank, driv
     positions.pop()
     with pytest.raises(SilentNodeError, match=r"leg 1 .*leg 6 "):
         await bank.read()
-    assert "the simulated encoders have died" in caplog.text
+    assert "the simulated encoders have failed" in caplog.text
 
 
 @pytest.mark.parametrize("transport", ["pty", "socket"])

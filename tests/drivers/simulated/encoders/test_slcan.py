@@ -11,7 +11,7 @@ from can.interfaces.slcan import slcanBus
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.simulated.slcan import SlcanAdapter, decode, encode, serve_slcan
+from drivers.simulated.slcan import SlcanAdapter, decode_frame, encode_frame, serve_slcan
 
 
 @st.composite
@@ -29,9 +29,9 @@ def messages(draw) -> can.Message:
 
 @given(messages())
 def test_decode_undoes_encode(message):
-    text = encode(message)
+    text = encode_frame(message)
     assert text.endswith(b"\r")
-    found = decode(text[:-1].decode())
+    found = decode_frame(text[:-1].decode())
     assert found is not None
     assert found.equals(message, timestamp_delta=None, check_channel=False)
 
@@ -47,20 +47,20 @@ def test_decode_undoes_encode(message):
     ],
 )
 def test_frames_are_written_as_the_protocol_says(message, text):
-    assert encode(message) == text
+    assert encode_frame(message) == text
 
 
 @given(st.text(alphabet="tTrR0123456789abcdefABCDEFxyz \n", max_size=30))
 def test_whatever_is_no_frame_is_refused(text):
-    found = decode(text)
-    assert found is None or encode(found).decode()[:-1].upper() == text.upper()
+    found = decode_frame(text)
+    assert found is None or encode_frame(found).decode()[:-1].upper() == text.upper()
 
 
 @pytest.mark.parametrize(
     "text", ["t800", "t8000", "t1819", "t18120A", "t18120AFF0", "T200000000", "r18120AFF"]
 )
 def test_faulty_frames_are_refused(text):
-    assert decode(text) is None
+    assert decode_frame(text) is None
 
 
 @pytest.fixture

@@ -146,4 +146,4 @@ async def test_a_truth_that_fails_is_as_loud_as_a_broken_cable(caplog):
         with pytest.raises(DeviceError, match="was lost"):
             await ask(link)
         await link.close()
-    assert "have died" in caplog.text
+    assert "have failed" in caplog.text

@@ -8,8 +8,8 @@ import pytest
 import serial
 
 from drivers.serial.shared_port import SharedSerialPort
+from drivers.simulated.gauges.bank import SimulatedGaugeBank
 from drivers.simulated.gauges.faults import InjectedGaugeFault
-from drivers.simulated.gauges.rack import SimulatedGaugeBank
 from hexacell.cell.devices import GaugeSettings
 from hexacell.cell.simulation import SimulatedGauges
 from hexacell.clock import CellClock

@@ -1,4 +1,4 @@
-"""The simulated lines of a whole cell: one a gauge, or one for all gauges of a multiplexer."""
+"""The simulated gauges of a cell: one line for each gauge, or for all gauges of a multiplexer."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def simulated_device(protocol: str, indicators: Mapping[int, Indicator]) -> Line
     """A device that speaks ``protocol``, with ``indicators`` by channel.
 
     Raises:
-        FileError: Nothing simulated speaks it.
+        FileError: There is no such simulated device.
     """
     if protocol not in DEVICES:
         raise FileError(
@@ -41,14 +41,13 @@ def simulated_device(protocol: str, indicators: Mapping[int, Indicator]) -> Line
 
 
 class SimulatedGaugeBank(Closeable):
-    """The gauges of a simulated cell, each on a line that is served until the rack is closed.
+    """The gauges of a simulated cell; serves until it is closed.
 
-    ``plungers`` are by gauge name: mm from the middle of the travel, in the instrument's own
-    direction, noise included; they are called from the lines' threads. Gauges on a multiplexer share
-    one line.
+    ``plungers`` gives the plunger position of each gauge by its name: mm from the middle of the
+    travel, in the instrument's own direction, with noise; called from the threads of the lines.
 
     Raises:
-        FileError: Nothing simulated speaks a gauge's protocol.
+        FileError: A gauge's protocol has no simulated device.
     """
 
     def __init__(
@@ -73,20 +72,20 @@ class SimulatedGaugeBank(Closeable):
         self.gauges = tuple(
             gauge.model_copy(update={"port": self._lines[gauge.name].url}) for gauge in gauges
         )
-        """The gauges' settings as given, with the ports under which they are reached."""
+        """The settings of the gauges with the ports on which they are served."""
 
     def line(self, gauge: str) -> GaugeLineServer:
-        """The line that ``gauge`` is on."""
+        """The line of ``gauge``."""
         return self._lines[gauge]
 
     def inject(
         self, gauge: str, fault: InjectedGaugeFault, *, answers: int | None = None, seconds: float = 1.0
     ) -> None:
-        """Let ``fault`` happen to a gauge or its line; see :meth:`ServedLine.inject`."""
+        """Inject ``fault`` into a gauge or its line; see :meth:`ServedLine.inject`."""
         self.line(gauge).inject(fault, channel=self._channels[gauge], answers=answers, seconds=seconds)
 
     def clear(self, gauge: str, fault: InjectedGaugeFault) -> None:
-        """Undo :meth:`inject`."""
+        """Clear an injected fault."""
         self.line(gauge).clear(fault, channel=self._channels[gauge])
 
     def _serve(self, group: Sequence[GaugeSettings], seed: int) -> GaugeLineServer:
@@ -102,7 +101,7 @@ class SimulatedGaugeBank(Closeable):
         )
 
     def close(self) -> None:
-        """End every line; twice is harmless."""
+        """Close every line; closing twice is harmless."""
         self._served.close()
 
 
@@ -111,7 +110,7 @@ def _channel(gauge: GaugeSettings) -> int:
 
 
 def _by_line(gauges: Sequence[GaugeSettings]) -> list[list[GaugeSettings]]:
-    """The gauges of one multiplexer, which is one protocol and port, together; the others alone."""
+    """The gauges grouped by line: those of one multiplexer (same protocol and port) together."""
     lines: dict[tuple[str | None, ...], list[GaugeSettings]] = {}
     for gauge in gauges:
         line = (gauge.protocol, gauge.port) if gauge.protocol in MULTIPLEXED else (gauge.name,)

@@ -91,7 +91,7 @@ class ConfigTransactions:
         )
 
     async def _apply_provisional(self, state: RunState) -> events.Event:
-        geometry = await in_thread(self.calibration.to_lend, state)
+        geometry = await in_thread(self.calibration.provisional_geometry, state)
         await self._apply(
             await in_thread(self.change_to, geometry, state),
             self._provisional_backup,

@@ -22,7 +22,7 @@ from hexacell.cell.recovery import (
 )
 from hexacell.errors import DeviceError, FileError, HexacellError
 from procedures.calibration.path_planning import NoSafePath
-from procedures.calibration.workflow import TravelError
+from procedures.calibration.set_steps import TravelError
 from procedures.devices.settling import NeverSettled
 from procedures.run import events
 from procedures.run.state import RunState

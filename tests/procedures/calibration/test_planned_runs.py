@@ -9,6 +9,7 @@ import pytest
 
 from hexacell.campaign.pose_list import PoseList
 from hexacell.kinematics.pose import Pose
+from procedures.calibration.identification_steps import campaign_state
 from procedures.calibration.workflow import Calibration, expected_records
 from procedures.run import events
 from procedures.run.state import fold
@@ -91,7 +92,7 @@ def test_listed_poses_are_run(make_rig, story) -> None:
 @pytest.mark.parametrize("order", [(1, 2), (2, 1)])
 def test_records_stay_in_the_order_in_which_sets_were_measured(make_rig, story, order) -> None:
     happened = [event for point in order for event in story(point=point).whole(2)]
-    situation = make_rig().calibration._situation(fold(happened), None)
+    situation = campaign_state(fold(happened), None)
     assert situation.measurements.points.tolist() == [point for point in order for _ in range(2)]
     assert situation.done == {1, 2}
     assert fold(happened).samples(Phase.IDENTIFY)[0].at.point == 1

@@ -16,7 +16,7 @@ from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.motion import return_path
 from hexacell.motion import route_search as route_module
 from hexacell.motion.trajectory import interpolate_line
-from procedures.calibration import workflow as module
+from procedures.calibration.identification_steps import IdentificationSteps
 from procedures.run import events
 from procedures.run.state import fold
 from procedures.run.steps import Move, Phase
@@ -32,7 +32,7 @@ class Ways:
     ) -> None:
         self.clear_to = clear_to
         self.stops = stops
-        monkeypatch.setattr(module.Calibration, "_known", lambda *_: (None, self))
+        monkeypatch.setattr(IdentificationSteps, "_estimated", lambda *_: (None, self))
         monkeypatch.setattr(return_path, "is_clear", self._is_clear)
         monkeypatch.setattr(return_path, "PathPlanner", self._departure)
         self.reference = np.zeros(3)
@@ -124,7 +124,7 @@ def test_nothing_known_leads_back_one_by_one(make_rig, story, monkeypatch) -> No
     def unknown(*_: Any) -> Any:
         raise IdentifiabilityError("the records cannot be followed")
 
-    monkeypatch.setattr(module.Calibration, "_known", unknown)
+    monkeypatch.setattr(IdentificationSteps, "_estimated", unknown)
     step = make_rig().calibration.next_step(fold(story().whole(ORIENTATIONS)[:-2]))
     assert step.key == f"P1/o{ORIENTATIONS - 1:02d}/move"
 

@@ -19,7 +19,8 @@ from hexacell.errors import LimitError
 from hexacell.kinematics.pose import Pose
 from hexacell.motion.route_search import find_route
 from procedures.calibration import path_planning
-from procedures.calibration.workflow import Calibration, Mode, expected_records
+from procedures.calibration.identification_steps import IdentificationSteps
+from procedures.calibration.workflow import Mode, expected_records
 from procedures.run import events
 from procedures.run.state import fold
 from procedures.run.steps import Compute, Move, Phase, Place, Sample
@@ -189,7 +190,8 @@ class Choices:
         self._refusal = refusal
         monkeypatch.setattr(module.Plan, "_next_pose", self._choose)
         monkeypatch.setattr(path_planning, "next_return_move", lambda *_: 0)
-        monkeypatch.setattr(Calibration, "_known", lambda *_: (None, SimpleNamespace(reference=None)))
+        known = None, SimpleNamespace(reference=None)
+        monkeypatch.setattr(IdentificationSteps, "_estimated", lambda *_: known)
 
     def _choose(self, situation: Any, point: int) -> MeasurePose:
         self.made += 1

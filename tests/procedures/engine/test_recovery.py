@@ -27,7 +27,7 @@ from hexacell.errors import (
     WriteBackUndone,
 )
 from procedures.calibration.path_planning import NoSafePath
-from procedures.calibration.workflow import TravelError
+from procedures.calibration.set_steps import TravelError
 from procedures.devices.settling import NeverSettled
 from procedures.engine.recovery_policy import GIVE_UP, RecoveryPolicy, failed, kind_of
 from procedures.journal.journal import read_journal

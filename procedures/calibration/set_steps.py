@@ -1,0 +1,70 @@
+"""The steps within one set of poses, whatever it is measured for."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+from hexacell.errors import LimitError
+from hexacell.kinematics.rotations import Array
+from hexacell.robot_model import Robot
+from procedures.calibration.path_planning import RunPathPlanner
+from procedures.run.state import RunState
+from procedures.run.steps import CloseSet, Move, Place, Revisit, Sample, SetKey, SixNumbers, Step
+
+
+class TravelError(LimitError):
+    """A plunger is at an end of its travel where the gauges must be read."""
+
+
+@dataclass(frozen=True, eq=False)
+class SetSteps:
+    """Steps of the sets of one robot."""
+
+    robot: Robot
+
+    @cached_property
+    def paths(self) -> RunPathPlanner:
+        """How to get to a pose from wherever the robot is."""
+        return RunPathPlanner(self.robot)
+
+    def at_pose(self, state: RunState, key: SetKey) -> Step | None:
+        """Place the gauges or sample, if the robot is at the pose of the set's next record."""
+        orientation = state.set(key).next_orientation
+        if state.standing != (key, orientation) or state.target is None:
+            return None
+        if orientation == 1 and not state.set(key).placed:
+            return Place(at=key, pose=state.target)
+        return Sample(at=key, orientation=orientation, pose=state.target)
+
+    def at_reference(self, state: RunState, key: SetKey) -> Step | None:
+        """Verify the set's reference, or close the set, if the robot is there."""
+        if state.standing != (key, 1):
+            return None
+        return Revisit(at=key) if state.set(key).reference_unverified else CloseSet(at=key)
+
+    def to_reference(self, state: RunState, key: SetKey, ball: Array | None) -> Move:
+        """Move to the set's reference by a checked path.
+
+        ``ball`` (3,), mm, is where the ball was when the gauges were zeroed, if that is known.
+        """
+        return self.paths.towards(state, reference_move(state, key), ball)
+
+
+def reference_pose(state: RunState, key: SetKey) -> SixNumbers:
+    """The pose of a set's first record."""
+    pose = state.set(key).pose(1)
+    assert pose is not None  # noqa: S101 - callers have a set with records
+    return pose
+
+
+def reference_move(state: RunState, key: SetKey) -> Move:
+    """The straight move to a set's reference."""
+    return Move(at=key, orientation=1, pose=reference_pose(state, key))
+
+
+def require_zero(state: RunState, key: SetKey) -> None:
+    """Raise ``TravelError`` if the gauges of a set could not be zeroed."""
+    measured = state.set(key)
+    if not measured.samples and measured.refusals:
+        raise TravelError(f"{key}: the gauges cannot be zeroed, they are at the end of their travel")

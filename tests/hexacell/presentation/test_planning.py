@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import pytest
 
 from hexacell.application.planning import NextPose, PlanTrial
@@ -67,7 +65,7 @@ def test_durations_are_rounded_to_what_is_known(minutes, text):
 def test_a_run_says_what_the_remaining_records_gain():
     line = run_forecast_line(RUN_FORECAST)
     assert line == "  predicted error at the task 0.290 mm; continuing gains 0.230 mm in 12 minutes"
-    last = replace(RUN_FORECAST, records=1)
+    last = RUN_FORECAST.model_copy(update={"records": 1})
     assert run_forecast_line(last) == "  predicted error at the task 0.290 mm"
 
 

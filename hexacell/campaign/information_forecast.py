@@ -46,10 +46,7 @@ class PlannedSets:
 
     def information_under(self, belief: RobotBelief) -> PlannedInformation:
         """The information of the sets at the present estimate; poses it cannot reach are left out."""
-        poses = PoseBatch(
-            np.concatenate([poses.positions for poses in self.sets]),
-            np.concatenate([poses.rotations for poses in self.sets]),
-        )
+        poses = PoseBatch.concatenate(self.sets)
         joints = belief.mechanism.inverse(belief.estimate, belief.branch, poses)
         rows = np.flatnonzero(np.isfinite(joints).all(axis=-1))
         jacobian, by_joints = position_derivatives(belief, ReachableTargets(poses[rows], joints[rows]))

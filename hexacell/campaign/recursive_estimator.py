@@ -127,7 +127,4 @@ def _start_poses(problem: Problem, before: Identification) -> PoseBatch | None:
         return None
     old = np.array([row for row, place in enumerate(former) if place is not None], dtype=np.intp)
     places = np.array([place for place in former if place is not None], dtype=np.intp)
-    positions, rotations = np.empty((problem.records, 3)), np.empty((problem.records, 3, 3))
-    positions[new], rotations[new] = solved.poses.positions, solved.poses.rotations
-    positions[old], rotations[old] = before.poses.positions[places], before.poses.rotations[places]
-    return PoseBatch(positions, rotations)
+    return problem.commands.poses.with_rows(new, solved.poses).with_rows(old, before.poses[places])

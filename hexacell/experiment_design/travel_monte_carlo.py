@@ -121,10 +121,7 @@ def stays_in_travel(
     ``reference_joints`` (6,), mm. Samples that cannot take it are dropped: the true robot could.
     """
     joints = np.concatenate([reference_joints[None], targets.joints])
-    poses = PoseBatch(
-        np.concatenate([reference.positions, targets.poses.positions]),
-        np.concatenate([reference.rotations, targets.poses.rotations]),
-    )
+    poses = PoseBatch.concatenate((reference, targets.poses))
     # The reference is estimated from its records, so that it closes the legs only approximately.
     poses = forward_kinematics(belief.mechanism, belief.estimate, joints, poses).poses
     sensitivity = pose_sensitivity(belief.mechanism, belief.estimate, poses, joints)

@@ -93,12 +93,10 @@ class CommandedRobot:
         if reachable.all():
             result = self._actual(commands, joints)
             return ActualPoses(result.poses, joints, result.found)
-        positions, rotations = commands.positions.copy(), commands.rotations.copy()
         result = self._actual(commands[reachable], joints[reachable])
-        positions[reachable], rotations[reachable] = result.poses.positions, result.poses.rotations
         found = reachable.copy()
         found[reachable] = result.found
-        return ActualPoses(PoseBatch(positions, rotations), joints, found)
+        return ActualPoses(commands.with_rows(reachable, result.poses), joints, found)
 
     def commands_for(
         self, poses: PoseBatch, joints: Array, *, stages: Sequence[int] = COMMAND_STAGES

@@ -185,7 +185,7 @@ def continue_solution(
             break
         ends = (start_joints[rows], joints[rows])
         result = _staged(mechanism, (start_geometry, geometry), ends, start[rows], stages)
-        poses = _replace(poses, rows, result.poses)
+        poses = poses.with_rows(rows, result.poses)
         found[rows] = result.found
     return ForwardResult(poses, found)
 
@@ -206,15 +206,9 @@ def _staged(
         now = (1.0 - fraction) * joints[0][rows] + fraction * joints[1][rows]
         close_mm = CONVERGED_MM if stage == stages else ON_THE_WAY_MM
         result = newton(mechanism, geometry, now, poses[rows], mode[rows], close_mm, STAGE_STEPS)
-        poses = _replace(poses, rows, result.poses)
+        poses = poses.with_rows(rows, result.poses)
         # Those that failed are not led on: they would cost more than all the others.
         rows = rows[result.found]
     found = np.zeros(len(start), dtype=bool)
     found[rows] = True
     return ForwardResult(poses, found)
-
-
-def _replace(poses: PoseBatch, rows: NDArray[np.intp], new: PoseBatch) -> PoseBatch:
-    positions, orientation = poses.positions.copy(), poses.rotations.copy()
-    positions[rows], orientation[rows] = new.positions, new.rotations
-    return PoseBatch(positions, orientation)

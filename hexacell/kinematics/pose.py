@@ -75,6 +75,21 @@ class PoseBatch:
         """One position (3,), mm, in several orientations (n, 3, 3)."""
         return cls(np.broadcast_to(np.asarray(position, dtype=float), (len(orientations), 3)), orientations)
 
+    @classmethod
+    def concatenate(cls, batches: Iterable[PoseBatch]) -> PoseBatch:
+        """The poses of some batches, one after the other."""
+        batches = list(batches)
+        return cls(
+            np.concatenate([batch.positions for batch in batches]),
+            np.concatenate([batch.rotations for batch in batches]),
+        )
+
+    def with_rows(self, rows: NDArray[np.intp] | Mask, poses: PoseBatch) -> PoseBatch:
+        """A copy in which ``poses`` replace those in some rows."""
+        positions, orientations = self.positions.copy(), self.rotations.copy()
+        positions[rows], orientations[rows] = poses.positions, poses.rotations
+        return PoseBatch(positions, orientations)
+
     def __len__(self) -> int:
         return len(self.positions)
 

@@ -47,10 +47,7 @@ class Path:
         """This path, and ``onward`` from the ``waypoint`` at its end."""
         return Path(
             (*self.waypoints, waypoint, *onward.waypoints),
-            PoseBatch(
-                np.concatenate([self.poses.positions, onward.poses.positions]),
-                np.concatenate([self.poses.rotations, onward.poses.rotations]),
-            ),
+            PoseBatch.concatenate((self.poses, onward.poses)),
             np.concatenate([self.joints, onward.joints]),
         )
 

@@ -191,13 +191,9 @@ def _commands(robot: Robot, truth: Geometry, targets: PoseBatch) -> PoseBatch:
 
 def _data_set(sets: list[_PointPoses], orientations: int) -> DataSet:
     labels = [(point, turn) for point in range(1, len(sets) + 1) for turn in range(1, orientations + 1)]
-    commands = [poses for one in sets for poses in one.commands]
     return DataSet(
         np.array(labels),
-        PoseBatch(
-            np.concatenate([poses.positions for poses in commands]),
-            np.concatenate([poses.rotations for poses in commands]),
-        ),
+        PoseBatch.concatenate(poses for one in sets for poses in one.commands),
         np.concatenate([joints for one in sets for joints in one.joints]),
         np.concatenate([poses.positions for one in sets for poses in one.actual]),
     )

@@ -74,7 +74,7 @@ class CommandedPoses:
 
     def solve_poses(self, geometry: Geometry, joints: Array) -> ForwardResult:
         """Poses that close ``geometry`` at joint variables (n, 6), mm, near the commanded ones."""
-        positions, rotations = np.array(self.poses.positions), np.array(self.poses.rotations)
+        poses = self.poses
         found = np.zeros(len(joints), dtype=bool)
         for choice, commanding in enumerate(self.candidate_geometries):
             rows = np.flatnonzero((self.choice == choice) & np.isfinite(self.joints).all(axis=-1))
@@ -89,6 +89,6 @@ class CommandedPoses:
                 start_joints=self.joints[rows],
                 tries=AT_HOME if commanding is geometry else CONTINUATION_STAGES,
             )
-            positions[rows], rotations[rows] = result.poses.positions, result.poses.rotations
+            poses = poses.with_rows(rows, result.poses)
             found[rows] = result.found
-        return ForwardResult(PoseBatch(positions, rotations), found)
+        return ForwardResult(poses, found)

@@ -92,11 +92,7 @@ class CdiGauge(SerialGauge):
         if isinstance(answer, DisplayedValue):
             return answer
         if answer is CdiError.OUT_OF_BOUNDS:
-            raise GaugeAtEnd(
-                "plunger at its end (OUT OF BOUNDS)",
-                subject=self.subject,
-                action="Move the gauge or the ball",
-            )
+            raise self._at_end("plunger at its end (OUT OF BOUNDS)")
         raise FrameRejected(frame)  # the request was garbled on its way
 
     async def _read_state(self) -> GaugeState:

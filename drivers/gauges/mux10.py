@@ -120,11 +120,7 @@ class Mux10Gauge(SerialGauge):
                 subject=self.subject,
                 action="Switch it on, check its cable, and channel in the cell file",
             )
-        raise GaugeAtEnd(
-            f"shows an error instead of a value ({displayed}), as at an end of its travel",
-            subject=self.subject,
-            action="Move the gauge or the ball",
-        )
+        raise self._at_end(f"shows an error instead of a value ({displayed}), as at an end of its travel")
 
     async def _read_state(self) -> GaugeState:
         displayed: DisplayedValue | None

@@ -6,7 +6,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from typing import ClassVar, TypeVar
 
-from drivers.gauges.errors import FrameRejected, GaugeUnsteady, WrongMode, WrongUnit, ZeroVoid
+from drivers.gauges.errors import FrameRejected, GaugeAtEnd, GaugeUnsteady, WrongMode, WrongUnit, ZeroVoid
 from drivers.gauges.protocol import (
     TERMINATOR,
     DisplayedValue,
@@ -218,6 +218,9 @@ class SerialGauge(ABC):
         """The error to raise, now and by every later reading until it is opened again."""
         self._void = ZeroVoid(problem, subject=self.subject, action="Open it again and zero anew")
         return self._void
+
+    def _at_end(self, problem: str) -> GaugeAtEnd:
+        return GaugeAtEnd(problem, subject=self.subject, action="Move the gauge or the ball")
 
     def _opened_state(self) -> GaugeState:
         self._open_port()

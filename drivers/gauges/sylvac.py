@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import ClassVar
 
-from drivers.gauges.errors import FrameRejected, GaugeAtEnd, WrongAnswer
+from drivers.gauges.errors import FrameRejected, WrongAnswer
 from drivers.gauges.protocol import DisplayedValue, GaugeState, LineSettings, ProtocolSpec, Unit
 from drivers.gauges.serial_gauge import SerialGauge
 from hexacell.errors import DeviceError
@@ -99,9 +99,7 @@ class SylvacGauge(SerialGauge):
             case DisplayedValue() as displayed:
                 return displayed
             case SylvacError.RANGE:
-                raise GaugeAtEnd(
-                    "plunger at its end (ERR3)", subject=self.subject, action="Move the gauge or the ball"
-                )
+                raise self._at_end("plunger at its end (ERR3)")
             case SylvacError.SENSOR:
                 raise self._voided("moved too fast or its sensor fails (ERR0)")
             case _:  # the request was garbled on its way

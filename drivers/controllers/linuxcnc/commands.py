@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
 from typing import TypeVar
 
-from drivers.controllers.errors import CommandRefused
+from drivers.controllers.errors import CommandRefused, ConnectionLost
 from drivers.controllers.linuxcnc.connection import Connection
 from drivers.controllers.linuxcnc.protocol import Response, parse_homed, parse_pose, parse_positions
 from hexacell.errors import DeviceError
@@ -113,3 +113,36 @@ class ControllerCommands:
             return parse(text)
         except ValueError as error:
             raise DeviceError(str(error), subject=self.subject) from error
+
+
+class CommandChannel:
+    """A connection that is opened when it is needed, and replaced after it broke.
+
+    Attributes:
+        commands: the present connection, if there is one.
+    """
+
+    def __init__(self, connect: Callable[[], Awaitable[ControllerCommands]]) -> None:
+        self.commands: ControllerCommands | None = None
+        self._connect = connect
+
+    async def synchronized(self) -> ControllerCommands:
+        """The connection, without an outstanding response.
+
+        Raises:
+            DeviceError: No connection is possible.
+        """
+        if self.commands is not None:
+            try:
+                await self.commands.connection.collect_late_response()
+            except ConnectionLost:
+                await self.close()
+        if self.commands is None:
+            self.commands = await self._connect()
+        return self.commands
+
+    async def close(self) -> None:
+        """Close the connection, if there is one."""
+        commands, self.commands = self.commands, None
+        if commands is not None:
+            await commands.connection.close()

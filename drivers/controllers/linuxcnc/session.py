@@ -24,10 +24,10 @@ from enum import Enum, auto
 
 from drivers.controllers.errors import ConnectionLost
 from drivers.controllers.linuxcnc import startup
-from drivers.controllers.linuxcnc.commands import ControllerCommands
+from drivers.controllers.linuxcnc.commands import CommandChannel, ControllerCommands
 from drivers.controllers.linuxcnc.connection import Connection
 from drivers.controllers.linuxcnc.send_arbiter import SendArbiter
-from drivers.controllers.linuxcnc.settings import Address, Timeouts
+from drivers.controllers.linuxcnc.settings import Address, Timeouts, now
 from drivers.controllers.linuxcnc.status_channel import StatusConnection
 from drivers.controllers.linuxcnc.stop import stop_in_place
 from drivers.interfaces import ControllerStatus
@@ -56,7 +56,7 @@ class Session:
         self._timeouts = timeouts
         self._trace = trace
         self._state = SessionState.CLOSED
-        self._commands: ControllerCommands | None = None
+        self._channel = CommandChannel(self._connect)
         self._arbiter = SendArbiter()
         self._status = StatusConnection(address, timeouts, self._arbiter, trace)
 
@@ -80,17 +80,12 @@ class Session:
         """
         self._require_open()
         await self._arbiter.stop_ended()
-        if self._commands is not None:
-            try:
-                await self._commands.connection.collect_late_response()
-            except ConnectionLost:
-                await self._drop()
-        if self._commands is None:
-            self._commands = await self._connect()
-        elif self._state is SessionState.CONTROL_LOST:
-            await self._commands.connection.take_control()
+        before = self._channel.commands
+        commands = await self._channel.synchronized()
+        if commands is before and self._state is SessionState.CONTROL_LOST:
+            await commands.connection.take_control()
         self._set_state(SessionState.IN_CONTROL)
-        return self._commands
+        return commands
 
     async def in_control(self) -> ControllerCommands:
         """The same, after taking control in any case."""
@@ -104,12 +99,12 @@ class Session:
         Raises:
             ConnectionLost: It cannot be reached within ``timeouts.reconnect``.
         """
-        deadline = _now() + self._timeouts.reconnect
+        deadline = now() + self._timeouts.reconnect
         while True:
             try:
                 return await self.synchronized()
             except ConnectionLost:
-                if _now() > deadline:
+                if now() > deadline:
                     raise
                 await asyncio.sleep(self._timeouts.poll)
 
@@ -141,7 +136,7 @@ class Session:
         """Close all connections; closing twice is harmless."""
         self._state = SessionState.CLOSED
         await self._status.close()
-        await self._drop()
+        await self._channel.close()
 
     async def _connect(self) -> ControllerCommands:
         async with self._arbiter.exclusive():
@@ -156,11 +151,6 @@ class Session:
             raise
         return commands
 
-    async def _drop(self) -> None:
-        commands, self._commands = self._commands, None
-        if commands is not None:
-            await commands.connection.close()
-
     def _set_state(self, state: SessionState) -> None:
         """Change the state of an open session; a closed one stays closed."""
         if self._state is not SessionState.CLOSED:
@@ -169,7 +159,3 @@ class Session:
     def _require_open(self) -> None:
         if self._state is SessionState.CLOSED:
             raise DeviceError("is not connected", subject=self._address.name, action="Open it first")
-
-
-def _now() -> float:
-    return asyncio.get_running_loop().time()

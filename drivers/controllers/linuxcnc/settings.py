@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from dataclasses import dataclass, field
 from typing import Self
 
@@ -52,3 +53,8 @@ class Timeouts:
     switch: float = 5.0
     reload: float = 120.0
     reconnect: float = 60.0
+
+
+def now() -> float:
+    """The time of the running event loop, s."""
+    return asyncio.get_running_loop().time()

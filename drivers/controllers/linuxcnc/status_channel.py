@@ -6,7 +6,7 @@ import asyncio
 from contextlib import nullcontext
 
 from drivers.controllers.errors import ConnectionLost
-from drivers.controllers.linuxcnc.commands import ControllerCommands
+from drivers.controllers.linuxcnc.commands import CommandChannel, ControllerCommands
 from drivers.controllers.linuxcnc.connection import Connection
 from drivers.controllers.linuxcnc.send_arbiter import SendArbiter
 from drivers.controllers.linuxcnc.settings import Address, Timeouts
@@ -31,7 +31,7 @@ class StatusConnection:
         self._timeouts = timeouts
         self._arbiter = arbiter
         self._trace = trace
-        self._commands: ControllerCommands | None = None
+        self._channel = CommandChannel(self._connect)
         self._errors: tuple[str, ...] = ()
         self._was_enabled = False
         self._query = asyncio.Lock()
@@ -43,11 +43,11 @@ class StatusConnection:
             DeviceError: It cannot be read.
         """
         async with self._query:
-            commands = await self._synchronized()
+            commands = await self._channel.synchronized()
             try:
                 return await self._read(commands)
             except ConnectionLost:
-                await self._drop()
+                await self._channel.close()
                 raise
 
     def reset_errors(self) -> None:
@@ -62,7 +62,7 @@ class StatusConnection:
         except TimeoutError:
             return None
         try:
-            commands, self._commands = self._commands, None
+            commands, self._channel.commands = self._channel.commands, None
         finally:
             self._query.release()
         if commands is None:
@@ -72,7 +72,7 @@ class StatusConnection:
 
     async def close(self) -> None:
         """Close the connection; closing twice is harmless."""
-        await self._drop()
+        await self._channel.close()
 
     async def _read(self, commands: ControllerCommands) -> ControllerStatus:
         estop, enabled = await commands.is_on("estop"), await commands.is_on("machine")
@@ -82,22 +82,8 @@ class StatusConnection:
             self._errors += tuple(await commands.errors())
         return ControllerStatus(estop, enabled, self._errors)
 
-    async def _synchronized(self) -> ControllerCommands:
-        if self._commands is not None:
-            try:
-                await self._commands.connection.collect_late_response()
-            except ConnectionLost:
-                await self._drop()
-        if self._commands is None:
-            async with self._arbiter.exclusive():
-                connection = await Connection.open(
-                    self._address, self._timeouts, self._trace, commanding=False
-                )
-            connection.send_turn = self._arbiter.query_turn
-            self._commands = ControllerCommands(connection, self._address.name)
-        return self._commands
-
-    async def _drop(self) -> None:
-        commands, self._commands = self._commands, None
-        if commands is not None:
-            await commands.connection.close()
+    async def _connect(self) -> ControllerCommands:
+        async with self._arbiter.exclusive():
+            connection = await Connection.open(self._address, self._timeouts, self._trace, commanding=False)
+        connection.send_turn = self._arbiter.query_turn
+        return ControllerCommands(connection, self._address.name)

@@ -81,7 +81,7 @@ class SimulatedGaugeBank(Closeable):
     def inject(
         self, gauge: str, fault: InjectedGaugeFault, *, answers: int | None = None, seconds: float = 1.0
     ) -> None:
-        """Inject ``fault`` into a gauge or its line; see :meth:`ServedLine.inject`."""
+        """Inject ``fault`` into a gauge or its line; see :meth:`GaugeLineServer.inject`."""
         self.line(gauge).inject(fault, channel=self._channels[gauge], answers=answers, seconds=seconds)
 
     def clear(self, gauge: str, fault: InjectedGaugeFault) -> None:

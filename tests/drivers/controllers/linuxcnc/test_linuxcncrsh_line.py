@@ -105,7 +105,7 @@ async def test_a_server_that_was_started_anew_is_connected_to_again(play):
         [*play.OPENING[:-1], ("get abs_act_pos", HALF_WAY)],
     )
     assert (await driver.pose()).x == 10.0
-    await until(driver._session._commands.connection._reader.at_eof)
+    await until(driver._session._channel.commands.connection._reader.at_eof)
     assert (await driver.pose()).x == 5.0
 
 

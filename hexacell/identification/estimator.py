@@ -26,7 +26,7 @@ def identify(problem: Problem, *, find_outliers: bool = True) -> Identification:
 
     Raises:
         IdentifiabilityError: the records cannot determine the parameters.
-        GaugeFaultError: gauges were misread.
+        GaugeFaultError: a gauge fault, or a zero shift that leaves too few records.
     """
     require_enough_records(problem)
     require_rotation_diversity(problem)

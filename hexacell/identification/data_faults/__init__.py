@@ -1,1 +1,1 @@
-"""Faults in the data: outliers, zero shifts and misread gauges, found and named."""
+"""Faults in the data: outliers, zero shifts and gauge faults, found and named."""

@@ -71,7 +71,7 @@ def screen(problem: Problem) -> ScreenedFit:
     """Fit a problem without the records that disagree with the others.
 
     Raises:
-        GaugeFaultError: gauges were misread, or too few records are left before a shift of a zero.
+        GaugeFaultError: a gauge fault, or a zero shift that leaves too few records.
     """
     try:
         selected = _stepwise_selection(problem)

@@ -51,6 +51,9 @@ class SocketTransport:
         if self._client is not None and self._client.fileno() in ready:
             data = self._read(self._client)
         if self._listener.fileno() in ready:
+            # A client that closes and connects again is gone only once all it sent has been read.
+            while self._client is not None and (rest := self._read(self._client)):
+                data += rest
             self._accept()
         return data
 
@@ -85,6 +88,8 @@ class SocketTransport:
     def _read(self, client: socket.socket) -> bytes:
         try:
             data = client.recv(CHUNK)
+        except BlockingIOError:
+            return b""
         except OSError:
             data = b""
         if not data:

@@ -13,6 +13,7 @@ import pytest
 
 from drivers.encoders.cia406 import Cia406Bank
 from hexacell.cell.devices import EncoderSettings
+from tests.waiting import until
 
 SYNC, NMT, EMERGENCY, SDO_ANSWER, SDO_REQUEST, HEARTBEAT = 0x80, 0x00, 0x80, 0x580, 0x600, 0x700
 NOT_THERE = 0x0602_0000
@@ -90,6 +91,10 @@ def plain_objects(node: int) -> dict[Object, bytes]:
     }
 
 
+MARKER = 0x7F0
+"""An identifier that nobody uses."""
+
+
 class RawBus:
     """Six raw nodes on a virtual bus; ``heard`` is what the driver sent."""
 
@@ -107,6 +112,15 @@ class RawBus:
     def send(self, can_id: int, data: bytes = b"", **kind: Any) -> None:
         """Put any frame on the bus."""
         self._bus.send(can.Message(arbitration_id=can_id, data=data, **{"is_extended_id": False} | kind))
+
+    async def delivered_to(self, bank: Cia406Bank) -> None:
+        """Return when the driver has received all that was sent so far: frames keep their order."""
+        assert bank._session is not None
+        received, network = threading.Event(), bank._session._bus.network
+        network.subscribe(MARKER, lambda *_frame: received.set())
+        self.send(MARKER)
+        await until(received.is_set)
+        network.unsubscribe(MARKER)
 
     def requests_to(self, node: int) -> list[str]:
         """SDO requests and NMT commands that a node got, in hexadecimal."""

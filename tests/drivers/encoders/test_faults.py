@@ -2,30 +2,30 @@
 
 from __future__ import annotations
 
-import asyncio
-import threading
+from typing import Any
 
 import pytest
 
+from drivers.encoders import node_monitor
 from drivers.encoders.cia406 import Cia406Bank
 from drivers.encoders.errors import InvalidSampleError, RestartedNodeError, SilentNodeError
 
-SETTLE_S = 0.05
 NO_MAGNET = bytes.fromhex("00ff210000000000")
 CLEARED = bytes(8)
+PERIOD_S = 0.02
 
 
 async def test_an_emergency_makes_samples_invalid_until_it_is_cleared(raw, bank):
     await bank.open()
     raw.send(0x83, NO_MAGNET)
-    await asyncio.sleep(SETTLE_S)
+    await raw.delivered_to(bank)
     for _ in range(2):
         with pytest.raises(
             InvalidSampleError, match=r"leg 3 \(node 3\): reports emergency FF00 \(no magnet"
         ):
             await bank.read()
     raw.send(0x83, CLEARED)
-    await asyncio.sleep(SETTLE_S)
+    await raw.delivered_to(bank)
     await bank.read()
 
 
@@ -42,7 +42,7 @@ async def test_an_emergency_makes_samples_invalid_until_it_is_cleared(raw, bank)
 async def test_whatever_is_no_clean_reset_is_an_error(raw, bank, data, words):
     await bank.open()
     raw.send(0x81, bytes.fromhex(data))
-    await asyncio.sleep(SETTLE_S)
+    await raw.delivered_to(bank)
     with pytest.raises(InvalidSampleError, match=rf"leg 1 .*{words}"):
         await bank.read()
 
@@ -68,7 +68,7 @@ async def test_after_an_emergency_the_alarms_are_looked_at(raw, bank, monkeypatc
     await bank.read()  # nobody has said so, and the last look is recent
     raw.send(0x83, NO_MAGNET)
     raw.send(0x83, CLEARED)
-    await asyncio.sleep(SETTLE_S)
+    await raw.delivered_to(bank)
     with pytest.raises(InvalidSampleError, match=r"leg 3 .*6503h:0 is 0x0001"):
         await bank.read()
     raw.nodes[3].objects[0x6503, 0] = bytes(2)
@@ -89,7 +89,7 @@ async def test_alarms_without_an_emergency_are_found_out(raw, bank, monkeypatch)
 async def test_a_boot_up_voids_the_set_until_opened_again(raw, bank):
     await bank.open()
     raw.send(0x702, b"\x00")
-    await asyncio.sleep(SETTLE_S)
+    await raw.delivered_to(bank)
     for _ in range(2):
         with pytest.raises(RestartedNodeError, match=r"leg 2 \(node 2\).*the set is void"):
             await bank.read()
@@ -102,7 +102,7 @@ async def test_a_boot_up_ends_a_round_that_waits(raw, settings):
     await bank.open()
     raw.nodes[2].answers_sync = lambda _: raw.send(0x702, b"\x00") or []
     with pytest.raises(RestartedNodeError):
-        await asyncio.wait_for(bank.read(), 2)
+        await bank.read()
     await bank.close()
 
 
@@ -123,30 +123,38 @@ async def test_a_boot_up_while_being_configured_is_noticed(raw, bank):
 async def test_a_node_that_leaves_operational_has_lost_its_configuration(raw, bank, state):
     await bank.open()
     raw.send(0x704, b"\x05")
-    await asyncio.sleep(SETTLE_S)
+    await raw.delivered_to(bank)
     await bank.read()
     raw.send(0x704, state)
-    await asyncio.sleep(SETTLE_S)
+    await raw.delivered_to(bank)
     with pytest.raises(RestartedNodeError, match=r"leg 4"):
         await bank.read()
 
 
+class Hearts:
+    """Heartbeats of the nodes in ``beating``, on a clock of the driver's that nothing else moves."""
+
+    def __init__(self, raw: Any) -> None:
+        self.beating = set(raw.nodes)
+        self._raw = raw
+        self._now_s = 1000.0
+
+    def monotonic(self) -> float:
+        return self._now_s
+
+    async def go_on(self, bank: Any, seconds: float) -> None:
+        for _ in range(round(seconds / PERIOD_S)):
+            self._now_s += PERIOD_S
+            for node in self.beating:
+                self._raw.send(0x700 + node, bytes([self._raw.nodes[node].state]))
+            await self._raw.delivered_to(bank)
+
+
 @pytest.fixture
-def hearts(raw):
-    """Heartbeats of the nodes in the set, every 20 ms."""
-    beating = set(raw.nodes)
-    stop = threading.Event()
-
-    def beat():
-        while not stop.wait(0.02):
-            for node in tuple(beating):
-                raw.send(0x700 + node, bytes([raw.nodes[node].state]))
-
-    thread = threading.Thread(target=beat)
-    thread.start()
-    yield beating
-    stop.set()
-    thread.join()
+def hearts(raw, monkeypatch):
+    beating = Hearts(raw)
+    monkeypatch.setattr(node_monitor, "time", beating)
+    return beating
 
 
 @pytest.fixture
@@ -159,23 +167,27 @@ async def watchful(settings):
 async def test_heartbeats_are_asked_for_and_their_loss_is_an_error(raw, watchful, hearts):
     await watchful.open()
     assert raw.nodes[1].objects[0x1017, 0] == b"\x14\x00"
-    await asyncio.sleep(0.3)
+    await hearts.go_on(watchful, 0.4)
     await watchful.read()
-    hearts.discard(5)
-    await asyncio.sleep(0.4)
+    hearts.beating.discard(5)
+    await hearts.go_on(watchful, 0.24)
+    await watchful.read()
+    await hearts.go_on(watchful, 0.04)
     with pytest.raises(SilentNodeError, match=r"encoder of leg 5 \(node 5\): no heartbeat for 0.26 s"):
         await watchful.read()
 
 
 async def test_loss_of_all_heartbeats_points_at_the_bus(watchful, hearts):
     await watchful.open()
-    hearts.clear()
-    await asyncio.sleep(0.4)
+    await hearts.go_on(watchful, 0.1)
+    hearts.beating.clear()
+    await hearts.go_on(watchful, 0.3)
     with pytest.raises(SilentNodeError, match=r"leg 1 .*leg 6 .*CAN adapter"):
         await watchful.read()
 
 
-async def test_without_heartbeats_silence_is_no_fault(raw, bank):
+async def test_without_heartbeats_silence_is_no_fault(bank, hearts):
     await bank.open()
-    await asyncio.sleep(0.4)
+    hearts.beating.clear()
+    await hearts.go_on(bank, 3600.0 * PERIOD_S)
     await bank.read()

@@ -1,4 +1,4 @@
-"""A reference seen again: whether the gauges still have the zero that its first reading gave them."""
+"""Verification of a reference: whether the gauges still have the zero of its first reading."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from procedures.run.steps import SetKey, ThreeNumbers
 def check_reference(
     at: SetKey, before: events.Reading, now: events.Reading, limit_mm: float
 ) -> events.ReferenceConfirmed | events.SetInvalidated:
-    """Whether a set goes on: gauges and sliders show at its reference what they showed before."""
+    """Whether gauges and sliders show at a set's reference what they showed before."""
     gauges = np.subtract(now.gauges_mm, before.gauges_mm)
     sliders = np.subtract(now.joints_mm, before.joints_mm)
     if np.abs(gauges).max() > limit_mm:

@@ -1,4 +1,4 @@
-"""Settled means seen: readings are taken until a whole window of them agrees."""
+"""Settled readings: readings are taken until a whole window of them agrees."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ async def read_all(devices: Devices, clock: CellClock) -> DeviceSnapshot:
 async def settle(devices: Devices, timing: TimingSettings, clock: CellClock) -> Settled:
     """Read until the last window of readings agrees, and give that window.
 
-    A gauge that still swings too much to be read at all counts as one that has not settled yet.
+    A gauge that moves too much to be read counts as not settled.
 
     Raises:
         DeviceError: it never did within the time allowed; the message names what kept moving.

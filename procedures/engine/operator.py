@@ -1,4 +1,4 @@
-"""Who answers the questions of a run: a person at some face, or nobody."""
+"""Operators, who answer the questions of a run: a person at any face, or none."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class Operator(Protocol):
         """The answer; see :class:`procedures.run.questions.Question`.
 
         Raises:
-            AnswerNeeded: nobody answers.
+            AnswerNeeded: there is no answer.
         """
         ...
 

@@ -1,7 +1,7 @@
-"""What follows a failure: by its kind, by how often it came, and by whether a person is there.
+"""The action after a failure: by its kind, by how often it occurred, and by whether a person is present.
 
-The policy is data, a ladder of actions for every kind of failure (``[recovery]`` in the cell file).
-Each attempt is an event, so where a run stands on a ladder is part of its state.
+The policy is data: an escalation, a sequence of actions, for every kind of failure (``[recovery]`` in
+the cell file). Each attempt is an event, so the state of a run knows which action is next.
 """
 
 from __future__ import annotations

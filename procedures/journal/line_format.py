@@ -1,4 +1,4 @@
-"""One line of the journal: how an event is written, and how a line is told from damage.
+"""One line of the journal: how an event is written, and how a damaged line is detected.
 
 A line is ``{"n":7,"at":"2026-11-20T10:30:00.000Z","s":5.125,"event":{...},"crc":"89abcdef"}`` and a
 line feed. The checksum is CRC-32 over the line's own bytes as they would be without it. The first
@@ -38,7 +38,7 @@ class Entry:
 
     Attributes:
         number: its place in the journal, from 1; also its line in the file.
-        at: when it was written, UTC, by a clock that somebody may have set in between.
+        at: when it was written, UTC, by a clock that may have been set in between.
         monotonic_s: the same by a clock that only goes forward, for durations, s; it begins anew
             when the machine does. None in journals of version 1.
     """

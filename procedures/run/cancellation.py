@@ -1,4 +1,4 @@
-"""What must not be left half done: stopping the machine, letting devices go."""
+"""Coroutines that must run to their end although the caller is cancelled."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ Result = TypeVar("Result")
 
 
 async def shielded(action: Coroutine[Any, Any, Result]) -> Result:
-    """Wait for an action to its end, however often the waiting is cancelled.
+    """Wait for an action to its end, however often the caller is cancelled.
 
     Raises:
-        asyncio.CancelledError: it was; raised when the action has ended.
+        asyncio.CancelledError: the caller was cancelled; raised when the action has ended.
     """
     task = asyncio.ensure_future(action)
     was_cancelled = await _end_of(task)
@@ -25,10 +25,10 @@ async def shielded(action: Coroutine[Any, Any, Result]) -> Result:
 
 
 async def cancel_and_wait(task: asyncio.Future[Any]) -> None:
-    """Cancel a task and wait for its end, however often the waiting is cancelled.
+    """Cancel a task and wait for its end, however often the caller is cancelled.
 
     Raises:
-        asyncio.CancelledError: the waiting was; raised when the task has ended.
+        asyncio.CancelledError: the caller was cancelled; raised when the task has ended.
     """
     task.cancel()
     if await _end_of(task):
@@ -49,5 +49,5 @@ async def _end_of(task: asyncio.Future[Any]) -> bool:
 async def in_thread(
     work: Callable[Arguments, Result], *args: Arguments.args, **kwargs: Arguments.kwargs
 ) -> Result:
-    """Work that may write files: who cancels it waits for its end, or it would write behind his back."""
+    """Run work in a thread. It may write files, so a cancelled caller waits for its end."""
     return await shielded(asyncio.to_thread(work, *args, **kwargs))

@@ -1,4 +1,4 @@
-"""What a face may tell a running engine, and the inbox in which it does so."""
+"""Commands to a running engine, and the queue that takes them."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from procedures.run.steps import SetKey
 
 @dataclass(frozen=True, slots=True)
 class Pause:
-    """Rest after the record that is being taken; ``at_once`` stops motion in place instead."""
+    """Pause after the record that is being taken; ``at_once`` stops motion in place instead."""
 
     at_once: bool = False
 
 
 @dataclass(frozen=True, slots=True)
 class Resume:
-    """Go on after a pause: the step that was broken off is decided again."""
+    """Continue after a pause: a step that was cancelled is decided again."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,7 +45,7 @@ class Answer:
 
 @dataclass(frozen=True, slots=True)
 class Stop:
-    """End after the step that is being done; the run can be resumed."""
+    """End after the step that is being executed; the run can be resumed."""
 
     reason: str = "a stop was asked for"
 
@@ -61,7 +61,7 @@ Command = Pause | Resume | Undo | MeasureAgain | Answer | Stop | Abort
 
 
 class CommandQueue:
-    """Commands on their way to one engine, in order; any thread or signal handler may put them in."""
+    """Commands to one engine, in order; any thread or signal handler may put them in."""
 
     def __init__(self) -> None:
         self._commands: deque[Command] = deque()
@@ -75,10 +75,10 @@ class CommandQueue:
         return self._loop is not None
 
     def put(self, command: Command) -> None:
-        """Leave a command; returns at once."""
+        """Add a command; returns at once."""
         self._commands.append(command)
         if self._loop is not None:
-            with suppress(RuntimeError):  # the loop has just been closed: nobody needs it any more
+            with suppress(RuntimeError):  # the loop has just been closed
                 self._loop.call_soon_threadsafe(self._arrived.set)
 
     async def next(self) -> Command:
@@ -95,7 +95,7 @@ class CommandQueue:
 
     @contextmanager
     def attended(self) -> Iterator[None]:
-        """Within this context the running loop takes commands out; afterwards all is over."""
+        """Within this context the running loop takes the commands; afterwards the run is over."""
         self._loop = asyncio.get_running_loop()
         try:
             yield

@@ -1,7 +1,7 @@
-"""What happened: the journal's records, from which everything else is derived.
+"""The events of a run, as the journal keeps them; everything else is derived from them.
 
-Raw readings do not depend on any geometry: encoder counts and gauge answers as they came, the pose
-commanded, and in ``RunStarted`` the geometry that commanded it.
+Readings are raw and depend on no geometry: encoder counts, gauge answers, and the commanded pose.
+``RunStarted`` has the geometry that commanded it.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ def place_of(step: Step | None) -> str:
 
 
 class RunStarted(Frozen):
-    """The run's first record."""
+    """The first event of a run."""
 
     kind: Literal["started"] = "started"
     software: str
@@ -46,14 +46,14 @@ class RunStarted(Frozen):
 
 
 class StepBegun(Frozen):
-    """A step was decided and is being done."""
+    """A step was decided and is being executed."""
 
     kind: Literal["begun"] = "begun"
     step: Step
 
 
 class Arrived(Frozen):
-    """The robot is where a move sent it."""
+    """A move has ended at its pose."""
 
     kind: Literal["arrived"] = "arrived"
     at: SetKey
@@ -62,21 +62,21 @@ class Arrived(Frozen):
 
 
 class Located(Frozen):
-    """The controller said where the robot stands, after a time in which nobody knew."""
+    """The controller reported its pose, after it had been unknown."""
 
     kind: Literal["located"] = "located"
     pose: SixNumbers
 
 
 class GaugesPlaced(Frozen):
-    """The gauges stand around the ball."""
+    """The gauges are placed around the ball."""
 
     kind: Literal["placed"] = "placed"
     at: SetKey
 
 
 class Temperature(Frozen):
-    """What a thermometer said, deg C; without a number, ``problem`` says why there is none."""
+    """The reading of a thermometer, deg C; without one, ``problem`` says why."""
 
     name: str
     celsius: float | None
@@ -112,9 +112,9 @@ class RecordTaken(Frozen):
 
 
 class RecordRejected(Frozen):
-    """A record was not taken: the ball left the travel. The orientation is chosen anew.
+    """A record was rejected: the ball left the travel. Its orientation is chosen again.
 
-    There is no ``reading`` where a plunger at its end gave none.
+    There is no ``reading`` if a plunger was at its end.
     """
 
     kind: Literal["refused"] = "refused"
@@ -125,7 +125,7 @@ class RecordRejected(Frozen):
 
 
 class RecordDiscarded(Frozen):
-    """A record no longer counts and is taken again at the same pose; it stays here."""
+    """A record no longer counts and is taken again at the same pose. It stays in the journal."""
 
     kind: Literal["undone"] = "undone"
     at: SetKey
@@ -133,7 +133,7 @@ class RecordDiscarded(Frozen):
 
 
 class ReferenceConfirmed(Frozen):
-    """Back at the reference after an interruption: ``change_mm`` is small, the set goes on."""
+    """The reference was read again after an interruption: ``change_mm`` is small, the set continues."""
 
     kind: Literal["confirmed"] = "confirmed"
     at: SetKey
@@ -151,9 +151,9 @@ class SetClosed(Frozen):
 
 
 class SetInvalidated(Frozen):
-    """The set is no longer to be trusted and will be measured again; its records stay here.
+    """The set does not count and is measured again. Its records stay in the journal.
 
-    There is a ``reading`` where its reference was seen again and is no longer the same.
+    There is a ``reading`` if its reference was read again and had changed.
     """
 
     kind: Literal["voided"] = "voided"
@@ -175,13 +175,13 @@ class ProvisionalApplied(Frozen):
 
 
 class ProvisionalReverted(Frozen):
-    """The controller's config is as it was before a geometry was lent, and has been read."""
+    """The controller has read its config as it was before the provisional geometry."""
 
     kind: Literal["taken back"] = "taken back"
 
 
 class Identified(Frozen):
-    """The geometry was identified, and the poses that will judge it were chosen."""
+    """The geometry was identified, and the held-out poses were chosen."""
 
     kind: Literal["identified"] = "identified"
     result: IdentificationResult
@@ -189,21 +189,21 @@ class Identified(Frozen):
 
 
 class Proposed(Frozen):
-    """The new geometry stands in the run folder, beside the conditions for writing it."""
+    """The new config was saved in the run folder, and the gates for writing it were evaluated."""
 
     kind: Literal["proposed"] = "proposed"
     gates: tuple[AcceptanceGate, ...]
 
 
 class Committed(Frozen):
-    """The controller's config holds the new geometry and the controller has read it."""
+    """The controller has read a config with the new geometry."""
 
     kind: Literal["committed"] = "committed"
     approved_by: str
 
 
 class ResultValidated(Frozen):
-    """The held-out points were compared."""
+    """The deviations at the held-out points were compared with the limits."""
 
     kind: Literal["judged"] = "judged"
     verdict: Verdict
@@ -211,13 +211,13 @@ class ResultValidated(Frozen):
 
 
 class RolledBack(Frozen):
-    """The controller's config is as it was before the run, bit for bit, and has been read."""
+    """The controller has read its config as it was before the run, bit for bit."""
 
     kind: Literal["rolled back"] = "rolled back"
 
 
 class Tripped(Frozen):
-    """A guard stopped the robot, or kept it from moving: which, on account of what, and what to do."""
+    """A guard stopped the robot, or kept it from moving: which, why, and the next action."""
 
     kind: Literal["tripped"] = "tripped"
     guard: Guard
@@ -232,14 +232,14 @@ class Tripped(Frozen):
 
 
 class Paused(Frozen):
-    """The run rests; ``at_once``: motion was stopped in place, in the middle of a step."""
+    """The run is paused; ``at_once``: motion was stopped in place, within a step."""
 
     kind: Literal["paused"] = "paused"
     at_once: bool = False
 
 
 class Resumed(Frozen):
-    """The run goes on after a pause."""
+    """The run continues after a pause."""
 
     kind: Literal["resumed"] = "resumed"
 
@@ -266,7 +266,7 @@ class Failed(Frozen):
 
 
 class CommandRejected(Frozen):
-    """A command that could not be obeyed, and why."""
+    """A command was refused, and why."""
 
     kind: Literal["declined"] = "declined"
     command: str
@@ -274,7 +274,7 @@ class CommandRejected(Frozen):
 
 
 class Interrupted(Frozen):
-    """The run stopped here: by a person, a fault, or because an answer is missing."""
+    """The run ended early: by a person, a failure, or because an answer is missing."""
 
     kind: Literal["interrupted"] = "interrupted"
     reason: str

@@ -1,4 +1,4 @@
-"""How a run ends: its last event, and the code that an error stands for."""
+"""The end of a run: its last event, and the exit code of an error."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where a run stands: a fold over its events, and nothing else."""
+"""The state of a run: a fold over its events, and nothing else."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ class SetState:
 
     Attributes:
         samples: those that count, in the order taken; the first is the reference.
-        again: poses whose records were undone and are to be taken again, by orientation.
-        reference_unverified: nobody watched the gauges for a while; their zero must be seen again.
+        again: poses of discarded records, to be taken again, by orientation.
+        reference_unverified: the gauges were unwatched; their zero must be verified at the reference.
     """
 
     samples: tuple[events.RecordTaken, ...] = ()
@@ -42,12 +42,12 @@ class SetState:
         return next(number for number in range(1, len(taken) + 2) if number not in taken)
 
     def pose(self, orientation: int) -> SixNumbers | None:
-        """Where a record was, or is to be, taken; nothing where that is not decided."""
+        """The pose of a record taken or to be taken again; None if it is not decided."""
         found = [sample.pose for sample in self.samples if sample.orientation == orientation]
         return found[0] if found else dict(self.again).get(orientation)
 
     def doubted(self) -> SetState:
-        """The same after a time in which nobody watched; a closed set is done with."""
+        """The same after the gauges were unwatched; a closed set is not affected."""
         return self if self.closed or not self.samples else replace(self, reference_unverified=True)
 
     def with_sample(self, sample: events.RecordTaken) -> SetState:
@@ -56,12 +56,12 @@ class SetState:
         return replace(self, samples=(*self.samples, sample), again=again)
 
     def refused(self, orientation: int) -> SetState:
-        """One more record that could not be taken; its orientation is chosen anew."""
+        """One more rejected record; its orientation is chosen again."""
         again = tuple(pair for pair in self.again if pair[0] != orientation)
         return replace(self, refusals=self.refusals + 1, again=again)
 
     def without(self, orientation: int) -> SetState:
-        """One record less; a set that was closed is open again, and its gauges are not believed."""
+        """One record less; a closed set is open again with its reference unverified."""
         kept = tuple(sample for sample in self.samples if sample.orientation != orientation)
         undone = [(s.orientation, s.pose) for s in self.samples if s.orientation == orientation]
         less = replace(self, samples=kept, again=(*self.again, *undone), drift_mm=None)
@@ -74,12 +74,12 @@ class RunState:
 
     Attributes:
         sets: by key, voided ones left out.
-        standing: the set and orientation whose pose the robot holds, if it holds one, and
-            ``target``, the pose that it was last commanded to or found at.
-        off_plan: it stands at a pose of no set: it was found there, or is on its way.
+        standing: the set and orientation of the pose that the robot is at; None if it is at none.
+        target: the pose that it was last commanded to or located at.
+        off_plan: it is at a pose of no set: it was located there, or is at a waypoint.
         path_from_reference: orientations and poses by which it came from the reference it was at last;
             0 where nothing is measured.
-        position_unknown: it may stand anywhere by now; the controller must be asked before it moves.
+        position_unknown: the controller must be asked for the pose before the robot moves.
         failures: how many, by kind and place, since the run was begun or resumed.
         rolling_back: the old geometry is being put back.
         lent: the provisional geometry that the controller was lent last, and ``lending``: whether it
@@ -135,7 +135,7 @@ class RunState:
 
 
 def fold(history: Iterable[events.Event]) -> RunState:
-    """Where a run stands after these events."""
+    """The state after these events."""
     return reduce(apply, history, RunState())
 
 
@@ -219,7 +219,7 @@ def _arrived(state: RunState, event: events.Arrived) -> RunState:
 
 
 def _trail(state: RunState, event: events.Arrived) -> tuple[tuple[int, SixNumbers], ...]:
-    """A way without loops; none where the robot did not come from the end of the one before."""
+    """The path without loops; empty if the robot did not start from its end."""
     poses = [pose for _, pose in state.path_from_reference]
     if event.orientation == 1:
         return ((1, event.pose),)
@@ -234,7 +234,7 @@ def _nowhere(state: RunState) -> RunState:
 
 
 def _doubted(state: RunState, but: SetKey | None = None) -> RunState:
-    """Sets that are left open lose their trust: gauges are carried away, slip, or are switched off."""
+    """All open sets but one become unverified: gauges are carried away, slip, or are switched off."""
     return replace(state, sets={k: v if k == but else v.doubted() for k, v in state.sets.items()})
 
 
@@ -242,7 +242,7 @@ def _failed(state: RunState, event: events.Failed) -> RunState:
     where = (event.failure.value, event.place)
     counted = replace(state, failures={**state.failures, where: event.attempt})
     match event.step:
-        # The ball left its plate on the way to a pose that was chosen: another one is to be chosen.
+        # The ball left its plate on the way to a chosen pose: another pose is chosen.
         case Move(at=at, orientation=orientation) if _is_plate(event) and at.phase is Phase.IDENTIFY:
             counted = _with_set(counted, at, counted.set(at).refused(orientation))
     return _doubted(counted) if event.action is Action.MEASURE_AGAIN else counted
@@ -253,7 +253,7 @@ def _is_plate(event: events.Failed) -> bool:
 
 
 def _rolled_back(state: RunState) -> RunState:
-    """Without a verdict the proposal waits again: nothing was verified under the geometry that went."""
+    """Without a verdict the proposal is open again, and the sets measured after it do not count."""
     if state.judged is not None:
         return replace(state, rolled_back=True)
     kept = {key: value for key, value in state.sets.items() if key.phase is not Phase.AFTER}
@@ -265,7 +265,7 @@ def _with_set(state: RunState, key: SetKey, value: SetState) -> RunState:
 
 
 def record(sample: events.RecordTaken) -> Record:
-    """A record as the mathematics takes it."""
+    """The record for the identification."""
     return Record(
         sample.at.point,
         sample.orientation,

@@ -1,4 +1,4 @@
-"""The engine's state machine: a handful of facts, and the one word for them."""
+"""The status of the engine: one word, derived from a few flags."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class EngineFlags:
     """What is the case; several facts may hold at once.
 
     Attributes:
-        fault: what failed, until somebody has said how to go on.
+        fault: what failed, until it is decided how to continue.
         asking: a question waits for a person.
         pausing: a pause is wanted, ``at_once`` in mid-step; ``resting``: it has begun.
         stopping: why the run is to end; nothing where it is not.

@@ -48,7 +48,7 @@ class Expectation(Frozen):
 
 
 class Locate(Frozen):
-    """Ask the controller where the robot stands: nobody knows, and no way is safe from nowhere."""
+    """Ask the controller for its pose: no path can be checked from an unknown one."""
 
     kind: Literal["locate"] = "locate"
 

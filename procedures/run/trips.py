@@ -1,4 +1,4 @@
-"""A guard that tripped: which, on account of what, and what to do."""
+"""A guard that tripped: which, why, and the next action."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from hexacell.errors import DeviceError, ExitCode, HexacellError, LimitError, fl
 
 
 class Guard(StrEnum):
-    """What is watched; the values stand in journals."""
+    """What is watched; the values are journalled."""
 
     STOP_LINE = "stop line"
     CONTROLLER = "controller"
@@ -56,7 +56,7 @@ class Trip:
 
 
 class GuardTripped(DeviceError):
-    """A guard stopped the robot, or kept it from moving; latched until somebody clears it."""
+    """A guard stopped the robot, or kept it from moving; latched until it is cleared."""
 
     exit_code: ClassVar[ExitCode] = ExitCode.HARDWARE
 
@@ -66,7 +66,7 @@ class GuardTripped(DeviceError):
 
 
 class DriftTripped(GuardTripped, LimitError):
-    """Back at a set's reference the gauges do not show what they did: the set is not to be trusted."""
+    """The gauges show another value at a set's reference than before: the set does not count."""
 
     exit_code: ClassVar[ExitCode] = ExitCode.OUT_OF_LIMITS
 

@@ -107,7 +107,7 @@ class SerialGauge(ABC):
         raise GaugeUnsteady(
             f"readings do not agree: {', '.join(displayed.text for displayed in readings)}",
             subject=self.subject,
-            action="Wait until it stands still; if it does, check its cable",
+            action="Wait until it is still; if it is, check its cable",
         )
 
     async def read_once(self) -> GaugeReading:
@@ -216,7 +216,7 @@ class SerialGauge(ABC):
 
     def _voided(self, problem: str) -> ZeroVoid:
         """The error to raise, now and by every later reading until it is opened again."""
-        self._void = ZeroVoid(problem, subject=self.subject, action="Open it again and zero anew")
+        self._void = ZeroVoid(problem, subject=self.subject, action="Open it again and zero it again")
         return self._void
 
     def _at_end(self, problem: str) -> GaugeAtEnd:

@@ -47,9 +47,9 @@ class NoAnswer(DeviceError):
 class SerialPort:
     """One serial port: requests and their responses, kept synchronized.
 
-    An answer that comes too late must never pass for the answer to the next question. So after a
-    time-out nothing is asked until the line has been silent for ``worst_latency_s`` since, and
-    bytes that nobody asked for are read away, never taken for an answer; ``strays`` keeps them.
+    A late response must never be taken for that of the next request. After a time-out, therefore, the
+    next request waits until the line has been silent for ``worst_latency_s``. Bytes that come without
+    a request are read and kept in ``unsolicited``, never taken for a response.
     """
 
     def __init__(

@@ -230,4 +230,6 @@ def free_bytes(folder: Path) -> int:
     try:
         return shutil.disk_usage(there).free
     except OSError as error:
-        raise atomic_files.os_error_to_file_error("its free space cannot be told", there, error) from error
+        raise atomic_files.os_error_to_file_error(
+            "its free space cannot be determined", there, error
+        ) from error

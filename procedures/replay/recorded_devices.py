@@ -242,11 +242,11 @@ class InactiveGuards(Guards):
         """Nothing to do."""
         del step, state, commanded
 
-    async def stand(self, action: Supervised[Result]) -> Result:
+    async def at_standstill(self, action: Supervised[Result]) -> Result:
         """Run it."""
         return await action()
 
-    async def sample(self, action: Supervised[Result]) -> Result:
+    async def during_readings(self, action: Supervised[Result]) -> Result:
         """Run it."""
         return await action()
 

@@ -35,7 +35,7 @@ class SimulatedController(Closeable):
         *,
         port: int = 0,
         connect_password: str = "EMC",  # noqa: S107 - linuxcncrsh's published default
-        enable_password: str = "EMCTOO",  # noqa: S107 - likewise
+        enable_password: str = "EMCTOO",  # noqa: S107 - same
         config: str = "simulated.ini",
     ) -> None:
         self.faults = ControllerFaults()

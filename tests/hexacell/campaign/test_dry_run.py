@@ -18,29 +18,29 @@ SMALL = {
 
 
 @pytest.fixture(scope="module")
-def foretold(make_plan):
+def result(make_plan):
     return dry_run(make_plan(**SMALL), robots=1)
 
 
-def test_it_is_what_a_campaign_then_gives(foretold, campaign, two_points):
+def test_it_is_what_a_campaign_then_gives(result, campaign, two_points):
     outlook = two_points.forecast(campaign[-1].state)
-    assert foretold.robots == 1
-    assert foretold.points == 2
-    assert 12 <= foretold.records <= 16
-    assert foretold.outside == 0
-    assert outlook.now_mm / 4.0 < foretold.worst_sigma_mm < 4.0 * outlook.now_mm
+    assert result.robots == 1
+    assert result.points == 2
+    assert 12 <= result.records <= 16
+    assert result.outside == 0
+    assert outlook.now_mm / 4.0 < result.worst_sigma_mm < 4.0 * outlook.now_mm
 
 
-def test_it_is_the_same_every_time(foretold, make_plan):
-    assert dry_run(make_plan(**SMALL), robots=1) == foretold
+def test_it_is_the_same_every_time(result, make_plan):
+    assert dry_run(make_plan(**SMALL), robots=1) == result
 
 
-def test_minutes_are_of_everything_that_is_measured(foretold, make_plan):
-    """On the way to held-out poses there are no stops."""
+def test_minutes_are_of_everything_that_is_measured(result, make_plan):
+    """Held-out poses are reached on straight lines."""
     plan = make_plan(**SMALL)
     timing = plan.settings.timing
     held_out = 2 * (2 * 6 + 2) * (timing.move_s + timing.window_s) / 60.0
-    assert foretold.minutes == pytest.approx(plan.budget.time_model.minutes(foretold.records, 2) + held_out)
+    assert result.minutes == pytest.approx(plan.budget.time_model.minutes(result.records, 2) + held_out)
 
 
 def test_robots_that_cannot_be_measured_do_not_count(make_plan):

@@ -1,4 +1,4 @@
-"""The first steps away from a reference, when next to nothing is known of the robot."""
+"""The first records at a point, when little is known of the robot."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ def test_no_robot_within_the_tolerances_leaves_the_travel_on_its_first_step(plan
         (43, Pose(0.0009, -0.1307, 550.0443, -0.29766, -0.29233, -0.10608)),
     ],
 )
-def test_a_search_that_comes_next_to_a_singularity_is_begun_elsewhere(plan, number, small_turn):
+def test_a_search_that_ends_next_to_a_singularity_is_started_elsewhere(plan, number, small_turn):
     """Robots of a thousand, by their number: between them and the drawing both records pass one."""
     measurements = measured(plan, robot_number(plan, number), [plan.reference_pose(1), small_turn])
     assert np.abs(measurements.records[1].deviation).max() > 2.0

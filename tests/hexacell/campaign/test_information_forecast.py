@@ -27,7 +27,7 @@ def plan(make_plan):
 
 
 def test_a_set_tells_what_the_estimator_then_knows(plan):
-    """The robot as drawn visits the sets; its records give the covariance that was foretold."""
+    """The robot as drawn visits the sets; its records give the predicted covariance."""
     belief = plan.robot.belief()
     virtual_robot = VirtualRobot(plan.robot, belief.estimate, np.random.default_rng(0))
     records = []
@@ -38,9 +38,9 @@ def test_a_set_tells_what_the_estimator_then_knows(plan):
             records.append(virtual_robot.measure(point, row + 1))
     found = estimate_online(plan.robot.problem(MeasurementSet(tuple(records))))
     seen = plan.planned_sets.information_under(belief)
-    foretold = add_information(belief.covariance, seen.information(1, 8) + seen.information(2, 8))
+    predicted = add_information(belief.covariance, seen.information(1, 8) + seen.information(2, 8))
     np.testing.assert_allclose(
-        np.sqrt(np.diag(found.free_covariance)), np.sqrt(np.diag(foretold)), rtol=0.02
+        np.sqrt(np.diag(found.free_covariance)), np.sqrt(np.diag(predicted)), rtol=0.02
     )
 
 

@@ -35,11 +35,11 @@ def summary(taken):
     return words
 
 
-def outlooks_of(taken):
-    """What was foretold at each visit."""
-    outlooks = [one.decision.forecast for one in taken if isinstance(one.decision, MeasurePose)]
-    assert None not in outlooks
-    return [outlook for outlook in outlooks if outlook is not None]
+def forecasts_of(taken):
+    """The forecast of each record."""
+    forecasts = [one.decision.forecast for one in taken if isinstance(one.decision, MeasurePose)]
+    assert None not in forecasts
+    return [forecast for forecast in forecasts if forecast is not None]
 
 
 def records_of(taken):
@@ -77,16 +77,16 @@ def test_nothing_but_the_situation_decides(campaign, make_plan):
         assert fresh.decide(one.state) == one.decision
 
 
-def test_what_each_record_leaves_is_as_foretold(campaign):
+def test_the_error_after_each_record_is_as_forecast(campaign):
     """The predicted error after a record, and what then is predicted before the next one."""
-    outlooks = outlooks_of(campaign)
-    for before, after in pairwise(outlooks[3:7]):
+    forecasts = forecasts_of(campaign)
+    for before, after in pairwise(forecasts[3:7]):
         assert after.now_mm == pytest.approx(before.next_mm, rel=0.1)
-    assert outlooks[-1].now_mm < 0.1 * outlooks[0].now_mm
-    assert [outlook.records for outlook in outlooks] == [*range(15, 8, -1), *range(7, 0, -1)]
-    assert all(outlook.end_mm <= outlook.next_mm <= outlook.now_mm for outlook in outlooks)
-    assert outlooks[-1].end_mm == outlooks[-1].next_mm
-    assert 1.0 < outlooks[-1].end_mm / outlooks[0].end_mm < 10.0  # so few records grow late
+    assert forecasts[-1].now_mm < 0.1 * forecasts[0].now_mm
+    assert [forecast.records for forecast in forecasts] == [*range(15, 8, -1), *range(7, 0, -1)]
+    assert all(forecast.end_mm <= forecast.next_mm <= forecast.now_mm for forecast in forecasts)
+    assert forecasts[-1].end_mm == forecasts[-1].next_mm
+    assert 1.0 < forecasts[-1].end_mm / forecasts[0].end_mm < 10.0  # so few records grow late
 
 
 def test_poses_and_expectations_are_in_the_controllers_frames(campaign, two_points, paper):
@@ -141,7 +141,7 @@ def test_a_budget_of_records_ends_it(make_plan, carry_out):
     assert len(records_of(taken)) == 11
     assert summary(taken)[-2:] == ["C2", "end"]
     assert taken[-1].decision == Finished("the budget of 11 records is used")
-    assert [outlook.records for outlook in outlooks_of(taken)] == [*range(10, 3, -1), 2, 1]
+    assert [forecast.records for forecast in forecasts_of(taken)] == [*range(10, 3, -1), 2, 1]
 
 
 def test_a_record_alone_at_a_point_is_not_begun(make_plan, campaign):
@@ -154,7 +154,7 @@ def test_a_record_alone_at_a_point_is_not_begun(make_plan, campaign):
     assert plan.decide(between) == Finished("the budget of 9 records is used")
 
 
-def test_a_budget_of_minutes_counts_the_gauges_way(make_plan, carry_out):
+def test_a_budget_of_minutes_counts_moving_the_gauges(make_plan, carry_out):
     plan = make_plan(
         identification__points=TWO_POINTS,
         identification__orientations=8,
@@ -170,7 +170,7 @@ def test_a_budget_of_minutes_counts_the_gauges_way(make_plan, carry_out):
 
 
 def test_it_stops_when_the_target_is_reached(make_plan, carry_out, campaign):
-    errors = outlooks_of(campaign)
+    errors = forecasts_of(campaign)
     target = 0.5 * (errors[-3].now_mm + errors[-2].now_mm)
     plan = make_plan(
         identification__points=TWO_POINTS,
@@ -193,7 +193,7 @@ def test_a_target_is_not_reached_before_the_records_can_identify(make_plan, carr
 
 
 def test_it_stops_where_nothing_is_worth_measuring(make_plan, carry_out, campaign):
-    gains = [outlook.now_mm - outlook.next_mm for outlook in outlooks_of(campaign)]
+    gains = [forecast.now_mm - forecast.next_mm for forecast in forecasts_of(campaign)]
     plan = make_plan(
         identification__points=TWO_POINTS,
         identification__orientations=8,
@@ -248,8 +248,8 @@ def test_dear_stations_are_left_later(make_plan, carry_out):
     assert isinstance(plan(60.0).decide(left.state), MeasurePose)
 
 
-def test_nothing_is_lent_before_the_robot_is_known_well_enough(campaign, make_plan):
-    """Two records leave the orientation open by degrees: with such a geometry it would be led astray."""
+def test_no_provisional_geometry_before_the_robot_is_known_well_enough(campaign, make_plan):
+    """Two records leave the orientation open by degrees: such a geometry would command wrong poses."""
     plan = make_plan(identification__points=TWO_POINTS, identification__orientations=8)
     by_records = {len(one.state.measurements): one.state for one in campaign}
     assert not plan.allows_provisional(CampaignState())

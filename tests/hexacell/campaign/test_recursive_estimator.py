@@ -66,8 +66,8 @@ def test_the_same_records_are_not_fitted_twice(two_points, records, monkeypatch)
     assert fitted == [1, 2, 3, 4, 5]
 
 
-def test_an_estimate_that_went_astray_is_begun_anew(two_points, records):
-    """Continued from far away it would end far away, and its cost says so."""
+def test_an_implausible_estimate_is_started_again(two_points, records):
+    """Continued from far away it would end far away, and its cost shows that."""
     problem = two_points.robot.problem(MeasurementSet(records))
     good = estimate_online(problem)
     before = estimate_online(two_points.robot.problem(MeasurementSet(records[:-1])))

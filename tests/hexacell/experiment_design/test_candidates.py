@@ -46,7 +46,7 @@ def found(know, much):
     return reachable(know(much), PoseBatch.at([0.0, 0.0, 550.0], orientations(256, TILT, seed=3)))
 
 
-def test_candidates_are_where_the_estimated_robot_stands(found, much, legs):
+def test_candidates_are_poses_of_the_estimated_robot(found, much, legs):
     assert len(found) > 100
     estimated = legs(much.geometry)
     for target, joints in zip(as_vectors(found.targets.poses), found.targets.joints, strict=True):

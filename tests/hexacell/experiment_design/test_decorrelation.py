@@ -51,7 +51,7 @@ def correlation_of(found, pair):
     )
 
 
-def test_the_measurement_does_to_the_correlation_what_was_told(
+def test_the_record_changes_the_correlation_as_predicted(
     found, belief, measured, visit, reach, paper, make_problem
 ):
     pairs = strongly_correlated(found)[:6]

@@ -117,7 +117,7 @@ def test_whatever_the_robot_turns_out_to_be_the_ball_stays_inside_the_travel(sta
 def test_what_is_gained_is_what_the_record_then_takes_from_the_uncertainty(
     stage, know, paper, reach, make_problem, noisy, visit
 ):
-    """Measured, and the estimate made again: the entropy falls by about the gain that was told."""
+    """Measured, and the estimate made again: the entropy falls by about the predicted gain."""
     estimate, _, choice = stage
     joints, pose = reach(paper.actual, paper.nominal, choice.command)
     few = visit(points=1, orientations=4, degrees=2.0, seed=5)
@@ -162,7 +162,7 @@ def test_the_choice_is_the_same_every_time(know, much):
 
 
 @pytest.mark.parametrize("present", [0, 2])
-def test_the_way_from_the_present_pose_is_clear_and_inside_the_travel(
+def test_the_path_from_the_present_pose_is_clear_and_inside_the_travel(
     know, much, paper, legs, vector_of, present
 ):
     """From a pose of the first point, over the stops, looked at more closely than the choice does."""
@@ -183,8 +183,8 @@ def test_the_way_from_the_present_pose_is_clear_and_inside_the_travel(
             assert np.abs(near[:3] - at.reference).max() < TRAVEL_MM + 0.1
 
 
-def test_an_orientation_without_a_clear_way_is_not_chosen(know, much):
-    """From beyond a singularity no way leads back: nothing is left to choose."""
+def test_an_orientation_without_a_clear_path_is_not_selected(know, much):
+    """From beyond a singularity no path leads back: nothing is left to select."""
     at = station_of(know, much, 1)
     beyond = PoseBatch.of([Pose(0, 0, 550, 0, 0, 100)])
     with pytest.raises(LimitError, match="inside the gauges' travel"):
@@ -192,7 +192,7 @@ def test_an_orientation_without_a_clear_way_is_not_chosen(know, much):
 
 
 def test_stops_must_be_worth_the_moves_that_they_take(know, much, monkeypatch):
-    """From a tilted pose: which orientation is chosen depends on what a way round may cost."""
+    """From a tilted pose: the selected orientation depends on what waypoints cost."""
     at, start = station_of(know, much, 1), much.problem.commands.poses[[2]]
 
     def chosen(least):

@@ -1,4 +1,4 @@
-"""Poses that judge: commanded through the uncorrected controller, safe, apart, with clear ways."""
+"""Validation poses: commanded through the uncorrected controller, safe, far apart, with clear lines."""
 
 from __future__ import annotations
 
@@ -92,7 +92,7 @@ def test_the_corrected_robot_can_take_them_too(chosen, much, legs):
         assert corrected.margin(joints, vector) > 0.05 - 1e-4
 
 
-def test_ways_from_one_to_the_next_and_back_to_the_first_are_clear(chosen, know, much):
+def test_lines_from_one_to_the_next_and_back_to_the_first_are_clear(chosen, know, much):
     rows = list(range(COUNT))
     for start, end in [*pairwise(rows), (COUNT - 1, 0)]:
         assert is_clear(know(much), chosen[[start]], chosen[[end]])
@@ -138,7 +138,7 @@ def test_a_point_the_corrected_robot_cannot_reach_is_refused(know, much, paper):
         select_validation_poses(know(short), np.array([0.0, 0.0, 620.0]), COUNT, TURNS)
 
 
-def test_a_robot_that_cannot_be_followed_there_is_refused(know, paper):
+def test_a_robot_whose_actual_pose_is_not_found_is_refused(know, paper):
     """Its legs are too short for the joint variables that the controller would go to."""
     short = Geometry(paper.nominal.S, paper.nominal.B, paper.nominal.l - 150.0)
     with pytest.raises(LimitError, match="cannot be told"):

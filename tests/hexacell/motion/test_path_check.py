@@ -1,4 +1,4 @@
-"""The straight line between two commands: seen all along, refused where anything is in the way."""
+"""The straight line between two commands: checked over its whole length."""
 
 from __future__ import annotations
 
@@ -34,16 +34,16 @@ def test_all_six_numbers_move_evenly_as_a_controllers_do():
     np.testing.assert_allclose(numbers[4], (12, -24, 560, 14, 6, -8), atol=1e-9)
 
 
-def test_angles_go_the_way_the_numbers_go_even_where_it_is_the_long_one():
+def test_angles_are_interpolated_as_numbers_even_over_the_longer_arc():
     way = interpolate_line(at(0, 0, 550, 0, 0, 170), at(0, 0, 550, 0, 0, -170), pieces=2)
     assert way.pose(1).c == pytest.approx(0.0, abs=1e-9)
 
 
-def test_an_open_way_is_clear(exactly):
+def test_an_open_line_is_clear(exactly):
     assert is_clear(exactly(), at(0, 0, 550), at(50, -60, 540, 20, -15, 25))
 
 
-def test_a_way_back_is_as_clear_as_the_way_there(exactly):
+def test_a_line_is_as_clear_in_both_directions(exactly):
     ends = [at(0, 0, 550, 10), at(30, 20, 560, -20, 5, 10), at(0, 0, 550, 44), at(20, 0, 899)]
     for start in ends:
         for end in ends:
@@ -82,12 +82,12 @@ def test_the_joint_range_holds_all_along(exactly):
     assert not is_clear(tight, at(0, 0, 600), at(0, 0, 480))
 
 
-def test_a_way_out_of_reach_is_refused(exactly):
+def test_a_line_out_of_reach_is_refused(exactly):
     assert not is_clear(exactly(), at(0, 0, 550), at(0, 0, 899))
 
 
-def test_the_estimated_robot_must_find_the_way_clear_too(know, paper):
-    """The controller's geometry sees nothing in the way; the real one comes next to a singularity."""
+def test_the_line_is_clear_for_the_estimated_robot_too(know, paper):
+    """For the controller's geometry the line is clear; the actual robot comes next to a singularity."""
     start, end = at(0, 0, 550), at(0, 0, 550, 32)
     assert is_clear(know(paper.nominal), start, end)
     assert not is_clear(know(paper.actual), start, end)

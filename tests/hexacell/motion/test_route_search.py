@@ -1,4 +1,4 @@
-"""Ways in straight lines: the fewest that are clear, or none."""
+"""Routes of straight lines: the fewest that are clear, or none."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ START, GOAL = at(0.0), at(9.0)
 
 
 @pytest.mark.parametrize(
-    ("clear", "way"),
+    ("clear", "route"),
     [
         ([(0, 9)], []),
         ([(0, 9), (0, 1), (1, 9)], []),
@@ -52,10 +52,10 @@ START, GOAL = at(0.0), at(9.0)
         ([], None),
     ],
 )
-def test_the_fewest_lines(monkeypatch: pytest.MonkeyPatch, clear: Any, way: list[int] | None) -> None:
+def test_the_fewest_lines(monkeypatch: pytest.MonkeyPatch, clear: Any, route: list[int] | None) -> None:
     lines = Lines(monkeypatch, *clear)
     nothing: Any = None
-    assert find_route(nothing, START, GOAL, VIA) == way
+    assert find_route(nothing, START, GOAL, VIA) == route
     assert len(lines.asked) == len(set(lines.asked)), "no line is checked twice"
 
 
@@ -71,8 +71,8 @@ def belief() -> Any:
     return robot_of(load_cell(bundled_config("simulated-hexaglide"))).belief()
 
 
-def test_a_way_over_untilted_poses_on_the_real_robot(belief: Any) -> None:
-    """Far and tilted the other way: each line that is taken is clear for the mathematics too."""
+def test_a_route_over_level_poses_on_the_papers_robot(belief: Any) -> None:
+    """Far apart and with another tilt: each line of the route passes the check."""
     start, goal = (
         PoseBatch.of([Pose(100.0, -100.0, 500.0, 25.0, 20.0, 0.0)]),
         PoseBatch.of([Pose(-100.0, 100.0, 500.0)]),
@@ -84,11 +84,11 @@ def test_a_way_over_untilted_poses_on_the_real_robot(belief: Any) -> None:
     assert all(is_clear(belief, here, there) for here, there in pairwise(stops))
 
 
-def test_no_way_leads_out_of_reach(belief: Any) -> None:
+def test_there_is_no_route_out_of_reach(belief: Any) -> None:
     assert find_route(belief, at(0.0), PoseBatch.of([Pose(0.0, 0.0, 2000.0)]), []) is None
 
 
-def test_a_robot_as_drawn_takes_the_ball_where_it_is_told(belief: Any) -> None:
+def test_the_ball_of_a_robot_as_drawn_is_where_it_is_commanded(belief: Any) -> None:
     ball = ball_position(belief, PoseBatch.of([Pose(10.0, -20.0, 550.0, 5.0, 0.0, 0.0)]))
     assert ball is not None
     assert np.abs(ball - [10.0, -20.0, 550.0]).max() < 1e-6

@@ -70,7 +70,7 @@ def test_all_at_once_is_as_one_after_the_other(hexaglide, paper, commanded, here
     assert agreeing < joints.shape[1]  # some lines lead into a singularity
 
 
-def test_what_is_in_doubt_is_followed_step_by_step_or_given_up(
+def test_unconfirmed_lines_are_tracked_point_by_point_or_left_out(
     hexaglide, paper, commanded, here, monkeypatch
 ):
     ways, joints = commanded

@@ -1,4 +1,4 @@
-"""Ways with gauges at the ball: straight, led over stops, or over the reference."""
+"""Paths with gauges at the ball: straight, over waypoints, or over the reference."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def home(well):
 
 
 def farthest(well, line):
-    """How far the ball gets from its place on the way over some commands, looked at closely."""
+    """How far the ball gets from its place on lines over some commands, finely sampled."""
     away = 0.0
     for start, end in pairwise(line):
         way = interpolate_line(start, end, 60)
@@ -57,48 +57,48 @@ def farthest(well, line):
     return away
 
 
-def line_of(passage, start, end):
-    return [start, *(PoseBatch.of([stop]) for stop in passage.waypoints), end]
+def line_of(path, start, end):
+    return [start, *(PoseBatch.of([stop]) for stop in path.waypoints), end]
 
 
-def test_where_the_straight_line_leaves_the_travel_stops_keep_the_ball_inside(well, commands, home):
-    """From one wide turn to others: hardly any straight line is safe, many led ones are."""
+def test_where_the_straight_line_leaves_the_travel_waypoints_keep_the_ball_inside(well, commands, home):
+    """From one large tilt to others: few straight lines are safe, many paths over waypoints are."""
     start = commands[[int(np.argmax(commands.tilts()))]]
-    ways = PathPlanner(well, start, None, BALL).plan(commands)
-    led = [row for row, way in enumerate(ways) if way and way.waypoints]
-    direct = [row for row, way in enumerate(ways) if way and not way.waypoints]
-    assert len(led) > len(direct) > 0
-    for row in [*led[:10], *direct[:5]]:
-        passage, end = ways[row], commands[[row]]
-        assert passage is not None
-        seen = farthest(well, line_of(passage, start, end))
+    paths = PathPlanner(well, start, None, BALL).plan(commands)
+    over_waypoints = [row for row, path in enumerate(paths) if path and path.waypoints]
+    direct = [row for row, path in enumerate(paths) if path and not path.waypoints]
+    assert len(over_waypoints) > len(direct) > 0
+    for row in [*over_waypoints[:10], *direct[:5]]:
+        path, end = paths[row], commands[[row]]
+        assert path is not None
+        seen = farthest(well, line_of(path, start, end))
         assert seen <= TRAVEL_MM + 0.1
-        assert np.abs(passage.poses.positions - BALL).max() == pytest.approx(seen, abs=0.3)
-    for row in led[:10]:
-        passage = ways[row]
-        assert passage is not None
-        assert len(passage.waypoints) == len(WAYPOINT_PIECES)
+        assert np.abs(path.poses.positions - BALL).max() == pytest.approx(seen, abs=0.3)
+    for row in over_waypoints[:10]:
+        path = paths[row]
+        assert path is not None
+        assert len(path.waypoints) == len(WAYPOINT_PIECES)
         assert farthest(well, [start, commands[[row]]]) > TRAVEL_MM
 
 
 def test_over_the_reference_the_ball_stays_inside_as_well(well, commands, home):
     start = commands[[int(np.argmax(commands.tilts()))]]
-    leave = PathPlanner(well, start, home, BALL)
-    over = leave.options(commands).via_reference(np.arange(len(commands)))
-    found = [(row, way) for row, way in enumerate(over) if way is not None]
+    planner = PathPlanner(well, start, home, BALL)
+    over = planner.options(commands).via_reference(np.arange(len(commands)))
+    found = [(row, path) for row, path in enumerate(over) if path is not None]
     assert len(found) > len(commands) // 4
-    for row, way in found[:5]:
-        assert home.pose(0) in way.waypoints
-        assert farthest(well, line_of(way, start, commands[[row]])) <= TRAVEL_MM + 0.1
+    for row, path in found[:5]:
+        assert home.pose(0) in path.waypoints
+        assert farthest(well, line_of(path, start, commands[[row]])) <= TRAVEL_MM + 0.1
 
 
-def test_from_the_reference_itself_there_is_no_way_over_it(well, commands, home):
-    ways = PathPlanner(well, home, None, BALL).options(commands)
-    assert list(ways.via_reference(np.array([0, 1]))) == [None, None]
+def test_from_the_reference_itself_there_is_no_path_over_it(well, commands, home):
+    paths = PathPlanner(well, home, None, BALL).options(commands)
+    assert list(paths.via_reference(np.array([0, 1]))) == [None, None]
 
 
-def test_nothing_leads_away_from_where_the_robot_cannot_be(well, commands):
+def test_there_is_no_path_from_where_the_robot_cannot_be(well, commands):
     beyond = PoseBatch.at([0.0, 0.0, 5000.0], np.eye(3)[None])
-    leave = PathPlanner(well, beyond, beyond, BALL)
-    assert not any(leave.plan(commands))
-    assert list(leave.options(commands).via_reference(np.array([0, 1]))) == [None, None]
+    planner = PathPlanner(well, beyond, beyond, BALL)
+    assert not any(planner.plan(commands))
+    assert list(planner.options(commands).via_reference(np.array([0, 1]))) == [None, None]

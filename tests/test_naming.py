@@ -10,8 +10,6 @@ CHECKOUT = Path(__file__).parent.parent
 PACKAGES = ("hexacell", "drivers", "procedures")
 ONE_IDEA_IN_SEVERAL_MODULES = {
     "main": "a command of the command line",
-    "encode": "a message or record as bytes or text",
-    "decode": "the reverse",
     "parse_value": "a reading in the syntax of one gauge protocol",
     "format_value": "the reverse, in the simulation",
 }

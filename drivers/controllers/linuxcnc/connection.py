@@ -18,7 +18,7 @@ from drivers.controllers.linuxcnc.protocol import (
     parse_explanation,
     parse_response,
 )
-from drivers.controllers.linuxcnc.settings import Address, Timeouts, now
+from drivers.controllers.linuxcnc.settings import Address, Timeouts, loop_time
 from drivers.wire_trace import TraceEntry, TraceRecorder, TrafficDirection
 from hexacell.errors import DeviceError, UsageError
 
@@ -132,11 +132,11 @@ class Connection:
         self.server = self._server_in(await self._first_line())
         await self._write(self._encoded("set echo off"))
         with contextlib.suppress(TimeoutError):  # the only response, if any, is the echo
-            await self._line(now() + self._timeouts.explanation)
+            await self._line(loop_time() + self._timeouts.explanation)
         await self.request("set verbose on")
 
     async def _first_line(self) -> str:
-        deadline = now() + self._timeouts.answer
+        deadline = loop_time() + self._timeouts.answer
         try:
             while (line := await self._line(deadline)).lower().startswith("warning:"):
                 pass
@@ -190,13 +190,13 @@ class Connection:
         return response
 
     async def _response_to(self, command: str, timeout_s: float) -> Response:
-        deadline = now() + timeout_s
+        deadline = loop_time() + timeout_s
         remarks: list[str] = []
         try:
             while (answer := parse_response(line := await self._line(deadline), command)) is None:
                 if explanation := parse_explanation(line):
                     remarks.append(explanation)
-                    deadline = min(deadline, now() + self._timeouts.explanation)
+                    deadline = min(deadline, loop_time() + self._timeouts.explanation)
         except TimeoutError:
             if remarks:  # 2.10 refuses without a NAK while another client moves the machine
                 return Response(accepted=False, explanations=tuple(remarks))

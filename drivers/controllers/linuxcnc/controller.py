@@ -18,7 +18,7 @@ from drivers.controllers.linuxcnc import startup
 from drivers.controllers.linuxcnc.commands import ControllerCommands
 from drivers.controllers.linuxcnc.protocol import pose_difference, rapid_move
 from drivers.controllers.linuxcnc.session import Session
-from drivers.controllers.linuxcnc.settings import Address, Timeouts, now
+from drivers.controllers.linuxcnc.settings import Address, Timeouts, loop_time
 from drivers.interfaces import ControllerStatus, DeviceIdentity
 from drivers.wire_trace import TraceRecorder
 from hexacell.cell.devices import ControllerSettings
@@ -185,10 +185,10 @@ class LinuxcncrshController:
             raise
 
     async def _verify_arrival(self, commands: ControllerCommands, target: Pose, stops: int) -> None:
-        deadline = now() + self._timeouts.arrival
+        deadline = loop_time() + self._timeouts.arrival
         while not self._agree(there := await commands.pose(), target):
             was_stopped = self._was_stopped_since(stops)
-            if was_stopped or now() > deadline:
+            if was_stopped or loop_time() > deadline:
                 reason = "it was stopped on request" if was_stopped else await commands.reason()
                 raise MotionInterrupted(
                     f"stopped at {there} on the way to {target}: {reason}",

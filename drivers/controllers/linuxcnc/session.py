@@ -27,7 +27,7 @@ from drivers.controllers.linuxcnc import startup
 from drivers.controllers.linuxcnc.commands import CommandChannel, ControllerCommands
 from drivers.controllers.linuxcnc.connection import Connection
 from drivers.controllers.linuxcnc.send_arbiter import SendArbiter
-from drivers.controllers.linuxcnc.settings import Address, Timeouts, now
+from drivers.controllers.linuxcnc.settings import Address, Timeouts, loop_time
 from drivers.controllers.linuxcnc.status_channel import StatusConnection
 from drivers.controllers.linuxcnc.stop import stop_in_place
 from drivers.interfaces import ControllerStatus
@@ -99,12 +99,12 @@ class Session:
         Raises:
             ConnectionLost: It cannot be reached within ``timeouts.reconnect``.
         """
-        deadline = now() + self._timeouts.reconnect
+        deadline = loop_time() + self._timeouts.reconnect
         while True:
             try:
                 return await self.synchronized()
             except ConnectionLost:
-                if now() > deadline:
+                if loop_time() > deadline:
                     raise
                 await asyncio.sleep(self._timeouts.poll)
 

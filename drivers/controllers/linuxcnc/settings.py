@@ -55,6 +55,6 @@ class Timeouts:
     reconnect: float = 60.0
 
 
-def now() -> float:
+def loop_time() -> float:
     """The time of the running event loop, s."""
     return asyncio.get_running_loop().time()

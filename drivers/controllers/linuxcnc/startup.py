@@ -12,7 +12,7 @@ from collections.abc import Awaitable, Callable
 from drivers.controllers.errors import CommandRefused, MotionInterrupted
 from drivers.controllers.linuxcnc.commands import ControllerCommands
 from drivers.controllers.linuxcnc.protocol import parse_positions
-from drivers.controllers.linuxcnc.settings import Timeouts, now
+from drivers.controllers.linuxcnc.settings import Timeouts, loop_time
 from hexacell.errors import DeviceError
 
 Stopped = Callable[[], bool]
@@ -82,10 +82,10 @@ async def home_joints(
     await commands.errors()
     _raise_if_stopped(stopped, commands)
     await commands.set("home -1", timeout_s)
-    deadline = now() + timeout_s
+    deadline = loop_time() + timeout_s
     while not await commands.all_homed():
         _raise_if_stopped(stopped, commands)
-        if now() > deadline:
+        if loop_time() > deadline:
             problem = f"is not homed after {timeout_s:g} s: {await commands.reason()}"
             raise DeviceError(problem, subject=commands.subject, action="Home it at the machine")
         await asyncio.sleep(poll_s)
@@ -155,9 +155,9 @@ async def _is(commands: ControllerCommands, what: str, *, on: bool) -> bool:
 
 
 async def _becomes_true(condition: Callable[[], Awaitable[bool]], timeouts: Timeouts) -> bool:
-    deadline = now() + timeouts.switch
+    deadline = loop_time() + timeouts.switch
     while not await condition():
-        if now() > deadline:
+        if loop_time() > deadline:
             return False
         await asyncio.sleep(timeouts.poll)
     return True

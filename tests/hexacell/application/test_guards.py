@@ -52,7 +52,7 @@ def striking(site: Any, key: str, kind: FaultKind, device: str) -> Callable[...,
                 "at_move": schedule.move_count + 1,
                 "after_s": 5.0,
             }
-            schedule.plan(SimulatedFault.model_validate(fault))
+            schedule.schedule(SimulatedFault.model_validate(fault))
 
     return listener
 

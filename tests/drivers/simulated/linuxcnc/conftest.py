@@ -17,6 +17,7 @@ from drivers.simulated.linuxcnc.server import HOST, SimulatedController
 from hexacell.cell.devices import ControllerSettings
 from hexacell.errors import FileError
 from hexacell.kinematics.pose import Pose
+from tests.waiting import wait_until
 
 QUICK = Timeouts(poll=0.005, arrival=0.05, switch=0.05)
 
@@ -57,10 +58,7 @@ class FakeMachine:
             self._stop.set()
 
     def wait_until(self, condition: Callable[[FakeMachine], bool]) -> None:
-        give_up = time.monotonic() + 5.0
-        while not condition(self):
-            assert time.monotonic() < give_up
-            time.sleep(0.001)
+        wait_until(lambda: condition(self))
 
     def wait_for(self, event: str) -> None:
         self.wait_until(lambda machine: event in machine.events)

@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from hexacell.cell.loader import Cell
+from hexacell.cell.mechanism_sections import mechanism_named
 from hexacell.cell.model import CellSettings
 from hexacell.controller_config.interface import Branch, ConfigFormat, ControllerGeometry
 from hexacell.errors import ReachError
@@ -91,7 +92,7 @@ class Robot:
 
     def for_controller(self, geometry: Geometry) -> Geometry:
         """A geometry in the convention's frames, in the frames of the controller's config."""
-        return self.frames.inverse().geometry(geometry)
+        return self.mechanism.change_frames(geometry, self.frames.inverse())
 
     def from_commands(self, commands: Iterable[Pose]) -> PoseBatch:
         """Poses (n) commanded in the controller's frames, in the convention's frames."""
@@ -126,7 +127,8 @@ class Robot:
 
 def config_format(settings: CellSettings) -> ConfigFormat:
     """The reader and writer of a cell's controller config."""
-    made: ConfigFormat = load(Group.CONFIG_FORMATS, settings.controller.config_format)()
+    parameters = mechanism_named(settings.robot.mechanism).parameters
+    made: ConfigFormat = load(Group.CONFIG_FORMATS, settings.controller.config_format)(parameters)
     return made
 
 
@@ -141,15 +143,15 @@ def robot_of(cell: Cell) -> Robot:
 
 def make_robot(settings: CellSettings, controller: ControllerGeometry) -> Robot:
     """The robot of a cell's settings and a controller geometry."""
-    mechanism: Mechanism = load(Group.MECHANISMS, settings.robot.mechanism)()
-    nominal, limits = settings.robot.nominal, settings.limits
-    drawing, _ = mechanism.normalize_frames(Geometry(nominal.S, nominal.B, nominal.l))
+    mechanism, limits = mechanism_named(settings.robot.mechanism), settings.limits
+    nominal = Geometry.of(mechanism.parameters, settings.robot.nominal.document())
+    drawing, _ = mechanism.normalize_frames(nominal)
     return Robot(
         mechanism=mechanism,
         drawing=drawing,
         controller=controller.geometry,
         branch=controller.branch,
-        tolerances=Tolerances(**settings.tolerances.model_dump()),
+        tolerances=Tolerances.of_settings(mechanism.parameters, settings.tolerances.document()),
         noise=Noise(
             settings.noise.encoder_mm,
             settings.noise.gauge_mm,

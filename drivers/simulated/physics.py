@@ -94,8 +94,7 @@ class RobotPhysics:
         start_geometry: Geometry,
         start_joints: Array,
     ) -> None:
-        values = settings.geometry
-        self._truth = Geometry(values.S, values.B, values.l)
+        self._truth = Geometry.of(mechanism.parameters, settings.geometry.document())
         self._mechanism = mechanism
         self.on_motion_start: Callable[[], None] = lambda: None
         self._settings = settings

@@ -11,8 +11,8 @@ from drivers.interfaces import DeviceIdentity
 from hexacell import __version__
 from hexacell.application.device_setup import Connected, device_addresses, open_devices, with_settings
 from hexacell.campaign.pose_list import pose_list_of
-from hexacell.cell.fields import GeometryValues
 from hexacell.cell.loader import Cell
+from hexacell.cell.mechanism_sections import mechanism_named
 from hexacell.controller_config.change import fingerprint
 from hexacell.controller_config.interface import ControllerGeometry
 from hexacell.errors import FileError, HexacellError, UsageError, flatten_errors
@@ -201,13 +201,7 @@ def run_started(
         mode=calibration.mode.value,
         config=str(cell.config_path),
         config_sha256=fingerprint(cell.config_path),
-        controller=GeometryValues.model_validate(
-            {
-                "S": robot.controller.S.tolist(),
-                "B": robot.controller.B.tolist(),
-                "l": robot.controller.l.tolist(),
-            }
-        ),
+        controller=robot.controller.document(),
         branch=robot.branch,
         devices=identities,
         pose_list=None if calibration.listed is None else read_text(calibration.listed.path),
@@ -240,6 +234,6 @@ def _resumed_start(request: RunRequest) -> events.RunStarted:
 
 def robot_of_run(cell: Cell, started: events.RunStarted) -> Robot:
     """The robot with the geometry that the controller had when the run began."""
-    values = started.controller
-    geometry = ControllerGeometry(Geometry(values.S, values.B, values.l), started.branch)
-    return make_robot(cell.settings, geometry)
+    parameters = mechanism_named(cell.settings.robot.mechanism).parameters
+    geometry = Geometry.of(parameters, started.controller)
+    return make_robot(cell.settings, ControllerGeometry(geometry, started.branch))

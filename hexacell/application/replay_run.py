@@ -13,6 +13,8 @@ from hexacell.application.device_setup import with_settings
 from hexacell.campaign.pose_list import pose_list_of
 from hexacell.cell.calibration import IdentificationSettings
 from hexacell.cell.loader import Cell, load_cell
+from hexacell.cell.mechanism_sections import geometry_settings, mechanism_named
+from hexacell.cell.model import CellSettings
 from hexacell.cell.toml_writer import to_toml
 from hexacell.controller_config.change import ConfigChange
 from hexacell.controller_config.receipt import BEFORE
@@ -122,7 +124,7 @@ def _set_up(
     if text is None:
         native = settings.controller.model_copy(update={"config_format": "toml"})
         settings = settings.model_copy(update={"controller": native})
-        text = _native_config(started)
+        text = _native_config(settings, started)
     cell = with_settings(cell, settings)
     cell.config_path.write_bytes(text)
     run = RunFolder(scratch / "run")
@@ -172,7 +174,8 @@ def _config_text(folder: RunFolder, started: RunStarted) -> bytes | None:
     return kept if kept is not None and atomic_files.sha256(kept) == started.config_sha256 else None
 
 
-def _native_config(started: RunStarted) -> bytes:
+def _native_config(settings: CellSettings, started: RunStarted) -> bytes:
     """A config in the native format with the geometry that commanded the run."""
-    geometry = to_toml(started.controller)
+    parameters = mechanism_named(settings.robot.mechanism).parameters
+    geometry = to_toml(geometry_settings(parameters).model_validate(started.controller))
     return f"[geometry]\n{geometry}branch = {list(started.branch)}\n".encode()

@@ -59,8 +59,7 @@ def pose_failures(plan: Plan, name: str, pose: Pose) -> Iterator[HexacellError]:
 def _out_of_travel(plan: Plan, name: str, point: int, pose: Pose) -> Iterator[HexacellError]:
     """A listed pose too far from its reference. Positions of measured files contain the robot's error."""
     travel = plan.settings.limits.gauge_travel_mm
-    stated = plan.settings.tolerances
-    error = stated.S_mm + stated.B_mm + stated.l_mm + stated.ball_mm
+    error = plan.robot.tolerances.sum_mm(plan.robot.mechanism.parameters)
     apart = float(np.abs(pose.position - plan.reference_pose(point).position).max())
     if apart > travel + error:
         yield ReachError(

@@ -71,7 +71,7 @@ class Task:
         workspace, by_workspace = _derivatives(belief, self.workspace)
         if not len(task) or not len(workspace):
             return None
-        fit = FrameFit(workspace, float(np.mean(np.linalg.norm(belief.estimate.B, axis=-1))))
+        fit = FrameFit(workspace, float(belief.mechanism.platform_radius(belief.estimate)))
         return TaskError(fit.remove_frame_motion(task, by_task, by_workspace)[:, :3])
 
 

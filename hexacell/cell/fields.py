@@ -12,7 +12,6 @@ NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Point = tuple[Finite, Finite, Finite]
 SixNumbers = tuple[Finite, Finite, Finite, Finite, Finite, Finite]
-SixPoints = tuple[Point, Point, Point, Point, Point, Point]
 
 
 class Section(BaseModel):
@@ -26,9 +25,5 @@ def broken_rule(problem: str, action: str) -> PydanticCustomError:
     return PydanticCustomError("broken_rule", "{problem}", {"problem": problem, "action": action})
 
 
-class GeometryValues(Section):
-    """The 42 numbers of a mechanism with one constraint a leg, mm."""
-
-    S: SixPoints = Field(description="spherical joints in the base frame at q = 0, mm, legs 1 to 6")
-    B: SixPoints = Field(description="universal joints in the platform frame (origin: the ball), mm")
-    l: SixNumbers = Field(description="leg lengths, mm")  # noqa: E741 - the paper's symbol
+GeometryDocument = dict[str, tuple[Finite | tuple[Finite, ...], ...]]
+"""The values of a geometry under the symbols of its parameter kinds, as JSON files have them."""

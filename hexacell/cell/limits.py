@@ -34,15 +34,6 @@ class NoiseSettings(Section):
     gauge_mm: Positive = Field(0.01, description="of a gauge's reading")
 
 
-class ToleranceSettings(Section):
-    """Largest deviations of the built robot from its drawing."""
-
-    S_mm: Positive = Field(7.0, description="every coordinate of a spherical joint")
-    B_mm: Positive = Field(7.0, description="every coordinate of a universal joint")
-    l_mm: Positive = Field(7.0, description="every leg length")
-    ball_mm: NotNegative = Field(0.0, description="mounting of the ball: an offset common to all B")
-
-
 class LimitSettings(Section):
     """Limits of every commanded pose."""
 

@@ -13,11 +13,14 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from hexacell.cell.diagnostics import Errors, explain_refusal, unsupported_values
+from hexacell.cell.diagnostics import Diagnosis
 from hexacell.cell.fields import Section
-from hexacell.cell.model import CellSettings
+from hexacell.cell.mechanism_sections import DEFAULT_MECHANISM
+from hexacell.cell.model import CellSettings, cell_model
+from hexacell.cell.model_lookup import ModelLookup
 from hexacell.cell.toml_writer import subsections, to_toml
 from hexacell.errors import FileError, SeveralErrors
+from hexacell.plugins import Group, names
 from hexacell.storage.atomic_files import read_text
 from hexacell.storage.toml_document import BYTE_ORDER_MARK, TomlDocument
 from hexacell.storage.toml_locations import KeyPath
@@ -81,7 +84,7 @@ def dump(settings: CellSettings) -> str:
 
 def schema() -> dict[str, Any]:
     """The JSON Schema of a cell file, for editors and for other programs."""
-    return CellSettings.model_json_schema()
+    return cell_model(DEFAULT_MECHANISM).model_json_schema()
 
 
 def dotted(path: KeyPath) -> str:
@@ -100,15 +103,24 @@ def _keys(section: Section, path: KeyPath) -> Iterator[KeyPath]:
 
 
 def _checked(document: TomlDocument, path: Path) -> CellSettings:
-    errors: Errors = unsupported_values(document)
+    model = cell_model(_mechanism(document))
+    diagnosis = Diagnosis(document, ModelLookup(model))
+    errors = diagnosis.unsupported_values()
     try:
         # As JSON, because strict validation then accepts arrays as tuples.
-        settings = CellSettings.model_validate_json(document.to_json(), strict=True)
+        settings = model.model_validate_json(document.to_json(), strict=True)
     except ValidationError as refusal:
-        errors |= explain_refusal(document, refusal)
+        errors |= diagnosis.explain_refusal(refusal)
     if errors:
         raise _joined(path, list(errors.values()))
     return settings
+
+
+def _mechanism(document: TomlDocument) -> str:
+    """The mechanism that the file names. One that is not installed is refused when the robot is made."""
+    robot = document.data.get("robot")
+    name = robot.get("mechanism") if isinstance(robot, dict) else None
+    return name if isinstance(name, str) and name in names(Group.MECHANISMS) else DEFAULT_MECHANISM
 
 
 def _joined(path: Path, errors: list[FileError]) -> FileError | SeveralErrors:

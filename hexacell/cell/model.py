@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Literal, Self
 
-from pydantic import Field, ValidationError, field_validator, model_validator
+from pydantic import Field, ValidationError, create_model, field_validator, model_validator
 from pydantic_core import InitErrorDetails
 
 from hexacell.cell.calibration import (
@@ -15,13 +16,20 @@ from hexacell.cell.calibration import (
     VerificationSettings,
 )
 from hexacell.cell.devices import ControllerSettings, EncoderSettings, GaugeSettings, ThermometerSettings
-from hexacell.cell.fields import GeometryValues, Section, broken_rule
+from hexacell.cell.fields import Section, broken_rule
 from hexacell.cell.limits import (
     GuardSettings,
     LimitSettings,
     NoiseSettings,
     TimingSettings,
+)
+from hexacell.cell.mechanism_sections import (
+    DEFAULT_MECHANISM,
+    GeometrySettings,
     ToleranceSettings,
+    geometry_settings,
+    mechanism_named,
+    tolerance_settings,
 )
 from hexacell.cell.recovery import RecoverySettings
 from hexacell.cell.simulation import SimulationSettings
@@ -30,12 +38,12 @@ from hexacell.cell.simulation import SimulationSettings
 class RobotSettings(Section):
     """The mechanism and its drawing."""
 
-    mechanism: str = Field("hexaglide", description="hexaglide, or one that a plug-in adds")
-    nominal: GeometryValues = Field(description="the drawing; identification starts from it")
+    mechanism: str = Field(DEFAULT_MECHANISM, description="hexaglide, or one that a plug-in adds")
+    nominal: GeometrySettings = Field(description="the drawing; identification starts from it")
 
 
 class CellSettings(Section):
-    """A whole cell file."""
+    """A whole cell file, for any mechanism; :func:`cell_model` is the model of one."""
 
     version: Literal[1] = Field(1, description="of this file's format")
     name: str = Field(min_length=1, description="of the cell, on screens and in reports")
@@ -92,6 +100,36 @@ class CellSettings(Section):
         if refusals:
             raise ValidationError.from_exception_data(self.name, refusals)
         return self
+
+
+@cache
+def cell_model(mechanism: str) -> type[CellSettings]:
+    """The model of the cell files of one mechanism, whose parameters decide some of the keys.
+
+    Raises:
+        UsageError: no such mechanism is installed.
+    """
+    parameters = mechanism_named(mechanism).parameters
+    geometry, tolerances = geometry_settings(parameters), tolerance_settings(parameters)
+    nominal = (geometry, RobotSettings.model_fields["nominal"])
+    truth = (geometry, SimulationSettings.model_fields["geometry"])
+    robot = create_model(
+        "RobotSettings", __base__=RobotSettings, __doc__=RobotSettings.__doc__, nominal=nominal
+    )
+    simulation = create_model(
+        "SimulationSettings",
+        __base__=SimulationSettings,
+        __doc__=SimulationSettings.__doc__,
+        geometry=truth,
+    )
+    return create_model(
+        "CellSettings",
+        __base__=CellSettings,
+        __doc__="A whole cell file.",
+        robot=(robot, ...),
+        tolerances=(tolerances, tolerances()),
+        simulation=(simulation | None, None),
+    )
 
 
 def _unreachable(place: tuple[str | int, ...], problem: str) -> InitErrorDetails:

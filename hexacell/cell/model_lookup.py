@@ -3,52 +3,61 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from types import UnionType
 from typing import Annotated, Union, get_args, get_origin
 
 from hexacell.cell.fields import Section
-from hexacell.cell.model import CellSettings
 from hexacell.storage.toml_document import table_header
 from hexacell.storage.toml_locations import KeyPath
 
 
-def section_at(path: KeyPath) -> type[Section] | None:
-    """The model of the section at ``path``; None if no section belongs there."""
-    annotation = _annotation_at(path)
-    return annotation if isinstance(annotation, type) and issubclass(annotation, Section) else None
+@dataclass(frozen=True, slots=True)
+class ModelLookup:
+    """Places in the cell file by their paths; ``model`` is that of the whole file."""
 
+    model: type[Section]
 
-def length_at(path: KeyPath) -> int | None:
-    """The length of the list at ``path``; None if any length is allowed or no list belongs there."""
-    annotation = _annotation_at(path)
-    items = get_args(annotation) if get_origin(annotation) is tuple else ()
-    return len(items) if items and items[-1] is not Ellipsis else None
+    def section_at(self, path: KeyPath) -> type[Section] | None:
+        """The model of the section at ``path``; None if no section belongs there."""
+        annotation = self._annotation_at(path)
+        return annotation if isinstance(annotation, type) and issubclass(annotation, Section) else None
 
+    def length_at(self, path: KeyPath) -> int | None:
+        """The length of the list at ``path``; None if any length is allowed or no list belongs there."""
+        annotation = self._annotation_at(path)
+        items = get_args(annotation) if get_origin(annotation) is tuple else ()
+        return len(items) if items and items[-1] is not Ellipsis else None
 
-def description_at(path: KeyPath) -> str | None:
-    """The description of the key at ``path``, or of the key whose list contains ``path``."""
-    while path and not isinstance(path[-1], str):
-        path = path[:-1]
-    section = section_at(path[:-1]) if path else None
-    field = section.model_fields.get(str(path[-1])) if section else None
-    return field.description if field else None
+    def description_at(self, path: KeyPath) -> str | None:
+        """The description of the key at ``path``, or of the key whose list contains ``path``."""
+        while path and not isinstance(path[-1], str):
+            path = path[:-1]
+        section = self.section_at(path[:-1]) if path else None
+        field = section.model_fields.get(str(path[-1])) if section else None
+        return field.description if field else None
 
+    def header(self, path: KeyPath) -> str:
+        """The header that opens the section at ``path``: ``[robot.nominal]``, ``[[gauges]]``."""
+        return table_header((*path, 0) if self.section_at((*path, 0)) else path)
 
-def header(path: KeyPath) -> str:
-    """The header that opens the section at ``path``: ``[robot.nominal]``, ``[[gauges]]``."""
-    return table_header((*path, 0) if section_at((*path, 0)) else path)
+    def sections_with(self, key: str) -> list[str]:
+        """The headers of the sections that have ``key``."""
+        found = self._sections(self.model, ())
+        return [self.header(path) for path, section in found if key in section.model_fields]
 
+    def _annotation_at(self, path: KeyPath) -> object:
+        annotation: object = self.model
+        for key in path:
+            annotation = _without_none(_inside(annotation, key))
+        return annotation
 
-def sections_with(key: str) -> list[str]:
-    """The headers of the sections that have ``key``."""
-    return [header(path) for path, section in _sections(CellSettings, ()) if key in section.model_fields]
-
-
-def _annotation_at(path: KeyPath) -> object:
-    annotation: object = CellSettings
-    for key in path:
-        annotation = _without_none(_inside(annotation, key))
-    return annotation
+    def _sections(self, section: type[Section], path: KeyPath) -> Iterator[tuple[KeyPath, type[Section]]]:
+        for name in section.model_fields:
+            for inner in ((*path, name), (*path, name, 0)):
+                if found := self.section_at(inner):
+                    yield inner, found
+                    yield from self._sections(found, inner)
 
 
 def _inside(annotation: object, key: str | int) -> object:
@@ -65,11 +74,3 @@ def _without_none(annotation: object) -> object:
     if get_origin(annotation) in {Union, UnionType}:
         return next(option for option in get_args(annotation) if option is not type(None))
     return annotation
-
-
-def _sections(section: type[Section], path: KeyPath) -> Iterator[tuple[KeyPath, type[Section]]]:
-    for name in section.model_fields:
-        for inner in ((*path, name), (*path, name, 0)):
-            if found := section_at(inner):
-                yield inner, found
-                yield from _sections(found, inner)

@@ -6,7 +6,8 @@ from typing import Literal
 
 from pydantic import Field
 
-from hexacell.cell.fields import GeometryValues, NotNegative, Positive, Section
+from hexacell.cell.fields import NotNegative, Positive, Section
+from hexacell.cell.mechanism_sections import GeometrySettings
 
 
 class SimulatedGauges(Section):
@@ -66,7 +67,7 @@ class SimulatedFault(Section):
 class SimulationSettings(Section):
     """The simulation of a cell."""
 
-    geometry: GeometryValues = Field(description="the true geometry, known to the simulation only")
+    geometry: GeometrySettings = Field(description="the true geometry, known to the simulation only")
     seed: int = Field(1, ge=0, description="random seed of the simulation")
     station_reach_mm: Positive = Field(
         30.0, description="at rest farther than this from the gauges, the gauges are moved to the ball"

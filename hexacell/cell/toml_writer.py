@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator
 import tomlkit
 
 from hexacell.cell.fields import Section
-from hexacell.cell.model_lookup import header
+from hexacell.storage.toml_document import table_header
 from hexacell.storage.toml_locations import KeyPath
 
 Remark = Callable[[KeyPath], str | None]
@@ -37,7 +37,7 @@ def _section(section: Section, path: KeyPath, remark: Remark) -> Iterator[str]:
             yield from _setting(name, value, remark((*path, name)))
     for name, value in section:
         for inner, subsection in subsections((*path, name), value):
-            yield from ("", header(inner))
+            yield from ("", table_header(inner))
             yield from _section(subsection, inner, remark)
 
 

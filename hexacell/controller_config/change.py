@@ -9,7 +9,7 @@ from typing import ClassVar, Self
 
 from pydantic import model_validator
 
-from hexacell.cell.fields import GeometryValues
+from hexacell.cell.fields import GeometryDocument
 from hexacell.controller_config.interface import ConfigFormat
 from hexacell.errors import FileError
 from hexacell.kinematics.geometry import Geometry
@@ -28,8 +28,8 @@ class ConfigChange(JsonRecord):
 
     path: Path
     format: str
-    before: GeometryValues
-    after: GeometryValues
+    before: GeometryDocument
+    after: GeometryDocument
     sha256_before: str
     sha256_after: str
     text_before: str
@@ -80,8 +80,8 @@ def propose(
     return ConfigChange(
         path=path.absolute(),
         format=format_name,
-        before=_values(before),
-        after=_values(after),
+        before=before.document(),
+        after=after.document(),
         sha256_before=fingerprint_at_start,
         sha256_after=atomic_files.sha256(text_after.encode()),
         text_before=text_before,
@@ -110,9 +110,3 @@ def diff(before: str, after: str) -> str:
 def _lines(text: str) -> list[str]:
     # str.splitlines also splits at form feeds and other characters that do not end a line in a file.
     return list(io.StringIO(text, newline="\n"))
-
-
-def _values(geometry: Geometry) -> GeometryValues:
-    return GeometryValues.model_validate(
-        {name: getattr(geometry, name).tolist() for name in ("S", "B", "l")}
-    )

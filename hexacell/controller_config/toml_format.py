@@ -13,7 +13,8 @@ character.
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, cast
 
@@ -21,16 +22,13 @@ import numpy as np
 
 from hexacell.controller_config.interface import Branch, ControllerGeometry
 from hexacell.errors import FileError
-from hexacell.kinematics.geometry import LEGS, Geometry
+from hexacell.kinematics.geometry import Geometry
+from hexacell.kinematics.parameters import LEGS, ParameterKind, ParameterSet
 from hexacell.storage import atomic_files
 from hexacell.storage.toml_document import TomlDocument
 from hexacell.storage.toml_edit import replace_values
 from hexacell.storage.toml_locations import KeyPath
 
-_SHAPES: Mapping[str, tuple[int, ...]] = {"S": (LEGS, 3), "B": (LEGS, 3), "l": (LEGS,)}
-_NEEDED = (
-    "[geometry] needs S and B (six rows of three numbers, mm), l (six lengths, mm) and branch (six signs)"
-)
 _DECIMALS = 6
 _HALF_A_NANOMETRE = 5e-7
 
@@ -38,16 +36,19 @@ _HALF_A_NANOMETRE = 5e-7
 class NativeToml:
     """The format ``toml``, a :class:`~hexacell.controller_config.interface.ConfigFormat`."""
 
+    def __init__(self, parameters: ParameterSet) -> None:
+        self._parameters = parameters
+
     def read(self, path: Path) -> ControllerGeometry:
-        """The geometry, mm, and the branch in the file.
+        """The geometry and the branch in the file.
 
         Raises:
             FileError: with file and line; also for a file that :meth:`rewrite` would refuse, so that this
                 is known before anything is measured.
         """
         text = atomic_files.read_text(path)
-        document = TomlDocument.parse(text, path)
-        controller = ControllerGeometry(_geometry(document), _branch(document))
+        content = _Content(TomlDocument.parse(text, path), self._parameters)
+        controller = ControllerGeometry(content.geometry(), content.branch())
         replace_values(text, {}, path)
         return controller
 
@@ -59,12 +60,12 @@ class NativeToml:
 
         Raises:
             FileError: ``text`` is no such config, or ``geometry`` has a value that is not finite or
-                a leg that is not longer than zero.
+                a length that is not above zero.
         """
         _require_physical(geometry)
-        before = _geometry(TomlDocument.parse(text))
+        before = _Content(TomlDocument.parse(text), self._parameters).geometry()
         changed = replace_values(text, dict(_changed_tokens(before, geometry)))
-        after = _geometry(TomlDocument.parse(changed))
+        after = _Content(TomlDocument.parse(changed), self._parameters).geometry()
         if after.largest_difference(geometry) > 2 * _HALF_A_NANOMETRE:
             raise FileError(
                 "the new geometry does not read back as it was written",
@@ -81,69 +82,92 @@ def number_token(value: float) -> str:
 
 
 def _require_physical(geometry: Geometry) -> None:
-    if not np.isfinite(geometry.vector()).all() or not (geometry.l > 0).all():
+    positive = [geometry[kind.symbol] for kind in geometry.parameters.kinds if kind.is_positive]
+    if not np.isfinite(geometry.vector).all() or not all((values > 0.0).all() for values in positive):
         raise FileError(
-            "the new geometry has values that are not finite, or legs that are not longer than zero",
+            "the new geometry has values that are not finite, or lengths that are not above zero",
             action="Nothing was written; identify again",
         )
 
 
 def _changed_tokens(before: Geometry, after: Geometry) -> Iterator[tuple[KeyPath, str]]:
-    for name in _SHAPES:
-        for index, new in np.ndenumerate(getattr(after, name)):
-            if abs(new - getattr(before, name)[index]) > _HALF_A_NANOMETRE:
-                yield ("geometry", name, *index), number_token(new)
+    for kind in after.parameters.kinds:
+        old = before[kind.symbol]
+        for index, new in np.ndenumerate(after[kind.symbol]):
+            if abs(new - old[index]) > _HALF_A_NANOMETRE:
+                yield ("geometry", kind.symbol, *index), number_token(float(new))
 
 
-def _geometry(document: TomlDocument) -> Geometry:
-    """The geometry, mm; raises ``FileError`` with the line where it is not that."""
-    arrays = {name: _numbers(document, _path_to(document, name), shape) for name, shape in _SHAPES.items()}
-    for leg, length in enumerate(arrays["l"]):
-        if length <= 0:
-            problem = f"leg {leg + 1} is {length} mm long, but must be longer than zero"
-            raise document.error(("geometry", "l", leg), problem, _NEEDED)
-    return Geometry(**arrays)
+@dataclass(frozen=True, slots=True)
+class _Content:
+    """What a config says; every method raises ``FileError`` with the line where it is not that."""
+
+    document: TomlDocument
+    parameters: ParameterSet
+
+    def geometry(self) -> Geometry:
+        """The geometry, in the units of its parameters."""
+        kinds = self.parameters.kinds
+        values = {kind.symbol: self._numbers(self._path_to(kind.symbol), kind.shape) for kind in kinds}
+        for kind in kinds:
+            if kind.is_positive:
+                self._require_positive(kind, values[kind.symbol])
+        return Geometry.of(self.parameters, values)
+
+    def branch(self) -> Branch:
+        """The signs, in ``[geometry]`` or at the top of the file."""
+        path = ("branch",) if "branch" in self.document.data else self._path_to("branch")
+        signs = self._numbers(path, (LEGS,))
+        for leg, sign in enumerate(signs):
+            if sign not in {1, -1}:
+                raise self._mismatch((*path, leg), "1 or -1")
+        return cast("Branch", tuple(int(sign) for sign in signs))
+
+    def _require_positive(self, kind: ParameterKind, values: Any) -> None:  # noqa: ANN401
+        for index, value in np.ndenumerate(np.array(values)):
+            if value <= 0.0:
+                component = kind.components[index[1]] if kind.components else ""
+                name = kind.display_name(index[0] + 1, component)
+                problem = f"{name} is {value} {kind.unit}, but must be above zero"
+                raise self._error(("geometry", kind.symbol, *index), problem)
+
+    def _path_to(self, name: str) -> KeyPath:
+        data = self.document.data
+        if "geometry" not in data:
+            raise self._error((), "there is no [geometry]")
+        if not isinstance(data["geometry"], dict):
+            raise self._mismatch(("geometry",), "a section")
+        if name not in data["geometry"]:
+            raise self._error(("geometry",), f"[geometry] has no {name}")
+        return ("geometry", name)
+
+    def _numbers(self, path: KeyPath, shape: tuple[int, ...]) -> Any:  # noqa: ANN401
+        """The number, or the nested lists of numbers, of that shape at ``path``."""
+        if not shape:
+            return self._number(path)
+        value = self.document.value(path)
+        if not isinstance(value, list) or len(value) != shape[0]:
+            item = "rows" if shape[1:] else "numbers"
+            raise self._mismatch(path, f"a list of {shape[0]} {item}")
+        return [self._numbers((*path, index), shape[1:]) for index in range(shape[0])]
+
+    def _number(self, path: KeyPath) -> float:
+        value = self.document.value(path)
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            raise self._mismatch(path, "a number")
+        if not abs(value) <= sys.float_info.max:  # NaN too, and integers of hundreds of digits
+            raise self._mismatch(path, "a finite number")
+        return float(value)
+
+    def _mismatch(self, path: KeyPath, expected: str) -> FileError:
+        return self._error(path, self.document.mismatch(path, expected))
+
+    def _error(self, path: KeyPath, problem: str) -> FileError:
+        kinds = ", ".join(_needed(kind) for kind in self.parameters.kinds)
+        return self.document.error(path, problem, f"[geometry] needs {kinds} and branch (six signs)")
 
 
-def _branch(document: TomlDocument) -> Branch:
-    """The signs, in ``[geometry]`` or at the top of the file; raises ``FileError``."""
-    path = ("branch",) if "branch" in document.data else _path_to(document, "branch")
-    signs = _numbers(document, path, (LEGS,))
-    for leg, sign in enumerate(signs):
-        if sign not in {1, -1}:
-            raise _mismatch(document, (*path, leg), "1 or -1")
-    return cast("Branch", tuple(int(sign) for sign in signs))
-
-
-def _path_to(document: TomlDocument, name: str) -> KeyPath:
-    if "geometry" not in document.data:
-        raise document.error((), "there is no [geometry]", _NEEDED)
-    if not isinstance(document.data["geometry"], dict):
-        raise _mismatch(document, ("geometry",), "a section")
-    if name not in document.data["geometry"]:
-        raise document.error(("geometry",), f"[geometry] has no {name}", _NEEDED)
-    return ("geometry", name)
-
-
-def _numbers(document: TomlDocument, path: KeyPath, shape: tuple[int, ...]) -> Any:  # noqa: ANN401
-    """The number, or the nested lists of numbers, of that shape at ``path``."""
-    if not shape:
-        return _number(document, path)
-    value = document.value(path)
-    if not isinstance(value, list) or len(value) != shape[0]:
-        item = "rows" if shape[1:] else "numbers"
-        raise _mismatch(document, path, f"a list of {shape[0]} {item}")
-    return [_numbers(document, (*path, index), shape[1:]) for index in range(shape[0])]
-
-
-def _number(document: TomlDocument, path: KeyPath) -> float:
-    value = document.value(path)
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        raise _mismatch(document, path, "a number")
-    if not abs(value) <= sys.float_info.max:  # NaN too, and integers of hundreds of digits
-        raise _mismatch(document, path, "a finite number")
-    return float(value)
-
-
-def _mismatch(document: TomlDocument, path: KeyPath, expected: str) -> FileError:
-    return document.error(path, document.mismatch(path, expected), _NEEDED)
+def _needed(kind: ParameterKind) -> str:
+    """``S (six rows of 3 numbers, mm)``."""
+    values = f"six rows of {len(kind.components)} numbers" if kind.components else "six numbers"
+    return f"{kind.symbol} ({', '.join(filter(None, (values, kind.unit)))})"

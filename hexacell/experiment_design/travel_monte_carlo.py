@@ -179,12 +179,13 @@ def _sample(
     # Newton's method starts where linear propagation puts the pose of each robot.
     steps = np.einsum("nip,rp->rni", sensitivity.parameters, errors).reshape(-1, 6)
     rows = np.tile(np.arange(count), samples)
-    robots = GeometryBatch.from_vectors((belief.estimate.vector() + errors).repeat(count, axis=0))
+    vectors = (belief.estimate.vector + errors).repeat(count, axis=0)
+    robots = GeometryBatch(belief.mechanism.parameters, vectors)
     start, mode = apply_twist(poses[rows], steps), sensitivity.mode[rows]
     result = forward_kinematics(belief.mechanism, robots, joints[rows], start, mode=mode)
     found = result.found.reshape(samples, count)
     first = np.arange(samples) * count
-    at_reference = (robots[first], result.poses[first], joints[np.zeros(samples, dtype=int)], margin)
+    at_reference = (robots.subset(first), result.poses[first], joints[np.zeros(samples, dtype=int)], margin)
     # A robot next to a singularity at its reference is refused before anything moves.
     kept = found[:, 0] & has_singularity_margin(belief.mechanism, *at_reference)
     everywhere = (robots, result.poses, joints[rows], settings.margin_share * margin)

@@ -5,8 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
-import numpy as np
-
 from hexacell.identification.problem.problem import Noise
 from hexacell.kinematics.commanded_motion import CommandedRobot
 from hexacell.kinematics.geometry import Geometry
@@ -46,13 +44,13 @@ class RobotBelief:
 
     @property
     def basis(self) -> Array:
-        """(42, p), from free parameters to all of them."""
+        """(P, p), from free parameters to all of them."""
         return self.mechanism.convention.basis()
 
     @cached_property
     def estimate(self) -> Geometry:
         """The estimated geometry."""
-        return Geometry.from_vector(self.basis @ np.asarray(self.free))
+        return self.mechanism.convention.geometry(self.free)
 
     @cached_property
     def commanded(self) -> CommandedRobot:

@@ -14,7 +14,6 @@ from hexacell.identification.solver import nuisance_parameters, singular_records
 from hexacell.identification.solver.chi_square import chi_square_test
 from hexacell.identification.solver.levenberg_marquardt import COARSE, Solution, SolverOptions
 from hexacell.identification.solver.result import DataFault, Identification
-from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array
 
@@ -67,7 +66,7 @@ def _result(
         problem, solution.prediction.weights, solution.prediction.residuals
     )
     return Identification(
-        geometry=Geometry.from_vector(basis @ solution.free),
+        geometry=problem.mechanism.convention.geometry(solution.free),
         covariance=basis @ covariance @ basis.T,
         free=solution.free,
         free_covariance=covariance,

@@ -127,7 +127,7 @@ class _Search:
         self.rows, self._poses, self._joints = self.rows[kept], self._poses[kept], self._joints[kept]
         self._error, self._jacobian = self._error[kept], self._jacobian[kept]
         if isinstance(self._geometry, GeometryBatch):
-            self._geometry = self._geometry[kept]
+            self._geometry = self._geometry.subset(kept)
 
 
 def _step(jacobian: Array, error: Array) -> Array:

@@ -1,86 +1,83 @@
-"""The 42 numbers of a six-legged mechanism, their names and their order."""
+"""The geometry of a robot: one number for each parameter of its mechanism."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from hexacell.kinematics.parameters import ParameterSet
 from hexacell.kinematics.rotations import Array
-
-LEGS = 6
-PARAMETERS = 42
-PARAMETER_NAMES: tuple[str, ...] = (
-    *(f"S{leg}{axis}" for leg in range(1, 7) for axis in "xyz"),
-    *(f"B{leg}{axis}" for leg in range(1, 7) for axis in "xyz"),
-    *(f"l{leg}" for leg in range(1, 7)),
-)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Geometry:
-    """Where a robot's joints are and how long its legs are, mm.
+    """The parameters of one robot, in their own units.
+
+    ``geometry["S"]`` is the array of one kind, ``(6, 3)`` or ``(6,)``.
 
     Attributes:
-        S: joints on the sliders (6, 3) in the base frame at joint variable zero.
-        B: joints on the platform (6, 3) in the platform frame, whose origin is the ball.
-        l: leg lengths (6,).
+        parameters: what the numbers are.
+        vector: the numbers (P,) in their order; a read-only copy.
 
-    The arrays are read-only copies. The vector form has the order of ``PARAMETER_NAMES``.
+    Raises:
+        ValueError: there are more or fewer numbers than parameters.
     """
 
-    S: Array
-    B: Array
-    l: Array  # noqa: E741 - the paper's symbol
+    parameters: ParameterSet
+    vector: Array
 
-    def __init__(self, S: ArrayLike, B: ArrayLike, l: ArrayLike) -> None:  # noqa: E741
-        for name, value, shape in (("S", S, (LEGS, 3)), ("B", B, (LEGS, 3)), ("l", l, (LEGS,))):
-            array = np.array(value, dtype=float)
-            if array.shape != shape:
-                raise ValueError(f"{name} has the shape {array.shape}, not {shape}")
-            array.setflags(write=False)
-            object.__setattr__(self, name, array)
+    def __init__(self, parameters: ParameterSet, vector: ArrayLike) -> None:
+        values = np.array(vector, dtype=float)
+        if values.shape != (len(parameters),):
+            raise ValueError(f"a geometry has {len(parameters)} numbers, not the shape {values.shape}")
+        values.setflags(write=False)
+        object.__setattr__(self, "parameters", parameters)
+        object.__setattr__(self, "vector", values)
 
     @classmethod
-    def from_vector(cls, vector: ArrayLike) -> Geometry:
-        """The geometry of 42 numbers in the order of ``PARAMETER_NAMES``, mm."""
-        vector = np.asarray(vector, dtype=float)
-        return cls(vector[:18].reshape(LEGS, 3), vector[18:36].reshape(LEGS, 3), vector[36:])
+    def of(cls, parameters: ParameterSet, values: Mapping[str, ArrayLike]) -> Geometry:
+        """The geometry of a document, which has nested lists under the symbols of the kinds.
 
-    def vector(self) -> Array:
-        """The 42 numbers in the order of ``PARAMETER_NAMES``, mm."""
-        return np.concatenate([self.S.ravel(), self.B.ravel(), self.l])
+        Raises:
+            ValueError: a kind has another shape.
+        """
+        return cls(parameters, parameters.vector(values))
+
+    def __getitem__(self, symbol: str) -> Array:
+        return self.parameters.array(self.vector, symbol)
+
+    def document(self) -> dict[str, Any]:
+        """Nested lists under the symbols of the kinds, as files have them."""
+        return self.parameters.document(self.vector)
 
     def largest_difference(self, other: Geometry) -> float:
-        """Largest absolute difference of a parameter, mm."""
-        return float(np.max(np.abs(self.vector() - other.vector())))
+        """Largest absolute difference of a parameter, mm or rad."""
+        return float(np.max(np.abs(self.vector - other.vector)))
 
     def interpolate(self, other: Geometry, fraction: float) -> Geometry:
         """The geometry ``fraction`` of the way to ``other``; 0 is this one, 1 the other."""
-        return Geometry.from_vector((1.0 - fraction) * self.vector() + fraction * other.vector())
+        return Geometry(self.parameters, (1.0 - fraction) * self.vector + fraction * other.vector)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class GeometryBatch:
-    """A geometry for each of n poses, all computed at once, mm.
+    """A geometry for each of n poses, all computed at once.
 
     Attributes:
-        S: joints on the sliders (n, 6, 3).
-        B: joints on the platform (n, 6, 3).
-        l: leg lengths (n, 6).
+        parameters: what the numbers are.
+        vectors: (n, P).
     """
 
-    S: Array
-    B: Array
-    l: Array  # noqa: E741 - the paper's symbol
+    parameters: ParameterSet
+    vectors: Array
 
-    @classmethod
-    def from_vectors(cls, vectors: Array) -> GeometryBatch:
-        """Of vectors (n, 42) in the order of ``PARAMETER_NAMES``, mm."""
-        return cls(
-            vectors[:, :18].reshape(-1, LEGS, 3), vectors[:, 18:36].reshape(-1, LEGS, 3), vectors[:, 36:]
-        )
+    def __getitem__(self, symbol: str) -> Array:
+        return self.parameters.array(self.vectors, symbol)
 
-    def __getitem__(self, rows: NDArray[np.intp]) -> GeometryBatch:
-        return GeometryBatch(self.S[rows], self.B[rows], self.l[rows])
+    def subset(self, rows: NDArray[np.intp]) -> GeometryBatch:
+        """The geometries of some poses."""
+        return GeometryBatch(self.parameters, self.vectors[rows])

@@ -7,8 +7,10 @@ from functools import cache
 from typing import Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
-from hexacell.kinematics.geometry import PARAMETER_NAMES, Geometry, GeometryBatch
+from hexacell.kinematics.geometry import Geometry, GeometryBatch
+from hexacell.kinematics.parameters import Parameter, ParameterSet
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array
 
@@ -23,7 +25,7 @@ class ConstraintDerivatives:
         pose: (n, 6, 6) by the ball's position, mm, then by a rotation vector in the base frame,
             rad, applied from the left.
         joints: (n, 6): leg i depends on joint variable i alone.
-        parameters: (n, 6, 7): leg i depends on its own S, B and l alone.
+        parameters: (n, 6, c): leg i depends on its own c numbers alone, in the order of the kinds.
     """
 
     pose: Array
@@ -40,16 +42,17 @@ class FrameConvention:
     """
 
     name: str
+    parameters: ParameterSet
     zero: tuple[str, ...]
     equal: tuple[tuple[str, ...], ...]
 
     @cache  # noqa: B019 - a convention lives as long as its mechanism's class
     def basis(self) -> Array:
-        """The (42, p) matrix from free parameters to all of them; its entries are 0 and 1."""
+        """The (P, p) matrix from free parameters to all of them; its entries are 0 and 1."""
         leader = {name: group[0] for group in self.equal for name in group}
         free = self.free_names()
-        matrix = np.zeros((len(PARAMETER_NAMES), len(free)))
-        for row, name in enumerate(PARAMETER_NAMES):
+        matrix = np.zeros((len(self.parameters), len(free)))
+        for row, name in enumerate(self.parameters.names):
             if name not in self.zero:
                 matrix[row, free.index(leader.get(name, name))] = 1.0
         matrix.setflags(write=False)
@@ -58,12 +61,35 @@ class FrameConvention:
     def free_names(self) -> tuple[str, ...]:
         """Names of the free parameters; one that stands for several carries the first name."""
         followers = {name for group in self.equal for name in group[1:]}
-        return tuple(name for name in PARAMETER_NAMES if name not in self.zero and name not in followers)
+        return tuple(
+            name for name in self.parameters.names if name not in self.zero and name not in followers
+        )
+
+    @cache  # noqa: B019
+    def free_rows(self) -> NDArray[np.intp]:
+        """Where the free parameters stand in a vector (P,) of all."""
+        return self.parameters.rows(self.free_names())
 
     def free_parameters(self, geometry: Geometry) -> Array:
         """The free parameters (p,) of a geometry that obeys the convention, mm."""
-        rows = [PARAMETER_NAMES.index(name) for name in self.free_names()]
-        return geometry.vector()[rows]
+        return geometry.vector[self.free_rows()]
+
+    def geometry(self, free: Array) -> Geometry:
+        """The geometry of free parameters (p,)."""
+        return Geometry(self.parameters, self.basis() @ free)
+
+    def display_name(self, name: str) -> str:
+        """A parameter for people: ``l3`` is "leg 3 length", ``B6x`` is "B6 x".
+
+        The first of several parameters that are equal stands for all: "B2/B3/B5 z".
+        """
+        group = next((group for group in self.equal if group[0] == name), (name,))
+        members: list[Parameter] = [
+            self.parameters.parameters[row] for row in self.parameters.rows(group).tolist()
+        ]
+        first = members[0]
+        joints = "/".join(f"{member.kind.symbol}{member.leg}" for member in members)
+        return first.kind.display_name(first.leg, first.component, joints)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -92,15 +118,12 @@ class FrameTransform:
         """The way back."""
         return FrameTransform(self.base.T, -self.base @ self.origin, self.platform.T)
 
-    def geometry(self, geometry: Geometry) -> Geometry:
-        """The same machine in the new frames."""
-        return Geometry((geometry.S - self.origin) @ self.base.T, geometry.B @ self.platform.T, geometry.l)
-
 
 class Mechanism(Protocol):
     """A six-legged parallel mechanism. Everything is batched over n poses; nothing raises."""
 
     name: str
+    parameters: ParameterSet
     convention: FrameConvention
 
     def constraints(self, geometry: Geometry, poses: PoseBatch, joints: Array) -> Array:
@@ -130,4 +153,12 @@ class Mechanism(Protocol):
 
     def normalize_frames(self, geometry: Geometry) -> tuple[Geometry, FrameTransform]:
         """The same machine in the frames of :attr:`convention`, and how to get there."""
+        ...
+
+    def change_frames(self, geometry: Geometry, change: FrameTransform) -> Geometry:
+        """The same machine in other frames."""
+        ...
+
+    def platform_radius(self, geometry: Geometry | GeometryBatch) -> Array:
+        """The platform's mean radius about the ball, mm: what scales rotations; (n,) of a batch."""
         ...

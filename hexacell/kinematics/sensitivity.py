@@ -28,7 +28,7 @@ class Sensitivity:
 
     Attributes:
         joints: (n, 6, 6).
-        parameters: (n, 6, 42).
+        parameters: (n, 6, P).
         mode: (n,), see :func:`assembly_mode`.
     """
 
@@ -45,7 +45,7 @@ def pose_sensitivity(
     by_legs = -np.linalg.inv(linear.pose)
     return Sensitivity(
         joints=by_legs * linear.joints[..., None, :],
-        parameters=_by_parameters(by_legs, linear),
+        parameters=_by_parameters(mechanism, by_legs, linear),
         mode=assembly_mode(linear.pose),
     )
 
@@ -53,18 +53,17 @@ def pose_sensitivity(
 def position_sensitivity(
     mechanism: Mechanism, geometry: Geometry, poses: PoseBatch, joints: Array
 ) -> tuple[Array, Array]:
-    """Of the ball's position alone: (n, 3, 42) by the parameters, (n, 3, 6) by the joint variables."""
+    """Of the ball's position alone: (n, 3, P) by the parameters, (n, 3, 6) by the joint variables."""
     linear = mechanism.derivatives(geometry, poses, joints)
     by_legs = -np.linalg.inv(linear.pose)[:, :3]
-    return _by_parameters(by_legs, linear), by_legs * linear.joints[..., None, :]
+    return _by_parameters(mechanism, by_legs, linear), by_legs * linear.joints[..., None, :]
 
 
-def _by_parameters(by_legs: Array, linear: ConstraintDerivatives) -> Array:
-    """How something (n, m, 6) that depends on the legs depends on the parameters (n, m, 42)."""
-    each = by_legs[..., None] * linear.parameters[..., None, :, :]
-    kinds = [each[..., part] for part in (slice(3), slice(3, 6), slice(6, 7))]
-    flat = [kind.reshape(*by_legs.shape[:2], 6 * kind.shape[-1]) for kind in kinds]
-    return np.concatenate(flat, axis=-1)
+def _by_parameters(mechanism: Mechanism, by_legs: Array, linear: ConstraintDerivatives) -> Array:
+    """How something (n, m, 6) that depends on the legs depends on the parameters (n, m, P)."""
+    of_legs = by_legs[..., None] * linear.parameters[..., None, :, :]
+    flat: Array = of_legs.reshape(*by_legs.shape[:2], -1)
+    return np.take(flat, mechanism.parameters.leg_order, axis=-1)
 
 
 def singularity_margin(mechanism: Mechanism, geometry: Geometry, poses: PoseBatch, joints: Array) -> Array:
@@ -119,6 +118,5 @@ def _dimensionless(
 ) -> Array:
     """The pose Jacobian with rotations scaled by the platform's mean radius."""
     scaled = pose_jacobian(mechanism, geometry, poses, joints).copy()
-    radius = np.mean(np.linalg.norm(geometry.B, axis=-1), axis=-1)
-    scaled[..., 3:] /= np.reshape(radius, (-1, 1, 1))
+    scaled[..., 3:] /= np.reshape(mechanism.platform_radius(geometry), (-1, 1, 1))
     return scaled

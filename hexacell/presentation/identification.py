@@ -10,7 +10,7 @@ from hexacell.identification.diagnostics.repeatability import Repeatability
 from hexacell.identification.diagnostics.variance_components import NoiseLevel, NoiseLevels
 from hexacell.identification.solver.chi_square import ChiSquareTest
 from hexacell.identification.solver.result import Identification
-from hexacell.kinematics.geometry import PARAMETER_NAMES, Geometry
+from hexacell.kinematics.geometry import Geometry
 from hexacell.presentation.layout import blocks, wrapped
 from hexacell.reporting.assessment import Assessment
 from hexacell.reporting.findings import findings, noise_sentence, pair_sentences, residual_sentence
@@ -69,7 +69,8 @@ def _data_and_termination(found: Identification) -> str:
 def parameter_table(found: Identification, drawing: Geometry) -> str:
     """One line a parameter, mm; those that the frame convention fixes are left out."""
     undetermined = set(found.undetermined)
-    rows = zip(PARAMETER_NAMES, drawing.vector(), found.geometry.vector(), found.sigma, strict=True)
+    names = found.geometry.parameters.names
+    rows = zip(names, drawing.vector, found.geometry.vector, found.sigma, strict=True)
     lines = [
         f"{name:4}{old:10.3f}{new:12.3f}{new - old:+9.3f}{sigma:8.3f}  "
         + ("not determined by these data" if name in undetermined else _significance(new - old, sigma))

@@ -14,16 +14,10 @@ from hexacell.identification.diagnostics.pose_accuracy import PoseErrors
 from hexacell.identification.diagnostics.variance_components import NoiseLevels
 from hexacell.identification.solver.chi_square import ChiSquareTest
 from hexacell.identification.solver.result import DataFault, DataFaultKind, Identification
-from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.pose import Pose
 from hexacell.measurements.records import RecordId
 from hexacell.reporting.assessment import Assessment
 from hexacell.reporting.findings import findings
-
-
-def geometry_values(geometry: Geometry) -> dict[str, Any]:
-    """``{"S": [6x3], "B": [6x3], "l": [6]}``, mm."""
-    return {"S": geometry.S.tolist(), "B": geometry.B.tolist(), "l": geometry.l.tolist()}
 
 
 def identification_document(found: Identification) -> dict[str, Any]:
@@ -37,8 +31,8 @@ def identification_document(found: Identification) -> dict[str, Any]:
         "residual_rms_mm": found.residual_rms_mm,
         "chi2": found.chi2,
         "dof": found.dof,
-        "geometry": geometry_values(found.geometry),
-        "sigma": geometry_values(Geometry.from_vector(found.sigma)),
+        "geometry": found.geometry.document(),
+        "sigma": found.geometry.parameters.document(found.sigma),
         "covariance": found.covariance.tolist(),
         "undetermined": list(found.undetermined),
         "outliers": [_outlier(record, fault) for record, fault in found.left_out],

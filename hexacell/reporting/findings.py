@@ -9,7 +9,6 @@ from hexacell.identification.diagnostics.variance_components import NoiseLevel, 
 from hexacell.identification.solver.chi_square import ChiSquareTest, ChiSquareVerdict
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.mechanism import FrameConvention
-from hexacell.kinematics.parameter_names import display_name
 from hexacell.reporting.assessment import Assessment
 
 POOR_REPEATABILITY = 2.0
@@ -40,7 +39,7 @@ def pair_sentences(found: Identification, assessed: Assessment) -> tuple[str, ..
     convention = found.problem.mechanism.convention
     sentences = []
     for pair, pose in zip(assessed.correlated, assessed.decorrelating_poses, strict=False):
-        first, second = (display_name(name, convention) for name in (pair.first, pair.second))
+        first, second = (convention.display_name(name) for name in (pair.first, pair.second))
         fact = f"{first} and {second} cannot be separated from these poses"
         remedy = (
             "no single tilt at these points would separate them"
@@ -101,7 +100,7 @@ def _verdict(found: Identification, assessed: Assessment) -> str:
 
 def _beyond_tolerance(violations: Sequence[ToleranceViolation], convention: FrameConvention) -> str:
     names = ", ".join(
-        f"{display_name(one.name, convention)} is {one.change_mm:+.2f} mm from the drawing "
+        f"{convention.display_name(one.name)} is {one.change_mm:+.2f} mm from the drawing "
         f"(tolerance {one.tolerance_mm:g}, sigma {one.sigma_mm:.2g})"
         for one in violations
     )
@@ -135,7 +134,7 @@ def _residual_verdict(goodness: ChiSquareTest) -> str:
 def _undetermined(found: Identification) -> str:
     convention = found.problem.mechanism.convention
     free = convention.free_names()
-    names = [display_name(name, convention) for name in found.undetermined if name in free]
+    names = [convention.display_name(name) for name in found.undetermined if name in free]
     if len(names) > NAMED_PARAMETERS:
         return f"{len(names)} of {len(free)} parameters are"
     return f"{', '.join(names)} {'is' if len(names) == 1 else 'are'}"

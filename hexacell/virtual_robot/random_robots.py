@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hexacell.kinematics.geometry import PARAMETER_NAMES, Geometry
+from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import Mechanism
 from hexacell.robot_model import Robot
 
@@ -23,9 +23,7 @@ def random_robot(
     As in Table 1 of Abtahi et al. 2010 (section 3.1, +-7 mm).
     """
     free = mechanism.convention.free_parameters(drawing)
-    return Geometry.from_vector(
-        mechanism.convention.basis() @ (free + random.uniform(-error_mm, error_mm, len(free)))
-    )
+    return mechanism.convention.geometry(free + random.uniform(-error_mm, error_mm, len(free)))
 
 
 def robots_within_tolerances(robot: Robot, count: int, seed: int) -> list[Geometry]:
@@ -36,15 +34,14 @@ def robots_within_tolerances(robot: Robot, count: int, seed: int) -> list[Geomet
     """
     random = np.random.default_rng(seed)
     convention, tolerances = robot.mechanism.convention, robot.tolerances
-    names = convention.free_names()
-    widths = tolerances.widths()[[PARAMETER_NAMES.index(name) for name in names]]
-    of_ball = np.array([[name[0] == "B" and name[-1] == axis for name in names] for axis in "xyz"])
+    parameters, rows = convention.parameters, convention.free_rows()
+    widths = tolerances.widths(parameters)[rows]
     centre = convention.free_parameters(robot.commanding)
     as_drawn = np.abs(centre - convention.free_parameters(robot.prior.centre)).max() < AS_DRAWN_MM
     share = 1.0 if as_drawn else WEAR_SHARE
     geometries = []
     for _ in range(count):
         ball = random.uniform(-tolerances.ball_mm, tolerances.ball_mm, 3)
-        free = centre + share * (random.uniform(-widths, widths) + ball @ of_ball)
-        geometries.append(Geometry.from_vector(convention.basis() @ free))
+        free = centre + share * (random.uniform(-widths, widths) + ball @ parameters.ball_offset[:, rows])
+        geometries.append(convention.geometry(free))
     return geometries

@@ -109,7 +109,7 @@ class RunPathPlanner:
         """What is known by now; the identified geometry commands once it is written."""
         if state.identified is None:
             return self._by_records(state)
-        geometry = state.identified.result.identified_geometry
+        geometry = state.identified.result.identified(self.robot.mechanism.parameters)
         free = self.robot.mechanism.convention.free_parameters(geometry)
         known = replace(self.robot.belief(), free=np.asarray(free))
         return replace(known, controller=geometry) if state.committed else known

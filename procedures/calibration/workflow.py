@@ -112,7 +112,9 @@ class Calibration:
         Raises:
             HexacellError: the records so far give no estimate.
         """
-        return self._at_start.points.estimate(state) if state.lent is None else geometry_of(state.lent)
+        if state.lent is not None:
+            return geometry_of(state.lent, self.robot)
+        return self._at_start.points.estimate(state)
 
     def held_out_poses(self, identified: Identification | None) -> tuple[tuple[SixNumbers, ...], ...]:
         """Poses at each held-out point, in the controller's frames.
@@ -142,7 +144,9 @@ class Calibration:
             return self._at_start
         if state.lending not in self._with_provisional:
             robot = replace(
-                self.robot, provisional=(geometry_of(state.lent),), uses_provisional=state.lending
+                self.robot,
+                provisional=(geometry_of(state.lent, self.robot),),
+                uses_provisional=state.lending,
             )
             self._with_provisional[state.lending] = _Measuring(self.settings, robot, self.listed)
         return self._with_provisional[state.lending]
@@ -157,6 +161,6 @@ class Calibration:
         return {}
 
 
-def geometry_of(applied: events.ProvisionalApplied) -> Geometry:
+def geometry_of(applied: events.ProvisionalApplied, robot: Robot) -> Geometry:
     """The provisional geometry, in the mechanism's frame convention."""
-    return Geometry(applied.geometry.S, applied.geometry.B, applied.geometry.l)
+    return Geometry.of(robot.mechanism.parameters, applied.geometry)

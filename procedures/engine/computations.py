@@ -45,8 +45,8 @@ class Computations:
         Raises:
             FileError: the config is not the one that the run began with.
         """
-        identified = _identified(state).estimate
         robot = self.calibration.robot
+        identified = _identified(state).estimate(robot.mechanism.parameters)
         commanding, _ = robot.mechanism.normalize_frames(robot.controller)
         conditions = gates(
             identified,
@@ -70,7 +70,7 @@ class Computations:
         return events.ResultValidated(verdict=verdict, line=line)
 
     def _counts(self, result: IdentificationResult) -> tuple[int, int, int]:
-        free = self.calibration.robot.mechanism.convention.free_parameters(result.identified_geometry)
+        free = self.calibration.robot.mechanism.convention.free_names()
         return len(free), result.records, result.points
 
     @property

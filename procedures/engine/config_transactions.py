@@ -23,7 +23,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from hexacell.acceptance.gates import AcceptanceGate
-from hexacell.cell.fields import GeometryValues
 from hexacell.cell.loader import Cell
 from hexacell.controller_config.change import ConfigChange, fingerprint, propose
 from hexacell.controller_config.receipt import RECEIPT, Receipt
@@ -98,10 +97,7 @@ class ConfigTransactions:
             "the provisional geometry",
             action="Correct that, or run without `provisional`",
         )
-        values = GeometryValues.model_validate(
-            {"S": geometry.S.tolist(), "B": geometry.B.tolist(), "l": geometry.l.tolist()}
-        )
-        return events.ProvisionalApplied(geometry=values, folder=PROVISIONAL_FOLDER)
+        return events.ProvisionalApplied(geometry=geometry.document(), folder=PROVISIONAL_FOLDER)
 
     async def _apply_result(self, state: RunState) -> events.Event:
         conditions = state.proposed.gates if state.proposed else ()
@@ -154,7 +150,9 @@ class ConfigTransactions:
             # Far from level, the slider positions may belong to no pose of the old geometry. The file
             # must not differ from what the controller has until it can be reloaded.
             if written and state.lent is not None:
-                change = await in_thread(self.change_to, geometry_of(state.lent), state)
+                change = await in_thread(
+                    self.change_to, geometry_of(state.lent, self.calibration.robot), state
+                )
                 await in_thread(commit, change, self._provisional_backup)
             raise
         return events.ProvisionalReverted()

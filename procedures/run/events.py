@@ -13,7 +13,7 @@ from pydantic import Field
 from drivers.interfaces import DeviceIdentity
 from hexacell.acceptance.gates import AcceptanceGate
 from hexacell.acceptance.validation import Verdict
-from hexacell.cell.fields import GeometryValues
+from hexacell.cell.fields import GeometryDocument
 from hexacell.cell.recovery import Action, FailureKind
 from hexacell.controller_config.interface import Branch
 from procedures.run.identified import IdentificationResult
@@ -39,7 +39,7 @@ class RunStarted(Frozen):
     mode: Literal["check", "optimise"]
     config: str
     config_sha256: str
-    controller: GeometryValues
+    controller: GeometryDocument
     branch: Branch
     devices: tuple[DeviceIdentity, ...]
     pose_list: str | None = None
@@ -170,7 +170,7 @@ class ProvisionalApplied(Frozen):
     """
 
     kind: Literal["lent"] = "lent"
-    geometry: GeometryValues
+    geometry: GeometryDocument
     folder: str
 
 

@@ -6,21 +6,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Self
 
+from hexacell.cell.fields import GeometryDocument
 from hexacell.identification.solver.levenberg_marquardt import Termination
 from hexacell.identification.solver.result import DataFaultKind
 from hexacell.kinematics.geometry import Geometry
+from hexacell.kinematics.parameters import ParameterSet
 from hexacell.kinematics.rotations import Array
-from procedures.run.steps import Frozen, SixNumbers, ThreeNumbers
-
-SixPoints = tuple[ThreeNumbers, ThreeNumbers, ThreeNumbers, ThreeNumbers, ThreeNumbers, ThreeNumbers]
-
-
-class ParameterValues(Frozen):
-    """One number a parameter of the mechanism, mm."""
-
-    S: SixPoints
-    B: SixPoints
-    l: SixNumbers  # noqa: E741 - the paper's symbol
+from procedures.run.steps import Frozen, ThreeNumbers
 
 
 class OutlierRecord(Frozen):
@@ -57,8 +49,8 @@ class IdentificationResult(Frozen):
     residual_rms_mm: float
     chi2: float
     dof: int
-    geometry: ParameterValues
-    sigma: ParameterValues
+    geometry: GeometryDocument
+    sigma: GeometryDocument
     covariance: tuple[tuple[float, ...], ...]
     undetermined: tuple[str, ...]
     outliers: tuple[OutlierRecord, ...]
@@ -69,13 +61,11 @@ class IdentificationResult(Frozen):
         """The result in :func:`~hexacell.reporting.documents.identification_document`."""
         return cls.model_validate(document)
 
-    @property
-    def estimate(self) -> KeptEstimate:
+    def estimate(self, parameters: ParameterSet) -> KeptEstimate:
         """What the acceptance gates need."""
-        sigma = Geometry(self.sigma.S, self.sigma.B, self.sigma.l).vector()
-        return KeptEstimate(self.identified_geometry, sigma, self.termination, self.undetermined)
+        sigma = parameters.vector(self.sigma)
+        return KeptEstimate(self.identified(parameters), sigma, self.termination, self.undetermined)
 
-    @property
-    def identified_geometry(self) -> Geometry:
-        """In the mechanism's frame convention, mm."""
-        return Geometry(self.geometry.S, self.geometry.B, self.geometry.l)
+    def identified(self, parameters: ParameterSet) -> Geometry:
+        """The geometry in the mechanism's frame convention."""
+        return Geometry.of(parameters, self.geometry)

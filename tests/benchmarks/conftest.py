@@ -12,6 +12,7 @@ import pytest
 from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import load_cell
 from hexacell.kinematics.geometry import Geometry
+from hexacell.kinematics.mechanisms.hexaglide import hexaglide_geometry
 from hexacell.kinematics.rotations import Array
 from hexacell.robot_model import Robot, robot_of
 
@@ -34,7 +35,7 @@ def table_one() -> TableOne:
     values = cell.settings.simulation.geometry
     return TableOne(
         robot_of(cell),
-        Geometry(values.S, values.B, values.l),
+        hexaglide_geometry(values["S"], values["B"], values["l"]),
         np.array(cell.settings.identification.points),
     )
 

@@ -28,7 +28,7 @@ from hexacell.cell.loader import Cell, load_cell
 from hexacell.cell.simulation import SimulatedFault
 from hexacell.clock import CellClock
 from hexacell.controller_config.toml_format import NativeToml
-from hexacell.kinematics.mechanisms.hexaglide import Hexaglide
+from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS, Hexaglide
 from procedures.devices.device_set import Devices
 from procedures.guards.guards import Guards
 from procedures.run import events
@@ -100,7 +100,12 @@ async def watched(folder: Path, protocol: str) -> AsyncIterator[Watched]:
     cell = load_cell(folder / source.name)
     settings = settings_of(cell, protocol)
     served = SimulatedCell(
-        settings, settings.simulation, Hexaglide(), NativeToml(), cell.config_path, other_processes=False
+        settings,
+        settings.simulation,
+        Hexaglide(),
+        NativeToml(HEXAGLIDE_PARAMETERS),
+        cell.config_path,
+        other_processes=False,
     )
     with served as simulated:
         links = SharedSerialPorts()

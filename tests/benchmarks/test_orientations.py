@@ -23,6 +23,7 @@ from hexacell.cell.loader import Cell, load_cell
 from hexacell.errors import HexacellError
 from hexacell.identification.estimator import identify
 from hexacell.kinematics.geometry import Geometry
+from hexacell.kinematics.mechanisms.hexaglide import hexaglide_geometry
 from hexacell.kinematics.pose import Pose
 from hexacell.measurements.records import MeasurementSet
 from hexacell.robot_model import Robot, robot_of
@@ -80,7 +81,9 @@ def truth_of(cell: Cell, robot: Robot, number: int) -> Geometry:
     if number == 0:
         assert cell.settings.simulation is not None
         actual = cell.settings.simulation.geometry
-        return robot.mechanism.normalize_frames(Geometry(actual.S, actual.B, actual.l))[0]
+        return robot.mechanism.normalize_frames(hexaglide_geometry(actual["S"], actual["B"], actual["l"]))[
+            0
+        ]
     return random_robot(robot.mechanism, robot.drawing, ERROR_MM, np.random.default_rng([4, number]))
 
 

@@ -17,6 +17,7 @@ from hexacell.identification.estimator import estimate_online, identify
 from hexacell.identification.problem.problem import Problem
 from hexacell.kinematics import rotations
 from hexacell.kinematics.geometry import Geometry
+from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS
 from hexacell.measurements.records import MeasurementSet, Record
 from hexacell.study import data_sets
 from hexacell.study.reference_solvers import error_vector, least_squares_without_jacobian
@@ -67,14 +68,14 @@ def as_the_paper_says(problem: Problem) -> np.ndarray:
 
     def position(row: int, geometry: Geometry) -> np.ndarray:
         def legs(pose: np.ndarray) -> np.ndarray:
-            v = geometry.S - pose[:3] - geometry.B @ rotations.from_angles(pose[3:]).T
+            v = geometry["S"] - pose[:3] - geometry["B"] @ rotations.from_angles(pose[3:]).T
             v[:, 0] += problem.joints[row]
-            return np.asarray(np.sum(v * v, axis=1) - geometry.l**2)
+            return np.asarray(np.sum(v * v, axis=1) - geometry["l"] ** 2)
 
         return root(legs, poses[row]).x[:3]
 
     def errors(free: np.ndarray) -> np.ndarray:
-        geometry = Geometry.from_vector(problem.basis @ free)
+        geometry = Geometry(HEXAGLIDE_PARAMETERS, problem.basis @ free)
         found = np.array([position(row, geometry) for row in range(problem.records)])
         return error_vector(problem, found - problem.deviations)
 

@@ -15,6 +15,7 @@ import pytest
 from hexacell.identification.estimator import identify
 from hexacell.kinematics.forward import continue_solution, forward_kinematics
 from hexacell.kinematics.geometry import Geometry
+from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS
 from hexacell.kinematics.rotations import Array
 from hexacell.study import data_sets
 
@@ -56,11 +57,11 @@ def cramer_rao_bound(robot, truth: Geometry, campaign: data_sets.DataSet) -> Arr
     positions = _position_of(robot, truth, campaign)
     by_joints = _by_joints(lambda joints: positions(truth, joints), campaign.joints)
     basis = robot.mechanism.convention.basis()
-    vector = truth.vector()
+    vector = truth.vector.copy()
     columns = []
     for column in basis.T:
         ahead, behind = (
-            positions(Geometry.from_vector(vector + sign * STEP_MM * column), campaign.joints)
+            positions(Geometry(HEXAGLIDE_PARAMETERS, vector + sign * STEP_MM * column), campaign.joints)
             for sign in (1, -1)
         )
         columns.append((ahead - behind) / (2 * STEP_MM))

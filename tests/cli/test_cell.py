@@ -10,7 +10,7 @@ from contextlib import contextmanager
 
 import pytest
 
-from hexacell.cell.model import CellSettings
+from hexacell.cell.model import CellSettings, cell_model
 
 CONTROLLER = "simulated-hexaglide.controller.toml"
 
@@ -51,9 +51,9 @@ def test_show_is_a_cell_file_with_defaults_and_origins(typed_here, cell_folder):
     )
     assert f"{name}  # line {number}\n" in outcome.out
     shown = tomllib.loads(outcome.out)
-    assert CellSettings.model_validate_json(json.dumps(shown)) == CellSettings.model_validate_json(
-        json.dumps(tomllib.loads(cell_folder.cell.read_text()))
-    )
+    assert cell_model("hexaglide").model_validate_json(json.dumps(shown)) == cell_model(
+        "hexaglide"
+    ).model_validate_json(json.dumps(tomllib.loads(cell_folder.cell.read_text())))
 
 
 def test_show_with_json_has_the_same_settings(typed_here, cell_folder):
@@ -62,7 +62,7 @@ def test_show_with_json_has_the_same_settings(typed_here, cell_folder):
     document = outcome.document
     assert document["controller"]["move_timeout_s"] == 60.0
     assert document["limits"]["gauge_travel_mm"] == 5.0
-    assert CellSettings.model_validate_json(json.dumps(document)).name == "simulated-hexaglide"
+    assert cell_model("hexaglide").model_validate_json(json.dumps(document)).name == "simulated-hexaglide"
 
 
 def line_of(text: str, words: str) -> int:
@@ -126,7 +126,7 @@ CONFIG_MISTAKES = {
     ),
     "five lengths": (("  590.0,  # leg 6\n", ""), "'l' in [geometry] is a list of 5"),
     "no geometry": (("\n[geometry]", "\n[geometries]"), "there is no [geometry]"),
-    "a leg of no length": (("  590.0,  # leg 1", "  0.0,  # leg 1"), "leg 1 is 0.0 mm long"),
+    "a leg of no length": (("  590.0,  # leg 1", "  0.0,  # leg 1"), "leg 1 length is 0.0 mm"),
     "no TOML": (("\n[geometry]", "\n[geometry"), "Correct this line"),
 }
 

@@ -17,7 +17,7 @@ from hexacell.campaign.planner import Plan
 from hexacell.kinematics.forward import continue_solution
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.inverse import inverse_kinematics
-from hexacell.kinematics.mechanisms.hexaglide import Hexaglide
+from hexacell.kinematics.mechanisms.hexaglide import Hexaglide, hexaglide_geometry
 from hexacell.kinematics.pose import Pose, PoseBatch
 
 HEADER = ["point", "orientation", *"xyzabc", *(f"q{leg}" for leg in range(1, 7)), "dx", "dy", "dz"]
@@ -44,8 +44,8 @@ class Stranger:
     def __init__(self, cell: Path, controller: Path, file: Path, noise_mm: float = NOISE_MM) -> None:
         truth = tomllib.loads(cell.read_text())["simulation"]["geometry"]
         config = tomllib.loads(controller.read_text())["geometry"]
-        self.truth = Geometry(truth["S"], truth["B"], truth["l"])
-        self.believed = Geometry(config["S"], config["B"], config["l"])
+        self.truth = hexaglide_geometry(truth["S"], truth["B"], truth["l"])
+        self.believed = hexaglide_geometry(config["S"], config["B"], config["l"])
         self.branch = tuple(config["branch"])
         self.file, self.noise_mm = file, noise_mm
         self.random = np.random.default_rng(4)
@@ -155,8 +155,8 @@ def test_it_reaches_the_accuracy_of_a_run(typed, cell_folder, stranger, demo):
 
 
 def _worst_error(found: dict[str, Any], truth: Geometry) -> float:
-    geometry = Geometry(found["S"], found["B"], found["l"])
-    return float(np.abs(geometry.vector() - truth.vector()).max())
+    geometry = hexaglide_geometry(found["S"], found["B"], found["l"])
+    return float(np.abs(geometry.vector - truth.vector).max())
 
 
 EMPTY = {"header only": ",".join(HEADER) + "\n", "nothing at all": "", "blank lines": "\n\n"}

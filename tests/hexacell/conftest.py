@@ -24,13 +24,13 @@ from hexacell.identification.problem.problem import Noise, Prior, Problem, Toler
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import Branch
-from hexacell.kinematics.mechanisms.hexaglide import Hexaglide
+from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS, Hexaglide, hexaglide_geometry
 from hexacell.kinematics.pose import Pose
 from hexacell.measurements.records import MeasurementSet, Record
 
 Array = NDArray[np.float64]
 
-NOMINAL = Geometry(  # Table 1, and Table 4 has the same
+NOMINAL = hexaglide_geometry(  # Table 1, and Table 4 has the same
     S=[[0.0, -155.0, 0.0], [0.0] * 3, [0.0, 155.0, 0.0], [0.0, 155.0, 0.0], [0.0] * 3, [0.0, -155.0, 0.0]],
     B=[
         [-90, -67, -125],
@@ -42,7 +42,7 @@ NOMINAL = Geometry(  # Table 1, and Table 4 has the same
     ],
     l=[590, 580, 615, 615, 580, 590],
 )
-ACTUAL = Geometry(  # Table 1
+ACTUAL = hexaglide_geometry(  # Table 1
     S=[
         [0.861, -160.815, 1.501],
         [0.0] * 3,
@@ -61,7 +61,7 @@ ACTUAL = Geometry(  # Table 1
     ],
     l=[583.941, 578.279, 610.563, 614.068, 585.272, 593.461],
 )
-CALIBRATED = Geometry(  # Table 4: the real robot, its ball 30 mm from where the drawing has it
+CALIBRATED = hexaglide_geometry(  # Table 4: the real robot, its ball 30 mm from where the drawing has it
     S=[
         [1.01, -152.19, -0.80],
         [0.0] * 3,
@@ -87,7 +87,7 @@ POINTS = np.array(  # Table 3, P1 to P6
 )
 
 PAPER_NOISE = Noise(encoder_mm=0.01, gauge_mm=0.01)
-PAPER_TOLERANCES = Tolerances(S_mm=7.0, B_mm=7.0, l_mm=7.0)
+PAPER_TOLERANCES = Tolerances({"S": 7.0, "B": 7.0, "l": 7.0})
 
 STAGES = 8
 FARTHEST_MM = 120.0
@@ -116,9 +116,9 @@ class Legs:
 
     def errors(self, pose: Array, joints: Array) -> Array:
         """How much too short each leg (6,) is at a position and rotation vector (6,)."""
-        sliders = self.geometry.S + np.outer(joints, [1.0, 0.0, 0.0])
-        ends = pose[:3] + self.geometry.B @ turn(pose[3:]).T
-        errors: Array = np.sqrt(np.sum((sliders - ends) ** 2, axis=1)) - self.geometry.l
+        sliders = self.geometry["S"] + np.outer(joints, [1.0, 0.0, 0.0])
+        ends = pose[:3] + self.geometry["B"] @ turn(pose[3:]).T
+        errors: Array = np.sqrt(np.sum((sliders - ends) ** 2, axis=1)) - self.geometry["l"]
         return errors
 
     def joints(self, pose: Array) -> Array:
@@ -126,7 +126,7 @@ class Legs:
         rotation = turn(pose[3:])
         places = []
         for S, B, length, side in zip(
-            self.geometry.S, self.geometry.B, self.geometry.l, BRANCH, strict=True
+            self.geometry["S"], self.geometry["B"], self.geometry["l"], BRANCH, strict=True
         ):
             x, y, z = pose[:3] + rotation @ B - S
             along = length**2 - y**2 - z**2
@@ -140,7 +140,7 @@ class Legs:
 
     def margin(self, joints: Array, pose: Array) -> float:
         """Smallest singular value of the Jacobian by differences, rotations in mean radii."""
-        radius = np.linalg.norm(self.geometry.B, axis=1).mean()
+        radius = np.linalg.norm(self.geometry["B"], axis=1).mean()
         columns = []
         for step in 1e-4 * np.eye(6):
             turned = Rotation.from_rotvec(step[3:] / radius) * Rotation.from_rotvec(pose[3:])
@@ -182,7 +182,7 @@ def reached(true: Geometry, commanding: Geometry, pose: Pose) -> tuple[Array, Ar
         return None
     for stage in range(1, STAGES + 1):
         share = stage / STAGES
-        bent = Legs(Geometry.from_vector((1.0 - share) * commanding.vector() + share * true.vector()))
+        bent = Legs(Geometry(HEXAGLIDE_PARAMETERS, (1.0 - share) * commanding.vector + share * true.vector))
         here = bent.closed(joints, here)
         if here is None:
             return None

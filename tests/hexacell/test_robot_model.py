@@ -15,9 +15,9 @@ from hexacell.controller_config.interface import ControllerGeometry
 from hexacell.errors import ReachError
 from hexacell.identification.estimator import estimate_online, identify
 from hexacell.identification.problem.problem import Tolerances
-from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.inverse import inverse_kinematics
 from hexacell.kinematics.mechanism import FrameTransform
+from hexacell.kinematics.mechanisms.hexaglide import Hexaglide, hexaglide_geometry
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.measurements.records import MeasurementSet, Record
 from hexacell.robot_model import make_robot, robot_of
@@ -46,14 +46,16 @@ def robot(cell):
 @pytest.fixture(scope="module")
 def on_floor(cell, paper):
     """The same robot, its controller's config in other frames."""
-    return make_robot(cell.settings, ControllerGeometry(TO_FLOOR.geometry(paper.nominal), paper.branch))
+    return make_robot(
+        cell.settings, ControllerGeometry(Hexaglide().change_frames(paper.nominal, TO_FLOOR), paper.branch)
+    )
 
 
 def test_the_bundled_cell_is_the_papers_simulated_robot(robot, paper):
     for geometry in (robot.drawing, robot.controller, robot.prior.centre):
-        np.testing.assert_array_equal(geometry.vector(), paper.nominal.vector())
+        np.testing.assert_array_equal(geometry.vector, paper.nominal.vector)
     assert robot.branch == paper.branch
-    assert robot.tolerances == Tolerances(7.0, 7.0, 7.0)
+    assert robot.tolerances == Tolerances({"S": 7.0, "B": 7.0, "l": 7.0})
     assert (robot.noise.encoder_mm, robot.noise.gauge_mm) == (0.01, 0.01)
 
 
@@ -76,9 +78,11 @@ def test_a_command_brings_the_controllers_own_robot_to_the_pose(on_floor, hexagl
 
 def test_a_geometry_returns_to_the_configs_frames(on_floor, hexaglide, paper):
     written = on_floor.for_controller(paper.actual)
-    np.testing.assert_allclose(written.vector(), TO_FLOOR.geometry(paper.actual).vector(), atol=1e-9)
+    np.testing.assert_allclose(
+        written.vector, Hexaglide().change_frames(paper.actual, TO_FLOOR).vector, atol=1e-9
+    )
     same = on_floor.for_controller(hexaglide.normalize_frames(on_floor.controller)[0])
-    np.testing.assert_allclose(same.vector(), on_floor.controller.vector(), atol=1e-9)
+    np.testing.assert_allclose(same.vector, on_floor.controller.vector, atol=1e-9)
 
 
 def test_frames_survive_a_calibration(cell, on_floor, paper):
@@ -105,13 +109,13 @@ def test_records_in_the_configs_frames_are_identified(on_floor, paper, visit):
     assert found.converged
     assert found.geometry.largest_difference(paper.actual) < 0.5  # stations may be turned: less is known
     written = on_floor.for_controller(found.geometry)
-    assert written.largest_difference(TO_FLOOR.geometry(found.geometry)) < 1e-9
+    assert written.largest_difference(Hexaglide().change_frames(found.geometry, TO_FLOOR)) < 1e-9
 
 
 def test_before_measuring_the_drawing_is_known_and_its_tolerances(robot, on_floor, paper):
     for known in (robot.belief(), on_floor.belief()):
-        np.testing.assert_allclose(known.estimate.vector(), paper.nominal.vector(), atol=1e-9)
-        np.testing.assert_allclose(known.controller.vector(), paper.nominal.vector(), atol=1e-9)
+        np.testing.assert_allclose(known.estimate.vector, paper.nominal.vector, atol=1e-9)
+        np.testing.assert_allclose(known.controller.vector, paper.nominal.vector, atol=1e-9)
         np.testing.assert_allclose(np.diag(known.covariance), 49.0 / 3.0)
 
 
@@ -141,7 +145,7 @@ def test_a_pose_out_of_reach_says_why(robot, pose, message):
 
 
 def test_reach_is_the_controllers_not_the_drawings(cell, paper):
-    short = Geometry(paper.nominal.S, paper.nominal.B, np.full(6, 450.0))
+    short = hexaglide_geometry(paper.nominal["S"], paper.nominal["B"], np.full(6, 450.0))
     robot = make_robot(cell.settings, ControllerGeometry(short, paper.branch))
     with pytest.raises(ReachError, match="leg 1"):
         robot.require_reach("task 1", Pose(0, 0, 600))

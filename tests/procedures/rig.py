@@ -19,7 +19,7 @@ from hexacell.application.calibration_run import run_started
 from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import Cell, dump, load_cell
 from hexacell.controller_config.toml_format import NativeToml
-from hexacell.kinematics.mechanisms.hexaglide import Hexaglide
+from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS, Hexaglide
 from hexacell.kinematics.pose import Pose
 from hexacell.robot_model import robot_of
 from hexacell.runs.run_folder import RunFolder
@@ -51,9 +51,11 @@ class Rig:
         self.clock, self.gauges, self.controller = bench.clock, bench.gauges, bench.controller
         home, config = Pose(*self.cell.settings.identification.points[0]), self.cell.config_path
         self.physics: RobotPhysics = _physics(
-            Hexaglide(), simulation, self.clock, NativeToml(), config, home
+            Hexaglide(), simulation, self.clock, NativeToml(HEXAGLIDE_PARAMETERS), config, home
         )
-        self.machine = SimulatedMachine(Hexaglide(), NativeToml(), config, self.physics, self.clock, home)
+        self.machine = SimulatedMachine(
+            Hexaglide(), NativeToml(HEXAGLIDE_PARAMETERS), config, self.physics, self.clock, home
+        )
         for gauge in bench.gauges:
             gauge.shown = partial(self.physics.gauge_displacement, gauge.name)
         bench.encoders.shown = lambda: list(self.physics.encoder_positions())

@@ -17,7 +17,6 @@ from hexacell.identification.solver import measurement_model
 from hexacell.identification.solver.levenberg_marquardt import LARGEST_AMPLIFICATION
 from hexacell.identification.solver.regularized_fit import Fit
 from hexacell.identification.solver.result import GAUGES, DataFault, DataFaultKind
-from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array, Mask
 from hexacell.measurements.records import RecordId
@@ -78,7 +77,7 @@ def deletion_test(problem: Problem, record: RecordId, fit: Fit) -> DeletionTest:
 
 def poses_at(problem: Problem, fit: Fit) -> tuple[PoseBatch, Mask]:
     """Poses that close a fit's geometry at all records of a problem, and which (n,) were found."""
-    geometry = Geometry.from_vector(problem.basis @ fit.solution.free)
+    geometry = problem.mechanism.convention.geometry(fit.solution.free)
     reached = problem.commands.solve_poses(geometry, problem.joints)
     return reached.poses, reached.found
 

@@ -104,7 +104,7 @@ def predicted_accuracy(
     if not can_take.any() or not can_span.any():
         return None
     task, workspace = task[can_take], workspace[can_span]
-    fit = FrameFit(workspace, float(np.mean(np.linalg.norm(found.geometry.B, axis=-1))))
+    fit = FrameFit(workspace, float(found.problem.mechanism.platform_radius(found.geometry)))
     aligned = fit.aligned(reached_workspace[can_span], reached[can_take])
     jacobian = fit.remove_frame_motion(
         task, _derivatives(found, branch, task), _derivatives(found, branch, workspace)

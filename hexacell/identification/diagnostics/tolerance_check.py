@@ -11,7 +11,8 @@ import numpy as np
 
 from hexacell.identification.problem.problem import Tolerances
 from hexacell.identification.solver.result import GeometryEstimate
-from hexacell.kinematics.geometry import PARAMETER_NAMES, Geometry
+from hexacell.kinematics.geometry import Geometry
+from hexacell.kinematics.parameters import ParameterSet
 from hexacell.kinematics.rotations import Array
 
 CERTAIN_SIGMAS = 3.0
@@ -35,19 +36,20 @@ def tolerance_violations(
     found: GeometryEstimate, drawing: Geometry, tolerances: Tolerances
 ) -> tuple[ToleranceViolation, ...]:
     """The parameters that, three sigma granted, are beyond their tolerance; not a number is beyond all."""
-    change = found.geometry.vector() - drawing.vector()
-    widths = tolerances.widths()
-    within = np.abs(_without_ball(change, tolerances)) - CERTAIN_SIGMAS * found.sigma <= widths
+    parameters = drawing.parameters
+    change = found.geometry.vector - drawing.vector
+    widths = tolerances.widths(parameters)
+    own = _without_ball_offset(change, parameters, tolerances.ball_mm)
+    within = np.abs(own) - CERTAIN_SIGMAS * found.sigma <= widths
     return tuple(
         ToleranceViolation(
-            PARAMETER_NAMES[row], float(change[row]), float(widths[row]), float(found.sigma[row])
+            parameters.names[row], float(change[row]), float(widths[row]), float(found.sigma[row])
         )
         for row in np.flatnonzero(~within)
     )
 
 
-def _without_ball(change: Array, tolerances: Tolerances) -> Array:
-    """The change less the ball's own offset, as far as that is allowed."""
-    B = change[18:36].reshape(6, 3)
-    offset = np.clip(np.median(B, axis=0), -tolerances.ball_mm, tolerances.ball_mm)
-    return np.concatenate([change[:18], (B - offset).ravel(), change[36:]])
+def _without_ball_offset(change: Array, parameters: ParameterSet, ball_mm: float) -> Array:
+    """The change less the ball's offset: the median along each axis, as far as that is allowed."""
+    medians = [np.median(change[axis > 0.0]) if axis.any() else 0.0 for axis in parameters.ball_offset]
+    return change - np.clip(medians, -ball_mm, ball_mm) @ parameters.ball_offset

@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 
 from hexacell.errors import IdentifiabilityError
 from hexacell.identification.problem.commanded_poses import CommandedPoses
-from hexacell.kinematics.geometry import LEGS, Geometry
+from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import Branch
+from hexacell.kinematics.parameters import LEGS
 from hexacell.kinematics.rotations import Array, Mask
 
 UNSUSPICIOUS_MM = 1.0
@@ -77,7 +78,7 @@ class EncoderConsistency:
 
     def _explicable(self) -> Array:
         """How far (n, 6), mm, tolerances can take each joint variable; infinite at the end of reach."""
-        at_drawing = self._commanded(np.zeros(7))
+        at_drawing = self._commanded(np.zeros(len(self.widths)))
         changes = np.zeros_like(at_drawing)
         for parameter in np.diag(self.widths):
             ends = [np.abs(self._commanded(sign * parameter) - at_drawing) for sign in (-1.0, 1.0)]
@@ -85,9 +86,9 @@ class EncoderConsistency:
         return np.nan_to_num(changes, nan=np.inf)
 
     def _commanded(self, change: Array) -> Array:
-        """Joint variables (n, 6), mm, with every leg changed by (7,), mm."""
-        drawing = self.drawing
-        geometry = Geometry(drawing.S + change[:3], drawing.B + change[3:6], drawing.l + change[6])
+        """Joint variables (n, 6), mm, with the numbers of every leg changed by (c,)."""
+        parameters = self.drawing.parameters
+        geometry = Geometry(parameters, self.drawing.vector + parameters.of_every_leg(change))
         return self.commands.mechanism.inverse(geometry, self.branch, self.commands.poses)
 
     def _advice(self, explicable: Array) -> str:

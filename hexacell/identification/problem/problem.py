@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 from hexacell.errors import IdentifiabilityError
 from hexacell.identification.problem.commanded_poses import CommandedPoses
 from hexacell.identification.problem.encoder_consistency import EncoderConsistency
-from hexacell.kinematics.geometry import PARAMETER_NAMES, Geometry
+from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import Branch, Mechanism
+from hexacell.kinematics.parameters import ParameterSet, Unit
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array, Mask
 from hexacell.measurements.records import MeasurementSet
@@ -34,19 +35,30 @@ class Noise:
 
 @dataclass(frozen=True, slots=True)
 class Tolerances:
-    """Half-widths, mm, within which the built robot differs from its drawing.
+    """Half-widths within which the built robot differs from its drawing.
 
-    ``ball_mm`` is an offset common to all B: where the ball was really mounted.
+    Attributes:
+        by_kind: of every parameter of a kind, in its unit, by the kind's symbol.
+        ball_mm: of an offset common to all platform joints: where the ball was really mounted.
     """
 
-    S_mm: float
-    B_mm: float
-    l_mm: float
+    by_kind: Mapping[str, float]
     ball_mm: float = 0.0
 
-    def widths(self) -> Array:
-        """The half-width of each of the 42 parameters, the ball's offset left out."""
-        return np.repeat([self.S_mm, self.B_mm, self.l_mm], [18, 18, 6])
+    @classmethod
+    def of_settings(cls, parameters: ParameterSet, settings: Mapping[str, float]) -> Tolerances:
+        """The tolerances under the kinds' keys and ``ball_mm``, as the cell file has them."""
+        by_kind = {kind.symbol: settings[kind.tolerance_key] for kind in parameters.kinds}
+        return cls(by_kind, settings["ball_mm"])
+
+    def widths(self, parameters: ParameterSet) -> Array:
+        """The half-width of each parameter (P,), the ball's offset left out."""
+        return parameters.by_kind(self.by_kind)
+
+    def sum_mm(self, parameters: ParameterSet) -> float:
+        """All tolerances of lengths together, the ball's offset included."""
+        lengths = (self.by_kind[kind.symbol] for kind in parameters.kinds if kind.unit is Unit.MM)
+        return sum(lengths) + self.ball_mm
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -65,20 +77,19 @@ class Prior:
     def of(cls, mechanism: Mechanism, drawing: Geometry, tolerances: Tolerances) -> Prior:
         """A Gaussian with the second moments of errors that are uniform within the tolerances."""
         centre, _ = mechanism.normalize_frames(drawing)
-        free = mechanism.convention.free_names()
-        rows = [PARAMETER_NAMES.index(name) for name in free]
-        covariance = np.diag(tolerances.widths()[rows] ** 2 / 3.0)
-        for axis in "xyz":
-            common = np.array([name[0] == "B" and name[-1] == axis for name in free], dtype=float)
+        rows = mechanism.convention.free_rows()
+        covariance = np.diag(tolerances.widths(mechanism.parameters)[rows] ** 2 / 3.0)
+        for common in mechanism.parameters.ball_offset[:, rows]:
             covariance += tolerances.ball_mm**2 / 3.0 * np.outer(common, common)
         return cls(centre, covariance)
 
     def leg_widths(self, mechanism: Mechanism) -> Array:
-        """The largest tolerances (7,), mm, of a leg's S, B and l, the ball's offset included."""
-        kinds = np.array([name[0] for name in mechanism.convention.free_names()])
-        widths = np.sqrt(3.0 * np.diag(self.covariance))
-        largest = [widths[kinds == kind].max(initial=0.0) for kind in "SBl"]
-        return np.repeat(largest, [3, 3, 1])
+        """The largest tolerances (c,) of a leg's own numbers, by kind, the ball's offset included."""
+        widths = np.zeros(len(mechanism.parameters))
+        widths[mechanism.convention.free_rows()] = np.sqrt(3.0 * np.diag(self.covariance))
+        parameters = mechanism.parameters
+        largest = [parameters.array(widths, kind.symbol).max() for kind in parameters.kinds]
+        return np.repeat(largest, [kind.numbers_per_leg for kind in parameters.kinds])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -115,7 +126,7 @@ class Problem:
 
     @property
     def basis(self) -> Array:
-        """(42, p), from free parameters to all of them."""
+        """(P, p), from free parameters to all of them."""
         return self.mechanism.convention.basis()
 
     @property

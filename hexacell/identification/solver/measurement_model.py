@@ -8,7 +8,6 @@ import numpy as np
 
 from hexacell.identification.problem.problem import Noise, Problem
 from hexacell.kinematics.forward import apply_twist, forward_kinematics
-from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array, Mask
 from hexacell.kinematics.sensitivity import pose_sensitivity
@@ -63,7 +62,7 @@ def evaluate_step(problem: Problem, now: Prediction, step: Array) -> TrialStep:
 
     Poses start where the linearisation puts them; where that is too far, at the present ones.
     """
-    geometry = Geometry.from_vector(problem.basis @ (now.free + step))
+    geometry = problem.mechanism.convention.geometry(now.free + step)
     for start in (apply_twist(now.poses, now.pose_jacobian @ step), now.poses):
         result = forward_kinematics(problem.mechanism, geometry, problem.joints, start, mode=now.mode)
         if result.found.all():
@@ -73,7 +72,7 @@ def evaluate_step(problem: Problem, now: Prediction, step: Array) -> TrialStep:
 
 def predict(problem: Problem, free: Array, poses: PoseBatch) -> Prediction:
     """Everything a solver step needs, at poses that close the geometry."""
-    geometry = Geometry.from_vector(problem.basis @ free)
+    geometry = problem.mechanism.convention.geometry(free)
     sensitivity = pose_sensitivity(problem.mechanism, geometry, poses, problem.joints)
     by_joints = sensitivity.joints[:, :3]
     return Prediction(

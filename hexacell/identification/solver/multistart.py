@@ -15,7 +15,6 @@ from hexacell.identification.problem.problem import Problem
 from hexacell.identification.solver.levenberg_marquardt import LARGEST_AMPLIFICATION
 from hexacell.identification.solver.measurement_model import predict
 from hexacell.identification.solver.nuisance_parameters import NuisanceElimination
-from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array
 
@@ -46,5 +45,5 @@ def _cost(problem: Problem, free: Array) -> float:
 
 
 def _poses(problem: Problem, free: Array) -> tuple[PoseBatch, bool]:
-    result = problem.commands.solve_poses(Geometry.from_vector(problem.basis @ free), problem.joints)
+    result = problem.commands.solve_poses(problem.mechanism.convention.geometry(free), problem.joints)
     return result.poses, bool(result.found.all())

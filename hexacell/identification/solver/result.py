@@ -12,7 +12,7 @@ from hexacell.errors import IdentifiabilityError
 from hexacell.identification.problem.problem import Problem
 from hexacell.identification.solver.chi_square import ChiSquareTest
 from hexacell.identification.solver.levenberg_marquardt import Termination
-from hexacell.kinematics.geometry import PARAMETER_NAMES, Geometry
+from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array
 from hexacell.measurements.records import Deviation, RecordId
@@ -104,9 +104,9 @@ class Identification:
 
     Attributes:
         geometry: in the mechanism's frame convention, mm.
-        covariance: (42, 42), mm^2, in that convention; zero for what it fixes.
+        covariance: (P, P), mm^2, in that convention; zero for what it fixes.
         free: the free parameters (p,), mm, and ``free_covariance`` (p, p) theirs.
-        prior_sigma: (42,), mm, before measuring.
+        prior_sigma: (P,), mm, before measuring.
         problem: the records that were used.
         poses: of the platform at each record, under the identified geometry.
         residual_rms_mm: of the centred residuals of the deviations.
@@ -152,7 +152,7 @@ class Identification:
 
     @property
     def sigma(self) -> Array:
-        """Standard deviations (42,), mm, of the parameters; zero for what the convention fixes."""
+        """Standard deviations (P,), mm, of the parameters; zero for what the convention fixes."""
         return np.sqrt(np.diag(self.covariance))
 
     @property
@@ -165,4 +165,4 @@ class Identification:
         """Parameters that the data hardly determine: their sigma is still near the prior's."""
         undetermined = self.sigma > UNDETERMINED_RATIO * self.prior_sigma
         rows = np.flatnonzero(undetermined & (self.prior_sigma > 0.0))
-        return tuple(PARAMETER_NAMES[row] for row in rows)
+        return tuple(self.geometry.parameters.names[row] for row in rows)

@@ -16,7 +16,6 @@ import numpy as np
 from hexacell.identification.problem.problem import Problem
 from hexacell.identification.solver import levenberg_marquardt
 from hexacell.identification.solver.levenberg_marquardt import COARSE, Solution, SolverOptions, Termination
-from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array, Mask
 from hexacell.kinematics.sensitivity import pose_sensitivity
@@ -56,7 +55,7 @@ def solve_around_singularities(
 
 def _restorable(problem: Problem, free: Array, aside: Mask) -> tuple[Mask, PoseBatch]:
     """Which of the records set aside are clear of singularities at a geometry, and their poses."""
-    geometry = Geometry.from_vector(problem.basis @ free)
+    geometry = problem.mechanism.convention.geometry(free)
     rows = np.flatnonzero(aside)
     found = problem.commands[rows].solve_poses(geometry, problem.joints[rows])
     by_joints = pose_sensitivity(problem.mechanism, geometry, found.poses, problem.joints[rows]).joints[

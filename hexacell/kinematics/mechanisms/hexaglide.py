@@ -8,14 +8,43 @@ Source: Abtahi et al. 2010, eq. 4 and 14, and the leg equation in ``docs/method.
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from hexacell.kinematics.geometry import Geometry, GeometryBatch
 from hexacell.kinematics.mechanism import Branch, ConstraintDerivatives, FrameConvention, FrameTransform
+from hexacell.kinematics.parameters import ParameterKind, ParameterSet
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array
 
+HEXAGLIDE_PARAMETERS = ParameterSet(
+    (
+        ParameterKind(
+            "S",
+            ("x", "y", "z"),
+            meaning="spherical joints in the base frame at q = 0, mm, legs 1 to 6",
+            tolerance_meaning="every coordinate of a spherical joint",
+        ),
+        ParameterKind(
+            "B",
+            ("x", "y", "z"),
+            meaning="universal joints in the platform frame (origin: the ball), mm",
+            tolerance_meaning="every coordinate of a universal joint",
+            has_ball_offset=True,
+        ),
+        ParameterKind(
+            "l",
+            (),
+            meaning="leg lengths, mm",
+            tolerance_meaning="every leg length",
+            display="leg {leg} length",
+            is_positive=True,
+        ),
+    )
+)
+
 PAPER_FRAME = FrameConvention(
     name="paper",
+    parameters=HEXAGLIDE_PARAMETERS,
     zero=("S2x", "S2y", "S2z", "S3z"),
     equal=(("B2z", "B3z", "B5z"), ("B2y", "B5y")),
 )
@@ -25,6 +54,7 @@ class Hexaglide:
     """The Hexaglide as six constraints; stateless."""
 
     name = "hexaglide"
+    parameters = HEXAGLIDE_PARAMETERS
     convention = PAPER_FRAME
 
     def constraints(self, geometry: Geometry, poses: PoseBatch, joints: Array) -> Array:
@@ -36,12 +66,12 @@ class Hexaglide:
     ) -> tuple[Array, Array]:
         """See :class:`~hexacell.kinematics.mechanism.Mechanism`."""
         b, v = _leg_vectors(geometry, poses, joints)
-        return _leg_errors(geometry, v), _by_pose(b, v / geometry.l[..., None])
+        return _leg_errors(geometry, v), _by_pose(b, v / geometry["l"][..., None])
 
     def derivatives(self, geometry: Geometry, poses: PoseBatch, joints: Array) -> ConstraintDerivatives:
         """See :class:`~hexacell.kinematics.mechanism.Mechanism`."""
         b, v = _leg_vectors(geometry, poses, joints)
-        n = v / geometry.l[:, None]
+        n = v / geometry["l"][:, None]
         by_length = -0.5 * (np.sum(n * n, axis=-1, keepdims=True) + 1.0)
         return ConstraintDerivatives(
             pose=_by_pose(b, n),
@@ -52,7 +82,7 @@ class Hexaglide:
     def inverse(self, geometry: Geometry, branch: Branch, poses: PoseBatch) -> Array:
         """See :class:`~hexacell.kinematics.mechanism.Mechanism`."""
         _, v = _leg_vectors(geometry, poses, np.zeros((len(poses), 6)))
-        along_rail_squared = geometry.l**2 - v[..., 1] ** 2 - v[..., 2] ** 2
+        along_rail_squared = geometry["l"] ** 2 - v[..., 1] ** 2 - v[..., 2] ** 2
         reachable = along_rail_squared >= 0.0
         along_rail = np.sqrt(np.where(reachable, along_rail_squared, np.nan))
         return np.asarray(branch) * along_rail - v[..., 0]
@@ -64,30 +94,47 @@ class Hexaglide:
 
     def normalize_frames(self, geometry: Geometry) -> tuple[Geometry, FrameTransform]:
         """Origin at S2, S3 level with it, platform axes through B2, B5 and B3."""
-        base = _roll_that_levels(geometry.S[2] - geometry.S[1])
-        platform = _axes_through(geometry.B[1], geometry.B[4], geometry.B[2])
-        change = FrameTransform(base, geometry.S[1].copy(), platform)
-        S = (geometry.S - geometry.S[1]) @ base.T
-        B = geometry.B @ platform.T
+        S, B = geometry["S"], geometry["B"]
+        base = _roll_that_levels(S[2] - S[1])
+        platform = _axes_through(B[1], B[4], B[2])
+        change = FrameTransform(base, S[1].copy(), platform)
+        S = (S - S[1]) @ base.T
+        B = B @ platform.T
         # The rules hold exactly, not just to rounding: later code relies on the equalities.
         S[1], S[2, 2] = 0.0, 0.0
         B[[2, 4], 2] = B[1, 2]
         B[4, 1] = B[1, 1]
-        return Geometry(S, B, geometry.l), change
+        return hexaglide_geometry(S, B, geometry["l"]), change
+
+    def change_frames(self, geometry: Geometry, change: FrameTransform) -> Geometry:
+        """See :class:`~hexacell.kinematics.mechanism.Mechanism`."""
+        S = (geometry["S"] - change.origin) @ change.base.T
+        return hexaglide_geometry(S, geometry["B"] @ change.platform.T, geometry["l"])
+
+    def platform_radius(self, geometry: Geometry | GeometryBatch) -> Array:
+        """See :class:`~hexacell.kinematics.mechanism.Mechanism`."""
+        radius: Array = np.mean(np.linalg.norm(geometry["B"], axis=-1), axis=-1)
+        return radius
+
+
+def hexaglide_geometry(S: ArrayLike, B: ArrayLike, l: ArrayLike) -> Geometry:  # noqa: E741
+    """The geometry of slider joints S (6, 3), platform joints B (6, 3) and leg lengths l (6,), mm."""
+    return Geometry.of(HEXAGLIDE_PARAMETERS, {"S": S, "B": B, "l": l})
 
 
 def _leg_vectors(
     geometry: Geometry | GeometryBatch, poses: PoseBatch, joints: Array
 ) -> tuple[Array, Array]:
     """R B_i (n, 6, 3), and v_i (n, 6, 3) from platform joint to slider joint, mm."""
-    b = geometry.B @ np.swapaxes(poses.rotations, -1, -2)
-    v = geometry.S - poses.positions[:, None, :] - b
+    b = geometry["B"] @ np.swapaxes(poses.rotations, -1, -2)
+    v = geometry["S"] - poses.positions[:, None, :] - b
     v[..., 0] += joints
     return b, v
 
 
 def _leg_errors(geometry: Geometry | GeometryBatch, v: Array) -> Array:
-    error: Array = (np.einsum("nij,nij->ni", v, v) - geometry.l**2) / (2.0 * geometry.l)
+    lengths = geometry["l"]
+    error: Array = (np.einsum("nij,nij->ni", v, v) - lengths**2) / (2.0 * lengths)
     return error
 
 

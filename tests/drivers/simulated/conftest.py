@@ -21,7 +21,7 @@ from hexacell.clock import CellClock
 from hexacell.controller_config.toml_format import NativeToml
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.inverse import inverse_kinematics
-from hexacell.kinematics.mechanisms.hexaglide import Hexaglide
+from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS, Hexaglide, hexaglide_geometry
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.rotations import Array
 
@@ -70,7 +70,7 @@ class Twin:
 
     def joints_for(self, pose: Pose) -> Array:
         """Where the controller's geometry puts the sliders for a pose."""
-        branch = NativeToml().read(self.config).branch
+        branch = NativeToml(HEXAGLIDE_PARAMETERS).read(self.config).branch
         joints: Array = inverse_kinematics(Hexaglide(), self.commanding, branch, PoseBatch.of([pose]))[0]
         return joints
 
@@ -83,9 +83,9 @@ class Twin:
 
         def error(numbers: Array) -> Array:
             platform = PoseBatch.of([Pose(*(float(number) for number in numbers))])
-            ends = platform.positions[0] + self.truth.B @ platform.rotations[0].T
-            sliders = self.truth.S + joints[:, None] * legs
-            return np.asarray(np.linalg.norm(sliders - ends, axis=1) - self.truth.l, dtype=float)
+            ends = platform.positions[0] + self.truth["B"] @ platform.rotations[0].T
+            sliders = self.truth["S"] + joints[:, None] * legs
+            return np.asarray(np.linalg.norm(sliders - ends, axis=1) - self.truth["l"], dtype=float)
 
         found = least_squares(
             error, pose.as_tuple(), x_scale=(1, 1, 1, 0.1, 0.1, 0.1), xtol=1e-15, ftol=1e-15
@@ -118,7 +118,7 @@ def make_twin(bundled_cell: Cell) -> MakeTwin:
         changes = STILL | {key.replace("__", "."): value for key, value in changes.items()}
         simulation = changed(simulation, changes)
         config = bundled_cell.config_path
-        read = NativeToml().read(config)
+        read = NativeToml(HEXAGLIDE_PARAMETERS).read(config)
         start = PoseBatch.of([home])
         joints = inverse_kinematics(Hexaglide(), read.geometry, read.branch, start)[0]
         clock = StillClock()
@@ -130,9 +130,11 @@ def make_twin(bundled_cell: Cell) -> MakeTwin:
             start_geometry=read.geometry,
             start_joints=joints,
         )
-        machine = SimulatedMachine(Hexaglide(), NativeToml(), config, physics, clock, home)
+        machine = SimulatedMachine(
+            Hexaglide(), NativeToml(HEXAGLIDE_PARAMETERS), config, physics, clock, home
+        )
         values = simulation.geometry
-        truth = Geometry(values.S, values.B, values.l)
+        truth = hexaglide_geometry(values["S"], values["B"], values["l"])
         return Twin(clock, physics, machine, config, truth, read.geometry)
 
     return make

@@ -23,7 +23,7 @@ from drivers.simulated.gauges.faults import InjectedGaugeFault
 from hexacell.cell.model import CellSettings
 from hexacell.controller_config.toml_format import NativeToml
 from hexacell.errors import FileError, HexacellError, ReachError
-from hexacell.kinematics.mechanisms.hexaglide import Hexaglide
+from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS, Hexaglide, hexaglide_geometry
 from hexacell.kinematics.pose import Pose
 
 DRIVERS: dict[str, Any] = {"sylvac": SylvacGauge, "mux10": Mux10Gauge, "cdi": CdiGauge}
@@ -36,7 +36,7 @@ def serve(bundled_cell: Any, settings: CellSettings | None = None, *, other_proc
         settings,
         settings.simulation,
         Hexaglide(),
-        NativeToml(),
+        NativeToml(HEXAGLIDE_PARAMETERS),
         bundled_cell.config_path,
         other_processes=other_processes,
     )
@@ -150,16 +150,17 @@ async def test_reloading_reads_the_config_and_moves_nothing(bundled_cell) -> Non
             await controller.prepare()
             sliders, believed = cell.machine.joints(), await controller.pose()
             config, values = bundled_cell.config_path, bundled_cell.settings.simulation.geometry
-            config.write_text(NativeToml().rewrite(config.read_text(), _geometry(values)))
+            config.write_text(
+                NativeToml(HEXAGLIDE_PARAMETERS).rewrite(config.read_text(), _geometry(values))
+            )
             await controller.reload()
             assert cell.machine.joints() == pytest.approx(sliders, abs=1e-6)
             assert (await controller.pose()).position != pytest.approx(believed.position, abs=0.5)
 
 
 def _geometry(values: Any) -> Any:
-    from hexacell.kinematics.geometry import Geometry
 
-    return Geometry(values.S, values.B, values.l)
+    return hexaglide_geometry(values["S"], values["B"], values["l"])
 
 
 async def test_the_cells_own_passwords_are_asked_for(bundled_cell) -> None:
@@ -181,7 +182,7 @@ def test_its_settings_name_every_device_and_no_simulation(bundled_cell) -> None:
         assert len({gauge.port for gauge in cell.settings.gauges}) == 3
         assert cell.settings.encoders.bus == cell.encoders.bus_settings
         assert cell.settings.controller.port == cell.controller.port
-        CellSettings.model_validate(cell.settings.model_dump(), strict=True)
+        type(cell.settings).model_validate(cell.settings.model_dump(), strict=True)
 
 
 def test_other_processes_reach_the_encoders_too(bundled_cell) -> None:

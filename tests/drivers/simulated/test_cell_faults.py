@@ -17,7 +17,7 @@ from hexacell.cell.simulation import SimulatedFault
 from hexacell.clock import CellClock
 from hexacell.controller_config.toml_format import NativeToml
 from hexacell.errors import DeviceError, UsageError
-from hexacell.kinematics.mechanisms.hexaglide import Hexaglide
+from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS, Hexaglide
 
 PATIENCE_S = 5.0
 
@@ -31,7 +31,7 @@ def cell(bundled_cell):
         settings,
         settings.simulation,
         Hexaglide(),
-        NativeToml(),
+        NativeToml(HEXAGLIDE_PARAMETERS),
         bundled_cell.config_path,
         other_processes=False,
     ) as simulated:
@@ -202,7 +202,7 @@ def test_a_cell_file_that_plans_what_cannot_be_is_refused(bundled_cell) -> None:
             settings,
             simulation,
             Hexaglide(),
-            NativeToml(),
+            NativeToml(HEXAGLIDE_PARAMETERS),
             bundled_cell.config_path,
             other_processes=False,
         )

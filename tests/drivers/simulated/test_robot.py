@@ -13,6 +13,7 @@ from drivers.simulated.robot import LINE_STEPS
 from hexacell.controller_config.toml_format import NativeToml
 from hexacell.errors import FileError
 from hexacell.kinematics.geometry import Geometry
+from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS, hexaglide_geometry
 from hexacell.kinematics.pose import Pose
 
 TILTED = Pose(5.0, -3.0, 548.0, 6.0, -4.0, 2.0)
@@ -20,7 +21,7 @@ TILTED = Pose(5.0, -3.0, 548.0, 6.0, -4.0, 2.0)
 
 def rewrite(twin: Any, geometry: Geometry) -> None:
     text = twin.config.read_text()
-    twin.config.write_text(NativeToml().rewrite(text, geometry))
+    twin.config.write_text(NativeToml(HEXAGLIDE_PARAMETERS).rewrite(text, geometry))
 
 
 def test_a_move_ends_at_its_target(twin) -> None:
@@ -201,7 +202,7 @@ def test_a_config_that_cannot_be_read_leaves_the_old_geometry(twin) -> None:
 
 
 def test_a_geometry_that_cannot_hold_the_sliders_is_refused(twin) -> None:
-    shrunk = Geometry(twin.truth.S, twin.truth.B, twin.truth.l / 3.0)
+    shrunk = hexaglide_geometry(twin.truth["S"], twin.truth["B"], twin.truth["l"] / 3.0)
     kept = twin.config.read_text()
     rewrite(twin, shrunk)
     with pytest.raises(FileError, match="no pose at the present slider positions"):

@@ -10,9 +10,10 @@ import pytest
 from hexacell.acceptance.gates import gates
 from hexacell.identification.problem.problem import Tolerances
 from hexacell.identification.solver.levenberg_marquardt import Termination
-from hexacell.kinematics.geometry import PARAMETER_NAMES, Geometry
+from hexacell.kinematics.geometry import Geometry
+from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS
 
-TOLERANCES = Tolerances(S_mm=7.0, B_mm=7.0, l_mm=7.0)
+TOLERANCES = Tolerances({"S": 7.0, "B": 7.0, "l": 7.0})
 
 
 @pytest.fixture
@@ -33,11 +34,11 @@ def shifted(identified, paper):
     """The identification with some parameters at given distances from the drawing, mm."""
 
     def shift(**errors):
-        vector = identified.geometry.vector()
+        vector = identified.geometry.vector.copy()
         for name, error in errors.items():
-            row = PARAMETER_NAMES.index(name)
-            vector[row] = paper.nominal.vector()[row] + error
-        return replace(identified, geometry=Geometry.from_vector(vector))
+            row = HEXAGLIDE_PARAMETERS.names.index(name)
+            vector[row] = paper.nominal.vector[row] + error
+        return replace(identified, geometry=Geometry(HEXAGLIDE_PARAMETERS, vector))
 
     return shift
 
@@ -64,7 +65,7 @@ def test_a_solver_that_did_not_converge_fails_the_gate(judged, identified):
 def test_undetermined_parameters_are_named(judged, identified):
     covariance = identified.covariance.copy()
     for name in ("S4z", "l3"):
-        row = PARAMETER_NAMES.index(name)
+        row = HEXAGLIDE_PARAMETERS.names.index(name)
         covariance[row, row] = identified.prior_sigma[row] ** 2
     gate = judged(replace(identified, covariance=covariance))["determined"]
     assert not gate.passed
@@ -79,7 +80,7 @@ def test_a_rod_far_outside_its_tolerance_is_refused_by_name_and_sign(judged, shi
 
 
 def test_a_violation_below_three_sigma_is_none(judged, shifted, identified):
-    sigma = identified.sigma[PARAMETER_NAMES.index("B6x")]
+    sigma = identified.sigma[HEXAGLIDE_PARAMETERS.names.index("B6x")]
     assert judged(shifted(B6x=7.0 + 2.9 * sigma))["within tolerance"].passed
     assert not judged(shifted(B6x=7.0 + 3.1 * sigma))["within tolerance"].passed
 
@@ -109,8 +110,8 @@ def test_the_change_is_from_the_controllers_geometry(judged, identified, paper):
 
 
 def test_nan_passes_no_gate(judged, identified):
-    vector = identified.geometry.vector()
+    vector = identified.geometry.vector.copy()
     vector[3 * 7] = np.nan
-    broken = judged(replace(identified, geometry=Geometry.from_vector(vector)))
+    broken = judged(replace(identified, geometry=Geometry(HEXAGLIDE_PARAMETERS, vector)))
     assert not broken["within tolerance"].passed
     assert not broken["small change"].passed

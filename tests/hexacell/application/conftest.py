@@ -20,7 +20,7 @@ from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import Cell, dump, load_cell
 from hexacell.cell.model import CellSettings
 from hexacell.controller_config.toml_format import NativeToml
-from hexacell.kinematics.mechanisms.hexaglide import Hexaglide
+from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS, Hexaglide
 from hexacell.runs.run_folder import RunFolder
 from procedures.calibration import workflow as calibration_module
 from procedures.calibration.workflow import Mode
@@ -186,7 +186,7 @@ def make_site(make_cell: MakeCell, tmp_path: Path) -> Iterator[Callable[..., Sit
             cell.settings,
             cell.settings.simulation,
             Hexaglide(),
-            NativeToml(),
+            NativeToml(HEXAGLIDE_PARAMETERS),
             cell.config_path,
             other_processes=False,
         )

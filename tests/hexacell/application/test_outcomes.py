@@ -15,6 +15,7 @@ from hexacell.acceptance.validation import Verdict
 from hexacell.controller_config.change import ConfigChange
 from hexacell.errors import AnswerNeeded, DeviceError, ExitCode, FileError, LimitError, WriteBackUndone
 from hexacell.kinematics.geometry import Geometry
+from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS, hexaglide_geometry
 from procedures.run import events
 from procedures.run.steps import Phase
 
@@ -84,9 +85,9 @@ async def test_a_gate_that_needs_a_person_who_is_there(proposed, approver) -> No
 def bend(site: Any, millimetres: float) -> None:
     """Somebody leans on the machine: its true geometry is another from now on."""
     physics = site.simulated.physics
-    bent = physics._truth.vector() + millimetres * np.sin(np.arange(42.0))
+    bent = physics._truth.vector + millimetres * np.sin(np.arange(42.0))
     with physics._lock:
-        physics._truth = Geometry.from_vector(bent)
+        physics._truth = Geometry(HEXAGLIDE_PARAMETERS, bent)
         physics._joints = physics._joints + np.nan  # so that the platform is moved along at once
 
 
@@ -102,7 +103,7 @@ async def test_worse_than_before_is_rolled_back_bit_for_bit(proposed, finished) 
 
 def _drawing(site: Any) -> Geometry:
     nominal = site.cell.settings.robot.nominal
-    return Geometry(nominal.S, nominal.B, nominal.l)
+    return hexaglide_geometry(nominal["S"], nominal["B"], nominal["l"])
 
 
 async def test_better_but_not_good_enough_is_rolled_back_too(proposed, finished) -> None:

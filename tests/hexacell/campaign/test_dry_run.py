@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from hexacell.campaign.dry_run import dry_run
+from hexacell.kinematics.mechanisms.hexaglide import hexaglide_geometry
 from hexacell.robot_model import make_robot
 from hexacell.virtual_robot.random_robots import robots_within_tolerances
 
@@ -53,9 +54,9 @@ def test_robots_that_cannot_be_measured_do_not_count(make_plan):
 
 def test_robots_are_within_the_tolerances_and_fill_them(make_plan):
     plan = make_plan(tolerances__l_mm=2.0)
-    drawing = plan.robot.drawing.vector()
+    drawing = plan.robot.drawing.vector
     errors = np.array(
-        [robot.vector() - drawing for robot in robots_within_tolerances(plan.robot, 64, seed=3)]
+        [robot.vector - drawing for robot in robots_within_tolerances(plan.robot, 64, seed=3)]
     )
     assert np.abs(errors[:, -6:]).max() <= 2.0
     assert np.abs(errors).max() <= 7.0
@@ -66,7 +67,7 @@ def test_robots_are_within_the_tolerances_and_fill_them(make_plan):
 def test_a_common_offset_of_the_ball_is_common(make_plan):
     plan = make_plan(tolerances__ball_mm=30.0, tolerances__B_mm=0.001)
     B = np.array(
-        [robot.B - plan.robot.drawing.B for robot in robots_within_tolerances(plan.robot, 16, seed=3)]
+        [robot["B"] - plan.robot.drawing["B"] for robot in robots_within_tolerances(plan.robot, 16, seed=3)]
     )
     assert np.ptp(B, axis=1).max() < 0.01
     assert np.abs(B).max() > 20.0
@@ -74,9 +75,9 @@ def test_a_common_offset_of_the_ball_is_common(make_plan):
 
 def test_a_robot_calibrated_before_is_near_what_its_controller_has(make_plan, paper):
     plan = make_plan()
-    controller = type(plan.robot.controller)(paper.actual.S, paper.actual.B, paper.actual.l)
+    controller = hexaglide_geometry(paper.actual["S"], paper.actual["B"], paper.actual["l"])
     format_of = type("Held", (), {"geometry": controller, "branch": paper.branch})()
     robot = make_robot(plan.settings, format_of)
-    centre = robot.belief().controller.vector()
-    errors = np.array([one.vector() - centre for one in robots_within_tolerances(robot, 16, seed=3)])
+    centre = robot.belief().controller.vector
+    errors = np.array([one.vector - centre for one in robots_within_tolerances(robot, 16, seed=3)])
     assert 0.5 < np.abs(errors).max() <= 0.7

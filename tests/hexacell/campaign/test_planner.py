@@ -13,6 +13,7 @@ from hexacell.campaign.planner import Plan
 from hexacell.campaign.stopping_rules import REFUSALS
 from hexacell.controller_config.interface import ControllerGeometry
 from hexacell.errors import IdentifiabilityError
+from hexacell.kinematics.mechanisms.hexaglide import hexaglide_geometry
 from hexacell.measurements.records import MeasurementSet
 from hexacell.robot_model import make_robot
 
@@ -92,7 +93,7 @@ def test_the_error_after_each_record_is_as_forecast(campaign):
 def test_poses_and_expectations_are_in_the_controllers_frames(campaign, two_points, paper):
     """A config whose base is turned upside down about the rails gets the same robot, turned."""
     turned = np.diag([1.0, -1.0, -1.0])
-    geometry = type(paper.nominal)(paper.nominal.S @ turned, paper.nominal.B, paper.nominal.l)
+    geometry = hexaglide_geometry(paper.nominal["S"] @ turned, paper.nominal["B"], paper.nominal["l"])
     robot = make_robot(two_points.settings, ControllerGeometry(geometry, paper.branch))
     points = tuple(tuple((turned @ np.array(point)).tolist()) for point in TWO_POINTS)
     identification = two_points.settings.identification.model_copy(update={"points": points})

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, get_args
 
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hexacell.cell import calibration, devices, fields, limits, model, simulation
+from hexacell.cell import calibration, devices, limits, model, simulation
 from hexacell.cell.loader import describe, dump, schema
+from hexacell.cell.mechanism_sections import geometry_settings
+from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS
 
 finite = st.floats(allow_nan=False, allow_infinity=False)
 positive = st.floats(min_value=0, exclude_min=True, allow_infinity=False)
@@ -21,7 +23,15 @@ anything = st.recursive(
     scalars, lambda inner: st.lists(inner, max_size=3) | st.dictionaries(texts, inner, max_size=3)
 )
 tables = st.dictionaries(texts, anything, max_size=3)
-geometries = st.builds(fields.GeometryValues, S=st.tuples(*[points] * 6), B=st.tuples(*[points] * 6), l=six)
+MODEL = model.cell_model("hexaglide")
+ROBOT: Any = MODEL.model_fields["robot"].annotation
+SIMULATION: Any = get_args(MODEL.model_fields["simulation"].annotation)[0]
+geometries = st.builds(
+    geometry_settings(HEXAGLIDE_PARAMETERS),
+    S=st.tuples(*[points] * 6),
+    B=st.tuples(*[points] * 6),
+    l=six,
+)
 
 
 def _gauges(axes: tuple[str, ...]) -> st.SearchStrategy[tuple[Any, ...]]:
@@ -44,9 +54,9 @@ def _gauges(axes: tuple[str, ...]) -> st.SearchStrategy[tuple[Any, ...]]:
 
 
 cells = st.builds(
-    model.CellSettings,
+    MODEL,
     name=texts,
-    robot=st.builds(model.RobotSettings, mechanism=texts, nominal=geometries),
+    robot=st.builds(ROBOT, mechanism=texts, nominal=geometries),
     controller=st.builds(
         devices.ControllerSettings,
         config=texts,
@@ -74,7 +84,7 @@ cells = st.builds(
     ),
     task=st.builds(calibration.TaskSettings, poses=st.lists(six, max_size=2).map(tuple)),
     simulation=st.builds(
-        simulation.SimulationSettings,
+        SIMULATION,
         geometry=geometries,
         gauges=st.builds(simulation.SimulatedGauges, baudrate=st.none() | st.integers(300, 10**6)),
     ),

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 from hexacell.kinematics.geometry import Geometry
+from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS
 
 CONFIG = """\
 # The owner's remarks stay.
@@ -90,4 +91,4 @@ def geometry() -> Geometry:
     moved = np.arange(42) * 0.001234567
     S = np.array([[side * 400.0, y, 0.0] for side in (-1, 1) for y in (0.0, 200.0, 400.0)])
     B = np.array([[side * 50.0, y, 10.0] for side in (-1, 1) for y in (-40.0, 0.0, 40.0)])
-    return Geometry.from_vector(np.concatenate([S.ravel(), B.ravel(), np.full(6, 700.0)]) + moved)
+    return Geometry(HEXAGLIDE_PARAMETERS, np.concatenate([S.ravel(), B.ravel(), np.full(6, 700.0)]) + moved)

@@ -12,12 +12,15 @@ from hexacell.controller_config.change import ConfigChange, diff, fingerprint, p
 from hexacell.controller_config.toml_format import NativeToml
 from hexacell.errors import FileError
 from hexacell.kinematics.geometry import Geometry
+from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS
 from hexacell.storage import atomic_files
 
 
 @pytest.fixture
 def proposal(config: Path, geometry: Geometry) -> ConfigChange:
-    return propose(config, NativeToml(), "toml", geometry, fingerprint_at_start=fingerprint(config))
+    return propose(
+        config, NativeToml(HEXAGLIDE_PARAMETERS), "toml", geometry, fingerprint_at_start=fingerprint(config)
+    )
 
 
 def test_a_proposal_says_what_would_change_and_writes_nothing(
@@ -27,8 +30,8 @@ def test_a_proposal_says_what_would_change_and_writes_nothing(
     assert proposal.path == config
     assert proposal.sha256_before == atomic_files.sha256(text) == fingerprint(config)
     assert proposal.text_before.encode() == text
-    assert proposal.before.l == (700.0,) * 6
-    assert proposal.after.S[1] == tuple(geometry.S[1])
+    assert proposal.before["l"] == (700.0,) * 6
+    assert proposal.after["S"][1] == tuple(geometry["S"][1])
     assert "-\t[-400.0, 200, 0.0]," in proposal.diff
     assert "+\t[-399.996296, 200.004938, 0.006173]," in proposal.diff
     assert "gain" not in proposal.diff
@@ -39,7 +42,9 @@ def test_a_relative_path_is_kept_whole(
 ) -> None:
     monkeypatch.chdir(config.parent)
     name = Path(config.name)
-    found = propose(name, NativeToml(), "toml", geometry, fingerprint_at_start=fingerprint(name))
+    found = propose(
+        name, NativeToml(HEXAGLIDE_PARAMETERS), "toml", geometry, fingerprint_at_start=fingerprint(name)
+    )
     assert found.path == config
 
 
@@ -47,7 +52,7 @@ def test_a_config_that_changed_since_the_run_began_is_refused(config: Path, geom
     start = fingerprint(config)
     config.write_text(config.read_text() + "# one more remark\n")
     with pytest.raises(FileError, match=r"changed since the run began.*run again"):
-        propose(config, NativeToml(), "toml", geometry, fingerprint_at_start=start)
+        propose(config, NativeToml(HEXAGLIDE_PARAMETERS), "toml", geometry, fingerprint_at_start=start)
 
 
 def test_a_proposal_survives_its_file(tmp_path: Path, proposal: ConfigChange) -> None:
@@ -60,7 +65,9 @@ def test_windows_line_ends_and_a_byte_order_mark_survive_the_file(
     tmp_path: Path, config: Path, geometry: Geometry
 ) -> None:
     config.write_bytes(b"\xef\xbb\xbf" + config.read_bytes().replace(b"\n", b"\r\n"))
-    made = propose(config, NativeToml(), "toml", geometry, fingerprint_at_start=fingerprint(config))
+    made = propose(
+        config, NativeToml(HEXAGLIDE_PARAMETERS), "toml", geometry, fingerprint_at_start=fingerprint(config)
+    )
     made.save(tmp_path / "proposal.json")
     assert ConfigChange.load(tmp_path / "proposal.json").text_before.encode() == config.read_bytes()
 

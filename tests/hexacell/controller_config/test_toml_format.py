@@ -13,10 +13,11 @@ from hexacell.controller_config import toml_format
 from hexacell.controller_config.interface import ConfigFormat
 from hexacell.controller_config.toml_format import NativeToml, number_token
 from hexacell.errors import FileError
-from hexacell.kinematics.geometry import PARAMETER_NAMES, PARAMETERS, Geometry
+from hexacell.kinematics.geometry import Geometry
+from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS
 from hexacell.storage.toml_edit import replace_values
 
-FORMAT: ConfigFormat = NativeToml()
+FORMAT: ConfigFormat = NativeToml(HEXAGLIDE_PARAMETERS)
 HALF_A_NANOMETRE = 5e-7
 
 AT_THE_TOP = [
@@ -105,7 +106,7 @@ moves = st.one_of(st.just(0.0), st.floats(-4e-7, 4e-7), st.floats(-7.0, 7.0), st
 def tokens_and_values(draw: st.DrawFn) -> tuple[list[str], np.ndarray]:
     """42 numbers as an owner spells them, and the geometry that is to replace them."""
     few = draw(st.lists(st.tuples(spellings, moves), min_size=1, max_size=6))
-    pairs = [few[index % len(few)] for index in range(PARAMETERS)]
+    pairs = [few[index % len(few)] for index in range(len(HEXAGLIDE_PARAMETERS))]
     values = np.array([tomllib.loads(f"x = {text}")["x"] + move for text, move in pairs])
     values[36:] = np.abs(values[36:]) + 1e-9
     return [text for text, _ in pairs], values
@@ -121,14 +122,14 @@ def expected_token(old: str, new: float) -> str:
 
 
 def token_by_name(tokens: list[str]) -> Callable[[str], str]:
-    return dict(zip(PARAMETER_NAMES, tokens, strict=True)).__getitem__
+    return dict(zip(HEXAGLIDE_PARAMETERS.names, tokens, strict=True)).__getitem__
 
 
 @given(layouts, tokens_and_values())
 def test_only_number_tokens_change(layout: Layout, numbers: tuple[list[str], np.ndarray]) -> None:
     old, new = numbers
     expected = [expected_token(text, value) for text, value in zip(old, new.tolist(), strict=True)]
-    changed = FORMAT.rewrite(layout.render(token_by_name(old)), Geometry.from_vector(new))
+    changed = FORMAT.rewrite(layout.render(token_by_name(old)), Geometry(HEXAGLIDE_PARAMETERS, new))
     assert changed == layout.render(token_by_name(expected))
 
 
@@ -139,7 +140,7 @@ def test_writing_the_same_values_changes_nothing(
     old, _ = numbers
     text = layout.render(token_by_name(old))
     same = [tomllib.loads(f"x = {token}")["x"] for token in old]
-    assert FORMAT.rewrite(text, Geometry.from_vector(same)) == text
+    assert FORMAT.rewrite(text, Geometry(HEXAGLIDE_PARAMETERS, same)) == text
 
 
 @given(layouts, tokens_and_values())
@@ -147,7 +148,7 @@ def test_what_was_written_is_read_and_then_written_no_more(
     layout: Layout, numbers: tuple[list[str], np.ndarray]
 ) -> None:
     old, new = numbers
-    geometry = Geometry.from_vector(new)
+    geometry = Geometry(HEXAGLIDE_PARAMETERS, new)
     changed = FORMAT.rewrite(layout.render(token_by_name(old)), geometry)
     assert FORMAT.rewrite(changed, geometry) == changed
 
@@ -185,7 +186,7 @@ def test_the_branch_may_be_at_the_top(config: Path) -> None:
     assert FORMAT.read(config).branch == (1, 1, 1, -1, -1, -1)
 
 
-GOOD = plain.render(token_by_name(["1.0"] * PARAMETERS))
+GOOD = plain.render(token_by_name(["1.0"] * len(HEXAGLIDE_PARAMETERS)))
 S, B, L, BRANCH = GOOD.splitlines()[1:5]
 ROW = "[ 1.0, 1.0, 1.0 ]"
 
@@ -242,8 +243,8 @@ ROW = "[ 1.0, 1.0, 1.0 ]"
         ("B = [ [ 1.0", "B = [ [ nan", 3, "row 1, number 1 is nan, but must be a finite number"),
         ("B = [ [ 1.0", "B = [ [ -inf", 3, "is -inf, but must be a finite number"),
         ("B = [ [ 1.0", f"B = [ [ 1{'0' * 400}", 3, "but must be a finite number"),
-        ("l = [ 1.0, 1.0", "l = [ 1.0, -1.0", 4, "leg 2 is -1.0 mm long"),
-        ("l = [ 1.0, 1.0, 1.0", "l = [ 1.0, 1.0, 0", 4, "leg 3 is 0.0 mm long"),
+        ("l = [ 1.0, 1.0", "l = [ 1.0, -1.0", 4, "leg 2 length is -1.0 mm"),
+        ("l = [ 1.0, 1.0, 1.0", "l = [ 1.0, 1.0, 0", 4, "leg 3 length is 0.0 mm"),
         (BRANCH, "branch = 1", 5, "'branch' in [geometry] is 1, but must be a list of 6 numbers"),
         (BRANCH, "branch = [1, 1, 1]", 5, "is a list of 3 items, but must be a list of 6 numbers"),
         ("+1, -1", "\n0, -1", 6, "'branch' in [geometry], number 3 is 0, but must be 1 or -1"),
@@ -292,17 +293,17 @@ def test_absent_unreadable_and_not_utf8(tmp_path: Path) -> None:
 def test_no_geometry_is_written_that_could_not_be_read(
     geometry: Geometry, place: int, value: float
 ) -> None:
-    vector = geometry.vector()
+    vector = geometry.vector.copy()
     vector[place] = value
     with pytest.raises(FileError, match="the new geometry has values"):
-        FORMAT.rewrite(GOOD, Geometry.from_vector(vector))
+        FORMAT.rewrite(GOOD, Geometry(HEXAGLIDE_PARAMETERS, vector))
 
 
 def test_a_leg_too_short_for_six_decimals_is_refused(geometry: Geometry) -> None:
-    vector = geometry.vector()
+    vector = geometry.vector.copy()
     vector[36] = 1e-9
-    with pytest.raises(FileError, match="longer than zero"):
-        FORMAT.rewrite(GOOD, Geometry.from_vector(vector))
+    with pytest.raises(FileError, match="above zero"):
+        FORMAT.rewrite(GOOD, Geometry(HEXAGLIDE_PARAMETERS, vector))
 
 
 def test_a_geometry_that_does_not_read_back_is_never_written(

@@ -9,6 +9,7 @@ from hexacell.controller_config.toml_format import NativeToml
 from hexacell.controller_config.write_back import Receipt, commit, rollback
 from hexacell.errors import FileError, WriteBackUndone
 from hexacell.kinematics.geometry import Geometry
+from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS, hexaglide_geometry
 from hexacell.storage import atomic_files
 
 
@@ -18,7 +19,9 @@ def names(folder: Path) -> list[str]:
 
 @pytest.fixture
 def proposal(config: Path, geometry: Geometry) -> ConfigChange:
-    return propose(config, NativeToml(), "toml", geometry, fingerprint_at_start=fingerprint(config))
+    return propose(
+        config, NativeToml(HEXAGLIDE_PARAMETERS), "toml", geometry, fingerprint_at_start=fingerprint(config)
+    )
 
 
 @pytest.fixture
@@ -32,7 +35,7 @@ def test_a_commit_writes_what_was_proposed(
     config.chmod(0o640)
     commit(proposal, run)
     assert config.read_bytes() == proposal.text_after.encode()
-    assert NativeToml().read(config).geometry.largest_difference(geometry) <= 5e-7
+    assert NativeToml(HEXAGLIDE_PARAMETERS).read(config).geometry.largest_difference(geometry) <= 5e-7
     assert config.stat().st_mode & 0o777 == 0o640
     assert names(config.parent) == [config.name]
 
@@ -51,7 +54,9 @@ def test_rollback_is_bit_for_bit_and_may_be_repeated(config: Path, run: Path, ge
         b"\xef\xbb\xbf" + config.read_bytes().replace(b"\n", b"\r\n") + b"# no end of line \t"
     )
     original = config.read_bytes()
-    made = propose(config, NativeToml(), "toml", geometry, fingerprint_at_start=fingerprint(config))
+    made = propose(
+        config, NativeToml(HEXAGLIDE_PARAMETERS), "toml", geometry, fingerprint_at_start=fingerprint(config)
+    )
     receipt = commit(made, run)
     assert config.read_bytes() != original
     assert rollback(receipt) is True
@@ -71,10 +76,17 @@ def test_commits_are_undone_one_after_another(
     config: Path, run: Path, geometry: Geometry, proposal: ConfigChange
 ) -> None:
     first = commit(proposal, run)
-    further = geometry.interpolate(NativeToml().read(config).geometry, 2.0)
-    further = Geometry(S=further.S + 1.0, B=further.B, l=further.l)
+    further = geometry.interpolate(NativeToml(HEXAGLIDE_PARAMETERS).read(config).geometry, 2.0)
+    further = hexaglide_geometry(S=further["S"] + 1.0, B=further["B"], l=further["l"])
     second = commit(
-        propose(config, NativeToml(), "toml", further, fingerprint_at_start=fingerprint(config)), run / "2"
+        propose(
+            config,
+            NativeToml(HEXAGLIDE_PARAMETERS),
+            "toml",
+            further,
+            fingerprint_at_start=fingerprint(config),
+        ),
+        run / "2",
     )
     with pytest.raises(FileError, match="changed since it was written"):
         rollback(first)
@@ -86,7 +98,9 @@ def test_commits_are_undone_one_after_another(
 def test_a_link_to_the_config_stays_a_link(config: Path, run: Path, geometry: Geometry) -> None:
     link = config.parent / "link.toml"
     link.symlink_to(config.name)
-    made = propose(link, NativeToml(), "toml", geometry, fingerprint_at_start=fingerprint(link))
+    made = propose(
+        link, NativeToml(HEXAGLIDE_PARAMETERS), "toml", geometry, fingerprint_at_start=fingerprint(link)
+    )
     receipt = commit(made, run)
     assert link.is_symlink()
     assert config.read_bytes() == made.text_after.encode()
@@ -128,8 +142,10 @@ def test_a_commit_interrupted_after_the_replacement_is_recognised(
 
 
 def test_a_proposal_without_a_change_is_committed_without_writing(config: Path, run: Path) -> None:
-    same = NativeToml().read(config).geometry
-    made = propose(config, NativeToml(), "toml", same, fingerprint_at_start=fingerprint(config))
+    same = NativeToml(HEXAGLIDE_PARAMETERS).read(config).geometry
+    made = propose(
+        config, NativeToml(HEXAGLIDE_PARAMETERS), "toml", same, fingerprint_at_start=fingerprint(config)
+    )
     inode = config.stat().st_ino
     receipt = commit(made, run)
     assert config.stat().st_ino == inode

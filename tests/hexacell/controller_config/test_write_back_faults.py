@@ -13,6 +13,7 @@ from hexacell.controller_config.toml_format import NativeToml
 from hexacell.controller_config.write_back import Receipt, commit, rollback
 from hexacell.errors import FileError, WriteBackUndone
 from hexacell.kinematics.geometry import Geometry
+from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS
 
 Job = Callable[[Path], object]
 
@@ -36,7 +37,11 @@ class Bench:
 
     def _proposal(self, geometry: Geometry) -> ConfigChange:
         return propose(
-            self.link, NativeToml(), "toml", geometry, fingerprint_at_start=fingerprint(self.link)
+            self.link,
+            NativeToml(HEXAGLIDE_PARAMETERS),
+            "toml",
+            geometry,
+            fingerprint_at_start=fingerprint(self.link),
         )
 
     def attempts(

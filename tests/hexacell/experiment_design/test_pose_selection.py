@@ -17,6 +17,7 @@ from hexacell.experiment_design.pose_selection import WAYPOINT_GAIN_RATIO, selec
 from hexacell.experiment_design.predicted_records import SAFETY_SIGMAS, TRAVEL_SHARE
 from hexacell.identification.estimator import estimate_online
 from hexacell.kinematics.geometry import Geometry
+from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.measurements.records import MeasurementSet, Record
 
@@ -105,7 +106,7 @@ def test_whatever_the_robot_turns_out_to_be_the_ball_stays_inside_the_travel(sta
     goes_to = aimed_at(legs, estimate, choice, at)
     deviations = []
     for free in robots:
-        robot = Geometry.from_vector(hexaglide.convention.basis() @ free)
+        robot = Geometry(HEXAGLIDE_PARAMETERS, hexaglide.convention.basis() @ free)
         reference = stands(legs, robot, problem.joints[reference_row], from_where)
         deviations.append(stands(legs, robot, choice.joints, goes_to)[:3] - reference[:3])
     spread = np.std(deviations, axis=0)
@@ -213,7 +214,10 @@ def test_what_a_record_will_depend_on_is_how_it_moves_with_the_parameters(stage,
 
     def ball(free):
         return stands(
-            legs, Geometry.from_vector(hexaglide.convention.basis() @ free), choice.joints, goes_to
+            legs,
+            Geometry(HEXAGLIDE_PARAMETERS, hexaglide.convention.basis() @ free),
+            choice.joints,
+            goes_to,
         )[:3]
 
     steps = 1e-3 * np.eye(len(estimate.free))
@@ -282,7 +286,7 @@ def test_a_references_derivative_is_how_it_moves_with_the_parameters(know, paper
     deviations = exact.measured().deviations[rows]
 
     def at(free):
-        geometry = Geometry.from_vector(hexaglide.convention.basis() @ free)
+        geometry = Geometry(HEXAGLIDE_PARAMETERS, hexaglide.convention.basis() @ free)
         near = np.hstack([exact.balls[rows], Rotation.from_matrix(exact.rotations[rows]).as_rotvec()])
         found = np.array(
             [stands(legs, geometry, q, pose) for q, pose in zip(exact.joints[rows], near, strict=True)]

@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from hexacell.errors import LimitError
 from hexacell.experiment_design.candidates import orientations
 from hexacell.experiment_design.validation_poses import select_validation_poses
-from hexacell.kinematics.geometry import Geometry
+from hexacell.kinematics.mechanisms.hexaglide import hexaglide_geometry
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.motion.path_check import is_clear
 
@@ -133,14 +133,14 @@ def test_a_point_out_of_reach_is_refused_and_named(know, much):
 
 def test_a_point_the_corrected_robot_cannot_reach_is_refused(know, much, paper):
     """Its legs are far shorter than the controller believes."""
-    short = Geometry(paper.nominal.S, paper.nominal.B, paper.nominal.l - 150.0)
+    short = hexaglide_geometry(paper.nominal["S"], paper.nominal["B"], paper.nominal["l"] - 150.0)
     with pytest.raises(LimitError, match="untilted platform cannot stand"):
         select_validation_poses(know(short), np.array([0.0, 0.0, 620.0]), COUNT, TURNS)
 
 
 def test_a_robot_whose_actual_pose_is_not_found_is_refused(know, paper):
     """Its legs are too short for the joint variables that the controller would go to."""
-    short = Geometry(paper.nominal.S, paper.nominal.B, paper.nominal.l - 150.0)
+    short = hexaglide_geometry(paper.nominal["S"], paper.nominal["B"], paper.nominal["l"] - 150.0)
     with pytest.raises(LimitError, match="cannot be told"):
         select_validation_poses(know(short), np.array([0.0, 0.0, 450.0]), COUNT, TURNS)
 

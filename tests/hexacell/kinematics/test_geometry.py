@@ -5,38 +5,39 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hexacell.kinematics.geometry import PARAMETER_NAMES, Geometry
+from hexacell.kinematics.geometry import Geometry
+from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS, hexaglide_geometry
 
 COUNTING = np.arange(42.0)
 
 
 def test_the_order_of_the_vector_is_that_of_the_names():
-    geometry = Geometry.from_vector(COUNTING)
-    for name, value in zip(PARAMETER_NAMES, COUNTING, strict=True):
+    geometry = Geometry(HEXAGLIDE_PARAMETERS, COUNTING)
+    for name, value in zip(HEXAGLIDE_PARAMETERS.names, COUNTING, strict=True):
         leg = int(name[1]) - 1
-        entry = geometry.l[leg] if name[0] == "l" else getattr(geometry, name[0])[leg, "xyz".index(name[2])]
+        entry = geometry["l"][leg] if name[0] == "l" else geometry[name[0]][leg, "xyz".index(name[2])]
         assert entry == value, name
-    np.testing.assert_array_equal(geometry.vector(), COUNTING)
+    np.testing.assert_array_equal(geometry.vector, COUNTING)
 
 
 def test_the_names_are_those_of_the_interface():
-    assert len(PARAMETER_NAMES) == 42
-    assert PARAMETER_NAMES[:4] == ("S1x", "S1y", "S1z", "S2x")
-    assert PARAMETER_NAMES[17:19] == ("S6z", "B1x")
-    assert PARAMETER_NAMES[35:37] == ("B6z", "l1")
-    assert PARAMETER_NAMES[-1] == "l6"
+    assert len(HEXAGLIDE_PARAMETERS.names) == 42
+    assert HEXAGLIDE_PARAMETERS.names[:4] == ("S1x", "S1y", "S1z", "S2x")
+    assert HEXAGLIDE_PARAMETERS.names[17:19] == ("S6z", "B1x")
+    assert HEXAGLIDE_PARAMETERS.names[35:37] == ("B6z", "l1")
+    assert HEXAGLIDE_PARAMETERS.names[-1] == "l6"
 
 
 def test_arrays_are_read_only_copies():
     S = np.zeros((6, 3))
-    geometry = Geometry(S, np.zeros((6, 3)), np.ones(6))
+    geometry = hexaglide_geometry(S, np.zeros((6, 3)), np.ones(6))
     S[0, 0] = 1.0
-    assert geometry.S[0, 0] == 0.0
-    for array in (geometry.S, geometry.B, geometry.l):
+    assert geometry["S"][0, 0] == 0.0
+    for array in (geometry["S"], geometry["B"], geometry["l"]):
         with pytest.raises(ValueError, match="read-only"):
             array[0] = 2.0
-    geometry.vector()[0] = 5.0
-    assert geometry.S[0, 0] == 0.0
+    with pytest.raises(ValueError, match="read-only"):
+        geometry.vector[0] = 5.0
 
 
 @pytest.mark.parametrize(
@@ -49,17 +50,13 @@ def test_arrays_are_read_only_copies():
 )
 def test_a_wrong_shape_is_refused_by_name(S, B, l, name):  # noqa: E741
     with pytest.raises(ValueError, match=f"^{name} has the shape"):
-        Geometry(S, B, l)
+        hexaglide_geometry(S, B, l)
 
 
 def test_differences_and_the_way_between_two_geometries(paper):
     assert paper.nominal.largest_difference(paper.actual) == pytest.approx(6.059)  # l1, Table 2
     assert paper.actual.largest_difference(paper.nominal) == pytest.approx(6.059)
-    np.testing.assert_array_equal(
-        paper.nominal.interpolate(paper.actual, 0.0).vector(), paper.nominal.vector()
-    )
-    np.testing.assert_array_equal(
-        paper.nominal.interpolate(paper.actual, 1.0).vector(), paper.actual.vector()
-    )
+    np.testing.assert_array_equal(paper.nominal.interpolate(paper.actual, 0.0).vector, paper.nominal.vector)
+    np.testing.assert_array_equal(paper.nominal.interpolate(paper.actual, 1.0).vector, paper.actual.vector)
     quarter = paper.nominal.interpolate(paper.actual, 0.25)
-    assert quarter.l[0] == pytest.approx(590 - 0.25 * 6.059)
+    assert quarter["l"][0] == pytest.approx(590 - 0.25 * 6.059)

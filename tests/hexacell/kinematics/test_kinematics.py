@@ -12,6 +12,7 @@ from hexacell.errors import ExitCode, ReachError
 from hexacell.kinematics.forward import apply_twist, assembly_mode, continue_solution, forward_kinematics
 from hexacell.kinematics.geometry import Geometry, GeometryBatch
 from hexacell.kinematics.inverse import inverse_kinematics
+from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS, hexaglide_geometry
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.sensitivity import (
     has_singularity_margin,
@@ -65,9 +66,9 @@ def test_inverse_agrees_with_linuxcnc(inverse, paper):
 
 
 def test_a_pose_out_of_reach_names_the_leg_and_the_pose(inverse, paper):
-    lengths = paper.nominal.l.copy()
+    lengths = paper.nominal["l"].copy()
     lengths[3] = 400.0
-    short_leg_4 = Geometry(paper.nominal.S, paper.nominal.B, lengths)
+    short_leg_4 = hexaglide_geometry(paper.nominal["S"], paper.nominal["B"], lengths)
     poses = PoseBatch.of([Pose(0, 0, 500), Pose(0, 0, 550), Pose(0, 0, 560, 1)])
     with pytest.raises(
         ReachError, match=r"^leg 4 cannot reach the pose X0\.000 Y0\.000 Z550\.000 "
@@ -92,7 +93,7 @@ def test_forward_undoes_inverse(hexaglide, paper, legs, vector_of, pose, by):
 
 @given(poses, geometry_errors)
 def test_inverse_undoes_following_to_another_geometry_and_back(hexaglide, paper, pose, errors):
-    built = Geometry.from_vector(paper.nominal.vector() + hexaglide.convention.basis() @ errors)
+    built = Geometry(HEXAGLIDE_PARAMETERS, paper.nominal.vector + hexaglide.convention.basis() @ errors)
     at = PoseBatch.of([pose])
     joints = hexaglide.inverse(paper.nominal, paper.branch, at)
     assume(not np.isnan(joints).any())
@@ -240,7 +241,7 @@ def test_sensitivity_is_how_the_pose_really_moves(hexaglide, paper, legs, vector
         np.testing.assert_allclose(found.joints[0, :, n], moved, atol=1e-5)
     for n in range(42):
         shift = step * np.eye(42)[n]
-        ends = [(Geometry.from_vector(geometry.vector() + s), joints) for s in (shift, -shift)]
+        ends = [(Geometry(HEXAGLIDE_PARAMETERS, geometry.vector + s), joints) for s in (shift, -shift)]
         moved = pose_difference(legs, joints, ends, near) / (2 * step)
         np.testing.assert_allclose(found.parameters[0, :, n], moved, atol=1e-5)
     by_parameters, by_joints = position_sensitivity(hexaglide, geometry, PoseBatch.of([pose]), joints[None])
@@ -290,9 +291,9 @@ def test_margin_is_zero_where_the_jacobian_changes_its_sign(hexaglide, paper, ax
 
 
 def test_two_equal_legs_hold_the_platform_at_five_only(hexaglide, paper, inverse):
-    S, B, l = paper.nominal.S.copy(), paper.nominal.B.copy(), paper.nominal.l.copy()  # noqa: E741
+    S, B, l = paper.nominal["S"].copy(), paper.nominal["B"].copy(), paper.nominal["l"].copy()  # noqa: E741
     S[4], B[4], l[4] = S[3], B[3], l[3]
-    twin = Geometry(S, B, l)
+    twin = hexaglide_geometry(S, B, l)
     at = PoseBatch.of([Pose(0, 0, 550), Pose(20, 30, 500, 10, -5, 8)])
     margins = singularity_margin(hexaglide, twin, at, inverse(twin, at))
     np.testing.assert_allclose(margins, 0.0, atol=1e-12)
@@ -300,7 +301,7 @@ def test_two_equal_legs_hold_the_platform_at_five_only(hexaglide, paper, inverse
 
 def test_margin_does_not_depend_on_the_size_of_the_machine(hexaglide, paper, inverse):
     at = PoseBatch.of([Pose(20, 30, 500, 10, -5, 8)])
-    larger = Geometry.from_vector(3.0 * paper.actual.vector())
+    larger = Geometry(HEXAGLIDE_PARAMETERS, 3.0 * paper.actual.vector)
     at_larger = PoseBatch(3.0 * at.positions, at.rotations)
     np.testing.assert_allclose(
         singularity_margin(hexaglide, larger, at_larger, inverse(larger, at_larger)),
@@ -316,8 +317,10 @@ def test_many_robots_at_once_stand_where_each_would(hexaglide, paper, inverse):
     random = np.random.default_rng(3)
     at = PoseBatch.of([Pose(0, 0, 550, 5 * k, -3 * k, 8 * k) for k in range(4)])
     joints = inverse(paper.nominal, at)
-    robots = [Geometry.from_vector(paper.nominal.vector() + random.normal(0, 1, 42)) for _ in range(4)]
-    together = GeometryBatch.from_vectors(np.array([robot.vector() for robot in robots]))
+    robots = [
+        Geometry(HEXAGLIDE_PARAMETERS, paper.nominal.vector + random.normal(0, 1, 42)) for _ in range(4)
+    ]
+    together = GeometryBatch(HEXAGLIDE_PARAMETERS, np.array([robot.vector for robot in robots]))
     found = forward_kinematics(hexaglide, together, joints, at)
     assert found.found.all()
     for row, robot in enumerate(robots):

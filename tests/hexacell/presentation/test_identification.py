@@ -10,7 +10,7 @@ import pytest
 from hexacell.cell.bundled import bundled_config
 from hexacell.cli.app import main
 from hexacell.errors import ExitCode
-from hexacell.kinematics.geometry import PARAMETER_NAMES
+from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS
 from hexacell.measurements.csv_file import write_measurements
 from hexacell.measurements.records import MeasurementSet
 
@@ -55,7 +55,7 @@ def test_every_free_parameter_has_its_line_and_says_how_far_it_moved(fit, clean)
     lines = fit(clean).out.splitlines()
     named = [line.split()[0] for line in lines if line.endswith("sigma") and "moved" in line]
     fixed = {"S2x", "S2y", "S2z", "S3z"}
-    assert named == [name for name in PARAMETER_NAMES if name not in fixed]
+    assert named == [name for name in HEXAGLIDE_PARAMETERS.names if name not in fixed]
     (leg,) = (line for line in lines if line.startswith("l1 "))
     _, old, new, change, sigma, _, times, _ = leg.split()
     assert float(new) - float(old) == pytest.approx(float(change), abs=2e-3)

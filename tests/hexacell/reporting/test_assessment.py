@@ -18,6 +18,7 @@ from hexacell.identification.solver.levenberg_marquardt import Termination
 from hexacell.identification.solver.result import DataFault, DataFaultKind
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import FrameTransform
+from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS, Hexaglide
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.measurements.records import MeasurementSet
 from hexacell.reporting.assessment import assess
@@ -111,8 +112,8 @@ def test_a_solver_that_did_not_converge_gives_no_result(good):
 
 def test_where_repeatability_dominates_recalibrating_will_not_help(visit, assessed_of, robot, paper):
     """A controller whose geometry is right to hundredths, on a machine with play of 0.3 mm."""
-    nearly = Geometry.from_vector(
-        paper.actual.vector() + 0.01 * np.random.default_rng(3).standard_normal(42)
+    nearly = Geometry(
+        HEXAGLIDE_PARAMETERS, paper.actual.vector + 0.01 * np.random.default_rng(3).standard_normal(42)
     )
     nearly = robot.mechanism.normalize_frames(nearly)[0]
     known = replace(
@@ -224,7 +225,7 @@ def test_the_frames_of_the_controller_s_config_do_not_matter(good, visit, assess
         )
     )
     elsewhere = seen_from(change, settings)
-    controller = ControllerGeometry(change.geometry(paper.nominal), paper.branch)
+    controller = ControllerGeometry(Hexaglide().change_frames(paper.nominal, change), paper.branch)
     _, assessed = assessed_of(told, make_robot(elsewhere, controller), elsewhere)
     _, before = good
     for name in ("before", "after"):

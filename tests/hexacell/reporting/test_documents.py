@@ -9,8 +9,8 @@ import pytest
 
 from hexacell.acceptance.validation import DeviationStatistics, Verdict
 from hexacell.identification.estimator import identify
-from hexacell.kinematics.geometry import PARAMETER_NAMES
-from hexacell.reporting.documents import geometry_values, identification_document, outcome_line
+from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS
+from hexacell.reporting.documents import identification_document, outcome_line
 
 # docs/interface.md, the document of fit --json; termination is an addition.
 KEYS = {
@@ -58,13 +58,13 @@ def test_the_covariance_is_in_the_order_of_the_geometry(document):
     in_order = [*np.ravel(sigma["S"]), *np.ravel(sigma["B"]), *sigma["l"]]
     np.testing.assert_allclose(np.sqrt(np.diag(covariance)), in_order, rtol=1e-12)
     fixed = [row for row in range(42) if not covariance[row].any()]
-    assert [PARAMETER_NAMES[row] for row in fixed] == ["S2x", "S2y", "S2z", "S3z"]
+    assert [HEXAGLIDE_PARAMETERS.names[row] for row in fixed] == ["S2x", "S2y", "S2z", "S3z"]
 
 
 def test_the_geometry_is_the_identified_one(document, identified, paper):
-    assert document["geometry"] == geometry_values(identified.geometry)
-    assert document["geometry"]["S"][3] == identified.geometry.S[3].tolist()
-    assert np.abs(np.array(document["geometry"]["l"]) - paper.actual.l).max() < 1.0
+    assert document["geometry"] == identified.geometry.document()
+    assert document["geometry"]["S"][3] == identified.geometry["S"][3].tolist()
+    assert np.abs(np.array(document["geometry"]["l"]) - paper.actual["l"]).max() < 1.0
 
 
 def test_outliers_and_undetermined_parameters_are_named(visit, make_problem):
@@ -80,7 +80,7 @@ def test_outliers_and_undetermined_parameters_are_named(visit, make_problem):
     assert outlier["off_mm"] == pytest.approx([1.0, 0.0, 0.0], abs=0.2)
     assert document["records"] == 54
     assert "S4z" in document["undetermined"]
-    assert set(document["undetermined"]) <= set(PARAMETER_NAMES)
+    assert set(document["undetermined"]) <= set(HEXAGLIDE_PARAMETERS.names)
     json.dumps(document, allow_nan=False)
 
 

@@ -10,6 +10,7 @@ import pytest
 from hexacell.controller_config.toml_format import NativeToml
 from hexacell.errors import DeviceError, ExitCode, FileError, HexacellError, Interruption
 from hexacell.kinematics.geometry import Geometry
+from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS
 from procedures.journal.journal import Journal, read_journal
 from procedures.run import events
 from procedures.run.commands import Abort
@@ -79,7 +80,7 @@ async def test_what_is_lent_is_nearer_to_the_truth(rig) -> None:
     lent: list[Geometry] = []
 
     def look() -> None:
-        lent.append(NativeToml().read(rig.cell.config_path).geometry)
+        lent.append(NativeToml(HEXAGLIDE_PARAMETERS).read(rig.cell.config_path).geometry)
         rig.engine.command(Abort())
 
     with pytest.raises(Interruption):

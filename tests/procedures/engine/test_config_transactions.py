@@ -6,7 +6,6 @@ from typing import Any
 
 import pytest
 
-from hexacell.cell.fields import GeometryValues
 from hexacell.errors import DeviceError, Interruption
 from procedures.engine.config_transactions import (
     ROLL_BACK,
@@ -21,7 +20,7 @@ from procedures.run.steps import Compute, Phase, SetKey
 
 ZERO = (0.0, 0.0, 0.0)
 APPLIED = events.ProvisionalApplied(
-    geometry=GeometryValues(S=(ZERO,) * 6, B=(ZERO,) * 6, l=(0.0,) * 6), folder="lent"
+    geometry={"S": (ZERO,) * 6, "B": (ZERO,) * 6, "l": (0.0,) * 6}, folder="lent"
 )
 COMMITTED = events.Committed(approved_by="a tester")
 FAILURE = DeviceError("is silent", subject="gauge x")

@@ -13,7 +13,6 @@ from pydantic import TypeAdapter, ValidationError
 from drivers.interfaces import DeviceIdentity
 from hexacell.acceptance.gates import AcceptanceGate
 from hexacell.acceptance.validation import Verdict
-from hexacell.cell.fields import GeometryValues
 from hexacell.cell.recovery import Action, FailureKind
 from hexacell.identification.solver.result import DataFaultKind
 from procedures.journal.journal import Journal, read_journal
@@ -95,11 +94,12 @@ reading = st.builds(
     answers=st.lists(st.tuples(text, text, text), max_size=2).map(tuple),
     counts=st.lists(st.tuples(*[st.integers()] * 6), max_size=2).map(tuple),
 )
-geometry = st.builds(
-    GeometryValues,
-    S=st.tuples(*[three] * 6),
-    B=st.tuples(*[three] * 6),
-    l=st.tuples(*[st.floats(1, 1e4)] * 6),
+geometry = st.fixed_dictionaries(
+    {
+        "S": st.tuples(*[three] * 6),
+        "B": st.tuples(*[three] * 6),
+        "l": st.tuples(*[st.floats(1, 1e4)] * 6),
+    }
 )
 gate = st.builds(AcceptanceGate, name=text, passed=st.booleans(), sentence=text, needs_person=st.booleans())
 outlier = st.builds(

@@ -11,8 +11,7 @@ from hexacell.controller_config.change import ConfigChange
 from hexacell.controller_config.toml_format import NativeToml
 from hexacell.controller_config.write_back import Receipt
 from hexacell.errors import ExitCode
-from hexacell.kinematics.geometry import Geometry
-from hexacell.kinematics.mechanisms.hexaglide import Hexaglide
+from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS, Hexaglide, hexaglide_geometry
 from hexacell.measurements.csv_file import read_measurements
 from procedures.calibration.workflow import Mode
 from procedures.run import events
@@ -33,11 +32,11 @@ def test_a_whole_run_passes(recording) -> None:
 def test_the_controller_gets_the_true_geometry(recording, tmp_path) -> None:
     config = tmp_path / "after.toml"
     config.write_bytes(recording.config_after)
-    written = NativeToml().read(config).geometry
-    truth = Geometry(**tomllib.loads(recording.history[0].cell_text)["simulation"]["geometry"])
-    found, expected = (Hexaglide().normalize_frames(geometry)[0].vector() for geometry in (written, truth))
+    written = NativeToml(HEXAGLIDE_PARAMETERS).read(config).geometry
+    truth = hexaglide_geometry(**tomllib.loads(recording.history[0].cell_text)["simulation"]["geometry"])
+    found, expected = (Hexaglide().normalize_frames(geometry)[0].vector for geometry in (written, truth))
     (identified,) = (event for event in recording.history if isinstance(event, events.Identified))
-    sigma = identified.result.estimate.sigma
+    sigma = identified.result.estimate(HEXAGLIDE_PARAMETERS).sigma
     assert np.abs(found - expected)[sigma > 0.0].max() > 0.0
     assert (np.abs(found - expected) <= 5.0 * sigma + 1e-6).all()
 

@@ -14,6 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from hexacell.identification.diagnostics.pose_accuracy import Accuracy, predicted_accuracy
 from hexacell.kinematics.geometry import Geometry
+from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS
 from hexacell.kinematics.pose import Pose, PoseBatch
 
 DRAWS = 60
@@ -61,7 +62,7 @@ def test_before_is_what_a_machine_like_the_estimate_does(
 ):
     commands = [*workspace, *task]
     reached = np.array([reach(identified.geometry, paper.nominal, pose)[1] for pose in commands])
-    radius = np.linalg.norm(identified.geometry.B, axis=1).mean()
+    radius = np.linalg.norm(identified.geometry["B"], axis=1).mean()
     rows = slice(0, len(workspace))
     left = errors_after_teaching(reached, np.array([vector_of(p) for p in commands]), rows, radius)
     found = accuracy_of(
@@ -79,12 +80,12 @@ def test_after_is_the_scatter_of_machines_that_the_covariance_allows(
 ):
     commands = np.array([vector_of(pose) for pose in [*workspace, *task]])
     joints = [legs(identified.geometry).joints(command) for command in commands]
-    radius = np.linalg.norm(identified.geometry.B, axis=1).mean()
+    radius = np.linalg.norm(identified.geometry["B"], axis=1).mean()
     random = np.random.default_rng(8)
     squares = []
     for _ in range(DRAWS):
         free = random.multivariate_normal(identified.free, identified.free_covariance)
-        machine = legs(Geometry.from_vector(identified.problem.basis @ free))
+        machine = legs(Geometry(HEXAGLIDE_PARAMETERS, identified.problem.basis @ free))
         reached = np.array([machine.closed(q, near) for q, near in zip(joints, commands, strict=True)])
         left = errors_after_teaching(reached, commands, slice(0, len(workspace)), radius)
         squares.append(np.mean(left[-2:] ** 2, axis=0))

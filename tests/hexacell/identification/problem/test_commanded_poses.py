@@ -9,6 +9,7 @@ from scipy.spatial.transform import Rotation
 from hexacell.identification.estimator import estimate_online, identify
 from hexacell.identification.problem.problem import Noise
 from hexacell.kinematics.mechanism import FrameTransform
+from hexacell.kinematics.mechanisms.hexaglide import Hexaglide
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.measurements.records import MeasurementSet, Record
 
@@ -111,8 +112,8 @@ def test_the_controllers_frames_do_not_matter(paper, visit, make_problem):
     measured = visit(seed=2).measured(0.01, seed=1)
     moved = make_problem(
         in_frames(measured, WORKSHOP),
-        controller=WORKSHOP.geometry(paper.nominal),
-        drawing=WORKSHOP.geometry(paper.nominal),
+        controller=Hexaglide().change_frames(paper.nominal, WORKSHOP),
+        drawing=Hexaglide().change_frames(paper.nominal, WORKSHOP),
     )
     there, here = identify(moved), identify(make_problem(measured))
     assert there.geometry.largest_difference(here.geometry) < EXACT_MM
@@ -124,7 +125,7 @@ def test_nor_do_they_for_records_older_than_the_last_calibration(paper, visit, m
     """A calibration keeps the config's frames, and so commands of before and after share them."""
     problem = make_problem(
         in_frames(visit(seed=2).measured(), WORKSHOP),
-        controller=WORKSHOP.geometry(paper.actual),
+        controller=Hexaglide().change_frames(paper.actual, WORKSHOP),
         drawing=paper.nominal,
     )
     assert identify(problem).geometry.largest_difference(paper.actual) < EXACT_MM

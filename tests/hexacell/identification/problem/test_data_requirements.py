@@ -11,7 +11,7 @@ from hexacell.errors import ExitCode, IdentifiabilityError
 from hexacell.identification.estimator import identify
 from hexacell.identification.problem.problem import Noise
 from hexacell.identification.solver.levenberg_marquardt import Termination
-from hexacell.kinematics.geometry import Geometry
+from hexacell.kinematics.mechanisms.hexaglide import hexaglide_geometry
 from hexacell.measurements.records import MeasurementSet
 
 
@@ -74,7 +74,7 @@ def test_joints_of_other_poses_are_refused_and_the_first_record_named(visit, mak
 
 
 def test_a_drawing_of_another_machine_is_refused(paper, visit, make_problem):
-    other = Geometry(paper.nominal.S, paper.nominal.B, paper.nominal.l - 150.0)
+    other = hexaglide_geometry(paper.nominal["S"], paper.nominal["B"], paper.nominal["l"] - 150.0)
     with pytest.raises(IdentifiabilityError, match="joint variables do not belong to the commanded pose"):
         make_problem(visit(seed=2).measured(), drawing=other, controller=other)
 

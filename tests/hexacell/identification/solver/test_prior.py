@@ -7,20 +7,21 @@ import pytest
 
 from hexacell.identification.estimator import estimate_online, identify
 from hexacell.identification.problem.problem import Prior, Tolerances
-from hexacell.kinematics.geometry import PARAMETER_NAMES
+from hexacell.kinematics.geometry import Geometry
+from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS
 
 
 def test_the_prior_has_the_moments_of_errors_within_the_tolerances(hexaglide, paper):
-    prior = Prior.of(hexaglide, paper.nominal, Tolerances(S_mm=3.0, B_mm=6.0, l_mm=1.5))
+    prior = Prior.of(hexaglide, paper.nominal, Tolerances({"S": 3.0, "B": 6.0, "l": 1.5}))
     names = hexaglide.convention.free_names()
     widths = {"S": 3.0, "B": 6.0, "l": 1.5}
     expected = np.diag([widths[name[0]] ** 2 / 3.0 for name in names])
     np.testing.assert_allclose(prior.covariance, expected)
-    np.testing.assert_array_equal(prior.centre.vector(), paper.nominal.vector())
+    np.testing.assert_array_equal(prior.centre.vector, paper.nominal.vector)
 
 
 def test_the_balls_mounting_moves_all_platform_joints_together(hexaglide, paper):
-    prior = Prior.of(hexaglide, paper.nominal, Tolerances(7.0, 7.0, 7.0, ball_mm=30.0))
+    prior = Prior.of(hexaglide, paper.nominal, Tolerances({"S": 7.0, "B": 7.0, "l": 7.0}, ball_mm=30.0))
     names = hexaglide.convention.free_names()
     for n, one in enumerate(names):
         for m, other in enumerate(names):
@@ -39,7 +40,7 @@ def test_the_prior_is_released_where_the_data_determine_the_parameters(paper, vi
 def test_a_drawing_elsewhere_gives_the_same_result(hexaglide, paper, visit, make_problem):
     measured = visit(seed=2).measured(0.01, seed=4)
     errors = np.random.default_rng(1).uniform(-3.0, 3.0, 35)
-    other = type(paper.nominal).from_vector(paper.nominal.vector() + hexaglide.convention.basis() @ errors)
+    other = Geometry(HEXAGLIDE_PARAMETERS, paper.nominal.vector + hexaglide.convention.basis() @ errors)
     here, there = (identify(make_problem(measured, drawing=drawing)) for drawing in (paper.nominal, other))
     assert here.geometry.largest_difference(there.geometry) < 1e-5
 
@@ -52,11 +53,11 @@ def small_tilts(visit, make_problem):
 def test_parameters_undetermined_by_small_tilts_are_named(small_tilts):
     assert small_tilts.converged
     assert len(small_tilts.undetermined) >= 5
-    told = dict(zip(PARAMETER_NAMES, small_tilts.sigma / 7.0 * np.sqrt(3.0), strict=True))
+    told = dict(zip(HEXAGLIDE_PARAMETERS.names, small_tilts.sigma / 7.0 * np.sqrt(3.0), strict=True))
     for name in small_tilts.undetermined:
         assert told[name] > 0.5
     determined = (
-        set(PARAMETER_NAMES)
+        set(HEXAGLIDE_PARAMETERS.names)
         - set(small_tilts.undetermined)
         - set(small_tilts.problem.mechanism.convention.zero)
     )
@@ -89,7 +90,7 @@ def test_the_online_estimate_starts_without_records(paper, visit, make_problem):
     first = type(measured)(measured.records[:1])
     estimate = estimate_online(make_problem(first))
     assert estimate.converged
-    np.testing.assert_allclose(estimate.geometry.vector(), paper.nominal.vector(), atol=1e-9)
+    np.testing.assert_allclose(estimate.geometry.vector, paper.nominal.vector, atol=1e-9)
     np.testing.assert_allclose(estimate.sigma, estimate.prior_sigma, rtol=1e-9)
 
 

@@ -8,7 +8,7 @@ from scipy.stats import chi2
 
 from hexacell.identification.estimator import identify
 from hexacell.identification.problem.problem import Noise
-from hexacell.kinematics.geometry import PARAMETER_NAMES
+from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS
 from hexacell.study import reference_solvers
 
 
@@ -79,13 +79,13 @@ def test_the_full_covariance_follows_from_the_free_one(identified, hexaglide):
     assert identified.covariance.shape == (42, 42)
     np.testing.assert_array_equal(identified.covariance, identified.covariance.T)
     assert np.linalg.eigvalsh(identified.free_covariance).min() > 0.0
-    for row, name in enumerate(PARAMETER_NAMES):
+    for row, name in enumerate(HEXAGLIDE_PARAMETERS.names):
         if name in convention.zero:
             assert not identified.covariance[row].any()
             assert identified.sigma[row] == 0.0
         else:
             assert identified.sigma[row] > 0.0
-    same = [PARAMETER_NAMES.index(name) for name in ("B2z", "B3z", "B5z")]
+    same = [HEXAGLIDE_PARAMETERS.names.index(name) for name in ("B2z", "B3z", "B5z")]
     np.testing.assert_array_equal(identified.sigma[same], identified.sigma[same[0]])
     np.testing.assert_array_equal(identified.covariance[same[0]], identified.covariance[same[1]])
 

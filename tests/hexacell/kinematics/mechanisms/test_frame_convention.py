@@ -8,8 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from hexacell.kinematics.geometry import PARAMETER_NAMES, Geometry
+from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import FrameTransform
+from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.sensitivity import pose_sensitivity
 
@@ -36,7 +37,7 @@ def geometries(draw):
 
 
 def obeys_the_rules(geometry: Geometry) -> bool:
-    S, B = geometry.S, geometry.B
+    S, B = geometry["S"], geometry["B"]
     zeros = [*S[1], S[2, 2]]
     equals = [B[1, 2] - B[2, 2], B[1, 2] - B[4, 2], B[1, 1] - B[4, 1]]
     return not np.any(zeros) and not np.any(equals)
@@ -46,17 +47,19 @@ def test_the_papers_tables_obey_the_convention(hexaglide, paper):
     for geometry in (paper.nominal, paper.actual, paper.calibrated):
         assert obeys_the_rules(geometry)
         same, _ = hexaglide.normalize_frames(geometry)
-        np.testing.assert_allclose(same.vector(), geometry.vector(), atol=CONVENTION_MM)
+        np.testing.assert_allclose(same.vector, geometry.vector, atol=CONVENTION_MM)
 
 
 @given(geometries())
 def test_every_geometry_can_be_brought_to_the_convention(hexaglide, paper, errors):
-    free_form = Geometry.from_vector(paper.nominal.vector() + errors)
+    free_form = Geometry(HEXAGLIDE_PARAMETERS, paper.nominal.vector + errors)
     found, change = hexaglide.normalize_frames(free_form)
     assert obeys_the_rules(found)
-    assert found.S[2, 1] > 0.0
-    assert found.B[4, 0] > found.B[1, 0]
-    np.testing.assert_allclose(change.geometry(free_form).vector(), found.vector(), atol=CONVENTION_MM)
+    assert found["S"][2, 1] > 0.0
+    assert found["B"][4, 0] > found["B"][1, 0]
+    np.testing.assert_allclose(
+        hexaglide.change_frames(free_form, change).vector, found.vector, atol=CONVENTION_MM
+    )
     # A change of frames is a motion along the rails' axes and a rotation of the platform's.
     for matrix in (change.base, change.platform):
         np.testing.assert_allclose(matrix @ matrix.T, np.eye(3), atol=1e-12)
@@ -66,23 +69,27 @@ def test_every_geometry_can_be_brought_to_the_convention(hexaglide, paper, error
 
 @given(geometries(), frame_changes())
 def test_frames_do_not_matter(hexaglide, paper, errors, change):
-    geometry, _ = hexaglide.normalize_frames(Geometry.from_vector(paper.nominal.vector() + errors))
-    back, _ = hexaglide.normalize_frames(change.geometry(geometry))
-    np.testing.assert_allclose(back.vector(), geometry.vector(), atol=CONVENTION_MM)
+    geometry, _ = hexaglide.normalize_frames(Geometry(HEXAGLIDE_PARAMETERS, paper.nominal.vector + errors))
+    back, _ = hexaglide.normalize_frames(hexaglide.change_frames(geometry, change))
+    np.testing.assert_allclose(back.vector, geometry.vector, atol=CONVENTION_MM)
 
 
 @given(frame_changes())
 def test_the_same_machine_stands_in_other_frames_at_the_same_joint_variables(hexaglide, paper, change):
     poses = PoseBatch.at([10.0, -50.0, 540.0], Rotation.from_rotvec([[0.2, -0.1, 0.3]]).as_matrix())
     joints = hexaglide.inverse(paper.actual, paper.branch, poses)
-    moved = hexaglide.constraints(change.geometry(paper.actual), change.poses(poses), joints)
+    moved = hexaglide.constraints(
+        hexaglide.change_frames(paper.actual, change), change.poses(poses), joints
+    )
     np.testing.assert_allclose(moved, 0.0, atol=1e-9)
 
 
 @given(frame_changes())
-def test_the_way_back(paper, change):
-    there_and_back = change.inverse().geometry(change.geometry(paper.actual))
-    np.testing.assert_allclose(there_and_back.vector(), paper.actual.vector(), atol=CONVENTION_MM)
+def test_the_way_back(hexaglide, paper, change):
+    there_and_back = hexaglide.change_frames(
+        hexaglide.change_frames(paper.actual, change), change.inverse()
+    )
+    np.testing.assert_allclose(there_and_back.vector, paper.actual.vector, atol=CONVENTION_MM)
     pose = PoseBatch.at([1.0, 2.0, 3.0], Rotation.from_rotvec([[0.2, -0.1, 0.3]]).as_matrix())
     back = change.inverse().poses(change.poses(pose))
     np.testing.assert_allclose(back.positions, pose.positions, atol=CONVENTION_MM)
@@ -103,7 +110,7 @@ def test_a_geometry_in_other_frames_predicts_the_same_differences(hexaglide, pap
     """Forward kinematics of the machine in moved frames, by the test's own root finder."""
     seen = visit(seed=2)
     rows = [0, 1, 2]
-    moved = legs(change.geometry(paper.actual))
+    moved = legs(hexaglide.change_frames(paper.actual, change))
     guesses = change.poses(PoseBatch(seen.balls[rows], np.array([seen.rotations[row] for row in rows])))
     balls = []
     for row, guess in zip(rows, range(3), strict=True):
@@ -117,18 +124,18 @@ def test_a_geometry_in_other_frames_predicts_the_same_differences(hexaglide, pap
 def test_the_free_parameters_are_35_and_named(hexaglide):
     free = hexaglide.convention.free_names()
     assert len(free) == 35
-    fixed = set(PARAMETER_NAMES) - set(free)
+    fixed = set(HEXAGLIDE_PARAMETERS.names) - set(free)
     assert fixed == {"S2x", "S2y", "S2z", "S3z", "B3z", "B5z", "B5y"}
 
 
 def test_the_basis_spreads_free_parameters_over_all(hexaglide):
     basis, free = hexaglide.convention.basis(), hexaglide.convention.free_names()
     assert basis.shape == (42, 35)
-    geometry = Geometry.from_vector(basis @ np.arange(1.0, 36.0))
+    geometry = Geometry(HEXAGLIDE_PARAMETERS, basis @ np.arange(1.0, 36.0))
     assert obeys_the_rules(geometry)
     np.testing.assert_array_equal(hexaglide.convention.free_parameters(geometry), np.arange(1.0, 36.0))
     for column, name in enumerate(free):
-        stands_for = {PARAMETER_NAMES[row] for row in np.flatnonzero(basis[:, column])}
+        stands_for = {HEXAGLIDE_PARAMETERS.names[row] for row in np.flatnonzero(basis[:, column])}
         expected = {"B2z": {"B2z", "B3z", "B5z"}, "B2y": {"B2y", "B5y"}}.get(name, {name})
         assert stands_for == expected
 
@@ -146,3 +153,19 @@ def test_a_rank_would_not_find_the_convention(hexaglide, paper, visit, built, ra
     assert (visible > 1e-9 * visible[0]).sum() == rank
     free = np.linalg.svd(differences @ hexaglide.convention.basis(), compute_uv=False)
     assert free[-1] > 1e-4 * free[0]
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("l3", "leg 3 length"),
+        ("B3z", "B3 z"),
+        ("S1y", "S1 y"),
+        ("B2z", "B2/B3/B5 z"),
+        ("B2y", "B2/B5 y"),
+        ("B3y", "B3 y"),
+    ],
+)
+def test_a_parameter_for_people(hexaglide, name, words):
+    """One that stands for several names them."""
+    assert hexaglide.convention.display_name(name) == words

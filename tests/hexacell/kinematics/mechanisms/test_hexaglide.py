@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from hexacell.kinematics.mechanisms.hexaglide import hexaglide_geometry
 from hexacell.kinematics.pose import Pose, PoseBatch
 
 STEP = 1e-30  # complex steps need no compromise between rounding and truncation
@@ -35,9 +36,9 @@ def by_complex_step(numbers, name, place):
 
 def state(geometry, pose, joints):
     return {
-        "S": geometry.S,
-        "B": geometry.B,
-        "l": geometry.l,
+        "S": geometry["S"],
+        "B": geometry["B"],
+        "l": geometry["l"],
         "joints": joints,
         "position": pose.position,
         "turn": np.zeros(3),
@@ -107,20 +108,20 @@ def test_every_branch_closes_the_legs_and_is_recognised(hexaglide, paper, pose, 
 def test_the_branch_says_on_which_side_of_its_platform_joint_a_slider_is(hexaglide, paper):
     at = PoseBatch.of([Pose(0, 0, 550)])
     joints = hexaglide.inverse(paper.nominal, paper.branch, at)[0]
-    platform_joints = paper.nominal.B[:, 0]
+    platform_joints = paper.nominal["B"][:, 0]
     assert (joints[:3] < platform_joints[:3]).all()
     assert (joints[3:] > platform_joints[3:]).all()
 
 
 def test_only_the_leg_that_cannot_reach_is_missing(hexaglide, paper):
-    lengths = paper.nominal.l.copy()
+    lengths = paper.nominal["l"].copy()
     lengths[3] = 300.0
-    short = type(paper.nominal)(paper.nominal.S, paper.nominal.B, lengths)
+    short = hexaglide_geometry(paper.nominal["S"], paper.nominal["B"], lengths)
     joints = hexaglide.inverse(short, paper.branch, PoseBatch.of([Pose(0, 0, 550), Pose(0, 0, 300)]))
     np.testing.assert_array_equal(np.isnan(joints), [[0, 0, 0, 1, 0, 0], [0] * 6])
 
 
 def test_a_leg_may_stand_exactly_upright(hexaglide, paper):
-    geometry = type(paper.nominal)(np.zeros((6, 3)), np.zeros((6, 3)), np.full(6, 500.0))
+    geometry = hexaglide_geometry(np.zeros((6, 3)), np.zeros((6, 3)), np.full(6, 500.0))
     joints = hexaglide.inverse(geometry, paper.branch, PoseBatch.of([Pose(7, 300, 400)]))
     np.testing.assert_array_equal(joints, [[7.0] * 6])

@@ -1,0 +1,187 @@
+"""The geometric parameters of a six-legged mechanism: kinds, names, units, order.
+
+A mechanism describes its parameters once, as a :class:`ParameterSet`. Vectors, documents, tables, the
+prior and the frame convention all follow from that description.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from hexacell.kinematics.rotations import Array
+
+LEGS = 6
+
+
+class Unit(StrEnum):
+    """The unit of a parameter, inside the program and in every file."""
+
+    MM = "mm"
+    RAD = "rad"
+    NONE = ""
+
+
+@dataclass(frozen=True, slots=True)
+class ParameterKind:
+    """One quantity of every leg, such as the joint on its slider.
+
+    Attributes:
+        symbol: as in formulas and files: ``S``.
+        components: names of its coordinates; empty for a single number.
+        meaning: what it is, for the cell file's description.
+        tolerance_meaning: what a tolerance of this kind applies to.
+        display: a format of ``legs`` ("B2/B3"), ``leg`` ("2") and ``component`` ("z").
+        has_ball_offset: the ball's mounting displaces this kind of all legs by the same vector.
+        is_positive: only values above zero are physical.
+    """
+
+    symbol: str
+    components: tuple[str, ...]
+    meaning: str
+    tolerance_meaning: str
+    display: str = "{legs} {component}"
+    unit: Unit = Unit.MM
+    has_ball_offset: bool = False
+    is_positive: bool = False
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """``(6, c)``, or ``(6,)`` for a single number a leg."""
+        return (LEGS, len(self.components)) if self.components else (LEGS,)
+
+    @property
+    def numbers_per_leg(self) -> int:
+        """How many numbers of this kind a leg has."""
+        return max(1, len(self.components))
+
+    def display_name(self, leg: int, component: str, joints: str | None = None) -> str:
+        """A parameter for people: "leg 3 length", "B6 x"; ``joints`` names several that are equal."""
+        joints = joints or f"{self.symbol}{leg}"
+        return self.display.format(legs=joints, leg=leg, component=component)
+
+    @property
+    def tolerance_key(self) -> str:
+        """Its tolerance in the cell file: ``S_mm``."""
+        return f"{self.symbol}_{self.unit}" if self.unit else self.symbol
+
+
+@dataclass(frozen=True, slots=True)
+class Parameter:
+    """One number of the geometry; legs count from 1."""
+
+    kind: ParameterKind
+    leg: int
+    component: str = ""
+
+    @property
+    def name(self) -> str:
+        """``S3x``, ``l4``."""
+        return f"{self.kind.symbol}{self.leg}{self.component}"
+
+
+@dataclass(frozen=True)
+class ParameterSet:
+    """All parameters of a mechanism, in the order of its vectors: by kind, then leg, then component."""
+
+    kinds: tuple[ParameterKind, ...]
+
+    @cached_property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Every parameter, in order."""
+        return tuple(
+            Parameter(kind, leg, component)
+            for kind in self.kinds
+            for leg in range(1, LEGS + 1)
+            for component in (kind.components or ("",))
+        )
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """Every parameter's name, in order."""
+        return tuple(parameter.name for parameter in self.parameters)
+
+    def __len__(self) -> int:
+        return len(self.parameters)
+
+    def rows(self, names: Iterable[str]) -> NDArray[np.intp]:
+        """Where parameters stand in a vector."""
+        place = {name: row for row, name in enumerate(self.names)}
+        return np.array([place[name] for name in names], dtype=np.intp)
+
+    @cached_property
+    def slices(self) -> Mapping[str, slice]:
+        """The part of a vector that each kind takes, by its symbol."""
+        ends = np.cumsum([LEGS * kind.numbers_per_leg for kind in self.kinds]).tolist()
+        symbols = (kind.symbol for kind in self.kinds)
+        return {
+            symbol: slice(begin, end)
+            for symbol, begin, end in zip(symbols, [0, *ends[:-1]], ends, strict=True)
+        }
+
+    @cached_property
+    def shapes(self) -> Mapping[str, tuple[int, ...]]:
+        """The shape of each kind's values, by its symbol."""
+        return {kind.symbol: kind.shape for kind in self.kinds}
+
+    @cached_property
+    def numbers_per_leg(self) -> int:
+        """How many parameters a leg has."""
+        return sum(kind.numbers_per_leg for kind in self.kinds)
+
+    @cached_property
+    def leg_order(self) -> NDArray[np.intp]:
+        """For each parameter its place among the numbers of leg 1, then those of leg 2, and so on.
+
+        The numbers of one leg are in the order of the kinds.
+        """
+        of_legs = np.arange(LEGS * self.numbers_per_leg).reshape(LEGS, -1)
+        ends = np.cumsum([kind.numbers_per_leg for kind in self.kinds])[:-1]
+        return np.concatenate([part.ravel() for part in np.split(of_legs, ends, axis=1)])
+
+    def of_every_leg(self, values: Array) -> Array:
+        """The vector in which every leg has the same numbers (c,), in the order of the kinds."""
+        repeated: Array = np.tile(values, LEGS)[self.leg_order]
+        return repeated
+
+    def by_kind(self, values: Mapping[str, float]) -> Array:
+        """The vector in which all parameters of a kind have the value under its symbol."""
+        counts = [LEGS * kind.numbers_per_leg for kind in self.kinds]
+        return np.repeat([values[kind.symbol] for kind in self.kinds], counts)
+
+    @cached_property
+    def ball_offset(self) -> Array:
+        """The change (3, P) of the parameters when the ball is mounted off its place by x, y or z."""
+        names = "xyz"
+        return np.array(
+            [[p.kind.has_ball_offset and p.component == axis for p in self.parameters] for axis in names],
+            dtype=float,
+        )
+
+    def array(self, vector: Array, symbol: str) -> Array:
+        """One kind's values ``(..., 6, c)`` or ``(..., 6)`` in vectors (..., P): a view."""
+        return vector[..., self.slices[symbol]].reshape(*vector.shape[:-1], *self.shapes[symbol])
+
+    def vector(self, values: Mapping[str, ArrayLike]) -> Array:
+        """The vector (P,) of the values under each kind's symbol.
+
+        Raises:
+            ValueError: a kind has another shape.
+        """
+        arrays = []
+        for symbol, shape in self.shapes.items():
+            array = np.asarray(values[symbol], dtype=float)
+            if array.shape != shape:
+                raise ValueError(f"{symbol} has the shape {array.shape}, not {shape}")
+            arrays.append(array.ravel())
+        return np.concatenate(arrays)
+
+    def document(self, vector: Array) -> dict[str, Any]:
+        """The vector as nested lists under the symbols of its kinds, as files have it."""
+        return {symbol: self.array(vector, symbol).tolist() for symbol in self.shapes}

@@ -39,9 +39,7 @@ class GeometrySettings(Section):
 
 
 class ToleranceSettings(Section):
-    """Largest deviations of the built robot from its drawing; has a key a kind."""
-
-    ball_mm: NotNegative = 0.0
+    """Largest deviations of the built robot from its drawing; has a key a kind, and ``ball_mm``."""
 
     def document(self) -> dict[str, float]:
         """The tolerances under their keys."""

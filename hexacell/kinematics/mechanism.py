@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hexacell.kinematics.geometry import Geometry, GeometryBatch
-from hexacell.kinematics.parameters import Parameter, ParameterSet
+from hexacell.kinematics.parameters import GeometricParameter, ParameterSet
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array
 
@@ -84,7 +84,7 @@ class FrameConvention:
         The first of several parameters that are equal stands for all: "B2/B3/B5 z".
         """
         group = next((group for group in self.equal if group[0] == name), (name,))
-        members: list[Parameter] = [
+        members: list[GeometricParameter] = [
             self.parameters.parameters[row] for row in self.parameters.rows(group).tolist()
         ]
         first = members[0]

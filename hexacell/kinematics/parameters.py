@@ -20,7 +20,7 @@ from hexacell.kinematics.rotations import Array
 LEGS = 6
 
 
-class Unit(StrEnum):
+class ParameterUnit(StrEnum):
     """The unit of a parameter, inside the program and in every file."""
 
     MM = "mm"
@@ -47,7 +47,7 @@ class ParameterKind:
     meaning: str
     tolerance_meaning: str
     display: str = "{legs} {component}"
-    unit: Unit = Unit.MM
+    unit: ParameterUnit = ParameterUnit.MM
     has_ball_offset: bool = False
     is_positive: bool = False
 
@@ -73,7 +73,7 @@ class ParameterKind:
 
 
 @dataclass(frozen=True, slots=True)
-class Parameter:
+class GeometricParameter:
     """One number of the geometry; legs count from 1."""
 
     kind: ParameterKind
@@ -93,10 +93,10 @@ class ParameterSet:
     kinds: tuple[ParameterKind, ...]
 
     @cached_property
-    def parameters(self) -> tuple[Parameter, ...]:
+    def parameters(self) -> tuple[GeometricParameter, ...]:
         """Every parameter, in order."""
         return tuple(
-            Parameter(kind, leg, component)
+            GeometricParameter(kind, leg, component)
             for kind in self.kinds
             for leg in range(1, LEGS + 1)
             for component in (kind.components or ("",))

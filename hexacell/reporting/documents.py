@@ -33,11 +33,28 @@ def identification_document(found: Identification) -> dict[str, Any]:
         "dof": found.dof,
         "geometry": found.geometry.document(),
         "sigma": found.geometry.parameters.document(found.sigma),
+        "parameters": _parameters(found),
         "covariance": found.covariance.tolist(),
         "undetermined": list(found.undetermined),
         "outliers": [_outlier(record, fault) for record, fault in found.left_out],
         "frame": found.frame,
     }
+
+
+def _parameters(found: Identification) -> list[dict[str, Any]]:
+    """Every parameter with its value and standard deviation, in the order of the covariance."""
+    values = zip(found.geometry.parameters.parameters, found.geometry.vector, found.sigma, strict=True)
+    return [
+        {
+            "name": parameter.name,
+            "kind": parameter.kind.symbol,
+            "leg": parameter.leg,
+            "unit": parameter.kind.unit.value,
+            "value": float(value),
+            "sigma": float(sigma),
+        }
+        for parameter, value, sigma in values
+    ]
 
 
 def _outlier(record: RecordId, fault: DataFault) -> dict[str, Any]:

@@ -59,7 +59,7 @@ class IdentificationResult(Frozen):
     @classmethod
     def of(cls, document: Mapping[str, Any]) -> Self:
         """The result in :func:`~hexacell.reporting.documents.identification_document`."""
-        return cls.model_validate(document)
+        return cls.model_validate({name: document[name] for name in cls.model_fields})
 
     def estimate(self, parameters: ParameterSet) -> KeptEstimate:
         """What the acceptance gates need."""

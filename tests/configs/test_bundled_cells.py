@@ -126,4 +126,4 @@ def test_paper_experiment_is_tables_3_and_4():
     assert settings.identification.points == (P1, P2, P3)
     assert settings.verification.points == (P4, P5, P6)
     assert (settings.identification.orientations, settings.verification.orientations) == (20, 20)
-    assert settings.tolerances.ball_mm == 40
+    assert settings.tolerances.document()["ball_mm"] == 40

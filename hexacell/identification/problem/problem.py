@@ -13,7 +13,7 @@ from hexacell.identification.problem.commanded_poses import CommandedPoses
 from hexacell.identification.problem.encoder_consistency import EncoderConsistency
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import Branch, Mechanism
-from hexacell.kinematics.parameters import ParameterSet, Unit
+from hexacell.kinematics.parameters import ParameterSet, ParameterUnit
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array, Mask
 from hexacell.measurements.records import MeasurementSet
@@ -57,7 +57,7 @@ class Tolerances:
 
     def sum_mm(self, parameters: ParameterSet) -> float:
         """All tolerances of lengths together, the ball's offset included."""
-        lengths = (self.by_kind[kind.symbol] for kind in parameters.kinds if kind.unit is Unit.MM)
+        lengths = (self.by_kind[kind.symbol] for kind in parameters.kinds if kind.unit is ParameterUnit.MM)
         return sum(lengths) + self.ball_mm
 
 

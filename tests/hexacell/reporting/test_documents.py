@@ -15,7 +15,8 @@ from hexacell.reporting.documents import identification_document, outcome_line
 # docs/interface.md, the document of fit --json; termination is an addition.
 KEYS = {
     "converged", "iterations", "records", "points", "residual_rms_mm", "chi2", "dof", "geometry",
-    "sigma", "covariance", "undetermined", "outliers", "frame", "termination",
+    "sigma",
+    "parameters", "covariance", "undetermined", "outliers", "frame", "termination",
 }  # fmt: skip
 
 

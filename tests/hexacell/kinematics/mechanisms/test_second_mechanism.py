@@ -1,0 +1,157 @@
+"""Another mechanism is one more file: everything else follows from its description."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import product
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hexacell.cell.mechanism_sections import geometry_settings, tolerance_settings
+from hexacell.controller_config.toml_format import NativeToml
+from hexacell.errors import FileError
+from hexacell.identification.estimator import identify
+from hexacell.identification.problem.problem import Noise, Prior, Tolerances, build_problem
+from hexacell.kinematics.forward import continue_solution
+from hexacell.kinematics.geometry import Geometry
+from hexacell.kinematics.mechanism import Mechanism
+from hexacell.kinematics.pose import Pose, PoseBatch
+from hexacell.kinematics.rotations import Array
+from hexacell.kinematics.sensitivity import pose_sensitivity, singularity_margin
+from hexacell.measurements.records import MeasurementSet, Record
+from hexacell.reporting.documents import identification_document
+from tests.hexacell.kinematics.mechanisms.gough_stewart import CONVENTION, PARAMETERS, GoughStewart
+
+MECHANISM: Mechanism = GoughStewart()
+BRANCH = (1, 1, 1, 1, 1, 1)
+TOLERANCES = Tolerances({"z": 1.0, "A": 2.0, "B": 2.0}, ball_mm=0.0)
+
+
+def ring(radius: float, degrees: tuple[float, ...], height: float) -> Array:
+    angles = np.radians(degrees)
+    return np.stack(
+        [radius * np.cos(angles), radius * np.sin(angles), np.full(len(angles), height)], axis=1
+    )
+
+
+@pytest.fixture(scope="module")
+def drawing() -> Geometry:
+    base = ring(350.0, (-50.0, 50.0, 70.0, 170.0, 190.0, 290.0), 0.0)
+    platform = ring(160.0, (-10.0, 10.0, 110.0, 130.0, 230.0, 250.0), -30.0)
+    drawn = Geometry.of(PARAMETERS, {"z": np.full(6, 500.0), "A": base, "B": platform})
+    return MECHANISM.normalize_frames(drawn)[0]
+
+
+@pytest.fixture(scope="module")
+def truth(drawing: Geometry) -> Geometry:
+    errors = np.random.default_rng(4).uniform(-1.0, 1.0, len(CONVENTION.free_names()))
+    return CONVENTION.geometry(CONVENTION.free_parameters(drawing) + errors)
+
+
+def poses(drawing: Geometry, random: np.random.Generator) -> Iterator[tuple[int, int, Pose]]:
+    """Orientations about the middle of the workspace, clear of singularities."""
+    middle = drawing["A"].mean(axis=0) + np.array([0.0, 0.0, 420.0])
+    for point, orientation in product(range(1, 6), range(1, 12)):
+        shift = 60.0 * np.array([point % 3 - 1, point % 2, point - 3])
+        while True:
+            pose = Pose(*(middle + shift).tolist(), *random.uniform(-20.0, 20.0, 3).tolist())
+            batch = PoseBatch.of([pose])
+            joints = MECHANISM.inverse(drawing, BRANCH, batch)
+            if singularity_margin(MECHANISM, drawing, batch, joints)[0] > 0.05:
+                break
+        yield point, orientation, pose
+
+
+@pytest.fixture(scope="module")
+def measurements(drawing: Geometry, truth: Geometry) -> MeasurementSet:
+    points, orientations, commands = zip(*poses(drawing, np.random.default_rng(1)), strict=True)
+    start = PoseBatch.of(commands)
+    joints = MECHANISM.inverse(drawing, BRANCH, start)
+    actual = continue_solution(
+        MECHANISM, truth, joints, start=start, start_geometry=drawing, start_joints=joints
+    )
+    assert actual.found.all()
+    balls, records = actual.poses.positions, []
+    for row, (point, orientation, pose) in enumerate(zip(points, orientations, commands, strict=True)):
+        deviation = balls[row] - balls[points.index(point)]
+        records.append(
+            Record(point, orientation, pose, tuple(joints[row].tolist()), tuple(deviation.tolist()))
+        )
+    return MeasurementSet(tuple(records))
+
+
+def test_derivatives_by_every_parameter(truth: Geometry) -> None:
+    """Implicit derivatives against differences of forward kinematics."""
+    start = PoseBatch.of([Pose(150.0, 120.0, 430.0, 8.0, -5.0, 11.0)])
+    joints = MECHANISM.inverse(truth, BRANCH, start)
+    found = pose_sensitivity(MECHANISM, truth, start, joints).parameters[0, :3]
+    step = 1e-4
+    for row in range(len(PARAMETERS)):
+        change = np.where(np.arange(len(PARAMETERS)) == row, step, 0.0)
+        ends = [
+            continue_solution(
+                MECHANISM,
+                Geometry(PARAMETERS, truth.vector + sign * change),
+                joints,
+                start=start,
+                start_geometry=truth,
+                start_joints=joints,
+            ).poses.positions[0]
+            for sign in (-1.0, 1.0)
+        ]
+        difference = (ends[1] - ends[0]) / (2.0 * step)
+        np.testing.assert_allclose(found[:, row], difference, atol=1e-6, err_msg=PARAMETERS.names[row])
+
+
+def test_it_is_identified_from_exact_records(
+    drawing: Geometry, truth: Geometry, measurements: MeasurementSet
+) -> None:
+    problem = build_problem(
+        MECHANISM,
+        measurements,
+        controller=drawing,
+        branch=BRANCH,
+        prior=Prior.of(MECHANISM, drawing, TOLERANCES),
+        noise=Noise(1e-4, 1e-4),
+    )
+    found = identify(problem)
+    assert found.converged
+    assert found.undetermined == ()
+    assert found.geometry.largest_difference(truth) < 1e-5
+    document = identification_document(found)
+    assert list(document["geometry"]) == ["z", "A", "B"]
+    assert [entry["name"] for entry in document["parameters"]] == list(PARAMETERS.names)
+    assert np.array(document["covariance"]).shape == (42, 42)
+
+
+def test_its_config_is_read_and_rewritten(tmp_path: Path, drawing: Geometry, truth: Geometry) -> None:
+    config = tmp_path / "robot.toml"
+    lines = [f"{symbol} = {values}" for symbol, values in drawing.document().items()]
+    config.write_text("\n".join(["[geometry]", *lines, f"branch = {list(BRANCH)}", ""]))
+    kept = NativeToml(PARAMETERS)
+    assert kept.read(config).geometry.largest_difference(drawing) == 0.0
+    config.write_text(kept.rewrite(config.read_text(), truth))
+    assert kept.read(config).geometry.largest_difference(truth) < 1e-6
+
+
+def test_what_its_config_lacks_is_named_by_its_own_kinds(tmp_path: Path) -> None:
+    config = tmp_path / "robot.toml"
+    config.write_text("[geometry]\nz = [1.0, 1.0, 1.0, 1.0, 1.0, 1.0]\n")
+    with pytest.raises(
+        FileError, match=r"has no A.*needs z \(six numbers, mm\), A \(six rows of 3 numbers, mm"
+    ):
+        NativeToml(PARAMETERS).read(config)
+
+
+def test_the_cell_file_has_its_keys(drawing: Geometry) -> None:
+    section = geometry_settings(PARAMETERS)
+    assert list(section.model_fields) == ["z", "A", "B"]
+    assert section.model_validate(drawing.document())["z"] == tuple(drawing["z"])
+    assert list(tolerance_settings(PARAMETERS)().document()) == ["z_mm", "A_mm", "B_mm", "ball_mm"]
+
+
+def test_its_parameters_have_names_for_people() -> None:
+    assert CONVENTION.display_name("z4") == "leg 4 zero"
+    assert CONVENTION.display_name("B1z") == "B1/B2/B3 z"

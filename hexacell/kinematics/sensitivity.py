@@ -62,7 +62,7 @@ def position_sensitivity(
 def _by_parameters(mechanism: Mechanism, by_legs: Array, linear: ConstraintDerivatives) -> Array:
     """How something (n, m, 6) that depends on the legs depends on the parameters (n, m, P)."""
     of_legs = by_legs[..., None] * linear.parameters[..., None, :, :]
-    flat: Array = of_legs.reshape(*by_legs.shape[:2], -1)
+    flat: Array = of_legs.reshape(*by_legs.shape[:2], len(mechanism.parameters))
     return np.take(flat, mechanism.parameters.leg_order, axis=-1)
 
 

@@ -153,4 +153,4 @@ def changed(section: SimulationSettings, changes: dict[str, Any]) -> SimulationS
         for head in heads:
             inner = inner[head]
         inner[last] = value
-    return SimulationSettings.model_validate(values)
+    return type(section).model_validate(values)

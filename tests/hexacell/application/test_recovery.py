@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -88,7 +89,7 @@ async def test_another_device_than_the_run_was_begun_with_is_refused(finished, m
     site = make_site()
     history = list(finished.until(events.SetClosed))
     devices = [
-        device.model_copy(update={"serial_number": "4711"}) if device.protocol == "cia406" else device
+        replace(device, serial_number="4711") if device.protocol == "cia406" else device
         for device in history[0].devices
     ]
     history[0] = history[0].model_copy(update={"devices": tuple(devices)})

@@ -1,4 +1,4 @@
-"""Validation: deviations of the ball at held-out points, before and after calibration."""
+"""Validation: deviations of the ball at held-out points before and after calibration, and the outcome."""
 
 from __future__ import annotations
 
@@ -51,3 +51,32 @@ def validate(
         return Verdict.WORSE
     within = after.mean_mm <= mean_mm and after.largest_mm <= largest_mm
     return Verdict.PASS if within else Verdict.OUT_OF_LIMITS
+
+
+def calibration_outcome(
+    counts: tuple[int, int, int],
+    before: DeviationStatistics | None,
+    after: DeviationStatistics | None,
+    limit_mm: float,
+    verdict: Verdict,
+) -> str:
+    """The outcome of a calibration in one line: what was used, deviation before and after, verdict.
+
+    ``counts`` are the numbers of free parameters, of records, and of points.
+    """
+    parameters, records, points = counts
+    what = f"{parameters} parameters, {records} records at {points} points"
+    if before is None or after is None:
+        return f"{what}; held-out points: {verdict}"
+    means = f"{before.mean_mm:.2f} -> {after.mean_mm:.3f} mm"
+    return f"{what}; mean deviation at held-out points {means} (limit {limit_mm:g}): {verdict}"
+
+
+def check_outcome(found: DeviationStatistics | None, limit_mm: float, verdict: Verdict) -> str:
+    """The outcome of a check in one line: deviation at the held-out points, verdict."""
+    if found is None:
+        return f"held-out points: {verdict}"
+    return (
+        f"{found.poses} poses at held-out points; mean deviation {found.mean_mm:.3f} mm "
+        f"(limit {limit_mm:g}): {verdict}"
+    )

@@ -8,20 +8,12 @@ from typing import Any
 
 from drivers.interfaces import DeviceIdentity
 from hexacell.application.calibration_run import RunRequest
-from hexacell.application.fit import FitResult
 from hexacell.application.planning import NextPose, PlanTrial
 from hexacell.application.replay_run import Replay
 from hexacell.campaign.decisions import Finished, Forecast, MeasurePose, StartPoint
 from hexacell.kinematics.pose import Pose
-from hexacell.reporting.documents import assessment_document, identification_document
 from procedures.replay.comparison import Difference
 from procedures.run import events
-
-
-def fit_document(result: FitResult) -> dict[str, Any]:
-    """What ``fit --json`` prints."""
-    found = result.identified
-    return identification_document(found) | assessment_document(found, result.assessed)
 
 
 def next_document(proposed: NextPose) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""An identification for programs: the ``fit --json`` document, and the outcome of a run in one line."""
+"""The JSON document of an identification and of the checks of it (``fit --json``)."""
 
 from __future__ import annotations
 
@@ -8,70 +8,29 @@ from typing import Any
 
 import numpy as np
 
-from hexacell.acceptance.validation import DeviationStatistics, Verdict
 from hexacell.experiment_design.decorrelation import DecorrelatingPose
 from hexacell.identification.diagnostics.pose_accuracy import PoseErrors
 from hexacell.identification.diagnostics.variance_components import NoiseLevels
 from hexacell.identification.solver.chi_square import ChiSquareTest
-from hexacell.identification.solver.result import DataFault, DataFaultKind, Identification
+from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.pose import Pose
-from hexacell.measurements.records import RecordId
 from hexacell.reporting.assessment import Assessment
 from hexacell.reporting.findings import findings
+from hexacell.reporting.result import IdentificationResult
+
+
+def fit_document(found: Identification, assessed: Assessment) -> dict[str, Any]:
+    """What ``hexacell fit --json`` prints and ``result.json`` holds (``docs/interface.md``)."""
+    return identification_document(found) | assessment_document(found, assessed)
 
 
 def identification_document(found: Identification) -> dict[str, Any]:
-    """The document that ``hexacell fit --json`` prints (``docs/interface.md``)."""
-    return {
-        "converged": found.converged,
-        "termination": found.termination.value,
-        "iterations": found.iterations,
-        "records": found.records,
-        "points": found.points,
-        "residual_rms_mm": found.residual_rms_mm,
-        "chi2": found.chi2,
-        "dof": found.dof,
-        "geometry": found.geometry.document(),
-        "sigma": found.geometry.parameters.document(found.sigma),
-        "parameters": _parameters(found),
-        "covariance": found.covariance.tolist(),
-        "undetermined": list(found.undetermined),
-        "outliers": [_outlier(record, fault) for record, fault in found.left_out],
-        "frame": found.frame,
-    }
-
-
-def _parameters(found: Identification) -> list[dict[str, Any]]:
-    """Every parameter with its value and standard deviation, in the order of the covariance."""
-    values = zip(found.geometry.parameters.parameters, found.geometry.vector, found.sigma, strict=True)
-    return [
-        {
-            "name": parameter.name,
-            "kind": parameter.kind.symbol,
-            "leg": parameter.leg,
-            "unit": parameter.kind.unit.value,
-            "value": float(value),
-            "sigma": float(sigma),
-        }
-        for parameter, value, sigma in values
-    ]
-
-
-def _outlier(record: RecordId, fault: DataFault) -> dict[str, Any]:
-    point, orientation = record
-    # The gauges of a zero shift are named in its finding only.
-    is_single_record = fault.kind is not DataFaultKind.ZERO_SHIFT
-    return {
-        "point": point,
-        "orientation": orientation,
-        "kind": fault.kind.value,
-        "gauges": list(fault.gauges) if is_single_record else [],
-        "off_mm": None if fault.offset_mm is None else list(fault.offset_mm),
-    }
+    """The identified geometry and its uncertainty."""
+    return IdentificationResult.of(found).document(found.geometry.parameters)
 
 
 def assessment_document(found: Identification, assessed: Assessment) -> dict[str, Any]:
-    """What ``hexacell fit --json`` adds: the checks of the result and its predicted accuracy."""
+    """The checks of the result, and its predicted accuracy."""
     return {
         "findings": list(findings(found, assessed)),
         "goodness": _goodness(assessed.goodness),
@@ -170,22 +129,3 @@ def _errors(errors: PoseErrors) -> dict[str, Any]:
 
 def _pose(pose: Pose) -> dict[str, float]:
     return dict(zip("xyzabc", pose.as_tuple(), strict=True))
-
-
-def outcome_line(
-    counts: tuple[int, int, int],
-    before: DeviationStatistics | None,
-    after: DeviationStatistics | None,
-    limit_mm: float,
-    verdict: Verdict,
-) -> str:
-    """The one line everywhere: what was used, held-out deviation before and after, the verdict.
-
-    ``counts`` are the numbers of free parameters, of records, and of points.
-    """
-    parameters, records, points = counts
-    what = f"{parameters} parameters, {records} records at {points} points"
-    if before is None or after is None:
-        return f"{what}; held-out points: {verdict}"
-    means = f"{before.mean_mm:.2f} -> {after.mean_mm:.3f} mm"
-    return f"{what}; mean deviation at held-out points {means} (limit {limit_mm:g}): {verdict}"

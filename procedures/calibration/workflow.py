@@ -16,7 +16,6 @@ from hexacell.acceptance.validation import Verdict
 from hexacell.campaign.planner import Plan
 from hexacell.campaign.pose_list import PoseList
 from hexacell.cell.model import CellSettings
-from hexacell.identification.estimator import identify
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.geometry import Geometry
 from hexacell.robot_model import Robot
@@ -91,14 +90,6 @@ class Calibration:
             step = measuring.points.next_step(state)
             return step or Compute(kind="take back" if state.lending else "identify")
         return measuring.held_out.next_step(state, Phase.BEFORE) or self._write_back(state)
-
-    def identification(self, state: RunState) -> Identification:
-        """Identify the geometry from the run's records.
-
-        Raises:
-            IdentifiabilityError: they do not determine it.
-        """
-        return identify(self.robot_of(state).problem(state.measurements()))
 
     def robot_of(self, state: RunState) -> Robot:
         """The robot with all geometries that commanded the run's records."""

@@ -5,16 +5,23 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from hexacell.acceptance.gates import gates
-from hexacell.acceptance.validation import DeviationStatistics, Verdict, validate
+from hexacell.acceptance.validation import (
+    DeviationStatistics,
+    Verdict,
+    calibration_outcome,
+    check_outcome,
+    validate,
+)
 from hexacell.cell.loader import Cell
+from hexacell.identification.estimator import identify
 from hexacell.measurements.csv_file import write_measurements
 from hexacell.reporting.assessment import assess
-from hexacell.reporting.documents import assessment_document, identification_document, outcome_line
+from hexacell.reporting.documents import fit_document
+from hexacell.reporting.result import IdentificationResult
 from hexacell.runs.run_folder import RunFolder
 from procedures.calibration.workflow import Calibration, Mode
 from procedures.engine.config_transactions import ConfigTransactions
 from procedures.run import events
-from procedures.run.identified import IdentificationResult
 from procedures.run.state import RunState
 from procedures.run.steps import Phase
 
@@ -32,11 +39,11 @@ class Computations:
         """Identify the geometry and choose the held-out poses; raises ``HexacellError``."""
         measurements = state.measurements()
         write_measurements(self.folder.measurements, measurements)
-        identified = self.calibration.identification(state)
-        assessed = assess(self.cell.settings, self.calibration.robot_of(state), measurements, identified)
-        document = identification_document(identified)
-        self.folder.write_result(document | assessment_document(identified, assessed))
-        result = IdentificationResult.of(document)
+        robot = self.calibration.robot_of(state)
+        identified = identify(robot.problem(measurements))
+        assessed = assess(self.cell.settings, robot, measurements, identified)
+        self.folder.write_result(fit_document(identified, assessed))
+        result = IdentificationResult.of(identified)
         return events.Identified(result=result, held_out=self.calibration.held_out_poses(identified))
 
     def propose(self, state: RunState) -> events.Proposed:
@@ -63,10 +70,12 @@ class Computations:
         before = DeviationStatistics.of(state.held_out(Phase.BEFORE))
         if self.calibration.mode is Mode.CHECK:
             verdict = self._verdict(before, before)
-            return events.ResultValidated(verdict=verdict, line=self._check_line(before, verdict))
+            line = check_outcome(before, self._limit_mm, verdict)
+            return events.ResultValidated(verdict=verdict, line=line)
         after = DeviationStatistics.of(state.held_out(Phase.AFTER))
         verdict = Verdict.WORSE if state.refusals(Phase.AFTER) else self._verdict(before, after)
-        line = outcome_line(self._counts(_identified(state)), before, after, self._limit_mm, verdict)
+        counts = self._counts(_identified(state))
+        line = calibration_outcome(counts, before, after, self._limit_mm, verdict)
         return events.ResultValidated(verdict=verdict, line=line)
 
     def _counts(self, result: IdentificationResult) -> tuple[int, int, int]:
@@ -80,14 +89,6 @@ class Computations:
     def _verdict(self, before: DeviationStatistics | None, after: DeviationStatistics | None) -> Verdict:
         largest_mm = self.cell.settings.acceptance.max_deviation_mm
         return validate(before, after, mean_mm=self._limit_mm, largest_mm=largest_mm)
-
-    def _check_line(self, found: DeviationStatistics | None, verdict: Verdict) -> str:
-        if found is None:
-            return f"held-out points: {verdict}"
-        return (
-            f"{found.poses} poses at held-out points; mean deviation {found.mean_mm:.3f} mm "
-            f"(limit {self._limit_mm:g}): {verdict}"
-        )
 
 
 def _identified(state: RunState) -> IdentificationResult:

@@ -16,7 +16,7 @@ from hexacell.acceptance.validation import Verdict
 from hexacell.cell.fields import GeometryDocument
 from hexacell.cell.recovery import Action, FailureKind
 from hexacell.controller_config.interface import Branch
-from procedures.run.identified import IdentificationResult
+from hexacell.reporting.result import IdentificationResult
 from procedures.run.steps import Frozen, SetKey, SixNumbers, Step, ThreeNumbers
 from procedures.run.trips import Guard, Trip
 

@@ -7,7 +7,7 @@ from typing import Any
 from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import load_cell
 from hexacell.identification.solver.levenberg_marquardt import Termination
-from procedures.run.identified import IdentificationResult
+from hexacell.reporting.result import IdentificationResult
 
 
 def an_identification(**changes: Any) -> IdentificationResult:
@@ -29,4 +29,4 @@ def an_identification(**changes: Any) -> IdentificationResult:
         "outliers": (),
         "frame": "as drawn",
     }
-    return IdentificationResult.of(document | changes)
+    return IdentificationResult.model_validate(document | changes)

@@ -7,7 +7,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hexacell.acceptance.validation import DeviationStatistics, Verdict, validate
+from hexacell.acceptance.validation import (
+    DeviationStatistics,
+    Verdict,
+    calibration_outcome,
+    check_outcome,
+    validate,
+)
 
 LIMITS = {"mean_mm": 0.05, "largest_mm": 0.15}
 BEFORE = DeviationStatistics(3.41, 6.0, 10)
@@ -80,3 +86,37 @@ def test_verdicts_read_as_words():
         "worse than before",
         "not evaluated",
     ]
+
+
+COUNTS = (35, 55, 5)
+
+
+def test_the_outcome_line():
+    line = calibration_outcome(
+        COUNTS,
+        DeviationStatistics(3.412, 6.0, 10),
+        DeviationStatistics(0.0119, 0.03, 10),
+        0.05,
+        Verdict.PASS,
+    )
+    assert line == (
+        "35 parameters, 55 records at 5 points; "
+        "mean deviation at held-out points 3.41 -> 0.012 mm (limit 0.05): pass"
+    )
+
+
+@pytest.mark.parametrize(
+    ("before", "after"),
+    [(None, None), (DeviationStatistics(3.4, 6.0, 10), None), (None, DeviationStatistics(0.01, 0.03, 10))],
+)
+def test_missing_held_out_data_are_stated_and_do_not_pass(before, after):
+    line = calibration_outcome(COUNTS, before, after, 0.05, Verdict.NOT_EVALUATED)
+    assert line == "35 parameters, 55 records at 5 points; held-out points: not evaluated"
+
+
+def test_the_outcome_of_a_check():
+    found = DeviationStatistics(3.412, 6.0, 10)
+    assert check_outcome(found, 0.05, Verdict.OUT_OF_LIMITS) == (
+        "10 poses at held-out points; mean deviation 3.412 mm (limit 0.05): out of limits"
+    )
+    assert check_outcome(None, 0.05, Verdict.NOT_EVALUATED) == "held-out points: not evaluated"

@@ -1,4 +1,4 @@
-"""The JSON document of an identification, and the outcome of a run in one line."""
+"""The JSON document of an identification."""
 
 from __future__ import annotations
 
@@ -7,10 +7,9 @@ import json
 import numpy as np
 import pytest
 
-from hexacell.acceptance.validation import DeviationStatistics, Verdict
 from hexacell.identification.estimator import identify
 from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS
-from hexacell.reporting.documents import identification_document, outcome_line
+from hexacell.reporting.documents import identification_document
 
 # docs/interface.md, the document of fit --json; termination is an addition.
 KEYS = {
@@ -95,29 +94,3 @@ def test_a_record_without_a_pose_gives_valid_json(noisy, make_problem):
     assert (outlier["point"], outlier["orientation"]) == (bad.point, bad.orientation)
     assert outlier["off_mm"] is None
     json.dumps(document, allow_nan=False)
-
-
-COUNTS = (35, 55, 5)
-
-
-def test_the_outcome_line():
-    line = outcome_line(
-        COUNTS,
-        DeviationStatistics(3.412, 6.0, 10),
-        DeviationStatistics(0.0119, 0.03, 10),
-        0.05,
-        Verdict.PASS,
-    )
-    assert line == (
-        "35 parameters, 55 records at 5 points; "
-        "mean deviation at held-out points 3.41 -> 0.012 mm (limit 0.05): pass"
-    )
-
-
-@pytest.mark.parametrize(
-    ("before", "after"),
-    [(None, None), (DeviationStatistics(3.4, 6.0, 10), None), (None, DeviationStatistics(0.01, 0.03, 10))],
-)
-def test_missing_held_out_data_are_stated_and_do_not_pass(before, after):
-    line = outcome_line(COUNTS, before, after, 0.05, Verdict.NOT_EVALUATED)
-    assert line == "35 parameters, 55 records at 5 points; held-out points: not evaluated"

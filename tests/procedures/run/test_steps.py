@@ -15,9 +15,9 @@ from hexacell.acceptance.gates import AcceptanceGate
 from hexacell.acceptance.validation import Verdict
 from hexacell.cell.recovery import Action, FailureKind
 from hexacell.identification.solver.result import DataFaultKind
+from hexacell.reporting.result import OutlierRecord
 from procedures.journal.journal import Journal, read_journal
 from procedures.run import events, steps
-from procedures.run.identified import OutlierRecord
 from procedures.run.steps import (
     CloseSet,
     Compute,

@@ -1,0 +1,125 @@
+"""The result of an identification as data, for files and for the journal.
+
+All that follows from it, the acceptance gates and the write-back, needs no other computation.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Self
+
+from pydantic import BaseModel, ConfigDict
+
+from hexacell.cell.fields import GeometryDocument
+from hexacell.identification.solver.levenberg_marquardt import Termination
+from hexacell.identification.solver.result import DataFault, DataFaultKind, Identification
+from hexacell.kinematics.geometry import Geometry
+from hexacell.kinematics.parameters import ParameterSet
+from hexacell.kinematics.rotations import Array
+from hexacell.measurements.records import Deviation, RecordId
+
+
+class _Frozen(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid", ser_json_inf_nan="constants")
+
+
+class OutlierRecord(_Frozen):
+    """A record that was left out.
+
+    ``gauges`` are those that alone are wrong, and ``off_mm`` what the gauges x, y and z show too much.
+    """
+
+    point: int
+    orientation: int
+    kind: DataFaultKind = DataFaultKind.GROSS_ERROR
+    gauges: tuple[str, ...] = ()
+    off_mm: Deviation | None = None
+
+    @classmethod
+    def of(cls, record: RecordId, fault: DataFault) -> Self:
+        """A record and its fault; the gauges of a zero shift are named in its finding only."""
+        point, orientation = record
+        gauges = () if fault.kind is DataFaultKind.ZERO_SHIFT else tuple(fault.gauges)
+        return cls(
+            point=point, orientation=orientation, kind=fault.kind, gauges=gauges, off_mm=fault.offset_mm
+        )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class KeptEstimate:
+    """A :class:`~hexacell.identification.solver.result.GeometryEstimate` from the journal."""
+
+    geometry: Geometry
+    sigma: Array
+    termination: Termination
+    undetermined: tuple[str, ...]
+
+
+class IdentificationResult(_Frozen):
+    """The identified geometry and its uncertainty: the first part of ``result.json``."""
+
+    converged: bool
+    termination: Termination
+    iterations: int
+    records: int
+    points: int
+    residual_rms_mm: float
+    chi2: float
+    dof: int
+    geometry: GeometryDocument
+    sigma: GeometryDocument
+    covariance: tuple[tuple[float, ...], ...]
+    undetermined: tuple[str, ...]
+    outliers: tuple[OutlierRecord, ...]
+    frame: str
+
+    @classmethod
+    def of(cls, found: Identification) -> Self:
+        """What is kept of an identification."""
+        parameters = found.geometry.parameters
+        return cls(
+            converged=found.converged,
+            termination=found.termination,
+            iterations=found.iterations,
+            records=found.records,
+            points=found.points,
+            residual_rms_mm=found.residual_rms_mm,
+            chi2=found.chi2,
+            dof=found.dof,
+            geometry=parameters.document(found.geometry.vector),
+            sigma=parameters.document(found.sigma),
+            covariance=found.covariance.tolist(),
+            undetermined=found.undetermined,
+            outliers=tuple(OutlierRecord.of(record, fault) for record, fault in found.left_out),
+            frame=found.frame,
+        )
+
+    def document(self, parameters: ParameterSet) -> dict[str, Any]:
+        """The same as JSON has it, with a row for each of the ``parameters``."""
+        return self.model_dump(mode="json") | {"parameters": self._parameter_rows(parameters)}
+
+    def _parameter_rows(self, parameters: ParameterSet) -> list[dict[str, Any]]:
+        """Value and standard deviation of every parameter, in the order of the covariance."""
+        values, sigmas = parameters.vector(self.geometry), parameters.vector(self.sigma)
+        return [
+            {
+                "name": parameter.name,
+                "kind": parameter.kind.symbol,
+                "leg": parameter.leg,
+                "unit": parameter.kind.unit.value,
+                "value": value,
+                "sigma": sigma,
+            }
+            for parameter, value, sigma in zip(
+                parameters.parameters, values.tolist(), sigmas.tolist(), strict=True
+            )
+        ]
+
+    def estimate(self, parameters: ParameterSet) -> KeptEstimate:
+        """What the acceptance gates need."""
+        sigma = parameters.vector(self.sigma)
+        return KeptEstimate(self.identified(parameters), sigma, self.termination, self.undetermined)
+
+    def identified(self, parameters: ParameterSet) -> Geometry:
+        """The geometry in the mechanism's frame convention."""
+        return Geometry.of(parameters, self.geometry)

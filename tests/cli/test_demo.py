@@ -253,7 +253,6 @@ def test_an_earlier_demo_is_replaced(earlier, start):
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(180)
 def test_the_papers_experiment_passes_too(typed):
     outcome = typed("demo", "--config", "paper-experiment", "--json")
     assert outcome.code == 0, outcome.err

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from pathlib import Path
 from typing import Any
 
@@ -18,8 +17,7 @@ from hexacell.clock import CellClock
 from hexacell.controller_config.toml_format import NativeToml
 from hexacell.errors import DeviceError, UsageError
 from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS, Hexaglide
-
-PATIENCE_S = 5.0
+from tests.waiting import wait_until
 
 
 @pytest.fixture
@@ -143,9 +141,7 @@ class Log:
         self.told.append(("clear", device, self.clock.now()))
 
     def wait_for(self, count: int) -> list[tuple[str, str]]:
-        give_up = time.monotonic() + PATIENCE_S
-        while len(self.told) < count and time.monotonic() < give_up:
-            time.sleep(0.005)
+        wait_until(lambda: len(self.told) >= count)
         return [(what, device) for what, device, _ in self.told]
 
 

@@ -1,15 +1,19 @@
 """Links whose URLs lead to a fake port."""
 
+import time
+from types import SimpleNamespace
+
 import pytest
 import serial
 
+from drivers.serial import port as serial_port
 from drivers.serial.shared_port import SharedSerialPorts
 from tests.drivers.serial.shared_port.fake_port import WORST_LATENCY_S
 
 
 @pytest.fixture
 def fake(monkeypatch):
-    """Make every URL lead to a given fake port, and note how it was asked for."""
+    """Make every URL lead to a given fake port, in its time, and note how it was asked for."""
 
     def install(port):
         def serial_for_url(url, *, do_not_open, **settings):
@@ -17,6 +21,8 @@ def fake(monkeypatch):
             port.url, port.settings = url, settings
             return port
 
+        clock = SimpleNamespace(monotonic=lambda: port.now_s, time=time.time)
+        monkeypatch.setattr(serial_port, "time", clock)
         monkeypatch.setattr(serial, "serial_for_url", serial_for_url)
         return port
 

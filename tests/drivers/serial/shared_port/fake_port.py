@@ -1,23 +1,30 @@
 """A serial port that delivers what it is told to, and links that lead to it."""
 
-import asyncio
+import math
 import threading
 import time
 
 from drivers.serial.shared_port import SharedSerialPort
+from tests.waiting import until
 
 WORST_LATENCY_S = 0.3
 SOON_S = 0.05
 LONG_S = 30.0
+FOREVER_S = math.inf
 SLICE_S = 0.005
 
 
 class FakePort:
-    """Delivers what ``answer`` says for each question, each part after its delay."""
+    """Delivers what ``answer`` says for each question, each part after its delay.
+
+    Time, ``now_s``, passes only while somebody waits for bytes, and takes none on the wall.
+    """
 
     def __init__(self, answer=lambda request: [(0.0, b"+1.234\r")]):
+        self.now_s = 0.0
         self.is_open = False
         self.asked = []
+        self.asked_at_s = []
         self.due = []
         self.broken = None
         self.threads = set()
@@ -33,14 +40,15 @@ class FakePort:
     @property
     def in_waiting(self):
         self._fail()
-        return sum(len(data) for due, data in self.due if due <= time.monotonic())
+        return sum(len(data) for due, data in self.due if due <= self.now_s)
 
     def read(self, size):
         self._fail()
         if not self.in_waiting:
-            time.sleep(SLICE_S)
-        here = b"".join(data for due, data in self.due if due <= time.monotonic())
-        later = [(due, data) for due, data in self.due if due > time.monotonic()]
+            self.now_s += SLICE_S
+            time.sleep(0)
+        here = b"".join(data for due, data in self.due if due <= self.now_s)
+        later = [(due, data) for due, data in self.due if due > self.now_s]
         self.due = [(0.0, here[size:])] * bool(here[size:]) + later
         return here[:size]
 
@@ -48,8 +56,9 @@ class FakePort:
         self._fail()
         self.threads.add(threading.current_thread().name)
         self.asked.append(request)
-        self.due += [(time.monotonic() + delay, data) for delay, data in self._answer(request)]
+        self.asked_at_s.append(self.now_s)
         self.written.set()
+        self.due += [(self.now_s + delay, data) for delay, data in self._answer(request)]
 
     def _fail(self):
         if self.broken is not None:
@@ -63,4 +72,4 @@ async def opened(url="fake", **settings):
 
 
 async def written(port):
-    await asyncio.to_thread(port.written.wait, LONG_S)
+    await until(port.written.is_set)

@@ -1,39 +1,44 @@
 """Cancelling and closing: nothing waits for what no longer comes."""
 
 import asyncio
-import time
+import threading
 
 import pytest
 
 from drivers.serial.port import NoAnswer
 from drivers.serial.shared_port import SharedSerialPort
 from hexacell.errors import DeviceError
-from tests.drivers.serial.shared_port.fake_port import LONG_S, SLICE_S, SOON_S, FakePort, opened, written
+from tests.drivers.serial.shared_port.fake_port import FOREVER_S, SOON_S, FakePort, opened, written
+from tests.waiting import until
 
 
 async def test_a_cancelled_exchange_leaves_the_link_in_step(fake):
-    port = fake(FakePort(lambda request: [(SOON_S, b"to " + request)]))
+    answering = threading.Event()
+    port = fake(FakePort(lambda request: [(SOON_S, b"to " + request)] * answering.wait()))
     link = await opened()
-    first = asyncio.create_task(link.exchange(b"1\r", b"\r", LONG_S))
+    first = asyncio.create_task(link.exchange(b"1\r", b"\r", FOREVER_S))
     await written(port)
     first.cancel()
     with pytest.raises(asyncio.CancelledError):
         await first
-    assert await link.exchange(b"2\r", b"\r", LONG_S) == b"to 2\r"
+    answering.set()
+    assert await link.exchange(b"2\r", b"\r", FOREVER_S) == b"to 2\r"
     assert link.take_unsolicited() == b""
     await link.close()
 
 
 async def test_an_exchange_that_is_cancelled_before_its_turn_is_never_asked(fake):
-    port = fake(FakePort(lambda request: [(SOON_S, b"to " + request)]))
+    answering = threading.Event()
+    port = fake(FakePort(lambda request: [(SOON_S, b"to " + request)] * answering.wait()))
     link = await opened()
-    first = asyncio.create_task(link.exchange(b"1\r", b"\r", LONG_S))
+    first = asyncio.create_task(link.exchange(b"1\r", b"\r", FOREVER_S))
     await written(port)
-    second = asyncio.create_task(link.exchange(b"2\r", b"\r", LONG_S))
+    second = asyncio.create_task(link.exchange(b"2\r", b"\r", FOREVER_S))
     await asyncio.sleep(0)
     second.cancel()
+    answering.set()
     assert await first == b"to 1\r"
-    assert await link.exchange(b"3\r", b"\r", LONG_S) == b"to 3\r"
+    assert await link.exchange(b"3\r", b"\r", FOREVER_S) == b"to 3\r"
     assert port.asked == [b"1\r", b"3\r"]
     await link.close()
 
@@ -42,7 +47,7 @@ async def test_exchanges_at_once_take_their_turns(fake):
     fake(FakePort(lambda request: [(0.01, b"to " + request)]))
     link = await opened()
     requests = [b"%d\r" % number for number in range(10)]
-    answers = await asyncio.gather(*(link.exchange(each, b"\r", LONG_S) for each in requests))
+    answers = await asyncio.gather(*(link.exchange(each, b"\r", FOREVER_S) for each in requests))
     assert answers == [b"to " + each for each in requests]
     await link.close()
 
@@ -50,9 +55,9 @@ async def test_exchanges_at_once_take_their_turns(fake):
 async def test_closing_does_not_wait_for_an_answer(fake):
     port = fake(FakePort(lambda _: []))
     link = await opened()
-    waiting = asyncio.create_task(link.exchange(b"?\r", b"\r", LONG_S))
+    waiting = asyncio.create_task(link.exchange(b"?\r", b"\r", FOREVER_S))
     await written(port)
-    await asyncio.wait_for(link.close(), LONG_S / 10)
+    await link.close()
     with pytest.raises(DeviceError, match="is closed"):
         await waiting
     assert not port.is_open
@@ -60,13 +65,13 @@ async def test_closing_does_not_wait_for_an_answer(fake):
 
 async def test_closing_does_not_wait_for_silence(fake):
     fake(FakePort(lambda _: []))
-    link = SharedSerialPort("fake", worst_latency_s=LONG_S)
+    link = SharedSerialPort("fake", worst_latency_s=FOREVER_S)
     await link.open()
     with pytest.raises(NoAnswer):
         await link.exchange(b"?\r", b"\r", SOON_S)
-    waiting = asyncio.create_task(link.exchange(b"?\r", b"\r", LONG_S))
+    waiting = asyncio.create_task(link.exchange(b"?\r", b"\r", FOREVER_S))
     await asyncio.sleep(0)
-    await asyncio.wait_for(link.close(), LONG_S / 10)
+    await link.close()
     with pytest.raises(DeviceError, match="is closed"):
         await waiting
 
@@ -79,10 +84,7 @@ async def test_a_cancelled_close_closes_all_the_same(fake):
     closing.cancel()
     with pytest.raises(asyncio.CancelledError):
         await closing
-    give_up = time.monotonic() + LONG_S
-    while port.is_open and time.monotonic() < give_up:  # noqa: ASYNC110 - a thread closes it
-        await asyncio.sleep(SLICE_S)
-    assert not port.is_open
+    await until(lambda: not port.is_open)
 
 
 async def test_closing_twice_is_harmless_and_using_it_afterwards_is_not(fake):
@@ -92,7 +94,7 @@ async def test_closing_twice_is_harmless_and_using_it_afterwards_is_not(fake):
     await link.close()
     link.require_silence()
     with pytest.raises(DeviceError, match="is closed"):
-        await link.exchange(b"?\r", b"\r", LONG_S)
+        await link.exchange(b"?\r", b"\r", FOREVER_S)
     with pytest.raises(DeviceError, match="is closed"):
         await link.open()
 
@@ -101,6 +103,6 @@ async def test_a_link_that_was_never_opened_closes_and_does_not_ask(fake):
     port = fake(FakePort())
     link = SharedSerialPort("fake")
     with pytest.raises(DeviceError, match="it is not open"):
-        await link.exchange(b"?\r", b"\r", LONG_S)
+        await link.exchange(b"?\r", b"\r", FOREVER_S)
     await link.close()
     assert port.asked == []

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import socket
 import threading
-import time
 from collections.abc import Callable, Iterator
 from dataclasses import astuple
 
@@ -15,13 +14,12 @@ from drivers.controllers.linuxcnc.settings import Timeouts
 from drivers.simulated.linuxcnc.machine import KinematicsFailure
 from drivers.simulated.linuxcnc.server import HOST, SimulatedController
 from hexacell.cell.devices import ControllerSettings
+from hexacell.clock import CellClock
 from hexacell.errors import FileError
 from hexacell.kinematics.pose import Pose
 from tests.waiting import wait_until
 
 QUICK = Timeouts(poll=0.005, arrival=0.05, switch=0.05)
-
-PATIENCE_S = 20.0  # a machine under load is no controller that fails
 
 
 class FakeMachine:
@@ -43,11 +41,11 @@ class FakeMachine:
             raise KinematicsFailure
         self._stop.clear()
         self.events.append("move")
-        start, begun = self._joints, time.monotonic()
+        start, clock = self._joints, CellClock()
         target = [value + self._geometry for value in astuple(pose)]
         share = 0.0
         while share < 1.0 and not self._stop.wait(0.001):
-            share = min(1.0, (time.monotonic() - begun) / self.duration_s)
+            share = min(1.0, clock.now() / self.duration_s)
             with self._lock:
                 self._joints = tuple(a + share * (b - a) for a, b in zip(start, target, strict=True))
 
@@ -90,7 +88,7 @@ class RawClient:
     """Says one line at a time and reads what comes until nothing has come for a moment."""
 
     def __init__(self, port: int) -> None:
-        self._socket = socket.create_connection((HOST, port), timeout=PATIENCE_S)
+        self._socket = socket.create_connection((HOST, port))
         self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
 
     def say(self, line: str, answer: bytes) -> None:
@@ -119,7 +117,7 @@ class RawClient:
         self._socket.settimeout(0.03)
         with pytest.raises(TimeoutError):
             self._socket.recv(1)
-        self._socket.settimeout(PATIENCE_S)
+        self._socket.settimeout(None)
 
     def expect_end(self) -> None:
         assert self._socket.recv(1) == b""
@@ -136,8 +134,7 @@ class RawClient:
         self.say("set estop off", b"SET ESTOP ACK\n\r")
         self.say("set machine on", b"SET MACHINE ACK\n\r")
         self.say("set home -1", b"SET HOME ACK\n\r")
-        while b"NO" in self.ask("get joint_homed"):
-            time.sleep(0.001)  # homing goes on
+        wait_until(lambda: b"NO" not in self.ask("get joint_homed"))
         self.say("set mode mdi", b"SET MODE ACK\n\r")
 
     def close(self) -> None:

@@ -27,13 +27,13 @@ TRANSPORTS = ("pty", "socket")
 FAST = 100.0
 TIMEOUT_S = 0.3
 WORST_LATENCY_S = 0.6
-LONG_S = 10.0
+LONG_S = 100.0
 
 
 class Cell:
     """Three gauges x, y, z that see balls at 1, 2 and 3 mm, and drivers for them."""
 
-    def __init__(self, protocols, transport="pty", timeout_s=TIMEOUT_S, **simulation):
+    def __init__(self, protocols, transport="pty", timeout_s=LONG_S, **simulation):
         self.balls = {"x": 1.0, "y": 2.0, "z": 3.0}
         settings = [
             GaugeSettings(name=name, axis=name, protocol=protocol, channel=number, timeout_s=timeout_s)
@@ -66,6 +66,18 @@ async def cell(*args, **kwargs):
 def served(protocol, plunger=lambda: 1.0, transport="pty", factor=FAST, channels=(1,), **pace):
     indicators = {channel: Indicator(plunger) for channel in channels}
     return serve_gauges(simulated_device(protocol, indicators), transport, CellClock(factor), **pace)
+
+
+def questions_to(line):
+    """A list that gets every question when it arrives at ``line``."""
+    questions, answer = [], line.device.answer
+
+    def noted(command):
+        questions.append(command)
+        return answer(command)
+
+    line.device.answer = noted
+    return questions
 
 
 async def ask(link, question=b"?\r"):

@@ -19,8 +19,10 @@ from tests.drivers.simulated.gauges.served.cell import (
     TRANSPORTS,
     ask,
     cell,
+    questions_to,
     served,
 )
+from tests.waiting import until
 
 
 async def test_silent(sylvac):
@@ -42,9 +44,12 @@ async def test_a_late_answer_is_never_the_next_reading(sylvac):
 
 
 async def test_cancelled_readings_leave_the_line_in_step(sylvac):
+    questions = questions_to(sylvac.rack.line("y"))
     for _ in range(5):
+        sylvac.rack.inject("y", InjectedGaugeFault.LATE, answers=1, seconds=0.02 * FAST)
+        questions.clear()
         reading = asyncio.create_task(sylvac.gauges["y"].read())
-        await asyncio.sleep(0.001)
+        await until(lambda: bool(questions))
         reading.cancel()
         with contextlib.suppress(asyncio.CancelledError):
             await reading
@@ -107,10 +112,12 @@ async def test_unplugged_and_plugged_in_again(transport):
 
 
 async def test_unplugged_during_a_question():
-    async with cell(["mux10"] * 3, latency_s=20.0) as made:
+    async with cell(["mux10"] * 3) as made:
         await made.gauges["x"].open()
+        made.rack.inject("x", InjectedGaugeFault.SILENT)
+        questions = questions_to(made.rack.line("x"))
         reading = asyncio.create_task(made.gauges["x"].read())
-        await asyncio.sleep(0.05)
+        await until(lambda: bool(questions))
         made.rack.inject("x", InjectedGaugeFault.UNPLUGGED)
         with pytest.raises(DeviceError, match="was lost"):
             await reading

@@ -76,7 +76,7 @@ class Robot:
             branch=self.branch,
             prior=self.prior,
             noise=self.noise,
-            lent=self.provisional,
+            provisional=self.provisional,
         )
 
     def belief(self, identified: Identification | None = None) -> RobotBelief:

@@ -38,19 +38,19 @@ class PlanTrial:
     target_mm: float | None
 
 
-def next_pose(cell: Cell, measurements: MeasurementSet, *, refusals: int = 0) -> NextPose:
+def next_pose(cell: Cell, measurements: MeasurementSet, *, rejections: int = 0) -> NextPose:
     """The pose worth measuring after these records.
 
     Args:
         cell: the robot, its tolerances, limits and points.
         measurements: the records so far; may be empty.
-        refusals: poses at the present point that could not be measured.
+        rejections: poses at the present point that could not be measured.
 
     Raises:
         HexacellError: the records do not belong to this cell, or no geometry fits them.
     """
     plan = _plan_of(cell)
-    state = state_of_records(plan, measurements, refusals=refusals)
+    state = state_of_records(plan, measurements, rejections=rejections)
     decision = decide(plan, state)
     forecast = decision.forecast if isinstance(decision, MeasurePose) else plan.forecast(state)
     return NextPose(decision, forecast)

@@ -130,17 +130,17 @@ def _set_up(
     run = RunFolder(scratch / "run")
     run.path.mkdir()
     calibration = Calibration(settings, robot_of_run(cell, started), Mode(started.mode), pose_list_of(cell))
-    tape = RecordedOutcome(settings.timing.window_s)
+    outcome = RecordedOutcome(settings.timing.window_s)
     performer = RecordedStepExecutor(
         cell,
         calibration,
-        recorded_devices(settings, tape),
-        RecordedClock(tape),
-        RecordedOperator(tape),
+        recorded_devices(settings, outcome),
+        RecordedClock(outcome),
+        RecordedOperator(outcome),
         run,
-        RecordedThermometers(tape),
+        RecordedThermometers(outcome),
     )
-    replayer = Replayer(performer, tape, run.journal, scope, tolerance)
+    replayer = Replayer(performer, outcome, run.journal, scope, tolerance)
     return replayer, started.model_copy(update={"config_sha256": atomic_files.sha256(text)})
 
 

@@ -22,14 +22,14 @@ class CampaignState:
         point: the point at which the gauges are, counted from 1; none between points.
         done: points that are not to be measured any more.
         present: the pose last commanded, in the controller's frames; none if it is not known.
-        refusals: records of the present point that could not be taken.
+        rejections: records of the present point that could not be taken.
     """
 
     measurements: MeasurementSet = field(default_factory=lambda: MeasurementSet(()))
     point: int | None = None
     done: frozenset[int] = frozenset()
     present: Pose | None = None
-    refusals: int = 0
+    rejections: int = 0
 
     def records_at(self, point: int) -> int:
         """How many records a point has."""

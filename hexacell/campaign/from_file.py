@@ -10,7 +10,7 @@ from hexacell.errors import UsageError
 from hexacell.measurements.records import MeasurementSet
 
 
-def state_of_records(plan: Plan, measurements: MeasurementSet, *, refusals: int = 0) -> CampaignState:
+def state_of_records(plan: Plan, measurements: MeasurementSet, *, rejections: int = 0) -> CampaignState:
     """The state after the last record: the gauges are at its point, all other points are done.
 
     Raises:
@@ -23,10 +23,10 @@ def state_of_records(plan: Plan, measurements: MeasurementSet, *, refusals: int 
                 action="Take the measurement file and the cell file that belong together",
             )
     if not len(measurements):
-        return CampaignState(refusals=refusals)
+        return CampaignState(rejections=rejections)
     last = measurements.records[-1]
     others = frozenset(measurements.points.tolist()) - {last.point}
-    return CampaignState(measurements, last.point, others, last.pose, refusals)
+    return CampaignState(measurements, last.point, others, last.pose, rejections)
 
 
 def decide(plan: Plan, state: CampaignState) -> StartPoint | MeasurePose | Finished:
@@ -37,7 +37,7 @@ def decide(plan: Plan, state: CampaignState) -> StartPoint | MeasurePose | Finis
     """
     decision = plan.decide(state)
     if isinstance(decision, FinishPoint):
-        leaving = replace(state, point=None, done=state.done | {decision.point}, present=None, refusals=0)
+        leaving = replace(state, point=None, done=state.done | {decision.point}, present=None, rejections=0)
         decision = plan.decide(leaving)
     if isinstance(decision, FinishPoint):  # impossible: between points there is none to finish
         raise TypeError(decision)

@@ -121,7 +121,7 @@ class PoseChooser:
                 self.robot.from_commands(waiting),
                 start,
                 reference_command=reference_command,
-                skipped=state.refusals,
+                skipped=state.rejections,
             )
         tilt = attempt.tilt_share * belief.limits.tilt
         well_known = orientation_sigma(belief, zero.target) <= WELL_KNOWN_SIGMA
@@ -144,7 +144,7 @@ class PoseChooser:
     def _seed(self, state: CampaignState) -> int:
         """Different for every record and every attempt, and the same when they are repeated."""
         point = state.point or 0
-        attempt = state.records_at(point) + 100 * state.refusals
+        attempt = state.records_at(point) + 100 * state.rejections
         return self.settings.identification.seed + 1000 * point + attempt
 
 

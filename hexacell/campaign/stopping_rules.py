@@ -40,8 +40,8 @@ class StoppingRules:
         size = self.forecaster.sizes[point]
         if state.records_at(point) >= size:
             return f"all its {size} orientations are measured"
-        if state.refusals > REFUSALS:
-            return f"the ball left the gauges' travel {state.refusals} times"
+        if state.rejections > REFUSALS:
+            return f"the ball left the gauges' travel {state.rejections} times"
         return (
             self._budget_used(state, points=0, records=1)
             or self._target_reached(state)

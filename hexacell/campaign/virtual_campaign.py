@@ -94,14 +94,14 @@ class VirtualCampaign:
         self.largest_mm = max(self.largest_mm, deviation)
         if deviation > self.plan.robot.limits.gauge_travel_mm:
             self.outside += 1
-            self.state = replace(state, present=decision.pose, refusals=state.refusals + 1)
+            self.state = replace(state, present=decision.pose, rejections=state.rejections + 1)
             return
         self.state = CampaignState(
             MeasurementSet((*state.measurements.records, record)),
             point,
             state.done,
             decision.pose,
-            state.refusals if state.point == point else 0,
+            state.rejections if state.point == point else 0,
         )
 
     def _finish(self, point: int, reference: Pose) -> None:

@@ -48,7 +48,7 @@ class FailureKind(StrEnum):
 
 
 Word = Literal["retry", "measure-again", "redo-set", "ask", "abort"]
-Ladder = tuple[Word, ...]
+Escalation = tuple[Word, ...]
 """How the first failure of a kind at a set is handled, the second, and so on; the last entry repeats."""
 
 _ASK: tuple[Word, ...] = ("ask",)
@@ -56,74 +56,78 @@ _ABORT: tuple[Word, ...] = ("abort",)
 _REDO: tuple[Word, ...] = ("redo-set", "redo-set", "abort")
 
 
-class _Ladders(Section):
-    """One ladder for each kind of failure. Each ends with ask or abort, so that attempts are bounded."""
+class _Escalations(Section):
+    """One escalation a kind of failure. Each ends with ask or abort, so that attempts are bounded."""
 
     @model_validator(mode="after")
-    def _every_ladder_ends(self) -> Self:
-        for name, ladder in self:
-            if not {*ladder[-1:]} & {"ask", "abort"}:
+    def _every_escalation_ends(self) -> Self:
+        for name, escalation in self:
+            if not {*escalation[-1:]} & {"ask", "abort"}:
                 raise broken_rule(f"{name} must end with ask or abort", "Append one of them")
         return self
 
-    def ladder(self, kind: FailureKind) -> tuple[Action, ...]:
+    def escalation(self, kind: FailureKind) -> tuple[Action, ...]:
         """The actions after successive failures of a kind."""
         words: tuple[str, ...] = getattr(self, kind.value, _ABORT)
         return tuple(Action(word) for word in words)
 
 
-class AttendedRecovery(_Ladders):
+class AttendedRecovery(_Escalations):
     """With a technician at the machine."""
 
-    gauge_silent: Ladder = Field(_ASK, description="no answer, or an invalid one")
-    gauge_setting: Ladder = Field(_ASK, description="inches, hold, a wrong mode, a low battery")
-    gauge_at_end: Ladder = Field(_ASK, description="a plunger at an end of its travel at a reference")
-    unsettled: Ladder = Field(_ASK, description="the readings did not settle")
-    zero_void: Ladder = Field(_ASK, description="a gauge was switched off or set differently")
-    encoder_silent: Ladder = Field(_ASK, description="a round of positions was not complete")
-    encoder_alarm: Ladder = Field(_ASK, description="an encoder reports an error")
-    encoder_restarted: Ladder = Field(_ASK, description="an encoder lost its configuration")
-    controller: Ladder = Field(_ASK, description="the controller refused, or stopped at another place")
-    link_lost: Ladder = Field(_ASK, description="a cable or connection broke")
-    drift: Ladder = Field(_ASK, description="the reference is beyond acceptance.drift_mm at the end")
-    no_way: Ladder = Field(_ASK, description="no safe path")
-    guard: Ladder = Field(_ASK, description="a guard tripped")
-    file: Ladder = Field(_ASK, description="a file could not be written or read")
-    other: Ladder = Field(_ASK, description="any other failure of a device")
+    gauge_silent: Escalation = Field(_ASK, description="no answer, or an invalid one")
+    gauge_setting: Escalation = Field(_ASK, description="inches, hold, a wrong mode, a low battery")
+    gauge_at_end: Escalation = Field(_ASK, description="a plunger at an end of its travel at a reference")
+    unsettled: Escalation = Field(_ASK, description="the readings did not settle")
+    zero_void: Escalation = Field(_ASK, description="a gauge was switched off or set differently")
+    encoder_silent: Escalation = Field(_ASK, description="a round of positions was not complete")
+    encoder_alarm: Escalation = Field(_ASK, description="an encoder reports an error")
+    encoder_restarted: Escalation = Field(_ASK, description="an encoder lost its configuration")
+    controller: Escalation = Field(_ASK, description="the controller refused, or stopped at another place")
+    link_lost: Escalation = Field(_ASK, description="a cable or connection broke")
+    drift: Escalation = Field(_ASK, description="the reference is beyond acceptance.drift_mm at the end")
+    no_way: Escalation = Field(_ASK, description="no safe path")
+    guard: Escalation = Field(_ASK, description="a guard tripped")
+    file: Escalation = Field(_ASK, description="a file could not be written or read")
+    other: Escalation = Field(_ASK, description="any other failure of a device")
 
 
-class UnattendedRecovery(_Ladders):
+class UnattendedRecovery(_Escalations):
     """Without a technician: a bounded number of attempts, then the run ends."""
 
-    gauge_silent: Ladder = Field(("retry", *_REDO), description="no answer, or an invalid one")
-    gauge_setting: Ladder = Field(_ABORT, description="inches, hold, a wrong mode, a low battery")
-    gauge_at_end: Ladder = Field(("redo-set", "abort"), description="a plunger at an end at a reference")
-    unsettled: Ladder = Field(
+    gauge_silent: Escalation = Field(("retry", *_REDO), description="no answer, or an invalid one")
+    gauge_setting: Escalation = Field(_ABORT, description="inches, hold, a wrong mode, a low battery")
+    gauge_at_end: Escalation = Field(
+        ("redo-set", "abort"), description="a plunger at an end at a reference"
+    )
+    unsettled: Escalation = Field(
         ("retry", "measure-again", "redo-set", "abort"), description="the readings did not settle"
     )
-    zero_void: Ladder = Field(_REDO, description="a gauge was switched off or set differently")
-    encoder_silent: Ladder = Field(
+    zero_void: Escalation = Field(_REDO, description="a gauge was switched off or set differently")
+    encoder_silent: Escalation = Field(
         ("retry", "measure-again", "measure-again", "abort"), description="a round was not complete"
     )
-    encoder_alarm: Ladder = Field(
+    encoder_alarm: Escalation = Field(
         ("measure-again", "measure-again", "abort"), description="an encoder reports an error"
     )
-    encoder_restarted: Ladder = Field(_REDO, description="an encoder lost its configuration")
-    controller: Ladder = Field(_ABORT, description="the controller refused, or stopped at another place")
-    link_lost: Ladder = Field(
+    encoder_restarted: Escalation = Field(_REDO, description="an encoder lost its configuration")
+    controller: Escalation = Field(
+        _ABORT, description="the controller refused, or stopped at another place"
+    )
+    link_lost: Escalation = Field(
         ("measure-again", "measure-again", "measure-again", "abort"),
         description="a cable or connection broke",
     )
-    drift: Ladder = Field(_REDO, description="the reference is beyond acceptance.drift_mm at the end")
-    no_way: Ladder = Field(("redo-set", "abort"), description="no safe path")
-    guard: Ladder = Field(_ABORT, description="a guard tripped")
-    file: Ladder = Field(_ABORT, description="a file could not be written or read")
-    other: Ladder = Field(_ABORT, description="any other failure of a device")
+    drift: Escalation = Field(_REDO, description="the reference is beyond acceptance.drift_mm at the end")
+    no_way: Escalation = Field(("redo-set", "abort"), description="no safe path")
+    guard: Escalation = Field(_ABORT, description="a guard tripped")
+    file: Escalation = Field(_ABORT, description="a file could not be written or read")
+    other: Escalation = Field(_ABORT, description="any other failure of a device")
 
     @model_validator(mode="after")
     def _nobody_is_asked(self) -> Self:
-        for name, ladder in self:
-            if "ask" in ladder:
+        for name, escalation in self:
+            if "ask" in escalation:
                 raise broken_rule(f"{name} asks, and nobody is there", "Replace ask by abort")
         return self
 

@@ -63,10 +63,10 @@ class HeldOutSteps:
 
     def _in_set(self, state: RunState, key: SetKey) -> Step:
         measured = state.set(key)
-        if measured.refusals and key.phase is Phase.AFTER:
+        if measured.rejections and key.phase is Phase.AFTER:
             return Compute(kind="judge")
         require_zero(state, key)
-        if measured.refusals:
+        if measured.rejections:
             raise TravelError(f"{key}: the ball left the gauges' travel at a held-out pose")
         if measured.reference_unverified:
             return self.sets.at_reference(state, key) or self._to_reference(state, key)
@@ -84,7 +84,7 @@ class HeldOutSteps:
         move = Move(at=key, orientation=orientation, pose=poses[key.point - 1][orientation - 1])
         if orientation == 1:
             return self.sets.paths.towards(state, move)
-        if state.standing == (key, orientation - 1):  # the poses were chosen with safe lines between them
+        if state.at_pose == (key, orientation - 1):  # the poses were chosen with safe lines between them
             return move
         return self.sets.paths.towards(state, move, self._ball(state, key))
 

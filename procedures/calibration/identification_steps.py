@@ -70,7 +70,7 @@ class IdentificationSteps:
 
     def _applies_provisional(self, state: RunState) -> bool:
         """Whether the controller gets a provisional geometry now, between two points."""
-        is_allowed = self.provisional and not state.lending
+        is_allowed = self.provisional and not state.provisional_active
         if not is_allowed or not any(measured.closed for measured in state.sets.values()):
             return False
         return self.plan.allows_provisional(campaign_state(state, None))
@@ -106,8 +106,8 @@ class IdentificationSteps:
 def open_set(state: RunState) -> SetKey | None:
     """The set of the identification that is being measured."""
     begun = [key for key, measured in state.sets.items() if not measured.closed]
-    standing = [] if state.standing is None else [state.standing[0]]
-    for key in [*begun, *standing]:
+    visited = [] if state.at_pose is None else [state.at_pose[0]]
+    for key in [*begun, *visited]:
         if key.phase is Phase.IDENTIFY and not state.set(key).closed:
             return key
     return None
@@ -125,7 +125,7 @@ def campaign_state(state: RunState, key: SetKey | None) -> CampaignState:
         point=None if key is None else key.point,
         done=frozenset(at.point for at, measured in sets.items() if measured.closed),
         present=None if key is None else _present_pose(state, key),
-        refusals=0 if key is None else state.set(key).refusals,
+        rejections=0 if key is None else state.set(key).rejections,
     )
 
 

@@ -36,7 +36,7 @@ class RunPathPlanner:
 
     def is_in_order(self, state: RunState, key: SetKey) -> bool:
         """Whether the robot came by the set's own moves, each of which was checked when it was chosen."""
-        return not state.off_plan and (state.standing is None or state.standing[0] == key)
+        return not state.off_plan and (state.at_pose is None or state.at_pose[0] == key)
 
     def towards(self, state: RunState, goal: Move, reference: Array | None = None) -> Move:
         """The next move towards ``goal``: ``goal`` itself if the straight line to it is clear.

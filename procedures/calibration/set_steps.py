@@ -31,7 +31,7 @@ class SetSteps:
     def at_pose(self, state: RunState, key: SetKey) -> Step | None:
         """Place the gauges or sample, if the robot is at the pose of the set's next record."""
         orientation = state.set(key).next_orientation
-        if state.standing != (key, orientation) or state.target is None:
+        if state.at_pose != (key, orientation) or state.target is None:
             return None
         if orientation == 1 and not state.set(key).placed:
             return Place(at=key, pose=state.target)
@@ -39,7 +39,7 @@ class SetSteps:
 
     def at_reference(self, state: RunState, key: SetKey) -> Step | None:
         """Verify the set's reference, or close the set, if the robot is there."""
-        if state.standing != (key, 1):
+        if state.at_pose != (key, 1):
             return None
         return Revisit(at=key) if state.set(key).reference_unverified else CloseSet(at=key)
 
@@ -66,5 +66,5 @@ def reference_move(state: RunState, key: SetKey) -> Move:
 def require_zero(state: RunState, key: SetKey) -> None:
     """Raise ``TravelError`` if the gauges of a set could not be zeroed."""
     measured = state.set(key)
-    if not measured.samples and measured.refusals:
+    if not measured.samples and measured.rejections:
         raise TravelError(f"{key}: the gauges cannot be zeroed, they are at the end of their travel")

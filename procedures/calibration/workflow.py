@@ -88,7 +88,7 @@ class Calibration:
             return step or (None if state.judged else Compute(kind="judge"))
         if state.identified is None:
             step = measuring.points.next_step(state)
-            return step or Compute(kind="take back" if state.lending else "identify")
+            return step or Compute(kind="take back" if state.provisional_active else "identify")
         return measuring.held_out.next_step(state, Phase.BEFORE) or self._write_back(state)
 
     def robot_of(self, state: RunState) -> Robot:
@@ -103,8 +103,8 @@ class Calibration:
         Raises:
             HexacellError: the records so far give no estimate.
         """
-        if state.lent is not None:
-            return geometry_of(state.lent, self.robot)
+        if state.provisional is not None:
+            return geometry_of(state.provisional, self.robot)
         return self._at_start.points.estimate(state)
 
     def held_out_poses(self, identified: Identification | None) -> tuple[tuple[SixNumbers, ...], ...]:
@@ -131,16 +131,16 @@ class Calibration:
 
     def _measuring(self, state: RunState) -> _Measuring:
         """The steps for the geometries that the controller has had in this run."""
-        if state.lent is None:
+        if state.provisional is None:
             return self._at_start
-        if state.lending not in self._with_provisional:
+        if state.provisional_active not in self._with_provisional:
             robot = replace(
                 self.robot,
-                provisional=(geometry_of(state.lent, self.robot),),
-                uses_provisional=state.lending,
+                provisional=(geometry_of(state.provisional, self.robot),),
+                uses_provisional=state.provisional_active,
             )
-            self._with_provisional[state.lending] = _Measuring(self.settings, robot, self.listed)
-        return self._with_provisional[state.lending]
+            self._with_provisional[state.provisional_active] = _Measuring(self.settings, robot, self.listed)
+        return self._with_provisional[state.provisional_active]
 
     @cached_property
     def _at_start(self) -> _Measuring:

@@ -110,8 +110,8 @@ class CommandLoop:
             case Pause() if flags.fault is None:
                 self.set_flags(pausing=True, at_once=flags.at_once or command.at_once)
                 return command.at_once or flags.asking
-            case Resume() if flags.resting or flags.pausing:
-                self.set_flags(pausing=False, at_once=False, resting=False)
+            case Resume() if flags.paused or flags.pausing:
+                self.set_flags(pausing=False, at_once=False, paused=False)
             case Answer() if self._broker.answer(command.value):
                 pass
             case Undo() | MeasureAgain():

@@ -73,7 +73,7 @@ class Computations:
             line = check_outcome(before, self._limit_mm, verdict)
             return events.ResultValidated(verdict=verdict, line=line)
         after = DeviationStatistics.of(state.held_out(Phase.AFTER))
-        verdict = Verdict.WORSE if state.refusals(Phase.AFTER) else self._verdict(before, after)
+        verdict = Verdict.WORSE if state.rejections(Phase.AFTER) else self._verdict(before, after)
         counts = self._counts(_identified(state))
         line = calibration_outcome(counts, before, after, self._limit_mm, verdict)
         return events.ResultValidated(verdict=verdict, line=line)

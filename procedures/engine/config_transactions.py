@@ -149,9 +149,9 @@ class ConfigTransactions:
         except HexacellError:
             # Far from level, the slider positions may belong to no pose of the old geometry. The file
             # must not differ from what the controller has until it can be reloaded.
-            if written and state.lent is not None:
+            if written and state.provisional is not None:
                 change = await in_thread(
-                    self.change_to, geometry_of(state.lent, self.calibration.robot), state
+                    self.change_to, geometry_of(state.provisional, self.calibration.robot), state
                 )
                 await in_thread(commit, change, self._provisional_backup)
             raise
@@ -192,7 +192,7 @@ def revert_unrecorded(event: events.Event, state: RunState) -> Reversal | None:
     """What to revert if an event could not be journalled; ``state`` is the one without it."""
     if isinstance(event, events.Committed) and state.committed is None:
         step, name = ROLL_BACK, "the new geometry"
-    elif isinstance(event, events.ProvisionalApplied) and not state.lending:
+    elif isinstance(event, events.ProvisionalApplied) and not state.provisional_active:
         step, name = TAKE_BACK, "a provisional geometry"
     else:
         return None
@@ -210,7 +210,7 @@ def revert_at_end(state: RunState, error: BaseException) -> Reversal | None:
     is_failure = isinstance(error, HexacellError) and not isinstance(error, Interruption)
     if is_failure and state.is_unverified:
         return Reversal(ROLL_BACK, "the new geometry was not verified, and could not be taken back")
-    is_at_reference = state.standing is not None and state.standing[1] == 1
-    if state.config_write_pending or (state.lending and is_at_reference):
+    is_at_reference = state.at_pose is not None and state.at_pose[1] == 1
+    if state.config_write_pending or (state.provisional_active and is_at_reference):
         return Reversal(TAKE_BACK, "")
     return None

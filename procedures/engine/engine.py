@@ -116,7 +116,7 @@ class Engine:
         if self.state.target is not None and not self.state.position_unknown:
             self.record(events.Interrupted(reason="the program ended without a word", exit_code=_KILLED))
         for key, measured in list(self.state.sets.items()):
-            is_useless = not measured.samples or (measured.refusals and key.phase is Phase.BEFORE)
+            is_useless = not measured.samples or (measured.rejections and key.phase is Phase.BEFORE)
             if is_useless and not measured.closed:
                 self.record(events.SetInvalidated(at=key, reason="the run was interrupted in this set"))
 
@@ -221,8 +221,8 @@ class Engine:
             self._is_prepared = False
             await shielded(self._executor.devices.controller.stop())
         self.record(events.Paused(at_once=at_once))
-        self._commands.set_flags(pausing=False, at_once=False, resting=True)
-        while self._commands.flags.resting:
+        self._commands.set_flags(pausing=False, at_once=False, paused=True)
+        while self._commands.flags.paused:
             await self._commands.take_one()
             self._record_invalidations()
             self._leave_if_stopping()

@@ -65,7 +65,7 @@ OF_GUARDS: Mapping[Guard, FailureKind] = {
 }
 """Guards that tripped on nothing that a device said; any other is a kind of its own."""
 
-GRAVITY = (Action.RETRY, Action.MEASURE_AGAIN, Action.REDO_SET, Action.ASK, Action.ABORT)
+SEVERITY = (Action.RETRY, Action.MEASURE_AGAIN, Action.REDO_SET, Action.ASK, Action.ABORT)
 
 
 def kind_of(error: HexacellError) -> FailureKind:
@@ -86,11 +86,11 @@ class RecoveryPolicy:
     """What follows the failures of a run.
 
     Attributes:
-        ladders: by kind; a kind without one ends the run.
+        escalations: by kind; a kind without one ends the run.
         wait_s: cell seconds before a device is tried again.
     """
 
-    ladders: Mapping[FailureKind, tuple[Action, ...]]
+    escalations: Mapping[FailureKind, tuple[Action, ...]]
     wait_s: float = 0.0
 
     @classmethod
@@ -100,12 +100,12 @@ class RecoveryPolicy:
             settings.attended if attended else settings.unattended
         )
         kinds = (kind for kind in FailureKind if kind is not FailureKind.FINAL)
-        return cls({kind: rules.ladder(kind) for kind in kinds}, settings.wait_s)
+        return cls({kind: rules.escalation(kind) for kind in kinds}, settings.wait_s)
 
     def action(self, kind: FailureKind, attempt: int) -> Action:
         """What follows the failure of a kind that is the ``attempt``-th, counted from 1."""
-        ladder = self.ladders.get(kind, (Action.ABORT,))
-        return ladder[min(attempt, len(ladder)) - 1]
+        escalation = self.escalations.get(kind, (Action.ABORT,))
+        return escalation[min(attempt, len(escalation)) - 1]
 
 
 GIVE_UP = RecoveryPolicy({})
@@ -117,7 +117,7 @@ def failed(
 ) -> events.Failed:
     """What is to be written down of a failure; of several at once, what the gravest calls for."""
     verdicts = (_verdict(policy, kind, step, state) for kind in _kinds(error))
-    kind, attempt, action = max(verdicts, key=lambda verdict: GRAVITY.index(verdict[2]))
+    kind, attempt, action = max(verdicts, key=lambda verdict: SEVERITY.index(verdict[2]))
     return events.Failed(step=step, failure=kind, attempt=attempt, reason=str(error), action=action)
 
 

@@ -90,7 +90,9 @@ class StepExecutor:
 
     async def _move(self, step: Move, state: RunState) -> events.Event:
         try:
-            await self.guards.move(step, state, lambda: self._commanded(step, lending=state.lending))
+            await self.guards.move(
+                step, state, lambda: self._commanded(step, is_provisional=state.provisional_active)
+            )
         except GuardTripped as tripped:
             if step.at.phase is not Phase.AFTER or not tripped.trip.is_about_the_ball:
                 raise
@@ -99,11 +101,11 @@ class StepExecutor:
             return events.RecordRejected(at=step.at, orientation=step.orientation, reason=str(tripped))
         return events.Arrived(at=step.at, orientation=step.orientation, pose=step.pose)
 
-    def _commanded(self, step: Move, *, lending: bool) -> Array:
+    def _commanded(self, step: Move, *, is_provisional: bool) -> Array:
         """Where the sliders (6,), mm, belong by the geometry that the controller has now."""
         robot = self.calibration.robot
         commanding = ControllerGeometry(robot.controller, robot.branch)
-        if lending or step.at.phase is Phase.AFTER:
+        if is_provisional or step.at.phase is Phase.AFTER:
             commanding = config_format(self.cell.settings).read(self.cell.config_path)
         target = PoseBatch.of([step.target])
         joints: Array = robot.mechanism.inverse(commanding.geometry, commanding.branch, target)[0]

@@ -182,7 +182,7 @@ class WatchedGauge:
 def _stuck_gauge(step: Move, state: RunState, gauges: tuple[WatchedGauge, ...]) -> Trip | None:
     """A gauge whose display did not change although its ball must have moved a certain distance."""
     samples = state.set(step.at).samples
-    if step.expected is None or state.standing != (step.at, len(samples)):
+    if step.expected is None or state.at_pose != (step.at, len(samples)):
         return None
     for gauge in gauges:
         expected = step.expected.deviation_mm[gauge.axis] - samples[-1].deviation_mm[gauge.axis]

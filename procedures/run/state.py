@@ -19,13 +19,13 @@ class SetState:
 
     Attributes:
         samples: those that count, in the order taken; the first is the reference.
-        again: poses of discarded records, to be taken again, by orientation.
+        again: orientations and poses of discarded records, which are taken again.
         reference_unverified: the gauges were unwatched; their zero must be verified at the reference.
     """
 
     samples: tuple[events.RecordTaken, ...] = ()
     placed: bool = False
-    refusals: int = 0
+    rejections: int = 0
     drift_mm: tuple[float, float, float] | None = None
     again: tuple[tuple[int, SixNumbers], ...] = ()
     reference_unverified: bool = False
@@ -46,7 +46,7 @@ class SetState:
         found = [sample.pose for sample in self.samples if sample.orientation == orientation]
         return found[0] if found else dict(self.again).get(orientation)
 
-    def doubted(self) -> SetState:
+    def unverified(self) -> SetState:
         """The same after the gauges were unwatched; a closed set is not affected."""
         return self if self.closed or not self.samples else replace(self, reference_unverified=True)
 
@@ -55,17 +55,17 @@ class SetState:
         again = tuple(pair for pair in self.again if pair[0] != sample.orientation)
         return replace(self, samples=(*self.samples, sample), again=again)
 
-    def refused(self, orientation: int) -> SetState:
+    def with_rejection(self, orientation: int) -> SetState:
         """One more rejected record; its orientation is chosen again."""
         again = tuple(pair for pair in self.again if pair[0] != orientation)
-        return replace(self, refusals=self.refusals + 1, again=again)
+        return replace(self, rejections=self.rejections + 1, again=again)
 
     def without(self, orientation: int) -> SetState:
         """One record less; a closed set is open again with its reference unverified."""
         kept = tuple(sample for sample in self.samples if sample.orientation != orientation)
         undone = [(s.orientation, s.pose) for s in self.samples if s.orientation == orientation]
         less = replace(self, samples=kept, again=(*self.again, *undone), drift_mm=None)
-        return less.doubted() if self.closed else less
+        return less.unverified() if self.closed else less
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,8 +73,8 @@ class RunState:
     """A run as far as it got.
 
     Attributes:
-        sets: by key, voided ones left out.
-        standing: the set and orientation of the pose that the robot is at; None if it is at none.
+        sets: by key, invalidated ones left out.
+        at_pose: the set and orientation of the pose that the robot is at; None if it is at none.
         target: the pose that it was last commanded to or located at.
         off_plan: it is at a pose of no set: it was located there, or is at a waypoint.
         path_from_reference: orientations and poses by which it came from the reference it was at last;
@@ -82,27 +82,27 @@ class RunState:
         position_unknown: the controller must be asked for the pose before the robot moves.
         failures: how many, by kind and place, since the run was begun or resumed.
         rolling_back: the old geometry is being put back.
-        lent: the provisional geometry that the controller was lent last, and ``lending``: whether it
-            has it now; ``config_write_pending``: it is being lent or taken back, and nobody knows how
-            far that got.
+        provisional: the provisional geometry that the controller was given last.
+        provisional_active: the controller has it now.
+        config_write_pending: it is being applied or reverted, and how far that got is unknown.
     """
 
     started: events.RunStarted | None = None
     sets: dict[SetKey, SetState] = field(default_factory=dict)
-    standing: tuple[SetKey, int] | None = None
+    at_pose: tuple[SetKey, int] | None = None
     target: SixNumbers | None = None
     off_plan: bool = False
     path_from_reference: tuple[tuple[int, SixNumbers], ...] = ()
     position_unknown: bool = False
-    voided: int = 0
+    invalidated: int = 0
     identified: events.Identified | None = None
     proposed: events.Proposed | None = None
     committed: events.Committed | None = None
     judged: events.ResultValidated | None = None
     rolled_back: bool = False
     rolling_back: bool = False
-    lent: events.ProvisionalApplied | None = None
-    lending: bool = False
+    provisional: events.ProvisionalApplied | None = None
+    provisional_active: bool = False
     config_write_pending: bool = False
     failures: dict[tuple[str, str], int] = field(default_factory=dict)
     ended: events.Ended | None = None
@@ -125,9 +125,9 @@ class RunState:
         """The records that the geometry is identified from."""
         return MeasurementSet(tuple(record(sample) for sample in self.samples(Phase.IDENTIFY)))
 
-    def refusals(self, phase: Phase) -> int:
-        """How many records of a phase were refused."""
-        return sum(value.refusals for key, value in self.sets.items() if key.phase is phase)
+    def rejections(self, phase: Phase) -> int:
+        """How many records of a phase were rejected."""
+        return sum(value.rejections for key, value in self.sets.items() if key.phase is phase)
 
     def held_out(self, phase: Phase) -> list[tuple[float, float, float]]:
         """Deviations at held-out poses, mm, references left out."""
@@ -149,29 +149,27 @@ def apply(state: RunState, event: events.Event) -> RunState:  # noqa: C901, PLR0
         case events.StepBegun(step=Compute(kind="lend" | "take back")):
             return replace(state, config_write_pending=True)
         case events.ProvisionalApplied():
-            return replace(
-                state,
-                lent=event,
-                lending=True,
-                config_write_pending=False,
-                standing=None,
-                position_unknown=True,
-            )
+            applied = replace(state, provisional=event, provisional_active=True, config_write_pending=False)
+            return _without_position(applied)
         case events.ProvisionalReverted():
             return replace(
-                state, lending=False, config_write_pending=False, standing=None, position_unknown=True
+                state,
+                provisional_active=False,
+                config_write_pending=False,
+                at_pose=None,
+                position_unknown=True,
             )
         case events.Located():
-            return replace(state, standing=None, off_plan=True, target=event.pose, position_unknown=False)
+            return replace(state, at_pose=None, off_plan=True, target=event.pose, position_unknown=False)
         case events.Arrived():
-            return _doubted(_arrived(state, event), but=event.at)
+            return _unverified(_arrived(state, event), but=event.at)
         case events.GaugesPlaced():
             return _with_set(state, event.at, replace(state.set(event.at), placed=True))
         case events.RecordTaken():
             return _with_set(state, event.at, state.set(event.at).with_sample(event))
         case events.RecordRejected():
-            refused = state.set(event.at).refused(event.orientation)
-            return _with_set(replace(state, standing=None), event.at, refused)
+            rejected = state.set(event.at).with_rejection(event.orientation)
+            return _with_set(replace(state, at_pose=None), event.at, rejected)
         case events.RecordDiscarded():
             return _with_set(state, event.at, state.set(event.at).without(event.orientation))
         case events.ReferenceConfirmed():
@@ -180,24 +178,24 @@ def apply(state: RunState, event: events.Event) -> RunState:  # noqa: C901, PLR0
             return _with_set(state, event.at, replace(state.set(event.at), drift_mm=event.drift_mm))
         case events.SetInvalidated():
             kept = {key: value for key, value in state.sets.items() if key != event.at}
-            return replace(state, sets=kept, standing=None, voided=state.voided + 1)
+            return replace(state, sets=kept, at_pose=None, invalidated=state.invalidated + 1)
         case events.Identified():
             return replace(state, identified=event)
         case events.Proposed():
             return replace(state, proposed=event)
         case events.Committed():
             # The same sliders are another pose under another geometry.
-            return replace(state, committed=event, standing=None, position_unknown=True)
+            return _without_position(replace(state, committed=event))
         case events.ResultValidated():
             return replace(state, judged=event)
         case events.RolledBack():
-            return _rolled_back(replace(state, standing=None, position_unknown=True, rolling_back=False))
+            return _rolled_back(_without_position(replace(state, rolling_back=False)))
         case events.Paused(at_once=True):
-            return _doubted(_nowhere(state))
+            return _unverified(_without_position(state))
         case events.Failed():
-            return _failed(_nowhere(state), event)
+            return _failed(_without_position(state), event)
         case events.Interrupted():
-            return _doubted(replace(_nowhere(state), failures={}))
+            return _unverified(replace(_without_position(state), failures={}))
         case events.Ended():
             return replace(state, ended=event)
         case _:
@@ -205,20 +203,19 @@ def apply(state: RunState, event: events.Event) -> RunState:  # noqa: C901, PLR0
 
 
 def _arrived(state: RunState, event: events.Arrived) -> RunState:
-    on_the_way = event.orientation == 0
-    standing = None if on_the_way else (event.at, event.orientation)
-    trail = _trail(state, event)
+    is_waypoint = event.orientation == 0
+    at_pose = None if is_waypoint else (event.at, event.orientation)
     return replace(
         state,
-        standing=standing,
-        off_plan=on_the_way,
+        at_pose=at_pose,
+        off_plan=is_waypoint,
         target=event.pose,
-        path_from_reference=trail,
+        path_from_reference=_path(state, event),
         position_unknown=False,
     )
 
 
-def _trail(state: RunState, event: events.Arrived) -> tuple[tuple[int, SixNumbers], ...]:
+def _path(state: RunState, event: events.Arrived) -> tuple[tuple[int, SixNumbers], ...]:
     """The path without loops; empty if the robot did not start from its end."""
     poses = [pose for _, pose in state.path_from_reference]
     if event.orientation == 1:
@@ -229,13 +226,13 @@ def _trail(state: RunState, event: events.Arrived) -> tuple[tuple[int, SixNumber
     return (*state.path_from_reference, (event.orientation, event.pose)) if is_at_its_end else ()
 
 
-def _nowhere(state: RunState) -> RunState:
-    return replace(state, standing=None, position_unknown=True)
+def _without_position(state: RunState) -> RunState:
+    return replace(state, at_pose=None, position_unknown=True)
 
 
-def _doubted(state: RunState, but: SetKey | None = None) -> RunState:
+def _unverified(state: RunState, but: SetKey | None = None) -> RunState:
     """All open sets but one become unverified: gauges are carried away, slip, or are switched off."""
-    return replace(state, sets={k: v if k == but else v.doubted() for k, v in state.sets.items()})
+    return replace(state, sets={k: v if k == but else v.unverified() for k, v in state.sets.items()})
 
 
 def _failed(state: RunState, event: events.Failed) -> RunState:
@@ -244,8 +241,8 @@ def _failed(state: RunState, event: events.Failed) -> RunState:
     match event.step:
         # The ball left its plate on the way to a chosen pose: another pose is chosen.
         case Move(at=at, orientation=orientation) if _is_plate(event) and at.phase is Phase.IDENTIFY:
-            counted = _with_set(counted, at, counted.set(at).refused(orientation))
-    return _doubted(counted) if event.action is Action.MEASURE_AGAIN else counted
+            counted = _with_set(counted, at, counted.set(at).with_rejection(orientation))
+    return _unverified(counted) if event.action is Action.MEASURE_AGAIN else counted
 
 
 def _is_plate(event: events.Failed) -> bool:

@@ -26,7 +26,7 @@ class EngineFlags:
     Attributes:
         fault: what failed, until it is decided how to continue.
         asking: a question waits for a person.
-        pausing: a pause is wanted, ``at_once`` in mid-step; ``resting``: it has begun.
+        pausing: a pause is wanted, ``at_once`` in mid-step; ``paused``: it has begun.
         stopping: why the run is to end; nothing where it is not.
     """
 
@@ -36,7 +36,7 @@ class EngineFlags:
     asking: bool = False
     pausing: bool = False
     at_once: bool = False
-    resting: bool = False
+    paused: bool = False
     stopping: str | None = None
 
     @property
@@ -46,7 +46,7 @@ class EngineFlags:
             (self.fault is not None, Status.FAULTED),
             (self.ended, Status.ENDED),
             (self.stopping is not None, Status.STOPPING),
-            (self.resting, Status.PAUSED),
+            (self.paused, Status.PAUSED),
             (self.asking, Status.AWAITING_OPERATOR),
             (self.pausing, Status.PAUSING),
             (self.begun, Status.RUNNING),

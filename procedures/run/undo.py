@@ -61,7 +61,7 @@ def _last_record(state: RunState) -> tuple[SetKey, int]:
     measured = [key for key, value in state.sets.items() if value.samples and not value.closed]
     if not measured:
         raise UsageError("there is no record to undo in the set that is being measured")
-    key = state.standing[0] if state.standing and state.standing[0] in measured else measured[-1]
+    key = state.at_pose[0] if state.at_pose and state.at_pose[0] in measured else measured[-1]
     return key, state.sets[key].samples[-1].orientation
 
 

@@ -257,7 +257,7 @@ def problem_of(
     controller: Geometry = NOMINAL,
     noise: Noise = PAPER_NOISE,
     tolerances: Tolerances = PAPER_TOLERANCES,
-    lent: tuple[Geometry, ...] = (),
+    provisional: tuple[Geometry, ...] = (),
 ) -> Problem:
     """The identification of some records on the paper's robot."""
     return build_problem(
@@ -267,7 +267,7 @@ def problem_of(
         branch=BRANCH,
         prior=Prior.of(Hexaglide(), drawing, tolerances),
         noise=noise,
-        lent=lent,
+        provisional=provisional,
     )
 
 

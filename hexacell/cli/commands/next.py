@@ -19,7 +19,7 @@ def main(options: argparse.Namespace) -> ExitCode:
     console = Console(options.json)
     cell = load_cell(options.cell)
     measurements = read_measurements(options.measurements, allow_partial=True)
-    proposed = next_pose(cell, measurements, refusals=options.refused)
+    proposed = next_pose(cell, measurements, rejections=options.refused)
     console.document(next_document(proposed))
     if not options.json:
         for line in next_pose_text(proposed):

@@ -102,7 +102,7 @@ class Problem:
         first_rows: (m,) row at which each point begins.
         commands: what the records were commanded with.
         initial_parameters: free parameters (p,), mm, where a search begins: those of the geometry that
-            commanded most records, as a rule the drawing, or that the controller was lent last.
+            commanded most records, as a rule the drawing, or those of the last provisional geometry.
         start: poses that close them at ``joints``.
         has_start_pose: (n,) bool, where there is such a pose: a singularity may lie between the
             geometry that commanded a record and this one.
@@ -175,12 +175,12 @@ def build_problem(
     branch: Branch,
     prior: Prior,
     noise: Noise,
-    lent: Sequence[Geometry] = (),
+    provisional: Sequence[Geometry] = (),
 ) -> Problem:
     """The problem of some records, whose poses were commanded under ``controller``'s geometry.
 
     Records from before the last calibration may have been commanded under the drawing instead, and
-    others under geometries, in the frame convention, that the controller was ``lent``.
+    others under ``provisional`` geometries, in the frame convention.
 
     Raises:
         IdentifiabilityError: joint variables do not belong to the commanded poses, or most records
@@ -191,9 +191,9 @@ def build_problem(
     joints, labels = measurements.joints[order], measurements.labels[order]
     commanding, change = mechanism.normalize_frames(controller)
     poses = change.poses(measurements.poses[order])
-    commands = CommandedPoses.of(mechanism, poses, (commanding, *lent, prior.centre), branch, joints)
+    commands = CommandedPoses.of(mechanism, poses, (commanding, *provisional, prior.centre), branch, joints)
     EncoderConsistency(commands, joints, labels, branch, prior.centre, prior.leg_widths(mechanism)).check()
-    begin = lent[-1] if lent else commands.most_frequent_geometry
+    begin = provisional[-1] if provisional else commands.most_frequent_geometry
     start = commands.solve_poses(begin, joints)
     _refuse_strangers(start.found, labels)
     return Problem(

@@ -71,7 +71,7 @@ async def test_a_device_that_stays_away(at_second_point) -> None:
 
 
 async def test_a_robot_that_cannot_be_stopped_is_left_to_people(at_second_point) -> None:
-    """Whatever the ladder says: nobody knows whether it still moves. Plugged in again, the run goes on."""
+    """Whatever the policy says: nobody knows whether it still moves. Plugged in again, the run goes on."""
     site = at_second_point
 
     def pull(event: events.Event, _: object) -> None:

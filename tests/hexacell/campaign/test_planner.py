@@ -104,15 +104,15 @@ def test_poses_and_expectations_are_in_the_controllers_frames(campaign, two_poin
     assert opening.pose.as_tuple()[:3] == points[0]
 
 
-@pytest.mark.parametrize("refusals", [0, REFUSALS, REFUSALS + 1])
-def test_refusals_bring_another_pose_until_the_point_is_given_up(campaign, two_points, refusals):
+@pytest.mark.parametrize("rejections", [0, REFUSALS, REFUSALS + 1])
+def test_refusals_bring_another_pose_until_the_point_is_given_up(campaign, two_points, rejections):
     one = campaign[3]
-    decision = two_points.decide(replace(one.state, refusals=refusals))
-    if refusals > REFUSALS:
+    decision = two_points.decide(replace(one.state, rejections=rejections))
+    if rejections > REFUSALS:
         assert decision == FinishPoint(1, "the ball left the gauges' travel 4 times")
     else:
         assert isinstance(decision, MeasurePose)
-        assert (decision.pose == one.decision.pose) == (refusals == 0)
+        assert (decision.pose == one.decision.pose) == (rejections == 0)
 
 
 def test_a_point_that_offers_nothing_is_closed_with_the_reason(campaign, make_plan):

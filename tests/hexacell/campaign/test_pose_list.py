@@ -68,11 +68,11 @@ def test_a_refused_pose_is_passed_over(plan_of, campaign, visited):
     plan = plan_of(visited)
     state = campaign[6].state
     first = plan.decide(state)
-    second = plan.decide(replace(state, refusals=1))
+    second = plan.decide(replace(state, rejections=1))
     assert isinstance(first, MeasurePose)
     if isinstance(second, MeasurePose):
         assert not _near(first.pose, second.pose)
-    given_up = plan.decide(replace(state, refusals=REFUSALS + 1))
+    given_up = plan.decide(replace(state, rejections=REFUSALS + 1))
     assert isinstance(given_up, FinishPoint)
 
 

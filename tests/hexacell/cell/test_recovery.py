@@ -1,4 +1,4 @@
-"""The [recovery] section: ladders that a cell may state, and those that it may not."""
+"""The [recovery] section: escalations that a cell may state, and those that it may not."""
 
 from __future__ import annotations
 
@@ -30,12 +30,12 @@ def with_section(tmp_path: Path):
     return make
 
 
-def test_a_cell_states_its_own_ladders(with_section) -> None:
+def test_a_cell_states_its_own_escalations(with_section) -> None:
     path = with_section('[recovery]\nagreement_mm = 0.02\n[recovery.unattended]\ndrift = ["abort"]\n')
     recovery = load_cell(path).settings.recovery
     assert recovery.agreement_mm == 0.02
-    assert recovery.unattended.ladder(FailureKind.DRIFT) == (Action.ABORT,)
-    assert recovery.unattended.ladder(FailureKind.ZERO_VOID)[0] is Action.REDO_SET
+    assert recovery.unattended.escalation(FailureKind.DRIFT) == (Action.ABORT,)
+    assert recovery.unattended.escalation(FailureKind.ZERO_VOID)[0] is Action.REDO_SET
 
 
 @pytest.mark.parametrize(
@@ -53,11 +53,11 @@ def test_what_a_cell_may_not_state(with_section, text: str, words: str) -> None:
         load_cell(with_section(text))
 
 
-@pytest.mark.parametrize("ladders", [AttendedRecovery(), UnattendedRecovery()])
-def test_there_is_a_ladder_for_every_kind_but_the_final_ones(ladders: AttendedRecovery) -> None:
-    named = set(type(ladders).model_fields)
+@pytest.mark.parametrize("escalations", [AttendedRecovery(), UnattendedRecovery()])
+def test_there_is_an_escalation_for_every_kind_but_the_final_ones(escalations: AttendedRecovery) -> None:
+    named = set(type(escalations).model_fields)
     assert named == {kind.value for kind in FailureKind} - {FailureKind.FINAL.value}
-    assert ladders.ladder(FailureKind.FINAL) == (Action.ABORT,)
+    assert escalations.escalation(FailureKind.FINAL) == (Action.ABORT,)
 
 
 def test_the_limit_of_agreement_is_tighter_than_that_of_drift() -> None:

@@ -63,7 +63,7 @@ def test_where_the_straight_line_is_not_clear_it_goes_round_and_asks_again(make_
     assert (step.key, step.pose) == ("P1/o00/move", (*ELSEWHERE[:3], 0.0, 0.0, 0.0))
     passed = events.Arrived(at=step.at, orientation=0, pose=step.pose)
     after = fold([rig.started(), found_at(ELSEWHERE), passed])
-    assert after.standing is None
+    assert after.at_pose is None
     assert rig.calibration.next_step(after).key == "P1/o01/move"
 
 

@@ -55,7 +55,7 @@ class Script:
         orientation = state.set(P1).next_orientation
         if orientation > 3:
             return None
-        kind = Sample if state.standing == (P1, orientation) else Move
+        kind = Sample if state.at_pose == (P1, orientation) else Move
         return kind(at=P1, orientation=orientation, pose=pose(orientation))
 
     async def prepare(self) -> None:

@@ -307,7 +307,7 @@ def test_open_sets_that_cannot_go_on_are_voided_and_the_others_doubted(script, j
         "P3": True,
     }
     engine.reopen_sets()
-    assert engine.state.voided == 2
+    assert engine.state.invalidated == 2
 
 
 def test_nothing_is_voided_in_a_new_run(script, journal) -> None:
@@ -319,9 +319,9 @@ def test_after_a_kill_nobody_knows_where_the_robot_stands(script, journal, story
     """A killed run leaves no word; the pose it had arrived at is not believed any more."""
     journal.append(story().arrived())
     engine = Engine(script, journal)
-    assert engine.state.standing is not None
+    assert engine.state.at_pose is not None
     engine.reopen_sets()
-    assert engine.state.standing is None
+    assert engine.state.at_pose is None
     assert isinstance(journal.events[-1], events.Interrupted)
 
 

@@ -1,4 +1,4 @@
-"""What follows a failure: ladders that end, attempts on paper, sets redone, fault latched until cleared."""
+"""What follows a failure: escalations that end, attempts counted, sets redone, faults latched."""
 
 from __future__ import annotations
 
@@ -84,7 +84,7 @@ def test_the_class_of_an_error_says_its_kind(error: HexacellError, kind: Failure
 
 @pytest.mark.parametrize("policy", [ATTENDED, UNATTENDED, GIVE_UP])
 @pytest.mark.parametrize("kind", FailureKind)
-def test_every_ladder_ends(policy: RecoveryPolicy, kind: FailureKind) -> None:
+def test_every_escalation_ends(policy: RecoveryPolicy, kind: FailureKind) -> None:
     assert policy.action(kind, 1000) in {Action.ASK, Action.ABORT}
     assert policy.action(FailureKind.FINAL, 1) is Action.ABORT
 

@@ -47,17 +47,17 @@ def through(
 ) -> ReplayReport:
     """A history through the procedure of a rig's cell, whose config is as it was at the beginning."""
     folder.mkdir()
-    tape = RecordedOutcome(rig.cell.settings.timing.window_s)
+    outcome = RecordedOutcome(rig.cell.settings.timing.window_s)
     calibration = Calibration(rig.cell.settings, robot_of(rig.cell), rig.mode)
     performer = RecordedStepExecutor(
         rig.cell,
         calibration,
-        recorded_devices(rig.cell.settings, tape),
-        RecordedClock(tape),
-        RecordedOperator(tape),
+        recorded_devices(rig.cell.settings, outcome),
+        RecordedClock(outcome),
+        RecordedOperator(outcome),
         type(rig.folder)(folder),
     )
-    replayer = Replayer(performer, tape, folder / "journal.jsonl", scope)
+    replayer = Replayer(performer, outcome, folder / "journal.jsonl", scope)
     return asyncio.run(replayer.replay(numbered(history)))
 
 
@@ -332,7 +332,7 @@ def test_an_error_of_the_program_is_found_again(recording, replay, monkeypatch) 
     def broken(*_: object) -> None:
         raise ZeroDivisionError("by nothing")
 
-    monkeypatch.setattr(Calibration, "identification", broken)
+    monkeypatch.setattr("procedures.engine.computations.identify", broken)
     history = [*recording.until(events.Identified)[:-1]]
     stopped_by_it = events.Interrupted(reason="by nothing", exit_code=1)
     assert replay([*history, stopped_by_it], scope=Scope.RESULTS).differences == []

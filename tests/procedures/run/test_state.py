@@ -41,7 +41,7 @@ def test_a_step_that_began_has_not_happened() -> None:
 
 def test_arriving_says_where_the_robot_stands(story) -> None:
     state = fold([story().arrived(3)])
-    assert state.standing == (P1, 3)
+    assert state.at_pose == (P1, 3)
     assert state.target == story().arrived(3).pose
 
 
@@ -60,10 +60,10 @@ def test_samples_are_kept_in_the_order_taken(story) -> None:
 
 def test_a_refusal_counts_and_leaves_the_robot_nowhere(story) -> None:
     state = fold([story().arrived(2), story().refused(), story().arrived(2), story().refused()])
-    assert state.set(P1).refusals == 2
-    assert state.refusals(Phase.IDENTIFY) == 2
-    assert state.refusals(Phase.AFTER) == 0
-    assert state.standing is None
+    assert state.set(P1).rejections == 2
+    assert state.rejections(Phase.IDENTIFY) == 2
+    assert state.rejections(Phase.AFTER) == 0
+    assert state.at_pose is None
     assert state.target == story().arrived(2).pose
 
 
@@ -77,8 +77,8 @@ def test_a_voided_set_is_gone_and_counted(story) -> None:
     kept = story(point=2)
     state = fold([*kept.whole(2), *story().whole(2)[:-2], story().voided()])
     assert list(state.sets) == [kept.key]
-    assert state.standing is None
-    assert state.voided == 1
+    assert state.at_pose is None
+    assert state.invalidated == 1
 
 
 def test_records_are_in_the_order_of_their_points(story) -> None:
@@ -138,7 +138,7 @@ def test_the_beginning_is_kept(recording) -> None:
     ],
 )
 def test_after_these_nobody_knows_what_pose_the_robot_holds(event: Any, story) -> None:
-    assert fold([story().arrived(2), event]).standing is None
+    assert fold([story().arrived(2), event]).at_pose is None
 
 
 WORSE = events.ResultValidated(verdict=Verdict.WORSE, line="worse")

@@ -91,7 +91,9 @@ def test_the_solver_starts_at_the_provisional_geometry(paper, visit, make_proble
     before = visit(points=1, orientations=4, degrees=2.0, seed=5).measured()
     after = visit(paper.actual, paper.actual, degrees=55.0, seed=7).measured()
     both = [*before.records, *(record for record in after.records if record.point > 1)]
-    problem = make_problem(MeasurementSet(tuple(both)), lent=(paper.actual,), noise=Noise(1e-4, 1e-4))
+    problem = make_problem(
+        MeasurementSet(tuple(both)), provisional=(paper.actual,), noise=Noise(1e-4, 1e-4)
+    )
     lost = ~problem.commands.solve_poses(problem.prior.centre, problem.joints).found
     assert np.count_nonzero(lost) > 10
     assert problem.has_start_pose.all()

@@ -1,16 +1,17 @@
-"""The demo: a run on a fresh copy of a simulated cell, in a folder of its own."""
+"""Simulated cells: served to other processes, and calibrated as a demo in a folder of its own."""
 
 from __future__ import annotations
 
 import shutil
-from contextlib import ExitStack
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
 from hexacell.application.calibration_run import RunRequest
-from hexacell.application.simulated_cell import require_simulation
+from hexacell.application.device_setup import device_addresses
 from hexacell.cell.bundled import CONTROLLER, bundled_config
-from hexacell.cell.loader import load_cell
-from hexacell.errors import FileError
+from hexacell.cell.loader import Cell, dump, load_cell
+from hexacell.errors import FileError, UsageError
 from hexacell.runs.run_folder import RunFolder
 from hexacell.storage.atomic_files import create_folder_durably, os_error_to_file_error, write_atomically
 from hexacell.storage.cell_lock import cell_lock, lock_path
@@ -19,6 +20,31 @@ from procedures.engine.operator import UnattendedOperator
 
 MARKER = ".hexacell-demo"
 """Name of the file that marks a folder as a demo's, which the next demo may replace."""
+
+
+def require_simulation(cell: Cell) -> Cell:
+    """The same cell, once it is certain that it needs no devices.
+
+    Raises:
+        UsageError: it is a real cell.
+    """
+    if cell.settings.simulation is None:
+        raise UsageError("there is no [simulation] in it: this is a real cell", subject=cell.path)
+    return cell
+
+
+@contextmanager
+def served_cell(cell: Cell) -> Iterator[str]:
+    """Serve a simulated cell within this context; gives a cell file that reaches it, as text.
+
+    Raises:
+        UsageError: it is a real cell.
+        HexacellError: the simulation cannot start.
+    """
+    require_simulation(cell)
+    with device_addresses(cell, other_processes=True) as settings:
+        controller = settings.controller.model_copy(update={"config": str(cell.config_path.resolve())})
+        yield dump(settings.model_copy(update={"controller": controller}))
 
 
 def prepare_demo(folder: Path, config_name: str) -> RunRequest:

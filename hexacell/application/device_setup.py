@@ -19,8 +19,7 @@ from hexacell.kinematics.mechanism import Mechanism
 from hexacell.plugins import Group, load
 from hexacell.robot_model import config_format
 from procedures.calibration.preflight import raise_all
-from procedures.devices.device_set import Devices, MountedGauge
-from procedures.devices.temperatures import Thermometers
+from procedures.devices.device_set import Devices, MountedGauge, Thermometers
 from procedures.run.cancellation import shielded
 
 

@@ -1,17 +1,24 @@
-"""Questions to a cell's plan without a run: the next pose, and a trial on simulated robots."""
+"""Questions to a plan without a run: the next pose after the records of a file, a trial on robots."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-from hexacell.campaign.decisions import Finished, Forecast, MeasurePose, StartPoint
+from hexacell.campaign.decisions import (
+    CampaignState,
+    Finished,
+    FinishPoint,
+    Forecast,
+    MeasurePose,
+    StartPoint,
+)
 from hexacell.campaign.dry_run import DryRunResult, dry_run
 from hexacell.campaign.feasibility import unreachable_share
-from hexacell.campaign.from_file import decide, state_of_records
 from hexacell.campaign.planner import Plan
 from hexacell.campaign.pose_list import pose_list_of
 from hexacell.cell.loader import Cell
+from hexacell.errors import UsageError
 from hexacell.measurements.records import MeasurementSet
 from hexacell.robot_model import robot_of
 
@@ -64,3 +71,37 @@ def try_plan(cell: Cell) -> PlanTrial:
 
 def _plan_of(cell: Cell) -> Plan:
     return Plan(cell.settings, robot_of(cell), pose_list_of(cell))
+
+
+def state_of_records(plan: Plan, measurements: MeasurementSet, *, rejections: int = 0) -> CampaignState:
+    """The state after the last record: the gauges are at its point, all other points are done.
+
+    Raises:
+        UsageError: a record is of a point that the plan does not have.
+    """
+    for point in measurements.points.tolist():
+        if point not in plan.points:
+            raise UsageError(
+                f"there are records of point {point}, but the cell file has {len(plan.points)} points",
+                action="Take the measurement file and the cell file that belong together",
+            )
+    if not len(measurements):
+        return CampaignState(rejections=rejections)
+    last = measurements.records[-1]
+    others = frozenset(measurements.points.tolist()) - {last.point}
+    return CampaignState(measurements, last.point, others, last.pose, rejections)
+
+
+def decide(plan: Plan, state: CampaignState) -> StartPoint | MeasurePose | Finished:
+    """What to measure now; where a point is done, at the next one.
+
+    Raises:
+        HexacellError: no geometry fits the records.
+    """
+    decision = plan.decide(state)
+    if isinstance(decision, FinishPoint):
+        leaving = replace(state, point=None, done=state.done | {decision.point}, present=None, rejections=0)
+        decision = plan.decide(leaving)
+    if isinstance(decision, FinishPoint):  # impossible: between points there is none to finish
+        raise TypeError(decision)
+    return decision

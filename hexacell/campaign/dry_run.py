@@ -13,8 +13,7 @@ from hexacell.campaign.virtual_campaign import VirtualCampaign
 from hexacell.errors import HexacellError
 from hexacell.identification.problem.data_requirements import is_determined
 from hexacell.kinematics.geometry import Geometry
-from hexacell.virtual_robot.random_robots import robots_within_tolerances
-from hexacell.virtual_robot.virtual_robot import VirtualRobot
+from hexacell.virtual_robot.virtual_robot import VirtualRobot, robots_within_tolerances
 
 ROBOTS = 2
 MOST_TRIED = 6

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hexacell.cell.model import CellSettings
-from hexacell.experiment_design.workspace import workspace_poses
+from hexacell.experiment_design.candidates import workspace_poses
 from hexacell.identification.belief import RobotBelief
 from hexacell.identification.diagnostics.frame_alignment import FrameFit
 from hexacell.kinematics.pose import Pose, PoseBatch

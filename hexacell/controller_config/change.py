@@ -5,16 +5,45 @@ from __future__ import annotations
 import difflib
 import io
 from pathlib import Path
-from typing import ClassVar, Self
+from typing import ClassVar, Literal, Self
 
-from pydantic import model_validator
+from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
 
 from hexacell.cell.fields import GeometryDocument
 from hexacell.controller_config.interface import ConfigFormat
 from hexacell.errors import FileError
 from hexacell.kinematics.geometry import Geometry
 from hexacell.storage import atomic_files
-from hexacell.storage.json_record import JsonRecord
+
+
+class JsonRecord(BaseModel):
+    """A frozen record: written atomically, validated when read."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    noun: ClassVar[str]
+    """What error messages call it."""
+
+    version: Literal[1] = 1
+
+    def to_json(self) -> bytes:
+        """The record as a JSON file's content."""
+        return self.model_dump_json(indent=2).encode() + b"\n"
+
+    def save(self, path: Path) -> None:
+        """Write the record atomically; raises ``FileError``."""
+        atomic_files.write_atomically(path, self.to_json())
+
+    @classmethod
+    def load(cls, path: Path) -> Self:
+        """The record in a JSON file; raises ``FileError`` if there is none or it is damaged."""
+        try:
+            return cls.model_validate_json(atomic_files.read_bytes(path))
+        except ValidationError as error:
+            first = error.errors(include_url=False)[0]
+            where = ".".join(str(key) for key in first["loc"]) or "the file"
+            problem = f"this is not a {cls.noun}: {where}: {first['msg']}"
+            raise FileError(problem, subject=path, action="Restore the file") from error
 
 
 class ConfigChange(JsonRecord):

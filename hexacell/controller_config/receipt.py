@@ -5,10 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import ClassVar
 
-from hexacell.controller_config.change import ConfigChange
+from hexacell.controller_config.change import ConfigChange, JsonRecord
 from hexacell.errors import FileError
 from hexacell.storage import atomic_files
-from hexacell.storage.json_record import JsonRecord
 
 BEFORE = "config-before"
 AFTER = "config-after"

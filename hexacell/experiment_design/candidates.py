@@ -1,4 +1,4 @@
-"""Candidate poses, and the commands that bring the robot to them."""
+"""Candidate poses, poses that span the workspace, and the commands that bring the robot to them."""
 
 from __future__ import annotations
 
@@ -20,6 +20,9 @@ limit twists, and they are as informative as tilts."""
 
 SMALLEST_SHARE = 0.004
 """Of the largest amplitude. Under the drawing's tolerances some robots allow no more."""
+
+WORKSPACE_ANGLE = np.radians(15.0)
+"""Small enough for a robot that is not calibrated yet, large enough to show errors of orientation."""
 
 
 class Amplitudes(Enum):
@@ -145,3 +148,18 @@ def within_limits(limits: Limits, poses: PoseBatch, joints: Array) -> Mask:
     """Which poses keep the tilt and joint limits; an unreachable one (NaN) does not."""
     in_range = (joints >= limits.joint_min_mm) & (joints <= limits.joint_max_mm)
     return in_range.all(axis=-1) & (poses.tilts() <= limits.tilt)
+
+
+def workspace_poses(belief: RobotBelief, points: Array) -> PoseBatch:
+    """Seven poses at each ball position (m, 3), mm: level, and rotated both ways about x, y and z.
+
+    Poses that the robot cannot take within its limits, by its estimated geometry or by the controller's,
+    are left out.
+    """
+    vectors = min(WORKSPACE_ANGLE, belief.limits.tilt) * np.concatenate(
+        [np.zeros((1, 3)), np.eye(3), -np.eye(3)]
+    )
+    rotated = rotations.from_vector(vectors)
+    positions = np.repeat(points, len(rotated), axis=0)
+    poses = PoseBatch(positions, np.tile(rotated, (len(points), 1, 1)))
+    return reachable(belief, poses).targets.poses

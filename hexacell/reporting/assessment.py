@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from hexacell.cell.model import CellSettings
+from hexacell.experiment_design.candidates import workspace_poses
 from hexacell.experiment_design.decorrelation import DecorrelatingPose, decorrelating_poses
-from hexacell.experiment_design.workspace import workspace_poses
 from hexacell.identification.diagnostics.correlations import CorrelatedPair, strongly_correlated
 from hexacell.identification.diagnostics.pose_accuracy import Accuracy, predicted_accuracy
 from hexacell.identification.diagnostics.repeatability import Repeatability, repeatability

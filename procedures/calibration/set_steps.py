@@ -1,16 +1,29 @@
-"""The steps within one set of poses, whatever it is measured for."""
+"""The steps within one set of poses, whatever it is measured for, and the verification of its reference."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
 
+import numpy as np
+
 from hexacell.errors import LimitError
 from hexacell.kinematics.rotations import Array
 from hexacell.robot_model import Robot
 from procedures.calibration.path_planning import RunPathPlanner
+from procedures.run import events
 from procedures.run.state import RunState
-from procedures.run.steps import CloseSet, Move, Place, Revisit, Sample, SetKey, SixNumbers, Step
+from procedures.run.steps import (
+    CloseSet,
+    Move,
+    Place,
+    Revisit,
+    Sample,
+    SetKey,
+    SixNumbers,
+    Step,
+    ThreeNumbers,
+)
 
 
 class TravelError(LimitError):
@@ -68,3 +81,30 @@ def require_zero(state: RunState, key: SetKey) -> None:
     measured = state.set(key)
     if not measured.samples and measured.rejections:
         raise TravelError(f"{key}: the gauges cannot be zeroed, they are at the end of their travel")
+
+
+def check_reference(
+    at: SetKey, before: events.Reading, now: events.Reading, limit_mm: float
+) -> events.ReferenceConfirmed | events.SetInvalidated:
+    """Whether gauges and sliders show at a set's reference what they showed before."""
+    gauges = np.subtract(now.gauges_mm, before.gauges_mm)
+    sliders = np.subtract(now.joints_mm, before.joints_mm)
+    if np.abs(gauges).max() > limit_mm:
+        reason = f"back at its reference the gauges show {in_words(gauges)}, more than {limit_mm:g} mm"
+        return events.SetInvalidated(at=at, reason=reason, reading=now)
+    if np.abs(sliders).max() > limit_mm:
+        leg = int(np.abs(sliders).argmax())
+        reason = f"back at its reference q{leg + 1} shows {sliders[leg]:+.3f}, more than {limit_mm:g} mm"
+        return events.SetInvalidated(at=at, reason=reason, reading=now)
+    return events.ReferenceConfirmed(at=at, change_mm=three_numbers(gauges), reading=now)
+
+
+def in_words(deviation: Array) -> str:
+    """Three numbers along x, y and z, mm."""
+    return ", ".join(f"{axis} {value:+.3f}" for axis, value in zip("xyz", deviation, strict=True))
+
+
+def three_numbers(values: Array) -> ThreeNumbers:
+    """An array (3,) as the journal keeps it."""
+    x, y, z = (float(value) for value in values)
+    return x, y, z

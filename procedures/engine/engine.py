@@ -16,14 +16,12 @@ from procedures.engine.step_executor import StepExecutor
 from procedures.journal.journal import Journal
 from procedures.run import events
 from procedures.run.cancellation import shielded
-from procedures.run.commands import Command, CommandQueue, MeasureAgain, Undo
+from procedures.run.commands import Command, CommandQueue, MeasureAgain, PendingInvalidations, Undo
 from procedures.run.questions import Question
-from procedures.run.result import ending, exit_code
 from procedures.run.state import RunState, apply, fold
-from procedures.run.status import Status
+from procedures.run.status import Status, ending, exit_code
 from procedures.run.steps import Phase, Step
 from procedures.run.trips import GuardTripped
-from procedures.run.undo import PendingInvalidations
 
 Listener = Callable[[events.Event, RunState], None]
 

@@ -16,11 +16,10 @@ from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.rotations import Array
 from hexacell.robot_model import config_format
 from hexacell.runs.run_folder import RunFolder
+from procedures.calibration.set_steps import check_reference, in_words, three_numbers
 from procedures.calibration.workflow import Calibration
-from procedures.devices.device_set import Devices, gather_errors
-from procedures.devices.reference_check import check_reference, in_words
+from procedures.devices.device_set import Devices, Thermometers, gather_errors
 from procedures.devices.settling import Settled, settle
-from procedures.devices.temperatures import Thermometers
 from procedures.engine.computations import Computations
 from procedures.engine.config_transactions import ConfigTransactions
 from procedures.engine.operator import Operator
@@ -138,7 +137,7 @@ class StepExecutor:
             orientation=step.orientation,
             pose=step.pose,
             reading=reading,
-            deviation_mm=_three(deviation),
+            deviation_mm=three_numbers(deviation),
         )
 
     async def _revisit(self, step: Revisit, state: RunState) -> events.Event:
@@ -165,9 +164,9 @@ class StepExecutor:
         zero = state.set(step.at).samples[0].reading
         drift = np.subtract(reading.gauges_mm, zero.gauges_mm)
         await self._check_gauges()
-        if drifted := self.guards.drift(str(step.at), _three(drift)):
+        if drifted := self.guards.drift(str(step.at), three_numbers(drift)):
             raise drifted
-        return events.SetClosed(at=step.at, drift_mm=_three(drift), reading=reading)
+        return events.SetClosed(at=step.at, drift_mm=three_numbers(drift), reading=reading)
 
     async def _read(self) -> events.Reading:
         timing = self.cell.settings.timing
@@ -196,15 +195,10 @@ def _reading(
         spread[mounted.axis.index] = spreads[row]
     q1, q2, q3, q4, q5, q6 = (float(value) for value in settled.joint_means())
     return events.Reading(
-        gauges_mm=_three(on_axes),
-        spread_mm=_three(spread),
+        gauges_mm=three_numbers(on_axes),
+        spread_mm=three_numbers(spread),
         joints_mm=(q1, q2, q3, q4, q5, q6),
         answers=tuple(tuple(reading.raw for reading in glance.gauges) for glance in settled.window),
         counts=tuple(glance.encoders.counts for glance in settled.window),
         temperatures=temperatures,
     )
-
-
-def _three(values: Array) -> tuple[float, float, float]:
-    x, y, z = (float(value) for value in values)
-    return x, y, z

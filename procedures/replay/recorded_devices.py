@@ -19,8 +19,7 @@ from hexacell.clock import CellClock
 from hexacell.errors import DeviceError
 from hexacell.kinematics.pose import Pose
 from hexacell.kinematics.rotations import Array
-from procedures.devices.device_set import Devices, MountedGauge
-from procedures.devices.temperatures import Thermometers
+from procedures.devices.device_set import Devices, MountedGauge, Thermometers
 from procedures.engine.step_executor import StepExecutor
 from procedures.guards.guards import Guards
 from procedures.guards.supervision import Supervised

@@ -28,8 +28,7 @@ from hexacell.kinematics.pose import Pose
 from hexacell.measurements.records import MeasurementSet
 from hexacell.robot_model import Robot, robot_of
 from hexacell.study.simulated_campaign import SimulatedCampaign
-from hexacell.virtual_robot.random_robots import random_robot
-from hexacell.virtual_robot.virtual_robot import VirtualRobot
+from hexacell.virtual_robot.virtual_robot import VirtualRobot, random_robot
 
 Say = Callable[[str, str, str], None]
 

@@ -8,7 +8,7 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from hexacell.application.simulated_cell import served_cell
+from hexacell.application.demo import served_cell
 from hexacell.cell.loader import load_cell
 from hexacell.errors import ExitCode
 from hexacell.storage.atomic_files import write_atomically

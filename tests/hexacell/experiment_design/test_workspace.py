@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hexacell.experiment_design.workspace import workspace_poses
+from hexacell.experiment_design.candidates import workspace_poses
 from hexacell.identification.belief import Limits, RobotBelief
 from hexacell.identification.problem.problem import Noise
 

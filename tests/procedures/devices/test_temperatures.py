@@ -10,7 +10,7 @@ import pytest
 from drivers.interfaces import DeviceIdentity, TemperatureReading
 from hexacell.errors import DeviceError
 from procedures.calibration.workflow import Mode
-from procedures.devices.temperatures import Thermometers
+from procedures.devices.device_set import Thermometers
 from procedures.journal.journal import read_journal
 from procedures.run import events
 from procedures.run.events import Temperature

@@ -38,6 +38,18 @@ def send(*numbers: signal.Signals) -> None:
         os.kill(os.getpid(), number)
 
 
+async def sent(*numbers: signal.Signals) -> None:
+    """Send signals; return when the event loop has dealt with them, and with one that came after them."""
+    dealt_with = asyncio.Event()
+    loop = asyncio.get_running_loop()
+    loop.add_signal_handler(signal.SIGUSR1, dealt_with.set)
+    try:
+        send(*numbers, signal.SIGUSR1)
+        await dealt_with.wait()
+    finally:
+        loop.remove_signal_handler(signal.SIGUSR1)
+
+
 async def commands_after(signals: SignalCommands, *numbers: signal.Signals) -> list[Command]:
     """The commands that an engine receives."""
     with signals.queue.attended():
@@ -87,8 +99,7 @@ def test_before_an_engine_runs_the_work_is_cancelled_and_cleans_up_undisturbed(s
 
     async def cleaning_up() -> None:
         for _ in range(3):
-            send(INT, TERM)
-            await asyncio.sleep(0.001)
+            await sent(INT, TERM)
         let_go.append("devices")
 
     with pytest.raises(Interruption):
@@ -100,8 +111,7 @@ def test_when_the_engine_has_ended_a_signal_changes_nothing(signals) -> None:
     async def over() -> str:
         with signals.queue.attended():
             pass
-        send(INT, TERM)
-        await asyncio.sleep(0.01)
+        await sent(INT, TERM)
         return "done"
 
     assert signals.run(over()) == "done"
@@ -112,8 +122,7 @@ def test_what_is_ignored_stays_ignored(signals) -> None:
 
     async def background_job() -> bool:
         with signals.queue.attended():
-            send(INT)
-            await asyncio.sleep(0.01)
+            await sent(INT)
             return list(signals.queue.take()) == []
 
     try:

@@ -17,6 +17,7 @@ from hexacell.errors import (
     flatten_errors,
 )
 from procedures.devices.device_set import gather_errors
+from tests.waiting import until
 
 
 async def test_all_are_opened_and_say_who_they_are(bench) -> None:
@@ -92,16 +93,18 @@ async def test_a_programming_error_is_not_hidden_behind_others() -> None:
 
 
 async def test_cancelling_goes_to_every_call() -> None:
+    begun: list[int] = []
     cancelled: list[int] = []
 
     async def forever(number: int) -> None:
+        begun.append(number)
         try:
             await asyncio.Event().wait()
         finally:
             cancelled.append(number)
 
     task = asyncio.create_task(gather_errors("no", [forever(1), forever(2)]))
-    await asyncio.sleep(0.01)
+    await until(lambda: len(begun) == 2)
     task.cancel()
     with pytest.raises(asyncio.CancelledError):
         await task

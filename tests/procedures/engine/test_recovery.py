@@ -37,6 +37,7 @@ from procedures.run.state import RunState, fold
 from procedures.run.status import Status
 from procedures.run.steps import Phase, Sample, SetKey
 from procedures.run.trips import DriftTripped, Guard, Trip
+from tests.waiting import until
 
 NODE = {"action": "Look at it"}
 UNATTENDED = RecoveryPolicy.of(RecoverySettings(), attended=False)
@@ -307,7 +308,7 @@ class TestATechnicianIsThere:
         moves = len(rig.controller.log)
         for command in (Resume(), Pause()):
             rig.engine.command(command)
-        await asyncio.sleep(0.01)
+        await until(lambda: len(happened(rig, events.CommandRejected)) == 2)
         assert rig.engine.status is Status.FAULTED
         assert len(rig.controller.log) == moves, "nothing moves under a fault"
         rig.engine.command(Answer("retry"))

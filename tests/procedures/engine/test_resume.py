@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-import time
+import threading
 from collections.abc import Sequence
 from typing import Any
 
@@ -140,10 +140,15 @@ async def test_motion_is_never_repeated(recording, replayed) -> None:
 async def test_cancelled_while_writing_it_ends_what_it_writes(recording, replayed, monkeypatch) -> None:
     rig = replayed(recording.until(events.Proposed))
     running = asyncio.create_task(rig.run())
+    cancelled = threading.Event()
+
+    def cancel() -> None:
+        running.cancel()
+        running.get_loop().call_soon(cancelled.set)  # when the run has met its cancellation
 
     def slow_commit(*order: Any) -> Any:
-        running.get_loop().call_soon_threadsafe(running.cancel)
-        time.sleep(0.1)
+        running.get_loop().call_soon_threadsafe(cancel)
+        cancelled.wait()
         return commit(*order)
 
     monkeypatch.setattr(config_transactions, "commit", slow_commit)

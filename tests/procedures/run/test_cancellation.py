@@ -43,12 +43,15 @@ async def test_cancelled_it_ends_first(times: int) -> None:
 
 
 async def test_an_error_is_not_lost_behind_a_cancellation() -> None:
+    cancelled = asyncio.Event()
+
     async def fail() -> None:
-        await asyncio.sleep(0.01)
+        await cancelled.wait()
         raise DeviceError("broken")
 
     task = asyncio.create_task(shielded(fail()))
     await asyncio.sleep(0)
     task.cancel()
+    cancelled.set()
     with pytest.raises(DeviceError):
         await task

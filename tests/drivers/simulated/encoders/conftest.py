@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from types import SimpleNamespace
@@ -46,7 +45,8 @@ def samples() -> Samples:
 
 @pytest.fixture
 def settings() -> EncoderSettings:
-    return EncoderSettings()
+    """The driver's time-outs are for silent nodes; a busy machine is not one."""
+    return EncoderSettings(timeout_s=10.0)
 
 
 @pytest.fixture
@@ -92,29 +92,38 @@ async def driver(settings):
         await each.close()
 
 
-class Listener:
-    """A bare connection to a simulated bus."""
+ASKED, REACHED = 0x7F0, 0x7F1
+"""Identifiers that nobody uses."""
 
-    def __init__(self, bus: can.BusABC) -> None:
+
+class Listener:
+    """A bare connection to the bus of a simulated bank."""
+
+    def __init__(self, bus: can.BusABC, bank: SimulatedEncoderBank) -> None:
         self.bus = bus
+        bank.bus.subscribe(ASKED, lambda *_frame: bank.bus.send_message(REACHED, b""))
 
     def send(self, can_id: int, *data: int) -> None:
         self.bus.send(can.Message(arbitration_id=can_id, data=bytes(data), is_extended_id=False))
 
-    def heard(self, seconds: float = 0.06) -> list[tuple[int, str]]:
-        """Everything that comes in so many seconds: (id, data in hexadecimal)."""
-        deadline, frames = time.monotonic() + seconds, []
-        while (left := deadline - time.monotonic()) > 0:
-            if (message := self.bus.recv(left)) is not None:
-                frames.append((message.arbitration_id, bytes(message.data).hex()))
-        return frames
+    def next(self) -> tuple[int, str]:
+        """The next frame: (id, data in hexadecimal)."""
+        message = self.bus.recv()
+        assert message is not None
+        return message.arbitration_id, bytes(message.data).hex()
+
+    def heard(self) -> list[tuple[int, str]]:
+        """Everything that comes until the bank has dealt with all that was sent so far."""
+        self.send(ASKED)
+        return list(iter(self.next, (REACHED, "")))
+
+    def silence(self) -> bool:
+        """Whether nothing comes for several periods of a timer."""
+        return self.bus.recv(0.06) is None
 
     def wait_for(self, can_id: int) -> str:
         """The data of the next frame with an id, whatever else comes."""
-        while message := self.bus.recv(2.0):
-            if message.arbitration_id == can_id:
-                return bytes(message.data).hex()
-        raise AssertionError(f"no frame {can_id:03X}h")
+        return next(data for heard_id, data in iter(self.next, None) if heard_id == can_id)
 
     def sdo(self, node: int, request: str) -> str:
         """The answer to an SDO request."""
@@ -127,7 +136,7 @@ def listen() -> Iterator[Callable[[SimulatedEncoderBank], Listener]]:
     with ExitStack() as stack:
 
         def make(bank: SimulatedEncoderBank) -> Listener:
-            return Listener(stack.enter_context(can.Bus(**bank.bus_settings)))
+            return Listener(stack.enter_context(can.Bus(**bank.bus_settings)), bank)
 
         yield make
 

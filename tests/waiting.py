@@ -13,10 +13,15 @@ from collections.abc import Callable
 PAUSE_S = 0.002
 
 
+def pause() -> None:
+    """What a fake device does while it has nothing to deliver: let other threads go on."""
+    time.sleep(PAUSE_S)
+
+
 def wait_until(condition: Callable[[], bool]) -> None:
     """Return as soon as ``condition`` holds; other threads and processes go on meanwhile."""
     while not condition():
-        time.sleep(PAUSE_S)
+        pause()
 
 
 async def until(condition: Callable[[], bool]) -> None:

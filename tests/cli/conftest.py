@@ -9,7 +9,6 @@ import secrets
 import signal
 import subprocess
 import sys
-import time
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import asdict, dataclass
@@ -22,6 +21,7 @@ from hexacell.cli.app import main
 from procedures.journal.journal import Journal, read_journal
 from procedures.run import events
 from tests.signals import terminal_signals
+from tests.waiting import wait_until
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 CELL = "simulated-hexaglide.toml"
@@ -241,10 +241,9 @@ class Process:
         self.wait_until(lambda: words in where(), words)
 
     def wait_until(self, condition: Callable[[], bool], what: str) -> None:
-        while not condition():
-            if self.popen.poll() is not None and not condition():
-                pytest.fail(f"waiting for {what!r}: {self.popen.poll()}\n{self.out}\n{self.err}")
-            time.sleep(0.02)
+        wait_until(lambda: condition() or self.popen.poll() is not None)
+        if not condition():
+            pytest.fail(f"waiting for {what!r}: {self.popen.poll()}\n{self.out}\n{self.err}")
 
     def ended(self) -> Outcome:
         """How it ends by itself; it leaves no temporary files."""
@@ -253,11 +252,10 @@ class Process:
         assert list(self.temporary.iterdir()) == []
         return Outcome(code, self.out, self.err)
 
-    def stopped(self, number: signal.Signals) -> tuple[Outcome, float]:
-        """How it ends on a signal, and after how many seconds."""
-        begun = time.monotonic()
+    def stopped(self, number: signal.Signals) -> Outcome:
+        """How it ends on a signal."""
         self.popen.send_signal(number)
-        return self.ended(), time.monotonic() - begun
+        return self.ended()
 
 
 Start = Callable[..., Process]

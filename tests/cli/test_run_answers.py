@@ -7,7 +7,6 @@ import pty
 import re
 import select
 import signal
-import time
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
@@ -15,6 +14,7 @@ import pytest
 
 from procedures.journal.journal import read_journal
 from procedures.run import events
+from tests.waiting import wait_until
 
 FAST = ("clock_factor = 50.0", "clock_factor = 200.0\ngive_up_s = 2000.0")
 ASK = ('approval = "automatic"', 'approval = "ask"')
@@ -70,9 +70,12 @@ def start_at(terminal, start, *arguments):
 
 def ended(process, terminal):
     """How it ends; its terminal is read meanwhile."""
-    while process.popen.poll() is None:
+
+    def is_over() -> bool:
         terminal.drain()
-        time.sleep(0.02)
+        return process.popen.poll() is not None
+
+    wait_until(is_over)
     assert "Traceback" not in terminal.drain()
     return process.popen.poll()
 
@@ -160,7 +163,7 @@ class TestNobodyIsThere:
         fast_cell.edit(ASK)
         run = fast_cell.rewound(demo.run, before="propose")
         process = start("run", fast_cell.cell, "--resume", run, through='exec "$@" <&- >&- 2>&-')
-        assert process.popen.wait(30) == 4
+        assert process.popen.wait() == 4
         assert (run / "proposal.json").is_file()
 
 
@@ -212,12 +215,12 @@ class TestAPersonAtTheTerminal:
         terminal.type("\n\n")  # an Enter too many must not answer the next question
         second = terminal.read_until("Press Enter when they are in place. ")
         assert "Point 2: the robot is at X100.000 Y100.000 Z550.000" in second
-        time.sleep(0.3)
         [run] = quick_cell.runs()
         placed = [e for e in read_journal(run / "journal.jsonl") if isinstance(e, events.GaugesPlaced)]
         assert len(placed) == 1
-        terminal.type("\n")
+        terminal.type("x\n")  # an answer as good as Enter; where no question is open, no letter known
         assert ended(process, terminal) == 1
+        assert process.out.count("Letters, each with Enter") == 1, "the second question was still open"
         assert "out of limits" in process.out
         assert "6/6" in terminal.shown  # the bar
         assert "held-out point 1, before  2 records" in process.out  # not swallowed by the bar's terminal

@@ -10,16 +10,17 @@ import shutil
 import signal
 import subprocess
 import sys
+import time
 from collections import Counter
 
 import pytest
 
-from procedures.journal.journal import read_journal
+from procedures.journal.journal import read_entries, read_journal
 from procedures.run import events
 from procedures.run.steps import Phase
 from tests.signals import terminal_signals
 
-STOPPED_S = 2.0
+STEPS_TO_STOP = 2  # that begin at most after a signal: it ends a run of dozens between two steps
 
 
 @pytest.fixture
@@ -43,6 +44,17 @@ def records_in(cell) -> int:
     return sum(journal.read_text().count('"kind":"sampled"') for journal in journals)
 
 
+def stopped_at_once(process, cell, number: signal.Signals):
+    """How it ends on a signal, after which its runs hardly begin a step, by their own clock."""
+    process.popen.send_signal(number)
+    signalled_s = time.monotonic()
+    outcome = process.ended()
+    entries = [entry for run in cell.runs() for entry in read_entries(run / "journal.jsonl")]
+    begun = [entry for entry in entries if isinstance(entry.event, events.StepBegun)]
+    assert len([entry for entry in begun if entry.monotonic_s > signalled_s]) <= STEPS_TO_STOP
+    return outcome
+
+
 def to_go_on(words: str) -> list[str]:
     """The command that a stopped run prints, without ``hexacell``."""
     lines = words.splitlines()
@@ -56,9 +68,8 @@ def test_a_check_is_stopped_at_once_and_resumed_as_it_says(start, typed_here, go
     config = good_cell.controller.read_bytes()
     process = start("run", good_cell.cell, "--unattended")
     under_way(process, good_cell, 1)
-    outcome, seconds = process.stopped(signal.SIGTERM)
+    outcome = stopped_at_once(process, good_cell, signal.SIGTERM)
     assert outcome.code == 130
-    assert seconds < STOPPED_S
     assert outcome.err == "hexacell: interrupted\n"
     [run] = good_cell.runs()
     last = history(run)[-1]
@@ -78,8 +89,8 @@ def test_a_calibration_is_stopped_and_finished(start, typed, quick_cell):
     process = start("run", quick_cell.cell)
     under_way(process, quick_cell, 5 + 3)
     config = quick_cell.controller.read_bytes()
-    outcome, seconds = process.stopped(signal.SIGINT)
-    assert (outcome.code, seconds < STOPPED_S) == (130, True)
+    outcome = stopped_at_once(process, quick_cell, signal.SIGINT)
+    assert outcome.code == 130
     assert quick_cell.controller.read_bytes() == config
     [run] = quick_cell.runs()
     resumed = typed("run", quick_cell.cell, "--resume", run.name, "--json")
@@ -101,16 +112,16 @@ def test_a_calibration_is_stopped_and_finished(start, typed, quick_cell):
 def test_a_stop_before_anything_was_measured_leaves_nothing_to_resume(start, good_cell):
     process = start("run", good_cell.cell)
     process.wait_for("times as fast", lambda: process.out)
-    outcome, seconds = process.stopped(signal.SIGTERM)
-    assert (outcome.code, seconds < STOPPED_S) == (130, True)
+    outcome = stopped_at_once(process, good_cell, signal.SIGTERM)
+    assert outcome.code == 130
     assert ("To go on" in outcome.out) == bool(good_cell.runs())
 
 
 def test_a_closed_terminal_stops_it_too_and_json_says_so(start, good_cell):
     process = start("run", good_cell.cell, "--unattended", "--json")
     under_way(process, good_cell, 1)
-    outcome, seconds = process.stopped(signal.SIGHUP)
-    assert (outcome.code, seconds < STOPPED_S) == (130, True)
+    outcome = stopped_at_once(process, good_cell, signal.SIGHUP)
+    assert outcome.code == 130
     assert outcome.document == {"error": "interrupted", "exit_code": 130}
     assert "To go on:" in outcome.err
 
@@ -131,8 +142,8 @@ def test_sigterm_stops_what_ignores_ctrl_c(start, good_cell):
     process = start("run", good_cell.cell, "--unattended", through="trap '' INT; exec \"$@\"")
     under_way(process, good_cell, 1)
     process.popen.send_signal(signal.SIGINT)
-    outcome, seconds = process.stopped(signal.SIGTERM)
-    assert (outcome.code, seconds < STOPPED_S) == (130, True)
+    outcome = stopped_at_once(process, good_cell, signal.SIGTERM)
+    assert outcome.code == 130
     assert isinstance(history(good_cell.runs()[0])[-1], events.Interrupted)
 
 

@@ -1,12 +1,11 @@
 """Wire dialogues: a port that expects these questions in this order and gives these answers."""
 
-import time
-
 import pytest
 import serial
 
 from drivers.serial.shared_port import SharedSerialPorts
 from hexacell.cell.devices import GaugeSettings
+from tests.waiting import pause
 
 TIMEOUT_S = 0.05
 WORST_LATENCY_S = 0.05
@@ -45,7 +44,7 @@ class Dialogue:
 
     def read(self, size):
         if not self.in_waiting:
-            time.sleep(0.002)
+            pause()
         data, self.pending = self.pending[:size], self.pending[size:]
         return data
 

@@ -25,6 +25,7 @@ from hexacell.controller_config.toml_format import NativeToml
 from hexacell.errors import FileError, HexacellError, ReachError
 from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS, Hexaglide, hexaglide_geometry
 from hexacell.kinematics.pose import Pose
+from tests.waiting import until
 
 DRIVERS: dict[str, Any] = {"sylvac": SylvacGauge, "mux10": Mux10Gauge, "cdi": CdiGauge}
 
@@ -59,8 +60,7 @@ def slow(settings: CellSettings) -> CellSettings:
 
 
 async def under_way(cell: SimulatedCell) -> None:
-    while cell.physics.progress() in {0.0, 1.0}:  # noqa: ASYNC110 - threads move the simulation
-        await asyncio.sleep(0.001)
+    await until(lambda: cell.physics.progress() not in {0.0, 1.0})
 
 
 @asynccontextmanager

@@ -70,7 +70,7 @@ def test_a_killed_process_leaves_no_stale_lock(config: Path, death: signal.Signa
     with another_process(config) as process:
         assert is_busy(config)
         process.send_signal(death)
-        process.wait(timeout=10)
+        process.wait()
         assert not is_busy(config)
 
 
@@ -81,7 +81,7 @@ def test_a_program_that_the_holder_started_does_not_keep_the_cell(config: Path) 
     try:
         assert not is_busy(config)
     finally:
-        child.communicate(b"\n", timeout=10)
+        child.communicate(b"\n")
 
 
 def test_a_second_descriptor_does_not_keep_the_cell(config: Path, monkeypatch: pytest.MonkeyPatch) -> None:

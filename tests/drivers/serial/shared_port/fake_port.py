@@ -46,7 +46,7 @@ class FakePort:
         self._fail()
         if not self.in_waiting:
             self.now_s += SLICE_S
-            time.sleep(0)
+            time.sleep(0)  # lets other threads go on
         here = b"".join(data for due, data in self.due if due <= self.now_s)
         later = [(due, data) for due, data in self.due if due > self.now_s]
         self.due = [(0.0, here[size:])] * bool(here[size:]) + later

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import math
+import threading
 
 import pytest
 
@@ -107,19 +108,20 @@ async def test_after_silence_the_bank_reads_on(raw, bank, hurry):
 async def test_an_answer_just_late_is_waited_for_before_the_next_sync(raw, bank, monkeypatch):
     await bank.open()
     assert bank._session is not None
-    bus, timed_out = bank._session._bus, []
+    bus, timed_out = bank._session._bus, threading.Event()
     wait_for = bus.wait_for
 
     def first_times_out(ready, _timeout_s):
         """Whoever waits for the answers of SYNC 2 gives up at once, and then waits for ever."""
-        give_up = not ready() and not timed_out
-        timed_out.extend([True] * give_up)
-        return wait_for(ready, 0.0 if give_up else math.inf)
+        if ready() or timed_out.is_set():
+            return wait_for(ready, math.inf)
+        timed_out.set()
+        return wait_for(ready, 0.0)
 
     monkeypatch.setattr(bus, "wait_for", first_times_out)
     raw.nodes[2].answers_sync = lambda sync: [] if sync == 2 else [counts(77)]
     reading = asyncio.ensure_future(bank.read())
-    await until(lambda: timed_out and raw.syncs == 2)
+    await until(lambda: timed_out.is_set() and raw.syncs == 2)
     raw.send(raw.nodes[2].tpdo, counts(66))
     assert (await reading).counts[1] == 77
     assert raw.syncs == 3

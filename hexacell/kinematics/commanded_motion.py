@@ -1,4 +1,4 @@
-"""Where a robot goes when its controller computes with another geometry.
+"""Commanded motion: the actual pose of a robot whose controller computes with another geometry.
 
 The controller solves the inverse kinematics of its own geometry G_c for a commanded pose x_c and moves
 the joints to q = IK(G_c, x_c). The platform of a robot with the geometry G_a then takes the pose
@@ -6,8 +6,8 @@ the joints to q = IK(G_c, x_c). The platform of a robot with the geometry G_a th
     x_a = FK(G_a, q),
 
 and the command that brings the robot to a pose x_a is x_c = FK(G_c, IK(G_a, x_a)). Forward kinematics has
-several solutions. The one on the assembly mode of the known pose is found by numerical continuation: the
-joint variables stay, and the geometry changes in stages from one to the other
+several solutions. Numerical continuation finds the one on the assembly mode of the known pose: the joint
+variables are fixed, and the geometry changes in stages from one to the other
 (:func:`hexacell.kinematics.forward.continue_solution`).
 """
 
@@ -25,10 +25,10 @@ from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array, Mask
 
 COMMAND_STAGES = (3,)
-"""Continuation stages towards a command. A pose that needs more is next to a singularity, and left out."""
+"""Continuation stages for a command. A pose that needs more is near a singularity and is not used."""
 
 JOINT_TOLERANCE_MM = 1e-6
-"""How exactly a command's inverse kinematics must give the joint variables back."""
+"""Largest difference between the joint variables of a command and the required ones."""
 
 
 def change_geometry(
@@ -51,18 +51,18 @@ def change_geometry(
         start=poses,
         start_geometry=before,
         start_joints=joints,
-        tries=stages,
+        stage_counts=stages,
     )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ActualPoses:
-    """Where n commands take a robot.
+    """The actual poses of n commands.
 
     Attributes:
-        poses: actual poses; where ``found`` is false they mean nothing.
-        joints: joint variables (n, 6), mm, that the controller computes; NaN where it cannot reach.
-        found: (n,) whether controller and robot can take the pose, on the same assembly mode.
+        poses: actual poses; undefined where ``found`` is false.
+        joints: joint variables (n, 6), mm, that the controller computes; NaN if out of reach.
+        found: (n,) whether controller and robot both reach the pose, on the same assembly mode.
     """
 
     poses: PoseBatch
@@ -83,11 +83,11 @@ class CommandedRobot:
     actual: Geometry
 
     def joints(self, commands: PoseBatch) -> Array:
-        """Joint variables (n, 6), mm, that the controller computes; NaN where it cannot reach."""
+        """Joint variables (n, 6), mm, that the controller computes; NaN if out of reach."""
         return self.mechanism.inverse(self.commanding, self.branch, commands)
 
     def actual_poses(self, commands: PoseBatch) -> ActualPoses:
-        """Where n commands take the robot."""
+        """The actual poses of n commands."""
         joints = self.joints(commands)
         reachable = np.asarray(np.isfinite(joints).all(axis=-1))
         if reachable.all():
@@ -101,10 +101,10 @@ class CommandedRobot:
     def commands_for(
         self, poses: PoseBatch, joints: Array, *, stages: Sequence[int] = COMMAND_STAGES
     ) -> ForwardResult:
-        """Commands (n) that bring the robot to actual poses, which it takes at ``joints`` (n, 6), mm.
+        """Commands (n) of actual poses at which the robot has the joint variables ``joints`` (n, 6), mm.
 
-        Not found where the controller's geometry cannot take these joint variables, or only on another
-        assembly mode or branch.
+        A command is not found if the controller's geometry has no pose at these joint variables, or has
+        one only on another assembly mode or branch.
         """
         result = change_geometry(self.mechanism, self.actual, self.commanding, poses, joints, stages=stages)
         error = np.abs(np.nan_to_num(self.joints(result.poses), nan=np.inf) - joints)

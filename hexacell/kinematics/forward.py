@@ -1,9 +1,20 @@
-"""Forward kinematics: the pose that closes a geometry at given joint variables, batched.
+"""Forward kinematics: damped Newton's method and numerical continuation, batched.
 
-Forward kinematics has many solutions (assembly modes). The one wanted is found by continuation:
-start at a pose that belongs to a known geometry and known joint variables, and follow it by Newton's
-method while both change into the ones asked for. What is found lies on the assembly mode asked for,
-or counts as not found.
+The pose x of a mechanism with the geometry G at the joint variables q solves the six constraints
+``c(x; G, q) = 0``. Newton's method updates the pose by a twist d (translation, rotation vector) with
+
+    J d = -c,    J = dc/dd,
+
+and shortens d to a largest translation and rotation, because the linearisation does not hold beyond.
+
+A parallel mechanism has up to 40 solutions (assembly modes), and Newton's method may converge to any of
+them. The wanted solution is found by continuation (homotopy): from a pose x0 that solves (G0, q0), the
+geometry and the joint variables change linearly to (G, q) in a few stages, and each stage starts from
+the solution of the one before. The sign of det J changes only at a singularity. A solution on which
+the sign differs from that at x0 is on another assembly mode and counts as not found.
+
+Sources: Merlet, Parallel Robots, 2nd ed. 2006, ch. 4 (Newton's method and assembly modes);
+Allgower and Georg, Numerical Continuation Methods, 1990, ch. 1 and 2.
 """
 
 from __future__ import annotations
@@ -20,20 +31,21 @@ from hexacell.kinematics.mechanism import Mechanism
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array, Mask
 
-CONVERGED_MM = 1e-10
-"""Constraints below this count as closed: legs are a metre, and doubles carry 16 digits."""
+TOLERANCE_MM = 1e-10
+"""Largest constraint of a solution: legs are about 1 m long, and doubles have 16 digits."""
 
-ON_THE_WAY_MM = 1e-3
-"""Between two stages of a continuation: near enough to begin the next one."""
+STAGE_TOLERANCE_MM = 1e-3
+"""Largest constraint at the end of an intermediate stage: the next stage corrects the rest."""
 
-NEWTON_STEPS = 12
-STAGE_STEPS = 6
-"""In one stage of a continuation. What takes more is better served by shorter stages."""
+MAX_STEPS = 12
+MAX_STAGE_STEPS = 6
+"""Newton steps in one stage of a continuation. Shorter stages cost less than more steps."""
 
-LONGEST_STEP_MM = 60.0
-LARGEST_TURN = 0.5
+MAX_TRANSLATION_MM = 60.0
+MAX_ROTATION_RAD = 0.5
 
 CONTINUATION_STAGES = (2, 8, 32)
+"""Numbers of stages, tried in this order."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -42,7 +54,7 @@ class ForwardResult:
 
     Attributes:
         poses: n poses; where ``found`` is false, the last iterate.
-        found: (n,) bool: converged to rounding, on the assembly mode it started from.
+        found: (n,) bool: converged, on the required assembly mode.
     """
 
     poses: PoseBatch
@@ -50,13 +62,13 @@ class ForwardResult:
 
 
 def assembly_mode(pose_jacobian: Array) -> Array:
-    """The sign (n,) of the determinant of pose Jacobians (n, 6, 6): it changes at a singularity."""
+    """Sign (n,) of the determinant of pose Jacobians (n, 6, 6); it changes only at a singularity."""
     signs: Array = np.sign(np.linalg.det(pose_jacobian))
     return signs
 
 
 def apply_twist(poses: PoseBatch, step: Array) -> PoseBatch:
-    """Poses after steps (n, 6): positions, mm, then rotation vectors in the base frame, rad."""
+    """Poses displaced by twists (n, 6): translations, mm, then rotation vectors in the base frame, rad."""
     return PoseBatch(
         poses.positions + step[..., :3], rotations.from_vector(step[..., 3:]) @ poses.rotations
     )
@@ -68,23 +80,23 @@ def newton(
     joints: Array,
     start: PoseBatch,
     mode: Array,
-    close_mm: float,
-    steps: int = NEWTON_STEPS,
+    tolerance_mm: float,
+    max_steps: int = MAX_STEPS,
 ) -> ForwardResult:
-    """Newton's method on each pose, every step bounded; poses that close are left as they are."""
-    search = _Search(mechanism, geometry, joints, start, mode)
-    for _ in range(steps):
-        # One that is out of reach has no number for an error, and is not open either.
-        search.leave(~(search.errors() >= close_mm), close_mm)
-        if not len(search.rows):
+    """Damped Newton's method on each of n poses; a pose that has converged is not changed further."""
+    iteration = _NewtonIteration(mechanism, geometry, joints, start, mode)
+    for _ in range(max_steps):
+        # Written so that a pose with the error NaN, which no step can improve, is finished as well.
+        iteration.finish(~(iteration.errors() >= tolerance_mm), tolerance_mm)
+        if not len(iteration.rows):
             break
-        search.step()
-    search.leave(np.ones(len(search.rows), dtype=bool), close_mm)
-    return ForwardResult(PoseBatch(search.positions, search.rotations), search.found)
+        iteration.step()
+    iteration.finish(np.ones(len(iteration.rows), dtype=bool), tolerance_mm)
+    return ForwardResult(PoseBatch(iteration.positions, iteration.rotations), iteration.found)
 
 
-class _Search:
-    """Poses that are sought, by their ``rows``, and those that the search has left."""
+class _NewtonIteration:
+    """The iterates of n poses: ``rows`` are still active, the other poses have their final values."""
 
     def __init__(
         self,
@@ -102,43 +114,45 @@ class _Search:
         self._error, self._jacobian = mechanism.residual_and_jacobian(geometry, start, joints)
 
     def errors(self) -> Array:
-        """How much the legs (n,) are too short or long at most, mm."""
+        """Largest absolute constraint of each active pose, mm."""
         largest: Array = np.abs(self._error).max(axis=-1, initial=0.0)
         return largest
 
     def step(self) -> None:
-        """All of them one step on."""
-        self._poses = apply_twist(self._poses, _step(self._jacobian, self._error))
+        """Advance all active poses by one step."""
+        self._poses = apply_twist(self._poses, _damped_step(self._jacobian, self._error))
         self._error, self._jacobian = self._mechanism.residual_and_jacobian(
             self._geometry, self._poses, self._joints
         )
 
-    def leave(self, ended: Mask, close_mm: float) -> None:
-        """Leave some where they are now."""
-        if not ended.any():
+    def finish(self, finished: Mask, tolerance_mm: float) -> None:
+        """Store the present values of some active poses as final."""
+        if not finished.any():
             return
-        at, closed = self.rows[ended], self.errors()[ended] < close_mm
-        self.positions[at] = self._poses.positions[ended]
-        self.rotations[at] = self._poses.rotations[ended]
-        self.found[at[closed]] = assembly_mode(self._jacobian[ended][closed]) == self._mode[at[closed]]
-        self._keep(np.flatnonzero(~ended))
+        rows, converged = self.rows[finished], self.errors()[finished] < tolerance_mm
+        self.positions[rows] = self._poses.positions[finished]
+        self.rotations[rows] = self._poses.rotations[finished]
+        modes = assembly_mode(self._jacobian[finished][converged])
+        self.found[rows[converged]] = modes == self._mode[rows[converged]]
+        self._keep_active(np.flatnonzero(~finished))
 
-    def _keep(self, kept: NDArray[np.intp]) -> None:
+    def _keep_active(self, kept: NDArray[np.intp]) -> None:
         self.rows, self._poses, self._joints = self.rows[kept], self._poses[kept], self._joints[kept]
         self._error, self._jacobian = self._error[kept], self._jacobian[kept]
         if isinstance(self._geometry, GeometryBatch):
             self._geometry = self._geometry.subset(kept)
 
 
-def _step(jacobian: Array, error: Array) -> Array:
+def _damped_step(jacobian: Array, error: Array) -> Array:
+    """Newton steps (n, 6), shortened to the largest translation and rotation."""
     try:
         step = -np.linalg.solve(jacobian, error[..., None])[..., 0]
     except np.linalg.LinAlgError:
         step = -(np.linalg.pinv(jacobian) @ error[..., None])[..., 0]
-    travel, turn = step[..., :3] / LONGEST_STEP_MM, step[..., 3:] / LARGEST_TURN
-    too_long = np.sqrt(np.maximum(np.sum(travel * travel, axis=-1), np.sum(turn * turn, axis=-1)))
-    shortened: Array = step / np.maximum(1.0, too_long)[..., None]
-    return shortened
+    translation, rotation = step[..., :3] / MAX_TRANSLATION_MM, step[..., 3:] / MAX_ROTATION_RAD
+    squares = np.maximum(np.sum(translation * translation, axis=-1), np.sum(rotation * rotation, axis=-1))
+    damped: Array = step / np.maximum(1.0, np.sqrt(squares))[..., None]
+    return damped
 
 
 def forward_kinematics(
@@ -148,16 +162,21 @@ def forward_kinematics(
     start: PoseBatch,
     *,
     mode: Array | None = None,
-    close_mm: float = CONVERGED_MM,
+    tolerance_mm: float = TOLERANCE_MM,
 ) -> ForwardResult:
-    """Poses of n joint vectors (n, 6), mm, by damped Newton steps from nearby poses.
+    """Poses of n joint vectors (n, 6), mm, by damped Newton's method from nearby poses.
 
-    ``geometry`` is one for all of them, or one for each. ``mode`` (n,) is the sign of the Jacobian's
-    determinant to be kept; by default that at ``start``. Legs may be ``close_mm`` too short or long.
+    Args:
+        mechanism: gives the constraints and their derivatives.
+        geometry: one for all poses, or one for each.
+        joints: (n, 6), mm.
+        start: n poses near the solutions.
+        mode: (n,) the required assembly mode; by default that of ``start``.
+        tolerance_mm: largest constraint of a solution.
     """
     if mode is None:
         mode = assembly_mode(mechanism.residual_and_jacobian(geometry, start, joints)[1])
-    return newton(mechanism, geometry, joints, start, mode, close_mm)
+    return newton(mechanism, geometry, joints, start, mode, tolerance_mm)
 
 
 def continue_solution(
@@ -168,46 +187,55 @@ def continue_solution(
     start: PoseBatch,
     start_geometry: Geometry,
     start_joints: Array,
-    tries: Sequence[int] = CONTINUATION_STAGES,
+    stage_counts: Sequence[int] = CONTINUATION_STAGES,
 ) -> ForwardResult:
-    """Poses of n joint vectors (n, 6), mm, continued from poses that are known exactly.
+    """Poses of n joint vectors (n, 6), mm, by continuation from n known poses.
 
-    ``start`` closes ``start_geometry`` at ``start_joints`` (n, 6). Geometry and joint variables go
-    to the ones asked for together, in as many stages as the first of ``tries`` says, then, where that
-    was not enough, in as many as the next. A stage that ends on the other side of a singularity is
-    a failure, not a solution.
+    Args:
+        mechanism: gives the constraints and their derivatives.
+        geometry: of the wanted poses.
+        joints: (n, 6), mm, of the wanted poses.
+        start: n poses that close ``start_geometry`` at ``start_joints``.
+        start_geometry: of the known poses.
+        start_joints: (n, 6), mm, of the known poses.
+        stage_counts: numbers of stages; the next one is tried for the poses where one fails.
     """
     poses = start
     found = np.zeros(len(joints), dtype=bool)
-    for stages in tries:
+    for stages in stage_counts:
         rows = np.flatnonzero(~found)
         if not len(rows):
             break
-        ends = (start_joints[rows], joints[rows])
-        result = _staged(mechanism, (start_geometry, geometry), ends, start[rows], stages)
+        both_joints = (start_joints[rows], joints[rows])
+        result = _continue_in_stages(
+            mechanism, (start_geometry, geometry), both_joints, start[rows], stages
+        )
         poses = poses.with_rows(rows, result.poses)
         found[rows] = result.found
     return ForwardResult(poses, found)
 
 
-def _staged(
+def _continue_in_stages(
     mechanism: Mechanism,
     geometries: tuple[Geometry, Geometry],
     joints: tuple[Array, Array],
     start: PoseBatch,
     stages: int,
 ) -> ForwardResult:
+    """Continuation from the first to the second of two geometries and joint vectors (n, 6), mm."""
     poses = start
     rows = np.arange(len(start))
     mode = assembly_mode(mechanism.residual_and_jacobian(geometries[0], start, joints[0])[1])
     for stage in range(1, stages + 1):
         fraction = stage / stages
         geometry = geometries[0].interpolate(geometries[1], fraction)
-        now = (1.0 - fraction) * joints[0][rows] + fraction * joints[1][rows]
-        close_mm = CONVERGED_MM if stage == stages else ON_THE_WAY_MM
-        result = newton(mechanism, geometry, now, poses[rows], mode[rows], close_mm, STAGE_STEPS)
+        stage_joints = (1.0 - fraction) * joints[0][rows] + fraction * joints[1][rows]
+        tolerance_mm = TOLERANCE_MM if stage == stages else STAGE_TOLERANCE_MM
+        result = newton(
+            mechanism, geometry, stage_joints, poses[rows], mode[rows], tolerance_mm, MAX_STAGE_STEPS
+        )
         poses = poses.with_rows(rows, result.poses)
-        # Those that failed are not led on: they would cost more than all the others.
+        # A failed pose takes the most steps, and the next stages could not find it either.
         rows = rows[result.found]
     found = np.zeros(len(start), dtype=bool)
     found[rows] = True

@@ -20,11 +20,11 @@ class Geometry:
     ``geometry["S"]`` is the array of one kind, ``(6, 3)`` or ``(6,)``.
 
     Attributes:
-        parameters: what the numbers are.
-        vector: the numbers (P,) in their order; a read-only copy.
+        parameters: description of the numbers.
+        vector: (P,), in the order of ``parameters``; a read-only copy.
 
     Raises:
-        ValueError: there are more or fewer numbers than parameters.
+        ValueError: the vector does not have one number for each parameter.
     """
 
     parameters: ParameterSet
@@ -40,10 +40,10 @@ class Geometry:
 
     @classmethod
     def of(cls, parameters: ParameterSet, values: Mapping[str, ArrayLike]) -> Geometry:
-        """The geometry of a document, which has nested lists under the symbols of the kinds.
+        """The geometry of a document: nested lists under the symbols of the kinds.
 
         Raises:
-            ValueError: a kind has another shape.
+            ValueError: a kind has a wrong shape.
         """
         return cls(parameters, parameters.vector(values))
 
@@ -51,7 +51,7 @@ class Geometry:
         return self.parameters.array(self.vector, symbol)
 
     def document(self) -> dict[str, Any]:
-        """Nested lists under the symbols of the kinds, as files have them."""
+        """Nested lists under the symbols of the kinds, the form of every file."""
         return self.parameters.document(self.vector)
 
     def largest_difference(self, other: Geometry) -> float:
@@ -59,16 +59,16 @@ class Geometry:
         return float(np.max(np.abs(self.vector - other.vector)))
 
     def interpolate(self, other: Geometry, fraction: float) -> Geometry:
-        """The geometry ``fraction`` of the way to ``other``; 0 is this one, 1 the other."""
+        """Linear interpolation: 0 gives this geometry, 1 gives ``other``."""
         return Geometry(self.parameters, (1.0 - fraction) * self.vector + fraction * other.vector)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class GeometryBatch:
-    """A geometry for each of n poses, all computed at once.
+    """One geometry for each of n poses, for batched computations.
 
     Attributes:
-        parameters: what the numbers are.
+        parameters: description of the numbers.
         vectors: (n, P).
     """
 

@@ -1,4 +1,4 @@
-"""Inverse kinematics: the joint variables that take a robot to a pose, in closed form."""
+"""Inverse kinematics: the joint variables of a pose, in closed form, leg by leg."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ def inverse_kinematics(mechanism: Mechanism, geometry: Geometry, branch: Branch,
     """Joint variables (n, 6), mm, of n poses.
 
     Raises:
-        ReachError: a leg is too short or too long for a pose; the message names both.
+        ReachError: a pose is out of a leg's reach; the message names both.
     """
     joints = mechanism.inverse(geometry, branch, poses)
     if np.isnan(joints).any():

@@ -1,4 +1,4 @@
-"""What a mechanism is: one scalar constraint a leg, its derivatives, and its frame convention."""
+"""The interface of a mechanism: one constraint per leg, its derivatives, and the frame convention."""
 
 from __future__ import annotations
 
@@ -35,10 +35,10 @@ class ConstraintDerivatives:
 
 @dataclass(frozen=True, slots=True)
 class FrameConvention:
-    """Which parameters a choice of frames fixes at zero, and which it makes equal.
+    """Parameters that the choice of frames sets to zero, and groups that it makes equal.
 
-    The rules are stated, never found by a rank threshold: with geometry errors the rank of the
-    data's Jacobian says something else (``docs/method.md``).
+    The rules are explicit and not derived from the numerical rank of the data's Jacobian, which
+    depends on the geometry errors (``docs/method.md``).
     """
 
     name: str
@@ -48,26 +48,26 @@ class FrameConvention:
 
     @cache  # noqa: B019 - a convention lives as long as its mechanism's class
     def basis(self) -> Array:
-        """The (P, p) matrix from free parameters to all of them; its entries are 0 and 1."""
-        leader = {name: group[0] for group in self.equal for name in group}
+        """The (P, p) matrix from the free parameters to all parameters; its entries are 0 and 1."""
+        representative = {name: group[0] for group in self.equal for name in group}
         free = self.free_names()
         matrix = np.zeros((len(self.parameters), len(free)))
         for row, name in enumerate(self.parameters.names):
             if name not in self.zero:
-                matrix[row, free.index(leader.get(name, name))] = 1.0
+                matrix[row, free.index(representative.get(name, name))] = 1.0
         matrix.setflags(write=False)
         return matrix
 
     def free_names(self) -> tuple[str, ...]:
-        """Names of the free parameters; one that stands for several carries the first name."""
-        followers = {name for group in self.equal for name in group[1:]}
+        """Names of the free parameters; a group of equal parameters has the name of its first."""
+        dependent = {name for group in self.equal for name in group[1:]}
         return tuple(
-            name for name in self.parameters.names if name not in self.zero and name not in followers
+            name for name in self.parameters.names if name not in self.zero and name not in dependent
         )
 
     @cache  # noqa: B019
     def free_rows(self) -> NDArray[np.intp]:
-        """Where the free parameters stand in a vector (P,) of all."""
+        """Indices of the free parameters in a vector (P,) of all parameters."""
         return self.parameters.rows(self.free_names())
 
     def free_parameters(self, geometry: Geometry) -> Array:
@@ -79,9 +79,9 @@ class FrameConvention:
         return Geometry(self.parameters, self.basis() @ free)
 
     def display_name(self, name: str) -> str:
-        """A parameter for people: ``l3`` is "leg 3 length", ``B6x`` is "B6 x".
+        """The name of a parameter in text: "leg 3 length" for ``l3``, "B6 x" for ``B6x``.
 
-        The first of several parameters that are equal stands for all: "B2/B3/B5 z".
+        The first of several equal parameters is named together with the others: "B2/B3/B5 z".
         """
         group = next((group for group in self.equal if group[0] == name), (name,))
         members: list[GeometricParameter] = [
@@ -94,7 +94,7 @@ class FrameConvention:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FrameTransform:
-    """From one choice of frames to another that describes the same machine.
+    """The change from one choice of base and platform frames to another, for the same machine.
 
     A position becomes ``base @ (P - origin)``, a rotation ``base @ R @ platform.T``.
     """
@@ -115,19 +115,19 @@ class FrameTransform:
         return deviations @ self.base.T
 
     def inverse(self) -> FrameTransform:
-        """The way back."""
+        """The opposite change."""
         return FrameTransform(self.base.T, -self.base @ self.origin, self.platform.T)
 
 
 class Mechanism(Protocol):
-    """A six-legged parallel mechanism. Everything is batched over n poses; nothing raises."""
+    """A six-legged parallel mechanism; all methods are batched over n poses, and none raises."""
 
     name: str
     parameters: ParameterSet
     convention: FrameConvention
 
     def constraints(self, geometry: Geometry, poses: PoseBatch, joints: Array) -> Array:
-        """How much too long each leg would have to be (n, 6), mm; zero where the machine closes."""
+        """Length error of each leg (n, 6), mm; zero where the mechanism closes."""
         ...
 
     def residual_and_jacobian(
@@ -135,7 +135,7 @@ class Mechanism(Protocol):
     ) -> tuple[Array, Array]:
         """:meth:`constraints` (n, 6) and their derivatives by the pose (n, 6, 6), for Newton's method.
 
-        Of one robot at all poses, or of another at each.
+        ``geometry`` is one for all poses, or one for each.
         """
         ...
 
@@ -144,15 +144,15 @@ class Mechanism(Protocol):
         ...
 
     def inverse(self, geometry: Geometry, branch: Branch, poses: PoseBatch) -> Array:
-        """Joint variables (n, 6), mm, in closed form; NaN where a leg cannot reach."""
+        """Joint variables (n, 6), mm, in closed form; NaN where a pose is out of a leg's reach."""
         ...
 
     def branch(self, geometry: Geometry, poses: PoseBatch, joints: Array) -> Array:
-        """On which of the two solutions of its inverse each leg stands (n, 6): -1 or 1."""
+        """Which of the two inverse solutions each leg is on (n, 6): -1 or 1."""
         ...
 
     def normalize_frames(self, geometry: Geometry) -> tuple[Geometry, FrameTransform]:
-        """The same machine in the frames of :attr:`convention`, and how to get there."""
+        """The same machine in the frames of :attr:`convention`, and the change of frames."""
         ...
 
     def change_frames(self, geometry: Geometry, change: FrameTransform) -> Geometry:
@@ -160,5 +160,5 @@ class Mechanism(Protocol):
         ...
 
     def platform_radius(self, geometry: Geometry | GeometryBatch) -> Array:
-        """The platform's mean radius about the ball, mm: what scales rotations; (n,) of a batch."""
+        """Mean distance of the platform joints from the ball, mm; (n,) for a batch. It scales rotations."""
         ...

@@ -1,7 +1,7 @@
 """The geometric parameters of a six-legged mechanism: kinds, names, units, order.
 
 A mechanism describes its parameters once, as a :class:`ParameterSet`. Vectors, documents, tables, the
-prior and the frame convention all follow from that description.
+prior and the frame convention are derived from that description.
 """
 
 from __future__ import annotations
@@ -30,14 +30,14 @@ class ParameterUnit(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class ParameterKind:
-    """One quantity of every leg, such as the joint on its slider.
+    """One quantity that every leg has, such as the joint on its slider.
 
     Attributes:
         symbol: as in formulas and files: ``S``.
         components: names of its coordinates; empty for a single number.
         meaning: what it is, for the cell file's description.
         tolerance_meaning: what a tolerance of this kind applies to.
-        display: a format of ``legs`` ("B2/B3"), ``leg`` ("2") and ``component`` ("z").
+        display: name in text, a format of ``legs`` ("B2/B3"), ``leg`` ("2") and ``component`` ("z").
         has_ball_offset: the ball's mounting displaces this kind of all legs by the same vector.
         is_positive: only values above zero are physical.
     """
@@ -62,7 +62,7 @@ class ParameterKind:
         return max(1, len(self.components))
 
     def display_name(self, leg: int, component: str, joints: str | None = None) -> str:
-        """A parameter for people: "leg 3 length", "B6 x"; ``joints`` names several that are equal."""
+        """The name in text: "leg 3 length", "B6 x"; ``joints`` names several equal parameters."""
         joints = joints or f"{self.symbol}{leg}"
         return self.display.format(legs=joints, leg=leg, component=component)
 
@@ -111,13 +111,13 @@ class ParameterSet:
         return len(self.parameters)
 
     def rows(self, names: Iterable[str]) -> NDArray[np.intp]:
-        """Where parameters stand in a vector."""
-        place = {name: row for row, name in enumerate(self.names)}
-        return np.array([place[name] for name in names], dtype=np.intp)
+        """Indices of parameters in a vector."""
+        index = {name: row for row, name in enumerate(self.names)}
+        return np.array([index[name] for name in names], dtype=np.intp)
 
     @cached_property
     def slices(self) -> Mapping[str, slice]:
-        """The part of a vector that each kind takes, by its symbol."""
+        """The part of a vector that belongs to each kind, by its symbol."""
         ends = np.cumsum([LEGS * kind.numbers_per_leg for kind in self.kinds]).tolist()
         symbols = (kind.symbol for kind in self.kinds)
         return {
@@ -137,7 +137,7 @@ class ParameterSet:
 
     @cached_property
     def leg_order(self) -> NDArray[np.intp]:
-        """For each parameter its place among the numbers of leg 1, then those of leg 2, and so on.
+        """For each parameter its index among the numbers of leg 1, then those of leg 2, and so on.
 
         The numbers of one leg are in the order of the kinds.
         """
@@ -157,7 +157,7 @@ class ParameterSet:
 
     @cached_property
     def ball_offset(self) -> Array:
-        """The change (3, P) of the parameters when the ball is mounted off its place by x, y or z."""
+        """The change (3, P) of the parameters when the ball is displaced by 1 mm in x, y or z."""
         names = "xyz"
         return np.array(
             [[p.kind.has_ball_offset and p.component == axis for p in self.parameters] for axis in names],
@@ -172,7 +172,7 @@ class ParameterSet:
         """The vector (P,) of the values under each kind's symbol.
 
         Raises:
-            ValueError: a kind has another shape.
+            ValueError: a kind has a wrong shape.
         """
         arrays = []
         for symbol, shape in self.shapes.items():
@@ -183,5 +183,5 @@ class ParameterSet:
         return np.concatenate(arrays)
 
     def document(self, vector: Array) -> dict[str, Any]:
-        """The vector as nested lists under the symbols of its kinds, as files have it."""
+        """The vector as nested lists under the symbols of its kinds, the form of every file."""
         return {symbol: self.array(vector, symbol).tolist() for symbol in self.shapes}

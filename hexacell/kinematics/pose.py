@@ -1,4 +1,4 @@
-"""Poses at the edges: six numbers in millimetres and degrees."""
+"""Poses: six numbers in mm and degrees for files and people, arrays for computations."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from hexacell.kinematics.rotations import Array, Mask
 
 @dataclass(frozen=True, slots=True)
 class Pose:
-    """A platform pose as files, controllers and people write it.
+    """A platform pose as it appears in files, controller commands and text.
 
     ``x, y, z`` is the ball's centre in the base frame, mm; ``a, b, c`` are the angles about the
     fixed axes x, y, z in that order, deg: ``R = Rz(c) Ry(b) Rx(a)``.
@@ -48,13 +48,13 @@ class Pose:
         return (self.x, self.y, self.z, self.a, self.b, self.c)
 
     def __str__(self) -> str:
-        words = zip("XYZABC", self.as_tuple(), strict=True)
-        return " ".join(f"{axis}{value:z.3f}" for axis, value in words)
+        coordinates = zip("XYZABC", self.as_tuple(), strict=True)
+        return " ".join(f"{axis}{value:z.3f}" for axis, value in coordinates)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PoseBatch:
-    """Many poses as mathematics wants them.
+    """Poses as arrays, for computations.
 
     Attributes:
         positions: ball centres (n, 3), mm.
@@ -66,7 +66,7 @@ class PoseBatch:
 
     @classmethod
     def of(cls, poses: Iterable[Pose]) -> PoseBatch:
-        """The arrays of some poses."""
+        """The batch of some poses."""
         numbers = np.array([pose.as_tuple() for pose in poses], dtype=float).reshape(-1, 6)
         return cls(numbers[:, :3], rotations.from_angles(np.radians(numbers[:, 3:])))
 
@@ -77,7 +77,7 @@ class PoseBatch:
 
     @classmethod
     def concatenate(cls, batches: Iterable[PoseBatch]) -> PoseBatch:
-        """The poses of some batches, one after the other."""
+        """The poses of several batches in one batch."""
         batches = list(batches)
         return cls(
             np.concatenate([batch.positions for batch in batches]),
@@ -97,7 +97,7 @@ class PoseBatch:
         return PoseBatch(self.positions[rows], self.rotations[rows])
 
     def pose(self, row: int) -> Pose:
-        """One of them, in mm and deg."""
+        """The pose in a row, in mm and deg."""
         return Pose.of(self.positions[row], self.rotations[row])
 
     def tilts(self) -> Array:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.floating[Any]]
-"""Real numbers; shapes are told in the docstrings."""
+"""Real numbers; docstrings give the shapes."""
 
 Mask = NDArray[np.bool_]
 
@@ -38,7 +38,7 @@ def to_angles(rotation: ArrayLike) -> Array:
     cos_b = np.hypot(r[..., 0, 0], r[..., 1, 0])
     b = np.arctan2(-r[..., 2, 0], cos_b)
     c = np.where(cos_b < 1e-12, 0.0, np.arctan2(r[..., 1, 0], r[..., 0, 0]))
-    # Read with c undone, so that near b = +-pi/2 the error of an ill-determined c does not add up.
+    # The rotation c is removed first: near b = +-pi/2 it is ill determined, and its error must not enter a.
     sine, cosine = np.sin(c), np.cos(c)
     a = np.arctan2(sine * r[..., 0, 2] - cosine * r[..., 1, 2], cosine * r[..., 1, 1] - sine * r[..., 0, 1])
     return np.stack([a, b, c], axis=-1)
@@ -60,7 +60,7 @@ def from_vector(vector: ArrayLike) -> Array:
     vector = np.asarray(vector, dtype=float)
     squared = np.einsum("...i,...i->...", vector, vector)[..., None, None]
     half = 0.5 * np.sqrt(squared)
-    # Below this half angle the quotient is 1 to the last bit, and at zero there is none.
+    # Below this half angle the quotient is 1 to the last bit; at zero it is undefined.
     quotient = np.sin(half) / half if half.min(initial=1.0) > 1e-9 else _sine_quotient(half)
     quadratic = 0.5 * quotient**2
     rotation: Array = (quotient * np.cos(half)) * skew(vector)

@@ -1,4 +1,23 @@
-"""How a pose moves with joint variables and parameters, and how near it is to a singularity; batched."""
+"""Sensitivity of a pose to joint variables and parameters, and its distance from a singularity; batched.
+
+The constraints ``c(x, q, p) = 0`` define the pose x as a function of the joint variables q and the
+parameters p. By the implicit function theorem
+
+    dx/dq = -J^-1 dc/dq,    dx/dp = -J^-1 dc/dp,    J = dc/dx.
+
+The distance from a singularity is the smallest singular value s of J, with rotations scaled by the
+platform's mean radius. Whether s is at least m is decided without a singular value decomposition for most
+poses. With A = J^-1, ``1/s = ||A||_2``, and the Frobenius norm bounds it for a 6 x 6 matrix:
+
+    ||A||_F / sqrt(6) <= ||A||_2 <= ||A||_F.
+
+With the Gramian ``M = A A^T``, ``||A||_2 = ||M^2||_2^(1/4)``, which gives the closer bounds
+
+    ||M^2||_F^(1/4) / 6^(1/8) <= ||A||_2 <= ||M^2||_F^(1/4).
+
+Only poses between these bounds need the decomposition. Source: Golub and Van Loan, Matrix Computations,
+4th ed. 2013, sections 2.3.2 (norms) and 2.4 (singular values).
+"""
 
 from __future__ import annotations
 
@@ -16,13 +35,13 @@ from hexacell.kinematics.rotations import Array, Mask
 def pose_jacobian(
     mechanism: Mechanism, geometry: Geometry | GeometryBatch, poses: PoseBatch, joints: Array
 ) -> Array:
-    """Derivatives (n, 6, 6) of the constraints by position, mm, and rotation vector, rad."""
+    """Derivatives (n, 6, 6) of the constraints by the ball's position, mm, and the rotation vector, rad."""
     return mechanism.residual_and_jacobian(geometry, poses, joints)[1]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Sensitivity:
-    """How a pose moves when the joint variables or the geometry change.
+    """Derivatives of a pose by the joint variables and the parameters.
 
     Rows are the ball's position, mm, then the rotation vector in the base frame, rad.
 
@@ -42,10 +61,10 @@ def pose_sensitivity(
 ) -> Sensitivity:
     """Implicit derivatives ``-J_pose^-1 J`` at n poses that close the mechanism."""
     linear = mechanism.derivatives(geometry, poses, joints)
-    by_legs = -np.linalg.inv(linear.pose)
+    by_constraints = -np.linalg.inv(linear.pose)
     return Sensitivity(
-        joints=by_legs * linear.joints[..., None, :],
-        parameters=_by_parameters(mechanism, by_legs, linear),
+        joints=by_constraints * linear.joints[..., None, :],
+        parameters=_by_parameters(mechanism, by_constraints, linear),
         mode=assembly_mode(linear.pose),
     )
 
@@ -53,24 +72,24 @@ def pose_sensitivity(
 def position_sensitivity(
     mechanism: Mechanism, geometry: Geometry, poses: PoseBatch, joints: Array
 ) -> tuple[Array, Array]:
-    """Of the ball's position alone: (n, 3, P) by the parameters, (n, 3, 6) by the joint variables."""
+    """Derivatives of the ball's position: (n, 3, P) by the parameters, (n, 3, 6) by the joint variables."""
     linear = mechanism.derivatives(geometry, poses, joints)
-    by_legs = -np.linalg.inv(linear.pose)[:, :3]
-    return _by_parameters(mechanism, by_legs, linear), by_legs * linear.joints[..., None, :]
+    by_constraints = -np.linalg.inv(linear.pose)[:, :3]
+    return _by_parameters(mechanism, by_constraints, linear), by_constraints * linear.joints[..., None, :]
 
 
-def _by_parameters(mechanism: Mechanism, by_legs: Array, linear: ConstraintDerivatives) -> Array:
-    """How something (n, m, 6) that depends on the legs depends on the parameters (n, m, P)."""
-    of_legs = by_legs[..., None] * linear.parameters[..., None, :, :]
-    flat: Array = of_legs.reshape(*by_legs.shape[:2], len(mechanism.parameters))
+def _by_parameters(mechanism: Mechanism, by_constraints: Array, linear: ConstraintDerivatives) -> Array:
+    """Derivatives (n, m, P) by the parameters, from those by the constraints (n, m, 6)."""
+    products = by_constraints[..., None] * linear.parameters[..., None, :, :]
+    flat: Array = products.reshape(*by_constraints.shape[:2], len(mechanism.parameters))
     return np.take(flat, mechanism.parameters.leg_order, axis=-1)
 
 
 def singularity_margin(mechanism: Mechanism, geometry: Geometry, poses: PoseBatch, joints: Array) -> Array:
     """Smallest singular value (n,) of the dimensionless pose Jacobian; 0 at a singularity.
 
-    Rotations are scaled by the platform's mean radius, so that a value of 0.1 says: some unit
-    motion of the platform changes no leg by more than a tenth of it.
+    Rotations are scaled by the platform's mean radius. With the value 0.1 there is a motion of the
+    platform by 1 mm that changes the six leg lengths by 0.1 mm together (Euclidean norm).
     """
     smallest: Array = np.linalg.svd(_dimensionless(mechanism, geometry, poses, joints), compute_uv=False)[
         ..., -1
@@ -81,8 +100,8 @@ def singularity_margin(mechanism: Mechanism, geometry: Geometry, poses: PoseBatc
 def has_singularity_margin(
     mechanism: Mechanism, geometry: Geometry | GeometryBatch, poses: PoseBatch, joints: Array, margin: float
 ) -> Mask:
-    """Whether :func:`singularity_margin` is at least ``margin`` at each of n poses, in less time."""
-    return _keeps_margin(_dimensionless(mechanism, geometry, poses, joints), margin)
+    """Whether :func:`singularity_margin` is at least ``margin`` at each of n poses, computed faster."""
+    return _has_margin(_dimensionless(mechanism, geometry, poses, joints), margin)
 
 
 def margin_and_mode(
@@ -90,27 +109,24 @@ def margin_and_mode(
 ) -> tuple[Mask, Array]:
     """:func:`has_singularity_margin`, and the :func:`assembly_mode` of each of n poses."""
     jacobian = _dimensionless(mechanism, geometry, poses, joints)
-    return _keeps_margin(jacobian, margin), assembly_mode(jacobian)
+    return _has_margin(jacobian, margin), assembly_mode(jacobian)
 
 
-def _keeps_margin(jacobian: Array, margin: float) -> Mask:
-    """By norms of the inverse, which bound the smallest singular value from both sides.
-
-    Those of its Gramian's square bound it closer; only what lies between needs the value itself.
-    """
+def _has_margin(jacobian: Array, margin: float) -> Mask:
+    """Bounds of the smallest singular value by norms of the inverse, see the head of this file."""
     try:
         inverse = np.linalg.inv(jacobian)
     except np.linalg.LinAlgError:
         return np.asarray(np.linalg.svd(jacobian, compute_uv=False)[..., -1] >= margin)
-    largest = np.linalg.norm(inverse, axis=(-2, -1)) * margin
-    keeps: Mask = largest <= 1.0
-    doubtful = np.flatnonzero(~keeps & (largest <= np.sqrt(6.0)))
-    gramian = inverse[doubtful] @ np.swapaxes(inverse[doubtful], -1, -2)
-    largest = np.linalg.norm(gramian @ gramian, axis=(-2, -1)) ** 0.25 * margin
-    keeps[doubtful] = largest <= 1.0
-    doubtful = doubtful[(largest > 1.0) & (largest <= 6.0**0.125)]
-    keeps[doubtful] = np.linalg.svd(jacobian[doubtful], compute_uv=False)[..., -1] >= margin
-    return keeps
+    bound = np.linalg.norm(inverse, axis=(-2, -1)) * margin
+    has_margin: Mask = bound <= 1.0
+    undecided = np.flatnonzero(~has_margin & (bound <= np.sqrt(6.0)))
+    gramian = inverse[undecided] @ np.swapaxes(inverse[undecided], -1, -2)
+    bound = np.linalg.norm(gramian @ gramian, axis=(-2, -1)) ** 0.25 * margin
+    has_margin[undecided] = bound <= 1.0
+    undecided = undecided[(bound > 1.0) & (bound <= 6.0**0.125)]
+    has_margin[undecided] = np.linalg.svd(jacobian[undecided], compute_uv=False)[..., -1] >= margin
+    return has_margin
 
 
 def _dimensionless(

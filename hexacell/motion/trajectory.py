@@ -177,7 +177,7 @@ class _Robot:
             joints.reshape(-1, 6),
             predicted.flat(),
             mode=self.mode.repeat(shape[0] * shape[1]),
-            close_mm=TOLERANCE_MM,
+            tolerance_mm=TOLERANCE_MM,
         )
         return LineBatch.from_poses(result.poses, shape[1]), result.found.reshape(shape)
 

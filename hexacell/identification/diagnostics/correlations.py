@@ -1,8 +1,8 @@
-"""Strongly correlated parameters, which the data determine only together.
+"""Strongly correlated parameters, which the data determine only in combination.
 
-With a correlation near one, the sum or difference of two parameters is known well and each of them
-is not. The geometry may be accurate nevertheless, but a change found in one of the two may in fact be
-a change of the other.
+With a correlation near 1 or -1, the difference or sum of two parameters is known well and each parameter
+poorly. The geometry may still be accurate, but a change identified in one of the two may be a change
+of the other.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ STRONG = 0.9
 
 @dataclass(frozen=True, slots=True)
 class CorrelatedPair:
-    """Two free parameters by their names, e.g. ``l3`` and ``B3z``, and their correlation."""
+    """The names of two free parameters, e.g. ``l3`` and ``B3z``, and their correlation."""
 
     first: str
     second: str
@@ -26,7 +26,7 @@ class CorrelatedPair:
 
 
 def strongly_correlated(found: Identification, above: float = STRONG) -> tuple[CorrelatedPair, ...]:
-    """Pairs of free parameters with a correlation beyond ``above``, the strongest first."""
+    """Pairs of free parameters with an absolute correlation above ``above``, the strongest first."""
     names = found.problem.mechanism.convention.free_names()
     sigma = np.sqrt(np.diag(found.free_covariance))
     correlation = found.free_covariance / np.outer(sigma, sigma)

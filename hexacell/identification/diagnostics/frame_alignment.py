@@ -1,7 +1,7 @@
-"""Frame alignment: pose errors less what another choice of base and platform frame removes.
+"""Frame alignment: pose errors after the base and platform frames are fitted (linear least squares).
 
-The base frame and the rotation of the platform frame are conventions, set whenever a fixture or a
-tool is taught. Pose errors are therefore compared after both frames are fitted. To first order a base
+The base frame and the rotation of the platform frame are conventions, set when a fixture or a tool is
+taught. Pose errors are therefore compared after both frames are fitted. To first order a base
 frame shifted by t and rotated by f, and a platform frame rotated by p about the ball, change a pose
 (P, R) by
 
@@ -22,15 +22,15 @@ from hexacell.kinematics.mechanism import FrameTransform
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array
 
-ROUNDS = 20
-SETTLED = 1e-12
-"""Largest rotation, rad, and shift over the length, of the last round."""
+MAX_ITERATIONS = 20
+TOLERANCE = 1e-12
+"""Convergence: largest rotation, rad, and largest shift divided by the length."""
 
 
 def pose_errors(reached: PoseBatch, commanded: PoseBatch) -> Array:
     """Errors (n, 6): positions, mm, then rotation vectors in the base frame, rad."""
-    turned = reached.rotations @ np.swapaxes(commanded.rotations, -1, -2)
-    return np.concatenate([reached.positions - commanded.positions, rotations.to_vector(turned)], axis=-1)
+    relative = reached.rotations @ np.swapaxes(commanded.rotations, -1, -2)
+    return np.concatenate([reached.positions - commanded.positions, rotations.to_vector(relative)], axis=-1)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -45,22 +45,22 @@ class FrameFit:
         scale = np.repeat([1.0, self.length], 3)
         design = (_design(self.workspace) * scale[:, None]).reshape(-1, 9)
         values = (errors.reshape(len(errors), 6, -1) * scale[:, None]).reshape(len(design), -1)
-        # One pose, or several equal ones, do not determine a frame: lstsq then gives the smallest change.
+        # Equal poses do not determine the frames; lstsq then gives the smallest change.
         best: Array = np.linalg.lstsq(design, values)[0]
         return best.reshape(9, *errors.shape[2:])
 
     def remove_frame_motion(self, poses: PoseBatch, errors: Array, workspace_errors: Array) -> Array:
-        """Errors (k, 6, ...) of other poses less what the best frames explain, to first order."""
+        """Errors (k, 6, ...) of other poses minus what the best frames explain, to first order."""
         explained: Array = np.tensordot(_design(poses), self.coefficients(workspace_errors), axes=1)
         return errors - explained
 
     def aligned(self, reached: PoseBatch, others: PoseBatch) -> PoseBatch:
-        """Poses ``others`` in the frames that bring ``reached`` nearest to the workspace."""
-        for _ in range(ROUNDS):
+        """Poses ``others`` in the frames that fit ``reached`` to the workspace best (Gauss-Newton)."""
+        for _ in range(MAX_ITERATIONS):
             best = self.coefficients(pose_errors(reached, self.workspace))
-            change = _undoing(best)
+            change = _inverse_change(best)
             reached, others = change.poses(reached), change.poses(others)
-            if max(np.abs(best[:3]).max() / self.length, np.abs(best[3:]).max()) < SETTLED:
+            if max(np.abs(best[:3]).max() / self.length, np.abs(best[3:]).max()) < TOLERANCE:
                 break
         return others
 
@@ -75,6 +75,7 @@ def _design(poses: PoseBatch) -> Array:
     return design
 
 
-def _undoing(coefficients: Array) -> FrameTransform:
+def _inverse_change(coefficients: Array) -> FrameTransform:
+    """The change of frames that removes the errors with these coefficients (9,)."""
     shift, base, platform = coefficients.reshape(3, 3)
     return FrameTransform(rotations.from_vector(-base), shift, rotations.from_vector(platform))

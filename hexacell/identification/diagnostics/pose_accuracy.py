@@ -1,7 +1,7 @@
 """Predicted pose accuracy: the error of commanded poses before and after calibration.
 
 A controller with geometry c computes the joint variables of a commanded pose X under c. The machine
-with geometry m takes the pose that these joint variables give under m.
+with geometry m takes the pose that m has at these joint variables.
 
 Before: c is the controller's present geometry and m the estimate. The difference is computed without
 approximation, by continuation. After: c is the estimate and m the true geometry, which differs from it
@@ -31,13 +31,13 @@ from hexacell.kinematics.sensitivity import pose_sensitivity
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PoseErrors:
-    """Distances (n,), mm, and angles (n,), rad, of n poses from where they should be."""
+    """Position errors (n,), mm, and orientation errors (n,), rad, of n poses."""
 
     distances_mm: Array
     angles: Array
 
     def times(self, factor: float) -> PoseErrors:
-        """All of them by a factor."""
+        """All errors multiplied by a factor."""
         return PoseErrors(factor * self.distances_mm, factor * self.angles)
 
     @property
@@ -66,10 +66,10 @@ class Accuracy:
     """Predicted errors at the task poses.
 
     Attributes:
-        poses: the task poses that the robot can take, in the mechanism's frame convention.
-        reachable: (k,) bool, which of those asked for they are.
+        poses: the reachable task poses, in the mechanism's frame convention.
+        reachable: (k,) bool, which of all task poses these are.
         before: with the controller's present geometry: the systematic error.
-        after: with the identified one: one standard deviation (root mean square) of each.
+        after: with the identified geometry: one standard deviation (root mean square) of each error.
     """
 
     poses: PoseBatch
@@ -81,7 +81,7 @@ class Accuracy:
     def removable_mm(self) -> float:
         """Root mean square distance that the identified geometry removes.
 
-        The difference from the controller's geometry contains the error of the estimate, too.
+        The error before calibration contains the error of the estimate; its square is subtracted.
         """
         squares = self.before.position_rms_mm**2 - self.after.position_rms_mm**2
         return float(np.sqrt(max(squares, 0.0)))
@@ -90,22 +90,22 @@ class Accuracy:
 def predicted_accuracy(
     found: Identification, controller: Geometry, branch: Branch, *, task: PoseBatch, workspace: PoseBatch
 ) -> Accuracy | None:
-    """The accuracy at task poses; none if the robot can take no task pose or no workspace pose.
+    """The accuracy at task poses; None if no task pose or no workspace pose is reachable.
 
     Args:
         found: the estimate and its covariance.
-        controller: what the controller has now, in the mechanism's frame convention.
+        controller: the controller's present geometry, in the mechanism's frame convention.
         branch: of the inverse kinematics.
-        task: where the accuracy is asked for.
-        workspace: poses over which the frames are chosen.
+        task: poses whose accuracy is computed.
+        workspace: poses over which the frames are fitted.
     """
-    reached, can_take = _reached(found, controller, branch, task)
-    reached_workspace, can_span = _reached(found, controller, branch, workspace)
-    if not can_take.any() or not can_span.any():
+    reached, task_reachable = _reached(found, controller, branch, task)
+    reached_workspace, workspace_reachable = _reached(found, controller, branch, workspace)
+    if not task_reachable.any() or not workspace_reachable.any():
         return None
-    task, workspace = task[can_take], workspace[can_span]
+    task, workspace = task[task_reachable], workspace[workspace_reachable]
     fit = FrameFit(workspace, float(found.problem.mechanism.platform_radius(found.geometry)))
-    aligned = fit.aligned(reached_workspace[can_span], reached[can_take])
+    aligned = fit.aligned(reached_workspace[workspace_reachable], reached[task_reachable])
     jacobian = fit.remove_frame_motion(
         task, _derivatives(found, branch, task), _derivatives(found, branch, workspace)
     )
@@ -113,18 +113,18 @@ def predicted_accuracy(
     mean_squares = np.einsum("nap,pq,naq->na", jacobian, found.free_covariance, jacobian)
     return Accuracy(
         poses=task,
-        reachable=can_take,
-        before=_lengths(pose_errors(aligned, task) ** 2),
-        after=_lengths(mean_squares),
+        reachable=task_reachable,
+        before=_norms(pose_errors(aligned, task) ** 2),
+        after=_norms(mean_squares),
     )
 
 
 def _reached(
     found: Identification, controller: Geometry, branch: Branch, commanded: PoseBatch
 ) -> tuple[PoseBatch, Mask]:
-    """Where the estimated robot goes when the controller is sent to n poses, and which poses it can take.
+    """Actual poses of the estimated robot at n commanded poses, and which are reachable.
 
-    A pose that the estimate itself could not be commanded to, once the controller has it, is left out.
+    Reachable means: with the controller's present geometry, and with the estimate in the controller.
     """
     mechanism = found.problem.mechanism
     actual = CommandedRobot(mechanism, branch, controller, found.geometry).actual_poses(commanded)
@@ -133,13 +133,13 @@ def _reached(
 
 
 def _derivatives(found: Identification, branch: Branch, poses: PoseBatch) -> Array:
-    """Of the poses (n, 6, p) by the free parameters, the joint variables being those of the estimate."""
+    """Derivatives (n, 6, p) of the poses by the free parameters, at the estimate's joint variables."""
     mechanism = found.problem.mechanism
     joints = mechanism.inverse(found.geometry, branch, poses)
     sensitivity = pose_sensitivity(mechanism, found.geometry, poses, joints)
     return sensitivity.parameters @ found.problem.basis
 
 
-def _lengths(squares: Array) -> PoseErrors:
-    """Of squared components (n, 6): positions, mm^2, then rotation vectors, rad^2."""
+def _norms(squares: Array) -> PoseErrors:
+    """Norms from squared components (n, 6): positions, mm^2, then rotation vectors, rad^2."""
     return PoseErrors(np.sqrt(squares[:, :3].sum(axis=-1)), np.sqrt(squares[:, 3:].sum(axis=-1)))

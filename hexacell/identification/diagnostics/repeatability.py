@@ -1,7 +1,7 @@
 """Repeatability: the scatter of deviations where the same pose was commanded more than once.
 
-It does not depend on a geometry: all visits of a commanded pose at a point have the same deviation,
-up to the scatter of the machine, which no calibration can remove.
+It needs no geometry: all visits of a commanded pose at a point have the same deviation, except for the
+scatter of the machine, which no calibration can remove.
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ from scipy.special import chdtri
 from hexacell.kinematics.rotations import Array
 from hexacell.measurements.records import MeasurementSet
 
-SAME_DIGITS = 6
-"""Decimal digits, mm and deg, in which equal commands agree."""
+COMMAND_DIGITS = 6
+"""Decimal digits, mm and deg, to which commands are compared."""
 CONFIDENCE = 0.95
 
 
@@ -27,7 +27,7 @@ class Repeatability:
 
     Attributes:
         per_axis_mm: pooled standard deviations along x, y and z.
-        degrees_of_freedom: of each of them: visits less poses.
+        degrees_of_freedom: of each of them: visits minus poses.
         poses: the number of poses visited more than once.
     """
 
@@ -37,7 +37,7 @@ class Repeatability:
 
     @property
     def distance_mm(self) -> float:
-        """Root mean square distance of a visit from the mean of all."""
+        """Root mean square distance of a visit from the mean of its pose."""
         return float(np.linalg.norm(self.per_axis_mm))
 
     @property
@@ -54,9 +54,9 @@ class Repeatability:
 def repeatability(
     measurements: MeasurementSet, left_out: Collection[tuple[int, int]] = ()
 ) -> Repeatability | None:
-    """The repeatability that a measurement set shows; none where no pose was visited twice.
+    """The repeatability in a measurement set; None if no pose was visited twice.
 
-    ``left_out`` are point and orientation of records that are known to be wrong.
+    ``left_out`` are the point and orientation of each record known to be wrong.
     """
     groups = [rows for rows in _visits(measurements, left_out) if len(rows) > 1]
     freedom = sum(len(rows) - 1 for rows in groups)
@@ -72,7 +72,7 @@ def _visits(measurements: MeasurementSet, left_out: Collection[tuple[int, int]])
     visits: defaultdict[tuple[float, ...], list[int]] = defaultdict(list)
     for row, record in enumerate(measurements.records):
         if record.id not in left_out:
-            command = (round(value, SAME_DIGITS) for value in record.pose.as_tuple())
+            command = (round(value, COMMAND_DIGITS) for value in record.pose.as_tuple())
             visits[record.point, *command].append(row)
     return visits.values()
 

@@ -1,6 +1,6 @@
-"""Parameters that were pushed beyond the drawing's tolerances.
+"""Tolerance check: identified parameters outside the drawing's tolerances.
 
-A good residual is no proof: rods 13 mm too short have explained data perfectly before.
+Small residuals do not prove a geometry: legs 13 mm too short can explain data perfectly.
 """
 
 from __future__ import annotations
@@ -15,15 +15,15 @@ from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.parameters import ParameterSet
 from hexacell.kinematics.rotations import Array
 
-CERTAIN_SIGMAS = 3.0
+SIGNIFICANT_SIGMAS = 3.0
 
 
 @dataclass(frozen=True, slots=True)
 class ToleranceViolation:
-    """A parameter that is certainly not within its tolerance; mm.
+    """A parameter that is significantly outside its tolerance; mm.
 
     Attributes:
-        change_mm: from the drawing, the ball's own offset included.
+        change_mm: from the drawing, the ball's offset included.
     """
 
     name: str
@@ -35,12 +35,12 @@ class ToleranceViolation:
 def tolerance_violations(
     found: GeometryEstimate, drawing: Geometry, tolerances: Tolerances
 ) -> tuple[ToleranceViolation, ...]:
-    """The parameters that, three sigma granted, are beyond their tolerance; not a number is beyond all."""
+    """The parameters outside their tolerance by more than three sigma. NaN counts as outside."""
     parameters = drawing.parameters
     change = found.geometry.vector - drawing.vector
     widths = tolerances.widths(parameters)
     own = _without_ball_offset(change, parameters, tolerances.ball_mm)
-    within = np.abs(own) - CERTAIN_SIGMAS * found.sigma <= widths
+    within = np.abs(own) - SIGNIFICANT_SIGMAS * found.sigma <= widths
     return tuple(
         ToleranceViolation(
             parameters.names[row], float(change[row]), float(widths[row]), float(found.sigma[row])
@@ -50,6 +50,6 @@ def tolerance_violations(
 
 
 def _without_ball_offset(change: Array, parameters: ParameterSet, ball_mm: float) -> Array:
-    """The change less the ball's offset: the median along each axis, as far as that is allowed."""
+    """The change minus the ball's offset: the median along each axis, limited to the tolerance."""
     medians = [np.median(change[axis > 0.0]) if axis.any() else 0.0 for axis in parameters.ball_offset]
     return change - np.clip(medians, -ball_mm, ball_mm) @ parameters.ball_offset

@@ -7,8 +7,8 @@ because Gq changes from pose to pose and differs in x, y and z. Restricted maxim
 
     r^T W Qk W r = tr(P Qk),    P = W - W X C X^T W,
 
-with the residuals r, their weights W = V^-1, and P, which is W less the part that the unknowns X
-explain. Both sides are sums over the records and need only the diagonal blocks of P, so a step costs
+with the residuals r, their weights W = V^-1, the Jacobian X of the unknowns and their covariance C.
+Both sides are sums over the records and need only the diagonal blocks of P, so a step costs
 as much as a step of the identification. The steps are Fisher scoring of the logarithms, so that the
 variances stay positive. The information matrix is computed from the same blocks and scaled so that
 the total noise has the standard error of its degrees of freedom; with 55 records that is within 5 %
@@ -28,13 +28,14 @@ from hexacell.identification.solver.linearized_solution import LinearizedSolutio
 from hexacell.identification.solver.nuisance_parameters import NuisanceElimination
 from hexacell.kinematics.rotations import Array
 
-STEPS = 60
-LONGEST_STEP = 1.5
-SETTLED = 1e-5
-SMALLEST_SHARE = 1e-2
-"""Of the stated standard deviation: the smallest noise that is estimated."""
-LARGEST_RELATIVE_ERROR = 0.4
-CLOSE_CORRELATION = -0.9
+MAX_STEPS = 60
+MAX_LOG_STEP = 1.5
+TOLERANCE = 1e-5
+MIN_RATIO = 1e-2
+"""Smallest estimated noise, as a share of the stated standard deviation."""
+MAX_RELATIVE_ERROR = 0.4
+MIN_CORRELATION = -0.9
+"""Below this correlation of the two estimates, the residuals do not separate them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,8 +43,8 @@ class NoiseLevel:
     """One kind of noise, standard deviations in mm.
 
     Attributes:
-        stated: in the cell file.
-        estimated: from the residuals.
+        stated: standard deviation in the cell file.
+        estimated: standard deviation from the residuals.
         standard_error: of ``estimated``.
         at_most: upper limit, two standard errors of the variance above the estimate.
     """
@@ -55,8 +56,8 @@ class NoiseLevel:
 
     @property
     def is_resolved(self) -> bool:
-        """Whether the residuals give more than an upper limit."""
-        return self.standard_error < LARGEST_RELATIVE_ERROR * self.estimated
+        """Whether the residuals determine the noise, not just an upper limit."""
+        return self.standard_error < MAX_RELATIVE_ERROR * self.estimated
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,11 +71,11 @@ class NoiseLevels:
     @property
     def are_separable(self) -> bool:
         """Whether the residuals separate the two kinds of noise."""
-        return self.correlation > CLOSE_CORRELATION and (self.encoder.is_resolved or self.gauge.is_resolved)
+        return self.correlation > MIN_CORRELATION and (self.encoder.is_resolved or self.gauge.is_resolved)
 
 
 def noise_levels(model: LinearizedSolution) -> NoiseLevels | None:
-    """The noise levels by the residuals; none without more records than unknowns."""
+    """The noise levels from the residuals; None without redundancy."""
     noise = model.problem.noise
     stated = np.array([noise.encoder_mm, noise.gauge_mm]) ** 2
     estimation = _Estimation.of(model)
@@ -115,51 +116,55 @@ class _Equations:
         gradient = 0.5 * self.variances * (self.found - self.expected)
         information = np.outer(self.variances, self.variances) * self.information
         step: Array = np.linalg.solve(information, gradient)
-        return np.clip(step, -LONGEST_STEP, LONGEST_STEP)
+        return np.clip(step, -MAX_LOG_STEP, MAX_LOG_STEP)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Estimation:
+    """Restricted maximum likelihood estimation; ``cofactors`` are Q1 and Q2 (n, 3, 3)."""
+
     model: LinearizedSolution
-    shapes: tuple[Array, Array]
+    cofactors: tuple[Array, Array]
     active_prior: Array
 
     @classmethod
     def of(cls, model: LinearizedSolution) -> _Estimation:
-        through_machine = model.by_joints @ np.swapaxes(model.by_joints, -1, -2)
-        direct = np.broadcast_to(np.eye(3), through_machine.shape)
-        return cls(model, (through_machine, direct), model.active_prior())
+        encoder = model.by_joints @ np.swapaxes(model.by_joints, -1, -2)
+        gauge = np.broadcast_to(np.eye(3), encoder.shape)
+        return cls(model, (encoder, gauge), model.active_prior())
 
     def solve(self, stated: Array) -> Array:
         """The variances (2,), mm^2, that solve the estimating equation."""
         variances = stated
-        for _ in range(STEPS):
+        for _ in range(MAX_STEPS):
             before = variances
             step = self.equations(variances).step()
-            variances = np.maximum(variances * np.exp(step), SMALLEST_SHARE**2 * stated)
-            if np.abs(np.log(variances / before)).max() < SETTLED:
+            variances = np.maximum(variances * np.exp(step), MIN_RATIO**2 * stated)
+            if np.abs(np.log(variances / before)).max() < TOLERANCE:
                 break
         return variances
 
     def equations(self, variances: Array) -> _Equations:
         """The estimating equation at some variances (2,), with the parameters refitted under them."""
         weights = self.model.weights(variances)
-        residuals, taken = self._refitted(weights)
+        residuals, explained = self._refitted(weights)
         weighted = np.einsum("nij,nj->ni", weights, residuals)
-        projected = weights - weights @ taken @ weights
-        products = [projected @ shape for shape in self.shapes]
+        projected = weights - weights @ explained @ weights
+        products = [projected @ cofactor for cofactor in self.cofactors]
         information = np.array([[np.einsum("nij,nji->", a, b) for b in products] for a in products])
         expected = np.array([np.einsum("nii->", product) for product in products])
         redundancy = variances @ expected
         return _Equations(
             variances,
-            np.array([np.einsum("ni,nij,nj->", weighted, shape, weighted) for shape in self.shapes]),
+            np.array(
+                [np.einsum("ni,nij,nj->", weighted, cofactor, weighted) for cofactor in self.cofactors]
+            ),
             expected,
             0.5 * information * redundancy / (variances @ information @ variances),
         )
 
     def _refitted(self, weights: Array) -> tuple[Array, Array]:
-        """Centred residuals (n, 3), mm, and the covariance (n, 3, 3), mm^2, that the unknowns explain."""
+        """Centred residuals (n, 3), mm, and their covariance (n, 3, 3), mm^2, explained by the unknowns."""
         model = self.model
         centring = NuisanceElimination(model.problem, weights)
         system = model.system(centring)
@@ -167,5 +172,5 @@ class _Estimation:
         step = -covariance @ (system.gradient() + self.active_prior @ model.from_centre)
         jacobian = centring.centred(model.jacobian)
         residuals = centring.centred(model.residuals) + jacobian @ step
-        taken = centring.nuisance_covariance() + jacobian @ covariance @ np.swapaxes(jacobian, -1, -2)
-        return residuals, taken
+        explained = centring.nuisance_covariance() + jacobian @ covariance @ np.swapaxes(jacobian, -1, -2)
+        return residuals, explained

@@ -1,8 +1,8 @@
-"""The commanded poses of records, from which their forward kinematics starts.
+"""The commanded poses of records: the start of their forward kinematics.
 
-A pose is commanded under a geometry: that of the controller, or of the drawing if the records are
+A pose is commanded under a geometry: that of the controller, or that of the drawing if the record is
 older than the last calibration. Each record is attributed to the geometry whose inverse kinematics is
-nearest to its encoders. From there its pose is continued to any other geometry.
+nearest to its encoders. Its pose under any other geometry is found by continuation from there.
 """
 
 from __future__ import annotations
@@ -19,8 +19,8 @@ from hexacell.kinematics.mechanism import Branch, Mechanism
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array, Mask
 
-AT_HOME = (1, *CONTINUATION_STAGES)
-"""Stages of the continuation under the commanding geometry: joint variables are near the commanded."""
+SAME_GEOMETRY_STAGES = (1, *CONTINUATION_STAGES)
+"""Continuation stages under the commanding geometry: the joint variables are near the commanded ones."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -28,7 +28,7 @@ class CommandedPoses:
     """The commands of n records.
 
     Attributes:
-        poses: as commanded.
+        poses: the commanded poses.
         candidate_geometries: geometries that may have commanded them.
         choice: (n,) the index of the one that did.
         joints: (n, 6), mm, its inverse kinematics; NaN where no candidate reaches the pose.
@@ -49,7 +49,7 @@ class CommandedPoses:
         branch: Branch,
         measured: Array,
     ) -> CommandedPoses:
-        """Poses commanded under one of some geometries, and the measured joint variables (n, 6), mm."""
+        """Attribute commanded poses to candidate geometries by the measured joint variables (n, 6), mm."""
         computed = np.stack(
             [mechanism.inverse(geometry, branch, poses) for geometry in candidate_geometries]
         )
@@ -87,7 +87,7 @@ class CommandedPoses:
                 start=self.poses[rows],
                 start_geometry=commanding,
                 start_joints=self.joints[rows],
-                tries=AT_HOME if commanding is geometry else CONTINUATION_STAGES,
+                stage_counts=SAME_GEOMETRY_STAGES if commanding is geometry else CONTINUATION_STAGES,
             )
             poses = poses.with_rows(rows, result.poses)
             found[rows] = result.found

@@ -10,22 +10,22 @@ from hexacell.kinematics import rotations
 from hexacell.kinematics.rotations import Array
 
 SAME_AXIS_RATIO = 0.02
-"""Of the largest rotations: smaller rotations about other axes are not intended."""
+"""Rotations about other axes below this share of the largest ones are not intended."""
 
 SMALLEST_ROTATION = 1e-3
-"""rad, root mean square: below it the platform was not rotated."""
+"""rad, root mean square; below it the platform counts as not rotated."""
 
-MOST_COUNTED_POSES = 1000
-"""With more records than these, different poses are not counted."""
+MAX_COUNTED_POSES = 1000
+"""With more records, all poses count as different."""
 
 
 def equations(problem: Problem) -> int:
-    """The number of equations: three for each different pose, less three for each point's reference."""
+    """The number of equations: three for each different pose, minus three for each point's reference."""
     return 3 * (_different_poses(problem) - problem.points)
 
 
 def is_determined(problem: Problem) -> bool:
-    """Whether there are as many equations as parameters, from two points at least."""
+    """Whether at least two points give at least as many equations as parameters."""
     return problem.points >= 2 and equations(problem) >= len(problem.prior.covariance)
 
 
@@ -33,21 +33,21 @@ def require_enough_records(problem: Problem) -> None:
     """Require enough points and different poses to determine the parameters.
 
     Raises:
-        IdentifiabilityError: what is missing, and what to measure.
+        IdentifiabilityError: names what is missing, and what to measure.
     """
     parameters = len(problem.prior.covariance)
     if problem.points < 2:
         raise IdentifiabilityError(
-            f"records at one point cannot determine the {parameters} parameters, however many they are",
+            f"records at one point cannot determine the {parameters} parameters, whatever their number",
             action="Measure at two points at least",
         )
     found = equations(problem)
     if found < parameters:
         missing = -(-(parameters - found) // 3)
         repeated = problem.records - _different_poses(problem)
-        but = f", {repeated} of them of a pose measured before," if repeated else ""
+        repeats = f", {repeated} of them of a pose measured before," if repeated else ""
         raise IdentifiabilityError(
-            f"{problem.records} records at {problem.points} points{but} give {found} equations for "
+            f"{problem.records} records at {problem.points} points{repeats} give {found} equations for "
             f"{parameters} parameters",
             action=f"Measure {missing} more records at these points",
         )
@@ -56,8 +56,10 @@ def require_enough_records(problem: Problem) -> None:
 def require_rotation_diversity(problem: Problem) -> None:
     """Require that the orientations at the points differ by rotations about more than one axis.
 
+    The principal axes are the eigenvectors of the rotation vectors' second moment.
+
     Raises:
-        IdentifiabilityError: the axis, and the rotations that are missing.
+        IdentifiabilityError: names the axis, and the rotations that are missing.
     """
     rotation_vectors = _rotations(problem)
     squares, axes = np.linalg.eigh(rotation_vectors.T @ rotation_vectors)
@@ -88,14 +90,16 @@ def _axis_and_missing(direction: Array) -> tuple[str, str]:
         x, y, z = direction * np.sign(direction[nearest])
         return f"the axis ({x:.2f}, {y:.2f}, {z:.2f})", "turn about axes across it too"
     axis = "xyz"[nearest]
-    return axis, " and ".join(words for name, words in rotations_about.items() if name != axis) + " too"
+    return axis, " and ".join(
+        rotation for name, rotation in rotations_about.items() if name != axis
+    ) + " too"
 
 
 def _different_poses(problem: Problem) -> int:
     """The number of different poses."""
-    if problem.records > MOST_COUNTED_POSES:
+    if problem.records > MAX_COUNTED_POSES:
         return problem.records
     poses = problem.commands.poses
-    turned = poses.rotations.reshape(-1, 9)
-    numbers = np.column_stack([problem.labels[:, 0], poses.positions, turned]).round(9)
+    matrices = poses.rotations.reshape(-1, 9)
+    numbers = np.column_stack([problem.labels[:, 0], poses.positions, matrices]).round(9)
     return len(np.unique(numbers, axis=0))

@@ -1,9 +1,9 @@
 """Encoder consistency: do the joint variables belong to the commanded poses?
 
-The joint variables q are the inverse kinematics of the commanded pose under the geometry in the
-controller at that time. That geometry may be unknown, but it was within the drawing's tolerances.
-These change q by at most the sum, over the parameters of a leg, of the change at either end of the
-tolerance.
+The joint variables q are the inverse kinematics of the commanded pose under the geometry that the
+controller had at that time. That geometry may be unknown, but it was within the drawing's tolerances.
+Its effect on q is bounded by worst-case tolerance analysis: the sum, over the parameters of a leg, of
+the larger change of q at the two ends of the tolerance.
 """
 
 from __future__ import annotations
@@ -20,25 +20,26 @@ from hexacell.kinematics.mechanism import Branch
 from hexacell.kinematics.parameters import LEGS
 from hexacell.kinematics.rotations import Array, Mask
 
-UNSUSPICIOUS_MM = 1.0
-"""Smaller differences are those of any working machine."""
+ACCEPTED_MM = 1.0
+"""Differences up to this are normal on any machine."""
 
-FEW = 0.2
-"""Of the records."""
+MAX_OUTLIER_SHARE = 0.2
+"""Largest share of the records that may be inconsistent."""
 
-FEWEST_TO_COMPARE = 3
-STRAY_SCATTERS = 10.0
+MIN_COMPARED_RECORDS = 3
+OUTLIER_SCATTERS = 10.0
+"""Median absolute deviations beyond which a joint variable is an outlier."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class EncoderConsistency:
-    """Joint variables beside what was commanded.
+    """The measured joint variables and the commanded poses of n records.
 
     Attributes:
         measured: (n, 6), mm.
         labels: (n, 2) point and orientation.
-        drawing: within ``widths`` (7,), mm, of which every geometry of the controller lay: the
-            tolerances of a leg's S, B and l.
+        drawing: every geometry of the controller is within ``widths`` of it.
+        widths: (c,), the tolerances of the numbers of one leg, in the order of the kinds.
     """
 
     commands: CommandedPoses
@@ -49,35 +50,35 @@ class EncoderConsistency:
     widths: Array
 
     def check(self) -> None:
-        """Raise where legs stand where no geometry within the tolerances sends them.
+        """Require that a geometry within the tolerances explains the joint variables.
 
-        A few such records are left to the tests for gross errors, which name them.
+        A few inconsistent records are accepted here: the search for false readings names them.
 
         Raises:
-            IdentifiabilityError: names the first record and its worst leg; the columns that look
-                exchanged, if some do.
+            IdentifiabilityError: names the first record and its worst leg, and the columns that look
+                exchanged, if any.
         """
-        # Where no leg reaches the pose, the solver finds no start either, and says so.
+        # NaN is a pose out of reach; build_problem reports those.
         difference = np.nan_to_num(np.abs(self.measured - self.commands.joints), nan=0.0)
-        if _are_few(_in_any_leg(difference > UNSUSPICIOUS_MM)):
+        if _is_small_share(_in_any_leg(difference > ACCEPTED_MM)):
             return
-        explicable = self._explicable()
-        foreign = _in_any_leg(difference > explicable)
-        if _are_few(foreign):
+        explained = self._explained()
+        inconsistent = _in_any_leg(difference > explained)
+        if _is_small_share(inconsistent):
             return
-        first = int(np.argmax(foreign))
-        leg = int(np.argmax(difference[first] - explicable[first]))
+        first = int(np.argmax(inconsistent))
+        leg = int(np.argmax(difference[first] - explained[first]))
         point, orientation = self.labels[first]
         raise IdentifiabilityError(
-            f"in {np.count_nonzero(foreign)} of {self.labels.shape[0]} records the joint variables do not "
+            f"in {np.count_nonzero(inconsistent)} of {len(self.labels)} records the joint variables do not "
             f"belong to the commanded pose; the first is point {point}, orientation {orientation}, where "
             f"q{leg + 1} is {difference[first, leg]:.1f} mm off, and the tolerances explain "
-            f"{explicable[first, leg]:.1f} mm",
-            action=self._advice(explicable),
+            f"{explained[first, leg]:.1f} mm",
+            action=self._advice(explained),
         )
 
-    def _explicable(self) -> Array:
-        """How far (n, 6), mm, tolerances can take each joint variable; infinite at the end of reach."""
+    def _explained(self) -> Array:
+        """Bound (n, 6), mm, of the tolerances' effect on each joint variable; infinite if out of reach."""
         at_drawing = self._commanded(np.zeros(len(self.widths)))
         changes = np.zeros_like(at_drawing)
         for parameter in np.diag(self.widths):
@@ -91,22 +92,20 @@ class EncoderConsistency:
         geometry = Geometry(parameters, self.drawing.vector + parameters.of_every_leg(change))
         return self.commands.mechanism.inverse(geometry, self.branch, self.commands.poses)
 
-    def _advice(self, explicable: Array) -> str:
+    def _advice(self, explained: Array) -> str:
         columns = self._columns()
         difference = np.nan_to_num(np.abs(self.measured[:, columns] - self.commands.joints), nan=0.0)
-        if not _are_few(_in_any_leg(difference > explicable)):
-            return (
-                "Check that q1 to q6 stand in the row of their pose, in mm, and which config commanded it"
-            )
+        if not _is_small_share(_in_any_leg(difference > explained)):
+            return "Check that q1 to q6 are in the row of their pose, in mm, and which config commanded it"
         moved = [leg for leg in range(LEGS) if columns[leg] != leg]
-        names, right = (
+        names, sources = (
             ", ".join(f"q{leg + 1}" for leg in legs) for legs in (moved, [columns[leg] for leg in moved])
         )
-        return f"The columns {names} look like those of {right}: check which encoder is on which slider"
+        return f"The columns {names} look like those of {sources}: check which encoder is on which slider"
 
     def _columns(self) -> list[int]:
-        """Which column (6,) agrees best with each leg's commands."""
-        # Costs every command a sixth of its start, and only wrong columns need it.
+        """The column (6,) that fits each leg's commands best: a linear assignment."""
+        # The import takes a sixth of the start-up time, and only wrong columns need it.
         from scipy.optimize import linear_sum_assignment  # noqa: PLC0415
 
         reached = np.isfinite(self.commands.joints).all(axis=-1)
@@ -121,25 +120,26 @@ def _in_any_leg(joints: Mask) -> Mask:
     return records
 
 
-def _are_few(records: Mask) -> bool:
-    return bool(np.count_nonzero(records) <= FEW * len(records))
+def _is_small_share(records: Mask) -> bool:
+    return bool(np.count_nonzero(records) <= MAX_OUTLIER_SHARE * len(records))
 
 
 def inconsistent_leg(
     commands: CommandedPoses, measured: Array, row: int, others: Mask
 ) -> tuple[int, float] | None:
-    """The leg (from 1) that in one record stands farthest from where it does in other ones, and mm.
+    """The leg (from 1) whose joint variable in one record is an outlier, and its offset, mm; or None.
 
-    Compared is how far joint variables (n, 6) are from the commanded ones: that changes little from
-    pose to pose of a point, whatever geometry the controller had.
+    The test compares the differences between measured (n, 6) and commanded joint variables with their
+    median over ``others``. They change little between the poses of a point, whatever geometry the
+    controller had.
     """
     misfit = measured - commands.joints
     known = misfit[others & np.isfinite(misfit).all(axis=-1)]
-    if len(known) < FEWEST_TO_COMPARE or not np.isfinite(misfit[row]).all():
+    if len(known) < MIN_COMPARED_RECORDS or not np.isfinite(misfit[row]).all():
         return None
     usual = np.median(known, axis=0)
     scatter = np.median(np.abs(known - usual), axis=0)
     off = misfit[row] - usual
-    beyond = np.abs(off) - UNSUSPICIOUS_MM - STRAY_SCATTERS * scatter
+    beyond = np.abs(off) - ACCEPTED_MM - OUTLIER_SCATTERS * scatter
     leg = int(np.argmax(beyond))
     return (leg + 1, float(off[leg])) if beyond[leg] > 0.0 else None

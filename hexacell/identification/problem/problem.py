@@ -1,4 +1,4 @@
-"""What is to be identified from what: the records, the prior and the noise, ready for a solver."""
+"""The identification problem: records, prior and noise in the form that the solver takes."""
 
 from __future__ import annotations
 
@@ -21,10 +21,13 @@ from hexacell.measurements.records import MeasurementSet
 
 @dataclass(frozen=True, slots=True)
 class Noise:
-    """Standard deviations of one record's numbers, mm, and of how the gauges stand.
+    """Standard deviations of the readings of a record and of the gauges' alignment and scale.
 
-    ``alignment`` is the prior of each station's small rotation against the base, rad a component;
-    ``gauge_scale`` that of each gauge's relative scale error. Zero says there is none.
+    Attributes:
+        encoder_mm: of a joint variable.
+        gauge_mm: of a gauge reading.
+        alignment: of each component of a station's small rotation against the base, rad; zero if exact.
+        gauge_scale: of each gauge's relative scale error; zero if exact.
     """
 
     encoder_mm: float
@@ -38,8 +41,8 @@ class Tolerances:
     """Half-widths within which the built robot differs from its drawing.
 
     Attributes:
-        by_kind: of every parameter of a kind, in its unit, by the kind's symbol.
-        ball_mm: of an offset common to all platform joints: where the ball was really mounted.
+        by_kind: for all parameters of a kind, in its unit, by the kind's symbol.
+        ball_mm: for the ball's mounting, an offset common to all platform joints.
     """
 
     by_kind: Mapping[str, float]
@@ -47,23 +50,23 @@ class Tolerances:
 
     @classmethod
     def of_settings(cls, parameters: ParameterSet, settings: Mapping[str, float]) -> Tolerances:
-        """The tolerances under the kinds' keys and ``ball_mm``, as the cell file has them."""
+        """The tolerances of a cell file: under the keys of the kinds, and ``ball_mm``."""
         by_kind = {kind.symbol: settings[kind.tolerance_key] for kind in parameters.kinds}
         return cls(by_kind, settings["ball_mm"])
 
     def widths(self, parameters: ParameterSet) -> Array:
-        """The half-width of each parameter (P,), the ball's offset left out."""
+        """The half-width of each parameter (P,), without the ball's offset."""
         return parameters.by_kind(self.by_kind)
 
     def sum_mm(self, parameters: ParameterSet) -> float:
-        """All tolerances of lengths together, the ball's offset included."""
+        """Sum of all length tolerances, the ball's offset included."""
         lengths = (self.by_kind[kind.symbol] for kind in parameters.kinds if kind.unit is ParameterUnit.MM)
         return sum(lengths) + self.ball_mm
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Prior:
-    """What is known before measuring: the drawing and how well it was kept.
+    """The Gaussian prior of the geometry: the drawing and its tolerances.
 
     Attributes:
         centre: the drawing, in the mechanism's frame convention.
@@ -75,7 +78,7 @@ class Prior:
 
     @classmethod
     def of(cls, mechanism: Mechanism, drawing: Geometry, tolerances: Tolerances) -> Prior:
-        """A Gaussian with the second moments of errors that are uniform within the tolerances."""
+        """The Gaussian with the second moments of errors uniform within the tolerances."""
         centre, _ = mechanism.normalize_frames(drawing)
         rows = mechanism.convention.free_rows()
         covariance = np.diag(tolerances.widths(mechanism.parameters)[rows] ** 2 / 3.0)
@@ -84,7 +87,7 @@ class Prior:
         return cls(centre, covariance)
 
     def leg_widths(self, mechanism: Mechanism) -> Array:
-        """The largest tolerances (c,) of a leg's own numbers, by kind, the ball's offset included."""
+        """The largest tolerances (c,) of the numbers of one leg, the ball's offset included."""
         widths = np.zeros(len(mechanism.parameters))
         widths[mechanism.convention.free_rows()] = np.sqrt(3.0 * np.diag(self.covariance))
         parameters = mechanism.parameters
@@ -97,17 +100,17 @@ class Problem:
     """Records in the frame convention, sorted by point.
 
     Attributes:
-        joints: (n, 6), mm, as the encoders gave them.
+        joints: (n, 6), mm, measured by the encoders.
         deviations: (n, 3), mm, in the convention's base frame.
         first_rows: (m,) row at which each point begins.
-        commands: what the records were commanded with.
-        initial_parameters: free parameters (p,), mm, where a search begins: those of the geometry that
-            commanded most records, as a rule the drawing, or those of the last provisional geometry.
-        start: poses that close them at ``joints``.
-        has_start_pose: (n,) bool, where there is such a pose: a singularity may lie between the
-            geometry that commanded a record and this one.
-        labels: (n, 2) point and orientation as the user counts them.
-        gauges: (3, 3), columns: along which the gauges x, y and z measure, in the convention's
+        commands: the commanded poses.
+        initial_parameters: free parameters (p,), mm, at which the solver starts: those of the last
+            provisional geometry, or of the geometry that commanded most records, usually the drawing.
+        start: poses that close ``initial_parameters`` at ``joints``.
+        has_start_pose: (n,) bool, whether ``start`` has a pose of the record; a singularity may lie
+            between the geometry that commanded the record and the initial one.
+        labels: (n, 2) point and orientation, counted from 1.
+        gauges: (3, 3), columns: measuring directions of the gauges x, y and z in the convention's
             base frame.
     """
 
@@ -126,17 +129,17 @@ class Problem:
 
     @property
     def basis(self) -> Array:
-        """(P, p), from free parameters to all of them."""
+        """(P, p), from the free parameters to all parameters."""
         return self.mechanism.convention.basis()
 
     @property
     def points(self) -> int:
-        """How many points have records."""
+        """The number of points with records."""
         return len(self.first_rows)
 
     @property
     def records(self) -> int:
-        """How many records there are."""
+        """The number of records."""
         return len(self.joints)
 
     def group_sums(self, values: Array) -> Array:
@@ -144,12 +147,12 @@ class Problem:
         return np.add.reduceat(values, self.first_rows, axis=0)
 
     def per_record(self, values: Array) -> Array:
-        """A value a point (m, ...) repeated for each of its records (n, ...)."""
+        """A value of each point (m, ...), repeated for each of its records (n, ...)."""
         lengths = np.diff(np.append(self.first_rows, self.records))
         return np.repeat(values, lengths, axis=0)
 
     def subset(self, rows: Mask) -> Problem:
-        """The same problem with some of its records (n,) only."""
+        """The problem of some of the records (n,)."""
         kept = np.flatnonzero(rows)
         return Problem(
             self.mechanism,
@@ -177,15 +180,23 @@ def build_problem(
     noise: Noise,
     provisional: Sequence[Geometry] = (),
 ) -> Problem:
-    """The problem of some records, whose poses were commanded under ``controller``'s geometry.
+    """The problem of a measurement set.
 
-    Records from before the last calibration may have been commanded under the drawing instead, and
-    others under ``provisional`` geometries, in the frame convention.
+    Args:
+        mechanism: kind of robot.
+        measurements: the records.
+        controller: geometry under which the poses were commanded, in any frames. Records from before
+            the last calibration may have been commanded under the drawing instead.
+        branch: of the inverse kinematics.
+        prior: of the geometry.
+        noise: of the readings.
+        provisional: further geometries under which records may have been commanded, in the frame
+            convention, the last one used last.
 
     Raises:
-        IdentifiabilityError: joint variables do not belong to the commanded poses, or most records
-            cannot be followed from the geometry that commanded them to the one where the search
-            begins; the message names the first.
+        IdentifiabilityError: joint variables do not belong to the commanded poses, or for most records
+            no continuation from the commanding to the initial geometry exists; the message names the
+            first.
     """
     order = np.argsort(measurements.group, kind="stable")
     joints, labels = measurements.joints[order], measurements.labels[order]
@@ -193,9 +204,9 @@ def build_problem(
     poses = change.poses(measurements.poses[order])
     commands = CommandedPoses.of(mechanism, poses, (commanding, *provisional, prior.centre), branch, joints)
     EncoderConsistency(commands, joints, labels, branch, prior.centre, prior.leg_widths(mechanism)).check()
-    begin = provisional[-1] if provisional else commands.most_frequent_geometry
-    start = commands.solve_poses(begin, joints)
-    _refuse_strangers(start.found, labels)
+    initial = provisional[-1] if provisional else commands.most_frequent_geometry
+    start = commands.solve_poses(initial, joints)
+    _require_start_poses(start.found, labels)
     return Problem(
         mechanism=mechanism,
         prior=prior,
@@ -204,7 +215,7 @@ def build_problem(
         deviations=change.deviations(measurements.deviations[order]),
         first_rows=_first_rows(labels[:, 0]),
         commands=commands,
-        initial_parameters=mechanism.convention.free_parameters(begin),
+        initial_parameters=mechanism.convention.free_parameters(initial),
         start=start.poses,
         has_start_pose=start.found,
         labels=labels,
@@ -212,15 +223,15 @@ def build_problem(
     )
 
 
-def _refuse_strangers(found: Mask, labels: NDArray[np.int_]) -> None:
-    """A few records beyond a singularity are no obstacle; where most are, something else is wrong."""
-    lost = np.flatnonzero(~found)
-    if 2 * len(lost) <= len(found):
+def _require_start_poses(found: Mask, labels: NDArray[np.int_]) -> None:
+    """Require a start pose for at least half of the records; the solver leaves the others out."""
+    missing = np.flatnonzero(~found)
+    if 2 * len(missing) <= len(found):
         return
-    point, orientation = labels[lost[0]]
+    point, orientation = labels[missing[0]]
     raise IdentifiabilityError(
-        f"{len(lost)} of {len(found)} records cannot be followed from the commanded pose to the joint "
-        f"variables without crossing a singularity; the first is point {point}, orientation {orientation}",
+        f"in {len(missing)} of {len(found)} records a singularity lies between the commanded pose and the "
+        f"joint variables; the first is point {point}, orientation {orientation}",
         action="Check that q1 to q6 belong to these poses, and the poses to this controller's config",
     )
 

@@ -1,4 +1,14 @@
-"""What a geometry predicts for every record, how that changes, and how far to trust it."""
+"""The measurement model: residuals of every record, their derivatives and their weights.
+
+A record predicts the ball's position P(p, q) by forward kinematics at the measured joint variables q. Its
+residual is P minus the measured deviation; the unknown constant of each point stays in it. The noise of
+the encoders reaches the residual through ``G = dP/dq``, so that a record's covariance is
+
+    V = s_encoder^2 G G^T + s_gauge^2 I.
+
+Near a singularity the first term is large, and ordinary least squares would weight such a record
+wrongly. The weight is the inverse of V.
+"""
 
 from __future__ import annotations
 
@@ -15,17 +25,17 @@ from hexacell.kinematics.sensitivity import pose_sensitivity
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Prediction:
-    """A geometry seen through the records.
+    """The measurement model at one geometry, linearised.
 
     Attributes:
         free: free parameters (p,), mm.
         poses: the platform's poses at the measured joint variables.
-        residuals: (n, 3), mm: predicted position less measured deviation, each point's unknown
-            constant still in it.
+        residuals: (n, 3), mm: predicted position minus measured deviation, with each point's unknown
+            constant.
         weights: (n, 3, 3), 1/mm^2: inverse covariance of one record.
         pose_jacobian: (n, 6, p) of position, mm, and rotation vector, rad, by the free parameters.
         mode: (n,) the assembly mode, see :func:`hexacell.kinematics.sensitivity.assembly_mode`.
-        amplification: (n,) mm of ball a mm of slider: large next to a singularity.
+        amplification: (n,) ball motion per slider motion, Frobenius norm; large near a singularity.
     """
 
     free: Array
@@ -44,12 +54,12 @@ class Prediction:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TrialStep:
-    """The residuals of a geometry to be tried.
+    """The residuals after a trial step.
 
     Attributes:
-        poses: n poses that close it.
+        poses: n poses that close the geometry.
         residuals: (n, 3), mm, as in :class:`Prediction`.
-        found: (n,) bool: which poses were found on their assembly mode.
+        found: (n,) bool: whether the pose was found on its assembly mode.
     """
 
     poses: PoseBatch
@@ -57,21 +67,21 @@ class TrialStep:
     found: Mask
 
 
-def evaluate_step(problem: Problem, now: Prediction, step: Array) -> TrialStep:
+def evaluate_step(problem: Problem, present: Prediction, step: Array) -> TrialStep:
     """The residuals after a step (p,), mm, of the free parameters.
 
-    Poses start where the linearisation puts them; where that is too far, at the present ones.
+    Forward kinematics starts at the linearised poses. If that fails, it starts at the present ones.
     """
-    geometry = problem.mechanism.convention.geometry(now.free + step)
-    for start in (apply_twist(now.poses, now.pose_jacobian @ step), now.poses):
-        result = forward_kinematics(problem.mechanism, geometry, problem.joints, start, mode=now.mode)
+    geometry = problem.mechanism.convention.geometry(present.free + step)
+    for start in (apply_twist(present.poses, present.pose_jacobian @ step), present.poses):
+        result = forward_kinematics(problem.mechanism, geometry, problem.joints, start, mode=present.mode)
         if result.found.all():
             break
     return TrialStep(result.poses, result.poses.positions - problem.deviations, result.found)
 
 
 def predict(problem: Problem, free: Array, poses: PoseBatch) -> Prediction:
-    """Everything a solver step needs, at poses that close the geometry."""
+    """The linearised measurement model at poses that close the geometry."""
     geometry = problem.mechanism.convention.geometry(free)
     sensitivity = pose_sensitivity(problem.mechanism, geometry, poses, problem.joints)
     by_joints = sensitivity.joints[:, :3]
@@ -87,12 +97,9 @@ def predict(problem: Problem, free: Array, poses: PoseBatch) -> Prediction:
 
 
 def record_covariance(position_by_joints: Array, noise: Noise) -> Array:
-    """Covariance (n, 3, 3), mm^2, of records: encoder noise through the machine, and the gauges'.
-
-    Near a singularity the first part is large, and ordinary least squares pays for ignoring it.
-    """
-    through_machine = position_by_joints @ np.swapaxes(position_by_joints, -1, -2)
-    return noise.encoder_mm**2 * through_machine + noise.gauge_mm**2 * np.eye(3)
+    """Covariance (n, 3, 3), mm^2, of records by ``dP/dq`` (n, 3, 6), from encoder and gauge noise."""
+    propagated = position_by_joints @ np.swapaxes(position_by_joints, -1, -2)
+    return noise.encoder_mm**2 * propagated + noise.gauge_mm**2 * np.eye(3)
 
 
 def record_weights(position_by_joints: Array, noise: Noise) -> Array:

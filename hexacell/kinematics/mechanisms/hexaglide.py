@@ -51,7 +51,7 @@ PAPER_FRAME = FrameConvention(
 
 
 class Hexaglide:
-    """The Hexaglide as six constraints; stateless."""
+    """The Hexaglide as a :class:`~hexacell.kinematics.mechanism.Mechanism`; stateless."""
 
     name = "hexaglide"
     parameters = HEXAGLIDE_PARAMETERS
@@ -66,7 +66,7 @@ class Hexaglide:
     ) -> tuple[Array, Array]:
         """See :class:`~hexacell.kinematics.mechanism.Mechanism`."""
         b, v = _leg_vectors(geometry, poses, joints)
-        return _leg_errors(geometry, v), _by_pose(b, v / geometry["l"][..., None])
+        return _leg_errors(geometry, v), _pose_jacobian(b, v / geometry["l"][..., None])
 
     def derivatives(self, geometry: Geometry, poses: PoseBatch, joints: Array) -> ConstraintDerivatives:
         """See :class:`~hexacell.kinematics.mechanism.Mechanism`."""
@@ -74,7 +74,7 @@ class Hexaglide:
         n = v / geometry["l"][:, None]
         by_length = -0.5 * (np.sum(n * n, axis=-1, keepdims=True) + 1.0)
         return ConstraintDerivatives(
-            pose=_by_pose(b, n),
+            pose=_pose_jacobian(b, n),
             joints=n[..., 0],
             parameters=np.concatenate([n, -n @ poses.rotations, by_length], axis=-1),
         )
@@ -93,14 +93,14 @@ class Hexaglide:
         return np.where(v[..., 0] < 0.0, -1, 1)
 
     def normalize_frames(self, geometry: Geometry) -> tuple[Geometry, FrameTransform]:
-        """Origin at S2, S3 level with it, platform axes through B2, B5 and B3."""
+        """Origin at S2, S3 at the same height, platform axes through B2, B5 and B3."""
         S, B = geometry["S"], geometry["B"]
-        base = _roll_that_levels(S[2] - S[1])
+        base = _leveling_roll(S[2] - S[1])
         platform = _axes_through(B[1], B[4], B[2])
         change = FrameTransform(base, S[1].copy(), platform)
         S = (S - S[1]) @ base.T
         B = B @ platform.T
-        # The rules hold exactly, not just to rounding: later code relies on the equalities.
+        # Later code relies on the rules being exact; the rotations satisfy them only to rounding.
         S[1], S[2, 2] = 0.0, 0.0
         B[[2, 4], 2] = B[1, 2]
         B[4, 1] = B[1, 1]
@@ -138,11 +138,11 @@ def _leg_errors(geometry: Geometry | GeometryBatch, v: Array) -> Array:
     return error
 
 
-def _by_pose(b: Array, n: Array) -> Array:
-    """Minus n, and minus b x n, side by side (n, 6, 6)."""
+def _pose_jacobian(b: Array, n: Array) -> Array:
+    """Derivatives (n, 6, 6) of the constraints by the pose: ``[-n, -b x n]``."""
     jacobian = np.empty((*n.shape[:-1], 6))
     jacobian[..., :3] = -n
-    # Written out: np.cross costs as much as the rest of a Newton step.
+    # np.cross would cost as much as the rest of a Newton step.
     bx, by, bz = b[..., 0], b[..., 1], b[..., 2]
     nx, ny, nz = n[..., 0], n[..., 1], n[..., 2]
     jacobian[..., 3] = bz * ny - by * nz
@@ -151,7 +151,7 @@ def _by_pose(b: Array, n: Array) -> Array:
     return jacobian
 
 
-def _roll_that_levels(vector: Array) -> Array:
+def _leveling_roll(vector: Array) -> Array:
     """The rotation about x that turns ``vector`` into z = 0, y > 0."""
     y, z = vector[1:] / np.hypot(vector[1], vector[2])
     return np.array([[1.0, 0.0, 0.0], [0.0, y, z], [0.0, -z, y]])

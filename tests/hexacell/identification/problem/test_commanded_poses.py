@@ -87,7 +87,7 @@ def test_a_calibrated_machine_is_calibrated_again(paper, visit, make_problem, se
 
 
 def test_the_solver_starts_at_the_provisional_geometry(paper, visit, make_problem):
-    """Many records commanded by it cannot be followed to the drawing: none is lost for that."""
+    """Continuation from it to the drawing fails for many of its records: none is lost for that."""
     before = visit(points=1, orientations=4, degrees=2.0, seed=5).measured()
     after = visit(paper.actual, paper.actual, degrees=55.0, seed=7).measured()
     both = [*before.records, *(record for record in after.records if record.point > 1)]

@@ -13,15 +13,10 @@ from collections.abc import Callable
 PAUSE_S = 0.002
 
 
-def pause() -> None:
-    """What a fake device does while it has nothing to deliver: let other threads go on."""
-    time.sleep(PAUSE_S)
-
-
 def wait_until(condition: Callable[[], bool]) -> None:
     """Return as soon as ``condition`` holds; other threads and processes go on meanwhile."""
     while not condition():
-        pause()
+        time.sleep(PAUSE_S)
 
 
 async def until(condition: Callable[[], bool]) -> None:

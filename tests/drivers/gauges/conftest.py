@@ -5,7 +5,7 @@ import serial
 
 from drivers.serial.shared_port import SharedSerialPorts
 from hexacell.cell.devices import GaugeSettings
-from tests.waiting import pause
+from tests.drivers.serial.port_time import PortTime
 
 TIMEOUT_S = 0.05
 WORST_LATENCY_S = 0.05
@@ -15,6 +15,7 @@ class Dialogue:
     """A scripted serial port."""
 
     def __init__(self):
+        self.time = PortTime()
         self.is_open = False
         self.expected = []
         self.pending = b""
@@ -44,7 +45,7 @@ class Dialogue:
 
     def read(self, size):
         if not self.in_waiting:
-            pause()
+            self.time.wait_for_bytes()
         data, self.pending = self.pending[:size], self.pending[size:]
         return data
 
@@ -65,6 +66,7 @@ def dialogue(monkeypatch):
         port.settings = settings
         return port
 
+    port.time.install(monkeypatch)
     monkeypatch.setattr(serial, "serial_for_url", serial_for_url)
     yield port
     assert port.expected == []

@@ -1,12 +1,8 @@
 """Links whose URLs lead to a fake port."""
 
-import time
-from types import SimpleNamespace
-
 import pytest
 import serial
 
-from drivers.serial import port as serial_port
 from drivers.serial.shared_port import SharedSerialPorts
 from tests.drivers.serial.shared_port.fake_port import WORST_LATENCY_S
 
@@ -21,8 +17,7 @@ def fake(monkeypatch):
             port.url, port.settings = url, settings
             return port
 
-        clock = SimpleNamespace(monotonic=lambda: port.now_s, time=time.time)
-        monkeypatch.setattr(serial_port, "time", clock)
+        port.time.install(monkeypatch)
         monkeypatch.setattr(serial, "serial_for_url", serial_for_url)
         return port
 

@@ -2,26 +2,22 @@
 
 import math
 import threading
-import time
 
 from drivers.serial.shared_port import SharedSerialPort
+from tests.drivers.serial.port_time import PortTime
 from tests.waiting import until
 
 WORST_LATENCY_S = 0.3
 SOON_S = 0.05
 LONG_S = 30.0
 FOREVER_S = math.inf
-SLICE_S = 0.005
 
 
 class FakePort:
-    """Delivers what ``answer`` says for each question, each part after its delay.
-
-    Time, ``now_s``, passes only while somebody waits for bytes, and takes none on the wall.
-    """
+    """Delivers what ``answer`` says for each question, each part after its delay."""
 
     def __init__(self, answer=lambda request: [(0.0, b"+1.234\r")]):
-        self.now_s = 0.0
+        self.time = PortTime()
         self.is_open = False
         self.asked = []
         self.asked_at_s = []
@@ -40,15 +36,14 @@ class FakePort:
     @property
     def in_waiting(self):
         self._fail()
-        return sum(len(data) for due, data in self.due if due <= self.now_s)
+        return sum(len(data) for due, data in self.due if due <= self.time.now_s)
 
     def read(self, size):
         self._fail()
         if not self.in_waiting:
-            self.now_s += SLICE_S
-            time.sleep(0)  # lets other threads go on
-        here = b"".join(data for due, data in self.due if due <= self.now_s)
-        later = [(due, data) for due, data in self.due if due > self.now_s]
+            self.time.wait_for_bytes()
+        here = b"".join(data for due, data in self.due if due <= self.time.now_s)
+        later = [(due, data) for due, data in self.due if due > self.time.now_s]
         self.due = [(0.0, here[size:])] * bool(here[size:]) + later
         return here[:size]
 
@@ -56,9 +51,9 @@ class FakePort:
         self._fail()
         self.threads.add(threading.current_thread().name)
         self.asked.append(request)
-        self.asked_at_s.append(self.now_s)
+        self.asked_at_s.append(self.time.now_s)
         self.written.set()
-        self.due += [(self.now_s + delay, data) for delay, data in self._answer(request)]
+        self.due += [(self.time.now_s + delay, data) for delay, data in self._answer(request)]
 
     def _fail(self):
         if self.broken is not None:

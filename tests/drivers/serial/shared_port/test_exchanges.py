@@ -77,7 +77,7 @@ async def test_nothing_is_asked_until_a_late_answer_has_had_its_time(fake):
 async def test_what_nobody_asked_for_is_put_aside(fake):
     port = fake(FakePort(lambda _: [(0.0, b"answer\r")]))
     link = await opened()
-    port.due = [(0.0, b"SY276.1\r"), (port.now_s + SOON_S, b"more\r")]
+    port.due = [(0.0, b"SY276.1\r"), (port.time.now_s + SOON_S, b"more\r")]
     assert await link.exchange(b"?\r", b"\r", LONG_S) == b"answer\r"
     assert link.take_unsolicited() == b"SY276.1\rmore\r"
     assert link.take_unsolicited() == b""
@@ -116,7 +116,7 @@ async def test_a_flood_without_an_end_is_cut_off(fake):
 async def test_a_device_that_never_falls_silent_is_refused(fake):
     port = fake(FakePort())
     link = await opened()
-    port.due = [(port.now_s + number * SOON_S, b"+1.234\r") for number in range(100)]
+    port.due = [(port.time.now_s + number * SOON_S, b"+1.234\r") for number in range(100)]
     with pytest.raises(DeviceError, match="keeps sending unasked"):
         await link.exchange(b"?\r", b"\r", LONG_S)
     assert port.asked == []

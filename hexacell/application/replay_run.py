@@ -12,12 +12,10 @@ from hexacell.application.calibration_run import robot_of_run
 from hexacell.application.device_setup import with_settings
 from hexacell.campaign.pose_list import pose_list_of
 from hexacell.cell.calibration import IdentificationSettings
-from hexacell.cell.loader import Cell, load_cell
+from hexacell.cell.loader import Cell, dump, load_cell
 from hexacell.cell.mechanism_sections import geometry_settings, mechanism_named
 from hexacell.cell.model import CellSettings
-from hexacell.cell.toml_writer import to_toml
-from hexacell.controller_config.change import ConfigChange
-from hexacell.controller_config.receipt import BEFORE
+from hexacell.controller_config.change import BEFORE, ConfigChange
 from hexacell.errors import FileError, HexacellError
 from hexacell.runs.run_folder import RunFolder
 from hexacell.storage import atomic_files
@@ -177,5 +175,5 @@ def _config_text(folder: RunFolder, started: RunStarted) -> bytes | None:
 def _native_config(settings: CellSettings, started: RunStarted) -> bytes:
     """A config in the native format with the geometry that commanded the run."""
     parameters = mechanism_named(settings.robot.mechanism).parameters
-    geometry = to_toml(geometry_settings(parameters).model_validate(started.controller))
+    geometry = dump(geometry_settings(parameters).model_validate(started.controller))
     return f"[geometry]\n{geometry}branch = {list(started.branch)}\n".encode()

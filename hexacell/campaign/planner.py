@@ -138,7 +138,7 @@ class Plan:
     @cached_property
     def task(self) -> Task:
         """Where the robot has to be accurate."""
-        return Task.of(self.settings, self.robot)
+        return Task.of(self.settings, self.robot, self.robot.belief())
 
     @cached_property
     def planned_sets(self) -> PlannedSets:

@@ -57,10 +57,10 @@ class Task:
     workspace: PoseBatch
 
     @classmethod
-    def of(cls, settings: CellSettings, robot: Robot) -> Task:
-        """The task of a cell."""
+    def of(cls, settings: CellSettings, robot: Robot, belief: RobotBelief) -> Task:
+        """The task of a cell; workspace poses are those that a robot as in ``belief`` can take."""
         points = PoseBatch.of(Pose(*point) for point in settings.identification.points)
-        workspace = workspace_poses(robot.belief(), robot.frames.poses(points).positions)
+        workspace = workspace_poses(belief, robot.frames.poses(points).positions)
         stated = robot.from_commands(Pose(*pose) for pose in settings.task.poses)
         poses = stated if len(stated) else workspace
         return cls(poses, workspace if len(workspace) else poses)

@@ -6,24 +6,26 @@ every value and errors that a technician can act on.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import tomlkit
 from pydantic import ValidationError
 
-from hexacell.cell.diagnostics import Diagnosis
+from hexacell.cell.diagnostics import Diagnosis, ModelLookup
 from hexacell.cell.fields import Section
 from hexacell.cell.mechanism_sections import DEFAULT_MECHANISM
 from hexacell.cell.model import CellSettings, cell_model
-from hexacell.cell.model_lookup import ModelLookup
-from hexacell.cell.toml_writer import subsections, to_toml
 from hexacell.errors import FileError, SeveralErrors
 from hexacell.plugins import Group, names
 from hexacell.storage.atomic_files import read_text
-from hexacell.storage.toml_document import BYTE_ORDER_MARK, TomlDocument
+from hexacell.storage.toml_document import BYTE_ORDER_MARK, TomlDocument, table_header
 from hexacell.storage.toml_locations import KeyPath
+
+Remark = Callable[[KeyPath], str | None]
+"""The comment behind the value at a path, if any."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,12 +76,7 @@ def describe(cell: Cell) -> str:
 
     The text is itself a cell file with equal settings.
     """
-    return to_toml(cell.settings, lambda key: str(cell.provenance[dotted(key)]))
-
-
-def dump(settings: CellSettings) -> str:
-    """The text of a cell file with these settings, exactly."""
-    return to_toml(settings)
+    return dump(cell.settings, lambda key: str(cell.provenance[dotted(key)]))
 
 
 def schema() -> dict[str, Any]:
@@ -128,3 +125,43 @@ def _joined(path: Path, errors: list[FileError]) -> FileError | SeveralErrors:
         return errors[0]
     in_order = sorted(errors, key=lambda error: error.line or 0)
     return SeveralErrors(f"{path} has {len(errors)} mistakes", [*in_order])
+
+
+def dump(settings: Section, remark: Remark = lambda _: None) -> str:
+    """The settings as TOML, defaults included, each number in full; a value of None is left out."""
+    return "\n".join(_section(settings, (), remark)).lstrip("\n") + "\n"
+
+
+def subsections(path: KeyPath, value: object) -> list[tuple[KeyPath, Section]]:
+    """The sections in the value at ``path``, each with its path; none if it is a plain value."""
+    if isinstance(value, Section):
+        return [(path, value)]
+    items = value if isinstance(value, tuple) else ()
+    return [((*path, n), item) for n, item in enumerate(items) if isinstance(item, Section)]
+
+
+def _section(section: Section, path: KeyPath, remark: Remark) -> Iterator[str]:
+    """The section's own values first: after a header every key belongs to the section it opens."""
+    for name, value in section:
+        if not subsections((*path, name), value):
+            yield from _setting(name, value, remark((*path, name)))
+    for name, value in section:
+        for inner, subsection in subsections((*path, name), value):
+            yield from ("", table_header(inner))
+            yield from _section(subsection, inner, remark)
+
+
+def _setting(name: str, value: object, comment: str | None) -> list[str]:
+    if value is None:
+        return [f"# {name} is not set"] if comment else []
+    return [f"{name} = {_value(value)}" + (f"  # {comment}" if comment else "")]
+
+
+def _value(value: object) -> str:
+    if isinstance(value, tuple) and value and all(isinstance(row, tuple) for row in value):
+        return "[\n" + "".join(f"  {_value(row)},\n" for row in value) + "]"
+    if isinstance(value, dict):
+        table = tomlkit.inline_table()
+        table.update(value)
+        return table.as_string()
+    return tomlkit.item(value).as_string()

@@ -11,8 +11,18 @@ from contextlib import suppress
 from pathlib import Path
 from typing import NoReturn
 
-from hexacell.controller_config.change import ConfigChange, diff, fingerprint, propose, require_fingerprint
-from hexacell.controller_config.receipt import AFTER, BEFORE, FOUND, RECEIPT, Receipt
+from hexacell.controller_config.change import (
+    AFTER,
+    BEFORE,
+    FOUND,
+    RECEIPT,
+    ConfigChange,
+    Receipt,
+    diff,
+    fingerprint,
+    propose,
+    require_fingerprint,
+)
 from hexacell.errors import FileError, HexacellError, WriteBackUndone
 from hexacell.storage import atomic_files
 

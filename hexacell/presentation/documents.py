@@ -11,7 +11,7 @@ from hexacell.application.calibration_run import RunRequest
 from hexacell.application.planning import NextPose, PlanTrial
 from hexacell.application.replay_run import Replay
 from hexacell.campaign.decisions import Finished, Forecast, MeasurePose, StartPoint
-from hexacell.kinematics.pose import Pose
+from hexacell.reporting.documents import pose_document
 from procedures.replay.comparison import Difference
 from procedures.run import events
 
@@ -26,7 +26,7 @@ def next_document(proposed: NextPose) -> dict[str, Any]:
         "done": False,
         "point": decision.point,
         **_expected_record(decision),
-        "pose": _pose(decision.pose),
+        "pose": pose_document(decision.pose),
         "joint_targets": list(decision.joints),
         "present_worst_sigma_mm": now,
         "predicted_worst_sigma_mm": None if forecast is None else forecast.next_mm,
@@ -51,7 +51,7 @@ def _expected_record(decision: StartPoint | MeasurePose) -> dict[str, Any]:
         "predicted_deviation": list(decision.deviation),
         "sigma": list(decision.sigma),
         "gain": decision.gain,
-        "via": [_pose(pose) for pose in decision.via],
+        "via": [pose_document(pose) for pose in decision.via],
     }
 
 
@@ -121,7 +121,3 @@ def _difference(replayed: Replay, difference: Difference) -> dict[str, Any]:
         "recorded": difference.change.recorded,
         "replayed": difference.change.replayed,
     }
-
-
-def _pose(pose: Pose) -> dict[str, float]:
-    return dict(zip("xyzabc", pose.as_tuple(), strict=True))

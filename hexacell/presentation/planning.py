@@ -1,9 +1,10 @@
-"""Text for the plan: what to measure next, and what the remaining records gain."""
+"""Text for the plan: the devices it needs, what to measure next, and what the remaining records gain."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
+from drivers.interfaces import DeviceIdentity
 from hexacell.application.planning import NextPose, PlanTrial
 from hexacell.campaign.decisions import Finished, Forecast, MeasurePose, StartPoint
 
@@ -88,3 +89,17 @@ def plan_trial_lines(trial: PlanTrial) -> Iterator[str]:
 def duration(minutes: float) -> str:
     """A duration, rounded to what is known of it."""
     return f"{60.0 * minutes:.0f} seconds" if minutes < 1.5 else f"{minutes:.0f} minutes"
+
+
+def device_line(identity: DeviceIdentity) -> str:
+    """Which device answered, with its protocol and serial number."""
+    serial = f", serial number {identity.serial_number}" if identity.serial_number else ""
+    return f"{identity.name}, {identity.protocol}{serial}: {identity.description}"
+
+
+def preflight_lines(devices: Sequence[DeviceIdentity]) -> Iterator[str]:
+    """What was checked, before the plan is tried on simulated robots."""
+    for identity in devices:
+        yield f"ok  {device_line(identity)}"
+    yield "ok  all points can be reached, all devices answer; nothing was moved"
+    yield "Trying the plan on simulated robots within the tolerances, some seconds ..."

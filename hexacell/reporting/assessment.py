@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+from hexacell.campaign.task_accuracy import Task
 from hexacell.cell.model import CellSettings
-from hexacell.experiment_design.candidates import workspace_poses
 from hexacell.experiment_design.decorrelation import DecorrelatingPose, decorrelating_poses
 from hexacell.identification.diagnostics.correlations import CorrelatedPair, strongly_correlated
 from hexacell.identification.diagnostics.pose_accuracy import Accuracy, predicted_accuracy
@@ -108,15 +108,8 @@ def _accuracy(
 ) -> tuple[PoseBatch, Accuracy | None]:
     """The task poses in the convention's frames, and the accuracy there."""
     belief = robot.belief(found)
-    points = PoseBatch.of(Pose(*point) for point in settings.identification.points)
-    workspace = workspace_poses(belief, robot.frames.poses(points).positions)
-    task = robot.from_commands(Pose(*pose) for pose in settings.task.poses)
-    task = task if len(task) else workspace
+    task = Task.of(settings, robot, belief)
     accuracy = predicted_accuracy(
-        found,
-        belief.controller,
-        robot.branch,
-        task=task,
-        workspace=workspace if len(workspace) else task,
+        found, belief.controller, robot.branch, task=task.poses, workspace=task.workspace
     )
-    return task, accuracy
+    return task.poses, accuracy

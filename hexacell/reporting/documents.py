@@ -98,7 +98,7 @@ def _decorrelating_pose(pose: DecorrelatingPose) -> dict[str, Any]:
         "point": pose.point,
         "axis": pose.axis,
         "angle_deg": pose.degrees,
-        "pose": _pose(pose.command),
+        "pose": pose_document(pose.command),
         "correlation": pose.correlation,
     }
 
@@ -111,7 +111,7 @@ def _accuracy(assessed: Assessment) -> dict[str, Any] | None:
         "task_named": assessed.task_named,
         "before": _errors(accuracy.before),
         "after": _errors(accuracy.after),
-        "poses": [_pose(pose) for pose in assessed.task],
+        "poses": [pose_document(pose) for pose in assessed.task],
         "reachable": accuracy.reachable.tolist(),
     }
 
@@ -127,5 +127,6 @@ def _errors(errors: PoseErrors) -> dict[str, Any]:
     }
 
 
-def _pose(pose: Pose) -> dict[str, float]:
+def pose_document(pose: Pose) -> dict[str, float]:
+    """A pose in the controller's frames, mm and deg, by its six letters."""
     return dict(zip("xyzabc", pose.as_tuple(), strict=True))

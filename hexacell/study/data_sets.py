@@ -1,4 +1,4 @@
-"""Measurements that a known robot would give, exact or with noise.
+"""Robots drawn at random, and measurements that a known robot would give, exact or with noise.
 
 Nothing here uses the derivatives that the estimator works with: poses are found by closing the legs, and
 deviations are differences of positions.
@@ -17,6 +17,7 @@ from hexacell.experiment_design.candidates import within_limits
 from hexacell.kinematics import rotations
 from hexacell.kinematics.forward import CONTINUATION_STAGES
 from hexacell.kinematics.geometry import Geometry
+from hexacell.kinematics.mechanism import Mechanism
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array
 from hexacell.kinematics.sensitivity import singularity_margin
@@ -197,3 +198,14 @@ def _data_set(sets: list[_PointPoses], orientations: int) -> DataSet:
         np.concatenate([joints for one in sets for joints in one.joints]),
         np.concatenate([poses.positions for one in sets for poses in one.actual]),
     )
+
+
+def random_robot(
+    mechanism: Mechanism, drawing: Geometry, error_mm: float, random: np.random.Generator
+) -> Geometry:
+    """A geometry in the frame convention, each free parameter uniform within ``error_mm``.
+
+    As in Table 1 of Abtahi et al. 2010 (section 3.1, +-7 mm).
+    """
+    free = mechanism.convention.free_parameters(drawing)
+    return mechanism.convention.geometry(free + random.uniform(-error_mm, error_mm, len(free)))

@@ -11,15 +11,14 @@ from dataclasses import replace
 import numpy as np
 
 from hexacell.campaign.decisions import MeasurePose, StartPoint
+from hexacell.campaign.dry_run import VirtualCampaign
 from hexacell.campaign.planner import Plan
-from hexacell.campaign.virtual_campaign import VirtualCampaign
 from hexacell.cell.model import CellSettings
 from hexacell.errors import LimitError
 from hexacell.identification.belief import RobotBelief
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.pose import Pose
-from hexacell.motion.return_path import next_return_move
-from hexacell.motion.route_search import find_route
+from hexacell.motion.routes import find_route, next_return_move
 from hexacell.robot_model import Robot
 from hexacell.virtual_robot.virtual_robot import VirtualRobot
 

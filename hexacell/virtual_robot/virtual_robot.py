@@ -8,7 +8,6 @@ from hexacell.errors import LimitError, ReachError
 from hexacell.kinematics.commanded_motion import ActualPoses, change_geometry
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.inverse import inverse_kinematics
-from hexacell.kinematics.mechanism import Mechanism
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.rotations import Array, Mask
 from hexacell.kinematics.sensitivity import singularity_margin
@@ -159,17 +158,6 @@ class VirtualRobot:
         if self._actual is None:
             raise LimitError("the robot is not at any pose yet")
         return self._actual
-
-
-def random_robot(
-    mechanism: Mechanism, drawing: Geometry, error_mm: float, random: np.random.Generator
-) -> Geometry:
-    """A geometry in the frame convention, each free parameter uniform within ``error_mm``.
-
-    As in Table 1 of Abtahi et al. 2010 (section 3.1, +-7 mm).
-    """
-    free = mechanism.convention.free_parameters(drawing)
-    return mechanism.convention.geometry(free + random.uniform(-error_mm, error_mm, len(free)))
 
 
 def robots_within_tolerances(robot: Robot, count: int, seed: int) -> list[Geometry]:

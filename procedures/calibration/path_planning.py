@@ -16,8 +16,7 @@ from hexacell.identification.estimator import estimate_online
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.rotations import Array
 from hexacell.motion.path_check import ball_position
-from hexacell.motion.return_path import next_return_move
-from hexacell.motion.route_search import find_route
+from hexacell.motion.routes import find_route, next_return_move
 from hexacell.motion.waypoint_planner import PathPlanner
 from hexacell.robot_model import Robot
 from procedures.run.state import RunState
@@ -72,7 +71,7 @@ class RunPathPlanner:
     ) -> Move | None:
         """The next move back to a set's reference, the gauges being there.
 
-        See :func:`hexacell.motion.return_path.next_return_move`. Where nothing is ``known`` the robot
+        See :func:`hexacell.motion.routes.next_return_move`. Where nothing is ``known`` the robot
         returns along its trail. None if it did not come from the reference.
         """
         trail = state.path_from_reference

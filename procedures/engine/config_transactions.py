@@ -24,8 +24,7 @@ from pathlib import Path
 
 from hexacell.acceptance.gates import AcceptanceGate
 from hexacell.cell.loader import Cell
-from hexacell.controller_config.change import ConfigChange, fingerprint, propose
-from hexacell.controller_config.receipt import RECEIPT, Receipt
+from hexacell.controller_config.change import RECEIPT, ConfigChange, Receipt, fingerprint, propose
 from hexacell.controller_config.write_back import commit, rollback
 from hexacell.errors import HexacellError, Interruption, LimitError, WriteBackUndone
 from hexacell.kinematics.geometry import Geometry

@@ -24,7 +24,6 @@ from hexacell.storage import atomic_files
 from procedures.journal.line_format import RESTORE, Entry, LineRefused, begins_whole, decode, encode, now
 from procedures.run.events import Event
 
-NAME = "journal.jsonl"
 LONGEST_LINE = 16 << 20
 """Bytes; no event comes near it. A file without line ends must not fill the memory."""
 

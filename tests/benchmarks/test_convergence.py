@@ -7,7 +7,7 @@ import numpy as np
 from hexacell.errors import LimitError
 from hexacell.identification.estimator import identify
 from hexacell.study import data_sets
-from hexacell.virtual_robot.virtual_robot import random_robot
+from hexacell.study.data_sets import random_robot
 
 ROBOTS = 1000
 SIGMAS = 6.0

@@ -27,8 +27,9 @@ from hexacell.kinematics.mechanisms.hexaglide import hexaglide_geometry
 from hexacell.kinematics.pose import Pose
 from hexacell.measurements.records import MeasurementSet
 from hexacell.robot_model import Robot, robot_of
+from hexacell.study.data_sets import random_robot
 from hexacell.study.simulated_campaign import SimulatedCampaign
-from hexacell.virtual_robot.virtual_robot import VirtualRobot, random_robot
+from hexacell.virtual_robot.virtual_robot import VirtualRobot
 
 Say = Callable[[str, str, str], None]
 

@@ -10,10 +10,9 @@ from hexacell.application.planning import try_plan
 from hexacell.cell.loader import load_cell
 from hexacell.cli.console import Console
 from hexacell.errors import ExitCode
-from hexacell.presentation.devices import preflight_lines
 from hexacell.presentation.documents import preflight_document
 from hexacell.presentation.layout import wrapped
-from hexacell.presentation.planning import plan_trial_lines
+from hexacell.presentation.planning import plan_trial_lines, preflight_lines
 from procedures.calibration.workflow import Mode
 
 

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from hexacell.campaign.decisions import CampaignState, Decision, Finished, FinishPoint
+from hexacell.campaign.dry_run import VirtualCampaign
 from hexacell.campaign.planner import Plan
-from hexacell.campaign.virtual_campaign import VirtualCampaign
 from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import load_cell
 from hexacell.kinematics.geometry import Geometry

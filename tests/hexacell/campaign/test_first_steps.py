@@ -10,7 +10,8 @@ from hexacell.campaign.recursive_estimator import OnlineEstimator
 from hexacell.identification.estimator import estimate_online
 from hexacell.kinematics.pose import Pose
 from hexacell.measurements.records import MeasurementSet
-from hexacell.virtual_robot.virtual_robot import VirtualRobot, random_robot
+from hexacell.study.data_sets import random_robot
+from hexacell.virtual_robot.virtual_robot import VirtualRobot
 
 TRAVEL_MM = 5.0
 ERROR_MM = 7.0

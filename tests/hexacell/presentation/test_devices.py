@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from drivers.interfaces import DeviceIdentity
-from hexacell.presentation.devices import device_line, preflight_lines
+from hexacell.presentation.planning import device_line, preflight_lines
 
 GAUGE = DeviceIdentity(name="x", protocol="sylvac", description="SY276")
 ENCODER = DeviceIdentity(

@@ -13,8 +13,7 @@ from hexacell.errors import IdentifiabilityError
 from hexacell.kinematics.forward import continue_solution
 from hexacell.kinematics.inverse import inverse_kinematics
 from hexacell.kinematics.pose import Pose, PoseBatch
-from hexacell.motion import return_path
-from hexacell.motion import route_search as route_module
+from hexacell.motion import routes
 from hexacell.motion.trajectory import interpolate_line
 from procedures.calibration.identification_steps import IdentificationSteps
 from procedures.run import events
@@ -24,7 +23,7 @@ from procedures.run.steps import Move, Phase
 ORIENTATIONS = 9
 
 
-class Ways:
+class ClearLines:
     """Stands in for the check of straight lines: only those to some orientations are clear."""
 
     def __init__(
@@ -33,8 +32,8 @@ class Ways:
         self.clear_to = clear_to
         self.stops = stops
         monkeypatch.setattr(IdentificationSteps, "_estimated", lambda *_: (None, self))
-        monkeypatch.setattr(return_path, "is_clear", self._is_clear)
-        monkeypatch.setattr(return_path, "PathPlanner", self._departure)
+        monkeypatch.setattr(routes, "is_clear", self._is_clear)
+        monkeypatch.setattr(routes, "PathPlanner", self._departure)
         self.reference = np.zeros(3)
 
     def _departure(self, _: Any, start: Any, home: Any, reference: Any) -> Any:
@@ -56,7 +55,7 @@ class Ways:
     [((1,), [1]), ((4, 1), [1]), ((4,), [4, 3, 2, 1]), ((), [8, 7, 6, 5, 4, 3, 2, 1]), ((6, 5, 2), [2, 1])],
 )
 def test_the_way_back_is_safe(make_rig, story, monkeypatch, clear_to, way) -> None:
-    Ways(monkeypatch, *clear_to)
+    ClearLines(monkeypatch, *clear_to)
     calibration, happened = make_rig().calibration, story().whole(ORIENTATIONS)[:-2]
     visited: list[int] = []
     while isinstance(step := calibration.next_step(fold(happened)), Move):
@@ -68,7 +67,7 @@ def test_the_way_back_is_safe(make_rig, story, monkeypatch, clear_to, way) -> No
 
 def test_a_way_back_over_stops_is_gone_stop_by_stop(make_rig, story, monkeypatch) -> None:
     stop = Pose(100.0, -100.0, 500.0, 4.0, 1.0, 0.0)
-    Ways(monkeypatch, 1, stops=(stop,))
+    ClearLines(monkeypatch, 1, stops=(stop,))
     calibration, happened = make_rig().calibration, story().whole(ORIENTATIONS)[:-2]
     step = calibration.next_step(fold(happened))
     assert isinstance(step, Move)
@@ -81,7 +80,7 @@ def test_a_way_back_over_stops_is_gone_stop_by_stop(make_rig, story, monkeypatch
 def test_at_a_stop_it_is_not_decided_anew(make_rig, story, monkeypatch) -> None:
     """From the stop alone nothing leads on, and back to where it came from would go on for ever."""
     stop = Pose(100.0, -100.0, 500.0, 4.0, 1.0, 0.0)
-    stands_in = Ways(monkeypatch, 1, stops=(stop,))
+    stands_in = ClearLines(monkeypatch, 1, stops=(stop,))
     calibration, happened = make_rig().calibration, story().whole(ORIENTATIONS)[:-2]
     to_stop = calibration.next_step(fold(happened))
     assert isinstance(to_stop, Move)
@@ -91,9 +90,8 @@ def test_at_a_stop_it_is_not_decided_anew(make_rig, story, monkeypatch) -> None:
         asked.append(start.pose(0).a)
         return stands_in._departure(_, start, home, reference)
 
-    monkeypatch.setattr(return_path, "PathPlanner", from_the_last_record_only)
-    monkeypatch.setattr(return_path, "is_clear", lambda *_: False)
-    monkeypatch.setattr(route_module, "is_clear", lambda *_: False)
+    monkeypatch.setattr(routes, "PathPlanner", from_the_last_record_only)
+    monkeypatch.setattr(routes, "is_clear", lambda *_: False)
     step = calibration.next_step(fold([*happened, story().arrived(0, to_stop.pose)]))
     assert step.key == "P1/o01/move"
     assert asked == pytest.approx([ORIENTATIONS - 1.0])
@@ -102,7 +100,7 @@ def test_at_a_stop_it_is_not_decided_anew(make_rig, story, monkeypatch) -> None:
 def test_the_way_back_leads_over_stops_that_were_passed_where_nothing_is_safe(
     make_rig, story, monkeypatch
 ) -> None:
-    Ways(monkeypatch)
+    ClearLines(monkeypatch)
     stop = (100.0, -100.0, 500.0, 4.0, 1.0, 0.0)
     s = story()
     led = [s.arrived(0, stop), s.arrived(3), s.sampled(3)]
@@ -114,7 +112,7 @@ def test_the_way_back_leads_over_stops_that_were_passed_where_nothing_is_safe(
 
 
 def test_the_way_back_from_a_refused_pose_begins_at_the_last_record(make_rig, story, monkeypatch) -> None:
-    Ways(monkeypatch)
+    ClearLines(monkeypatch)
     refusals = [story().arrived(5), story().refused(5)] * (REFUSALS + 1)
     step = make_rig().calibration.next_step(fold([*story().whole(4)[:-2], *refusals]))
     assert step.key == "P1/o04/move"

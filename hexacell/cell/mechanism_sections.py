@@ -9,11 +9,10 @@ from pydantic import Field, create_model
 
 from hexacell.cell.fields import Finite, NotNegative, Positive, Section
 from hexacell.kinematics.mechanism import Mechanism
-from hexacell.kinematics.parameters import ParameterSet
+from hexacell.kinematics.parameters import ParameterKind, ParameterSet
 from hexacell.plugins import Group, load
 
 DEFAULT_MECHANISM = "hexaglide"
-DEFAULT_TOLERANCE = 7.0
 
 
 @cache
@@ -59,13 +58,17 @@ def geometry_settings(parameters: ParameterSet) -> type[GeometrySettings]:
 def tolerance_settings(parameters: ParameterSet) -> type[ToleranceSettings]:
     """The section for the tolerances of these parameters."""
     fields: dict[str, Any] = {
-        kind.tolerance_key: (Positive, Field(DEFAULT_TOLERANCE, description=kind.tolerance_meaning))
-        for kind in parameters.kinds
+        kind.tolerance_key: (Positive, _tolerance_field(kind)) for kind in parameters.kinds
     }
     kinds = " and ".join(kind.symbol for kind in parameters.kinds if kind.has_ball_offset)
     description = f"mounting of the ball: an offset common to all {kinds}"
     fields["ball_mm"] = (NotNegative, Field(0.0, description=description))
     return _made("ToleranceSettings", ToleranceSettings, fields)
+
+
+def _tolerance_field(kind: ParameterKind) -> Any:  # noqa: ANN401 - what pydantic's Field returns
+    default = ... if kind.default_tolerance is None else kind.default_tolerance
+    return Field(default, description=kind.tolerance_meaning)
 
 
 def _array_type(shape: tuple[int, ...]) -> Any:  # noqa: ANN401 - a type made here

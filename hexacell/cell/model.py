@@ -111,6 +111,7 @@ def cell_model(mechanism: str) -> type[CellSettings]:
     """
     parameters = mechanism_named(mechanism).parameters
     geometry, tolerances = geometry_settings(parameters), tolerance_settings(parameters)
+    has_defaults = not any(field.is_required() for field in tolerances.model_fields.values())
     nominal = (geometry, RobotSettings.model_fields["nominal"])
     truth = (geometry, SimulationSettings.model_fields["geometry"])
     robot = create_model(
@@ -127,7 +128,7 @@ def cell_model(mechanism: str) -> type[CellSettings]:
         __base__=CellSettings,
         __doc__="A whole cell file.",
         robot=(robot, ...),
-        tolerances=(tolerances, tolerances()),
+        tolerances=(tolerances, tolerances() if has_defaults else ...),
         simulation=(simulation | None, None),
     )
 

@@ -17,7 +17,7 @@ class ControllerGeometry:
     """The geometry that a controller uses.
 
     Attributes:
-        geometry: the 42 numbers as the config states them, mm.
+        geometry: as the config states it.
         branch: for each leg, which of the two solutions of the inverse kinematics the robot uses.
     """
 

@@ -23,14 +23,11 @@ import numpy as np
 from hexacell.controller_config.interface import Branch, ControllerGeometry
 from hexacell.errors import FileError
 from hexacell.kinematics.geometry import Geometry
-from hexacell.kinematics.parameters import LEGS, ParameterKind, ParameterSet
+from hexacell.kinematics.parameters import LEGS, ParameterKind, ParameterSet, ParameterUnit
 from hexacell.storage import atomic_files
 from hexacell.storage.toml_document import TomlDocument
 from hexacell.storage.toml_edit import replace_values
 from hexacell.storage.toml_locations import KeyPath
-
-_DECIMALS = 6
-_HALF_A_NANOMETRE = 5e-7
 
 
 class NativeToml:
@@ -53,10 +50,10 @@ class NativeToml:
         return controller
 
     def rewrite(self, text: str, geometry: Geometry) -> str:
-        """``text`` with ``geometry`` in it: six decimals (1 nm), no exponent.
+        """``text`` with ``geometry`` in it, with as many decimals as the unit has (1 nm), no exponent.
 
-        A value that differs by no more than half a nanometre keeps its token. The new text is read
-        again before it is returned.
+        A value that differs by no more than half of the last decimal keeps its token. The new text is
+        read again before it is returned.
 
         Raises:
             FileError: ``text`` is no such config, or ``geometry`` has a value that is not finite or
@@ -66,7 +63,8 @@ class NativeToml:
         before = _Content(TomlDocument.parse(text), self._parameters).geometry()
         changed = replace_values(text, dict(_changed_tokens(before, geometry)))
         after = _Content(TomlDocument.parse(changed), self._parameters).geometry()
-        if after.largest_difference(geometry) > 2 * _HALF_A_NANOMETRE:
+        last_decimal = {kind.symbol: 10.0**-kind.unit.decimals for kind in self._parameters.kinds}
+        if (abs(after.vector - geometry.vector) > self._parameters.by_kind(last_decimal)).any():
             raise FileError(
                 "the new geometry does not read back as it was written",
                 action="Nothing was written; please report this with the config",
@@ -74,9 +72,9 @@ class NativeToml:
         return changed
 
 
-def number_token(value: float) -> str:
-    """``value`` as a TOML float: at most six decimals, at least one, never ``-0.0``."""
-    whole, _, decimals = f"{value:.{_DECIMALS}f}".partition(".")
+def number_token(value: float, unit: ParameterUnit = ParameterUnit.MM) -> str:
+    """``value`` as a TOML float: at most the decimals of its unit, at least one, never ``-0.0``."""
+    whole, _, decimals = f"{value:.{unit.decimals}f}".partition(".")
     number = f"{whole}.{decimals.rstrip('0') or '0'}"
     return "0.0" if number == "-0.0" else number
 
@@ -92,10 +90,10 @@ def _require_physical(geometry: Geometry) -> None:
 
 def _changed_tokens(before: Geometry, after: Geometry) -> Iterator[tuple[KeyPath, str]]:
     for kind in after.parameters.kinds:
-        old = before[kind.symbol]
+        old, half_of_last = before[kind.symbol], 0.5 * 10.0**-kind.unit.decimals
         for index, new in np.ndenumerate(after[kind.symbol]):
-            if abs(new - old[index]) > _HALF_A_NANOMETRE:
-                yield ("geometry", kind.symbol, *index), number_token(float(new))
+            if abs(new - old[index]) > half_of_last:
+                yield ("geometry", kind.symbol, *index), number_token(float(new), kind.unit)
 
 
 @dataclass(frozen=True, slots=True)

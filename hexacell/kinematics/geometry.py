@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -29,6 +29,7 @@ class Geometry:
 
     parameters: ParameterSet
     vector: Array
+    _arrays: dict[str, Array] = field(repr=False)
 
     def __init__(self, parameters: ParameterSet, vector: ArrayLike) -> None:
         values = np.array(vector, dtype=float)
@@ -37,6 +38,7 @@ class Geometry:
         values.setflags(write=False)
         object.__setattr__(self, "parameters", parameters)
         object.__setattr__(self, "vector", values)
+        object.__setattr__(self, "_arrays", {})
 
     @classmethod
     def of(cls, parameters: ParameterSet, values: Mapping[str, ArrayLike]) -> Geometry:
@@ -48,7 +50,10 @@ class Geometry:
         return cls(parameters, parameters.vector(values))
 
     def __getitem__(self, symbol: str) -> Array:
-        return self.parameters.array(self.vector, symbol)
+        # Newton's method asks for them at every step: the views are made once.
+        if symbol not in self._arrays:
+            self._arrays[symbol] = self.parameters.array(self.vector, symbol)
+        return self._arrays[symbol]
 
     def document(self) -> dict[str, Any]:
         """Nested lists under the symbols of the kinds, the form of every file."""
@@ -74,9 +79,12 @@ class GeometryBatch:
 
     parameters: ParameterSet
     vectors: Array
+    _arrays: dict[str, Array] = field(default_factory=dict, init=False, repr=False)
 
     def __getitem__(self, symbol: str) -> Array:
-        return self.parameters.array(self.vectors, symbol)
+        if symbol not in self._arrays:
+            self._arrays[symbol] = self.parameters.array(self.vectors, symbol)
+        return self._arrays[symbol]
 
     def subset(self, rows: NDArray[np.intp]) -> GeometryBatch:
         """The geometries of some poses."""

@@ -27,6 +27,11 @@ class ParameterUnit(StrEnum):
     RAD = "rad"
     NONE = ""
 
+    @property
+    def decimals(self) -> int:
+        """Decimals in a config: 1 nm; 1 nrad, which is 1 nm at 1 m."""
+        return 6 if self is ParameterUnit.MM else 9
+
 
 @dataclass(frozen=True, slots=True)
 class ParameterKind:
@@ -40,6 +45,10 @@ class ParameterKind:
         display: name in text, a format of ``legs`` ("B2/B3"), ``leg`` ("2") and ``component`` ("z").
         has_ball_offset: the ball's mounting displaces this kind of all legs by the same vector.
         is_positive: only values above zero are physical.
+        default_tolerance: where the cell file states none; without one it must.
+
+    Raises:
+        ValueError: the ball's offset needs the components x, y and z.
     """
 
     symbol: str
@@ -50,6 +59,11 @@ class ParameterKind:
     unit: ParameterUnit = ParameterUnit.MM
     has_ball_offset: bool = False
     is_positive: bool = False
+    default_tolerance: float | None = None
+
+    def __post_init__(self) -> None:
+        if self.has_ball_offset and self.components != ("x", "y", "z"):
+            raise ValueError(f"{self.symbol} takes the ball's offset, so its components must be x, y, z")
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -64,7 +78,7 @@ class ParameterKind:
     def display_name(self, leg: int, component: str, joints: str | None = None) -> str:
         """The name in text: "leg 3 length", "B6 x"; ``joints`` names several equal parameters."""
         joints = joints or f"{self.symbol}{leg}"
-        return self.display.format(legs=joints, leg=leg, component=component)
+        return self.display.format(legs=joints, leg=leg, component=component).strip()
 
     @property
     def tolerance_key(self) -> str:

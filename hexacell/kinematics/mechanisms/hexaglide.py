@@ -23,12 +23,14 @@ HEXAGLIDE_PARAMETERS = ParameterSet(
             ("x", "y", "z"),
             meaning="spherical joints in the base frame at q = 0, mm, legs 1 to 6",
             tolerance_meaning="every coordinate of a spherical joint",
+            default_tolerance=7.0,
         ),
         ParameterKind(
             "B",
             ("x", "y", "z"),
             meaning="universal joints in the platform frame (origin: the ball), mm",
             tolerance_meaning="every coordinate of a universal joint",
+            default_tolerance=7.0,
             has_ball_offset=True,
         ),
         ParameterKind(
@@ -36,6 +38,7 @@ HEXAGLIDE_PARAMETERS = ParameterSet(
             (),
             meaning="leg lengths, mm",
             tolerance_meaning="every leg length",
+            default_tolerance=7.0,
             display="leg {leg} length",
             is_positive=True,
         ),

@@ -17,11 +17,24 @@ from hexacell.kinematics.rotations import Array
 PARAMETERS = ParameterSet(
     (
         ParameterKind(
-            "z", (), "leg lengths at q = 0, mm", "every leg length", "leg {leg} zero", is_positive=True
+            "z",
+            (),
+            "leg lengths at q = 0, mm",
+            "every leg length",
+            "leg {leg} zero",
+            is_positive=True,
+            default_tolerance=1.0,
         ),
-        ParameterKind("A", ("x", "y", "z"), "joints on the base, mm", "every joint on the base"),
         ParameterKind(
-            "B", ("x", "y", "z"), "joints on the platform, mm", "every joint", has_ball_offset=True
+            "A", ("x", "y", "z"), "joints on the base, mm", "every joint on the base", default_tolerance=2.0
+        ),
+        ParameterKind(
+            "B",
+            ("x", "y", "z"),
+            "joints on the platform, mm",
+            "every joint",
+            has_ball_offset=True,
+            default_tolerance=2.0,
         ),
     )
 )

@@ -11,7 +11,7 @@ import numpy as np
 from hexacell.campaign.decisions import CampaignState
 from hexacell.campaign.planner import Plan
 from hexacell.errors import HexacellError, LimitError, ReachError, UsageError
-from hexacell.experiment_design.gauge_zero import GaugeZero, estimate_gauge_zero
+from hexacell.experiment_design.predicted_records import GaugeZero, estimate_gauge_zero
 from hexacell.identification.belief import RobotBelief
 from hexacell.identification.solver.result import UNDETERMINED_RATIO
 from hexacell.kinematics.pose import Pose, PoseBatch

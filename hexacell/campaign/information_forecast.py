@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from hexacell.experiment_design import candidates
 from hexacell.experiment_design.candidates import ReachableTargets, reachable
 from hexacell.experiment_design.criteria import D_OPTIMAL
-from hexacell.experiment_design.gauge_zero import position_derivatives
+from hexacell.experiment_design.predicted_records import position_derivatives
 from hexacell.identification.belief import RobotBelief
 from hexacell.identification.solver.measurement_model import record_covariance, record_weights
 from hexacell.kinematics.pose import PoseBatch

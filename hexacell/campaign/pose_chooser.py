@@ -14,8 +14,8 @@ from hexacell.errors import LimitError
 from hexacell.experiment_design import candidates
 from hexacell.experiment_design.candidates import Amplitudes
 from hexacell.experiment_design.criteria import D_OPTIMAL, Criterion, CriterionName
-from hexacell.experiment_design.gauge_zero import GaugeZero
 from hexacell.experiment_design.pose_selection import SelectedPose, select_from_list, select_pose
+from hexacell.experiment_design.predicted_records import GaugeZero
 from hexacell.experiment_design.travel_monte_carlo import orientation_sigma
 from hexacell.identification.belief import RobotBelief
 from hexacell.kinematics.pose import Pose, PoseBatch

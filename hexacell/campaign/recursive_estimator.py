@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hexacell.errors import LimitError
-from hexacell.experiment_design.gauge_zero import GaugeZero, estimate_gauge_zero
+from hexacell.experiment_design.predicted_records import GaugeZero, estimate_gauge_zero
 from hexacell.identification.belief import RobotBelief
 from hexacell.identification.estimator import estimate_online
 from hexacell.identification.problem.data_requirements import is_determined

@@ -10,7 +10,7 @@ from typing import Any, TextIO, TypeVar
 
 from hexacell.cli.console import Console
 from hexacell.errors import AnswerNeeded
-from hexacell.presentation.questions import matching_choice, question_text, repeated_text
+from hexacell.presentation.run import matching_choice, question_text, repeated_text
 from procedures.run import events
 from procedures.run.commands import Abort, Command, CommandQueue, MeasureAgain, Pause, Resume, Undo
 from procedures.run.questions import Question, QuestionKind

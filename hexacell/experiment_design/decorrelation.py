@@ -15,8 +15,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from hexacell.experiment_design.candidates import Candidates, reachable
-from hexacell.experiment_design.gauge_zero import GaugeZero, estimate_gauge_zero
-from hexacell.experiment_design.predicted_records import SAFETY_SIGMAS, TRAVEL_SHARE, predict_records
+from hexacell.experiment_design.predicted_records import (
+    SAFETY_SIGMAS,
+    TRAVEL_SHARE,
+    GaugeZero,
+    estimate_gauge_zero,
+    predict_records,
+)
 from hexacell.identification.belief import RobotBelief
 from hexacell.identification.diagnostics.correlations import CorrelatedPair
 from hexacell.identification.solver.result import Identification

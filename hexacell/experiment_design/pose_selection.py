@@ -23,8 +23,12 @@ import numpy as np
 from hexacell.errors import LimitError
 from hexacell.experiment_design.candidates import commands_for, outcomes_of, reachable_targets
 from hexacell.experiment_design.criteria import D_OPTIMAL, Criterion
-from hexacell.experiment_design.gauge_zero import GaugeZero
-from hexacell.experiment_design.predicted_records import TRAVEL_SHARE, PredictedRecords, predict_records
+from hexacell.experiment_design.predicted_records import (
+    TRAVEL_SHARE,
+    GaugeZero,
+    PredictedRecords,
+    predict_records,
+)
 from hexacell.experiment_design.travel_monte_carlo import TravelConstraint
 from hexacell.identification.belief import RobotBelief
 from hexacell.kinematics.pose import Pose, PoseBatch

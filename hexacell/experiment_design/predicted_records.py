@@ -1,4 +1,7 @@
-"""Records that candidate poses would give, predicted by linear propagation of covariance."""
+"""Predicted records: the zero of a point's gauges, and what candidate poses would show against it.
+
+Both are propagated linearly with their covariances.
+"""
 
 from __future__ import annotations
 
@@ -7,16 +10,85 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from hexacell.experiment_design.candidates import ReachableTargets
-from hexacell.experiment_design.gauge_zero import GaugeZero, position_derivatives
+from hexacell.errors import LimitError
+from hexacell.experiment_design.candidates import ReachableTargets, commands_for
 from hexacell.identification.belief import RobotBelief
-from hexacell.identification.solver.measurement_model import record_covariance
+from hexacell.identification.solver.measurement_model import record_covariance, record_weights
+from hexacell.kinematics.forward import assembly_mode
+from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array, Mask
+from hexacell.kinematics.sensitivity import pose_jacobian, position_sensitivity
 
 SAFETY_SIGMAS = 4.0
 TRAVEL_SHARE = 0.9
 """Share of the travel that the predicted deviation and four sigma may use. The most informative poses are
 at this limit, thousands of 50,000 records; with three sigma one in some thousands left the travel."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class GaugeZero:
+    """What is known of the zero of a point's gauges.
+
+    Attributes:
+        reference: estimated position (3,), mm, of the ball when they were zeroed.
+        orientation: the platform's then (3, 3), under the estimate.
+        joints: joint variables then (6,), mm.
+        jacobian: derivative (3, p) of ``reference`` by the free parameters.
+        covariance: of ``reference`` (3, 3), mm^2, the parameters being known.
+    """
+
+    reference: Array
+    orientation: Array
+    joints: Array
+    jacobian: Array
+    covariance: Array
+
+    @property
+    def target(self) -> ReachableTargets:
+        """The reference as a target (1)."""
+        return ReachableTargets(PoseBatch.at(self.reference, self.orientation[None]), self.joints[None])
+
+    def command(self, belief: RobotBelief) -> PoseBatch:
+        """The command (1) that leads to the reference."""
+        return commands_for(belief, self.target)[0]
+
+    def mode(self, belief: RobotBelief) -> Array:
+        """The assembly mode (1,) of the estimated robot at the reference."""
+        target = self.target
+        return assembly_mode(pose_jacobian(belief.mechanism, belief.estimate, target.poses, target.joints))
+
+
+def estimate_gauge_zero(
+    belief: RobotBelief, poses: PoseBatch, joints: Array, deviations: Array
+) -> GaugeZero:
+    """The weighted mean of what each of a point's records (n) says of the zero.
+
+    Args:
+        belief: what is known of the robot.
+        poses: of the records, under the estimate; the first is the reference.
+        joints: joint variables (n, 6), mm.
+        deviations: what the gauges showed (n, 3), mm.
+
+    Raises:
+        LimitError: all poses are at a singularity, where the records say nothing.
+    """
+    jacobian, by_joints = position_derivatives(belief, ReachableTargets(poses, joints))
+    weights = record_weights(by_joints, belief.noise)
+    try:
+        covariance = np.linalg.inv(weights.sum(axis=0))
+    except np.linalg.LinAlgError:
+        raise LimitError("the records of this point say nothing about where the ball is") from None
+    reference = covariance @ np.einsum("nij,nj->i", weights, poses.positions - deviations)
+    mean_jacobian = covariance @ np.einsum("nij,njp->ip", weights, jacobian)
+    return GaugeZero(reference, poses.rotations[0], joints[0], mean_jacobian, covariance)
+
+
+def position_derivatives(belief: RobotBelief, targets: ReachableTargets) -> tuple[Array, Array]:
+    """Of the ball's position at n targets: (n, 3, p) by the free parameters, (n, 3, 6) by the joints."""
+    by_parameters, by_joints = position_sensitivity(
+        belief.mechanism, belief.estimate, targets.poses, targets.joints
+    )
+    return by_parameters @ belief.basis, by_joints
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -26,8 +26,7 @@ from functools import cached_property, lru_cache
 import numpy as np
 
 from hexacell.experiment_design.candidates import ReachableTargets
-from hexacell.experiment_design.gauge_zero import GaugeZero
-from hexacell.experiment_design.predicted_records import PredictedRecords, predict_records
+from hexacell.experiment_design.predicted_records import GaugeZero, PredictedRecords, predict_records
 from hexacell.identification.belief import RobotBelief
 from hexacell.kinematics.forward import apply_twist, forward_kinematics
 from hexacell.kinematics.geometry import GeometryBatch

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from hexacell.campaign.decisions import CampaignState, FinishPoint, MeasurePose, StartPoint
 from hexacell.campaign.planner import Plan
 from hexacell.errors import HexacellError
-from hexacell.experiment_design.gauge_zero import GaugeZero
+from hexacell.experiment_design.predicted_records import GaugeZero
 from hexacell.identification.belief import RobotBelief
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.pose import Pose

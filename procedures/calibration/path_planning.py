@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hexacell.errors import HexacellError, LimitError
-from hexacell.experiment_design.gauge_zero import GaugeZero
+from hexacell.experiment_design.predicted_records import GaugeZero
 from hexacell.identification.belief import RobotBelief
 from hexacell.identification.estimator import estimate_online
 from hexacell.kinematics.pose import Pose, PoseBatch

@@ -9,7 +9,7 @@ from typing import Any, Self
 from drivers.simulated.closeable import Closeable
 from drivers.simulated.encoders.can_bus import SimulatedCanBus
 from drivers.simulated.encoders.node import DeviceData, SimulatedEncoder
-from drivers.simulated.encoders.vendors import EVENTS_AND_SYNC, Vendor
+from drivers.simulated.encoders.object_dictionary import EVENTS_AND_SYNC, Vendor
 from hexacell.cell.devices import EncoderSettings
 from hexacell.clock import CellClock
 

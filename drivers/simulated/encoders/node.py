@@ -16,7 +16,7 @@ from canopen.sdo.exceptions import SdoAbortedError
 
 from drivers.simulated.encoders import object_dictionary
 from drivers.simulated.encoders.can_bus import SimulatedCanBus, Timer
-from drivers.simulated.encoders.vendors import Vendor
+from drivers.simulated.encoders.object_dictionary import Vendor
 
 _NMT = 0x000
 _RESET_COMMANDS = (0x81, 0x82)

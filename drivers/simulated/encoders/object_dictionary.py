@@ -1,4 +1,4 @@
-"""The object dictionary of a simulated encoder, built from a table."""
+"""The object dictionary of a simulated encoder, built from a table, and what differs between vendors."""
 
 from __future__ import annotations
 
@@ -14,7 +14,63 @@ from canopen.objectdictionary.datatypes import (
     UNSIGNED32,
 )
 
-from drivers.simulated.encoders.vendors import TpdoDefaults, Vendor
+
+@dataclass(frozen=True, slots=True)
+class TpdoDefaults:
+    """A transmit PDO after power-on; ``mapping`` holds (index, subindex, bits)."""
+
+    mapping: tuple[tuple[int, int, int], ...]
+    transmission_type: int
+    event_timer_ms: int = 0
+    enabled: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class Vendor:
+    """The encoders of one vendor."""
+
+    device_type: int
+    tpdos: tuple[TpdoDefaults, ...]
+    step_in_6005: bool = True
+    mapping_writable: bool = True
+    magnets: int = 1
+
+
+_POSITION = (0x6004, 0, 32)
+_SPEED = (0x6030, 1, 16)
+_MAGNET_1 = (0x6020, 1, 32)
+_MAGNET_2 = (0x6020, 2, 32)
+
+EVENTS_AND_SYNC = Vendor(
+    device_type=0x0008_0196,
+    tpdos=(
+        TpdoDefaults((_POSITION, _SPEED), transmission_type=254, event_timer_ms=10),
+        TpdoDefaults((_POSITION, _SPEED), transmission_type=1),
+    ),
+)
+"""TPDO1 on its event timer, TPDO2 with every SYNC."""
+
+EVENTS_ONLY = Vendor(
+    device_type=0x0008_0196,
+    tpdos=(
+        TpdoDefaults((_POSITION,), transmission_type=254, event_timer_ms=1),
+        TpdoDefaults((), transmission_type=1, enabled=False),
+    ),
+    step_in_6005=False,
+)
+"""TPDO1 every millisecond, TPDO2 off and empty; the step is in 6501h."""
+
+TWO_MAGNETS = Vendor(
+    device_type=0x000A_0196,
+    tpdos=(
+        TpdoDefaults((_MAGNET_1, _SPEED), transmission_type=254, event_timer_ms=10),
+        TpdoDefaults((_MAGNET_2, _MAGNET_1), transmission_type=1),
+    ),
+    mapping_writable=False,
+    magnets=2,
+)
+"""Positions in 6020h, and a fixed mapping in which the first magnet comes second."""
+
 
 POSITION = 0x6004
 POSITION_OF_MAGNET = 0x6020

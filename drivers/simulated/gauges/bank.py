@@ -7,9 +7,8 @@ from contextlib import ExitStack
 
 from drivers.simulated.closeable import Closeable
 from drivers.simulated.gauges.cdi import CdiDevice
-from drivers.simulated.gauges.device import LineDevice
+from drivers.simulated.gauges.device import Indicator, LineDevice, PlungerPosition
 from drivers.simulated.gauges.faults import InjectedGaugeFault
-from drivers.simulated.gauges.indicator import Indicator, PlungerPosition
 from drivers.simulated.gauges.mux10 import Mux10Device
 from drivers.simulated.gauges.server import GaugeLineServer, serve_gauges
 from drivers.simulated.gauges.sylvac import SylvacDevice

@@ -1,12 +1,87 @@
-"""The device on a simulated line."""
+"""The device on a simulated line, and its dial indicators, whose settings depend on no protocol."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from math import copysign
 from typing import ClassVar
 
-from drivers.simulated.gauges.indicator import Indicator
+MM_PER_INCH = 25.4
+PUSH_MM = 6.0
+
+PlungerPosition = Callable[[], float]
+"""The plunger position now, mm from the middle of its travel, with noise.
+
+Called from the thread of the line.
+"""
+
+
+class Indicator:
+    """One instrument. Its keys are the methods, its settings the attributes."""
+
+    def __init__(self, plunger: PlungerPosition, travel_mm: float = 12.5) -> None:
+        self.inch = False
+        self.reversed = False
+        self.battery_low = False
+        self.preset_mm = 0.0
+        self.powered = True
+        self.at_end = False
+        self._plunger = plunger
+        self._travel_mm = travel_mm
+        self._offset_mm = 0.0
+        self._held_mm: float | None = None
+        self._jammed_mm: float | None = None
+        self._pushed_mm = 0.0
+
+    @property
+    def on_hold(self) -> bool:
+        """Whether the display is on hold."""
+        return self._held_mm is not None
+
+    def shown(self) -> float | None:
+        """The number on the display, mm or inch; None with the plunger at an end of its travel."""
+        value = self._live_mm() if self._held_mm is None else self._held_mm
+        if value is None:
+            return None
+        return value / MM_PER_INCH if self.inch else value
+
+    def hold(self) -> None:
+        """Hold the display; without effect at an end of the travel."""
+        self._held_mm = self._live_mm()
+
+    def release(self) -> None:
+        """End the hold."""
+        self._held_mm = None
+
+    def jam(self, *, on: bool) -> None:
+        """Jam the plunger at its position, or free it; the instrument still answers."""
+        self._jammed_mm = self._plunger() if on else None
+
+    def push(self, *, on: bool) -> None:
+        """Push the plunger farther than a ball on its plate could, or release it."""
+        self._pushed_mm = -copysign(PUSH_MM, self._plunger()) if on else 0.0
+
+    def recall_preset(self) -> None:
+        """Set the display to the preset value; with a preset of 0 this is the zero key."""
+        self._offset_mm += self.preset_mm - (self._live_mm() or 0.0)
+
+    def switch_off(self) -> None:
+        """The automatic switch-off."""
+        self.powered = False
+
+    def switch_on(self) -> None:
+        """Switch on: no hold, and the zero at the present plunger position."""
+        self.powered = True
+        self.release()
+        self._offset_mm = 0.0
+        self._offset_mm = -(self._live_mm() or 0.0)
+
+    def _live_mm(self) -> float | None:
+        position = self._plunger() + self._pushed_mm if self._jammed_mm is None else self._jammed_mm
+        if self.at_end or abs(position) > self._travel_mm / 2:
+            return None
+        return (-position if self.reversed else position) + self._offset_mm
 
 
 class LineDevice(ABC):

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from random import Random
 
-from drivers.simulated.gauges.indicator import Indicator
+from drivers.simulated.gauges.device import Indicator
 
 DIGITS = b"0123456789"
 DATA_BITS = 7

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from drivers.simulated.gauges.device import LineDevice
-from drivers.simulated.gauges.indicator import Indicator
+from drivers.simulated.gauges.device import Indicator, LineDevice
 
 NO_GAUGE = b"911\r"
 GAUGE_ERROR = b"912\r"

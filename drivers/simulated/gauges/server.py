@@ -13,9 +13,8 @@ from concurrent.futures import Future
 from typing import Literal
 
 from drivers.simulated.closeable import Closeable
-from drivers.simulated.gauges.device import LineDevice
+from drivers.simulated.gauges.device import Indicator, LineDevice
 from drivers.simulated.gauges.faults import InjectedGaugeFault, WireFaults, apply_fault
-from drivers.simulated.gauges.indicator import Indicator
 from drivers.simulated.transports.interface import Transport
 from drivers.simulated.transports.pty import PtyTransport
 from drivers.simulated.transports.tcp import SocketTransport

@@ -9,10 +9,14 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 
+from drivers.simulated.linuxcnc.commands import (
+    GET_COMMANDS,
+    SET_COMMANDS,
+    ClientSession,
+    Permission,
+    ServerSettings,
+)
 from drivers.simulated.linuxcnc.faults import ControllerFault, ControllerFaults
-from drivers.simulated.linuxcnc.get_commands import GET_COMMANDS
-from drivers.simulated.linuxcnc.session import ClientSession, ServerSettings
-from drivers.simulated.linuxcnc.set_commands import SET_COMMANDS, Permission
 from drivers.simulated.linuxcnc.state import ConnectionCut, ControllerState
 
 MAX_LINE_BYTES = 255

@@ -9,9 +9,9 @@ from contextlib import suppress
 
 from drivers.simulated.closeable import Closeable
 from drivers.simulated.linuxcnc.client import Client
+from drivers.simulated.linuxcnc.commands import ServerSettings
 from drivers.simulated.linuxcnc.faults import ControllerFaults
 from drivers.simulated.linuxcnc.machine import Machine
-from drivers.simulated.linuxcnc.session import ServerSettings
 from drivers.simulated.linuxcnc.state import ConnectionCut, ControllerState
 
 HOST = "127.0.0.1"

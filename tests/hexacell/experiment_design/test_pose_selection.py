@@ -12,9 +12,8 @@ from scipy.spatial.transform import Rotation
 from hexacell.errors import ExitCode, LimitError
 from hexacell.experiment_design import pose_selection
 from hexacell.experiment_design.candidates import orientations
-from hexacell.experiment_design.gauge_zero import estimate_gauge_zero
 from hexacell.experiment_design.pose_selection import WAYPOINT_GAIN_RATIO, select_pose
-from hexacell.experiment_design.predicted_records import SAFETY_SIGMAS, TRAVEL_SHARE
+from hexacell.experiment_design.predicted_records import SAFETY_SIGMAS, TRAVEL_SHARE, estimate_gauge_zero
 from hexacell.identification.estimator import estimate_online
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS

@@ -7,7 +7,7 @@ import pytest
 from hexacell.acceptance.gates import AcceptanceGate
 from hexacell.cell.recovery import Action
 from hexacell.kinematics.pose import Pose
-from hexacell.presentation.questions import matching_choice, question_text, repeated_text
+from hexacell.presentation.run import matching_choice, question_text, repeated_text
 from procedures.run.questions import ask_approval, ask_placement, ask_recovery
 
 CHOICES = (Action.RETRY, Action.MEASURE_AGAIN, Action.REDO_SET, Action.ABORT)

@@ -3,7 +3,7 @@
 import pytest
 
 from drivers.simulated.gauges.cdi import CdiDevice
-from drivers.simulated.gauges.indicator import Indicator
+from drivers.simulated.gauges.device import Indicator
 from drivers.simulated.gauges.mux10 import Mux10Device
 from drivers.simulated.gauges.sylvac import SylvacDevice
 

@@ -10,7 +10,7 @@ from drivers.gauges.serial_gauge import SerialGauge
 from drivers.gauges.sylvac import SylvacGauge
 from drivers.serial.shared_port import SharedSerialPorts
 from drivers.simulated.gauges.bank import SimulatedGaugeBank, simulated_device
-from drivers.simulated.gauges.indicator import Indicator
+from drivers.simulated.gauges.device import Indicator
 from drivers.simulated.gauges.server import serve_gauges
 from hexacell.cell.devices import GaugeSettings
 from hexacell.cell.simulation import SimulatedGauges

@@ -72,17 +72,17 @@ class RunPathPlanner:
         """The next move back to a set's reference, the gauges being there.
 
         See :func:`hexacell.motion.routes.next_return_move`. Where nothing is ``known`` the robot
-        returns along its trail. None if it did not come from the reference.
+        returns by the path on which it came. None if it did not come from the reference.
         """
-        trail = state.path_from_reference
-        if len(trail) < 2 or state.target != trail[-1][1] or trail[0][1] != state.set(key).pose(1):
+        visited = state.path_from_reference
+        if len(visited) < 2 or state.target != visited[-1][1] or visited[0][1] != state.set(key).pose(1):
             return None
-        moves = [Move(at=key, orientation=orientation, pose=pose) for orientation, pose in trail[:-1]]
+        moves = [Move(at=key, orientation=orientation, pose=pose) for orientation, pose in visited[:-1]]
         if known is None or len(moves) == 1:
             return moves[-1]
         belief, zero = known
-        commands = self.robot.from_commands(Pose(*pose) for _, pose in trail)
-        departure = max(row for row, (orientation, _) in enumerate(trail) if orientation)
+        commands = self.robot.from_commands(Pose(*pose) for _, pose in visited)
+        departure = max(row for row, (orientation, _) in enumerate(visited) if orientation)
         move = next_return_move(belief, zero.reference, commands, departure)
         return moves[move] if isinstance(move, int) else self._waypoint(key, move)
 
@@ -136,7 +136,7 @@ def _level(pose: SixNumbers) -> SixNumbers:
 
 def _no_safe_path(here: SixNumbers, goal: Move) -> NoSafePath:
     return NoSafePath(
-        f"{goal.at}: the robot stands at {Pose(*here)}, and no straight line that keeps to the limits "
+        f"{goal.at}: the robot is at {Pose(*here)}, and no straight line that keeps to the limits "
         f"leads from there to {goal.target}; it was not moved",
         action="Bring it near that pose with its own controller, then go on",
     )

@@ -115,7 +115,7 @@ GIVE_UP = RecoveryPolicy({})
 def failed(
     policy: RecoveryPolicy, error: HexacellError, step: Step | None, state: RunState
 ) -> events.Failed:
-    """What is to be written down of a failure; of several at once, what the gravest calls for."""
+    """The event of a failure; of several at once, the one with the most severe action decides."""
     verdicts = (_verdict(policy, kind, step, state) for kind in _kinds(error))
     kind, attempt, action = max(verdicts, key=lambda verdict: SEVERITY.index(verdict[2]))
     return events.Failed(step=step, failure=kind, attempt=attempt, reason=str(error), action=action)

@@ -1,8 +1,8 @@
 """The run on disk: one JSON line an event, appended, checksummed, forced out before going on.
 
 Every line is on the disk before the next is begun, so a power cut can tear the last one only: it may
-be cut off, or have zeros where its bytes should be. Such a tail is dropped; nobody was told that it
-had been written. Anything else that is wrong is damage and refused with its line. One process writes
+be cut off, or have zeros where its bytes should be. Such a tail is dropped: its write was never
+confirmed. Anything else that is wrong is damage and refused with its line. One process writes
 at a time.
 """
 

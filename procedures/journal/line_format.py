@@ -111,7 +111,7 @@ def decode(line: bytes, due: int) -> Entry | None:
 
 
 def is_whole(line: bytes) -> bool:
-    """Whether a line, without its line feed, has the checksum that stands in it."""
+    """Whether a line, without its line feed, has the checksum that it states."""
     tail = _TAIL.fullmatch(line[-_TAIL_LENGTH:])
     return tail is not None and int(tail[1], 16) == _checksum(line[:-_TAIL_LENGTH])
 

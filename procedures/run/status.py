@@ -48,10 +48,10 @@ class Status(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class EngineFlags:
-    """What is the case; several facts may hold at once.
+    """Facts about the engine; several may hold at once.
 
     Attributes:
-        fault: what failed, until it is decided how to continue.
+        fault: what failed, until somebody decides how to continue.
         asking: a question waits for a person.
         pausing: a pause is wanted, ``at_once`` in mid-step; ``paused``: it has begun.
         stopping: why the run is to end; nothing where it is not.
@@ -68,7 +68,7 @@ class EngineFlags:
 
     @property
     def status(self) -> Status:
-        """The gravest fact decides; a fault stays until it is cleared, also after the end."""
+        """The most severe fact decides; a fault stays until it is cleared, also after the end."""
         words = (
             (self.fault is not None, Status.FAULTED),
             (self.ended, Status.ENDED),

@@ -113,11 +113,11 @@ async def test_a_cancelled_move_stands_still_and_the_next_one_is_its_own(ready, 
 
 
 async def test_a_move_that_takes_too_long(driver, machine):
-    controller = driver(move_timeout_s=0.05)
+    controller = driver(move_timeout_s=1.0)
     await controller.open()
     await controller.prepare()
     machine.duration_s = LONG_S
-    with pytest.raises(MotionInterrupted, match=r"still moving after 0\.05 s"):
+    with pytest.raises(MotionInterrupted, match=r"still moving after 1 s"):
         await controller.move(TARGET)
     machine.duration_s = 0.01
     await controller.move(HOME)

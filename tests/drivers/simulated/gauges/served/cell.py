@@ -25,7 +25,7 @@ DRIVERS: dict[str, Callable[..., SerialGauge]] = {
 PROTOCOLS = tuple(DRIVERS)
 TRANSPORTS = ("pty", "socket")
 FAST = 100.0
-TIMEOUT_S = 0.3
+TIMEOUT_S = 1.0  # for what does not answer; a busy machine answers late
 WORST_LATENCY_S = 0.6
 LONG_S = 100.0
 

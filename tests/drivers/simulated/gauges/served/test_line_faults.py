@@ -60,7 +60,7 @@ async def test_cancelled_readings_leave_the_line_in_step(sylvac):
 @pytest.mark.parametrize("protocol", PROTOCOLS)
 @pytest.mark.parametrize("fault", [InjectedGaugeFault.GARBLED_DIGIT, InjectedGaugeFault.GARBLED_BIT])
 async def test_one_garbled_answer_never_gets_through(protocol, fault):
-    async with cell([protocol] * 3, timeout_s=0.1) as made:
+    async with cell([protocol] * 3, timeout_s=TIMEOUT_S) as made:
         await made.open()
         for _ in range(5):
             made.rack.inject("y", fault, answers=1)

@@ -75,7 +75,7 @@ def _unknown(group: Group, name: str) -> UsageError:
 def _import(group: Group, point: EntryPoint) -> Factory:
     try:
         factory: object = point.load()
-    except Exception as error:  # third-party code may fail in any way
+    except Exception as error:  # third-party code may raise anything
         raise _broken(group, point, repr(error)) from error
     if not callable(factory):
         raise _broken(group, point, f"{factory!r} is not callable")

@@ -93,7 +93,7 @@ class CdiGauge(SerialGauge):
             return answer
         if answer is CdiError.OUT_OF_BOUNDS:
             raise self._at_end("plunger at its end (OUT OF BOUNDS)")
-        raise FrameRejected(frame)  # the request was garbled on its way
+        raise FrameRejected(frame)  # the request was garbled
 
     async def _read_state(self) -> GaugeState:
         unit = await self._unit()

@@ -102,14 +102,14 @@ class SylvacGauge(SerialGauge):
                 raise self._at_end("plunger at its end (ERR3)")
             case SylvacError.SENSOR:
                 raise self._voided("moved too fast or its sensor fails (ERR0)")
-            case _:  # the request was garbled on its way
+            case _:  # the request was garbled
                 raise FrameRejected(frame)
 
     async def _read_state(self) -> GaugeState:
         unit = await self._query(UNIT.command, UNIT.parse)
         if unit is None:
             raise DeviceError(
-                "does not tell its unit", subject=self.subject, action="Use an indicator that knows UNI?"
+                "does not report its unit", subject=self.subject, action="Use an indicator that knows UNI?"
             )
         direction = await self._query(DIRECTION.command, DIRECTION.parse)
         return GaugeState(

@@ -82,8 +82,8 @@ class SharedSerialPort:
 
     def take_unsolicited(self) -> bytes:
         """The bytes that came without a request or too late since the last call; the latest ones only."""
-        strays = self._port.unsolicited
-        return b"".join(strays.popleft() for _ in range(len(strays)))
+        unsolicited = self._port.unsolicited
+        return b"".join(unsolicited.popleft() for _ in range(len(unsolicited)))
 
     async def close(self) -> None:
         """Close the port and end its thread within 200 ms; closing twice is harmless."""

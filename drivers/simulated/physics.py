@@ -1,7 +1,7 @@
 """The true state of a simulated cell: actual slider positions, actual ball position, and the sensors.
 
-Sliders move along given paths with a smooth velocity profile, and can be stopped on the way. The
-platform follows the true geometry by continuation, so it stays in its assembly mode. Gauges and
+Sliders move along given paths with a smooth velocity profile, and can be stopped at any time. The
+pose under the true geometry is computed by continuation, so that the assembly mode is kept. Gauges and
 encoders add noise.
 """
 

@@ -3,7 +3,7 @@
 Such files are ``temp1_input`` below /sys/class/hwmon (the kernel's
 Documentation/hwmon/sysfs-interface.rst) and ``temperature`` of a DS18B20 below
 /sys/bus/w1/devices (Documentation/w1/slaves/w1_therm.rst). Reading the latter makes the sensor measure,
-which takes up to 750 ms; the file is empty while another measurement is under way.
+which takes up to 750 ms; the file is empty during another measurement.
 """
 
 from __future__ import annotations

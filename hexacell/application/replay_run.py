@@ -165,7 +165,7 @@ def _identification(cell: Cell, started: RunStarted) -> IdentificationSettings:
 
 
 def _config_text(folder: RunFolder, started: RunStarted) -> bytes | None:
-    """The controller's config as it was when the run began, if the run folder kept it."""
+    """The controller's config at the start of the run, if the run folder kept it."""
     kept = atomic_files.read_if_present(folder.path / BEFORE)
     if kept is None and folder.proposal.is_file():
         kept = ConfigChange.load(folder.proposal).text_before.encode()

@@ -95,7 +95,7 @@ def too_few_records(plan: Plan) -> Iterator[HexacellError]:
 
 
 def _records_needed(plan: Plan, unknowns: int) -> int:
-    """The least number of records, the points taken in their order, that gives enough equations."""
+    """The smallest number of records, with the points in their order, that gives enough equations."""
     differences = records = -(-unknowns // 3)
     for point in plan.points:
         if differences <= 0:
@@ -108,7 +108,7 @@ def _records_needed(plan: Plan, unknowns: int) -> int:
 def optimisation_failures(plan: Plan) -> Iterator[list[HexacellError]]:
     """What prevents a plan whose poses can be reached from selecting its poses.
 
-    Yields what each piece of the work found, often nothing, so that the caller may stop in between.
+    Yields the failures after each part of the work, often none, so that the caller may stop in between.
     """
     yield [*_unreachable_points(plan)]
     yield [*_blocked_lines(plan)]
@@ -121,7 +121,7 @@ def optimisation_failures(plan: Plan) -> Iterator[list[HexacellError]]:
 
 
 def unreachable_share(plan: Plan) -> dict[int, float]:
-    """At each point the share of robots within the tolerances that cannot take its reference."""
+    """At each point the share of robots within the tolerances that cannot reach its reference."""
     references = plan.robot.from_commands([plan.reference_pose(point) for point in plan.points])
     robots = robots_within_tolerances(plan.robot, ROBOTS, plan.settings.identification.seed)
     can_take = np.array([VirtualRobot(plan.robot, truth).can_take(references) for truth in robots])
@@ -133,8 +133,8 @@ def _unreachable_points(plan: Plan) -> Iterator[HexacellError]:
     for point, share in unreachable_share(plan).items():
         if share > LARGEST_SHARE:
             yield UsageError(
-                f"{share:.0%} of the robots within the tolerances cannot stand there, though the "
-                "controller takes it for reachable",
+                f"{share:.0%} of the robots within the tolerances cannot reach it, although the "
+                "controller computes that it is reachable",
                 subject=f"identification point {point}",
                 action="Move it away from singularities and from the ends of reach",
             )
@@ -180,7 +180,7 @@ def _points_without_poses(plan: Plan) -> Iterator[list[HexacellError]]:
 
 
 def _no_safe_pose(plan: Plan, belief: RobotBelief, point: int) -> HexacellError | None:
-    """Why no record can follow a point's reference, if none can."""
+    """The reason if no record after a point's reference is possible."""
     state = CampaignState(point=point, present=plan.reference_pose(point))
     try:
         plan.chooser.choose(belief, _expected_zero(plan, belief, point), state)
@@ -199,7 +199,7 @@ def _expected_zero(plan: Plan, belief: RobotBelief, point: int) -> GaugeZero:
     """The gauges' zero after the reference was measured, if the robot is as estimated."""
     actual = belief.commanded.actual_poses(plan.robot.from_commands([plan.reference_pose(point)]))
     if not actual.found[0]:
-        raise LimitError("the robot as drawn cannot stand where the controller would send it")
+        raise LimitError("the robot as drawn cannot reach the pose that the controller would command")
     return estimate_gauge_zero(belief, actual.poses, actual.joints, np.zeros((1, 3)))
 
 

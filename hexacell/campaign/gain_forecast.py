@@ -46,7 +46,7 @@ class Forecaster:
 
     Attributes:
         sizes: how many records each point gets at most.
-        select_sets: gives the sets that stand for poses not selected yet; called once, when needed.
+        select_sets: gives sets that represent the poses not selected yet; called once, when needed.
     """
 
     sizes: Mapping[int, int]
@@ -84,7 +84,7 @@ class Forecaster:
         return Forecast(
             now_mm=now,
             next_mm=after,
-            # The planned sets may tell less than the record that was really selected.
+            # The planned sets may give less information than the record actually selected.
             end_mm=after if selected and records == 1 else min(end, after),
             records=records,
             minutes=self.budget.time_model.minutes(records, begun_later),

@@ -1,7 +1,7 @@
 """The information of whole sets of records, before any of their poses is selected.
 
-A set of well spread poses stands for those that will be selected at a point: the D-optimal ones of the
-robot as drawn, found greedily. What n records add to the information on the parameters follows from their
+The poses that will be selected at a point are represented by a set of well spread ones: the greedy
+D-optimal set for the robot as drawn. The information that n records add is computed from their
 Jacobians H and covariances V at the present estimate. The point's unknown zero is eliminated by the Schur
 complement:
 

@@ -167,7 +167,7 @@ class Plan:
             return Finished(reason)
         safe = [point for point in self.points if point not in state.done and self._is_safe(state, point)]
         if not safe:
-            return Finished("the robot cannot stand safely at the points that are left")
+            return Finished("none of the remaining points can be reached safely")
         worthwhile = self._worthwhile(state, safe)
         if not worthwhile:
             least = self.settings.identification.least_gain_mm

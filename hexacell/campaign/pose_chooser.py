@@ -77,7 +77,7 @@ class PoseChooser:
         present, end = self.robot.from_commands([state.present]), PoseBatch.of([selected.command])
         route = find_route(belief, present, end, commands, zero.reference)
         if route is None:
-            raise LimitError("no safe straight line leads on from here")
+            raise LimitError("no safe straight line starts here")
         return selected, tuple(via[row] for row in route)
 
     def choose(self, belief: RobotBelief, zero: GaugeZero, state: CampaignState) -> SelectedPose:
@@ -131,7 +131,7 @@ class PoseChooser:
 
     @staticmethod
     def _as_visited(visited: list[Pose], waypoint: Pose) -> Pose:
-        """The reference exactly as it was visited, where that is the waypoint."""
+        """The reference exactly as visited, if the waypoint is the reference."""
         return visited[0] if visited and is_same_pose(visited[0], waypoint) else waypoint
 
     def _criterion(self, belief: RobotBelief) -> Criterion:

@@ -47,7 +47,7 @@ class OnlineEstimate:
         """
         found = self.identification
         if found is None or point not in found.problem.labels[:, 0]:
-            raise LimitError("the records of this point say nothing about where the ball is")
+            raise LimitError("the records of this point do not determine the ball's position")
         problem = found.problem
         rows = np.flatnonzero(problem.labels[:, 0] == point)
         return estimate_gauge_zero(

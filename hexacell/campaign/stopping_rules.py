@@ -80,4 +80,4 @@ class StoppingRules:
             return None
         estimate = self.estimator.estimate(state.measurements)
         best = self.forecaster.rank_points(state, estimate, [point, *others]).best
-        return None if best == point else f"point {best} tells more in the same time"
+        return None if best == point else f"point {best} gains more in the same time"

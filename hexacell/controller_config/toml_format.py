@@ -66,7 +66,7 @@ class NativeToml:
         last_decimal = {kind.symbol: 10.0**-kind.unit.decimals for kind in self._parameters.kinds}
         if (abs(after.vector - geometry.vector) > self._parameters.by_kind(last_decimal)).any():
             raise FileError(
-                "the new geometry does not read back as it was written",
+                "the new geometry reads back with different numbers",
                 action="Nothing was written; please report this with the config",
             )
         return changed

@@ -53,7 +53,7 @@ def commit(change: ConfigChange, backup_folder: Path) -> Receipt:
 
 
 def rollback(receipt: Receipt, *, force: bool = False) -> bool:
-    """Restore the config as it was before the commit, byte for byte.
+    """Restore the config of before the commit, byte for byte.
 
     Args:
         receipt: of the commit.
@@ -129,7 +129,7 @@ def _undo(receipt: Receipt, before: bytes, cause: BaseException) -> NoReturn:
     if not isinstance(cause, Exception):
         raise cause
     raise WriteBackUndone(
-        f"the write-back failed and was undone, the config is as it was ({_reason(cause)})",
+        f"the write-back failed and was undone, the config is unchanged ({_reason(cause)})",
         subject=receipt.path,
         action="Correct that and apply the change again",
     ) from cause
@@ -160,9 +160,7 @@ def _keep_foreign_version(receipt: Receipt, found: bytes | None) -> None:
 
 def _require_written(path: Path, expected: bytes) -> None:
     if atomic_files.read_bytes(path) != expected:
-        raise FileError(
-            "the file does not read back as it was written", subject=path, action="Check the disk"
-        )
+        raise FileError("the file does not contain what was written", subject=path, action="Check the disk")
 
 
 def _content(path: Path) -> bytes | None:

@@ -151,7 +151,7 @@ def within_limits(limits: Limits, poses: PoseBatch, joints: Array) -> Mask:
 
 
 def workspace_poses(belief: RobotBelief, points: Array) -> PoseBatch:
-    """Seven poses at each ball position (m, 3), mm: level, and rotated both ways about x, y and z.
+    """Seven poses at each ball position (m, 3), mm: level, and rotated in both directions about x, y and z.
 
     Poses that the robot cannot take within its limits, by its estimated geometry or by the controller's,
     are left out.

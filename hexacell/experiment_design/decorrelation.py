@@ -1,8 +1,8 @@
 """The record that would best separate two parameters whose estimates are strongly correlated.
 
 One more record is tried at each point measured so far: the level platform tilted about x or y, or rotated
-about z. The covariance C after it follows from the record's Jacobian H against the point's reference and
-its own covariance V, before it is measured:
+about z. The covariance C after it is predicted from the record's Jacobian H, relative to the point's
+reference, and its covariance V (Kalman update):
 
     C' = C - C H^T (H C H^T + V)^-1 H C = C - F^T F.
 """
@@ -110,7 +110,7 @@ def _trials(belief: RobotBelief, found: Identification) -> Iterator[_Trials]:
 
 
 def _rotations() -> Array:
-    """Rotations (24, 3, 3) about x, y and z, both ways."""
+    """Rotations (24, 3, 3) about x, y and z in both directions."""
     angles = np.concatenate([ANGLES, -ANGLES])
     return rotations.from_vector((angles[:, None, None] * np.eye(3)).reshape(-1, 3))
 

@@ -84,12 +84,12 @@ def select_pose(
     be 20 degrees from where the controller believes it to be.
 
     Args:
-        belief: what is known of the robot.
+        belief: the estimate of the robot and its covariance.
         zero: of the point's gauges.
         orientations: the candidates.
         start: the command (1) that the path starts from; by default that of the reference.
         criterion: what is gained.
-        reference_command: the command (1) of the reference, if paths may lead over it.
+        reference_command: the command (1) of the reference, if paths may pass through it.
 
     Raises:
         LimitError: none is reachable within the limits and almost surely inside the travel.
@@ -169,7 +169,7 @@ class _PathSearch:
     def first_safe(
         self, records: PredictedRecords, commands: PoseBatch, gains: Array
     ) -> SelectedPose | None:
-        """The first of some ranked candidates to which a safe path leads."""
+        """The first of some ranked candidates with a safe path to it."""
         if not len(records):
             return None
         paths, rows = self.planner.options(commands), np.flatnonzero(self.travel.holds(records))
@@ -189,7 +189,7 @@ class _PathSearch:
         return self._selected(records[np.array([row])], commands.pose(row), path.waypoints)
 
     def _first(self, paths_to: Callable[[Rows], list[Path | None]], rows: Rows) -> tuple[int, Path] | None:
-        """The first row to which a path leads along which the ball stays inside, and the path."""
+        """The first row with a path along which the ball stays inside, and the path."""
         for row, path in zip(rows.tolist(), paths_to(rows), strict=True):
             if path is not None and self.travel.holds_along(path):
                 return row, path

@@ -42,11 +42,11 @@ def select_validation_poses(
     joints = belief.commanded.joints(poses)
     usable = np.flatnonzero(within_limits(belief.limits, poses, joints) & _after(belief, poses))
     if not len(usable) or usable[0] != 0:
-        raise LimitError(f"the untilted platform cannot stand at {poses.pose(0)} within the limits")
+        raise LimitError(f"the untilted platform cannot reach {poses.pose(0)} within the limits")
     poses = poses[usable]
     actual = belief.commanded.actual_poses(poses)
     if not actual.found[0]:
-        raise LimitError(f"where the robot really goes for {poses.pose(0)} cannot be told")
+        raise LimitError(f"the actual pose at the command {poses.pose(0)} cannot be computed")
     inside = _stays_inside(belief, actual)
     selected = _select_farthest(belief, poses[inside], actual.poses[inside], used, count)
     if len(selected) < count:
@@ -85,7 +85,7 @@ def _select_farthest(
 ) -> list[int]:
     """Rows of commands: the first, then each next one farthest from those selected and used.
 
-    From each a clear line must lead to the next, and back to the first, where the set ends.
+    The straight lines from each to the next, and back to the first, must be clear.
     """
     distance = np.full(len(commands), np.inf)
     for orientation in () if used is None else used:

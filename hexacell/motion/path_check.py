@@ -2,7 +2,7 @@
 
 A line is sampled. Joint ranges are checked on a fine sampling of the commands. The singularity margin is
 checked on a coarser one, for the controller's geometry and for the estimated one; both must keep their
-assembly mode. The ball's distance from the reference follows from the estimated robot's actual path.
+assembly mode. The ball's distance from the reference is computed from the estimated robot's actual path.
 """
 
 from __future__ import annotations
@@ -135,7 +135,7 @@ def _trace(
     *,
     thorough: bool,
 ) -> tuple[LineBatch, NDArray[np.intp]]:
-    """Actual poses of the estimated robot along some lines, and the rows of those it can follow."""
+    """Actual poses of the estimated robot along some lines, and the rows of those without a singularity."""
     if start.actual is None or not len(rows):
         return commands, rows[:0]
     traced = trace_path(

@@ -1,4 +1,4 @@
-"""Straight lines of commands, and the actual path of a robot while its controller follows them.
+"""Straight lines of commands, and the actual path of a robot under its controller.
 
 The controller interpolates the command linearly. The actual pose at each point of the line closes the
 robot's own geometry at the joint variables that the controller computes; it is found by path tracking
@@ -119,8 +119,8 @@ class TracedPath:
     """The actual path of a robot along n lines.
 
     Attributes:
-        actual: poses; meaningless on lines that are not ``found``.
-        found: (n,) lines that the robot can follow on its assembly mode.
+        actual: poses; undefined on lines that are not ``found``.
+        found: (n,) lines along which the robot stays on its assembly mode.
     """
 
     actual: LineBatch

@@ -1,6 +1,6 @@
 """The result of an identification as data, for files and for the journal.
 
-All that follows from it, the acceptance gates and the write-back, needs no other computation.
+The acceptance gates and the write-back are derived from it without further computation.
 """
 
 from __future__ import annotations

@@ -104,7 +104,7 @@ def write_atomically(path: Path, data: bytes, *, expected: bytes | None = None) 
             _require_content(target, expected)
             os.replace(temporary, target)  # noqa: PTH105 - named as the system call it is
     except OSError as error:
-        raise os_error_to_file_error("cannot be written and is as it was", path, error) from error
+        raise os_error_to_file_error("cannot be written and is unchanged", path, error) from error
     try:
         sync_folder(target.parent)
     except OSError as error:
@@ -231,7 +231,7 @@ def _keep_owner(descriptor: int, target: Path, status: os.stat_result) -> None:
     except PermissionError as error:
         raise FileError(
             f"the file belongs to user {status.st_uid}, group {status.st_gid}, and replacing it would "
-            "change that; it is as it was",
+            "change that; it is unchanged",
             subject=target,
             action="Run as its owner",
         ) from error

@@ -80,7 +80,7 @@ class _Scanner:
             self._lines[self._table] = self._line_here()
 
     def _open(self, path: KeyPath, keys: str) -> KeyPath:
-        """The path that ``keys``, read just now, lead to from ``path``."""
+        """The path of the ``keys`` just read, relative to ``path``."""
         for key in _split_keys(keys):
             # A header below an array of tables continues the last table of the array.
             path = (*path, self._lengths[path] - 1) if path in self._lengths else path

@@ -67,14 +67,14 @@ def gauss_newton(
         poses = reached.poses
         if np.abs(step).max() < tolerance_mm:
             return geometry
-    raise ConvergenceError(f"Gauss-Newton did not settle in {steps} steps")
+    raise ConvergenceError(f"Gauss-Newton did not converge in {steps} steps")
 
 
 def least_squares_without_jacobian(problem: Problem) -> Geometry:
-    """The paper's second way (its lsqnonlin): finite differences, a trust region, scipy's TRF.
+    """The paper's second solver (lsqnonlin): finite differences, a trust region, scipy's TRF.
 
     Raises:
-        ConvergenceError: scipy reports no convergence, or the end is outside the assembly mode.
+        ConvergenceError: scipy reports no convergence, or the solution is on another assembly mode.
     """
 
     def reached(free: Array) -> ForwardResult:

@@ -36,7 +36,7 @@ class VirtualRobot:
     Attributes:
         model: what is known of it: mechanism, commanding geometry, noise and limits.
         truth: its geometry, in the mechanism's frame convention.
-        smallest_margin: the smallest singularity margin of the true geometry on the way so far.
+        smallest_margin: the smallest singularity margin of the true geometry along all moves so far.
     """
 
     def __init__(self, model: Robot, truth: Geometry, random: np.random.Generator | None = None) -> None:
@@ -73,14 +73,14 @@ class VirtualRobot:
         commands = self.model.from_commands([command])
         actual = self.actual_poses(commands)
         if not actual.found[0] or self._see_margin(actual.poses, actual.joints) < self._least_margin:
-            raise ReachError(f"this robot cannot stand at {command}")
+            raise ReachError(f"this robot cannot reach {command}")
         self._command, self._actual = command, actual.poses
 
     def move(self, command: Pose) -> None:
         """Move to a command along the controller's straight line.
 
         Raises:
-            LimitError: it is not at any pose yet, or the line leads into a singularity.
+            LimitError: it is not at any pose yet, or a singularity is on the line.
             ReachError: the controller cannot reach a pose on the line.
         """
         end = self.model.from_commands([command])
@@ -89,7 +89,7 @@ class VirtualRobot:
         arguments = (LineBatch.from_poses(line, 1), joints[:, None], self._actual_pose)
         traced = trace_path(self.model.mechanism, self.truth, *arguments)
         if not traced.found[0]:
-            raise LimitError("the line leads into a singularity")
+            raise LimitError("a singularity is on the line")
         poses = traced.actual.flat()
         self._see_margin(poses, joints)
         self._command, self._actual = command, poses[[-1]]

@@ -78,7 +78,7 @@ class IdentificationSteps:
     def _finish_point(self, state: RunState, key: SetKey) -> Step:
         if step := self.sets.at_reference(state, key):
             return step
-        # Also from a waypoint of the way back, where another path might lead to where it came from.
+        # Also at a waypoint of the path back: a new plan could return to where the robot came from.
         back = self.sets.paths.back(state, key, self._known(state, key))
         return back or self._at_or_to_reference(state, key)
 
@@ -87,7 +87,7 @@ class IdentificationSteps:
         return step or self.sets.to_reference(state, key, self._ball(state, key))
 
     def _ball(self, state: RunState, key: SetKey) -> Array | None:
-        """Where the ball was when the set's gauges were zeroed (3,), mm, if the records can tell."""
+        """Where the ball was when the set's gauges were zeroed (3,), mm, if the records determine it."""
         known = self._known(state, key)
         return None if known is None else known[1].reference
 
@@ -138,7 +138,7 @@ def _present_pose(state: RunState, key: SetKey) -> Pose | None:
 
 
 def _measure_pose(state: RunState, chosen: MeasurePose) -> Move:
-    """The move to the chosen pose, or to the first pose on the way to it."""
+    """The move to the chosen pose, or to the first waypoint of its path."""
     at = SetKey(phase=Phase.IDENTIFY, point=chosen.point)
     if chosen.via:
         pose = chosen.via[0].as_tuple()

@@ -24,7 +24,7 @@ from procedures.run.steps import Move, SetKey, SixNumbers
 
 
 class NoSafePath(LimitError):
-    """No checked straight line leads on from where the robot is; nothing moved."""
+    """No checked straight line starts at the robot's position; nothing moved."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,7 +95,7 @@ class RunPathPlanner:
         return Move(at=key, orientation=0, pose=self.robot.to_command(command).as_tuple())
 
     def _intermediate(self, state: RunState, goal: Move) -> list[tuple[int, SixNumbers]]:
-        """Poses that a route may lead over, with their orientations; 0 where nothing is measured."""
+        """Poses that a route may use as waypoints, with their orientations; 0 where nothing is measured."""
         samples = state.set(goal.at).samples
         visited = [(s.orientation, s.pose) for s in samples if s.orientation != goal.orientation]
         level = [_level(pose) for pose in (state.target, goal.pose) if pose is not None]
@@ -136,7 +136,7 @@ def _level(pose: SixNumbers) -> SixNumbers:
 
 def _no_safe_path(here: SixNumbers, goal: Move) -> NoSafePath:
     return NoSafePath(
-        f"{goal.at}: the robot is at {Pose(*here)}, and no straight line that keeps to the limits "
+        f"{goal.at}: the robot is at {Pose(*here)}, and no straight line within the limits "
         f"leads from there to {goal.target}; it was not moved",
-        action="Bring it near that pose with its own controller, then go on",
+        action="Bring it near that pose with its own controller, then continue",
     )

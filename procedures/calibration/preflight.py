@@ -20,7 +20,7 @@ from procedures.run.cancellation import in_thread
 async def plan_failures(calibration: Calibration, *, unattended: bool) -> list[HexacellError]:
     """What is wrong with the plan itself, before any device is asked.
 
-    It takes a second or more. A stop is heeded after the piece of the work that is being done.
+    It takes a second or more. A stop takes effect after the current part of the work.
     """
     pieces = _plan_failures(calibration, unattended=unattended)
     failures: list[HexacellError] = []
@@ -68,7 +68,7 @@ async def device_failures(devices: Devices) -> list[HexacellError]:
 
 
 async def start_failures(devices: Devices, folder: Path, free_disk_mb: float) -> list[HexacellError]:
-    """What keeps a run from beginning beside its devices: the stop line, and a disk without room."""
+    """What prevents the start of a run, apart from the devices: the stop line, and a full disk."""
     pressed = await devices.stop_input.active_reason()
     trips = [
         None if pressed is None else rules.motion_forbidden(pressed),
@@ -82,4 +82,4 @@ def raise_all(failures: list[HexacellError]) -> None:
     if len(failures) == 1:
         raise failures[0]
     if failures:
-        raise SeveralErrors(f"{len(failures)} things stand in the way", failures)
+        raise SeveralErrors(f"{len(failures)} problems prevent the run", failures)

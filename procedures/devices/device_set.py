@@ -104,7 +104,7 @@ class Thermometers:
     async def _identity(self, thermometer: Thermometer) -> DeviceIdentity | None:
         try:
             return await thermometer.open()
-        except Exception as error:  # a stranger's driver may fail in any way
+        except Exception as error:  # a third-party driver may raise anything
             self._warn(thermometer.name, error)
             return None
 

@@ -126,9 +126,9 @@ class ConfigTransactions:
         except HexacellError as error:
             await in_thread(rollback, receipt)
             raise WriteBackUndone(
-                f"the controller did not take {name} ({error}); its config is as it was",
+                f"the controller did not take {name} ({error}); its config is restored",
                 subject=receipt.path,
-                action=action if await self._reads_again() else "Start the controller anew before it moves",
+                action=action if await self._reads_again() else "Restart the controller before it moves",
             ) from error
 
     async def _reads_again(self) -> bool:
@@ -203,8 +203,8 @@ def revert_at_end(state: RunState, error: BaseException) -> Reversal | None:
     """What to revert if an error ends the run.
 
     A result that was not verified is reverted after a failure; a person who interrupts may resume and
-    verify it. A provisional geometry is reverted where the robot is at a reference. Elsewhere the slider
-    positions may belong to no pose of the old geometry, and the resumed run reverts it.
+    verify it. A provisional geometry is reverted where the robot is at a reference. At other poses the
+    slider positions may belong to no pose of the old geometry; the resumed run reverts it.
     """
     is_failure = isinstance(error, HexacellError) and not isinstance(error, Interruption)
     if is_failure and state.is_unverified:

@@ -33,7 +33,7 @@ _BEFORE_SAMPLING = (events.Located, events.Arrived, events.GaugesPlaced)
 class Engine:
     """One run, from the end of its journal to the end of the run.
 
-    A face hears of events through listeners, called after each event is on the disk, and of the status
+    A face receives events through listeners, called after each event is on the disk, and of the status
     through ``watch``. It controls the run through ``command``. The executor's operator should be
     ``broker``, so that any face may answer the question that is open.
     """
@@ -88,7 +88,7 @@ class Engine:
 
         Raises:
             Interruption: a command ended the run early.
-            HexacellError: a step failed, and the policy had no way to continue.
+            HexacellError: a step failed, and the policy ends the run.
         """
         self._commands.set_flags(begun=True)
         try:
@@ -112,7 +112,7 @@ class Engine:
         the robot is unknown.
         """
         if self.state.target is not None and not self.state.position_unknown:
-            self.record(events.Interrupted(reason="the program ended without a word", exit_code=_KILLED))
+            self.record(events.Interrupted(reason="the program ended unexpectedly", exit_code=_KILLED))
         for key, measured in list(self.state.sets.items()):
             is_useless = not measured.samples or (measured.rejections and key.phase is Phase.BEFORE)
             if is_useless and not measured.closed:

@@ -83,7 +83,7 @@ def _kind_of_trip(trip: Trip) -> FailureKind:
 
 @dataclass(frozen=True, slots=True)
 class RecoveryPolicy:
-    """What follows the failures of a run.
+    """The actions after the failures of a run.
 
     Attributes:
         escalations: by kind; a kind without one ends the run.
@@ -103,7 +103,7 @@ class RecoveryPolicy:
         return cls({kind: rules.escalation(kind) for kind in kinds}, settings.wait_s)
 
     def action(self, kind: FailureKind, attempt: int) -> Action:
-        """What follows the failure of a kind that is the ``attempt``-th, counted from 1."""
+        """The action after the ``attempt``-th failure of a kind, counted from 1."""
         escalation = self.escalations.get(kind, (Action.ABORT,))
         return escalation[min(attempt, len(escalation)) - 1]
 

@@ -1,8 +1,8 @@
 """Which devices are supervised during which kind of step, and against which limits.
 
 Gauges are supervised only within a set: after its reference was taken, on moves between its poses. On
-the way to another point the ball leaves the gauge plates, plungers extend to their ends and gauges
-may be carried; their readings then mean nothing.
+moves to another point the ball leaves the gauge plates, plungers extend to their ends and gauges may be
+carried, so their readings are not used.
 The controller is supervised whenever it must stay enabled. That is not the case while it is prepared
 or reloads its config: there the driver itself verifies every step.
 """

@@ -121,7 +121,7 @@ def unexpected_motion(snapshot: Snapshot, limits: GuardLimits) -> Trip | None:
     if limits.rest_mm is None or report is None or report.value is None or report.first is None:
         return None
     moved = np.subtract(report.value.positions_mm, report.first.positions_mm)
-    words = f"moved by {{:+.2f}} mm while the robot had to stand still (limit {limits.rest_mm:g} mm)"
+    words = f"moved by {{:+.2f}} mm during standstill (limit {limits.rest_mm:g} mm)"
     return _slider_trip(moved, limits.rest_mm, words)
 
 
@@ -149,7 +149,7 @@ def motion_forbidden(reason: str) -> Trip:
 
 def following_error(commanded: Array, measured: Array, limit_mm: float) -> Trip | None:
     """After a move: a slider (6,), mm, is too far from its commanded position."""
-    words = f"is {{:+.3f}} mm from where the controller was told to send it (limit {limit_mm:g} mm)"
+    words = f"is {{:+.3f}} mm from its commanded position (limit {limit_mm:g} mm)"
     return _slider_trip(np.subtract(measured, commanded), limit_mm, words)
 
 

@@ -166,7 +166,7 @@ def _parse(path: Path, stream: BinaryIO) -> tuple[tuple[Entry, ...], int]:
             due = len(entries) + 1
             entry = _decoded(path, line, due)
             if entry is None:
-                if begins_whole(line) or _anything_follows(stream):
+                if begins_whole(line) or _has_more_data(stream):
                     raise _damaged(path, due)
                 break
             entries.append(entry)
@@ -174,7 +174,7 @@ def _parse(path: Path, stream: BinaryIO) -> tuple[tuple[Entry, ...], int]:
     return tuple(entries), whole
 
 
-def _anything_follows(stream: BinaryIO) -> bool:
+def _has_more_data(stream: BinaryIO) -> bool:
     return any(part.strip(b"\0") for part in iter(partial(stream.read, LONGEST_LINE), b""))
 
 

@@ -39,8 +39,8 @@ class Entry:
     Attributes:
         number: its place in the journal, from 1; also its line in the file.
         at: when it was written, UTC, by a clock that may have been set in between.
-        monotonic_s: the same by a clock that only goes forward, for durations, s; it begins anew
-            when the machine does. None in journals of version 1.
+        monotonic_s: time of a monotonic clock, for durations, s; it restarts when the machine
+            does. None in journals of version 1.
     """
 
     number: int
@@ -50,7 +50,7 @@ class Entry:
 
 
 class LineRefused(Exception):
-    """A line that is as it was written and still cannot be used."""
+    """An undamaged line that this version cannot use."""
 
     def __init__(self, problem: str, action: str) -> None:
         self.problem = problem
@@ -100,7 +100,7 @@ def decode(line: bytes, due: int) -> Entry | None:
     number, at, monotonic, event = match.groups()
     if int(number) != due:
         raise LineRefused(
-            f"the journal is damaged: record {int(number)} stands where record {due} is due", RESTORE
+            f"the journal is damaged: record {int(number)} is in the place of record {due}", RESTORE
         )
     try:
         found = _EVENTS.validate_json(event)
@@ -117,9 +117,9 @@ def is_whole(line: bytes) -> bool:
 
 
 def begins_whole(line: bytes) -> bool:
-    """Whether a damaged line begins with a whole one that something else follows.
+    """Whether a damaged line starts with a whole line and has more data after it.
 
-    Then only the line feed between the two is gone. Zeros are nothing: they were never written.
+    Then only the line feed between the two is lost. Zeros do not count as data: they were never written.
     """
     ends = (match.end() for match in _TAIL.finditer(line))
     return any(line[end + 1 :].strip(b"\0") and is_whole(line[:end]) for end in ends)

@@ -177,7 +177,7 @@ class Replayer:
             self.report.taken += 1
 
     async def _end(self, event: events.Ended, before: Sequence[Entry]) -> None:
-        """The real engine must find no next step and end the run in the same way."""
+        """The engine must find no next step and end the run with the same event."""
         if self._scope is not Scope.ALL:
             self.report.taken += 1
             return

@@ -165,7 +165,7 @@ class SetInvalidated(Frozen):
 class ProvisionalApplied(Frozen):
     """The controller commands with a provisional geometry while the points are measured.
 
-    ``geometry`` is in the mechanism's frame convention. The config as it was is kept in ``folder``,
+    ``geometry`` is in the mechanism's frame convention. The earlier config is kept in ``folder``,
     a part of the run folder.
     """
 
@@ -175,7 +175,7 @@ class ProvisionalApplied(Frozen):
 
 
 class ProvisionalReverted(Frozen):
-    """The controller has read its config as it was before the provisional geometry."""
+    """The controller has read the config of before the provisional geometry."""
 
     kind: Literal["taken back"] = "taken back"
 
@@ -211,7 +211,7 @@ class ResultValidated(Frozen):
 
 
 class RolledBack(Frozen):
-    """The controller has read its config as it was before the run, bit for bit."""
+    """The controller has read the config of before the run, bit for bit."""
 
     kind: Literal["rolled back"] = "rolled back"
 
@@ -248,7 +248,7 @@ class Failed(Frozen):
     """A step, or deciding on one, failed; motion was stopped.
 
     ``failure`` is its kind, ``attempt`` counts failures of this kind at this set or step since the
-    run was begun or resumed, and ``action`` is what follows; ``asked`` tells whether a person chose it.
+    run was begun or resumed, and ``action`` is the reaction; ``asked`` is whether a person chose it.
     """
 
     kind: Literal["failed"] = "failed"

@@ -55,7 +55,7 @@ class Question:
         subject: what the question is about.
         choices: the answers that are accepted. If empty, any text is (the name of who approves) and
             None declines.
-        default: the choice that an empty answer stands for; None if a choice must be made.
+        default: the choice that an empty answer selects; None if a choice must be made.
     """
 
     kind: QuestionKind

@@ -239,7 +239,7 @@ def _failed(state: RunState, event: events.Failed) -> RunState:
     where = (event.failure.value, event.place)
     counted = replace(state, failures={**state.failures, where: event.attempt})
     match event.step:
-        # The ball left its plate on the way to a chosen pose: another pose is chosen.
+        # The ball left its plate on the move to a chosen pose: another pose is chosen.
         case Move(at=at, orientation=orientation) if _is_plate(event) and at.phase is Phase.IDENTIFY:
             counted = _with_set(counted, at, counted.set(at).with_rejection(orientation))
     return _unverified(counted) if event.action is Action.MEASURE_AGAIN else counted

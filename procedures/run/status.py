@@ -20,7 +20,7 @@ def ending(state: RunState) -> events.Ended:
     code = ExitCode.DONE if passed else ExitCode.OUT_OF_LIMITS
     line = judged.line if judged is not None else "nothing was judged"
     if state.rolled_back:
-        line += "; rolled back, the controller is as it was"
+        line += "; rolled back, the controller has its old config"
     return events.Ended(exit_code=int(code), line=line)
 
 

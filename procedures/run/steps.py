@@ -61,7 +61,7 @@ class Locate(Frozen):
 class Move(Frozen):
     """Send the robot to a pose; the first orientation of a set is its reference.
 
-    Orientation 0 is a pose on the way, at which nothing is measured.
+    Orientation 0 is a waypoint, at which nothing is measured.
     """
 
     kind: Literal["move"] = "move"

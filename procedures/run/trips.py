@@ -39,7 +39,7 @@ class Trip:
 
     @property
     def is_about_the_ball(self) -> bool:
-        """Whether every device is well, and only the pose was not one that the gauges can follow."""
+        """Whether all devices work and only the pose was outside the gauges' range."""
         return self.guard in {Guard.GAUGE_END, Guard.PLATE}
 
     def as_error(self) -> GuardTripped:

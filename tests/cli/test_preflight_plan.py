@@ -32,7 +32,7 @@ IMPOSSIBLE: dict[str, tuple[tuple[tuple[str, str], ...], tuple[str, ...]]] = {
     ),
     "tolerances": (
         (("S_mm = 7.0", "S_mm = 150.0"),),
-        ("identification point 1", "cannot stand there"),
+        ("identification point 1", "cannot reach it"),
     ),
     "tilt": (
         (("tilt_deg = 45.0", "tilt_deg = 0.5"),),
@@ -48,7 +48,7 @@ IMPOSSIBLE: dict[str, tuple[tuple[tuple[str, str], ...], tuple[str, ...]]] = {
     ),
     "a point that most robots cannot reach": (
         ((P5, "[179.0, -280.0, 322.0],\n]\norientations = 11"),),
-        ("identification point 5: ", "of the robots within the tolerances cannot stand there"),
+        ("identification point 5: ", "of the robots within the tolerances cannot reach it"),
     ),
     "a way across a singularity": (
         ((P5, "[111.0, 15.0, -266.0],\n]\norientations = 11"),),

@@ -113,7 +113,9 @@ class TestNobodyIsThere:
         outcome = typed_here("run", fast_cell.cell, "--resume", run, "--json")
         assert outcome.code == outcome.document["exit_code"] == 1
         line = outcome.document["line"]
-        assert line.endswith("(limit 0.0001): out of limits; rolled back, the controller is as it was")
+        assert line.endswith(
+            "(limit 0.0001): out of limits; rolled back, the controller has its old config"
+        )
         assert "the old geometry is back in the controller" in outcome.err
         assert fast_cell.controller.read_bytes() == config
         assert (run / "config-after").read_bytes() != config
@@ -140,7 +142,7 @@ class TestNobodyIsThere:
         outcome = typed_here("run", fast_cell.cell, "--resume", run, "--json")
         assert outcome.code == outcome.document["exit_code"] == 6
         assert "failed with status 7: sorry" in outcome.err
-        assert "its config is as it was" in outcome.err
+        assert "its config is restored" in outcome.err
         assert fast_cell.controller.read_bytes() == config
 
     def test_a_check_changes_nothing(self, typed_here, fast_cell):
@@ -250,13 +252,13 @@ class TestAPersonAtTheTerminal:
         process = start_at(terminal, start, "run", quick_cell.cell, "--mode", "check")
         terminal.read_until("Press Enter when they are in place. ")
         terminal.type("\n")
-        terminal.read_until("How to go on (retry, measure-again, redo-set, abort)? ")
+        terminal.read_until("How to continue (retry, measure-again, redo-set, abort)? ")
         terminal.type("re\n")
         terminal.read_until("Type one of retry, measure-again, redo-set, abort: ")
         terminal.type("redo\n")
         terminal.read_until("Press Enter when they are in place. ")
         terminal.type("\n")
-        terminal.read_until("How to go on (retry, measure-again, redo-set, abort)? ")
+        terminal.read_until("How to continue (retry, measure-again, redo-set, abort)? ")
         terminal.type("abort\n")
         assert ended(process, terminal) in {1, 3}
         assert "measured again" in process.out

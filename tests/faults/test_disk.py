@@ -133,7 +133,7 @@ def test_a_disk_that_is_full_while_measuring(disk: Disk, writes: Sequence[Write]
 @pytest.mark.slow
 def test_a_config_that_may_not_be_written(disk: Disk, writes: Sequence[Write]) -> None:
     words = disk.fail(the(writes, "open", "simulated-hexaglide.controller.toml"), errno.EACCES)
-    assert "simulated-hexaglide.controller.toml: cannot be written and is as it was" in words
+    assert "simulated-hexaglide.controller.toml: cannot be written and is unchanged" in words
 
 
 @pytest.mark.slow

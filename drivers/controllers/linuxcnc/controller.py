@@ -90,7 +90,7 @@ class LinuxcncrshController:
 
         Raises:
             MoveRefused: The pose is out of reach or limits, or the controller is not prepared.
-            MotionInterrupted: It stopped elsewhere; the message says where.
+            MotionInterrupted: it stopped at another pose, which the message names.
             DeviceError: The connection broke.
         """
         stops = self._session.stop_count
@@ -191,7 +191,7 @@ class LinuxcncrshController:
             if was_stopped or loop_time() > deadline:
                 reason = "it was stopped on request" if was_stopped else await commands.reason()
                 raise MotionInterrupted(
-                    f"stopped at {there} on the way to {target}: {reason}",
+                    f"stopped at {there} before reaching {target}: {reason}",
                     subject=self._name,
                     action="Find out why it stopped, then prepare it and measure this pose again",
                 )

@@ -31,8 +31,8 @@ def rejected_record(
 ) -> DataFault:
     """A record that is left out.
 
-    ``gauges`` alone are wrong, or none stands out. ``offset_mm`` is what the gauges x, y and z read too
-    much; ``leg`` (from 1) is off its commanded place by so many mm.
+    ``gauges`` are the faulty gauges, empty if no single one is at fault. ``offset_mm`` are the errors of
+    the gauges x, y and z; ``leg`` is a leg (from 1) and its distance from the commanded position, mm.
     """
     point, orientation = record
     if kind is DataFaultKind.MISMATCHED_JOINTS and leg:

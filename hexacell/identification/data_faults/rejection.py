@@ -55,8 +55,8 @@ from hexacell.measurements.records import RecordId
 FEW_RECORDS = 60
 OTHER_STARTS = 4
 LARGEST_MEAN_SQUARE = 3.0
-"""With so few records the cost has other minima. A gauge fault is refused only if none of so many
-other starts leads to one, whose mean square difference from the drawing, in sigma, is smaller."""
+"""Up to FEW_RECORDS the cost may have several minima. A gauge fault is reported only if none of
+OTHER_STARTS start points gives a solution with a smaller mean square difference from the drawing, in sigma."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -1,4 +1,4 @@
-"""Random multistart: other start points for the solver where the drawing leads to a wrong minimum.
+"""Random multistart: other start points for the solver if it finds a wrong minimum from the drawing.
 
 With few records, and a pose near a singularity at the drawing, the true geometry may lie beyond that
 singularity, where no descent from the drawing ends. Geometries are drawn from the tolerance prior,

@@ -45,7 +45,7 @@ class DataFault:
         action: the next thing to do.
         point: at which point; none where it is every point.
         orientation: the record, or the first one after a zero shift; none where it is all of the point.
-        gauges: the gauges concerned, of ``xyz``; empty where no single one stands out.
+        gauges: the gauges concerned, of ``xyz``; empty if no single one is at fault.
         left_out: the records left out; empty where the data are refused.
         statistic: squared length of the standardized residual, about 3 for a good record; infinite for
             a record that the identified geometry cannot reach.

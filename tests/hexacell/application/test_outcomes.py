@@ -95,7 +95,7 @@ async def test_worse_than_before_is_rolled_back_bit_for_bit(proposed, finished) 
     site = proposed()
     ended = await site.calibrate(at(events.Committed, lambda: bend(site, 6.0)), resume=True)
     assert ended.exit_code == ExitCode.OUT_OF_LIMITS
-    assert ended.line.endswith("rolled back, the controller is as it was")
+    assert ended.line.endswith("rolled back, the controller has its old config")
     assert site.happened(events.ResultValidated)[0].verdict is Verdict.WORSE
     assert site.config == finished.config_before
     assert site.simulated.machine._geometry.geometry.largest_difference(_drawing(site)) == 0.0
@@ -118,7 +118,7 @@ async def test_a_controller_that_does_not_take_the_reload(proposed, finished, tm
     first_time = tmp_path / "tried"
     once = f"test -e {first_time} || {{ touch {first_time}; exit 1; }}"
     site = proposed(controller__reload_command=("sh", "-c", once))
-    with pytest.raises(WriteBackUndone, match=r"its config is as it was$") as undone:
+    with pytest.raises(WriteBackUndone, match=r"its config is restored$") as undone:
         await site.calibrate(resume=True)
     assert undone.value.exit_code is ExitCode.WRITE_BACK_UNDONE
     assert site.config == finished.config_before
@@ -129,7 +129,7 @@ async def test_a_controller_that_does_not_take_the_reload(proposed, finished, tm
 
 async def test_a_controller_that_never_reloads_must_be_started_anew(proposed, finished) -> None:
     site = proposed(controller__reload_command=("false",))
-    with pytest.raises(WriteBackUndone, match="Start the controller anew before it moves"):
+    with pytest.raises(WriteBackUndone, match="Restart the controller before it moves"):
         await site.calibrate(resume=True)
     assert site.config == finished.config_before
 

@@ -245,7 +245,7 @@ def test_dear_stations_are_left_later(make_plan, carry_out):
 
     taken = carry_out(plan(0.0), most=10)
     left = next(one for one in taken if isinstance(one.decision, FinishPoint))
-    assert "tells more in the same time" in left.decision.reason
+    assert "gains more in the same time" in left.decision.reason
     assert isinstance(plan(60.0).decide(left.state), MeasurePose)
 
 

@@ -312,7 +312,7 @@ def test_a_geometry_that_does_not_read_back_is_never_written(
     monkeypatch.setattr(
         toml_format, "replace_values", lambda *args: replace_values(*args).replace("700.", "70.")
     )
-    with pytest.raises(FileError, match="does not read back as it was written"):
+    with pytest.raises(FileError, match="reads back with different numbers"):
         FORMAT.rewrite(config.read_text(), geometry)
 
 

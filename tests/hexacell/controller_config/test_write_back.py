@@ -251,7 +251,7 @@ def test_a_full_disk_leaves_the_config_alone(
 
     def full(path: Path, data: bytes, **options: bytes) -> None:
         if path == config:
-            raise FileError("cannot be written and is as it was: the disk is full", subject=path)
+            raise FileError("cannot be written and is unchanged: the disk is full", subject=path)
         write(path, data, **options)
 
     monkeypatch.setattr(atomic_files, "write_atomically", full)

@@ -32,7 +32,9 @@ def test_an_approval_shows_the_change_then_every_gate() -> None:
 
 
 def test_a_failure_names_the_choices() -> None:
-    assert question_text(FAILURE) == "\nIt broke.\nHow to go on (retry, measure-again, redo-set, abort)? "
+    assert (
+        question_text(FAILURE) == "\nIt broke.\nHow to continue (retry, measure-again, redo-set, abort)? "
+    )
     assert repeated_text(FAILURE) == "Type one of retry, measure-again, redo-set, abort: "
 
 

@@ -271,7 +271,7 @@ JUDGED = {
         (
             [JUDGED[Verdict.WORSE], events.RolledBack()],
             1,
-            "so it is: worse than before; rolled back, the controller is as it was",
+            "so it is: worse than before; rolled back, the controller has its old config",
         ),
         ([], 1, "nothing was judged"),
     ],

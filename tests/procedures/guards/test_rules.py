@@ -192,7 +192,7 @@ def test_sliders_are_where_they_were_sent() -> None:
     trip = rules.following_error(sent, measured, 1.0)
     assert trip is not None
     assert (trip.guard, trip.device) == (Guard.FOLLOWING, "slider 5")
-    assert "is -1.250 mm from where the controller was told to send it (limit 1 mm)" in trip.problem
+    assert "is -1.250 mm from its commanded position (limit 1 mm)" in trip.problem
 
 
 @pytest.mark.parametrize(

@@ -48,7 +48,7 @@ def test_a_last_line_that_is_whole_but_unknown_is_no_torn_tail(path: Path, writt
 @pytest.mark.parametrize("twice", [0, 3])
 def test_a_last_line_that_stood_before_is_no_torn_tail(path: Path, written: bytes, twice: int) -> None:
     path.write_bytes(written + written.splitlines(keepends=True)[twice])
-    with pytest.raises(FileError, match=rf":5: .*damaged: record {twice + 1} stands where record 5"):
+    with pytest.raises(FileError, match=rf":5: .*damaged: record {twice + 1} is in the place of record 5"):
         read_journal(path)
 
 

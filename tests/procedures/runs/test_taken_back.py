@@ -22,7 +22,7 @@ async def test_what_is_worse_is_rolled_back_bit_for_bit(recording, replayed) -> 
     rig = replayed(with_tiny_deviations_before(recording.until(events.Proposed)))
     ended = await rig.run()
     assert ended.exit_code == ExitCode.OUT_OF_LIMITS
-    assert ended.line.endswith("worse than before; rolled back, the controller is as it was")
+    assert ended.line.endswith("worse than before; rolled back, the controller has its old config")
     assert happened(rig, events.ResultValidated)[0].verdict is Verdict.WORSE
     assert happened(rig, events.Committed)
     assert rig.config == recording.config_before
@@ -67,7 +67,7 @@ async def test_a_controller_in_an_unknown_state_is_said(recording, replayed, mon
         raise DeviceError("connection lost", subject="controller")
 
     monkeypatch.setattr(rig.controller, "reload", broken)
-    with pytest.raises(WriteBackUndone, match="Start the controller anew before it moves"):
+    with pytest.raises(WriteBackUndone, match="Restart the controller before it moves"):
         await rig.run()
     assert rig.config == recording.config_before
 

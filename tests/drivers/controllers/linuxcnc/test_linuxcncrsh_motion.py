@@ -46,7 +46,7 @@ async def test_an_acknowledgement_is_not_an_arrival(play, elsewhere):
         "get abs_act_pos": elsewhere,
         "get error": [b"ERROR joint 2 following error\r\n", b"ERROR OK\r\n"],
     }
-    with pytest.raises(MotionInterrupted, match=r"on the way to X10\.000 Y20\.000 Z560") as caught:
+    with pytest.raises(MotionInterrupted, match=r"before reaching X10\.000 Y20\.000 Z560") as caught:
         await driver.move(TARGET)
     assert "joint 2 following error" in caught.value.problem
 

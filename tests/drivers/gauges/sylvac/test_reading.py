@@ -57,7 +57,7 @@ async def test_an_instrument_that_knows_only_its_unit_will_do(dialogue, gauge):
 
 async def test_an_instrument_that_does_not_tell_its_unit_is_refused(dialogue, gauge):
     dialogue.expect((b"UNI?\r", b"ERR1\r"))
-    with pytest.raises(DeviceError, match="gauge y: does not tell its unit"):
+    with pytest.raises(DeviceError, match="gauge y: does not report its unit"):
         await gauge.open()
 
 

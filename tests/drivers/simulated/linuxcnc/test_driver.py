@@ -207,7 +207,7 @@ async def test_a_refused_move(ready, simulated):
 
 async def test_an_acknowledged_move_that_does_not_take_place(ready, simulated):
     simulated.faults.inject(ControllerFault.DOES_NOT_MOVE, times=1)
-    with pytest.raises(MotionInterrupted, match=r"stopped at X0\.000 .* on the way to X100\.000"):
+    with pytest.raises(MotionInterrupted, match=r"stopped at X0\.000 .* before reaching X100\.000"):
         await ready.move(TARGET)
     await ready.move(TARGET)
 

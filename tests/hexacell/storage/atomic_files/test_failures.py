@@ -16,7 +16,7 @@ def test_a_read_only_folder_is_reported(ordinary_folder: Path) -> None:
     path = ordinary_folder / "controller.toml"
     path.write_bytes(b"old")
     ordinary_folder.chmod(0o500)
-    with pytest.raises(FileError, match="is as it was: permission denied") as caught:
+    with pytest.raises(FileError, match="is unchanged: permission denied") as caught:
         atomic_files.write_atomically(path, b"new")
     assert caught.value.subject == str(path)
     assert caught.value.exit_code is ExitCode.USAGE
@@ -45,7 +45,7 @@ def test_a_write_that_the_kernel_cuts_short_leaves_nothing(path: Path, tmp_path:
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (10_000, hard))
     try:
-        with pytest.raises(FileError, match="cannot be written and is as it was"):
+        with pytest.raises(FileError, match="cannot be written and is unchanged"):
             atomic_files.write_atomically(path, b"x" * 100_000)
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
@@ -72,7 +72,7 @@ def test_failures_are_reported_in_plain_words(
         raise OSError(code, os.strerror(code))
 
     monkeypatch.setattr(os, name, fail)
-    with pytest.raises(FileError, match="is as it was") as caught:
+    with pytest.raises(FileError, match="is unchanged") as caught:
         atomic_files.write_atomically(path, b"new")
     assert words in str(caught.value)
     assert path.read_bytes() == b"old"

@@ -18,7 +18,7 @@ WAITS = {"wait", "join", "communicate", "result", "run", "acquire", "settimeout"
 ALLOWED = {
     "conftest.py": "how long a test's remains may last before the test fails",
     "cli/test_run_stopped.py": "compares a moment with those in a journal",
-    "drivers/controllers/linuxcnc/test_linuxcncrsh_status.py": "outlasts a limit, which nobody may use",
+    "drivers/controllers/linuxcnc/test_status_channel.py": "outlasts a limit, which nobody may use",
     "drivers/encoders/test_lifetime.py": "cancels at sixty different moments",
     "drivers/simulated/linuxcnc/conftest.py": "how fast a fake machine moves, and that nothing is said",
     "faults/conftest.py": "how long a whole run takes, of which moments are drawn",

@@ -53,10 +53,13 @@ from hexacell.kinematics.rotations import Array
 from hexacell.measurements.records import RecordId
 
 FEW_RECORDS = 60
+"""Up to this number of records the cost may have several minima."""
+
 OTHER_STARTS = 4
+"""With few records, the start points that are tried before a gauge fault is reported."""
+
 LARGEST_MEAN_SQUARE = 3.0
-"""Up to FEW_RECORDS the cost may have several minima. A gauge fault is reported only if none of
-OTHER_STARTS start points gives a solution with a smaller mean square difference from the drawing, in sigma."""
+"""Of the difference from the drawing, in sigma, of a solution found from another start point."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -1,0 +1,12 @@
+"""Inverse kinematics of the paper's robot."""
+
+from __future__ import annotations
+
+import pytest
+
+from hexacell.kinematics.inverse import inverse_kinematics
+
+
+@pytest.fixture
+def inverse(hexaglide, paper):
+    return lambda geometry, at: inverse_kinematics(hexaglide, geometry, paper.branch, at)

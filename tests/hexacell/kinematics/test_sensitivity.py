@@ -1,0 +1,117 @@
+"""Derivatives of poses and singularity margins against finite differences."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import assume, given
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from hexacell.kinematics.geometry import Geometry
+from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS, hexaglide_geometry
+from hexacell.kinematics.pose import Pose, PoseBatch
+from hexacell.kinematics.sensitivity import (
+    has_singularity_margin,
+    pose_jacobian,
+    pose_sensitivity,
+    position_sensitivity,
+    singularity_margin,
+)
+from tests.hexacell.kinematics.numeric import POSES, numeric_jacobian, turned_about
+
+
+def pose_difference(legs, joints, steps, near):
+    """Of a machine's pose between two geometries or joint vectors, by the test's root finder."""
+    plus, minus = (legs(geometry).closed(q, near) for geometry, q in steps)
+    turn = Rotation.from_rotvec(plus[3:]) * Rotation.from_rotvec(minus[3:]).inv()
+    return np.concatenate([plus[:3] - minus[:3], turn.as_rotvec()])
+
+
+@pytest.mark.parametrize("pose", [Pose(10, 20, 560, 5, -4, 3), Pose(-60, -120, 480, 20, 15, -25)])
+def test_sensitivity_agrees_with_finite_differences(hexaglide, paper, legs, vector_of, pose):
+    geometry, near, step = paper.actual, vector_of(pose), 1e-3
+    joints = legs(geometry).joints(near)
+    found = pose_sensitivity(hexaglide, geometry, PoseBatch.of([pose]), joints[None])
+    for n in range(6):
+        shift = step * np.eye(6)[n]
+        ends = [(geometry, joints + shift), (geometry, joints - shift)]
+        moved = pose_difference(legs, joints, ends, near) / (2 * step)
+        np.testing.assert_allclose(found.joints[0, :, n], moved, atol=1e-5)
+    for n in range(42):
+        shift = step * np.eye(42)[n]
+        ends = [(Geometry(HEXAGLIDE_PARAMETERS, geometry.vector + s), joints) for s in (shift, -shift)]
+        moved = pose_difference(legs, joints, ends, near) / (2 * step)
+        np.testing.assert_allclose(found.parameters[0, :, n], moved, atol=1e-5)
+    by_parameters, by_joints = position_sensitivity(hexaglide, geometry, PoseBatch.of([pose]), joints[None])
+    np.testing.assert_allclose(by_parameters, found.parameters[:, :3], atol=1e-12)
+    np.testing.assert_allclose(by_joints, found.joints[:, :3], atol=1e-12)
+
+
+@given(POSES)
+def test_pose_jacobian_agrees_with_finite_differences(hexaglide, paper, pose):
+    at = PoseBatch.of([pose])
+    joints = hexaglide.inverse(paper.nominal, paper.branch, at)
+    assume(not np.isnan(joints).any())
+    found = pose_jacobian(hexaglide, paper.nominal, at, joints)[0]
+    np.testing.assert_allclose(found, numeric_jacobian(hexaglide, paper.nominal, at, joints), atol=1e-5)
+
+
+@given(POSES)
+def test_margin_is_the_smallest_singular_value_of_the_scaled_jacobian(
+    hexaglide, paper, legs, vector_of, pose
+):
+    joints = legs(paper.actual).joints(vector_of(pose))
+    assume(not np.isnan(joints).any())
+    margin = singularity_margin(hexaglide, paper.actual, PoseBatch.of([pose]), joints[None])
+    assert margin[0] == pytest.approx(legs(paper.actual).margin(joints, vector_of(pose)), abs=1e-5)
+
+
+@pytest.mark.parametrize(("axis", "clear", "beyond"), [("a", 30, 50), ("c", 40, 85), ("b", -30, -60)])
+def test_margin_is_zero_where_the_jacobian_changes_its_sign(hexaglide, paper, axis, clear, beyond):
+    def determinant(angle: float) -> float:
+        at = PoseBatch.of([turned_about(axis, angle)])
+        joints = hexaglide.inverse(paper.nominal, paper.branch, at)
+        return float(np.linalg.det(numeric_jacobian(hexaglide, paper.nominal, at, joints)))
+
+    low, high = float(clear), float(beyond)
+    assert determinant(low) * determinant(high) < 0.0
+    for _ in range(40):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if determinant(middle) * determinant(low) > 0.0 else (low, middle)
+    at = PoseBatch.of([turned_about(axis, angle) for angle in (clear, low, beyond)])
+    joints = hexaglide.inverse(paper.nominal, paper.branch, at)
+    margins = singularity_margin(hexaglide, paper.nominal, at, joints)
+    assert margins[1] < 1e-7
+    assert margins[0] > 0.03
+
+
+def test_margin_is_zero_with_two_equal_legs(hexaglide, paper, inverse):
+    S, B, l = paper.nominal["S"].copy(), paper.nominal["B"].copy(), paper.nominal["l"].copy()  # noqa: E741
+    S[4], B[4], l[4] = S[3], B[3], l[3]
+    twin = hexaglide_geometry(S, B, l)
+    at = PoseBatch.of([Pose(0, 0, 550), Pose(20, 30, 500, 10, -5, 8)])
+    margins = singularity_margin(hexaglide, twin, at, inverse(twin, at))
+    np.testing.assert_allclose(margins, 0.0, atol=1e-12)
+
+
+def test_margin_does_not_depend_on_the_size_of_the_machine(hexaglide, paper, inverse):
+    at = PoseBatch.of([Pose(20, 30, 500, 10, -5, 8)])
+    larger = Geometry(HEXAGLIDE_PARAMETERS, 3.0 * paper.actual.vector)
+    at_larger = PoseBatch(3.0 * at.positions, at.rotations)
+    np.testing.assert_allclose(
+        singularity_margin(hexaglide, larger, at_larger, inverse(larger, at_larger)),
+        singularity_margin(hexaglide, paper.actual, at, inverse(paper.actual, at)),
+        rtol=1e-12,
+    )
+
+
+@given(st.lists(POSES, min_size=1, max_size=6), st.floats(0.0, 0.4))
+def test_has_margin_agrees_with_the_margin(hexaglide, paper, at, margin):
+    batch = PoseBatch.of(at)
+    joints = hexaglide.inverse(paper.nominal, paper.branch, batch)
+    assume(np.isfinite(joints).all())
+    margins = singularity_margin(hexaglide, paper.nominal, batch, joints)
+    assume(np.abs(margins - margin).min() > 1e-9)
+    kept = has_singularity_margin(hexaglide, paper.nominal, batch, joints, margin)
+    np.testing.assert_array_equal(kept, margins >= margin)

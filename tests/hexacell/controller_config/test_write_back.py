@@ -223,7 +223,7 @@ def test_what_does_not_read_back_is_undone(
             config.write_bytes(b"garbled")
 
     monkeypatch.setattr(os, "replace", garble)
-    with pytest.raises(WriteBackUndone, match="does not read back") as caught:
+    with pytest.raises(WriteBackUndone, match="does not contain what was written") as caught:
         commit(proposal, run)
     assert caught.value.exit_code == 6
     assert config.read_bytes() == proposal.text_before.encode()

@@ -121,6 +121,6 @@ def test_one_failure_is_raised_as_it_is() -> None:
 
 def test_several_are_raised_in_one_report() -> None:
     errors = [ReachError("too far"), DeviceError("dead"), AnswerNeeded("nobody")]
-    with pytest.raises(SeveralErrors, match=r"(?s)3 things .*too far.*dead.*nobody") as refusal:
+    with pytest.raises(SeveralErrors, match=r"(?s)3 problems .*too far.*dead.*nobody") as refusal:
         raise_all([*errors])
     assert refusal.value.worst is ExitCode.HARDWARE

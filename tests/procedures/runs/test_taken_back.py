@@ -51,7 +51,7 @@ async def test_a_ball_outside_the_travel_afterwards_is_rolled_back(recording, re
 async def test_a_controller_that_does_not_take_it_gets_its_config_back(recording, replayed) -> None:
     rig = replayed(recording.until(events.Proposed))
     rig.controller.failures["reload"] = DeviceError("does not come back", subject="controller")
-    with pytest.raises(WriteBackUndone, match=r"did not take the new geometry .*as it was$") as undone:
+    with pytest.raises(WriteBackUndone, match=r"did not take the new geometry .*is restored$") as undone:
         await rig.run()
     assert undone.value.exit_code is ExitCode.WRITE_BACK_UNDONE
     assert rig.config == recording.config_before

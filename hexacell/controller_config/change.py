@@ -177,7 +177,7 @@ class Receipt(JsonRecord):
         )
 
     def backup(self) -> bytes:
-        """The config as it was before; raises ``FileError`` if the backup is gone or damaged."""
+        """The config before the change; raises ``FileError`` if the backup is gone or damaged."""
         data = atomic_files.read_bytes(self.backup_folder / BEFORE)
         if atomic_files.sha256(data) != self.sha256_before:
             raise FileError(

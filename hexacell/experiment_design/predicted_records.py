@@ -49,7 +49,7 @@ class GaugeZero:
         return ReachableTargets(PoseBatch.at(self.reference, self.orientation[None]), self.joints[None])
 
     def command(self, belief: RobotBelief) -> PoseBatch:
-        """The command (1) that leads to the reference."""
+        """The command (1) of the reference."""
         return commands_for(belief, self.target)[0]
 
     def mode(self, belief: RobotBelief) -> Array:
@@ -77,7 +77,7 @@ def estimate_gauge_zero(
     try:
         covariance = np.linalg.inv(weights.sum(axis=0))
     except np.linalg.LinAlgError:
-        raise LimitError("the records of this point say nothing about where the ball is") from None
+        raise LimitError("the records of this point do not determine the ball's position") from None
     reference = covariance @ np.einsum("nij,nj->i", weights, poses.positions - deviations)
     mean_jacobian = covariance @ np.einsum("nij,njp->ip", weights, jacobian)
     return GaugeZero(reference, poses.rotations[0], joints[0], mean_jacobian, covariance)

@@ -60,11 +60,11 @@ def question_text(question: Question) -> str:
             outcomes = "".join(f"{'ok' if gate.passed else 'NO'}  {gate.sentence}\n" for gate in gates)
             return f"\n{diff}\n{outcomes}Write this into the controller's config? Type yes: "
         case StepFailure(problem=problem):
-            return f"\n{problem}\nHow to go on ({', '.join(question.choices)})? "
+            return f"\n{problem}\nHow to continue ({', '.join(question.choices)})? "
 
 
 def repeated_text(question: Question) -> str:
-    """What is shown after a line that is no answer."""
+    """The text after an invalid answer."""
     return f"Type one of {', '.join(question.choices)}: "
 
 

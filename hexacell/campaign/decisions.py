@@ -62,7 +62,7 @@ class Forecast(BaseModel):
 
     @property
     def gain_mm(self) -> float:
-        """What going on to the end takes away."""
+        """The reduction of the error by completing the plan."""
         return self.now_mm - self.end_mm
 
 

@@ -1,4 +1,4 @@
-"""Forecast of what going on would gain: for people, and to decide which point is worth its time."""
+"""Forecast of the gain of further records, for display and for the choice of points."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ class Forecaster:
     def forecast(
         self, state: CampaignState, estimate: OnlineEstimate, selected: SelectedPose | None = None
     ) -> Forecast | None:
-        """What a selected record, and then going on to the end, would do; none without task poses."""
+        """The effect of a selected record and of completing the plan; None without task poses."""
         belief = estimate.belief
         error = self.task.error(belief)
         if error is None:

@@ -76,7 +76,7 @@ class Plan:
         return self._at_point(state, state.point)
 
     def estimate(self, state: CampaignState) -> OnlineEstimate:
-        """What the records so far say of the robot.
+        """The estimate of the robot from the records so far.
 
         Raises:
             IdentifiabilityError: they do not belong to it.
@@ -93,7 +93,7 @@ class Plan:
         return orientation_sigma(estimate.belief, last) <= PROVISIONAL_SIGMA
 
     def forecast(self, state: CampaignState) -> Forecast | None:
-        """What going on would gain; none where there are no task poses."""
+        """The gain of further records; None without task poses."""
         return self._forecaster.forecast(state, self.estimate(state))
 
     def planned(self, state: CampaignState) -> dict[int, int]:

@@ -34,7 +34,7 @@ FEW_RESIDUALS = 30.0
 
 @dataclass(frozen=True, slots=True, eq=False)
 class OnlineEstimate:
-    """What the records so far say of the robot; ``identification`` is none before the first."""
+    """The estimate of the robot from the records so far; ``identification`` is None before the first."""
 
     belief: RobotBelief
     identification: Identification | None
@@ -64,7 +64,7 @@ class OnlineEstimator:
         self._last: Identification | None = None
 
     def estimate(self, measurements: MeasurementSet) -> OnlineEstimate:
-        """What some records say, in their order.
+        """The estimate from some records, in their order.
 
         Raises:
             IdentifiabilityError: they do not belong to this robot.

@@ -1,4 +1,4 @@
-"""Sections of the cell file that say what a calibration measures and when its result is accepted."""
+"""Sections of the cell file: what a calibration measures and when its result is accepted."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Sections of the cell file that say which devices there are and how to reach them."""
+"""Sections of the cell file: the devices and their addresses."""
 
 from __future__ import annotations
 

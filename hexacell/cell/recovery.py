@@ -1,4 +1,4 @@
-"""The section of the cell file that says how failures are handled."""
+"""The section of the cell file on the handling of failures."""
 
 from __future__ import annotations
 

@@ -70,7 +70,7 @@ def estimate_gauge_zero(
         deviations: what the gauges showed (n, 3), mm.
 
     Raises:
-        LimitError: all poses are at a singularity, where the records say nothing.
+        LimitError: all poses are at a singularity, where the records have no information.
     """
     jacobian, by_joints = position_derivatives(belief, ReachableTargets(poses, joints))
     weights = record_weights(by_joints, belief.noise)

@@ -50,7 +50,7 @@ class TravelCheckSettings:
         uncertain_share: of the travel, where the orientation is uncertain.
         half_travel_sigma: standard deviation at which half of the travel may be used.
         sigmas: standard deviations of the sampled deviations that must be inside the travel.
-        fewest_samples: sampled robots that can take the reference pose; of fewer nothing can be said.
+        fewest_samples: sampled robots that can take the reference pose; fewer are not sufficient.
         margin_share: of the singularity margin, which all sampled robots must keep.
     """
 

@@ -71,7 +71,7 @@ class FrameConvention:
         return self.parameters.rows(self.free_names())
 
     def free_parameters(self, geometry: Geometry) -> Array:
-        """The free parameters (p,) of a geometry that obeys the convention, mm."""
+        """The free parameters (p,) of a geometry in the convention's frames."""
         return geometry.vector[self.free_rows()]
 
     def geometry(self, free: Array) -> Geometry:

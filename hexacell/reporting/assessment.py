@@ -60,7 +60,7 @@ class Assessment:
 
     @property
     def refused(self) -> bool:
-        """Whether the geometry must not be used, whatever the other checks say."""
+        """Whether the geometry must not be used, regardless of the other checks."""
         contradicted = self.goodness.ratio > CONTRADICTED_RATIO and not self.does_not_repeat
         return contradicted or bool(self.tolerance_violations)
 

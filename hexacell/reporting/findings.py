@@ -52,7 +52,7 @@ def pair_sentences(found: Identification, assessed: Assessment) -> tuple[str, ..
 
 
 def residual_sentence(test: ChiSquareTest) -> str:
-    """What the chi-square test says of the residuals."""
+    """The finding of the chi-square test."""
     match test.agreement:
         case ChiSquareVerdict.NOT_EVALUATED:
             return "There are no more records than unknowns: the residuals prove nothing."

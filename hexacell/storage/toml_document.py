@@ -22,7 +22,7 @@ _POSITION = re.compile(r" \(at (?:line (?P<line>\d+), column \d+|end of document
 
 @dataclass(frozen=True, slots=True)
 class TomlDocument:
-    """What a TOML text says, and on which lines.
+    """The values of a TOML text, and their lines.
 
     Attributes:
         data: the values, as ``tomllib`` reads them.
@@ -47,7 +47,7 @@ class TomlDocument:
             return json.dumps(self.data, default=str)
 
     def value(self, path: KeyPath) -> Any:  # noqa: ANN401 - whatever TOML may hold
-        """What the text says at ``path``; raises ``LookupError``."""
+        """The value at ``path``; raises ``LookupError``."""
         found: Any = self.data
         for key in path:
             found = found[key]

@@ -65,7 +65,7 @@ class VirtualRobot:
         return can_take
 
     def place(self, command: Pose) -> None:
-        """Be at a command at once, whatever is between.
+        """Set the robot to a command at once, without a check of the line.
 
         Raises:
             ReachError: it cannot take the command clear of singularities.

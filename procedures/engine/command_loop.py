@@ -127,5 +127,5 @@ def _refusal(command: Command, flags: EngineFlags) -> str:
     if isinstance(command, Answer):
         return "no question is open that this would answer"
     if flags.fault is not None:
-        return "a fault waits for somebody to say how to go on"
-    return "the run does not rest"
+        return "a fault waits for a decision on how to continue"
+    return "the run is not paused"

@@ -29,7 +29,7 @@ SIGNIFICANCE = 1e-3
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DeletionTest:
-    """What a fit says about a record that it left out.
+    """The test of a record against a fit without it.
 
     Attributes:
         fault: what is wrong with the record if it disagrees.

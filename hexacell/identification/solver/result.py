@@ -94,7 +94,7 @@ class GeometryEstimate(Protocol):
 
     @property
     def undetermined(self) -> tuple[str, ...]:
-        """Parameters about which the data said next to nothing."""
+        """Parameters about which the data have almost no information."""
         ...
 
 

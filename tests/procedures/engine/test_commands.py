@@ -235,7 +235,7 @@ async def test_records_may_be_undone_while_it_rests(stage: Stage) -> None:
 @pytest.mark.parametrize(
     ("command", "words"),
     [
-        (Resume(), "the run does not rest"),
+        (Resume(), "the run is not paused"),
         (Answer("yes"), "no question is open that this would answer"),
         (Undo(), "there is no record to undo in the set that is being measured"),
         (MeasureAgain(P1, 7), "P1 has no such record"),

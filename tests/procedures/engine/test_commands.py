@@ -29,6 +29,7 @@ from procedures.run.questions import (
 from procedures.run.state import RunState, fold
 from procedures.run.status import Status
 from procedures.run.steps import Move, Phase, Sample, SetKey, Step
+from tests.waiting import until
 
 P1 = SetKey(phase=Phase.IDENTIFY, point=1)
 READING = events.Reading(
@@ -255,9 +256,7 @@ async def test_what_cannot_be_obeyed_is_said_and_changes_nothing(stage, command:
 async def test_a_stop_lets_the_step_end(stage: Stage, bench) -> None:
     await stage.held_at("P1/o02/sample")
     stage.engine.command(Stop("a stop was asked for"))
-    await asyncio.sleep(0)
-    await asyncio.sleep(0)
-    assert stage.engine.status is Status.STOPPING
+    await until(lambda: stage.engine.status is Status.STOPPING)
     with pytest.raises(Interruption) as ended:
         await stage.over()
     assert ended.value.exit_code is ExitCode.INTERRUPTED

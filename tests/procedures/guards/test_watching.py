@@ -226,7 +226,7 @@ async def test_a_move_that_begins_at_the_end_of_a_plunger_may_lead_away_from_it(
 async def test_sliders_that_are_not_where_they_were_sent(scene) -> None:
     stage = await reference(scene())
     stage.slip_mm = -1.5
-    with pytest.raises(GuardTripped, match=r"slider \d: is -1\.\d+ mm from where") as tripped:
+    with pytest.raises(GuardTripped, match=r"slider \d: is -1\.\d+ mm from its commanded") as tripped:
         await stage.do(move(2))
     assert tripped.value.trip.guard is Guard.FOLLOWING
     assert stage.stops == 1

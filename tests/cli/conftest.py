@@ -36,6 +36,12 @@ QUICK = (
     ("max_deviation_mm = 0.15", "max_deviation_mm = 1.5"),
 )
 
+# A busy machine may leave a simulated device waiting longer than a real one ever takes.
+PATIENT = tuple(
+    (f'protocol = "{protocol}"', f'protocol = "{protocol}"\ntimeout_s = 20.0')
+    for protocol in ("sylvac", "mux10", "cdi", "cia406")
+)
+
 # As few records as identify it.
 SHORT = (
     (
@@ -98,6 +104,10 @@ class CellFolder:
     def edit(self, *edits: tuple[str, str]) -> None:
         self.cell.write_text(changed(self.cell.read_text(), edits))
 
+    def wait_long_for_devices(self) -> None:
+        """Let a busy machine take its time."""
+        self.edit(*PATIENT)
+
     def snapshot(self) -> dict[str, bytes | None]:
         """Everything in it except the lock, whose content has no meaning."""
         return {
@@ -142,6 +152,7 @@ def cell_folder(tmp_path: Path) -> CellFolder:
 def quick_cell(cell_folder: CellFolder) -> CellFolder:
     """The same, calibrated in a few seconds."""
     cell_folder.edit(*QUICK)
+    cell_folder.wait_long_for_devices()
     return cell_folder
 
 

@@ -24,6 +24,7 @@ BY_HAND = ('placement = "fixed"', 'placement = "by-hand"')
 @pytest.fixture
 def fast_cell(cell_folder):
     cell_folder.edit(FAST)
+    cell_folder.wait_long_for_devices()
     return cell_folder
 
 

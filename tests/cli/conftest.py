@@ -30,7 +30,7 @@ CONTROLLER = "simulated-hexaglide.controller.toml"
 # Fewer records and wide limits, on a cell that lives fast: the whole job in a few seconds.
 QUICK = (
     ("clock_factor = 50.0", "clock_factor = 200.0\ngive_up_s = 2000.0"),
-    ("orientations = 11", "orientations = 5"),
+    ("orientations = 11", "orientations = 7"),
     ("orientations = 6", "orientations = 2"),
     ("mean_deviation_mm = 0.05", "mean_deviation_mm = 0.5"),
     ("max_deviation_mm = 0.15", "max_deviation_mm = 1.5"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Awaitable, Callable
 from typing import TypeVar
 
@@ -17,12 +18,37 @@ _MAX_ERRORS = 100
 _MAX_SHOWN = 4
 
 
+class ErrorMessages:
+    """The error messages of one machine, shared by the connections to it.
+
+    LinuxCNC gives a message once, to the connection that asks first. The order that failed and the
+    status both need it, so each has a list of those that it has not used yet.
+    """
+
+    def __init__(self) -> None:
+        self.for_orders: list[str] = []
+        self.for_status: list[str] = []
+        self._reading = asyncio.Lock()
+
+    async def read(self, next_message: Callable[[], Awaitable[str]]) -> None:
+        """Empty the controller's queue; a message that another connection is reading is waited for."""
+        async with self._reading:
+            for _ in range(_MAX_ERRORS):
+                if (text := await next_message()).upper() == "OK":
+                    break
+                for unused in (self.for_orders, self.for_status):
+                    if text not in unused:
+                        unused.append(text)
+                    del unused[:-_MAX_ERRORS]
+
+
 class ControllerCommands:
     """Get and set commands over one connection."""
 
-    def __init__(self, connection: Connection, subject: str) -> None:
+    def __init__(self, connection: Connection, subject: str, messages: ErrorMessages | None = None) -> None:
         self.connection = connection
         self.subject = subject
+        self._messages = messages or ErrorMessages()
 
     async def get(self, what: str) -> str:
         """The text after ``WHAT``.
@@ -66,17 +92,18 @@ class ControllerCommands:
         """Whether ``estop`` or ``machine`` is on."""
         return (await self.get(what)).upper() == "ON"
 
-    async def errors(self) -> list[str]:
-        """The controller's error messages, oldest first; its queue is empty afterwards.
+    async def read_errors(self) -> None:
+        """Have the controller's error messages in the list that all connections share."""
+        await self._messages.read(lambda: self.get("error"))
 
-        The queue also holds older messages: empty it before an order whose errors matter.
+    async def errors(self) -> list[str]:
+        """The error messages that no order has used yet, oldest first.
+
+        They may be older than the order: call this before an order whose errors matter.
         """
-        found: dict[str, None] = {}
-        for _ in range(_MAX_ERRORS):
-            if (text := await self.get("error")).upper() == "OK":
-                break
-            found[text] = None
-        return list(found)
+        await self.read_errors()
+        found, self._messages.for_orders = self._messages.for_orders, []
+        return found
 
     async def reason(self, explanations: tuple[str, ...] = ()) -> str:
         """Why a command had no effect: the controller's error messages, else its state."""

@@ -24,7 +24,7 @@ from enum import Enum, auto
 
 from drivers.controllers.errors import ConnectionLost
 from drivers.controllers.linuxcnc import startup
-from drivers.controllers.linuxcnc.commands import CommandChannel, ControllerCommands
+from drivers.controllers.linuxcnc.commands import CommandChannel, ControllerCommands, ErrorMessages
 from drivers.controllers.linuxcnc.connection import Connection
 from drivers.controllers.linuxcnc.send_arbiter import SendArbiter
 from drivers.controllers.linuxcnc.settings import Address, Timeouts, loop_time
@@ -58,7 +58,8 @@ class Session:
         self._state = SessionState.CLOSED
         self._channel = CommandChannel(self._connect)
         self._arbiter = SendArbiter()
-        self._status = StatusConnection(address, timeouts, self._arbiter, trace)
+        self._messages = ErrorMessages()
+        self._status = StatusConnection(address, timeouts, self._arbiter, self._messages, trace)
 
     async def open(self) -> ControllerCommands:
         """Open the command connection; the session stays closed if that fails."""
@@ -142,7 +143,7 @@ class Session:
         async with self._arbiter.exclusive():
             connection = await Connection.open(self._address, self._timeouts, self._trace)
         connection.send_turn = self._arbiter.command_turn
-        commands = ControllerCommands(connection, self._address.name)
+        commands = ControllerCommands(connection, self._address.name, self._messages)
         try:
             await startup.acknowledge_on_completion(commands)
             self._require_open()  # it may have been closed meanwhile

@@ -6,7 +6,7 @@ import asyncio
 from contextlib import nullcontext
 
 from drivers.controllers.errors import ConnectionLost
-from drivers.controllers.linuxcnc.commands import CommandChannel, ControllerCommands
+from drivers.controllers.linuxcnc.commands import CommandChannel, ControllerCommands, ErrorMessages
 from drivers.controllers.linuxcnc.connection import Connection
 from drivers.controllers.linuxcnc.send_arbiter import SendArbiter
 from drivers.controllers.linuxcnc.settings import Address, Timeouts
@@ -20,19 +20,24 @@ RELEASE_TIMEOUT_S = 0.05
 class StatusConnection:
     """Reads the machine's status without taking control, which queries do not need.
 
-    Reading the machine's error messages removes them from its queue. They are therefore read only
-    after the machine was seen enabled and then disabled; ``reset_errors`` forgets that it was enabled.
+    Error messages are reported while the machine is disabled after it was seen enabled, those that an
+    order read included; ``reset_errors`` forgets that it was enabled.
     """
 
     def __init__(
-        self, address: Address, timeouts: Timeouts, arbiter: SendArbiter, trace: TraceRecorder | None
+        self,
+        address: Address,
+        timeouts: Timeouts,
+        arbiter: SendArbiter,
+        messages: ErrorMessages,
+        trace: TraceRecorder | None,
     ) -> None:
         self._address = address
         self._timeouts = timeouts
         self._arbiter = arbiter
         self._trace = trace
         self._channel = CommandChannel(self._connect)
-        self._errors: tuple[str, ...] = ()
+        self._messages = messages
         self._was_enabled = False
         self._query = asyncio.Lock()
 
@@ -52,7 +57,7 @@ class StatusConnection:
 
     def reset_errors(self) -> None:
         """Leave error messages to the order that is about to enable the machine."""
-        self._was_enabled, self._errors = False, ()
+        self._was_enabled, self._messages.for_status = False, []
 
     async def release_connection(self) -> Connection | None:
         """Give the connection away for a stop; none if a query occupies it for too long."""
@@ -75,15 +80,19 @@ class StatusConnection:
         await self._channel.close()
 
     async def _read(self, commands: ControllerCommands) -> ControllerStatus:
+        known = len(self._messages.for_status)
         estop, enabled = await commands.is_on("estop"), await commands.is_on("machine")
         if enabled and not estop:
-            self._was_enabled, self._errors = True, ()
+            self._was_enabled = True
+            # An order may have read the message of a machine that was disabled since it answered.
+            del self._messages.for_status[:known]
         elif self._was_enabled:
-            self._errors += tuple(await commands.errors())
-        return ControllerStatus(estop, enabled, self._errors)
+            await commands.read_errors()
+            return ControllerStatus(estop, enabled, tuple(self._messages.for_status))
+        return ControllerStatus(estop, enabled)
 
     async def _connect(self) -> ControllerCommands:
         async with self._arbiter.exclusive():
             connection = await Connection.open(self._address, self._timeouts, self._trace, commanding=False)
         connection.send_turn = self._arbiter.query_turn
-        return ControllerCommands(connection, self._address.name)
+        return ControllerCommands(connection, self._address.name, self._messages)

@@ -30,8 +30,7 @@ FAULTS = [
     (FaultKind.STOP_LINE, "", IN_A_SET, {Guard.STOP_LINE}),
     (FaultKind.STOP_LINE, "", TO_A_POINT, {Guard.STOP_LINE}),
     (FaultKind.EMERGENCY_STOP, "controller", IN_A_SET, {Guard.CONTROLLER}),
-    # LinuxCNC gives an error message once, to whichever connection asks first: the move or the status.
-    (FaultKind.FOLLOWING_ERROR, "controller", TO_A_POINT, {Guard.FOLLOWING, Guard.CONTROLLER}),
+    (FaultKind.FOLLOWING_ERROR, "controller", TO_A_POINT, {Guard.FOLLOWING}),
     (FaultKind.AT_END, "x", IN_A_SET, {Guard.GAUGE_END}),
     (FaultKind.OFF_PLATE, "z", IN_A_SET, {Guard.PLATE, Guard.GAUGE_END}),
     (FaultKind.UNPLUGGED, "x", IN_A_SET, {Guard.DEVICE, Guard.STALE}),

@@ -6,7 +6,7 @@ import asyncio
 
 import pytest
 
-from drivers.controllers.errors import MotionInterrupted
+from drivers.controllers.errors import MotionInterrupted, MoveRefused
 from drivers.controllers.linuxcnc.send_arbiter import PARSED_S, SendArbiter
 from drivers.interfaces import ControllerStatus
 from hexacell.errors import DeviceError
@@ -49,7 +49,45 @@ async def test_a_machine_that_went_off_is_asked_why(play) -> None:
         assert not status.may_move
 
 
-async def test_complaints_of_a_machine_that_was_never_on_are_left_to_who_switches_it_on(play) -> None:
+FAULT = ("get error", b"ERROR joint 3 following error\r\n")
+BLOCK = "set mdi G0 X1.00000000 Y2.00000000 Z3.00000000 A0.00000000 B0.00000000 C0.00000000"
+
+
+async def test_status_has_the_messages_that_the_order_is_reading(play) -> None:
+    """LinuxCNC gives a message once; here the order's connection gets it, and is not done reading."""
+    reading = play.Pause()
+    main = [
+        (BLOCK, b"SET MDI NAK\n\r"),
+        ("get enable", b"ENABLE ON\r\n"),
+        FAULT,
+        ("get error", reading, b"ERROR OK\r\n"),
+    ]
+    off = asked(machine="OFF")
+    driver = await play.opened(main, [*GREETING, *asked(), *off, ERROR_OK])
+    await driver.status()
+    moving = asyncio.create_task(driver.move(Pose(1.0, 2.0, 3.0)))
+    await reading.reached.wait()
+    status = asyncio.create_task(driver.status())
+    reading.set()
+    assert (await status).error_messages == ("joint 3 following error",)
+    with pytest.raises(MoveRefused, match="joint 3 following error"):
+        await moving
+
+
+async def test_an_order_has_the_messages_that_the_status_read(play) -> None:
+    refused = play.Pause()
+    main = [(BLOCK, refused, b"SET MDI NAK\n\r"), ("get enable", b"ENABLE ON\r\n"), ERROR_OK]
+    driver = await play.opened(main, [*GREETING, *asked(), *asked(machine="OFF"), FAULT, ERROR_OK])
+    await driver.status()
+    moving = asyncio.create_task(driver.move(Pose(1.0, 2.0, 3.0)))
+    await refused.reached.wait()
+    assert (await driver.status()).error_messages == ("joint 3 following error",)
+    refused.set()
+    with pytest.raises(MoveRefused, match="joint 3 following error"):
+        await moving
+
+
+async def test_messages_of_a_machine_that_was_never_on_are_left_to_who_switches_it_on(play) -> None:
     driver = await play.opened([], [*GREETING, *asked(estop="ON", machine="OFF")])
     assert await driver.status() == ControllerStatus(estop=True, enabled=False)
 
@@ -57,8 +95,7 @@ async def test_complaints_of_a_machine_that_was_never_on_are_left_to_who_switche
 async def test_it_is_answered_while_a_move_is_under_way(play) -> None:
     arrived = play.Pause()
     there = b"ABS_ACT_POS 1.000000 2.000000 3.000000 0.000000 0.000000 0.000000\r\n"
-    block = "set mdi G0 X1.00000000 Y2.00000000 Z3.00000000 A0.00000000 B0.00000000 C0.00000000"
-    main = [(block, arrived, b"SET MDI ACK\n\r"), ("get abs_act_pos", there)]
+    main = [(BLOCK, arrived, b"SET MDI ACK\n\r"), ("get abs_act_pos", there)]
     driver = await play.opened(main, [*GREETING, *asked()])
     moving = asyncio.create_task(driver.move(Pose(1.0, 2.0, 3.0)))
     await arrived.reached.wait()
@@ -161,8 +198,7 @@ async def test_whoever_keeps_the_arbiter_keeps_it() -> None:
 async def test_a_stop_that_came_while_it_moved_is_told_by_the_move(play) -> None:
     """The order that was under way fails by itself; the watch over it needs no second stop."""
     stopped = play.Pause()
-    block = "set mdi G0 X1.00000000 Y2.00000000 Z3.00000000 A0.00000000 B0.00000000 C0.00000000"
-    main = [(block, stopped, b"SET MDI ACK\n\r"), ("get abs_act_pos", play.AT_REST)]
+    main = [(BLOCK, stopped, b"SET MDI ACK\n\r"), ("get abs_act_pos", play.AT_REST)]
     driver = await play.opened(
         main,
         [

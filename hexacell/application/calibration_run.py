@@ -95,7 +95,7 @@ async def calibrate(
                 failures.extend(await _start_failures(cell, connected, request.folder.path))
                 raise_all(failures)
                 require_known(connected.identities, started.devices if started else ())
-                devices = connected.devices if live is None else live.observe(connected.devices)
+                devices = connected.devices if live is None else replace(connected.devices, live=live)
                 observed = replace(connected, devices=devices)
                 request = replace(request, cell=with_settings(cell, settings))
                 return await _run(request, calibration, observed, listeners, queue)

@@ -8,10 +8,21 @@ from collections.abc import Awaitable, Sequence
 from dataclasses import dataclass, field
 from typing import TypeVar
 
-from drivers.interfaces import Controller, DeviceIdentity, EncoderBank, Gauge, StopInput, Thermometer
+from drivers.interfaces import (
+    Controller,
+    ControllerStatus,
+    DeviceIdentity,
+    EncoderBank,
+    EncoderSample,
+    Gauge,
+    GaugeReading,
+    StopInput,
+    Thermometer,
+)
 from drivers.stop_input.stop_input import CombinedStopInput
 from hexacell.cell.devices import GaugeAxis
 from hexacell.errors import HexacellError, SeveralErrors, flatten_errors
+from procedures.devices.live_values import LiveValues
 from procedures.run.events import Temperature
 
 Result = TypeVar("Result")
@@ -29,12 +40,16 @@ class MountedGauge:
 
 @dataclass(frozen=True, slots=True)
 class Devices:
-    """Three gauges, the encoders, the controller, and the line by which anybody may stop it."""
+    """Three gauges, the encoders, the controller, and the line by which anybody may stop it.
+
+    What a run reads of them is also kept in ``live``.
+    """
 
     gauges: tuple[MountedGauge, ...]
     encoders: EncoderBank
     controller: Controller
     stop_input: StopInput = field(default_factory=CombinedStopInput)
+    live: LiveValues = field(default_factory=LiveValues)
 
     async def open(self) -> tuple[DeviceIdentity, ...]:
         """Connect to all of them at once; nothing moves.
@@ -47,6 +62,28 @@ class Devices:
         found = await gather_errors("devices do not answer as they must", calls)
         return tuple(identity for identities in found for identity in identities)
 
+    async def read_gauges(self) -> list[GaugeReading]:
+        """One reading of each gauge, in the order of ``gauges``."""
+        gauges = [mounted.gauge for mounted in self.gauges]
+        calls = [self.live.gauge(gauge.name).of(gauge.read()) for gauge in gauges]
+        return await gather_errors("gauges cannot be read", calls)
+
+    async def read_gauge_once(self, gauge: Gauge) -> GaugeReading:
+        """See :meth:`Gauge.read_once`."""
+        return await self.live.gauge(gauge.name).of(gauge.read_once())
+
+    async def read_encoders(self) -> EncoderSample:
+        """See :meth:`EncoderBank.read`."""
+        return await self.live.encoders.of(self.encoders.read())
+
+    async def controller_status(self) -> ControllerStatus:
+        """See :meth:`Controller.status`."""
+        return await self.live.controller.of(self.controller.status())
+
+    async def stop_reason(self) -> str:
+        """Why motion is forbidden; empty while it is not."""
+        return await self.live.stop_reason.of(self._stop_reason())
+
     async def close(self) -> None:
         """Let all of them go, whatever happens to one."""
         ports: list[Gauge | EncoderBank | Controller | StopInput] = [
@@ -56,6 +93,9 @@ class Devices:
             self.stop_input,
         ]
         await asyncio.gather(*(port.close() for port in ports), return_exceptions=True)
+
+    async def _stop_reason(self) -> str:
+        return await self.stop_input.active_reason() or ""
 
 
 async def _alone(identity: Awaitable[DeviceIdentity]) -> tuple[DeviceIdentity, ...]:

@@ -13,7 +13,7 @@ from hexacell.cell.limits import TimingSettings
 from hexacell.clock import CellClock
 from hexacell.errors import DeviceError, HexacellError, consists_only_of, flatten_errors
 from hexacell.kinematics.rotations import Array
-from procedures.devices.device_set import Devices, gather_errors
+from procedures.devices.device_set import Devices
 
 LEAST_WINDOWS = 3
 """So many windows' worth of readings are taken before giving up, however long they take."""
@@ -65,10 +65,8 @@ class Settled:
 
 async def read_all(devices: Devices, clock: CellClock) -> DeviceSnapshot:
     """Read everything once."""
-    readings = await gather_errors(
-        "gauges cannot be read", [mounted.gauge.read() for mounted in devices.gauges]
-    )
-    return DeviceSnapshot(clock.now(), tuple(readings), await devices.encoders.read())
+    readings = await devices.read_gauges()
+    return DeviceSnapshot(clock.now(), tuple(readings), await devices.read_encoders())
 
 
 async def settle(devices: Devices, timing: TimingSettings, clock: CellClock) -> Settled:

@@ -115,7 +115,7 @@ class Guards:
 
     async def _go(self, step: Move) -> EncoderSample:
         await self._devices.controller.move(step.target)
-        return await self._devices.encoders.read()
+        return await self._devices.read_encoders()
 
     def _limits(self, rest_mm: float | None = None) -> GuardLimits:
         guards = self._settings.guards
@@ -132,11 +132,11 @@ class Guards:
         devices = self._devices
         return DevicePollers(
             gauges=self._gauge_pollers(gauges),
-            encoders=DevicePoller("encoders", devices.encoders.read, POLL_PAUSE_S) if encoders else None,
-            controller=DevicePoller("controller", devices.controller.status, POLL_PAUSE_S)
+            encoders=DevicePoller("encoders", devices.read_encoders, POLL_PAUSE_S) if encoders else None,
+            controller=DevicePoller("controller", devices.controller_status, POLL_PAUSE_S)
             if controller
             else None,
-            stop_input=DevicePoller(STOP_LINE, self._forbidden, POLL_PAUSE_S),
+            stop_input=DevicePoller(STOP_LINE, devices.stop_reason, POLL_PAUSE_S),
         )
 
     def _gauge_pollers(self, gauges: tuple[WatchedGauge, ...]) -> tuple[DevicePoller[GaugeDeviation], ...]:
@@ -148,32 +148,31 @@ class Guards:
             for gauge in gauges
         )
 
-    async def _forbidden(self) -> str:
-        return await self._devices.stop_input.active_reason() or ""
-
     def _watched_gauges(self, step: Move, state: RunState) -> tuple[WatchedGauge, ...]:
         samples = state.set(step.at).samples
         if not samples:
             return ()
         reference = samples[0].reading.gauges_mm
         return tuple(
-            WatchedGauge(mounted, reference[mounted.axis.index]) for mounted in self._devices.gauges
+            WatchedGauge(self._devices, mounted, reference[mounted.axis.index])
+            for mounted in self._devices.gauges
         )
 
 
 class WatchedGauge:
     """A mounted gauge within a set, and every value it displayed since the move began."""
 
-    def __init__(self, mounted: MountedGauge, reference_mm: float) -> None:
+    def __init__(self, devices: Devices, mounted: MountedGauge, reference_mm: float) -> None:
         self.device = f"gauge {mounted.gauge.name}"
         self.axis = mounted.axis.index
         self.displayed: list[str] = []
+        self._devices = devices
         self._mounted = mounted
         self._reference_mm = reference_mm
 
     async def read_deviation(self) -> GaugeDeviation:
         """The present deviation from the reference of the set."""
-        reading = await self._mounted.gauge.read_once()
+        reading = await self._devices.read_gauge_once(self._mounted.gauge)
         self.displayed.append(reading.raw)
         deviation_mm = self._mounted.axis.deviation(reading.value_mm, self._reference_mm)
         return GaugeDeviation(self.axis, deviation_mm)

@@ -91,7 +91,7 @@ class Gauge(Device[DeviceIdentity], Protocol):
         """The displayed value at this moment, from a single query, also during motion.
 
         For supervision only, never for a record. A garbled answer raises
-        :class:`drivers.gauges.errors.WrongAnswer`.
+        :class:`drivers.errors.WrongAnswer`.
         """
         ...
 

@@ -12,7 +12,7 @@ from typing import Any
 import can
 import canopen
 
-from drivers.encoders.errors import BusError
+from drivers.errors import BusError
 from drivers.wire_trace import TraceEntry, TraceRecorder, TrafficDirection
 
 SLICE_S = 0.03

@@ -5,6 +5,8 @@ The SDO client can be interrupted, and detects a second device under the same no
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
 from enum import IntEnum
 
 from canopen.objectdictionary import ObjectDictionary
@@ -12,16 +14,33 @@ from canopen.sdo.client import SdoClient
 from canopen.sdo.exceptions import SdoAbortedError, SdoCommunicationError
 
 from drivers.encoders.can_bus import EncoderBus
-from drivers.encoders.errors import (
-    ConfigurationError,
-    DuplicatedNodeError,
-    Leg,
-    SilentNodeError,
-    WrongDeviceError,
-)
 from drivers.encoders.object_dictionary import ObjectEntry
+from drivers.errors import SilentNodeError
+from hexacell.errors import DeviceError
 
 _NMT = 0x000
+
+
+@dataclass(frozen=True, slots=True)
+class Leg:
+    """One leg's encoder; ``number`` counts from 1, ``node`` is the CANopen node id (1 to 127)."""
+
+    number: int
+    node: int
+
+    def __str__(self) -> str:
+        return f"leg {self.number} (node {self.node})"
+
+    @property
+    def subject(self) -> str:
+        """The subject of messages about this encoder."""
+        return subject_of([self])
+
+
+def subject_of(legs: Sequence[Leg]) -> str:
+    """The subject of messages about one or more encoders."""
+    noun = "encoder of" if len(legs) == 1 else "encoders of"
+    return f"{noun} {', '.join(map(str, legs))}"
 
 
 class NmtCommand(IntEnum):
@@ -51,12 +70,14 @@ class EncoderNode:
         """The value of a mandatory entry.
 
         Raises:
-            NodeError: The entry does not exist, or the node does not respond.
+            DeviceError: The entry does not exist, or the node does not respond.
         """
         value = self.read_optional(entry)
         if value is None:
-            raise WrongDeviceError(
-                f"has no {entry}", self.leg, action="Check that it is a CANopen encoder (CiA 406)"
+            raise DeviceError(
+                f"has no {entry}",
+                subject=self.leg.subject,
+                action="Check that it is a CANopen encoder (CiA 406)",
             )
         return value
 
@@ -64,7 +85,7 @@ class EncoderNode:
         """The value of an entry; none if the device does not have it.
 
         Raises:
-            NodeError: No response, or two.
+            DeviceError: No response, or two.
         """
         try:
             return int.from_bytes(self.sdo.upload(entry.index, entry.subindex), "little")
@@ -77,16 +98,12 @@ class EncoderNode:
         """Write an entry.
 
         Raises:
-            NodeError: The device refuses, or there is no response, or two.
+            DeviceError: The device refuses, or there is no response, or two.
         """
         try:
             self.sdo.download(entry.index, entry.subindex, value.to_bytes(entry.size, "little"))
         except SdoAbortedError as error:
-            raise ConfigurationError(
-                f"refuses to set {entry} to {value:#x}: {error}",
-                self.leg,
-                action="Set it with the vendor's tool, or use another device",
-            ) from error
+            raise setting_refused(f"refuses to set {entry} to {value:#x}: {error}", self.leg) from error
         except SdoCommunicationError as error:
             raise self._communication_error(entry, error) from error
 
@@ -94,28 +111,33 @@ class EncoderNode:
         """Raise if a second device responded under this node id.
 
         Raises:
-            DuplicatedNodeError: It did.
+            DeviceError: It did.
         """
         if self.sdo.has_surplus_response:
             raise duplicated_node("responded twice to one request", self.leg)
 
-    def _communication_error(
-        self, entry: ObjectEntry, error: Exception
-    ) -> DuplicatedNodeError | SilentNodeError:
+    def _communication_error(self, entry: ObjectEntry, error: Exception) -> DeviceError:
         if self.sdo.has_surplus_response:
             return duplicated_node("responded twice to one request", self.leg)
         return SilentNodeError(
             f"does not respond for {entry}: {error}",
-            self.leg,
+            subject=self.leg.subject,
             action="Check its supply and cable, then open the encoders again",
         )
 
 
-def duplicated_node(what: str, leg: Leg) -> DuplicatedNodeError:
+def setting_refused(what: str, leg: Leg) -> DeviceError:
+    """The error for a device that does not take a setting needed for one sample per SYNC."""
+    return DeviceError(
+        what, subject=leg.subject, action="Set it with the vendor's tool, or use another device"
+    )
+
+
+def duplicated_node(what: str, leg: Leg) -> DeviceError:
     """The error for a node id that two devices share."""
-    return DuplicatedNodeError(
+    return DeviceError(
         f"{what}: two devices share node id {leg.node}, or another program uses this bus",
-        leg,
+        subject=leg.subject,
         action="Unplug one of them, or give it another node id, then open the encoders again",
     )
 

@@ -18,7 +18,7 @@ class Cia406Bank:
 
     ``settings.bus`` is passed unchanged to ``can.Bus``, so every interface of python-can works.
     ``trace`` is called with every CANopen frame, from the threads of the bus. Every failure is a
-    ``DeviceError``, those of the bus and of nodes one of :mod:`drivers.encoders.errors`.
+    ``DeviceError``, those with a reaction of their own one of :mod:`drivers.errors`.
     """
 
     def __init__(self, settings: EncoderSettings, trace: TraceRecorder | None = None) -> None:

@@ -6,8 +6,7 @@ import math
 from collections.abc import Sequence
 
 from drivers.encoders.can_bus import EncoderBus
-from drivers.encoders.canopen_node import EncoderNode
-from drivers.encoders.errors import MissingNodeError, WrongDeviceError, subject_of
+from drivers.encoders.canopen_node import EncoderNode, subject_of
 from drivers.encoders.object_dictionary import (
     DEVICE_TYPE,
     ENCODER_PROFILE,
@@ -19,8 +18,10 @@ from drivers.encoders.object_dictionary import (
     VENDOR,
     DeviceType,
 )
+from drivers.errors import BusError
 from drivers.interfaces import DeviceIdentity
 from hexacell.cell.devices import EncoderSettings
+from hexacell.errors import DeviceError
 
 SECOND_RESPONSE_S = 0.03
 """How long a second device may take to respond to the same request."""
@@ -30,8 +31,8 @@ def detect_nodes(nodes: Sequence[EncoderNode], bus: EncoderBus, timeout_s: float
     """Probe all nodes at once.
 
     Raises:
-        MissingNodeError: Some do not respond within ``timeout_s``.
-        DuplicatedNodeError: More than one device responds under one node id.
+        BusError: Some do not respond within ``timeout_s``.
+        DeviceError: More than one device responds under one node id.
     """
     for node in nodes:
         node.sdo.probe()
@@ -48,15 +49,15 @@ def read_device_type(node: EncoderNode) -> DeviceType:
     """The device type of a node.
 
     Raises:
-        WrongDeviceError: It is not an absolute linear encoder.
+        DeviceError: It is not an absolute linear encoder.
     """
     value = node.read(DEVICE_TYPE)
     try:
         return DeviceType(value)
     except ValueError as error:
-        raise WrongDeviceError(
+        raise DeviceError(
             f"is no absolute linear encoder: its device type is {_device_type_text(value)}",
-            node.leg,
+            subject=node.leg.subject,
             action="Check `nodes` under [encoders] in the cell file against the devices' node ids",
         ) from error
 
@@ -65,15 +66,15 @@ def check_measuring_step(node: EncoderNode, step_nm: float) -> None:
     """Compare the measuring step with the cell file.
 
     Raises:
-        WrongDeviceError: It differs, or the device does not report it.
+        DeviceError: It differs, or the device does not report it.
     """
     found = node.read_optional(MEASURING_STEP_SETTING)
     if found is None:
         found = node.read(MEASURING_STEP)
     if not math.isclose(found, step_nm, rel_tol=1e-9):
-        raise WrongDeviceError(
+        raise DeviceError(
             f"has a measuring step of {found} nm, the cell file says {step_nm:g} nm",
-            node.leg,
+            subject=node.leg.subject,
             action="Correct `measuring_step_nm` under [encoders], or set the device with its vendor's tool",
         )
 
@@ -86,7 +87,7 @@ def read_identity(node: EncoderNode, kind: DeviceType) -> DeviceIdentity:
         words += [] if value is None else [f"{name} 0x{value:08X}"]
     serial_number = node.read_optional(SERIAL_NUMBER)
     return DeviceIdentity(
-        name=subject_of([node.leg]),
+        name=node.leg.subject,
         protocol="cia406",
         description=", ".join(words),
         serial_number="" if serial_number is None else str(serial_number),
@@ -97,26 +98,26 @@ def check_serial_number(node: EncoderNode, identity: DeviceIdentity, settings: E
     """Compare the serial number with the cell file, if that has one.
 
     Raises:
-        WrongDeviceError: It differs.
+        DeviceError: It differs.
     """
     if settings.serial_numbers is None:
         return
     expected = str(settings.serial_numbers[node.leg.number - 1])
     if identity.serial_number != expected:
-        raise WrongDeviceError(
+        raise DeviceError(
             f"has serial number {identity.serial_number or '(none)'}, the cell file says {expected}",
-            node.leg,
+            subject=node.leg.subject,
             action="If it was exchanged on purpose, correct `serial_numbers` under [encoders] and "
             "calibrate; if not, check which cable goes to which leg",
         )
 
 
-def _missing(missing: Sequence[EncoderNode], unexpected: Sequence[int]) -> MissingNodeError:
+def _missing(missing: Sequence[EncoderNode], unexpected: Sequence[int]) -> BusError:
     found = ", ".join(str(node) for node in unexpected)
     hint = f"; node {found} is on the bus but belongs to no leg" if unexpected else ""
-    return MissingNodeError(
+    return BusError(
         f"nobody answers{hint}",
-        *(node.leg for node in missing),
+        subject=subject_of([node.leg for node in missing]),
         action="Check supply, cable, bit rate and node id",
     )
 

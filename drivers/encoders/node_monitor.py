@@ -14,9 +14,9 @@ from enum import IntEnum
 from canopen.emcy import EmcyError
 
 from drivers.encoders.can_bus import EncoderBus
-from drivers.encoders.canopen_node import EncoderNode
-from drivers.encoders.errors import InvalidSampleError, Leg, RestartedNodeError, SilentNodeError
+from drivers.encoders.canopen_node import EncoderNode, Leg, subject_of
 from drivers.encoders.object_dictionary import ALARMS, ERROR_REGISTER, ObjectEntry
+from drivers.errors import InvalidSampleError, RestartedNodeError, SilentNodeError
 
 HEARTBEAT = 0x700
 EMERGENCY = 0x080
@@ -113,7 +113,7 @@ def invalid_sample(what: str, leg: Leg) -> InvalidSampleError:
     """The error for positions that the device itself reports as invalid."""
     return InvalidSampleError(
         f"{what}; its position cannot be trusted",
-        leg,
+        subject=leg.subject,
         action="Remove the cause (magnet, distance, temperature), then measure again",
     )
 
@@ -127,7 +127,7 @@ def silence_action(*, all_legs: bool) -> str:
 def _restarted(legs: Sequence[Leg]) -> RestartedNodeError:
     return RestartedNodeError(
         "restarted, or was stopped, during the run and lost its configuration: the set is void",
-        *legs,
+        subject=subject_of(legs),
         action="Check its supply, open the encoders again and repeat the set",
     )
 
@@ -135,7 +135,7 @@ def _restarted(legs: Sequence[Leg]) -> RestartedNodeError:
 def _silent(monitors: Sequence[NodeMonitor], *, all_legs: bool) -> SilentNodeError:
     return SilentNodeError(
         f"no heartbeat for {monitors[0].timeout_s:.2g} s",
-        *(monitor.leg for monitor in monitors),
+        subject=subject_of([monitor.leg for monitor in monitors]),
         action=silence_action(all_legs=all_legs),
     )
 
@@ -168,7 +168,7 @@ class AlarmPoll:
     """Reads the alarm entries of all nodes: at first, then every ``PERIOD_S`` and after emergencies.
 
     Raises:
-        NodeError: As :meth:`check`.
+        DeviceError: As :meth:`check`.
     """
 
     def __init__(self, nodes: Sequence[EncoderNode], monitors: Sequence[NodeMonitor]) -> None:
@@ -186,7 +186,7 @@ class AlarmPoll:
 
         Raises:
             InvalidSampleError: A device has an alarm.
-            NodeError: It does not respond.
+            DeviceError: It does not respond.
         """
         emergencies = sum(monitor.emergencies for monitor in self._monitors)
         if time.monotonic() < self._due and emergencies == self._emergencies_seen:

@@ -8,8 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from drivers.encoders.canopen_node import EncoderNode
-from drivers.encoders.errors import ConfigurationError
+from drivers.encoders.canopen_node import EncoderNode, setting_refused
 from drivers.encoders.object_dictionary import (
     POSITION,
     POSITION_OF_MAGNET_1,
@@ -94,11 +93,11 @@ def configure_position_tpdo(node: EncoderNode, kind: DeviceType, heartbeat_ms: i
     """Set one TPDO to the position with every SYNC, switch the others off, start the heartbeat.
 
     Raises:
-        NodeError: The device does not take that, or does not answer.
+        DeviceError: The device does not take that, or does not answer.
     """
     tpdos = [tpdo for number in range(1, TPDO_COUNT + 1) if (tpdo := _read(node, number)) is not None]
     if not tpdos:
-        raise _refused(node, "has no transmit PDO")
+        raise setting_refused("has no transmit PDO", node.leg)
     selected = _select(tpdos)
     for tpdo in tpdos:
         node.write(tpdo_cob_id(tpdo.number), tpdo.cob_id | _OFF)
@@ -135,7 +134,7 @@ def _set_up(node: EncoderNode, tpdo: Tpdo, kind: DeviceType) -> PositionChannel:
         _map_only(node, tpdo.number, kind.position)
         offset = 0
     if offset % 8:
-        raise _refused(node, f"has its position {offset} bits into TPDO {tpdo.number}")
+        raise setting_refused(f"has its position {offset} bits into TPDO {tpdo.number}", node.leg)
     node.write(tpdo_transmission_type(tpdo.number), WITH_EVERY_SYNC)
     if node.read_optional(tpdo_event_timer(tpdo.number)):
         node.write(tpdo_event_timer(tpdo.number), 0)
@@ -154,14 +153,10 @@ def _map_only(node: EncoderNode, number: int, position: ObjectEntry) -> None:
 def _verify(node: EncoderNode, number: int) -> None:
     """Read back: some devices acknowledge a write without effect."""
     if node.read(tpdo_transmission_type(number)) != WITH_EVERY_SYNC:
-        raise _refused(node, f"acknowledges, but does not keep, TPDO {number} with every SYNC")
+        raise setting_refused(f"acknowledges, but does not keep, TPDO {number} with every SYNC", node.leg)
     if node.read(tpdo_cob_id(number)) & _OFF:
-        raise _refused(node, f"acknowledges, but does not do, switching TPDO {number} on")
+        raise setting_refused(f"acknowledges, but does not do, switching TPDO {number} on", node.leg)
 
 
 def _mapped(entry: ObjectEntry) -> MappedEntry:
     return MappedEntry(entry.index, entry.subindex, _POSITION_BITS)
-
-
-def _refused(node: EncoderNode, what: str) -> ConfigurationError:
-    return ConfigurationError(what, node.leg, action="Set it with the vendor's tool, or use another device")

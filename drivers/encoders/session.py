@@ -6,8 +6,7 @@ import threading
 from functools import partial
 
 from drivers.encoders.can_bus import EncoderBus
-from drivers.encoders.canopen_node import EncoderNode, NmtCommand
-from drivers.encoders.errors import BusError, Leg
+from drivers.encoders.canopen_node import EncoderNode, Leg, NmtCommand
 from drivers.encoders.node_identity import (
     check_measuring_step,
     check_serial_number,
@@ -19,6 +18,7 @@ from drivers.encoders.node_monitor import AlarmPoll, NodeMonitor, check_nodes
 from drivers.encoders.object_dictionary import DeviceType
 from drivers.encoders.pdo_configuration import configure_position_tpdo
 from drivers.encoders.sync_sampling import SyncSampler
+from drivers.errors import BusError
 from drivers.interfaces import DeviceIdentity, EncoderSample
 from drivers.wire_trace import TraceRecorder
 from hexacell.cell.devices import EncoderSettings

@@ -8,11 +8,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from drivers.encoders.can_bus import EncoderBus
-from drivers.encoders.canopen_node import duplicated_node
-from drivers.encoders.errors import BusError, Leg, SilentNodeError, WrongDeviceError
+from drivers.encoders.canopen_node import Leg, duplicated_node, subject_of
 from drivers.encoders.node_identity import SECOND_RESPONSE_S
 from drivers.encoders.node_monitor import silence_action
 from drivers.encoders.pdo_configuration import PositionChannel
+from drivers.errors import BusError, SilentNodeError
+from hexacell.errors import DeviceError
 
 SYNC = 0x080
 MAX_SYNCS = 3
@@ -76,7 +77,7 @@ class SyncSampler:
         """Raise if there were unsolicited frames.
 
         Raises:
-            DuplicatedNodeError: A leg sent more positions than there were SYNCs.
+            DeviceError: A leg sent more positions than there were SYNCs.
             BusError: Another master sends SYNC.
         """
         for leg, outstanding in zip(self._legs, self._outstanding, strict=True):
@@ -108,9 +109,9 @@ class SyncSampler:
     def _decode(self, *, signed: bool) -> tuple[int, ...]:
         for leg, channel, frame in zip(self._legs, self._channels, self._frames, strict=True):
             if len(frame) < channel.length:
-                raise WrongDeviceError(
+                raise DeviceError(
                     f"sent {len(frame)} bytes where its position needs {channel.length}",
-                    leg,
+                    subject=leg.subject,
                     action="Open the encoders again; if it stays so, use another device",
                 )
         pairs = zip(self._channels, self._frames, strict=True)
@@ -122,7 +123,7 @@ class SyncSampler:
         ]
         return SilentNodeError(
             f"no response to SYNC within {self._timeout_s:g} s, {MAX_SYNCS} times",
-            *silent,
+            subject=subject_of(silent),
             action=silence_action(all_legs=len(silent) == len(self._legs)),
         )
 

@@ -13,8 +13,15 @@ from enum import Enum, IntEnum
 from functools import partial
 from typing import ClassVar
 
-from drivers.gauges.errors import FrameRejected, GaugeAtEnd, GaugeSilent
-from drivers.gauges.protocol import DisplayedValue, GaugeState, LineSettings, ProtocolSpec, Unit
+from drivers.errors import GaugeAtEnd, GaugeSilent
+from drivers.gauges.protocol import (
+    DisplayedValue,
+    FrameRejected,
+    GaugeState,
+    LineSettings,
+    ProtocolSpec,
+    Unit,
+)
 from drivers.gauges.serial_gauge import SerialGauge
 
 VALUE_REQUEST = b"R\r"

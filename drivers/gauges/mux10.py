@@ -14,8 +14,8 @@ import re
 from dataclasses import dataclass
 from typing import ClassVar
 
-from drivers.gauges.errors import FrameRejected, GaugeAtEnd, GaugeSilent, WrongAnswer
-from drivers.gauges.protocol import DisplayedValue, GaugeState, LineSettings, ProtocolSpec
+from drivers.errors import GaugeAtEnd, GaugeSilent, WrongAnswer
+from drivers.gauges.protocol import DisplayedValue, FrameRejected, GaugeState, LineSettings, ProtocolSpec
 from drivers.gauges.serial_gauge import SerialGauge
 from drivers.interfaces import GaugeReading
 from hexacell.errors import DeviceError

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, fields
 from enum import StrEnum
 
-from drivers.gauges.errors import GaugeSilent, WrongAnswer
+from drivers.errors import GaugeSilent, WrongAnswer
 
 BIT_7 = 0x80
 TERMINATOR = b"\r"  # ends every request, and is the first line end of every answer
@@ -70,6 +70,14 @@ def unexpected_answer(subject: str, spec: ProtocolSpec, received: bytes) -> Wron
         subject=subject,
         action="Correct protocol or port in the cell file",
     )
+
+
+class FrameRejected(Exception):
+    """A frame that does not fully match the protocol; the request is repeated. Never shown to users."""
+
+    def __init__(self, frame: bytes) -> None:
+        self.frame = frame
+        super().__init__(frame)
 
 
 INCH_DECIMALS = 5  # no instrument resolves 10 nm, so this many decimals are inches

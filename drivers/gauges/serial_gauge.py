@@ -6,10 +6,11 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from typing import ClassVar, TypeVar
 
-from drivers.gauges.errors import FrameRejected, GaugeAtEnd, GaugeUnsteady, WrongMode, WrongUnit, ZeroVoid
+from drivers.errors import GaugeAtEnd, GaugeUnsteady, WrongSetting, ZeroVoid
 from drivers.gauges.protocol import (
     TERMINATOR,
     DisplayedValue,
+    FrameRejected,
     GaugeState,
     ProtocolSpec,
     Unit,
@@ -200,19 +201,19 @@ class SerialGauge(ABC):
         if state.unit is Unit.INCH:
             raise self._inch()
         if state.hold:
-            raise self._wrong_mode("is on hold, its value is frozen", "Release hold")
+            raise self._wrong_setting("is on hold, its value is frozen", "Release hold")
         if state.mode is not None and state.mode not in self.normal_modes:
-            raise self._wrong_mode(f"is in mode {state.mode}", "Set it to normal measuring")
+            raise self._wrong_setting(f"is in mode {state.mode}", "Set it to normal measuring")
         if state.scaling:
-            raise self._wrong_mode("multiplies what it measures", "Switch its ratio off")
+            raise self._wrong_setting("multiplies what it measures", "Switch its ratio off")
         if state.battery_low:
-            raise self._wrong_mode("has a low battery", "Change it, then zero the gauge again")
+            raise self._wrong_setting("has a low battery", "Change it, then zero the gauge again")
 
-    def _inch(self) -> WrongUnit:
-        return WrongUnit("answers in inch", subject=self.subject, action="Press its in/mm key")
+    def _inch(self) -> WrongSetting:
+        return self._wrong_setting("answers in inch", "Press its in/mm key")
 
-    def _wrong_mode(self, problem: str, action: str) -> WrongMode:
-        return WrongMode(problem, subject=self.subject, action=action)
+    def _wrong_setting(self, problem: str, action: str) -> WrongSetting:
+        return WrongSetting(problem, subject=self.subject, action=action)
 
     def _voided(self, problem: str) -> ZeroVoid:
         """The error to raise, now and by every later reading until it is opened again."""

@@ -14,8 +14,15 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import ClassVar
 
-from drivers.gauges.errors import FrameRejected, WrongAnswer
-from drivers.gauges.protocol import DisplayedValue, GaugeState, LineSettings, ProtocolSpec, Unit
+from drivers.errors import WrongAnswer
+from drivers.gauges.protocol import (
+    DisplayedValue,
+    FrameRejected,
+    GaugeState,
+    LineSettings,
+    ProtocolSpec,
+    Unit,
+)
 from drivers.gauges.serial_gauge import SerialGauge
 from hexacell.errors import DeviceError
 

@@ -1,62 +1,49 @@
-"""Errors of serial ports: each function builds one, with the next action."""
+"""What pyserial raises while a port is opened, as errors with the next action."""
 
 from __future__ import annotations
 
 import errno
+import termios
+from collections.abc import Iterator
+from contextlib import contextmanager
 
-from hexacell.errors import DeviceError, FileError
+from drivers.errors import PortLost
+from hexacell.errors import FileError
+
+_ABSENT = ("is absent", "Plug it in or correct port in the cell file")
+_NOT_PERMITTED = ("may not be opened by this user", "Let the user into the group that owns it")
+_IN_USE = ("is in use", "Close the other program that has it open")
 
 _CAUSES = {
-    errno.ENOENT: ("is absent", "Plug it in or correct port in the cell file"),
-    errno.ENODEV: ("is absent", "Plug it in or correct port in the cell file"),
-    errno.ENXIO: ("is absent", "Plug it in or correct port in the cell file"),
-    errno.EACCES: ("may not be opened by this user", "Let the user into the group that owns it"),
-    errno.EPERM: ("may not be opened by this user", "Let the user into the group that owns it"),
-    errno.EBUSY: ("is in use", "Close the other program that has it open"),
-    errno.EAGAIN: ("is in use", "Close the other program that has it open"),
+    errno.ENOENT: _ABSENT,
+    errno.ENODEV: _ABSENT,
+    errno.ENXIO: _ABSENT,
+    errno.EACCES: _NOT_PERMITTED,
+    errno.EPERM: _NOT_PERMITTED,
+    errno.EBUSY: _IN_USE,
+    errno.EAGAIN: _IN_USE,
 }
 
 
-class PortLost(DeviceError):
-    """A port is not available, or was lost."""
+@contextmanager
+def opening_errors(subject: str, url: str) -> Iterator[None]:
+    """Convert the errors of opening the port ``url``.
 
-
-def port_open_failed(subject: str, url: str, error: BaseException) -> DeviceError:
-    """Opening the port failed with ``error``, an ``OSError`` or a ``termios.error``."""
-    problem, action = _CAUSES.get(
-        getattr(error, "errno", None) or 0,
-        (f"cannot be opened: {error}", "Check the device and port in the cell file"),
-    )
-    return PortLost(f"port {url} {problem}", subject=subject, action=action)
-
-
-def settings_rejected(subject: str, url: str, error: BaseException) -> FileError:
-    """The URL or one of the settings is not accepted by pyserial."""
-    return FileError(
-        f"port {url} or its serial settings are refused: {error}",
-        subject=subject,
-        action="Correct port or serial in the cell file",
-    )
-
-
-def port_lost(subject: str, url: str, reason: str) -> DeviceError:
-    """An open port is gone."""
-    return PortLost(
-        f"port {url} was lost ({reason})",
-        subject=subject,
-        action="Plug it in and open the device again; its zero is void",
-    )
-
-
-def port_closed(subject: str, url: str) -> DeviceError:
-    """The port is closed, or being closed, by this program."""
-    return PortLost(f"port {url} is closed", subject=subject)
-
-
-def line_not_silent(subject: str, url: str) -> DeviceError:
-    """The device sends continuously, so an answer cannot be recognised."""
-    return DeviceError(
-        f"the device on {url} keeps sending unasked",
-        subject=subject,
-        action="Switch its continuous output off, or correct port and protocol in the cell file",
-    )
+    Raises:
+        PortLost: The port is absent, in use, or cannot be opened.
+        FileError: pyserial does not accept the URL or a setting.
+    """
+    try:
+        yield
+    except (ValueError, TypeError) as error:
+        raise FileError(
+            f"port {url} or its serial settings are refused: {error}",
+            subject=subject,
+            action="Correct port or serial in the cell file",
+        ) from error
+    except (OSError, termios.error) as error:
+        problem, action = _CAUSES.get(
+            getattr(error, "errno", None) or 0,
+            (f"cannot be opened: {error}", "Check the device and port in the cell file"),
+        )
+        raise PortLost(f"port {url} {problem}", subject=subject, action=action) from error

@@ -16,13 +16,8 @@ from contextlib import contextmanager, suppress
 
 import serial
 
-from drivers.serial.errors import (
-    line_not_silent,
-    port_closed,
-    port_lost,
-    port_open_failed,
-    settings_rejected,
-)
+from drivers.errors import PortLost
+from drivers.serial.errors import opening_errors
 from drivers.wire_trace import TraceEntry, TraceRecorder, TrafficDirection
 from hexacell.errors import DeviceError
 
@@ -96,7 +91,7 @@ class SerialPort:
             DeviceError: The port is not open, was lost, or is being closed.
         """
         if self._port is None:
-            raise port_lost(self.subject, self.url, "it is not open")
+            raise self._lost("it is not open")
         with self._port_errors():
             self._resynchronise(self._port)
             self._send(self._port, request)
@@ -105,6 +100,11 @@ class SerialPort:
     def require_silence(self) -> None:
         """Wait for a short silence of the line before the next request."""
         self._silence_s = max(self._silence_s, FRAME_GAP_S)
+
+    def require_not_closed(self) -> None:
+        """Raise if this program has closed the port or is closing it."""
+        if self.closing.is_set():
+            raise PortLost(f"port {self.url} is closed", subject=self.subject)
 
     def close(self) -> None:
         """Close the port; closing twice is harmless."""
@@ -123,15 +123,11 @@ class SerialPort:
 
     def _opened(self) -> serial.Serial:
         attempts = 0
-        try:
+        with opening_errors(self.subject, self.url):
             port = self._configured()
             while not port.is_open:
                 attempts += 1
                 self._try_to_open(port, last=attempts == OPEN_TRIES)
-        except (ValueError, TypeError) as error:
-            raise settings_rejected(self.subject, self.url, error) from error
-        except (OSError, termios.error) as error:
-            raise port_open_failed(self.subject, self.url, error) from error
         return port
 
     def _try_to_open(self, port: serial.Serial, *, last: bool) -> None:
@@ -140,7 +136,8 @@ class SerialPort:
         except termios.error as error:
             if last or not _refuses_parity(error):
                 raise
-            self._sleep(SLICE_S)
+            self.closing.wait(SLICE_S)
+            self.require_not_closed()
 
     def _configured(self) -> serial.Serial:
         lines = {name: value for name, value in self._settings.items() if name in {"dtr", "rts"}}
@@ -159,7 +156,7 @@ class SerialPort:
         deadline = time.monotonic() + SILENCE_ATTEMPTS * max(self._silence_s, FRAME_GAP_S)
         while self._since_traffic_s() < self._silence_s or port.in_waiting:
             if time.monotonic() > deadline:
-                raise line_not_silent(self.subject, self.url)
+                raise self._not_silent()
             self._keep_unsolicited(self._read(port))
         self._silence_s = 0.0
 
@@ -185,8 +182,7 @@ class SerialPort:
 
     def _read(self, port: serial.Serial) -> bytes:
         """The bytes that come within one slice, possibly none."""
-        if self.closing.is_set():
-            raise port_closed(self.subject, self.url)
+        self.require_not_closed()
         data = port.read(1)
         if data:
             data += self._waiting(port)
@@ -202,8 +198,7 @@ class SerialPort:
         return data
 
     def _send(self, port: serial.Serial, request: bytes) -> None:
-        if self.closing.is_set():
-            raise port_closed(self.subject, self.url)
+        self.require_not_closed()
         self._record(TrafficDirection.SENT, request)
         self._asked_at = self._last_traffic = time.monotonic()
         # pyserial also raises it if all was sent and this thread was then not scheduled for so long;
@@ -215,17 +210,27 @@ class SerialPort:
         if data and self._recorder is not None:
             self._recorder(TraceEntry(time.time(), self.url, direction, data))
 
-    def _sleep(self, seconds: float) -> None:
-        if self.closing.wait(seconds):
-            raise port_closed(self.subject, self.url)
-
     @contextmanager
     def _port_errors(self) -> Iterator[None]:
         try:
             yield
         except (OSError, termios.error) as error:
             self.close()
-            raise port_lost(self.subject, self.url, str(error)) from error
+            raise self._lost(str(error)) from error
+
+    def _not_silent(self) -> DeviceError:
+        return DeviceError(
+            f"the device on {self.url} keeps sending unasked",
+            subject=self.subject,
+            action="Switch its continuous output off, or correct port and protocol in the cell file",
+        )
+
+    def _lost(self, reason: str) -> PortLost:
+        return PortLost(
+            f"port {self.url} was lost ({reason})",
+            subject=self.subject,
+            action="Plug it in and open the device again; its zero is void",
+        )
 
 
 def _refuses_parity(error: termios.error) -> bool:

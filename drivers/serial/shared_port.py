@@ -9,7 +9,6 @@ from dataclasses import dataclass, field
 from functools import partial
 from typing import TypeVar
 
-from drivers.serial.errors import port_closed, settings_rejected
 from drivers.serial.port import WORST_LATENCY_S, SerialPort
 from drivers.wire_trace import TraceRecorder
 from hexacell.errors import FileError
@@ -20,7 +19,7 @@ Result = TypeVar("Result")
 class SharedSerialPort:
     """A serial port used by one thread, on behalf of any coroutine of one event loop.
 
-    ``url`` and ``serial_settings`` are passed to ``serial.serial_for_url``, except ``dtr`` and ``rts``,
+    ``url`` and ``settings`` are passed to ``serial.serial_for_url``, except ``dtr`` and ``rts``,
     which set those lines. Time-outs are set by this class.
 
     Exchanges run one after another. If a coroutine is cancelled, its exchange still ends in the thread
@@ -30,13 +29,12 @@ class SharedSerialPort:
     def __init__(
         self,
         url: str,
-        *,
+        settings: Mapping[str, object],
         trace: TraceRecorder | None = None,
         worst_latency_s: float = WORST_LATENCY_S,
-        **serial_settings: object,
     ) -> None:
         self.url = url
-        self._port = SerialPort(url, serial_settings, trace, worst_latency_s)
+        self._port = SerialPort(url, settings, trace, worst_latency_s)
         self._worker = ThreadPoolExecutor(1, thread_name_prefix=f"serial {url}")
         self._closed = False
 
@@ -97,8 +95,7 @@ class SharedSerialPort:
         self._worker.shutdown()
 
     async def _run(self, job: Callable[[], Result]) -> Result:
-        if self._closed:
-            raise port_closed(self.subject, self.url)
+        self._port.require_not_closed()
         return await asyncio.wrap_future(self._worker.submit(job))
 
 
@@ -136,7 +133,9 @@ class SharedSerialPorts:
         Raises:
             FileError: Another gauge uses the port with other settings, alone, or on this channel.
         """
-        shared = self._shared.get(url) or _PortUsers(self._make(url, settings), settings)
+        shared = self._shared.get(url) or _PortUsers(
+            SharedSerialPort(url, settings, self._trace, self._worst_latency_s), settings
+        )
         self._require_no_conflict(url, shared, gauge, settings, channel)
         self._shared[url] = shared
         shared.channels[gauge] = channel
@@ -159,14 +158,6 @@ class SharedSerialPorts:
         ports = [shared.port for shared in self._shared.values()]
         self._shared.clear()
         await asyncio.gather(*(port.close() for port in ports))
-
-    def _make(self, url: str, settings: Mapping[str, object]) -> SharedSerialPort:
-        try:
-            return SharedSerialPort(
-                url, trace=self._trace, worst_latency_s=self._worst_latency_s, **settings
-            )
-        except TypeError as error:  # a setting has the name of an own parameter
-            raise settings_rejected(f"port {url}", url, error) from error
 
     @staticmethod
     def _require_no_conflict(

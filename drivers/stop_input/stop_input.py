@@ -17,7 +17,7 @@ from typing import Protocol
 import serial
 
 from drivers.interfaces import DeviceIdentity
-from drivers.serial.errors import port_open_failed, settings_rejected
+from drivers.serial.errors import opening_errors
 from hexacell.cell.limits import GuardSettings
 from hexacell.errors import HexacellError
 
@@ -31,7 +31,7 @@ class StopSource(Protocol):
     device: str
 
     def open(self) -> None:
-        """Connect."""
+        """Connect; it is closed again even if this fails."""
         ...
 
     def active_reason(self) -> str | None:
@@ -85,17 +85,11 @@ class StopContact:
             FileError: pyserial does not accept the URL.
         """
         self.close()
-        try:
-            port = serial.serial_for_url(self._url, do_not_open=True)
-            port.dtr = port.rts = True
-            port.open()
-            self._port = port
-            getattr(port, self._line)
-        except (ValueError, TypeError) as error:
-            raise settings_rejected(SUBJECT, self._url, error) from error
-        except (OSError, termios.error) as error:
-            self.close()
-            raise port_open_failed(SUBJECT, self._url, error) from error
+        with opening_errors(SUBJECT, self._url):
+            self._port = serial.serial_for_url(self._url, do_not_open=True)
+            self._port.dtr = self._port.rts = True
+            self._port.open()
+            getattr(self._port, self._line)
 
     def active_reason(self) -> str | None:
         """The reason, if the contact is open or the port was lost. It takes one system call."""

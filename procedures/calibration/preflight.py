@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Awaitable, Iterator
 from pathlib import Path
 
-from drivers.gauges.errors import GaugeAtEnd
+from drivers.errors import GaugeAtEnd
 from drivers.interfaces import EncoderSample, GaugeReading
 from hexacell.campaign import feasibility
 from hexacell.errors import AnswerNeeded, HexacellError, SeveralErrors, flatten_errors

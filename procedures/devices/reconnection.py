@@ -5,21 +5,23 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 from drivers.controllers.errors import ConnectionLost
-from drivers.encoders import errors as encoder
-from drivers.gauges.errors import GaugeSilent, WrongAnswer, WrongMode, WrongUnit, ZeroVoid
+from drivers.errors import (
+    BusError,
+    GaugeSilent,
+    PortLost,
+    RestartedNodeError,
+    SilentNodeError,
+    WrongAnswer,
+    WrongSetting,
+    ZeroVoid,
+)
 from drivers.interfaces import DeviceIdentity
-from drivers.serial.errors import PortLost
 from hexacell.errors import DeviceError, HexacellError
 from procedures.devices.device_set import Devices, MountedGauge, gather_errors
 from procedures.run.trips import Guard, GuardTripped, causes_of
 
-GAUGE_ERRORS = (GaugeSilent, WrongAnswer, WrongMode, WrongUnit, ZeroVoid, PortLost)
-ENCODER_ERRORS = (
-    encoder.BusError,
-    encoder.SilentNodeError,
-    encoder.RestartedNodeError,
-    encoder.MissingNodeError,
-)
+GAUGE_ERRORS = (GaugeSilent, WrongAnswer, WrongSetting, ZeroVoid, PortLost)
+ENCODER_ERRORS = (BusError, SilentNodeError, RestartedNodeError)
 
 
 class DeviceReplaced(DeviceError):

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from drivers.gauges.errors import GaugeAtEnd, GaugeUnsteady
+from drivers.errors import GaugeAtEnd, GaugeUnsteady
 from drivers.interfaces import EncoderSample, GaugeReading
 from hexacell.cell.limits import TimingSettings
 from hexacell.clock import CellClock

@@ -9,10 +9,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
+from drivers import errors as device
 from drivers.controllers import errors as controller
-from drivers.encoders import errors as encoder
-from drivers.gauges import errors as gauge
-from drivers.serial.errors import PortLost
 from hexacell.cell.recovery import (
     Action,
     AttendedRecovery,
@@ -30,22 +28,20 @@ from procedures.run.steps import Compute, Step
 from procedures.run.trips import Guard, GuardTripped, Trip, causes_of
 
 KINDS: Mapping[type[HexacellError], FailureKind] = {
-    gauge.GaugeSilent: FailureKind.GAUGE_SILENT,
-    gauge.WrongAnswer: FailureKind.GAUGE_SILENT,
-    gauge.WrongUnit: FailureKind.GAUGE_SETTING,
-    gauge.WrongMode: FailureKind.GAUGE_SETTING,
-    gauge.GaugeAtEnd: FailureKind.GAUGE_AT_END,
-    gauge.GaugeUnsteady: FailureKind.UNSETTLED,
-    gauge.ZeroVoid: FailureKind.ZERO_VOID,
-    encoder.SilentNodeError: FailureKind.ENCODER_SILENT,
-    encoder.InvalidSampleError: FailureKind.ENCODER_ALARM,
-    encoder.RestartedNodeError: FailureKind.ENCODER_RESTARTED,
-    encoder.MissingNodeError: FailureKind.LINK_LOST,
-    encoder.BusError: FailureKind.LINK_LOST,
+    device.GaugeSilent: FailureKind.GAUGE_SILENT,
+    device.WrongAnswer: FailureKind.GAUGE_SILENT,
+    device.WrongSetting: FailureKind.GAUGE_SETTING,
+    device.GaugeAtEnd: FailureKind.GAUGE_AT_END,
+    device.GaugeUnsteady: FailureKind.UNSETTLED,
+    device.ZeroVoid: FailureKind.ZERO_VOID,
+    device.SilentNodeError: FailureKind.ENCODER_SILENT,
+    device.InvalidSampleError: FailureKind.ENCODER_ALARM,
+    device.RestartedNodeError: FailureKind.ENCODER_RESTARTED,
+    device.BusError: FailureKind.LINK_LOST,
     controller.ConnectionLost: FailureKind.LINK_LOST,
     controller.CommandRefused: FailureKind.CONTROLLER,
     controller.MotionInterrupted: FailureKind.CONTROLLER,
-    PortLost: FailureKind.LINK_LOST,
+    device.PortLost: FailureKind.LINK_LOST,
     NeverSettled: FailureKind.UNSETTLED,
     TravelError: FailureKind.GAUGE_AT_END,
     NoSafePath: FailureKind.NO_WAY,

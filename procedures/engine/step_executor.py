@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from drivers.gauges.errors import GaugeAtEnd
+from drivers.errors import GaugeAtEnd
 from hexacell.cell.loader import Cell
 from hexacell.clock import CellClock
 from hexacell.controller_config.interface import ControllerGeometry

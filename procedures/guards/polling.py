@@ -15,7 +15,7 @@ from dataclasses import dataclass, field, replace
 from types import TracebackType
 from typing import Any, Generic, Self, TypeVar
 
-from drivers.gauges.errors import GaugeAtEnd, WrongAnswer
+from drivers.errors import GaugeAtEnd, WrongAnswer
 from drivers.interfaces import ControllerStatus, EncoderSample
 from drivers.serial.port import FRAME_GAP_S
 from hexacell.clock import CellClock

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from drivers.gauges.errors import GaugeAtEnd
+from drivers.errors import GaugeAtEnd
 from drivers.stop_input.stop_input import SUBJECT as STOP_LINE
 from hexacell.kinematics.rotations import Array
 from hexacell.storage import atomic_files

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TypeVar
 
-from drivers.gauges.errors import GaugeAtEnd
+from drivers.errors import GaugeAtEnd
 from drivers.interfaces import ControllerStatus, DeviceIdentity, EncoderSample, GaugeReading
 from hexacell.cell.devices import GaugeSettings
 from hexacell.cell.model import CellSettings

@@ -7,7 +7,7 @@ import threading
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
-from drivers.gauges.errors import GaugeAtEnd
+from drivers.errors import GaugeAtEnd
 from drivers.interfaces import ControllerStatus, DeviceIdentity, EncoderSample, GaugeReading
 from drivers.simulated.robot import SimulatedMachine
 from hexacell.acceptance.gates import AcceptanceGate

@@ -8,7 +8,7 @@ import pytest
 
 from drivers.encoders import node_monitor
 from drivers.encoders.cia406 import Cia406Bank
-from drivers.encoders.errors import InvalidSampleError, RestartedNodeError, SilentNodeError
+from drivers.errors import InvalidSampleError, RestartedNodeError, SilentNodeError
 
 NO_MAGNET = bytes.fromhex("00ff210000000000")
 CLEARED = bytes(8)

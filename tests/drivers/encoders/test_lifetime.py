@@ -9,7 +9,7 @@ import can
 import pytest
 
 from drivers.encoders.cia406 import Cia406Bank
-from drivers.encoders.errors import BusError, MissingNodeError
+from drivers.errors import BusError
 from hexacell.errors import DeviceError
 from tests.waiting import until
 
@@ -39,7 +39,7 @@ async def test_no_thread_outlives_close(raw, bank):
 async def test_no_thread_outlives_a_failed_open(raw, impatient):
     before = set(threading.enumerate())
     del raw.nodes[1]
-    with pytest.raises(MissingNodeError):
+    with pytest.raises(BusError):
         await impatient.open()
     assert set(threading.enumerate()) == before
 

@@ -6,16 +6,9 @@ import can
 import pytest
 
 from drivers.encoders.cia406 import Cia406Bank
-from drivers.encoders.errors import (
-    BusError,
-    ConfigurationError,
-    DuplicatedNodeError,
-    InvalidSampleError,
-    MissingNodeError,
-    SilentNodeError,
-    WrongDeviceError,
-)
+from drivers.errors import BusError, InvalidSampleError, SilentNodeError
 from hexacell.cell.devices import EncoderSettings
+from hexacell.errors import DeviceError
 
 DIALOGUE_WITH_NODE_4 = """
     8004                enter PRE-OPERATIONAL
@@ -74,19 +67,14 @@ async def test_it_says_who_answered(bank):
 
 async def test_missing_nodes_are_all_named(raw, impatient):
     del raw.nodes[2], raw.nodes[5]
-    with pytest.raises(
-        MissingNodeError, match=r"encoders of leg 2 \(node 2\), leg 5 \(node 5\): nobody"
-    ) as caught:
+    with pytest.raises(BusError, match=r"encoders of leg 2 \(node 2\), leg 5 \(node 5\): nobody"):
         await impatient.open()
-    assert [leg.node for leg in caught.value.legs] == [2, 5]
 
 
 async def test_a_node_that_no_leg_has_is_pointed_out(raw, impatient):
     raw.nodes[127] = raw.nodes.pop(3)
     raw.nodes[127].node = 127
-    with pytest.raises(
-        MissingNodeError, match=r"leg 3 \(node 3\).*node 127 is on the bus but belongs to no leg"
-    ):
+    with pytest.raises(BusError, match=r"leg 3 \(node 3\).*node 127 is on the bus but belongs to no leg"):
         await impatient.open()
 
 
@@ -101,13 +89,13 @@ async def test_nodes_need_not_be_numbered_like_legs(raw, settings):
 
 async def test_two_answers_to_one_request_are_two_devices(raw, bank):
     raw.nodes[4].answers_sdo = 2
-    with pytest.raises(DuplicatedNodeError, match=r"leg 4 \(node 4\).*two devices share node id 4"):
+    with pytest.raises(DeviceError, match=r"leg 4 \(node 4\).*two devices share node id 4"):
         await bank.open()
 
 
 async def test_two_positions_for_the_first_sync_are_two_devices(raw, bank):
     raw.nodes[4].answers_sync = lambda _: [bytes(4), bytes(4)]
-    with pytest.raises(DuplicatedNodeError, match=r"leg 4 \(node 4\)"):
+    with pytest.raises(DeviceError, match=r"leg 4 \(node 4\).*two devices share"):
         await bank.open()
 
 
@@ -121,13 +109,13 @@ async def test_two_positions_for_the_first_sync_are_two_devices(raw, bank):
 )
 async def test_another_kind_of_device_is_refused_and_named(raw, bank, value, words):
     raw.nodes[6].objects[0x1000, 0] = value.to_bytes(4, "little")
-    with pytest.raises(WrongDeviceError, match=rf"leg 6.*0x{value:08X}.*{words}"):
+    with pytest.raises(DeviceError, match=rf"leg 6.*0x{value:08X}.*{words}"):
         await bank.open()
 
 
 async def test_another_measuring_step_is_refused(raw, bank):
     raw.nodes[1].objects[0x6005, 1] = (5000).to_bytes(4, "little")
-    with pytest.raises(WrongDeviceError, match=r"leg 1.*step of 5000 nm, the cell file says 1000 nm"):
+    with pytest.raises(DeviceError, match=r"leg 1.*step of 5000 nm, the cell file says 1000 nm"):
         await bank.open()
 
 
@@ -139,13 +127,13 @@ async def test_the_step_may_be_kept_in_6501(raw, bank, step, fits):
     if fits:
         await bank.open()
     else:
-        with pytest.raises(WrongDeviceError, match="100 nm"):
+        with pytest.raises(DeviceError, match="has a measuring step of 100 nm"):
             await bank.open()
 
 
 async def test_a_device_that_does_not_tell_its_step_is_refused(raw, bank):
     del raw.nodes[3].objects[0x6005, 1]
-    with pytest.raises(WrongDeviceError, match=r"leg 3.*has no object 6501h:0"):
+    with pytest.raises(DeviceError, match=r"leg 3.*has no object 6501h:0"):
         await bank.open()
 
 
@@ -154,14 +142,14 @@ async def test_serial_numbers_are_compared_when_stated(raw, settings):
     bank = Cia406Bank(settings.model_copy(update={"serial_numbers": stated}))
     await bank.open()
     raw.nodes[2].objects[0x1018, 4] = (77).to_bytes(4, "little")
-    with pytest.raises(WrongDeviceError, match=r"leg 2.*serial number 77, the cell file says 502"):
+    with pytest.raises(DeviceError, match=r"leg 2.*serial number 77, the cell file says 502"):
         await bank.open()
 
 
 async def test_a_serial_number_stated_but_not_there_is_refused(raw, settings):
     del raw.nodes[2].objects[0x1018, 4]
     bank = Cia406Bank(settings.model_copy(update={"serial_numbers": (501, 502, 503, 504, 505, 506)}))
-    with pytest.raises(WrongDeviceError, match=r"leg 2.*\(none\)"):
+    with pytest.raises(DeviceError, match=r"leg 2.*serial number \(none\)"):
         await bank.open()
 
 
@@ -184,7 +172,7 @@ async def test_position_is_mapped_where_no_tpdo_has_it(raw, bank):
 
 async def test_a_write_refused_names_object_and_leg(raw, bank):
     raw.nodes[5].refuses[0x1801, 2] = 0x0601_0002
-    with pytest.raises(ConfigurationError, match=r"leg 5.*object 1801h:2 to 0x1.*read only"):
+    with pytest.raises(DeviceError, match=r"leg 5.*object 1801h:2 to 0x1.*read only"):
         await bank.open()
 
 
@@ -193,14 +181,14 @@ async def test_a_device_that_only_pretends_to_be_configured_is_refused(raw, bank
     raw.nodes[5].objects[0x1801, 2] = b"\xfe"
     raw.nodes[5].objects[0x1801, 1] = bytes.fromhex("85020080")
     raw.nodes[5].forgets.add(entry)
-    with pytest.raises(ConfigurationError, match=r"leg 5.*acknowledges"):
+    with pytest.raises(DeviceError, match=r"leg 5.*acknowledges"):
         await bank.open()
 
 
 async def test_a_device_without_tpdos_is_refused(raw, bank):
     for key in [key for key in raw.nodes[5].objects if 0x1800 <= key[0] < 0x1C00]:
         del raw.nodes[5].objects[key]
-    with pytest.raises(ConfigurationError, match=r"leg 5.*no transmit PDO"):
+    with pytest.raises(DeviceError, match=r"leg 5.*no transmit PDO"):
         await bank.open()
 
 
@@ -208,7 +196,7 @@ async def test_a_position_between_bytes_is_refused(raw, bank):
     raw.nodes[5].objects[0x1A01, 0] = b"\x02"
     raw.nodes[5].objects[0x1A01, 1] = bytes.fromhex("04003060")
     raw.nodes[5].objects[0x1A01, 2] = bytes.fromhex("20000460")
-    with pytest.raises(ConfigurationError, match=r"leg 5.*4 bits"):
+    with pytest.raises(DeviceError, match=r"leg 5.*position 4 bits into TPDO 2"):
         await bank.open()
 
 

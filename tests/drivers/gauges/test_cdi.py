@@ -6,17 +6,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from drivers.errors import GaugeAtEnd, GaugeSilent, WrongAnswer, WrongSetting, ZeroVoid
 from drivers.gauges.cdi import CdiError, CdiGauge, Parameter, parse_parameter, parse_value
-from drivers.gauges.errors import (
-    FrameRejected,
-    GaugeAtEnd,
-    GaugeSilent,
-    WrongAnswer,
-    WrongMode,
-    WrongUnit,
-    ZeroVoid,
-)
-from drivers.gauges.protocol import DisplayedValue
+from drivers.gauges.protocol import DisplayedValue, FrameRejected
 from drivers.interfaces import DeviceIdentity, GaugeReading
 from drivers.simulated.gauges.cdi import format_value
 
@@ -175,21 +167,21 @@ async def test_unknown_parameters_are_left_out(dialogue, gauge):
 
 async def test_an_inch_gauge_is_refused(dialogue, gauge):
     dialogue.expect(*opening(b"+ 0.08417, IN\r\n"))
-    with pytest.raises(WrongUnit, match="gauge y: answers in inch"):
+    with pytest.raises(WrongSetting, match="gauge y: answers in inch"):
         await gauge.open()
 
 
 @pytest.mark.parametrize("value", [b"+ 0.08417, IN\r\n", b"+  0.0842, IN\r\n"])
 async def test_inch_pressed_during_a_set_is_found_in_a_reading(dialogue, opened, value):
     dialogue.expect((b"R\r", value))
-    with pytest.raises(WrongUnit):
+    with pytest.raises(WrongSetting):
         await opened.read()
 
 
 async def test_the_unit_is_asked_for_with_the_plunger_at_its_end(dialogue, gauge):
     at_end = opening(b"OUT OF BOUNDS\r\n")
     dialogue.expect(at_end[0], (b"?p013\r", b"1\r\n"), *at_end[1:])
-    with pytest.raises(WrongUnit):
+    with pytest.raises(WrongSetting):
         await gauge.open()
     dialogue.expect(at_end[0], (b"?p013\r", b"2\r\n"), *at_end[1:])
     await gauge.open()
@@ -206,7 +198,7 @@ async def test_the_unit_is_asked_for_with_the_plunger_at_its_end(dialogue, gauge
 )
 async def test_what_falsifies_readings_is_refused(dialogue, gauge, answers, words):
     dialogue.expect(*opening(**answers))
-    with pytest.raises(WrongMode, match=words):
+    with pytest.raises(WrongSetting, match=words):
         await gauge.open()
 
 

@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from drivers.errors import GaugeAtEnd, GaugeSilent, WrongAnswer, WrongSetting, ZeroVoid
 from drivers.gauges import mux10
-from drivers.gauges.errors import FrameRejected, GaugeAtEnd, GaugeSilent, WrongAnswer, WrongUnit, ZeroVoid
 from drivers.gauges.mux10 import MultiplexerError, Mux10Gauge, parse_identification, parse_value
-from drivers.gauges.protocol import DisplayedValue
+from drivers.gauges.protocol import DisplayedValue, FrameRejected
 from drivers.interfaces import DeviceIdentity, GaugeReading
 from drivers.simulated.gauges.mux10 import format_value
 from hexacell.errors import DeviceError, FileError
@@ -186,14 +186,14 @@ async def test_the_data_button_of_another_channel_is_not_mistaken(dialogue, open
 
 async def test_five_decimals_are_inches(dialogue, gauge):
     dialogue.expect((b"2\r", b"02A+00.00484\r"), OPENING[1])
-    with pytest.raises(WrongUnit, match="gauge y: answers in inch"):
+    with pytest.raises(WrongSetting, match="gauge y: answers in inch"):
         await gauge.open()
 
 
 @pytest.mark.parametrize("call", ["read", "check"])
 async def test_inch_pressed_during_a_set_is_found(dialogue, opened, call):
     dialogue.expect((b"2\r", b"02A+00.00484\r"))
-    with pytest.raises(WrongUnit):
+    with pytest.raises(WrongSetting):
         await getattr(opened, call)()
 
 

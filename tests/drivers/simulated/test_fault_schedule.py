@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from drivers.gauges.errors import GaugeAtEnd, GaugeSilent
+from drivers.errors import GaugeAtEnd, GaugeSilent
 from drivers.gauges.sylvac import SylvacGauge
 from drivers.serial.shared_port import SharedSerialPorts
 from drivers.simulated.cell import SimulatedCell

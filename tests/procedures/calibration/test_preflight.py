@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import pytest
 
-from drivers.gauges.errors import GaugeSilent, GaugeUnsteady
+from drivers.errors import GaugeSilent, GaugeUnsteady
 from hexacell.campaign import feasibility
 from hexacell.errors import AnswerNeeded, DeviceError, ExitCode, ReachError, SeveralErrors
 from procedures.calibration.preflight import device_failures, plan_failures, raise_all

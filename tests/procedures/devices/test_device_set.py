@@ -6,7 +6,7 @@ import asyncio
 
 import pytest
 
-from drivers.gauges.errors import GaugeAtEnd, GaugeSilent
+from drivers.errors import GaugeAtEnd, GaugeSilent
 from hexacell.errors import (
     CellBusy,
     DeviceError,

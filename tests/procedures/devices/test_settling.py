@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from drivers.gauges.errors import GaugeAtEnd, GaugeSilent, GaugeUnsteady
+from drivers.errors import GaugeAtEnd, GaugeSilent, GaugeUnsteady
 from hexacell.cell.limits import TimingSettings
 from hexacell.errors import DeviceError, ExitCode, SeveralErrors
 from procedures.devices.settling import LEAST_WINDOWS, read_all, settle

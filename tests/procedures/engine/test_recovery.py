@@ -9,10 +9,19 @@ from typing import Any
 import pytest
 
 from drivers.controllers.errors import ConnectionLost, MotionInterrupted, MoveRefused, ResponseTimeout
-from drivers.encoders.errors import BusError, InvalidSampleError, RestartedNodeError, SilentNodeError
-from drivers.gauges.errors import GaugeAtEnd, GaugeSilent, GaugeUnsteady, WrongUnit, ZeroVoid
+from drivers.errors import (
+    BusError,
+    GaugeAtEnd,
+    GaugeSilent,
+    GaugeUnsteady,
+    InvalidSampleError,
+    PortLost,
+    RestartedNodeError,
+    SilentNodeError,
+    WrongSetting,
+    ZeroVoid,
+)
 from drivers.interfaces import DeviceIdentity
-from drivers.serial.errors import PortLost, port_lost
 from hexacell.cell.recovery import Action, FailureKind, RecoverySettings
 from hexacell.errors import (
     AnswerNeeded,
@@ -39,7 +48,6 @@ from procedures.run.steps import Phase, Sample, SetKey
 from procedures.run.trips import DriftTripped, Guard, Trip
 from tests.waiting import until
 
-NODE = {"action": "Look at it"}
 UNATTENDED = RecoveryPolicy.of(RecoverySettings(), attended=False)
 ATTENDED = RecoveryPolicy.of(RecoverySettings(), attended=True)
 P1, P2 = (SetKey(phase=Phase.IDENTIFY, point=point) for point in (1, 2))
@@ -58,13 +66,13 @@ class TrippedGuard(DeviceError):
         (NeverSettled("moves"), FailureKind.UNSETTLED),
         (GaugeAtEnd("at its end"), FailureKind.GAUGE_AT_END),
         (TravelError("at its end"), FailureKind.GAUGE_AT_END),
-        (WrongUnit("inch"), FailureKind.GAUGE_SETTING),
+        (WrongSetting("inch"), FailureKind.GAUGE_SETTING),
         (ZeroVoid("was off"), FailureKind.ZERO_VOID),
-        (SilentNodeError("silent", **NODE), FailureKind.ENCODER_SILENT),
-        (InvalidSampleError("no magnet", **NODE), FailureKind.ENCODER_ALARM),
-        (RestartedNodeError("booted", **NODE), FailureKind.ENCODER_RESTARTED),
+        (SilentNodeError("silent"), FailureKind.ENCODER_SILENT),
+        (InvalidSampleError("no magnet"), FailureKind.ENCODER_ALARM),
+        (RestartedNodeError("booted"), FailureKind.ENCODER_RESTARTED),
         (BusError("died"), FailureKind.LINK_LOST),
-        (port_lost("gauge x", "/dev/x", "unplugged"), FailureKind.LINK_LOST),
+        (PortLost("port /dev/x was lost"), FailureKind.LINK_LOST),
         (ConnectionLost("gone"), FailureKind.LINK_LOST),
         (ResponseTimeout("late"), FailureKind.LINK_LOST),
         (MoveRefused("to move", "limits", subject="controller"), FailureKind.CONTROLLER),
@@ -108,7 +116,7 @@ def test_attempts_are_counted_by_kind_and_set_since_the_last_interruption() -> N
 
 
 def test_of_several_failures_the_gravest_decides() -> None:
-    several = SeveralErrors("two", [GaugeSilent("silent"), WrongUnit("inch")])
+    several = SeveralErrors("two", [GaugeSilent("silent"), WrongSetting("inch")])
     failure = failed(UNATTENDED, several, STEP, RunState())
     assert (failure.failure, failure.action) == (FailureKind.GAUGE_SETTING, Action.ABORT)
 
@@ -383,7 +391,3 @@ class TestANewGeometryThatCannotBeVerified:
         ended = await rig.run()
         assert ended.exit_code == ExitCode.DONE
         assert rig.config == recording.config_after
-
-
-def test_a_link_that_was_lost_is_a_kind_of_its_own() -> None:
-    assert isinstance(port_lost("gauge x", "/dev/x", "unplugged"), PortLost)

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from drivers.gauges.errors import GaugeAtEnd, GaugeSilent, ZeroVoid
+from drivers.errors import GaugeAtEnd, GaugeSilent, ZeroVoid
 from hexacell.cell.devices import GaugeAxis
 from hexacell.errors import DeviceError, HexacellError, LimitError, SeveralErrors
 from hexacell.kinematics.pose import Pose

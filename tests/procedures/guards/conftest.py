@@ -16,7 +16,7 @@ from typing import Any
 import pytest
 
 from drivers.controllers.errors import MotionInterrupted
-from drivers.gauges.errors import GaugeSilent, WrongUnit
+from drivers.errors import GaugeSilent, WrongSetting
 from drivers.interfaces import ControllerStatus, EncoderSample, GaugeReading
 from hexacell.cell.limits import GuardSettings
 from hexacell.errors import DeviceError
@@ -178,7 +178,7 @@ class Scene:
         async def answer() -> GaugeReading:
             await self._answer(f"gauge {name}", GAUGE_S)
             if name in self.inch:
-                raise WrongUnit("answers in inch", subject=f"gauge {name}", action="Press its in/mm key")
+                raise WrongSetting("answers in inch", subject=f"gauge {name}", action="Press its in/mm key")
             return await real()
 
         return answer

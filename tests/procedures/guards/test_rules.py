@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.gauges.errors import GaugeAtEnd, GaugeSilent, WrongAnswer, ZeroVoid
+from drivers.errors import GaugeAtEnd, GaugeSilent, WrongAnswer, ZeroVoid
 from drivers.interfaces import ControllerStatus, EncoderSample
 from hexacell.errors import DeviceError, ExitCode, LimitError
 from procedures.guards import rules

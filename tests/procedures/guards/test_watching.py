@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from drivers.gauges.errors import GaugeAtEnd, WrongAnswer
+from drivers.errors import GaugeAtEnd, WrongAnswer
 from drivers.interfaces import GaugeReading
 from hexacell.errors import DeviceError, HexacellError, LimitError
 from procedures.guards.polling import DevicePoller, DevicePollers, GuardMonitor, LineActivity

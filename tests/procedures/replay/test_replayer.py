@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from drivers.gauges.errors import GaugeAtEnd
+from drivers.errors import GaugeAtEnd
 from hexacell.acceptance.validation import Verdict
 from hexacell.errors import HexacellError, LimitError
 from hexacell.robot_model import robot_of

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from drivers.gauges.errors import GaugeAtEnd, GaugeSilent
+from drivers.errors import GaugeAtEnd, GaugeSilent
 from hexacell.errors import AnswerNeeded, ExitCode, HexacellError, LimitError
 from hexacell.measurements.csv_file import read_measurements
 from procedures.engine.operator import UnattendedOperator

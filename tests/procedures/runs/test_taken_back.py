@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from drivers.gauges.errors import GaugeAtEnd
+from drivers.errors import GaugeAtEnd
 from hexacell.acceptance.validation import Verdict
 from hexacell.errors import DeviceError, ExitCode, FileError, WriteBackUndone
 from procedures.run import events

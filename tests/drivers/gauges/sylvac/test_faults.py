@@ -2,7 +2,7 @@
 
 import pytest
 
-from drivers.gauges.errors import GaugeAtEnd, GaugeSilent, WrongAnswer, WrongMode, WrongUnit, ZeroVoid
+from drivers.errors import GaugeAtEnd, GaugeSilent, WrongAnswer, WrongSetting, ZeroVoid
 from drivers.gauges.sylvac import SylvacGauge
 from hexacell.errors import DeviceError, ExitCode, FileError
 from tests.drivers.gauges.sylvac.dialogue import OPENING, opening
@@ -76,20 +76,20 @@ async def test_overspeed_voids_the_zero_until_it_is_opened_again(dialogue, opene
 
 async def test_an_inch_gauge_is_refused(dialogue, gauge):
     dialogue.expect(*opening(UNI=b"IN\r"))
-    with pytest.raises(WrongUnit) as caught:
+    with pytest.raises(WrongSetting) as caught:
         await gauge.open()
     assert str(caught.value) == "gauge y: answers in inch. Press its in/mm key"
 
 
 async def test_inch_pressed_during_a_set_is_found_in_a_reading(dialogue, opened):
     dialogue.expect((b"?\r", b"+0.04858\r"))
-    with pytest.raises(WrongUnit):
+    with pytest.raises(WrongSetting):
         await opened.read()
 
 
 async def test_inch_pressed_during_a_set_is_found_by_the_check(dialogue, opened):
     dialogue.expect(*opening(UNI=b"IN\r"))
-    with pytest.raises(WrongUnit):
+    with pytest.raises(WrongSetting):
         await opened.check()
 
 
@@ -107,11 +107,11 @@ async def test_what_falsifies_readings_is_refused_at_opening_and_by_the_check(
     dialogue, gauge, answers, words
 ):
     dialogue.expect(*opening(**answers))
-    with pytest.raises(WrongMode, match=words):
+    with pytest.raises(WrongSetting, match=words):
         await gauge.open()
     dialogue.expect(*OPENING, *opening(**answers))
     await gauge.open()
-    with pytest.raises(WrongMode, match=words):
+    with pytest.raises(WrongSetting, match=words):
         await gauge.check()
 
 

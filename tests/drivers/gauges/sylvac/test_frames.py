@@ -6,8 +6,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from drivers.gauges.errors import FrameRejected
-from drivers.gauges.protocol import DisplayedValue
+from drivers.gauges.protocol import DisplayedValue, FrameRejected
 from drivers.gauges.sylvac import BATTERY, IDENTIFICATION, PRESET, SylvacError, parse_value
 from drivers.simulated.gauges.sylvac import format_value
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from drivers.gauges.errors import GaugeAtEnd, GaugeSilent, GaugeUnsteady, WrongAnswer
+from drivers.errors import GaugeAtEnd, GaugeSilent, GaugeUnsteady, WrongAnswer
 from drivers.gauges.serial_gauge import MAX_READINGS
 from drivers.gauges.sylvac import SylvacGauge
 from drivers.interfaces import DeviceIdentity, Gauge, GaugeReading

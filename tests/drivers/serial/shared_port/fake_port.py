@@ -61,7 +61,7 @@ class FakePort:
 
 
 async def opened(url="fake", **settings):
-    link = SharedSerialPort(url, worst_latency_s=WORST_LATENCY_S, **settings)
+    link = SharedSerialPort(url, settings, worst_latency_s=WORST_LATENCY_S)
     await link.open()
     return link
 

@@ -65,7 +65,7 @@ async def test_closing_does_not_wait_for_an_answer(fake):
 
 async def test_closing_does_not_wait_for_silence(fake):
     fake(FakePort(lambda _: []))
-    link = SharedSerialPort("fake", worst_latency_s=FOREVER_S)
+    link = SharedSerialPort("fake", {}, worst_latency_s=FOREVER_S)
     await link.open()
     with pytest.raises(NoAnswer):
         await link.exchange(b"?\r", b"\r", SOON_S)
@@ -101,7 +101,7 @@ async def test_closing_twice_is_harmless_and_using_it_afterwards_is_not(fake):
 
 async def test_a_link_that_was_never_opened_closes_and_does_not_ask(fake):
     port = fake(FakePort())
-    link = SharedSerialPort("fake")
+    link = SharedSerialPort("fake", {})
     with pytest.raises(DeviceError, match="it is not open"):
         await link.exchange(b"?\r", b"\r", FOREVER_S)
     await link.close()

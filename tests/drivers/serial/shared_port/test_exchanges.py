@@ -134,7 +134,7 @@ async def test_only_our_own_question_back_is_no_answer():
 async def test_every_byte_is_traced(fake):
     trace = WireTrace()
     fake(FakePort(lambda _: [(0.0, b"?\r+1.234\r")]))
-    link = SharedSerialPort("fake", trace=trace)
+    link = SharedSerialPort("fake", {}, trace=trace)
     await link.open()
     await link.exchange(b"?\r", b"\r", LONG_S)
     await link.close()

@@ -7,7 +7,8 @@ import termios
 import pytest
 import serial
 
-from drivers.serial.errors import port_open_failed
+from drivers.errors import PortLost
+from drivers.serial.errors import opening_errors
 from drivers.serial.shared_port import SharedSerialPort
 from hexacell.errors import DeviceError, ExitCode
 from tests.drivers.serial.shared_port.fake_port import LONG_S, FakePort, opened
@@ -23,7 +24,7 @@ async def test_an_absent_port_is_told_with_the_gauge_and_what_to_do(links):
 
 
 async def test_a_refused_connection_is_told():
-    link = SharedSerialPort("socket://127.0.0.1:1")
+    link = SharedSerialPort("socket://127.0.0.1:1", {})
     with pytest.raises(DeviceError, match="cannot be opened"):
         await link.open()
     await link.close()
@@ -40,15 +41,15 @@ async def test_a_refused_connection_is_told():
     ],
 )
 def test_the_cause_is_told_in_words(number, words):
-    error = port_open_failed("gauge x", "/dev/ttyUSB0", serial.SerialException(number, "reason"))
-    assert words in str(error)
-    assert error.action
+    with pytest.raises(PortLost, match=words) as caught, opening_errors("gauge x", "/dev/ttyUSB0"):
+        raise serial.SerialException(number, "reason")
+    assert caught.value.action
 
 
 async def test_a_port_in_use_is_told():
     near, far = os.openpty()
     url = os.ttyname(far)
-    one, two = await opened(url, exclusive=True), SharedSerialPort(url, exclusive=True)
+    one, two = await opened(url, exclusive=True), SharedSerialPort(url, {"exclusive": True})
     with pytest.raises(DeviceError, match="is in use"):
         await two.open()
     await one.close()
@@ -60,7 +61,7 @@ async def test_a_port_in_use_is_told():
 async def test_a_pseudo_terminal_that_refuses_parity_is_told():
     near, far = os.openpty()
     for again in range(2):
-        link = SharedSerialPort(os.ttyname(far), bytesize=7, parity="E", stopbits=2)
+        link = SharedSerialPort(os.ttyname(far), {"bytesize": 7, "parity": "E", "stopbits": 2})
         if again:  # the open that pyserial 196 is about, and nobody resets the speed here
             with pytest.raises(DeviceError, match="cannot be opened"):
                 await link.open()

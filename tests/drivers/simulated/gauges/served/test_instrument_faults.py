@@ -2,7 +2,7 @@
 
 import pytest
 
-from drivers.gauges.errors import GaugeAtEnd, GaugeSilent, WrongMode, WrongUnit, ZeroVoid
+from drivers.errors import GaugeAtEnd, GaugeSilent, WrongSetting, ZeroVoid
 from drivers.simulated.gauges.faults import InjectedGaugeFault
 from tests.drivers.simulated.gauges.served.cell import PROTOCOLS, cell, served
 
@@ -13,7 +13,7 @@ async def test_inch(protocol):
         await made.open()
         made.rack.inject("y", InjectedGaugeFault.INCH)
         for call in (made.gauges["y"].read, made.gauges["y"].check, made.gauges["y"].open):
-            with pytest.raises(WrongUnit, match="gauge y: answers in inch"):
+            with pytest.raises(WrongSetting, match="gauge y: answers in inch"):
                 await call()
         assert (await made.gauges["z"].read()).value_mm == 3.0
         made.rack.clear("y", InjectedGaugeFault.INCH)
@@ -28,7 +28,7 @@ async def test_hold(protocol):
         made.rack.inject("x", InjectedGaugeFault.HOLD)
         made.balls["x"] = 1.5
         assert (await made.gauges["x"].read()).value_mm == 1.0
-        with pytest.raises(WrongMode, match="gauge x: is on hold"):
+        with pytest.raises(WrongSetting, match="gauge x: is on hold"):
             await made.gauges["x"].check()
         made.rack.clear("x", InjectedGaugeFault.HOLD)
         await made.gauges["x"].check()
@@ -50,7 +50,7 @@ async def test_reversed(protocol):
 
 async def test_battery_low(sylvac):
     sylvac.rack.inject("x", InjectedGaugeFault.BATTERY_LOW)
-    with pytest.raises(WrongMode, match="gauge x: has a low battery"):
+    with pytest.raises(WrongSetting, match="gauge x: has a low battery"):
         await sylvac.gauges["x"].check()
     sylvac.rack.clear("x", InjectedGaugeFault.BATTERY_LOW)
     await sylvac.gauges["x"].check()

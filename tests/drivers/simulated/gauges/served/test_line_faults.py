@@ -6,7 +6,7 @@ import logging
 
 import pytest
 
-from drivers.gauges.errors import GaugeSilent, GaugeUnsteady, WrongAnswer, ZeroVoid
+from drivers.errors import GaugeSilent, GaugeUnsteady, WrongAnswer, ZeroVoid
 from drivers.serial.shared_port import SharedSerialPort, SharedSerialPorts
 from drivers.simulated.gauges.faults import InjectedGaugeFault
 from hexacell.cell.devices import GaugeSettings
@@ -148,7 +148,7 @@ async def test_a_truth_that_fails_is_as_loud_as_a_broken_cable(caplog):
         raise ArithmeticError("the truth has no such pose")
 
     with served("sylvac", broken) as line, caplog.at_level(logging.ERROR):
-        link = SharedSerialPort(line.url)
+        link = SharedSerialPort(line.url, {})
         await link.open()
         with pytest.raises(DeviceError, match="was lost"):
             await ask(link)

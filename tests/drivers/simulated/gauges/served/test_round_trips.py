@@ -66,11 +66,10 @@ def test_an_unknown_protocol_is_refused_and_nothing_is_left_open():
 
 @pytest.mark.parametrize("asked", [False, True])
 async def test_a_pseudo_terminal_opens_with_parity_again_and_again(asked):
+    settings = {"baudrate": 4800, "bytesize": 7, "parity": "E", "stopbits": 2, "exclusive": True}
     with served("sylvac") as line:
         for _ in range(5):
-            link = SharedSerialPort(
-                line.url, baudrate=4800, bytesize=7, parity="E", stopbits=2, exclusive=True
-            )
+            link = SharedSerialPort(line.url, settings)
             await link.open()
             if asked:
                 assert await ask(link) == b"+1.000\r"
@@ -98,7 +97,7 @@ async def test_questions_in_pieces_and_in_a_row_are_answered_in_order(transport)
 
 async def test_a_second_client_of_a_socket_is_turned_away():
     with served("sylvac", transport="socket") as line:
-        one, two = SharedSerialPort(line.url), SharedSerialPort(line.url)
+        one, two = SharedSerialPort(line.url, {}), SharedSerialPort(line.url, {})
         await one.open()
         assert await ask(one) == b"+1.000\r"
         await two.open()
@@ -107,7 +106,7 @@ async def test_a_second_client_of_a_socket_is_turned_away():
         assert await ask(one) == b"+1.000\r"
         await one.close()
         await two.close()
-        three = SharedSerialPort(line.url)
+        three = SharedSerialPort(line.url, {})
         await three.open()
         assert await ask(three) == b"+1.000\r"
         await three.close()
@@ -125,7 +124,7 @@ async def test_a_second_client_of_a_socket_is_turned_away():
 async def test_an_answer_takes_its_latency_and_its_time_on_the_wire(protocol, question, baudrate, wire_s):
     with served(protocol, factor=4.0, latency_s=0.05, baudrate=baudrate) as line:
         clock = CellClock(4.0)
-        link = SharedSerialPort(line.url)
+        link = SharedSerialPort(line.url, {})
         await link.open()
         asked = clock.now()
         await ask(link, question)
@@ -135,7 +134,7 @@ async def test_an_answer_takes_its_latency_and_its_time_on_the_wire(protocol, qu
 
 async def test_a_faster_clock_shortens_the_pace():
     with served("sylvac", factor=1000.0, latency_s=60.0) as line:
-        link = SharedSerialPort(line.url)
+        link = SharedSerialPort(line.url, {})
         await link.open()
         assert await ask(link) == b"+1.000\r"  # after 60 ms of real time
         await link.close()
@@ -143,7 +142,7 @@ async def test_a_faster_clock_shortens_the_pace():
 
 async def test_closing_does_not_wait_for_answers_that_are_due():
     line = served("sylvac", factor=1.0, latency_s=3600.0)
-    link = SharedSerialPort(line.url)
+    link = SharedSerialPort(line.url, {})
     await link.open()
     questions = questions_to(line)
     waiting = asyncio.create_task(ask(link))

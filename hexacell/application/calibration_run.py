@@ -27,12 +27,12 @@ from procedures.devices.live_values import LiveValues
 from procedures.devices.reconnection import require_known
 from procedures.engine.config_transactions import holds_provisional
 from procedures.engine.engine import Engine, Listener
-from procedures.engine.operator import Operator, QuestionBroker
 from procedures.engine.recovery_policy import RecoveryPolicy
 from procedures.engine.step_executor import StepExecutor
 from procedures.journal.journal import Journal, read_journal
 from procedures.run import events
 from procedures.run.commands import CommandQueue
+from procedures.run.questions import Operator, QuestionBroker
 from procedures.run.state import fold
 
 

@@ -16,7 +16,7 @@ from hexacell.runs.run_folder import RunFolder
 from hexacell.storage.atomic_files import create_folder_durably, os_error_to_file_error, write_atomically
 from hexacell.storage.cell_lock import cell_lock, lock_path
 from procedures.calibration.workflow import Mode
-from procedures.engine.operator import UnattendedOperator
+from procedures.run.questions import UnattendedOperator
 
 MARKER = ".hexacell-demo"
 """Name of the file that marks a folder as a demo's, which the next demo may replace."""

@@ -7,7 +7,6 @@ from collections.abc import Callable, Coroutine
 from dataclasses import replace
 from typing import Any, TypeVar
 
-from procedures.engine.operator import QuestionBroker
 from procedures.run.cancellation import cancel_and_wait
 from procedures.run.commands import (
     Abort,
@@ -20,6 +19,7 @@ from procedures.run.commands import (
     Stop,
     Undo,
 )
+from procedures.run.questions import QuestionBroker
 from procedures.run.status import EngineFlags, Status
 
 Result = TypeVar("Result")

@@ -32,11 +32,10 @@ from hexacell.robot_model import config_format
 from hexacell.runs.run_folder import RunFolder
 from procedures.calibration.workflow import Calibration, geometry_of
 from procedures.devices.device_set import Devices
-from procedures.engine.operator import Operator
 from procedures.guards.guards import Guards
 from procedures.run import events
 from procedures.run.cancellation import in_thread
-from procedures.run.questions import ask_approval
+from procedures.run.questions import Operator, ask_approval
 from procedures.run.state import RunState
 from procedures.run.steps import Compute
 

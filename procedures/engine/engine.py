@@ -9,7 +9,6 @@ from contextlib import suppress
 from hexacell.errors import ExitCode, HexacellError, Interruption, SeveralErrors
 from procedures.engine.command_loop import CommandLoop, StepCancelled
 from procedures.engine.config_transactions import Reversal, revert_at_end, revert_unrecorded
-from procedures.engine.operator import QuestionBroker, UnattendedOperator
 from procedures.engine.recovery import Recovery
 from procedures.engine.recovery_policy import GIVE_UP, RecoveryPolicy
 from procedures.engine.step_executor import StepExecutor
@@ -17,7 +16,7 @@ from procedures.journal.journal import Journal
 from procedures.run import events
 from procedures.run.cancellation import shielded
 from procedures.run.commands import Command, CommandQueue, MeasureAgain, PendingInvalidations, Undo
-from procedures.run.questions import Question
+from procedures.run.questions import Question, QuestionBroker, UnattendedOperator
 from procedures.run.state import RunState, apply, fold
 from procedures.run.status import Status, ending, exit_code
 from procedures.run.steps import Phase, Step

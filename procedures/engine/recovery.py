@@ -10,11 +10,10 @@ from hexacell.cell.recovery import Action
 from hexacell.errors import AnswerNeeded, HexacellError, Interruption
 from procedures.devices.reconnection import reconnect
 from procedures.engine.command_loop import CommandLoop, StepCancelled
-from procedures.engine.operator import QuestionBroker
 from procedures.engine.recovery_policy import RecoveryPolicy, choices, failed
 from procedures.engine.step_executor import StepExecutor
 from procedures.run import events
-from procedures.run.questions import ask_recovery
+from procedures.run.questions import QuestionBroker, ask_recovery
 from procedures.run.state import RunState
 from procedures.run.steps import SetKey, Step
 

@@ -22,11 +22,10 @@ from procedures.devices.device_set import Devices, Thermometers, gather_errors
 from procedures.devices.settling import Settled, settle
 from procedures.engine.computations import Computations
 from procedures.engine.config_transactions import ConfigTransactions
-from procedures.engine.operator import Operator
 from procedures.guards.guards import Guards
 from procedures.run import events
 from procedures.run.cancellation import in_thread
-from procedures.run.questions import ask_placement
+from procedures.run.questions import Operator, ask_placement
 from procedures.run.state import RunState
 from procedures.run.steps import CloseSet, Compute, Locate, Move, Phase, Place, Revisit, Sample, Step
 from procedures.run.trips import GuardTripped

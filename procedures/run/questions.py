@@ -1,14 +1,18 @@
-"""Questions that a run asks a person: plain data, so that any face can show and answer them."""
+"""Questions that a run asks a person, as plain data for any user interface, and who answers them."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import asyncio
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
+from typing import Protocol
 
 from hexacell.acceptance.gates import AcceptanceGate
 from hexacell.cell.recovery import Action
+from hexacell.errors import AnswerNeeded
 from hexacell.kinematics.pose import Pose
+from procedures.run.cancellation import cancel_and_wait
 
 PLACED = "placed"
 """The one answer to a request to place the gauges."""
@@ -64,14 +68,6 @@ class Question:
     choices: tuple[str, ...] = ()
     default: str | None = None
 
-    def accepts(self, answer: str | None) -> bool:
-        """Whether this is an answer to the question."""
-        return not self.choices or answer in self.choices
-
-    def resolve(self, answer: str | None) -> str | None:
-        """The answer, or the default where none was given."""
-        return self.default if answer is None else answer
-
 
 def ask_placement(point: int, pose: Pose) -> Question:
     """Ask for the gauges to be placed around the ball; answered when they are."""
@@ -101,3 +97,84 @@ def ask_recovery(problem: str, choices: Sequence[Action]) -> Question:
         StepFailure(problem),
         choices=tuple(choice.value for choice in choices),
     )
+
+
+class Operator(Protocol):
+    """Answers questions."""
+
+    async def ask(self, question: Question) -> str | None:
+        """The answer; see :class:`Question`.
+
+        Raises:
+            AnswerNeeded: there is no answer.
+        """
+        ...
+
+
+class QuestionBroker:
+    """An :class:`Operator` that passes questions on, and takes an answer from any face meanwhile.
+
+    The first answer counts: the operator's, or the one given to :meth:`answer`.
+
+    Attributes:
+        open: the question that waits for an answer, if one does.
+        on_change: called whenever a question is opened or closed.
+    """
+
+    def __init__(self, operator: Operator) -> None:
+        self._operator = operator
+        self._answer: asyncio.Future[str | None] | None = None
+        self.open: Question | None = None
+        self.on_change: Callable[[], None] = lambda: None
+
+    def answer(self, answer: str | None) -> bool:
+        """Answer the open question; False if none is open or this is no answer to it."""
+        if self.open is None or self._answer is None or self._answer.done():
+            return False
+        answer = self.open.default if answer is None else answer
+        if self.open.choices and answer not in self.open.choices:
+            return False
+        self._answer.set_result(answer)
+        return True
+
+    async def ask(self, question: Question) -> str | None:
+        """See :meth:`Operator.ask`."""
+        asked = asyncio.ensure_future(self._operator.ask(question))
+        self._answer = asyncio.get_running_loop().create_future()
+        self._set_open(question)
+        try:
+            await asyncio.wait([asked, self._answer], return_when=asyncio.FIRST_COMPLETED)
+            return self._answer.result() if self._answer.done() else asked.result()
+        finally:
+            self._answer.cancel()
+            self._set_open(None)
+            await cancel_and_wait(asked)
+
+    def _set_open(self, question: Question | None) -> None:
+        self.open = question
+        self.on_change()
+
+
+class UnattendedOperator:
+    """No person is present: every question ends the run."""
+
+    async def ask(self, question: Question) -> str | None:
+        """Refuse.
+
+        Raises:
+            AnswerNeeded: names what is needed, and how to run without it where that is possible.
+        """
+        match question.subject:
+            case GaugePlacement(point=point, pose=pose):
+                raise AnswerNeeded(
+                    f"the gauges must be put around the ball at point {point} ({pose}), but the run is "
+                    "unattended",
+                    action='Run it attended, or use fixed stations (placement = "fixed" in [stations])',
+                )
+            case PendingChange(gates=gates):
+                reasons = " ".join(gate.sentence for gate in gates if not gate.passed)
+                raise AnswerNeeded(
+                    f"the new geometry waits for approval: {reasons or 'the cell file says to ask'}"
+                )
+            case StepFailure(problem=problem):
+                raise AnswerNeeded(f"{problem} Somebody must choose: {', '.join(question.choices)}")

@@ -12,9 +12,9 @@ from hexacell.errors import CellBusy
 from hexacell.runs.run_folder import RunFolder
 from hexacell.storage.cell_lock import cell_lock
 from procedures.calibration.workflow import Mode
-from procedures.engine.operator import UnattendedOperator
 from procedures.journal.journal import Journal
 from procedures.run import events
+from procedures.run.questions import UnattendedOperator
 from procedures.run.steps import Compute
 
 COMMITTED = events.Committed(approved_by="a tester")

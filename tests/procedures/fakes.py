@@ -172,6 +172,14 @@ class Approver:
                 return self.decisions.pop(0) if self.decisions else Action.ABORT
 
 
+class SilentOperator:
+    """An operator who never answers, so that a command has to."""
+
+    async def ask(self, question: Question) -> str | None:
+        await asyncio.Event().wait()
+        return question.default
+
+
 @dataclass
 class Bench:
     """Three gauges, encoders and a controller on a manual clock, to be told what to show."""

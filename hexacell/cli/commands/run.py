@@ -12,7 +12,7 @@ from hexacell.cli.terminal import TerminalOperator, is_interactive
 from hexacell.errors import ExitCode
 from hexacell.runs.run_folder import find_run, new_run
 from procedures.calibration.workflow import Mode
-from procedures.engine.operator import UnattendedOperator
+from procedures.run.questions import UnattendedOperator
 
 
 def main(options: argparse.Namespace) -> ExitCode:

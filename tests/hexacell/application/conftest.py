@@ -25,10 +25,9 @@ from hexacell.runs.run_folder import RunFolder
 from procedures.calibration import workflow as calibration_module
 from procedures.calibration.workflow import Mode
 from procedures.engine.engine import Listener
-from procedures.engine.operator import UnattendedOperator
 from procedures.journal.journal import Journal, read_journal
 from procedures.run import events
-from procedures.run.questions import Question
+from procedures.run.questions import Question, UnattendedOperator
 
 SMALL: dict[str, Any] = {
     "identification.points": ((100.0, -100.0, 500.0), (-100.0, 100.0, 500.0)),

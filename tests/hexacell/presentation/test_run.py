@@ -13,8 +13,8 @@ from hexacell.cli.parser import make_parser
 from hexacell.presentation.run import closing_lines, resume_command, resume_hint
 from hexacell.runs.run_folder import RunFolder
 from procedures.calibration.workflow import Mode
-from procedures.engine.operator import UnattendedOperator
 from procedures.run import events
+from procedures.run.questions import UnattendedOperator
 
 
 @pytest.fixture

@@ -10,25 +10,15 @@ from typing import Any
 
 import pytest
 
-from hexacell.cell.recovery import Action
 from hexacell.errors import ExitCode, Interruption
-from hexacell.kinematics.pose import Pose
 from procedures.engine.engine import Engine
-from procedures.engine.operator import QuestionBroker
 from procedures.journal.journal import Journal, read_journal
 from procedures.run import events
 from procedures.run.commands import Abort, Answer, CommandQueue, MeasureAgain, Pause, Resume, Stop, Undo
-from procedures.run.questions import (
-    GaugePlacement,
-    Question,
-    QuestionKind,
-    ask_approval,
-    ask_placement,
-    ask_recovery,
-)
 from procedures.run.state import RunState, fold
 from procedures.run.status import Status
 from procedures.run.steps import Move, Phase, Sample, SetKey, Step
+from tests.procedures.fakes import SilentOperator
 from tests.waiting import until
 
 P1 = SetKey(phase=Phase.IDENTIFY, point=1)
@@ -155,7 +145,7 @@ async def test_a_pause_at_once_stops_motion_and_the_step_is_decided_again(stage,
     begun = len(stage.script.begun)
     for _ in range(5):
         await asyncio.sleep(0)
-    assert len(stage.script.begun) == begun, "nothing moves while it rests"
+    assert len(stage.script.begun) == begun, "nothing moves during a pause"
     stage.engine.command(Resume())
     await stage.over()
     assert stage.script.begun[begun] == "P1/o02/move"
@@ -170,7 +160,7 @@ async def test_a_pause_may_be_taken_back_before_it_begins(stage: Stage) -> None:
     assert "paused" not in stage.kinds
 
 
-async def test_undo_means_the_record_that_was_there_when_it_was_said(stage: Stage) -> None:
+async def test_undo_means_the_last_record_at_the_moment_of_the_command(stage: Stage) -> None:
     """Not the one that is being taken meanwhile."""
     await stage.held_at("P1/o03/sample")
     stage.engine.command(Undo())
@@ -220,7 +210,7 @@ async def test_measured_again(stage: Stage, command: MeasureAgain, event: events
     assert sorted(orientations) == [1, 2, 3]
 
 
-async def test_records_may_be_undone_while_it_rests(stage: Stage) -> None:
+async def test_records_may_be_undone_during_a_pause(stage: Stage) -> None:
     await stage.held_at("P1/o02/sample")
     stage.engine.command(Pause())
     await asyncio.sleep(0)
@@ -242,7 +232,7 @@ async def test_records_may_be_undone_while_it_rests(stage: Stage) -> None:
         (MeasureAgain(P1, 7), "P1 has no such record"),
     ],
 )
-async def test_what_cannot_be_obeyed_is_said_and_changes_nothing(stage, command: Any, words: str) -> None:
+async def test_a_command_that_cannot_be_obeyed_is_rejected_with_a_reason(stage, command: Any, words: str) -> None:
     await stage.held_at("P1/o01/sample")
     stage.engine.command(command)
     ended = await stage.over()
@@ -284,7 +274,7 @@ async def test_a_stop_then_an_abort_ends_at_once(stage: Stage) -> None:
 
 
 @pytest.mark.parametrize("command", [Stop(), Abort()])
-async def test_a_run_that_rests_ends_at_once(stage: Stage, command: Any) -> None:
+async def test_a_paused_run_ends_at_once(stage: Stage, command: Any) -> None:
     await stage.held_at("P1/o02/move")
     stage.engine.command(Pause(at_once=True))
     await stage.until(events.Paused)
@@ -294,7 +284,7 @@ async def test_a_run_that_rests_ends_at_once(stage: Stage, command: Any) -> None
     assert stage.kinds[-2:] == ["paused", "interrupted"]
 
 
-async def test_commands_given_before_it_runs_are_heeded(stage: Stage) -> None:
+async def test_commands_given_before_the_start_are_obeyed(stage: Stage) -> None:
     stage.engine.command(Stop("before"))
     with pytest.raises(Interruption, match="before"):
         await stage.engine.run()
@@ -310,26 +300,18 @@ async def test_a_command_from_another_thread_wakes_the_engine(stage: Stage) -> N
     thread.join()
 
 
-async def test_an_inbox_hands_out_in_order_and_waits() -> None:
-    inbox = CommandQueue()
-    inbox.put(Pause())
-    inbox.put(Resume())
-    assert [await inbox.next(), await inbox.next()] == [Pause(), Resume()]
-    waiting = asyncio.create_task(inbox.next())
-    with inbox.attended():
+async def test_a_queue_gives_commands_in_order_and_waits() -> None:
+    queue = CommandQueue()
+    queue.put(Pause())
+    queue.put(Resume())
+    assert [await queue.next(), await queue.next()] == [Pause(), Resume()]
+    waiting = asyncio.create_task(queue.next())
+    with queue.attended():
         await asyncio.sleep(0)
         assert not waiting.done()
-        inbox.put(Undo())
+        queue.put(Undo())
         assert await waiting == Undo()
-    assert (inbox.is_attended, inbox.is_over) == (False, True)
-
-
-class Silent:
-    """A face that shows questions and answers them by command."""
-
-    async def ask(self, question: Question) -> str | None:
-        await asyncio.Event().wait()
-        return question.default
+    assert (queue.is_attended, queue.is_over) == (False, True)
 
 
 Meanwhile = Callable[[events.Event, RunState], None]
@@ -353,50 +335,16 @@ def when_asked(rig: Any, *commands: Any) -> Meanwhile:
 
 async def test_a_question_may_be_answered_by_command(recording, replayed) -> None:
     rig = replayed(recording.until(events.Proposed)[:-1], acceptance__approval="ask")
-    object.__setattr__(rig.performer, "operator", Silent())
+    object.__setattr__(rig.performer, "operator", SilentOperator())
     ended = await rig.run(when_asked(rig, Answer("a name")))
     assert ended.exit_code == ExitCode.DONE
     assert events.Committed(approved_by="a name") in read_journal(rig.folder.journal)
 
 
 @pytest.mark.parametrize("command", [Stop(), Abort()])
-async def test_a_question_keeps_nobody_from_leaving(recording, replayed, command) -> None:
+async def test_a_run_that_waits_for_an_answer_can_be_ended(recording, replayed, command) -> None:
     rig = replayed(recording.until(events.Proposed)[:-1], acceptance__approval="ask")
-    object.__setattr__(rig.performer, "operator", Silent())
+    object.__setattr__(rig.performer, "operator", SilentOperator())
     with pytest.raises(Interruption):
         await rig.run(when_asked(rig, command))
     assert rig.config == recording.config_before
-
-
-async def test_a_broker_takes_only_answers_that_there_are() -> None:
-    broker = QuestionBroker(Silent())
-    assert not broker.answer("retry"), "nothing is asked"
-    asking = asyncio.create_task(broker.ask(ask_recovery("It broke.", (Action.RETRY, Action.ABORT))))
-    await asyncio.sleep(0)
-    assert broker.open
-    assert (broker.open.kind, broker.open.text) == (QuestionKind.CHOOSE_RECOVERY, "It broke.")
-    assert broker.open.choices == ("retry", "abort")
-    assert not broker.answer("redo-set")
-    assert not broker.answer(None), "a choice must be made"
-    assert broker.answer("retry")
-    assert not broker.answer("abort"), "it is answered"
-    assert await asking == "retry"
-    assert broker.open is None
-
-
-async def test_an_empty_answer_is_the_default() -> None:
-    broker = QuestionBroker(Silent())
-    asking = asyncio.create_task(broker.ask(ask_placement(2, Pose(1.0, 2.0, 3.0))))
-    await asyncio.sleep(0)
-    assert broker.open
-    assert broker.open.subject == GaugePlacement(2, Pose(1.0, 2.0, 3.0))
-    assert broker.answer(None)
-    assert await asking == "placed"
-
-
-async def test_an_approval_may_be_declined_from_any_face() -> None:
-    broker = QuestionBroker(Silent())
-    asking = asyncio.create_task(broker.ask(ask_approval([], "diff")))
-    await asyncio.sleep(0)
-    assert broker.answer(None)
-    assert await asking is None

@@ -6,8 +6,8 @@ import pytest
 
 from hexacell.controller_config.change import ConfigChange
 from hexacell.errors import AnswerNeeded, ExitCode, LimitError
-from procedures.engine.operator import UnattendedOperator
 from procedures.run import events
+from procedures.run.questions import UnattendedOperator
 from tests.procedures.runs.listening import DOUBTFUL, FORBIDDEN, GOOD, happened, proposed
 
 

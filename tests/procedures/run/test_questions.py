@@ -1,0 +1,84 @@
+"""Questions: what the broker accepts as an answer, and what an unattended run reports instead of one."""
+
+from __future__ import annotations
+
+import asyncio
+
+import pytest
+
+from hexacell.acceptance.gates import AcceptanceGate
+from hexacell.cell.recovery import Action
+from hexacell.errors import AnswerNeeded, ExitCode
+from hexacell.kinematics.pose import Pose
+from procedures.run.questions import (
+    GaugePlacement,
+    QuestionBroker,
+    QuestionKind,
+    UnattendedOperator,
+    ask_approval,
+    ask_placement,
+    ask_recovery,
+)
+from tests.procedures.fakes import SilentOperator
+
+
+async def test_unattended_no_gauges_are_placed() -> None:
+    with pytest.raises(AnswerNeeded, match=r"point 3 \(X1\.000 .*fixed stations") as refusal:
+        await UnattendedOperator().ask(ask_placement(3, Pose(1.0, 2.0, 3.0)))
+    assert refusal.value.exit_code is ExitCode.ANSWER_NEEDED
+
+
+async def test_unattended_approval_is_refused_with_the_reasons() -> None:
+    gates = [
+        AcceptanceGate(
+            name="small change", passed=False, sentence="The largest change is 9 mm.", needs_person=True
+        ),
+        AcceptanceGate(name="converged", passed=True, sentence="The solver ended."),
+    ]
+    with pytest.raises(AnswerNeeded, match=r"approval: The largest change is 9 mm\.$"):
+        await UnattendedOperator().ask(ask_approval(gates, "diff"))
+
+
+async def test_unattended_approval_is_refused_where_the_cell_file_requires_it() -> None:
+    with pytest.raises(AnswerNeeded, match="the cell file says to ask"):
+        await UnattendedOperator().ask(ask_approval([], "diff"))
+
+
+async def test_unattended_no_recovery_is_chosen() -> None:
+    question = ask_recovery("It broke.", (Action.RETRY, Action.ABORT))
+    with pytest.raises(AnswerNeeded, match=r"^It broke\. Somebody must choose: retry, abort"):
+        await UnattendedOperator().ask(question)
+
+
+async def test_only_a_choice_of_the_question_is_an_answer() -> None:
+    broker = QuestionBroker(SilentOperator())
+    assert not broker.answer("retry"), "no question is open"
+    asking = asyncio.create_task(broker.ask(ask_recovery("It broke.", (Action.RETRY, Action.ABORT))))
+    await asyncio.sleep(0)
+    assert broker.open
+    assert (broker.open.kind, broker.open.text) == (QuestionKind.CHOOSE_RECOVERY, "It broke.")
+    assert broker.open.choices == ("retry", "abort")
+    assert not broker.answer("redo-set")
+    assert not broker.answer(None), "a choice must be made"
+    assert broker.answer("retry")
+    assert not broker.answer("abort"), "it is answered"
+    assert await asking == "retry"
+    assert broker.open is None
+
+
+async def test_an_empty_answer_is_the_default() -> None:
+    broker = QuestionBroker(SilentOperator())
+    asking = asyncio.create_task(broker.ask(ask_placement(2, Pose(1.0, 2.0, 3.0))))
+    await asyncio.sleep(0)
+    assert broker.open
+    assert broker.open.subject == GaugePlacement(2, Pose(1.0, 2.0, 3.0))
+    assert broker.answer(None)
+    assert await asking == "placed"
+
+
+async def test_an_approval_may_be_declined() -> None:
+    broker = QuestionBroker(SilentOperator())
+    asking = asyncio.create_task(broker.ask(ask_approval([], "diff")))
+    await asyncio.sleep(0)
+    assert broker.answer(None)
+    assert await asking is None

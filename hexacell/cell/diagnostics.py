@@ -115,7 +115,7 @@ class Diagnosis:
     def unsupported_values(self) -> Errors:
         """Values that TOML allows and a cell file does not: NaN, infinities, dates and times."""
         errors: Errors = {}
-        for path in self.document.lines:
+        for path in self.document.spans:
             value = self.document.value(path)
             if isinstance(value, float) and not math.isfinite(value):
                 errors[path] = self._mismatch(path, "a finite number")

@@ -6,7 +6,7 @@ every value and errors that a technician can act on.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -21,35 +21,25 @@ from hexacell.cell.model import CellSettings, cell_model
 from hexacell.errors import FileError, SeveralErrors
 from hexacell.plugins import Group, names
 from hexacell.storage.atomic_files import read_text
-from hexacell.storage.toml_document import BYTE_ORDER_MARK, TomlDocument, table_header
-from hexacell.storage.toml_locations import KeyPath
+from hexacell.storage.toml_document import TomlDocument, table_header
+from hexacell.storage.toml_locations import BYTE_ORDER_MARK, KeyPath
 
 Remark = Callable[[KeyPath], str | None]
 """The comment behind the value at a path, if any."""
 
 
-@dataclass(frozen=True, slots=True)
-class Origin:
-    """Where a setting comes from: a line of the cell file, or the program's default (no line)."""
-
-    line: int | None = None
-
-    def __str__(self) -> str:
-        return "default" if self.line is None else f"line {self.line}"
-
-
 @dataclass(frozen=True)
 class Cell:
-    """A cell file as read.
-
-    ``provenance`` has every setting under its dotted key, ``limits.tilt_deg`` or
-    ``gauges[2].port``, sections in a list counted from 1.
-    """
+    """A cell file as read."""
 
     path: Path
     settings: CellSettings
-    text: str
-    provenance: Mapping[str, Origin]
+    document: TomlDocument
+
+    @property
+    def text(self) -> str:
+        """The whole file, without a byte order mark."""
+        return self.document.text
 
     @property
     def config_path(self) -> Path:
@@ -64,39 +54,24 @@ def load_cell(path: Path) -> Cell:
         FileError: The file cannot be read, is no TOML, or has one mistake.
         SeveralErrors: It has more than one; each of ``errors`` is a FileError with its line.
     """
-    text = read_text(path).removeprefix(BYTE_ORDER_MARK)
-    document = TomlDocument.parse(text, path)
-    settings = _checked(document, path)
-    origins = {dotted(key): Origin(document.lines.get(key)) for key in _keys(settings, ())}
-    return Cell(path, settings, text, origins)
+    document = TomlDocument.parse(read_text(path).removeprefix(BYTE_ORDER_MARK), path)
+    return Cell(path, _checked(document, path), document)
 
 
 def describe(cell: Cell) -> str:
-    """The cell file with every default filled in, each value marked with where it comes from.
+    """The cell file with every default filled in; behind each value its line in the file, or ``default``.
 
     The text is itself a cell file with equal settings.
     """
-    return dump(cell.settings, lambda key: str(cell.provenance[dotted(key)]))
+    document = cell.document
+    return dump(
+        cell.settings, lambda key: f"line {document.line_of(key)}" if key in document.spans else "default"
+    )
 
 
 def schema() -> dict[str, Any]:
     """The JSON Schema of a cell file, for editors and for other programs."""
     return cell_model(DEFAULT_MECHANISM).model_json_schema()
-
-
-def dotted(path: KeyPath) -> str:
-    """A path as a dotted key: ``gauges[2].port``, counted from 1."""
-    return "".join(f"[{key + 1}]" if isinstance(key, int) else f".{key}" for key in path).removeprefix(".")
-
-
-def _keys(section: Section, path: KeyPath) -> Iterator[KeyPath]:
-    """The paths of all settings, those in sections within ``section`` included."""
-    for name, value in section:
-        inner = subsections((*path, name), value)
-        if not inner:
-            yield (*path, name)
-        for key, subsection in inner:
-            yield from _keys(subsection, key)
 
 
 def _checked(document: TomlDocument, path: Path) -> CellSettings:

@@ -26,7 +26,6 @@ from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.parameters import LEGS, ParameterKind, ParameterSet, ParameterUnit
 from hexacell.storage import atomic_files
 from hexacell.storage.toml_document import TomlDocument
-from hexacell.storage.toml_edit import replace_values
 from hexacell.storage.toml_locations import KeyPath
 
 
@@ -37,17 +36,9 @@ class NativeToml:
         self._parameters = parameters
 
     def read(self, path: Path) -> ControllerGeometry:
-        """The geometry and the branch in the file.
-
-        Raises:
-            FileError: with file and line; also for a file that :meth:`rewrite` would refuse, so that this
-                is known before anything is measured.
-        """
-        text = atomic_files.read_text(path)
-        content = _Content(TomlDocument.parse(text, path), self._parameters)
-        controller = ControllerGeometry(content.geometry(), content.branch())
-        replace_values(text, {}, path)
-        return controller
+        """The geometry and the branch in the file; raises ``FileError`` with file and line."""
+        content = _Content(TomlDocument.parse(atomic_files.read_text(path), path), self._parameters)
+        return ControllerGeometry(content.geometry(), content.branch())
 
     def rewrite(self, text: str, geometry: Geometry) -> str:
         """``text`` with ``geometry`` in it, with as many decimals as the unit has (1 nm), no exponent.
@@ -60,8 +51,9 @@ class NativeToml:
                 a length that is not above zero.
         """
         _require_physical(geometry)
-        before = _Content(TomlDocument.parse(text), self._parameters).geometry()
-        changed = replace_values(text, dict(_changed_tokens(before, geometry)))
+        document = TomlDocument.parse(text)
+        before = _Content(document, self._parameters).geometry()
+        changed = document.replaced(dict(_changed_tokens(before, geometry)))
         after = _Content(TomlDocument.parse(changed), self._parameters).geometry()
         last_decimal = {kind.symbol: 10.0**-kind.unit.decimals for kind in self._parameters.kinds}
         if (abs(after.vector - geometry.vector) > self._parameters.by_kind(last_decimal)).any():

@@ -1,4 +1,4 @@
-"""A TOML text as read: its values, the line of each, and errors that name file and line."""
+"""A TOML text as read: its values, the place of each, and errors that name file and line."""
 
 from __future__ import annotations
 
@@ -12,9 +12,7 @@ from pathlib import Path
 from typing import Any, Self
 
 from hexacell.errors import FileError
-from hexacell.storage.toml_locations import KeyPath, locate
-
-BYTE_ORDER_MARK = "\ufeff"
+from hexacell.storage.toml_locations import BYTE_ORDER_MARK, KeyPath, locate
 
 _LONGEST_QUOTE = 40
 _POSITION = re.compile(r" \(at (?:line (?P<line>\d+), column \d+|end of document)\)$")
@@ -22,24 +20,21 @@ _POSITION = re.compile(r" \(at (?:line (?P<line>\d+), column \d+|end of document
 
 @dataclass(frozen=True, slots=True)
 class TomlDocument:
-    """The values of a TOML text, and their lines.
+    """The values of a TOML text as ``tomllib`` reads them, and where in the text each of them stands.
 
-    Attributes:
-        data: the values, as ``tomllib`` reads them.
-        lines: the line, from 1, of every table, value and array element.
-        source: the file that errors name; a text may have none.
+    ``source`` is the file that errors name; a text may have none.
     """
 
+    text: str
     data: Mapping[str, Any]
-    lines: Mapping[KeyPath, int]
+    spans: Mapping[KeyPath, slice]
     source: Path | None = None
 
     @classmethod
     def parse(cls, text: str, source: Path | None = None) -> Self:
         """The document in ``text``; raises ``FileError`` with the line where it is no TOML."""
-        text = text.removeprefix(BYTE_ORDER_MARK)
         with _file_errors(text, source):
-            return cls(tomllib.loads(text), locate(text), source)
+            return cls(text, tomllib.loads(text.removeprefix(BYTE_ORDER_MARK)), locate(text), source)
 
     def to_json(self) -> str:
         """The values as JSON, dates and times as text; raises ``FileError`` for endless integers."""
@@ -56,9 +51,17 @@ class TomlDocument:
     def line_of(self, path: KeyPath) -> int | None:
         """The line of ``path`` or, where the text does not have it, of the innermost table around it."""
         for length in range(len(path), 0, -1):
-            if path[:length] in self.lines:
-                return self.lines[path[:length]]
+            if span := self.spans.get(path[:length]):
+                return self.text.count("\n", 0, span.start) + 1
         return None
+
+    def replaced(self, tokens: Mapping[KeyPath, str]) -> str:
+        """The text with other tokens at the given places; every other character is kept."""
+        text = self.text
+        for path in sorted(tokens, key=lambda path: self.spans[path].start, reverse=True):
+            span = self.spans[path]
+            text = text[: span.start] + tokens[path] + text[span.stop :]
+        return text
 
     def error(self, path: KeyPath, problem: str, action: str) -> FileError:
         """A problem at ``path``, with its line."""

@@ -1,14 +1,17 @@
-"""The line of every value in a TOML text.
+"""Where every value of a TOML text stands.
 
-Error messages name the line of a wrong value; ``tomllib`` and ``tomlkit`` give values without lines.
-The scanner here only finds where tokens begin and end. What they mean, and whether the text is TOML at
-all (https://toml.io/en/v1.0.0), is decided by ``tomllib``, which must have accepted the text before.
+Error messages name the line of a wrong value, and a write-back replaces numbers and nothing else;
+``tomllib`` gives values without their places. The scanner here only finds where tokens begin and end.
+What they mean, and whether the text is TOML at all (https://toml.io/en/v1.0.0), is decided by
+``tomllib``, which must have accepted the text before.
 """
 
 from __future__ import annotations
 
 import re
 import tomllib
+
+BYTE_ORDER_MARK = "\ufeff"
 
 KeyPath = tuple[str | int, ...]
 """Keys of tables and, counted from 0, positions in arrays, from the document's root."""
@@ -21,16 +24,15 @@ _STRING = re.compile(
     r'"""(?:[^\\]|\\.)*?"{3,5}' + r"|'''.*?'{3,5}|" + _BASIC_STRING + "|" + _LITERAL_STRING,
     re.DOTALL,
 )
-# A date and its time may be separated by a blank, so a blank does not end a bare value.
-_BARE_VALUE = re.compile(r"[^,\]}#\r\n]*")
+# A date and its time may be separated by a blank, so only the last blanks end a bare value.
+_BARE_VALUE = re.compile(r"[^,\]}#\r\n]*(?<![ \t])")
 _KEYS = re.compile(rf"""(?:{_BASIC_STRING}|{_LITERAL_STRING}|[^"'=\]])+""")
 
 
-def locate(text: str) -> dict[KeyPath, int]:
-    """The line, from 1, of every table, value and array element in valid TOML.
+def locate(text: str) -> dict[KeyPath, slice]:
+    """The part of ``text``, valid TOML, that is each table, value and array element.
 
-    A table has the line of the header or dotted key that mentions it first. A byte order mark must be
-    removed before.
+    That of a table is the header or dotted key that mentions it first.
     """
     return _Scanner(text).document()
 
@@ -38,20 +40,18 @@ def locate(text: str) -> dict[KeyPath, int]:
 class _Scanner:
     def __init__(self, text: str) -> None:
         self._text = text
-        self._offset = 0
-        self._line = 1
-        self._line_offset = 0
+        self._offset = len(BYTE_ORDER_MARK) if text.startswith(BYTE_ORDER_MARK) else 0
         self._table: KeyPath = ()
-        self._lines: dict[KeyPath, int] = {}
+        self._spans: dict[KeyPath, slice] = {}
         self._lengths: dict[KeyPath, int] = {}
 
-    def document(self) -> dict[KeyPath, int]:
+    def document(self) -> dict[KeyPath, slice]:
         while self._next():
             if self._next() == "[":
                 self._header()
             else:
                 self._key_and_value(self._table)
-        return self._lines
+        return self._spans
 
     def _next(self) -> str:
         self._match(_BLANKS)
@@ -63,45 +63,43 @@ class _Scanner:
         self._offset = match.end()
         return match[0]
 
-    def _line_here(self) -> int:
-        self._line += self._text.count("\n", self._line_offset, self._offset)
-        self._line_offset = self._offset
-        return self._line
-
     def _header(self) -> None:
-        brackets = 2 if self._text.startswith("[[", self._offset) else 1
+        start = self._offset
+        brackets = 2 if self._text.startswith("[[", start) else 1
         self._offset += brackets
-        self._table = self._open((), self._match(_KEYS))
+        self._table = self._open(())
         self._offset += brackets
         if brackets == 2:
             index = self._lengths.get(self._table, 0)
             self._lengths[self._table] = index + 1
             self._table = (*self._table, index)
-            self._lines[self._table] = self._line_here()
+            self._spans[self._table] = slice(start, self._offset)
 
-    def _open(self, path: KeyPath, keys: str) -> KeyPath:
-        """The path of the ``keys`` just read, relative to ``path``."""
-        for key in _split_keys(keys):
+    def _open(self, path: KeyPath) -> KeyPath:
+        """The path of the keys here, relative to ``path``."""
+        start = self._offset
+        for key in _split_keys(self._match(_KEYS)):
             # A header below an array of tables continues the last table of the array.
             path = (*path, self._lengths[path] - 1) if path in self._lengths else path
             path = (*path, key)
-            self._lines.setdefault(path, self._line_here())
+            self._spans.setdefault(path, slice(start, self._offset))
         return path
 
     def _key_and_value(self, table: KeyPath) -> None:
-        path = self._open(table, self._match(_KEYS))
+        path = self._open(table)
         self._offset += len("=")
         self._value(path)
 
     def _value(self, path: KeyPath) -> None:
         first = self._next()
-        self._lines[path] = self._line_here()
+        start = self._offset
         if first == "[":
             self._array(path)
         elif first == "{":
             self._inline_table(path)
         else:
             self._match(_STRING if first in {'"', "'"} else _BARE_VALUE)
+        self._spans[path] = slice(start, self._offset)
 
     def _array(self, path: KeyPath) -> None:
         self._offset += len("[")

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hexacell.cell.loader import Origin, load_cell
+from hexacell.cell.loader import load_cell
 from hexacell.errors import ExitCode, FileError, HexacellError, SeveralErrors
 
 
@@ -31,30 +31,9 @@ def test_config_may_be_an_absolute_path(load_changed):
     assert cell.config_path == Path("/etc/robot.toml")
 
 
-def test_provenance_tells_line_or_default(load_text, cell_text, line_with):
-    origins = load_text(cell_text).provenance
-    assert origins["limits.tilt_deg"] == Origin(line_with("tilt_deg"))
-    assert origins["robot.nominal.S"] == Origin(line_with("S = ["))
-    assert origins["gauges[3].protocol"] == Origin(line_with('"cdi"'))
-    assert str(origins["gauges[3].protocol"]) == f"line {line_with('cdi')}"
-    assert str(origins["timing.window_s"]) == "default"
-    assert str(origins["gauges[3].port"]) == "default"
-
-
-def test_provenance_has_every_setting(load_text, cell_text):
-    cell = load_text(cell_text)
-    for key in cell.provenance:
-        value: object = cell.settings
-        for name, _, number in re.findall(r"(\w+)(\[(\d+)\])?", key):
-            value = getattr(value, name)
-            value = value[int(number) - 1] if number else value  # type: ignore[index]
-    assert len(cell.provenance) > 80
-
-
-def test_windows_line_ends_and_byte_order_mark(load_text, cell_text, line_with):
+def test_windows_line_ends_and_byte_order_mark(load_text, cell_text):
     cell = load_text("\ufeff" + cell_text.replace("\n", "\r\n"))
     assert cell.settings == load_text(cell_text).settings
-    assert cell.provenance["limits.tilt_deg"] == Origin(line_with("tilt_deg"))
 
 
 def test_absent_file_is_named(tmp_path):

@@ -232,7 +232,7 @@ async def test_records_may_be_undone_during_a_pause(stage: Stage) -> None:
         (MeasureAgain(P1, 7), "P1 has no such record"),
     ],
 )
-async def test_a_command_that_cannot_be_obeyed_is_rejected_with_a_reason(stage, command: Any, words: str) -> None:
+async def test_a_command_that_cannot_be_obeyed_is_rejected(stage, command: Any, words: str) -> None:
     await stage.held_at("P1/o01/sample")
     stage.engine.command(command)
     ended = await stage.over()

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from hexacell.acceptance.gates import gates
-from hexacell.acceptance.validation import (
+from hexacell.acceptance import (
     DeviationStatistics,
     Verdict,
     calibration_outcome,
     check_outcome,
+    gates,
     validate,
 )
 from hexacell.cell.loader import Cell

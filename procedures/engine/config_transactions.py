@@ -22,7 +22,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from hexacell.acceptance.gates import AcceptanceGate
+from hexacell.acceptance import AcceptanceGate
 from hexacell.cell.loader import Cell
 from hexacell.controller_config.change import RECEIPT, ConfigChange, Receipt, fingerprint, propose
 from hexacell.controller_config.write_back import commit, rollback

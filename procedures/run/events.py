@@ -11,8 +11,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field
 
 from drivers.interfaces import DeviceIdentity
-from hexacell.acceptance.gates import AcceptanceGate
-from hexacell.acceptance.validation import Verdict
+from hexacell.acceptance import AcceptanceGate, Verdict
 from hexacell.cell.fields import GeometryDocument
 from hexacell.cell.recovery import Action, FailureKind
 from hexacell.controller_config.interface import Branch

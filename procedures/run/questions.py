@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Protocol
 
-from hexacell.acceptance.gates import AcceptanceGate
+from hexacell.acceptance import AcceptanceGate
 from hexacell.cell.recovery import Action
 from hexacell.errors import AnswerNeeded
 from hexacell.kinematics.pose import Pose

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import StrEnum
 
-from hexacell.acceptance.validation import Verdict
+from hexacell.acceptance import Verdict
 from hexacell.errors import ExitCode, HexacellError, SeveralErrors
 from procedures.run import events
 from procedures.run.state import RunState

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from hexacell.acceptance.validation import Verdict
+from hexacell.acceptance import Verdict
 from procedures.journal.journal import read_entries
 from procedures.journal.line_format import encode
 from procedures.run import events

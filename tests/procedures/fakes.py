@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from drivers.errors import GaugeAtEnd
 from drivers.interfaces import ControllerStatus, DeviceIdentity, EncoderSample, GaugeReading
 from drivers.simulated.robot import SimulatedMachine
-from hexacell.acceptance.gates import AcceptanceGate
+from hexacell.acceptance import AcceptanceGate
 from hexacell.cell.devices import GaugeAxis
 from hexacell.cell.recovery import Action
 from hexacell.clock import CellClock

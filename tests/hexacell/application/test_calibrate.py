@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hexacell.acceptance.validation import Verdict
+from hexacell.acceptance import Verdict
 from hexacell.application.calibration_run import calibrate
 from hexacell.controller_config.change import ConfigChange, fingerprint
 from hexacell.controller_config.write_back import Receipt

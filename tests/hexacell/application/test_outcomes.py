@@ -10,8 +10,7 @@ import pytest
 
 from drivers.simulated.gauges.faults import InjectedGaugeFault
 from drivers.simulated.linuxcnc.faults import ControllerFault
-from hexacell.acceptance.gates import AcceptanceGate
-from hexacell.acceptance.validation import Verdict
+from hexacell.acceptance import AcceptanceGate, Verdict
 from hexacell.controller_config.change import ConfigChange
 from hexacell.errors import AnswerNeeded, DeviceError, ExitCode, FileError, LimitError, WriteBackUndone
 from hexacell.kinematics.geometry import Geometry

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from hexacell.acceptance.gates import AcceptanceGate
+from hexacell.acceptance import AcceptanceGate
 from hexacell.cell.recovery import Action
 from hexacell.kinematics.pose import Pose
 from hexacell.presentation.run import matching_choice, question_text, repeated_text

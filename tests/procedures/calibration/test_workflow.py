@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from hexacell.acceptance.validation import Verdict
+from hexacell.acceptance import Verdict
 from hexacell.campaign import planner as module
 from hexacell.campaign import pose_chooser
 from hexacell.campaign.decisions import MeasurePose

@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from hexacell.acceptance.validation import Verdict
+from hexacell.acceptance import Verdict
 from hexacell.errors import (
     AnswerNeeded,
     DeviceError,

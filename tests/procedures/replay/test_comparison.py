@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from hexacell.acceptance.gates import AcceptanceGate
+from hexacell.acceptance import AcceptanceGate
 from procedures.journal.line_format import decode
 from procedures.replay.comparison import Aspect, Change, Difference, changes, is_wording
 from procedures.run import events

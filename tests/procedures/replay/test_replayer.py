@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from drivers.errors import GaugeAtEnd
-from hexacell.acceptance.validation import Verdict
+from hexacell.acceptance import Verdict
 from hexacell.errors import HexacellError, LimitError
 from hexacell.robot_model import robot_of
 from procedures.calibration.workflow import Calibration, Mode

@@ -6,7 +6,7 @@ import asyncio
 
 import pytest
 
-from hexacell.acceptance.gates import AcceptanceGate
+from hexacell.acceptance import AcceptanceGate
 from hexacell.cell.recovery import Action
 from hexacell.errors import AnswerNeeded, ExitCode
 from hexacell.kinematics.pose import Pose

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from hexacell.acceptance.validation import Verdict
+from hexacell.acceptance import Verdict
 from procedures.run import events
 from procedures.run.state import RunState, apply, fold
 from procedures.run.steps import CloseSet, Phase, SetKey

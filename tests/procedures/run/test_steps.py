@@ -11,8 +11,7 @@ from hypothesis import strategies as st
 from pydantic import TypeAdapter, ValidationError
 
 from drivers.interfaces import DeviceIdentity
-from hexacell.acceptance.gates import AcceptanceGate
-from hexacell.acceptance.validation import Verdict
+from hexacell.acceptance import AcceptanceGate, Verdict
 from hexacell.cell.recovery import Action, FailureKind
 from hexacell.identification.solver.result import DataFaultKind
 from hexacell.reporting.result import OutlierRecord

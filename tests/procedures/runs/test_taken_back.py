@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from drivers.errors import GaugeAtEnd
-from hexacell.acceptance.validation import Verdict
+from hexacell.acceptance import Verdict
 from hexacell.errors import DeviceError, ExitCode, FileError, WriteBackUndone
 from procedures.run import events
 from tests.procedures.runs.listening import (

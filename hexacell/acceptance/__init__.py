@@ -1,1 +1,0 @@
-"""Acceptance of a result: gates before it is written, validation afterwards."""

@@ -23,14 +23,7 @@ from procedures.calibration.workflow import Calibration, Mode
 from procedures.journal.journal import read_entries
 from procedures.journal.line_format import Entry
 from procedures.replay.comparison import TOLERANCE, Aspect, Difference
-from procedures.replay.recorded_devices import (
-    RecordedClock,
-    RecordedOperator,
-    RecordedOutcome,
-    RecordedStepExecutor,
-    RecordedThermometers,
-    recorded_devices,
-)
+from procedures.replay.recorded_executor import RecordedStepExecutor
 from procedures.replay.replayer import Replayer, ReplayReport, Scope
 from procedures.run.events import RunStarted
 
@@ -128,17 +121,8 @@ def _set_up(
     run = RunFolder(scratch / "run")
     run.path.mkdir()
     calibration = Calibration(settings, robot_of_run(cell, started), Mode(started.mode), pose_list_of(cell))
-    outcome = RecordedOutcome(settings.timing.window_s)
-    performer = RecordedStepExecutor(
-        cell,
-        calibration,
-        recorded_devices(settings, outcome),
-        RecordedClock(outcome),
-        RecordedOperator(outcome),
-        run,
-        RecordedThermometers(outcome),
-    )
-    replayer = Replayer(performer, outcome, run.journal, scope, tolerance)
+    executor = RecordedStepExecutor.of(cell, calibration, run)
+    replayer = Replayer(executor, run.journal, scope, tolerance)
     return replayer, started.model_copy(update={"config_sha256": atomic_files.sha256(text)})
 
 

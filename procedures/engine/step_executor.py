@@ -117,7 +117,7 @@ class StepExecutor:
 
     async def _sample(self, step: Sample, state: RunState) -> events.Event:
         try:
-            reading = await self._read()
+            reading = await self.read()
         except HexacellError as error:
             if not consists_only_of(error, GaugeAtEnd):
                 raise
@@ -141,7 +141,7 @@ class StepExecutor:
 
     async def _revisit(self, step: Revisit, state: RunState) -> events.Event:
         try:
-            reading = await self._read()
+            reading = await self.read()
         except HexacellError as error:
             if not consists_only_of(error, GaugeAtEnd):
                 raise
@@ -159,7 +159,7 @@ class StepExecutor:
         await gather_errors("gauges are not as they were", checks)
 
     async def _close(self, step: CloseSet, state: RunState) -> events.Event:
-        reading = await self._read()
+        reading = await self.read()
         zero = state.set(step.at).samples[0].reading
         drift = np.subtract(reading.gauges_mm, zero.gauges_mm)
         await self._check_gauges()
@@ -167,7 +167,8 @@ class StepExecutor:
             raise drifted
         return events.SetClosed(at=step.at, drift_mm=three_numbers(drift), reading=reading)
 
-    async def _read(self) -> events.Reading:
+    async def read(self) -> events.Reading:
+        """One settled reading of all devices; raises ``HexacellError``."""
         timing = self.cell.settings.timing
         settled = await self.guards.during_readings(lambda: settle(self.devices, timing, self.clock))
         return _reading(self.devices, settled, await self.thermometers.read())

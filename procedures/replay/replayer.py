@@ -18,7 +18,6 @@ from pydantic import BaseModel
 
 from hexacell.errors import ExitCode, HexacellError
 from procedures.engine.engine import Engine
-from procedures.engine.step_executor import StepExecutor
 from procedures.journal.journal import Journal
 from procedures.journal.line_format import Entry, encode
 from procedures.replay.comparison import (
@@ -30,7 +29,7 @@ from procedures.replay.comparison import (
     counts_mismatch,
     is_wording,
 )
-from procedures.replay.recorded_devices import RecordedOutcome
+from procedures.replay.recorded_executor import RecordedStepExecutor
 from procedures.run import events
 from procedures.run.events import Event
 from procedures.run.state import RunState, apply
@@ -79,21 +78,18 @@ class Replayer:
     """Replays one recorded run.
 
     Args:
-        executor: executes steps with the recorded devices of ``recorded``, in a temporary folder.
-        recorded: the source of all device readings.
+        executor: executes steps in a temporary folder.
         scratch: path of a temporary journal, for the end of the run.
     """
 
     def __init__(
         self,
-        executor: StepExecutor,
-        recorded: RecordedOutcome,
+        executor: RecordedStepExecutor,
         scratch: Path,
         scope: Scope = Scope.ALL,
         tolerance: float = TOLERANCE,
     ) -> None:
         self._executor = executor
-        self._recorded = recorded
         self._scratch = scratch
         self._scope = scope
         self._tolerance = tolerance
@@ -151,7 +147,7 @@ class Replayer:
                 self._add_difference(Aspect.RESULT, step.key, change)
 
     async def _outcome_of(self, step: Step, outcome: events.Event) -> events.Event | Exception:
-        self._recorded.load(outcome)
+        self._executor.recorded.outcome = outcome
         return await _result_or_error(self._executor.perform(step, self._state))
 
     async def _interruption(self, event: events.Interrupted) -> None:

@@ -22,13 +22,7 @@ from procedures.calibration.workflow import Calibration, Mode
 from procedures.journal.journal import read_journal
 from procedures.journal.line_format import Entry
 from procedures.replay.comparison import Aspect
-from procedures.replay.recorded_devices import (
-    RecordedClock,
-    RecordedOperator,
-    RecordedOutcome,
-    RecordedStepExecutor,
-    recorded_devices,
-)
+from procedures.replay.recorded_executor import RecordedStepExecutor
 from procedures.replay.replayer import Replayer, ReplayReport, Scope
 from procedures.run import events
 from procedures.run.state import RunState
@@ -47,17 +41,9 @@ def through(
 ) -> ReplayReport:
     """A history through the procedure of a rig's cell, whose config is as it was at the beginning."""
     folder.mkdir()
-    outcome = RecordedOutcome(rig.cell.settings.timing.window_s)
     calibration = Calibration(rig.cell.settings, robot_of(rig.cell), rig.mode)
-    performer = RecordedStepExecutor(
-        rig.cell,
-        calibration,
-        recorded_devices(rig.cell.settings, outcome),
-        RecordedClock(outcome),
-        RecordedOperator(outcome),
-        type(rig.folder)(folder),
-    )
-    replayer = Replayer(performer, outcome, folder / "journal.jsonl", scope)
+    executor = RecordedStepExecutor.of(rig.cell, calibration, type(rig.folder)(folder))
+    replayer = Replayer(executor, folder / "journal.jsonl", scope)
     return asyncio.run(replayer.replay(numbered(history)))
 
 
@@ -285,6 +271,14 @@ def test_what_was_changed_afterwards_is_found_in_its_line(recording, replay, wha
     assert (first.line, first.change.field) == (line, field)
     assert first.aspect is (Aspect.DECISION if scope is Scope.DECISIONS else Aspect.RESULT)
     assert f"line {line}, " in str(first)
+
+
+@pytest.mark.parametrize("changes", [{"spread_mm": (0.0, 1.0, 0.0)}, {"counts": ((0,) * 6,)}])
+def test_a_reading_that_had_not_settled_is_found(recording, replay, changes: dict[str, Any]) -> None:
+    changes = {f"reading.{key}": value for key, value in changes.items()}
+    history = changed(recording.history, events.RecordTaken, changes, 3)
+    [first, *_] = replay(history, scope=Scope.RESULTS).differences
+    assert "had not settled" in str(first)
 
 
 def test_one_difference_makes_no_other(recording, replay) -> None:

@@ -1,0 +1,167 @@
+"""The step executor of a replay: devices and operator answer from the journal.
+
+No robot moves, so there is nothing to supervise: the guards of a replay only evaluate numbers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Self, TypeVar
+
+from drivers.errors import GaugeAtEnd
+from drivers.interfaces import ControllerStatus, DeviceIdentity, EncoderSample
+from hexacell.cell.loader import Cell
+from hexacell.clock import CellClock
+from hexacell.errors import DeviceError
+from hexacell.kinematics.pose import Pose
+from hexacell.kinematics.rotations import Array
+from hexacell.runs.run_folder import RunFolder
+from procedures.calibration.workflow import Calibration
+from procedures.devices.device_set import Devices
+from procedures.engine.step_executor import StepExecutor
+from procedures.guards.guards import Guards
+from procedures.guards.supervision import Supervised
+from procedures.replay.comparison import TOLERANCE
+from procedures.run import events
+from procedures.run.questions import Question
+from procedures.run.state import RunState
+from procedures.run.steps import Move
+
+PROTOCOL = "recorded"
+
+Result = TypeVar("Result")
+
+
+@dataclass(slots=True)
+class Recorded:
+    """The recorded outcome of the step that is repeated."""
+
+    outcome: events.Event | None = None
+
+    @property
+    def reading(self) -> events.Reading:
+        """Its reading; raises ``DeviceError`` if it has none."""
+        reading: events.Reading | None = getattr(self.outcome, "reading", None)
+        if reading is None:
+            raise DeviceError("the journal has no reading for this step", subject="the recorded devices")
+        return reading
+
+
+@dataclass(frozen=True, slots=True)
+class RecordedEncoders:
+    """Encoders at the recorded positions."""
+
+    recorded: Recorded
+
+    async def open(self) -> tuple[DeviceIdentity, ...]:
+        """Nothing to connect."""
+        return (DeviceIdentity("encoders", PROTOCOL, "encoders in a journal"),)
+
+    async def read(self) -> EncoderSample:
+        """The last counts of the reading."""
+        reading = self.recorded.reading
+        return EncoderSample(reading.counts[-1], reading.joints_mm)
+
+    async def close(self) -> None:
+        """Nothing to release."""
+
+
+@dataclass(frozen=True, slots=True)
+class RecordedController:
+    """A controller whose moves all arrive; a move that did not arrive has no arrival in the journal."""
+
+    recorded: Recorded
+
+    async def open(self) -> DeviceIdentity:
+        """Nothing to connect."""
+        return DeviceIdentity("controller", PROTOCOL, "a controller in a journal")
+
+    async def prepare(self) -> None:
+        """Nothing to do."""
+
+    async def move(self, pose: Pose) -> None:
+        """Nothing to do."""
+
+    async def pose(self) -> Pose:
+        """The pose in the outcome."""
+        pose = getattr(self.recorded.outcome, "pose", None)
+        if pose is None:
+            raise DeviceError("the journal has no pose for this step", subject="controller")
+        return Pose(*pose)
+
+    async def status(self) -> ControllerStatus:
+        """Enabled."""
+        return ControllerStatus(estop=False, enabled=True)
+
+    async def stop(self) -> None:
+        """Nothing to do."""
+
+    async def reload(self) -> None:
+        """Nothing to do."""
+
+    async def close(self) -> None:
+        """Nothing to release."""
+
+
+@dataclass(frozen=True, slots=True)
+class RecordedOperator:
+    """An operator who gives the recorded answers."""
+
+    recorded: Recorded
+
+    async def ask(self, question: Question) -> str | None:
+        """Who approved a change, if anybody did; a question about a failure is never asked here."""
+        if isinstance(self.recorded.outcome, events.Committed):
+            return self.recorded.outcome.approved_by
+        return question.default
+
+
+class InactiveGuards(Guards):
+    """Guards without supervision; the drift of a reference, which needs no device, is still evaluated."""
+
+    async def prepare(self) -> None:
+        """Nothing to do."""
+
+    async def move(self, step: Move, state: RunState, commanded: Callable[[], Array]) -> None:
+        """Nothing to do."""
+        del step, state, commanded
+
+    async def at_standstill(self, action: Supervised[Result]) -> Result:
+        """Run it."""
+        return await action()
+
+    async def reload(self) -> None:
+        """Nothing to do."""
+
+
+@dataclass(frozen=True, eq=False)
+class RecordedStepExecutor(StepExecutor):
+    """A step executor with the recorded outcome of each step in place of devices."""
+
+    recorded: Recorded = field(default_factory=Recorded)
+
+    @classmethod
+    def of(cls, cell: Cell, calibration: Calibration, folder: RunFolder) -> Self:
+        """For a cell and a temporary folder."""
+        recorded = Recorded()
+        devices = Devices((), RecordedEncoders(recorded), RecordedController(recorded))
+        operator = RecordedOperator(recorded)
+        return cls(cell, calibration, devices, CellClock(), operator, folder, recorded=recorded)
+
+    @cached_property
+    def guards(self) -> Guards:
+        """No supervision."""
+        return InactiveGuards(self.cell.settings, self.devices, self.clock, self.folder.path)
+
+    async def read(self) -> events.Reading:
+        """The recorded reading; raises ``GaugeAtEnd`` where the recorded gauges did."""
+        outcome = self.recorded.outcome
+        if isinstance(outcome, events.RecordRejected) and outcome.reading is None:
+            raise GaugeAtEnd(outcome.reason)
+        reading, timing = self.recorded.reading, self.cell.settings.timing
+        too_wide = max(reading.spread_mm) > timing.spread_gauge_mm + TOLERANCE
+        if too_wide or len(reading.counts) < timing.readings:
+            raise DeviceError("the recorded readings had not settled", subject="the recorded devices")
+        return reading

@@ -22,7 +22,7 @@ from hexacell.identification.problem.data_requirements import is_determined
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.pose import Pose
 from hexacell.measurements.records import MeasurementSet
-from hexacell.virtual_robot.virtual_robot import VirtualRobot, robots_within_tolerances
+from hexacell.virtual_robot import VirtualRobot, robots_within_tolerances
 
 ROBOTS = 2
 MOST_TRIED = 6

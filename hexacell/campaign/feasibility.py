@@ -16,7 +16,7 @@ from hexacell.identification.belief import RobotBelief
 from hexacell.identification.solver.result import UNDETERMINED_RATIO
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.motion.path_check import is_clear
-from hexacell.virtual_robot.virtual_robot import VirtualRobot, robots_within_tolerances
+from hexacell.virtual_robot import VirtualRobot, robots_within_tolerances
 
 ROBOTS = 32
 """Number of robots drawn within the tolerances."""

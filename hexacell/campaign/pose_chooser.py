@@ -19,7 +19,7 @@ from hexacell.experiment_design.predicted_records import GaugeZero
 from hexacell.experiment_design.travel_monte_carlo import orientation_sigma
 from hexacell.identification.belief import RobotBelief
 from hexacell.kinematics.pose import Pose, PoseBatch
-from hexacell.motion.routes import find_route
+from hexacell.motion.paths import find_route
 from hexacell.robot_model import Robot
 
 WELL_KNOWN_SIGMA = np.radians(0.5)

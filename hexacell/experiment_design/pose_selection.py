@@ -33,7 +33,7 @@ from hexacell.experiment_design.travel_monte_carlo import TravelConstraint
 from hexacell.identification.belief import RobotBelief
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.rotations import Array
-from hexacell.motion.waypoint_planner import Path, PathPlanner, Rows
+from hexacell.motion.paths import Path, PathPlanner, Rows
 
 MOST_CANDIDATES = 240
 COMMAND_BATCH = 48

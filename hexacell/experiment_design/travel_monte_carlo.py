@@ -33,7 +33,7 @@ from hexacell.kinematics.geometry import GeometryBatch
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array, Mask
 from hexacell.kinematics.sensitivity import Sensitivity, has_singularity_margin, pose_sensitivity
-from hexacell.motion.waypoint_planner import Path
+from hexacell.motion.paths import Path
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,6 +11,9 @@ from numpy.typing import ArrayLike, NDArray
 from hexacell.kinematics import rotations
 from hexacell.kinematics.rotations import Array, Mask
 
+Index = slice | NDArray[np.intp] | Mask | list[int]
+"""Which poses of a batch. With two axes a pair: which poses of a line, and which lines."""
+
 
 @dataclass(frozen=True, slots=True)
 class Pose:
@@ -54,7 +57,7 @@ class Pose:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PoseBatch:
-    """Poses as arrays, for computations.
+    """Poses as arrays, for computations: n of them, or (m, n), which is m poses along each of n lines.
 
     Attributes:
         positions: ball centres (n, 3), mm.
@@ -84,7 +87,7 @@ class PoseBatch:
             np.concatenate([batch.rotations for batch in batches]),
         )
 
-    def with_rows(self, rows: NDArray[np.intp] | Mask, poses: PoseBatch) -> PoseBatch:
+    def with_rows(self, rows: Index | tuple[Index | int, Index | int], poses: PoseBatch) -> PoseBatch:
         """A copy in which ``poses`` replace those in some rows."""
         positions, orientations = self.positions.copy(), self.rotations.copy()
         positions[rows], orientations[rows] = poses.positions, poses.rotations
@@ -93,8 +96,12 @@ class PoseBatch:
     def __len__(self) -> int:
         return len(self.positions)
 
-    def __getitem__(self, rows: slice | NDArray[np.intp] | Mask | list[int]) -> PoseBatch:
+    def __getitem__(self, rows: Index | tuple[Index | int, Index | int]) -> PoseBatch:
         return PoseBatch(self.positions[rows], self.rotations[rows])
+
+    def reshape(self, *shape: int) -> PoseBatch:
+        """The same poses in their order: ``-1`` for one axis, ``-1, n`` for n lines."""
+        return PoseBatch(self.positions.reshape(*shape, 3), self.rotations.reshape(*shape, 3, 3))
 
     def pose(self, row: int) -> Pose:
         """The pose in a row, in mm and deg."""

@@ -18,9 +18,9 @@ from hexacell.errors import LimitError
 from hexacell.identification.belief import RobotBelief
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.pose import Pose
-from hexacell.motion.routes import find_route, next_return_move
+from hexacell.motion.paths import find_route, next_return_move
 from hexacell.robot_model import Robot
-from hexacell.virtual_robot.virtual_robot import VirtualRobot
+from hexacell.virtual_robot import VirtualRobot
 
 
 class SimulatedCampaign(VirtualCampaign):

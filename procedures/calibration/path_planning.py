@@ -16,8 +16,7 @@ from hexacell.identification.estimator import estimate_online
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.rotations import Array
 from hexacell.motion.path_check import ball_position
-from hexacell.motion.routes import find_route, next_return_move
-from hexacell.motion.waypoint_planner import PathPlanner
+from hexacell.motion.paths import PathPlanner, find_route, next_return_move
 from hexacell.robot_model import Robot
 from procedures.run.state import RunState
 from procedures.run.steps import Move, SetKey, SixNumbers
@@ -71,7 +70,7 @@ class RunPathPlanner:
     ) -> Move | None:
         """The next move back to a set's reference, the gauges being there.
 
-        See :func:`hexacell.motion.routes.next_return_move`. Where nothing is ``known`` the robot
+        See :func:`hexacell.motion.paths.next_return_move`. Where nothing is ``known`` the robot
         returns by the path on which it came. None if it did not come from the reference.
         """
         visited = state.path_from_reference

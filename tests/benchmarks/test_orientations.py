@@ -29,7 +29,7 @@ from hexacell.measurements.records import MeasurementSet
 from hexacell.robot_model import Robot, robot_of
 from hexacell.study.data_sets import random_robot
 from hexacell.study.simulated_campaign import SimulatedCampaign
-from hexacell.virtual_robot.virtual_robot import VirtualRobot
+from hexacell.virtual_robot import VirtualRobot
 
 Say = Callable[[str, str, str], None]
 

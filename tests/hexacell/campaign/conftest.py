@@ -16,7 +16,7 @@ from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import load_cell
 from hexacell.kinematics.geometry import Geometry
 from hexacell.robot_model import config_format, make_robot
-from hexacell.virtual_robot.virtual_robot import VirtualRobot
+from hexacell.virtual_robot import VirtualRobot
 
 FEW = 64
 TWO_POINTS = ((100.0, -100.0, 500.0), (-100.0, 100.0, 500.0))

@@ -8,7 +8,7 @@ import pytest
 from hexacell.campaign.dry_run import dry_run
 from hexacell.kinematics.mechanisms.hexaglide import hexaglide_geometry
 from hexacell.robot_model import make_robot
-from hexacell.virtual_robot.virtual_robot import robots_within_tolerances
+from hexacell.virtual_robot import robots_within_tolerances
 
 TWO_POINTS = ((100.0, -100.0, 500.0), (-100.0, 100.0, 500.0))
 SMALL = {

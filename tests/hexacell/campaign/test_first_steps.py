@@ -11,7 +11,7 @@ from hexacell.identification.estimator import estimate_online
 from hexacell.kinematics.pose import Pose
 from hexacell.measurements.records import MeasurementSet
 from hexacell.study.data_sets import random_robot
-from hexacell.virtual_robot.virtual_robot import VirtualRobot
+from hexacell.virtual_robot import VirtualRobot
 
 TRAVEL_MM = 5.0
 ERROR_MM = 7.0

@@ -11,7 +11,7 @@ from hexacell.identification.diagnostics.pose_accuracy import predicted_accuracy
 from hexacell.identification.estimator import estimate_online
 from hexacell.kinematics.rotations import Array
 from hexacell.measurements.records import MeasurementSet
-from hexacell.virtual_robot.virtual_robot import VirtualRobot
+from hexacell.virtual_robot import VirtualRobot
 
 TWO_POINTS = ((100.0, -100.0, 500.0), (-100.0, 100.0, 500.0))
 

@@ -10,7 +10,7 @@ from hexacell.kinematics.forward import assembly_mode, continue_solution, forwar
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.sensitivity import pose_jacobian
 from hexacell.motion import trajectory as module
-from hexacell.motion.trajectory import LineBatch, trace_path
+from hexacell.motion.trajectory import interpolate_lines, trace_path
 
 START = PoseBatch.of([Pose(0, 0, 550)])
 TURNS = orientations(64, np.radians(60.0), seed=3)
@@ -20,10 +20,10 @@ TURNS = orientations(64, np.radians(60.0), seed=3)
 def commanded(hexaglide, paper):
     """Lines from the first point to many orientations that the controller can reach, and their joints."""
     ends = PoseBatch.at([10.0, -20.0, 540.0], TURNS)
-    ways = LineBatch.through((START, ends))
-    joints = hexaglide.inverse(paper.nominal, paper.branch, ways.flat()).reshape(*ways.shape, 6)
+    ways = interpolate_lines((START, ends))
+    joints = hexaglide.inverse(paper.nominal, paper.branch, ways.reshape(-1)).reshape(-1, len(ends), 6)
     rows = np.flatnonzero(np.isfinite(joints).all(axis=(0, 2)))
-    return ways.lines(rows), joints[:, rows]
+    return ways[:, rows], joints[:, rows]
 
 
 @pytest.fixture
@@ -56,13 +56,13 @@ def stepwise(hexaglide, geometry, ways, joints, here, row, fineness=8):
 
 def test_all_at_once_is_as_one_after_the_other(hexaglide, paper, commanded, here):
     ways, joints = commanded
-    went = trace_path(hexaglide, paper.actual, ways, joints, here)
+    actual, found = trace_path(hexaglide, paper.actual, ways, joints, here)
     agreeing = 0
     for row in range(joints.shape[1]):
         slowly = stepwise(hexaglide, paper.actual, ways, joints, here, row)
-        if went.found[row]:
+        if found[row]:
             assert slowly is not None
-            np.testing.assert_allclose(went.actual.positions[1:, row], slowly, atol=1e-3)
+            np.testing.assert_allclose(actual.positions[1:, row], slowly, atol=1e-3)
             agreeing += 1
         else:
             assert slowly is None
@@ -74,21 +74,19 @@ def test_unconfirmed_lines_are_tracked_point_by_point_or_left_out(
     hexaglide, paper, commanded, here, monkeypatch
 ):
     ways, joints = commanded
-    sure = trace_path(hexaglide, paper.actual, ways, joints, here)
+    sure, is_sure = trace_path(hexaglide, paper.actual, ways, joints, here)
     monkeypatch.setattr(module._Robot, "confirm", lambda *_: False)
     monkeypatch.setattr(module, "JUMP_MM", 0.0)
-    doubted = trace_path(hexaglide, paper.actual, ways, joints, here)
-    np.testing.assert_array_equal(doubted.found, sure.found)
-    np.testing.assert_allclose(
-        doubted.actual.positions[:, sure.found], sure.actual.positions[:, sure.found], atol=1e-3
-    )
-    assert not trace_path(hexaglide, paper.actual, ways, joints, here, thorough=False).found.any()
+    doubted, found = trace_path(hexaglide, paper.actual, ways, joints, here)
+    np.testing.assert_array_equal(found, is_sure)
+    np.testing.assert_allclose(doubted.positions[:, is_sure], sure.positions[:, is_sure], atol=1e-3)
+    assert not trace_path(hexaglide, paper.actual, ways, joints, here, thorough=False)[1].any()
 
 
 def test_a_jump_to_another_solution_is_not_a_path(hexaglide, paper, commanded, here, monkeypatch):
     """Poses of another assembly mode amid a line, as a search that left its branch would find them."""
     ways, joints = commanded
-    sure = trace_path(hexaglide, paper.actual, ways, joints, here)
+    sure, is_sure = trace_path(hexaglide, paper.actual, ways, joints, here)
     honest = module._Robot.correct
     asked = []
 
@@ -98,22 +96,20 @@ def test_a_jump_to_another_solution_is_not_a_path(hexaglide, paper, commanded, h
         if len(asked) == 1:
             turned = poses.rotations.copy()
             turned[5:] = turned[5:] @ PoseBatch.of([Pose(0, 0, 0, 0, 0, 120)]).rotations[0]
-            return LineBatch(poses.positions + np.array([0.0, 0.0, 1.0]), turned), found
+            return PoseBatch(poses.positions + np.array([0.0, 0.0, 1.0]), turned), found
         return poses, found
 
     monkeypatch.setattr(module._Robot, "correct", jumping)
-    repaired = trace_path(hexaglide, paper.actual, ways, joints, here)
+    repaired, found = trace_path(hexaglide, paper.actual, ways, joints, here)
     assert len(asked) > 1
-    np.testing.assert_array_equal(repaired.found, sure.found)
-    np.testing.assert_allclose(
-        repaired.actual.positions[:, sure.found], sure.actual.positions[:, sure.found], atol=1e-3
-    )
+    np.testing.assert_array_equal(found, is_sure)
+    np.testing.assert_allclose(repaired.positions[:, is_sure], sure.positions[:, is_sure], atol=1e-3)
 
 
 def test_from_waypoint_to_waypoint():
     stop, end = PoseBatch.of([Pose(0, 0, 560, 10)]), PoseBatch.of([Pose(10, 0, 550, 0, 10, 0)])
-    way = LineBatch.through((START, stop, end), refinement=2)
-    pieces = way.shape[0] - 1
+    way = interpolate_lines((START, stop, end), refinement=2)
+    pieces = len(way) - 1
     assert pieces == 4 * module.PIECES_BETWEEN_WAYPOINTS
-    passed = [way.flat().pose(row).as_tuple() for row in (0, pieces // 2, pieces)]
+    passed = [way[:, 0].pose(row).as_tuple() for row in (0, pieces // 2, pieces)]
     np.testing.assert_allclose(passed, [p.pose(0).as_tuple() for p in (START, stop, end)], atol=1e-9)

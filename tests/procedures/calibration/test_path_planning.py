@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from hexacell.kinematics.pose import Pose, PoseBatch
-from hexacell.motion import routes as route_module
+from hexacell.motion import paths as route_module
 from procedures.calibration import path_planning
 from procedures.calibration.path_planning import NoSafePath
 from procedures.engine.recovery_policy import RecoveryPolicy

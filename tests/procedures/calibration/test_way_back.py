@@ -13,7 +13,7 @@ from hexacell.errors import IdentifiabilityError
 from hexacell.kinematics.forward import continue_solution
 from hexacell.kinematics.inverse import inverse_kinematics
 from hexacell.kinematics.pose import Pose, PoseBatch
-from hexacell.motion import routes
+from hexacell.motion import paths
 from hexacell.motion.trajectory import interpolate_line
 from procedures.calibration.identification_steps import IdentificationSteps
 from procedures.run import events
@@ -32,8 +32,8 @@ class ClearLines:
         self.clear_to = clear_to
         self.stops = stops
         monkeypatch.setattr(IdentificationSteps, "_estimated", lambda *_: (None, self))
-        monkeypatch.setattr(routes, "is_clear", self._is_clear)
-        monkeypatch.setattr(routes, "PathPlanner", self._departure)
+        monkeypatch.setattr(paths, "is_clear", self._is_clear)
+        monkeypatch.setattr(paths, "PathPlanner", self._departure)
         self.reference = np.zeros(3)
 
     def _departure(self, _: Any, start: Any, home: Any, reference: Any) -> Any:
@@ -90,8 +90,8 @@ def test_at_a_stop_it_is_not_decided_anew(make_rig, story, monkeypatch) -> None:
         asked.append(start.pose(0).a)
         return stands_in._departure(_, start, home, reference)
 
-    monkeypatch.setattr(routes, "PathPlanner", from_the_last_record_only)
-    monkeypatch.setattr(routes, "is_clear", lambda *_: False)
+    monkeypatch.setattr(paths, "PathPlanner", from_the_last_record_only)
+    monkeypatch.setattr(paths, "is_clear", lambda *_: False)
     step = calibration.next_step(fold([*happened, story().arrived(0, to_stop.pose)]))
     assert step.key == "P1/o01/move"
     assert asked == pytest.approx([ORIENTATIONS - 1.0])

@@ -17,7 +17,7 @@ from hexacell.campaign.decisions import MeasurePose
 from hexacell.campaign.stopping_rules import REFUSALS
 from hexacell.errors import LimitError
 from hexacell.kinematics.pose import Pose
-from hexacell.motion.routes import find_route
+from hexacell.motion.paths import find_route
 from procedures.calibration import path_planning
 from procedures.calibration.identification_steps import IdentificationSteps
 from procedures.calibration.workflow import Mode, expected_records

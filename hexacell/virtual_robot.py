@@ -12,7 +12,7 @@ from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.rotations import Array, Mask
 from hexacell.kinematics.sensitivity import singularity_margin
 from hexacell.measurements.records import Record
-from hexacell.motion.trajectory import LineBatch, interpolate_line, trace_path
+from hexacell.motion.trajectory import interpolate_line, trace_path
 from hexacell.robot_model import Robot
 
 PIECES = 24
@@ -86,11 +86,11 @@ class VirtualRobot:
         end = self.model.from_commands([command])
         line = interpolate_line(self._commanded, end, PIECES)
         joints = self._joints(line)
-        arguments = (LineBatch.from_poses(line, 1), joints[:, None], self._actual_pose)
-        traced = trace_path(self.model.mechanism, self.truth, *arguments)
-        if not traced.found[0]:
+        arguments = (line.reshape(-1, 1), joints[:, None], self._actual_pose)
+        traced, found = trace_path(self.model.mechanism, self.truth, *arguments)
+        if not found[0]:
             raise LimitError("a singularity is on the line")
-        poses = traced.actual.flat()
+        poses = traced.reshape(-1)
         self._see_margin(poses, joints)
         self._command, self._actual = command, poses[[-1]]
 

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from hexacell.kinematics.pose import Pose, PoseBatch
-from hexacell.motion import routes
-from hexacell.motion.routes import next_return_move
+from hexacell.motion import paths
+from hexacell.motion.paths import next_return_move
 
 TRAIL = [Pose(0, 0, 500, angle) for angle in (0, 5, 10, 15)]
 WAYPOINT = Pose(1, 2, 500, 7, 3, 0)
@@ -27,8 +27,8 @@ def plan(monkeypatch: pytest.MonkeyPatch) -> Any:
             asked.append(start.pose(0).a)
             return SimpleNamespace(plan=lambda _: [SimpleNamespace(waypoints=waypoints) if found else None])
 
-        monkeypatch.setattr(routes, "PathPlanner", planner)
-        monkeypatch.setattr(routes, "is_clear", lambda _, __, end, ___: round(end.pose(0).a) in clear_to)
+        monkeypatch.setattr(paths, "PathPlanner", planner)
+        monkeypatch.setattr(paths, "is_clear", lambda _, __, end, ___: round(end.pose(0).a) in clear_to)
         return asked
 
     return planned

@@ -1,4 +1,4 @@
-"""Paths from one command to others with gauges at the ball: straight, over waypoints, over the reference.
+"""Paths between commands: straight, over waypoints, over the reference, over poses known already.
 
 A controller moves along a straight line of its own six numbers. Its geometry is wrong by millimetres, and
 differently in every orientation. Between two orientations far apart the ball may therefore leave the
@@ -7,10 +7,20 @@ the straight line the command is shifted back by the deviation that the estimate
 
 Lines between two large rotations often cross a singularity, though each end can be reached from the
 reference. A path over the reference is therefore the third kind.
+
+:func:`find_route` is a breadth-first search for the fewest straight lines over given poses. Its edges are
+checked only when the search needs them, because a check costs far more than the search.
+
+:func:`next_return_move` decides on the way back to a reference move by move. The path is planned from the
+last pose that was to be measured, and kept while the robot is on it: planned again from a waypoint, it
+could lead back and forth endlessly. Where no path can be planned the robot returns by the path on which
+it came. A straight line to an earlier pose shortens that where it is clear.
 """
 
 from __future__ import annotations
 
+from collections import deque
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -19,8 +29,8 @@ from numpy.typing import NDArray
 
 from hexacell.identification.belief import RobotBelief
 from hexacell.kinematics.pose import Pose, PoseBatch
-from hexacell.kinematics.rotations import Array
-from hexacell.motion.path_check import CheckedLines, StartState, check_lines, start_state
+from hexacell.kinematics.rotations import Array, Mask
+from hexacell.motion.path_check import CheckedLines, LinesFrom, is_clear
 from hexacell.motion.trajectory import PIECES
 
 Rows = NDArray[np.intp]
@@ -28,6 +38,10 @@ Rows = NDArray[np.intp]
 WAYPOINT_PIECES = (1, PIECES // 3, 2 * PIECES // 3, PIECES - 1)
 """Pieces of the straight line after which the waypoints are: closer together near the ends, where
 rotations are large and the ball moves fastest."""
+
+SAME_MM = 1e-6
+SAME_ANGLE = float(np.radians(1e-6))
+"""Commands that differ by less are the same, converted between frames."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -82,15 +96,12 @@ class PathPlanner:
         A single line is searched thoroughly. Of several lines one that is hard to trace is left out:
         tracing it costs more than trying another end.
         """
-        return PathOptions(self, ends, self.check(ends, thorough=len(ends) == 1))
+        return PathOptions(self, ends, self.lines.check(ends, thorough=len(ends) == 1))
 
-    def check(
-        self, ends: PoseBatch, waypoints: tuple[PoseBatch, ...] = (), *, thorough: bool
-    ) -> CheckedLines:
-        """Check lines from the start to n commands, straight or over waypoints (n each)."""
-        return check_lines(
-            self.belief, self._start_state, ends, self.reference, waypoints, thorough=thorough
-        )
+    @cached_property
+    def lines(self) -> LinesFrom:
+        """The lines from the start."""
+        return LinesFrom(self.belief, self.start, self.reference)
 
     @cached_property
     def from_reference(self) -> PathPlanner | None:
@@ -103,10 +114,6 @@ class PathPlanner:
     def to_reference(self) -> Path | None:
         """The path to the reference; none if there is none, or this planner starts there."""
         return None if self.reference_command is None else self.plan(self.reference_command)[0]
-
-    @cached_property
-    def _start_state(self) -> StartState:
-        return start_state(self.belief, self.start)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -131,7 +138,7 @@ class PathOptions:
         if not is_open.any():
             return [None] * len(rows)
         waypoints = tuple(self._shifted(piece, rows[is_open]) for piece in WAYPOINT_PIECES)
-        lines = self.planner.check(self.ends[rows[is_open]], waypoints, thorough=len(self.ends) == 1)
+        lines = self.planner.lines.check(self.ends[rows[is_open]], waypoints, thorough=len(self.ends) == 1)
         places = np.cumsum(is_open) - 1
         return [
             _path(lines, waypoints, place) if opened else None
@@ -149,7 +156,7 @@ class PathOptions:
 
     def _shifted(self, piece: int, rows: Rows) -> PoseBatch:
         """Commands on some lines after a piece, shifted back by the ball's deviation there."""
-        commands, actual = self.lines.commands.at(piece, rows), self.lines.actual.at(piece, rows)
+        commands, actual = self.lines.commands[piece, rows], self.lines.actual[piece, rows]
         deviation = actual.positions - self.planner.reference
         return PoseBatch(commands.positions - deviation, commands.rotations)
 
@@ -159,3 +166,55 @@ def _path(lines: CheckedLines, waypoints: tuple[PoseBatch, ...], row: int) -> Pa
     if not lines.is_clear[row]:
         return None
     return Path(tuple(waypoint.pose(row) for waypoint in waypoints), *lines.traced(row))
+
+
+def find_route(
+    belief: RobotBelief,
+    start: PoseBatch,
+    end: PoseBatch,
+    via: Sequence[PoseBatch],
+    reference: Array | None = None,
+) -> list[int] | None:
+    """The fewest straight lines from ``start`` to ``end``: the rows of ``via`` between them, in order.
+
+    An empty list where the straight line itself is clear; none where there is no route. With gauges
+    zeroed where the ball was at ``reference`` (3,), mm, the ball stays inside their travel.
+    """
+    queue: deque[list[int]] = deque([[]])
+    unvisited = list(range(len(via)))
+    while queue:
+        route = queue.popleft()
+        here = via[route[-1]] if route else start
+        if is_clear(belief, here, end, reference):
+            return route
+        reached = [row for row in unvisited if is_clear(belief, here, via[row], reference)]
+        unvisited = [row for row in unvisited if row not in reached]
+        queue.extend([*route, row] for row in reached)
+    return None
+
+
+def next_return_move(belief: RobotBelief, reference: Array, trail: PoseBatch, departure: int) -> int | Pose:
+    """The next move back to the reference: a row of the trail, or a waypoint beside it.
+
+    Args:
+        belief: what is known of the robot.
+        reference: where the ball was when the gauges were zeroed (3,), mm.
+        trail: commands (m, 2 at least) from the reference's own to the present one.
+        departure: the row of the last command that is not a waypoint.
+    """
+    here, home = trail[[-1]], trail[[0]]
+    (path,) = PathPlanner(belief, trail[[departure]], None, reference).plan(home)
+    waypoints = () if path is None else path.waypoints
+    line = PoseBatch.of([trail.pose(departure), *waypoints])
+    if path is not None and _is_same(line, here).any():
+        passed = int(np.argmax(_is_same(line, here)))
+        return waypoints[passed] if passed < len(waypoints) else 0
+    shortcuts = (row for row in range(len(trail) - 2) if is_clear(belief, here, trail[[row]], reference))
+    return next(shortcuts, len(trail) - 2)
+
+
+def _is_same(poses: PoseBatch, other: PoseBatch) -> Mask:
+    distance = np.abs(poses.positions - other.positions).max(axis=-1)
+    angle = np.abs(poses.rotations - other.rotations).max(axis=(-2, -1))
+    same: Mask = (distance < SAME_MM) & (angle < SAME_ANGLE)
+    return same

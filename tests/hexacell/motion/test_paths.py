@@ -11,8 +11,8 @@ from hexacell.experiment_design.candidates import commands_for, orientations, re
 from hexacell.kinematics.forward import continue_solution
 from hexacell.kinematics.inverse import inverse_kinematics
 from hexacell.kinematics.pose import PoseBatch
+from hexacell.motion.paths import WAYPOINT_PIECES, PathPlanner
 from hexacell.motion.trajectory import interpolate_line
-from hexacell.motion.waypoint_planner import WAYPOINT_PIECES, PathPlanner
 
 TRAVEL_MM = 5.0
 BALL = np.array([0.0, 0.0, 550.0])

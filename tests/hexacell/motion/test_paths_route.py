@@ -11,9 +11,9 @@ import pytest
 from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import load_cell
 from hexacell.kinematics.pose import Pose, PoseBatch
-from hexacell.motion import routes as module
+from hexacell.motion import paths as module
 from hexacell.motion.path_check import ball_position, is_clear
-from hexacell.motion.routes import find_route
+from hexacell.motion.paths import find_route
 from hexacell.robot_model import robot_of
 
 

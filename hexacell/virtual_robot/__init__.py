@@ -1,1 +1,0 @@
-"""Virtual robots: geometries drawn within the tolerances, and how they move when commanded."""

@@ -75,10 +75,10 @@ class LinuxcncrshController:
         stops = self._session.stop_count
         async with self._order:
             commands = await self._session.in_control()
-            await commands.errors()
             await startup.acknowledge_on_completion(commands)
             await startup.leave_emergency_stop(commands, self._timeouts)
             await startup.switch_machine(commands, self._timeouts, on=True)
+            self._session.machine_is_enabled()
             await self._home_if_needed(commands, stops)
             await startup.enter_mdi_mode(commands, self._timeouts)
             await startup.check_coordinate_system(commands)

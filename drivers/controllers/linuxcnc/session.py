@@ -89,10 +89,16 @@ class Session:
         return commands
 
     async def in_control(self) -> ControllerCommands:
-        """The same, after taking control in any case."""
+        """The same, after taking control in any case; older error messages are dropped."""
         self._set_state(SessionState.CONTROL_LOST)
-        self._status.reset_errors()
-        return await self.synchronized()
+        commands = await self.synchronized()
+        await commands.errors()
+        self._status.begin_disabled()
+        return commands
+
+    def machine_is_enabled(self) -> None:
+        """Note that it was seen enabled: what disables it from now on is an error."""
+        self._status.begin_enabled()
 
     async def reconnect(self) -> ControllerCommands:
         """The same, as soon as a controller that may be restarting can be reached.

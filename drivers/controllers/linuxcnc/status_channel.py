@@ -20,8 +20,8 @@ RELEASE_TIMEOUT_S = 0.05
 class StatusConnection:
     """Reads the machine's status without taking control, which queries do not need.
 
-    Error messages are reported while the machine is disabled after it was seen enabled, those that an
-    order read included; ``reset_errors`` forgets that it was enabled.
+    Error messages are reported of a machine that was enabled and became disabled, those that an order
+    read included. The messages of a machine that was never enabled are left to the order that enables it.
     """
 
     def __init__(
@@ -55,9 +55,13 @@ class StatusConnection:
                 await self._channel.close()
                 raise
 
-    def reset_errors(self) -> None:
-        """Leave error messages to the order that is about to enable the machine."""
+    def begin_disabled(self) -> None:
+        """An order is about to enable the machine."""
         self._was_enabled, self._messages.for_status = False, []
+
+    def begin_enabled(self) -> None:
+        """An order has enabled the machine; no status may have been read since."""
+        self._was_enabled = True
 
     async def release_connection(self) -> Connection | None:
         """Give the connection away for a stop; none if a query occupies it for too long."""

@@ -87,6 +87,27 @@ async def test_an_order_has_the_messages_that_the_status_read(play) -> None:
         await moving
 
 
+async def test_a_machine_that_goes_off_before_the_first_status_was_enabled_by_its_preparation(play) -> None:
+    preparation = [
+        ("set enable EMCTOO", b"SET ENABLE ACK\n\r"),
+        ("get error", b"ERROR left over from before\r\n"),
+        ERROR_OK,
+        ("set set_wait done", b"SET SET_WAIT ACK\n\r"),
+        ("get estop", b"ESTOP OFF\r\n"),
+        ("set machine on", b"SET MACHINE ACK\n\r"),
+        ("get machine", b"MACHINE ON\r\n"),
+        ("get joint_homed", b"JOINT_HOMED YES YES YES YES YES YES\r\n"),
+        ("set mode mdi", b"SET MODE ACK\n\r"),
+        ("get mode", b"MODE MDI\r\n"),
+        ("get user_linear_units", b"USER_LINEAR_UNITS MM\r\n"),
+        ("get program_codes", b"PROGRAM_CODES G21 G90\r\n"),
+        ("get pos_offset", b"POS_OFFSET 0.0 0.0 0.0 0.0 0.0 0.0\r\n"),
+    ]
+    driver = await play.opened(preparation, [*GREETING, *asked(machine="OFF"), FAULT, ERROR_OK])
+    await driver.prepare()
+    assert (await driver.status()).error_messages == ("joint 3 following error",)
+
+
 async def test_messages_of_a_machine_that_was_never_on_are_left_to_who_switches_it_on(play) -> None:
     driver = await play.opened([], [*GREETING, *asked(estop="ON", machine="OFF")])
     assert await driver.status() == ControllerStatus(estop=True, enabled=False)

@@ -59,7 +59,7 @@ class SimulatedCell(Closeable):
             if other_processes:
                 adapter = served.enter_context(serve_slcan(self.encoders.channel, "pty"))
                 bus = adapter.bus_settings
-            self.controller = served.enter_context(_controller(settings, self.machine, config))
+            self.controller = served.enter_context(SimulatedController(self.machine, settings.controller))
             self.faults = CellFaults(self.gauges, self.encoders, self.controller, stop_file)
             self.schedule = served.enter_context(FaultSchedule(self.faults, clock, simulation.faults))
             self.physics.on_motion_start = self.schedule.on_motion_start
@@ -122,16 +122,6 @@ def _encoder_bank(
     latency = simulation.encoders.latency_s
     return SimulatedEncoderBank(
         settings.encoders, lambda: physics.encoder_positions().tolist(), clock, latency_s=latency
-    )
-
-
-def _controller(settings: CellSettings, machine: SimulatedMachine, config: Path) -> SimulatedController:
-    controller = settings.controller
-    return SimulatedController(
-        machine,
-        connect_password=controller.connect_password,
-        enable_password=controller.enable_password,
-        config=config.name,
     )
 
 

@@ -14,7 +14,6 @@ from drivers.simulated.closeable import Closeable
 from drivers.simulated.encoders import SimulatedEncoderBank
 from drivers.simulated.gauges.bank import SimulatedGaugeBank
 from drivers.simulated.gauges.faults import InjectedGaugeFault
-from drivers.simulated.linuxcnc.faults import ControllerFault
 from drivers.simulated.linuxcnc.server import SimulatedController
 from hexacell.cell.simulation import SimulatedFault
 from hexacell.clock import CellClock
@@ -120,7 +119,7 @@ class CellFaults:
         if kind is FaultKind.UNPLUGGED:
             (controller.unplug if on else controller.plug_in)()
         elif kind is FaultKind.SILENT:
-            (controller.faults.inject if on else controller.faults.clear)(ControllerFault.SILENT)
+            controller.silence(silent=on)
         elif on and kind is FaultKind.EMERGENCY_STOP:
             controller.state.set_estop(on=True)
         elif on:

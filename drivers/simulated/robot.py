@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from drivers.simulated.linuxcnc.machine import KinematicsFailure
+from drivers.simulated.linuxcnc.state import KinematicsFailure
 from drivers.simulated.physics import RobotPhysics
 from hexacell.clock import CellClock
 from hexacell.controller_config.interface import ConfigFormat, ControllerGeometry

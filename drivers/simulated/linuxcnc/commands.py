@@ -5,19 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from enum import IntEnum
+from pathlib import Path
 from typing import TypeVar
 
 from drivers.simulated.linuxcnc.state import ControllerState, TaskMode, WaitMode
-
-
-@dataclass(frozen=True, slots=True)
-class ServerSettings:
-    """The passwords, and the server's identification."""
-
-    connect_password: str
-    enable_password: str
-    server: str
-    config: str
+from hexacell.cell.devices import ControllerSettings
 
 
 @dataclass(slots=True, eq=False)
@@ -25,7 +17,7 @@ class ClientSession:
     """The settings of one connection, and the state that all of them share."""
 
     state: ControllerState
-    settings: ServerSettings
+    settings: ControllerSettings
     greeted: bool = False
     echo: bool = True
     verbose: bool = False
@@ -52,10 +44,7 @@ def _numbers(values: Iterable[float]) -> str:
 
 
 GET_COMMANDS: dict[str, Callable[[ClientSession], str]] = {
-    "ECHO": lambda session: _on_off(on=session.echo),
-    "VERBOSE": lambda session: _on_off(on=session.verbose),
     "ENABLE": lambda session: _on_off(on=session.has_control),
-    "SET_WAIT": lambda session: session.state.wait_mode.value,
     "ESTOP": lambda session: _on_off(on=session.state.estop),
     "MACHINE": lambda session: _on_off(on=session.state.enabled),
     "MODE": lambda session: session.state.mode.value,
@@ -66,10 +55,8 @@ GET_COMMANDS: dict[str, Callable[[ClientSession], str]] = {
     "ABS_ACT_POS": lambda session: _numbers(session.state.machine.pose().as_tuple()),
     "POS_OFFSET": lambda _session: _numbers([0.0] * 6),
     "PROGRAM_CODES": lambda _session: _MODAL_CODES,
-    "PROGRAM_UNITS": lambda _session: "MM",
     "USER_LINEAR_UNITS": lambda _session: "MM",
-    "INIFILE": lambda session: session.settings.config,
-    "PLAT": lambda _session: "Linux",
+    "INIFILE": lambda session: Path(session.settings.config).name,
 }
 
 

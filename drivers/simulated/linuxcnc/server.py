@@ -1,21 +1,28 @@
-"""The simulated controller as a TCP server on the loopback interface."""
+"""The simulated controller as a TCP server on the loopback interface: lines in, responses out.
+
+Responses to ``get`` end with CR LF, responses to ``set`` with LF CR, a refused ``get`` with two CR LF;
+after the greeting, input is echoed unchanged. (Traces of LinuxCNC 2.9.)
+"""
 
 from __future__ import annotations
 
+import re
 import socket
 import socketserver
 import threading
+from collections.abc import Callable
 from contextlib import suppress
 
 from drivers.simulated.closeable import Closeable
-from drivers.simulated.linuxcnc.client import Client
-from drivers.simulated.linuxcnc.commands import ServerSettings
-from drivers.simulated.linuxcnc.faults import ControllerFaults
-from drivers.simulated.linuxcnc.machine import Machine
-from drivers.simulated.linuxcnc.state import ConnectionCut, ControllerState
+from drivers.simulated.linuxcnc.commands import GET_COMMANDS, SET_COMMANDS, ClientSession, Permission
+from drivers.simulated.linuxcnc.state import ConnectionCut, ControllerState, Machine
+from hexacell.cell.devices import ControllerSettings
 
 HOST = "127.0.0.1"
+SERVER = "EMCNETSVR 1.1"
+MAX_LINE_BYTES = 255
 
+_LINE_ENDS = re.compile(rb"[\r\n]")
 _CHUNK = 1600
 _POLL_S = 0.05
 
@@ -25,27 +32,12 @@ class SimulatedController(Closeable):
 
     Attributes:
         port: where it listens, on 127.0.0.1.
-        faults: the active faults; may be changed at any time.
         state: the state that its clients share.
     """
 
-    def __init__(
-        self,
-        machine: Machine,
-        *,
-        port: int = 0,
-        connect_password: str = "EMC",  # noqa: S107 - linuxcncrsh's published default
-        enable_password: str = "EMCTOO",  # noqa: S107 - same
-        config: str = "simulated.ini",
-    ) -> None:
-        self.faults = ControllerFaults()
-        self.state = ControllerState(machine, self.faults)
-        access = ServerSettings(connect_password, enable_password, "EMCNETSVR 1.1", config)
-        try:
-            self._server = _Server(port, self.state, self.faults, access)
-        except BaseException:
-            self.state.close()
-            raise
+    def __init__(self, machine: Machine, settings: ControllerSettings) -> None:
+        self.state = ControllerState(machine)
+        self._server = _Server(self.state, settings)
         self.port = self._server.server_address[1]
         self._thread = threading.Thread(
             target=self._server.serve_forever, args=(_POLL_S,), name="simulated controller"
@@ -61,6 +53,10 @@ class SimulatedController(Closeable):
         """Accept connections again."""
         self._server.unplugged = False
 
+    def silence(self, *, silent: bool = True) -> None:
+        """Lines get no response, and are lost."""
+        self._server.silent = silent
+
     def close(self) -> None:
         """Stop the machine, cut all connections and end all threads; closing twice is harmless."""
         self._server.shutdown()
@@ -71,18 +67,15 @@ class SimulatedController(Closeable):
 
 
 class _Server(socketserver.ThreadingTCPServer):
-    allow_reuse_address = True
     daemon_threads = False
 
-    def __init__(
-        self, port: int, control: ControllerState, faults: ControllerFaults, access: ServerSettings
-    ) -> None:
-        self.control = control
-        self.faults = faults
-        self.access = access
+    def __init__(self, state: ControllerState, settings: ControllerSettings) -> None:
+        self.state = state
+        self.settings = settings
         self.unplugged = False
+        self.silent = False
         self._connections: set[socket.socket] = set()
-        super().__init__((HOST, port), _Handler)
+        super().__init__((HOST, 0), _Handler)
 
     def get_request(self) -> tuple[socket.socket, tuple[str, int]]:
         connection, address = super().get_request()
@@ -111,8 +104,76 @@ class _Handler(socketserver.BaseRequestHandler):
     request: socket.socket
 
     def handle(self) -> None:
-        shared = self.server
-        client = Client(shared.control, shared.faults, shared.access, self.request.sendall)
+        client = _Client(ClientSession(self.server.state, self.server.settings), self.request.sendall)
         with suppress(OSError, ConnectionCut):
             while data := self.request.recv(_CHUNK):
-                client.receive(data)
+                if not self.server.silent:
+                    client.receive(data)
+
+
+class _Client:
+    """The lines and responses of one connection; ``write`` sends bytes back over it."""
+
+    def __init__(self, session: ClientSession, write: Callable[[bytes], None]) -> None:
+        self._session = session
+        self._write = write
+        self._rest = b""
+
+    def receive(self, data: bytes) -> None:
+        """Process received bytes and respond to every completed line.
+
+        Raises:
+            ConnectionCut: The client sent ``quit`` or a line that is too long.
+        """
+        if self._session.echo and self._session.greeted:
+            self._write(data)
+        *lines, self._rest = _LINE_ENDS.split(self._rest + data)
+        for line in lines:
+            if len(line) > MAX_LINE_BYTES:
+                raise ConnectionCut
+            self._execute(line.decode("utf-8", "replace"))
+
+    def _execute(self, line: str) -> None:
+        verb, what, argument = (*line.split(maxsplit=2), "", "", "")[:3]
+        match verb.upper():
+            case "HELLO":
+                self._hello(what, argument)
+            case "GET":
+                self._get(what.upper())
+            case "SET":
+                self._set(what.upper(), argument.strip())
+            case "QUIT":
+                raise ConnectionCut
+
+    def _hello(self, password: str, name_and_version: str) -> None:
+        if password == self._session.settings.connect_password and len(name_and_version.split()) >= 2:
+            self._session.greeted = True
+            self._write(f"HELLO ACK {SERVER}\r\n".encode())
+        else:
+            self._write(b"HELLO NAK\r\n")
+
+    def _get(self, what: str) -> None:
+        if not what:
+            self._write(b"GET NAK\r\n")
+        elif what in GET_COMMANDS:
+            self._write(f"{what} {GET_COMMANDS[what](self._session)}\r\n".encode())
+        else:
+            self._write(f"GET {what} NAK\r\n\r\n".encode())
+
+    def _set(self, what: str, argument: str) -> None:
+        if not self._session.greeted:
+            self._write(b"SET NAK\r\n")
+        elif not what:
+            self._write(b"SET NAK\n\r")
+        elif not (self._is_permitted(what) and SET_COMMANDS[what].execute(self._session, argument)):
+            self._write(f"SET {what} NAK\n\r".encode())
+        elif self._session.verbose:
+            self._write(f"SET {what} ACK\n\r".encode())
+
+    def _is_permitted(self, what: str) -> bool:
+        if what not in SET_COMMANDS:
+            return False
+        permission = SET_COMMANDS[what].permission
+        return (permission < Permission.COMMANDER or self._session.has_control) and (
+            permission < Permission.ON or self._session.state.enabled
+        )

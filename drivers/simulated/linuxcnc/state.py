@@ -11,15 +11,11 @@ from collections import deque
 from collections.abc import Callable
 from concurrent.futures import CancelledError, Future, ThreadPoolExecutor, wait
 from enum import Enum
+from typing import Protocol
 
-from drivers.simulated.linuxcnc.faults import ControllerFault, ControllerFaults
-from drivers.simulated.linuxcnc.machine import KinematicsFailure, Machine
 from drivers.simulated.linuxcnc.mdi import BlockError, parse_block
 from hexacell.errors import HexacellError
 from hexacell.kinematics.pose import Pose
-
-FAULT_DELAY_S = 0.02
-"""When faults during a move are triggered, s after its start."""
 
 FAULTY_JOINT = 3
 """The joint with simulated following errors, counted from 0 as in LinuxCNC."""
@@ -31,7 +27,6 @@ class TaskMode(Enum):
     """The task mode."""
 
     MANUAL = "MANUAL"
-    AUTO = "AUTO"
     MDI = "MDI"
 
 
@@ -46,10 +41,57 @@ class ConnectionCut(Exception):
     """The connection of the command must be cut."""
 
 
+class KinematicsFailure(Exception):
+    """The target is out of reach of the controller's geometry."""
+
+
+class Machine(Protocol):
+    """The machine behind the controller, called from several threads.
+
+    While ``move`` or ``home`` blocks in one thread, any other method may be called from another.
+    """
+
+    def move(self, pose: Pose) -> None:
+        """Move to ``pose``; returns when the motion has ended or was stopped.
+
+        Raises:
+            KinematicsFailure: The geometry cannot reach it; nothing moves.
+        """
+        ...
+
+    def stop(self) -> None:
+        """Stop a motion in place, if there is one."""
+        ...
+
+    def pose(self) -> Pose:
+        """The pose by the joint positions and the controller's geometry."""
+        ...
+
+    def joints(self) -> tuple[float, ...]:
+        """The six joint positions, mm."""
+        ...
+
+    def switch_on(self) -> None:
+        """Enable the drives; the geometry is read from the config file here only.
+
+        Raises:
+            HexacellError: The config cannot be used; the machine stays off.
+        """
+        ...
+
+    def switch_off(self) -> None:
+        """Disable the drives; the joints stay where they are."""
+        ...
+
+    def home(self) -> None:
+        """Home the joints; returns when that has ended or was stopped."""
+        ...
+
+
 class ControllerState:
     """The controller of one machine; a thread of its own executes motions one after another."""
 
-    def __init__(self, machine: Machine, faults: ControllerFaults) -> None:
+    def __init__(self, machine: Machine) -> None:
         self.estop = True
         self.enabled = False
         self.mode = TaskMode.MANUAL
@@ -58,7 +100,6 @@ class ControllerState:
         self.wait_mode = WaitMode.RECEIVED
         self.commander: object | None = None
         self.machine = machine
-        self._faults = faults
         self._errors: deque[str] = deque()
         self._jobs: list[Future[bool]] = []
         self._abort_count = 0
@@ -87,10 +128,10 @@ class ControllerState:
             self.estop = on
         return True
 
-    def exceed_following_error(self, joint: int = FAULTY_JOINT) -> None:
+    def exceed_following_error(self) -> None:
         """A joint exceeds its following error: the machine is switched off, with an error message."""
         with self._lock:
-            self._errors.append(following_error_message(joint))
+            self._errors.append(f"joint {FAULTY_JOINT} following error")
             self._switch_off()
 
     def set_machine(self, *, on: bool) -> bool:
@@ -131,22 +172,20 @@ class ControllerState:
         return True
 
     def mdi(self, block: str) -> bool:
-        """Carry out one block; blocks until it has ended if ``answers`` says so.
+        """Carry out one block; with ``WaitMode.DONE`` returns when it has ended.
 
         Raises:
-            ConnectionCut: A fault requires it, or the controller is being closed.
+            ConnectionCut: The controller is being closed.
         """
         try:
             target = parse_block(block, self.machine.pose())
             self._require_mdi()
         except BlockError as error:
-            return self._failed(str(error))
-        if self._faults.triggers(ControllerFault.REFUSES_MOVE):
-            return self._failed(following_error_message(FAULTY_JOINT))
-        if target is None or self._faults.triggers(ControllerFault.DOES_NOT_MOVE):
+            self._errors.append(str(error))
+            return self.wait_mode is WaitMode.RECEIVED
+        if target is None:
             return True
         job = self._start(lambda: self._travel(target))
-        self._trigger_faults_during_move(job)
         return self.wait_mode is WaitMode.RECEIVED or _outcome(job)
 
     def _require_mdi(self) -> None:
@@ -154,23 +193,6 @@ class ControllerState:
             raise BlockError("Can't issue MDI command when not homed")
         if self.mode is not TaskMode.MDI:
             raise BlockError("Must be in MDI mode to issue MDI command")
-
-    def _failed(self, *errors: str) -> bool:
-        self._errors.extend(errors)
-        return self.wait_mode is WaitMode.RECEIVED
-
-    def _trigger_faults_during_move(self, job: Future[bool]) -> None:
-        drops = self._faults.triggers(ControllerFault.DROPS_CONNECTION)
-        stops = self._faults.triggers(ControllerFault.EMERGENCY_STOP)
-        lags = self._faults.triggers(ControllerFault.FOLLOWING_ERROR)
-        if drops or stops or lags:
-            wait([job], timeout=FAULT_DELAY_S)
-        if stops:
-            self.set_estop(on=True)
-        if lags:
-            self.exceed_following_error()
-        if drops:
-            raise ConnectionCut
 
     def _start(self, motion: Callable[[], bool]) -> Future[bool]:
         with self._lock:
@@ -211,11 +233,6 @@ class ControllerState:
         if self.enabled:
             self.enabled = False
             self.machine.switch_off()
-
-
-def following_error_message(joint: int) -> str:
-    """LinuxCNC's message for a following error."""
-    return f"joint {joint} following error"
 
 
 def _outcome(job: Future[bool]) -> bool:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from drivers.simulated.linuxcnc.machine import KinematicsFailure
+from drivers.simulated.linuxcnc.state import KinematicsFailure
 from drivers.simulated.robot import LINE_STEPS
 from hexacell.controller_config.toml_format import NativeToml
 from hexacell.errors import FileError

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from drivers.simulated.gauges.faults import InjectedGaugeFault
-from drivers.simulated.linuxcnc.faults import ControllerFault
 from hexacell.acceptance import AcceptanceGate, Verdict
+from hexacell.cell.simulation import SimulatedFault
 from hexacell.controller_config.change import ConfigChange
 from hexacell.errors import AnswerNeeded, DeviceError, ExitCode, FileError, LimitError, WriteBackUndone
 from hexacell.kinematics.geometry import Geometry
@@ -179,10 +179,12 @@ async def test_two_gauges_that_fail_at_once_are_both_named(make_site) -> None:
 
 async def test_an_emergency_stop_stops_it(make_site) -> None:
     site = make_site()
-    fault = at(
-        events.RecordTaken,
-        lambda: site.simulated.controller.faults.inject(ControllerFault.EMERGENCY_STOP, 1),
-    )
+
+    def stop_in_the_next_move() -> None:
+        schedule = site.simulated.schedule
+        schedule.schedule(SimulatedFault(kind="emergency stop", at_move=schedule.move_count + 1))
+
+    fault = at(events.RecordTaken, stop_in_the_next_move)
     with pytest.raises(DeviceError, match="controller") as refusal:
         await site.calibrate(fault)
     assert refusal.value.exit_code is ExitCode.HARDWARE

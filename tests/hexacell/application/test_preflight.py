@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from drivers.simulated.gauges.faults import InjectedGaugeFault
-from drivers.simulated.linuxcnc.faults import ControllerFault
 from hexacell.application.calibration_run import preflight
 from hexacell.campaign import feasibility
 from hexacell.errors import (
@@ -57,7 +56,8 @@ async def test_every_failure_is_said_at_once(make_site) -> None:
     site.simulated.gauges.inject("x", InjectedGaugeFault.INCH)
     site.simulated.gauges.inject("z", InjectedGaugeFault.HOLD)
     site.simulated.encoders.faults.unplug(4)
-    site.simulated.controller.faults.inject(ControllerFault.REFUSES_PASSWORD)
+    controller = site.simulated.settings.controller.model_copy(update={"connect_password": "WRONG"})
+    site.simulated.settings = site.simulated.settings.model_copy(update={"controller": controller})
     before = site.simulated.machine.joints()
     with pytest.raises(SeveralErrors) as refusal:
         await check(site)

@@ -11,11 +11,11 @@ import pytest
 
 from drivers.controllers.linuxcnc.controller import LinuxcncrshController
 from drivers.controllers.linuxcnc.settings import Timeouts
-from drivers.simulated.linuxcnc.machine import KinematicsFailure
 from drivers.simulated.linuxcnc.server import HOST, SimulatedController
+from drivers.simulated.linuxcnc.state import KinematicsFailure
 from hexacell.cell.devices import ControllerSettings
 from hexacell.clock import CellClock
-from hexacell.errors import FileError
+from hexacell.errors import DeviceError, FileError
 from hexacell.kinematics.pose import Pose
 from tests.waiting import wait_until
 
@@ -30,6 +30,8 @@ class FakeMachine:
         self.config: float | None = 0.0
         self.jump_mm = 0.0
         self.deaf_to = 0
+        self.refusal = ""
+        self.ignored_moves = 0
         self.events: list[str] = []
         self._geometry = 0.0
         self._joints = (0.0,) * 6
@@ -39,6 +41,11 @@ class FakeMachine:
     def move(self, pose: Pose) -> None:
         if pose.z > 1000.0:
             raise KinematicsFailure
+        if self.refusal:
+            raise DeviceError(self.refusal)
+        if self.ignored_moves:
+            self.ignored_moves -= 1
+            return
         self._stop.clear()
         self.events.append("move")
         start, clock = self._joints, CellClock()
@@ -150,7 +157,7 @@ def machine() -> FakeMachine:
 @pytest.fixture
 def simulated(machine: FakeMachine) -> Iterator[SimulatedController]:
     """A simulated controller on a free port."""
-    with SimulatedController(machine) as server:
+    with SimulatedController(machine, ControllerSettings(config="folder/machine.ini")) as server:
         yield server
 
 

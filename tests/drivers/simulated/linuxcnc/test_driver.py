@@ -8,8 +8,6 @@ import pytest
 
 from drivers.controllers.errors import ConnectionLost, MotionInterrupted, MoveRefused, ResponseTimeout
 from drivers.controllers.linuxcnc.settings import Timeouts
-from drivers.simulated.linuxcnc.faults import ControllerFault
-from drivers.simulated.linuxcnc.server import SimulatedController
 from drivers.simulated.linuxcnc.state import WaitMode
 from hexacell.errors import DeviceError
 from hexacell.kinematics.pose import Pose
@@ -41,7 +39,7 @@ async def begin(ready, machine):
 async def test_from_emergency_stop_to_a_pose(driver, machine):
     controller = driver()
     try:
-        assert (await controller.open()).description == "EMCNETSVR 1.1, simulated.ini"
+        assert (await controller.open()).description == "EMCNETSVR 1.1, machine.ini"
         assert machine.events == []
         await controller.prepare()
         assert machine.events == ["on", "home"]
@@ -184,49 +182,50 @@ async def test_a_slider_that_jumps_when_the_machine_comes_on(ready, machine):
 async def test_a_silent_controller(driver, simulated):
     controller = driver(Timeouts(answer=0.3))
     await controller.open()
-    simulated.faults.inject(ControllerFault.SILENT)
+    simulated.silence()
     with pytest.raises(ResponseTimeout, match="did not answer 'get abs_act_pos'"):
         await controller.pose()
-    simulated.faults.clear(ControllerFault.SILENT)
+    simulated.silence(silent=False)
     assert await controller.pose() == HOME
     await controller.close()
 
 
-async def test_a_refused_password(driver, simulated):
-    simulated.faults.inject(ControllerFault.REFUSES_PASSWORD)
+async def test_a_refused_password(driver):
     with pytest.raises(DeviceError, match="refuses the connect password"):
-        await driver().open()
+        await driver(connect_password="WRONG").open()
 
 
-async def test_a_refused_move(ready, simulated):
-    simulated.faults.inject(ControllerFault.REFUSES_MOVE, times=1)
+async def test_a_refused_move(ready, machine):
+    machine.refusal = "joint 3 following error"
     with pytest.raises(MoveRefused, match="joint 3 following error"):
         await ready.move(TARGET)
+    machine.refusal = ""
     await ready.move(TARGET)
 
 
-async def test_an_acknowledged_move_that_does_not_take_place(ready, simulated):
-    simulated.faults.inject(ControllerFault.DOES_NOT_MOVE, times=1)
+async def test_an_acknowledged_move_that_does_not_take_place(ready, machine):
+    machine.ignored_moves = 1
     with pytest.raises(MotionInterrupted, match=r"stopped at X0\.000 .* before reaching X100\.000"):
         await ready.move(TARGET)
     await ready.move(TARGET)
 
 
 async def test_a_connection_dropped_in_mid_move(ready, simulated, machine):
-    machine.duration_s = LONG_S
-    simulated.faults.inject(ControllerFault.DROPS_CONNECTION, times=1)
+    moving = await begin(ready, machine)
+    simulated.unplug()
+    simulated.plug_in()
     with pytest.raises(ConnectionLost, match="closed the connection"):
-        await ready.move(TARGET)
+        await moving
     stood = await ready.pose()
     assert stood == await ready.pose()
     assert stood.x < 90.0
 
 
 async def test_an_emergency_stop_in_mid_move(ready, simulated, machine):
-    machine.duration_s = LONG_S
-    simulated.faults.inject(ControllerFault.EMERGENCY_STOP, times=1)
+    moving = await begin(ready, machine)
+    simulated.state.set_estop(on=True)
     with pytest.raises(MotionInterrupted, match="it is in emergency stop"):
-        await ready.move(TARGET)
+        await moving
     machine.duration_s = 0.01
     await ready.prepare()
     await ready.move(TARGET)
@@ -238,8 +237,3 @@ async def test_a_controller_that_goes_away(ready, simulated):
         await ready.pose()
     with pytest.raises(DeviceError, match="could not be stopped: it cannot be reached"):
         await ready.stop()
-
-
-async def test_one_taken_port_leaves_nothing_behind(simulated, machine):
-    with pytest.raises(OSError, match="in use"):
-        SimulatedController(machine, port=simulated.port)

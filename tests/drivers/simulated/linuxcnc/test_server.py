@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import pytest
 
-from drivers.simulated.linuxcnc.faults import ControllerFault
-
 NOBODY = [
     ("get estop", b"ESTOP ON\r\n"),
     ("set estop off", b"SET NAK\r\n"),
@@ -16,7 +14,6 @@ NOBODY = [
     ("get enable", b"get enable\r\nENABLE OFF\r\n"),
     ("set enable EMCTOO", b"set enable EMCTOO\r\n"),
     ("set echo off", b"set echo off\r\n"),
-    ("get echo", b"ECHO OFF\r\n"),
     ("set verbose on", b"SET VERBOSE ACK\n\r"),
     ("get enable", b"ENABLE ON\r\n"),
 ]
@@ -32,9 +29,7 @@ GREETED = [
     ("set machine on", b"SET MACHINE ACK\n\r"),
     ("get machine", b"MACHINE OFF\r\n"),
     ("get error", b"ERROR OK\r\n"),
-    ("get set_wait", b"SET_WAIT RECEIVED\r\n"),
     ("set set_wait done", b"SET SET_WAIT ACK\n\r"),
-    ("get set_wait", b"SET_WAIT DONE\r\n"),
     ("set wait_mode done", b"SET WAIT_MODE NAK\n\r"),
     ("set mode mdi", b"SET MODE NAK\n\r"),
     ("set home -1", b"SET HOME NAK\n\r"),
@@ -87,7 +82,7 @@ READY = [
     ("set home -1", b"SET HOME ACK\n\r"),
     ("get error", b"ERROR OK\r\n"),
     ("get pos_offset", b"POS_OFFSET 0.000000 0.000000 0.000000 0.000000 0.000000 0.000000\r\n"),
-    ("get program_units", b"PROGRAM_UNITS MM\r\n"),
+    ("get user_linear_units", b"USER_LINEAR_UNITS MM\r\n"),
 ]
 
 
@@ -117,7 +112,7 @@ def test_an_unknown_first_word_gets_no_answer(client):
     me.send("foo bar")
     me.send("")
     me.expect_silence()
-    me.say("get echo", b"ECHO OFF\r\n")
+    me.say("get mode", b"MODE MANUAL\r\n")
 
 
 def test_success_is_silent_until_verbose_is_on(client):
@@ -253,49 +248,38 @@ def test_homing_that_is_aborted_leaves_it_unhomed(client, machine):
 
 def test_silence(client, simulated):
     me = client()
-    simulated.faults.inject(ControllerFault.SILENT, times=1)
+    simulated.silence()
     me.send("get estop")
     me.expect_silence()
+    simulated.silence(silent=False)
     me.say("get estop", b"ESTOP ON\r\n")
 
 
-def test_a_refused_password(client, simulated):
-    me = client()
-    simulated.faults.inject(ControllerFault.REFUSES_PASSWORD)
-    me.say("hello EMC test 1.0", b"HELLO NAK\r\n")
-    simulated.faults.clear(ControllerFault.REFUSES_PASSWORD)
-    me.say("hello EMC test 1.0", b"HELLO ACK EMCNETSVR 1.1\r\n")
-
-
-def test_faults_of_moves_strike_as_often_as_told(client, simulated, machine):
-    me = client()
-    me.make_ready()
-    simulated.faults.inject(ControllerFault.REFUSES_MOVE, times=1)
-    me.say("set mdi G0 X1", b"SET MDI NAK\n\r")
-    me.say("get error", b"ERROR joint 3 following error\r\n")
-    simulated.faults.inject(ControllerFault.DOES_NOT_MOVE, times=1)
-    me.say("set mdi G0 X1", b"SET MDI ACK\n\r")
-    assert machine.pose().x == 0.0
-    me.say("set mdi G0 X1", b"SET MDI ACK\n\r")
-    assert machine.pose().x == 1.0
-
-
-def test_an_emergency_stop_in_the_middle_of_a_move(client, simulated, machine):
+@pytest.mark.parametrize("fault", ["estop", "following error"])
+def test_faults_during_a_move_stop_it(client, simulated, machine, fault):
     me = client()
     me.make_ready()
     machine.duration_s = 30.0
-    simulated.faults.inject(ControllerFault.EMERGENCY_STOP, times=1)
-    me.say("set mdi G0 X100", b"SET MDI ACK\n\r")
-    me.say("get estop", b"ESTOP ON\r\n")
-    assert 0.0 < machine.pose().x < 99.0
-
-
-def test_a_connection_dropped_in_the_middle_of_a_move(client, simulated, machine):
-    me = client()
-    me.make_ready()
-    machine.duration_s = 30.0
-    simulated.faults.inject(ControllerFault.DROPS_CONNECTION, times=1)
     me.send("set mdi G0 X100")
+    machine.wait_for("move")
+    if fault == "estop":
+        simulated.state.set_estop(on=True)
+    else:
+        simulated.state.exceed_following_error()
+    assert me.hear(13) == b"SET MDI ACK\n\r"
+    me.say("get machine", b"MACHINE OFF\r\n")
+    me.say("get estop", b"ESTOP ON\r\n" if fault == "estop" else b"ESTOP OFF\r\n")
+    me.say("get error", b"ERROR OK\r\n" if fault == "estop" else b"ERROR joint 3 following error\r\n")
+    assert machine.pose().x < 99.0
+
+
+def test_an_unplugged_controller_cuts_connections_and_its_machine_continues(client, simulated, machine):
+    me = client()
+    me.make_ready()
+    machine.duration_s = 30.0
+    me.send("set mdi G0 X100")
+    machine.wait_for("move")
+    simulated.unplug()
     me.expect_end()
     assert machine.events[-1] == "move"
 

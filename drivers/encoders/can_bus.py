@@ -16,7 +16,7 @@ from drivers.errors import BusError
 from drivers.wire_trace import TraceEntry, TraceRecorder, TrafficDirection
 
 SLICE_S = 0.03
-"""Longest wait without a check for cancellation."""
+"""Longest wait without a check whether it was interrupted."""
 
 SEND_TIMEOUT_S = 0.2
 """Longest wait for an interface to accept a frame."""
@@ -32,10 +32,8 @@ class EncoderBus:
 
     Subscribers run on that thread with ``condition`` held, and notify it about a change that a waiting
     thread must see. ``health_check`` is called at every wake-up and raises if the wait cannot
-    succeed. ``trace`` gets every frame in the format of candump: ``181#00C40900``.
-
-    Raises:
-        BusError: The bus cannot be opened.
+    succeed. ``trace`` gets every frame in the format of candump: ``181#00C40900``. Every failure of the
+    bus is a ``BusError``; a wait also raises what ``health_check`` does.
     """
 
     def __init__(
@@ -54,11 +52,7 @@ class EncoderBus:
         self._receiver.start()
 
     def check(self) -> None:
-        """Raise if the bus has failed, the job was cancelled, or the health check fails.
-
-        Raises:
-            DeviceError: What is wrong.
-        """
+        """Raise if the bus has failed, was interrupted, or the health check fails."""
         with self.condition:
             if self._failure is not None:
                 raise self._error("has failed", self._failure) from self._failure
@@ -67,11 +61,7 @@ class EncoderBus:
             self.health_check()
 
     def wait_for(self, ready: Callable[[], bool], timeout_s: float) -> bool:
-        """Wait until ``ready()``; false after ``timeout_s``.
-
-        Raises:
-            DeviceError: As :meth:`check`.
-        """
+        """Wait until ``ready()``; false after ``timeout_s``."""
         deadline = time.monotonic() + timeout_s
         with self.condition:
             while not ready():
@@ -83,11 +73,7 @@ class EncoderBus:
         return True
 
     def listen(self, seconds: float) -> None:
-        """Receive frames for ``seconds``.
-
-        Raises:
-            DeviceError: As :meth:`check`.
-        """
+        """Receive frames for ``seconds``."""
         self.wait_for(lambda: False, seconds)
 
     def close(self) -> None:
@@ -152,11 +138,7 @@ class _Network(canopen.Network):
         self._send = send
 
     def send_message(self, can_id: int, data: bytes, remote: bool = False) -> None:
-        """Send one frame.
-
-        Raises:
-            BusError: The bus does not accept it.
-        """
+        """Send one frame."""
         frame = can.Message(
             arbitration_id=can_id, data=data, is_extended_id=False, is_remote_frame=remote, is_rx=False
         )

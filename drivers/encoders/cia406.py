@@ -5,12 +5,27 @@ from __future__ import annotations
 import threading
 from functools import partial
 
-from drivers.encoders.session import EncoderSession
-from drivers.encoders.worker_thread import WorkerThread
+from drivers.encoders.can_bus import EncoderBus
+from drivers.encoders.canopen_node import EncoderNode, Leg, NmtCommand
+from drivers.encoders.node_identity import (
+    check_measuring_step,
+    check_serial_number,
+    detect_nodes,
+    read_device_type,
+    read_identity,
+)
+from drivers.encoders.node_monitor import AlarmPoll, NodeMonitor, check_nodes
+from drivers.encoders.object_dictionary import DeviceType
+from drivers.encoders.pdo_configuration import configure_position_tpdo
+from drivers.encoders.sync_sampling import SyncSampler
+from drivers.errors import BusError
 from drivers.interfaces import DeviceIdentity, EncoderSample
 from drivers.wire_trace import TraceRecorder
+from drivers.worker_thread import WorkerThread
 from hexacell.cell.devices import EncoderSettings
 from hexacell.errors import DeviceError
+
+NM_TO_MM = 1e-6
 
 
 class Cia406Bank:
@@ -28,28 +43,20 @@ class Cia406Bank:
         self._session: EncoderSession | None = None
 
     async def open(self) -> tuple[DeviceIdentity, ...]:
-        """Connect, identify, configure and start the nodes; an open bank is closed first.
+        """The identities, legs 1 to 6, of the connected, configured and started nodes.
 
-        Returns:
-            The identities, legs 1 to 6.
-
-        Raises:
-            DeviceError: The reason of the failure; nothing is left open.
+        An open bank is closed first; after a failure nothing is left open.
         """
         await self.close()
         self._worker = WorkerThread("encoders")
         try:
-            return await self._worker.run(partial(self._open, self._worker.cancelled))
+            return await self._worker.run(partial(self._open, self._worker.closing))
         except BaseException:
             await self.close()
             raise
 
     async def read(self) -> EncoderSample:
-        """One complete sample: all six positions at the same instant.
-
-        Raises:
-            DeviceError: The sample is incomplete or not valid.
-        """
+        """One complete sample: all six positions at the same instant."""
         if self._worker is None:
             raise _not_open()
         return await self._worker.run(self._read)
@@ -60,8 +67,8 @@ class Cia406Bank:
         if worker is not None:
             await worker.finish(self._close)
 
-    def _open(self, interrupted: threading.Event) -> tuple[DeviceIdentity, ...]:
-        self._session = EncoderSession(self._settings, interrupted, self._trace)
+    def _open(self, closing: threading.Event) -> tuple[DeviceIdentity, ...]:
+        self._session = EncoderSession(self._settings, closing, self._trace)
         return self._session.identities
 
     def _read(self) -> EncoderSample:
@@ -72,7 +79,92 @@ class Cia406Bank:
     def _close(self) -> None:
         session, self._session = self._session, None
         if session is not None:
-            session.close()
+            session.bus.close()
+
+
+class EncoderSession:
+    """Opens, identifies, configures and starts the nodes; then takes samples.
+
+    Used by one thread. If a step fails, the bus is closed again.
+    """
+
+    identities: tuple[DeviceIdentity, ...]
+    """Legs 1 to 6."""
+
+    def __init__(
+        self, settings: EncoderSettings, closing: threading.Event, trace: TraceRecorder | None = None
+    ) -> None:
+        self.bus = EncoderBus(_bus_settings(settings), closing, trace)
+        self._settings = settings
+        try:
+            self._start()
+        except BaseException:
+            self.bus.close()
+            raise
+
+    def read(self) -> EncoderSample:
+        """One complete sample; valid only if no fault is found after it."""
+        self.bus.check()
+        counts = self._sampler.sample(signed=self._settings.signed)
+        self._alarms.check()
+        self.bus.check()
+        return EncoderSample(counts, positions_mm(counts, self._settings))
+
+    def _start(self) -> None:
+        settings = self._settings
+        legs = tuple(Leg(number, node) for number, node in enumerate(settings.nodes, 1))
+        nodes = tuple(EncoderNode(leg, self.bus, settings.timeout_s) for leg in legs)
+        for node in nodes:
+            node.command(NmtCommand.ENTER_PRE_OPERATIONAL)
+        detect_nodes(nodes, self.bus, settings.timeout_s)
+        monitors = tuple(NodeMonitor(leg, self.bus, settings.heartbeat_ms) for leg in legs)
+        device_types = tuple(read_device_type(node) for node in nodes)
+        self.identities = tuple(map(self._identify, nodes, device_types))
+        channels = tuple(
+            configure_position_tpdo(node, device_type, settings.heartbeat_ms)
+            for node, device_type in zip(nodes, device_types, strict=True)
+        )
+        for monitor in monitors:
+            monitor.start_heartbeat_timeout()
+        self._sampler = SyncSampler(legs, channels, self.bus, settings.timeout_s)
+        self.bus.health_check = partial(_check_all, nodes, monitors, self._sampler)
+        self._alarms = AlarmPoll(nodes, monitors)
+        for node in nodes:
+            node.command(NmtCommand.START)
+        self._sampler.self_test(signed=settings.signed)
+
+    def _identify(self, node: EncoderNode, device_type: DeviceType) -> DeviceIdentity:
+        check_measuring_step(node, self._settings.measuring_step_nm)
+        identity = read_identity(node, device_type)
+        check_serial_number(node, identity, self._settings)
+        return identity
+
+
+def positions_mm(counts: tuple[int, ...], settings: EncoderSettings) -> tuple[float, ...]:
+    """Joint variables q along the rails, mm: direction x counts x step + offset."""
+    step_mm = settings.measuring_step_nm * NM_TO_MM
+    terms = zip(settings.direction, counts, settings.offset_mm, strict=True)
+    return tuple(direction * count * step_mm + offset for direction, count, offset in terms)
+
+
+def _check_all(
+    nodes: tuple[EncoderNode, ...], monitors: tuple[NodeMonitor, ...], sampler: SyncSampler
+) -> None:
+    for node in nodes:
+        node.check_alone()
+    check_nodes(monitors)
+    sampler.check()
+
+
+def _bus_settings(settings: EncoderSettings) -> dict[str, object]:
+    if settings.bus is None:
+        raise BusError(
+            "is not configured in the cell file",
+            subject="encoder bus",
+            action="State `bus` under [encoders], for example "
+            '{ interface = "slcan", channel = "/dev/ttyACM0", bitrate = 500000 }',
+        )
+    return settings.bus
 
 
 def _not_open() -> DeviceError:

@@ -51,14 +51,15 @@ class SerialPort:
         self,
         url: str,
         settings: Mapping[str, object],
+        closing: threading.Event,
         recorder: TraceRecorder | None = None,
         worst_latency_s: float = WORST_LATENCY_S,
     ) -> None:
         self.url = url
         self.subject = f"port {url}"
-        self.closing = threading.Event()
         self.unsolicited: deque[bytes] = deque(maxlen=64)
         self._settings = settings
+        self._closing = closing
         self._recorder = recorder
         self._worst_latency_s = worst_latency_s
         self._port: serial.Serial | None = None
@@ -103,7 +104,7 @@ class SerialPort:
 
     def require_not_closed(self) -> None:
         """Raise if this program has closed the port or is closing it."""
-        if self.closing.is_set():
+        if self._closing.is_set():
             raise PortLost(f"port {self.url} is closed", subject=self.subject)
 
     def close(self) -> None:
@@ -136,7 +137,7 @@ class SerialPort:
         except termios.error as error:
             if last or not _refuses_parity(error):
                 raise
-            self.closing.wait(SLICE_S)
+            self._closing.wait(SLICE_S)
             self.require_not_closed()
 
     def _configured(self) -> serial.Serial:

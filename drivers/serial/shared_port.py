@@ -4,16 +4,12 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable, Mapping
-from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field
 from functools import partial
-from typing import TypeVar
 
 from drivers.serial.port import WORST_LATENCY_S, SerialPort
 from drivers.wire_trace import TraceRecorder
+from drivers.worker_thread import Result, WorkerThread
 from hexacell.errors import FileError
-
-Result = TypeVar("Result")
 
 
 class SharedSerialPort:
@@ -34,23 +30,42 @@ class SharedSerialPort:
         worst_latency_s: float = WORST_LATENCY_S,
     ) -> None:
         self.url = url
-        self._port = SerialPort(url, settings, trace, worst_latency_s)
-        self._worker = ThreadPoolExecutor(1, thread_name_prefix=f"serial {url}")
-        self._closed = False
-
-    @property
-    def subject(self) -> str:
-        """The subject of error messages."""
-        return self._port.subject
-
-    @subject.setter
-    def subject(self, subject: str) -> None:
-        self._port.subject = subject
+        self._settings = settings
+        self._channels: dict[str, int | None] = {}
+        self._worker = WorkerThread(f"serial {url}")
+        self._port = SerialPort(url, settings, self._worker.closing, trace, worst_latency_s)
 
     @property
     def open_count(self) -> int:
         """How often the port has been opened; it grows with every reconnection."""
         return self._port.open_count
+
+    def add_gauge(self, gauge: str, settings: Mapping[str, object], channel: int | None) -> None:
+        """Let ``gauge`` use the port, alone or with a multiplexer's ``channel``.
+
+        Raises:
+            FileError: Another gauge uses it with other settings, alone, or on this channel.
+        """
+        others = {name: taken for name, taken in self._channels.items() if name != gauge}
+        same = [name for name, taken in others.items() if channel is None or taken in {None, channel}]
+        problem = None
+        if same:
+            where = "" if channel is None else f", channel {channel},"
+            problem = f"port {self.url}{where} already belongs to gauge {same[0]}"
+        elif others and dict(settings) != dict(self._settings):
+            problem = f"port {self.url} is shared with gauge {min(others)} under other serial settings"
+        if problem is not None:
+            action = "Correct port, channel or serial in the cell file"
+            raise FileError(problem, subject=f"gauge {gauge}", action=action)
+        self._channels[gauge] = channel
+        self._name_subject()
+
+    def remove_gauge(self, gauge: str) -> bool:
+        """Stop ``gauge`` from using the port; whether others use it."""
+        self._channels.pop(gauge, None)
+        if self._channels:
+            self._name_subject()
+        return bool(self._channels)
 
     async def open(self) -> int:
         """Open the port unless it is open and usable; how often it has been opened.
@@ -75,7 +90,7 @@ class SharedSerialPort:
 
     def require_silence(self) -> None:
         """Wait for a short silence before the next exchange, after a garbled frame."""
-        if not self._closed:
+        if not self._worker.closing.is_set():
             self._worker.submit(self._port.require_silence)
 
     def take_unsolicited(self) -> bytes:
@@ -85,31 +100,15 @@ class SharedSerialPort:
 
     async def close(self) -> None:
         """Close the port and end its thread within 200 ms; closing twice is harmless."""
-        if self._closed:
-            return
-        self._closed = True
-        self._port.closing.set()
-        finished = self._worker.submit(self._port.close)
-        self._worker.shutdown(wait=False)
-        await asyncio.shield(asyncio.wrap_future(finished))
-        self._worker.shutdown()
+        await self._worker.finish(self._port.close)
 
     async def _run(self, job: Callable[[], Result]) -> Result:
         self._port.require_not_closed()
-        return await asyncio.wrap_future(self._worker.submit(job))
+        return await self._worker.run(job)
 
-
-@dataclass(slots=True)
-class _PortUsers:
-    """A port, its settings, and the channel of every gauge that uses it."""
-
-    port: SharedSerialPort
-    settings: Mapping[str, object]
-    channels: dict[str, int | None] = field(default_factory=dict)
-
-    def name_subject(self) -> None:
-        names = sorted(self.channels)
-        self.port.subject = f"gauge {names[0]}" if len(names) == 1 else f"gauges {', '.join(names)}"
+    def _name_subject(self) -> None:
+        names = sorted(self._channels)
+        self._port.subject = f"gauge {names[0]}" if len(names) == 1 else f"gauges {', '.join(names)}"
 
 
 class SharedSerialPorts:
@@ -120,7 +119,7 @@ class SharedSerialPorts:
     ) -> None:
         self._trace = trace
         self._worst_latency_s = worst_latency_s
-        self._shared: dict[str, _PortUsers] = {}
+        self._ports: dict[str, SharedSerialPort] = {}
 
     def acquire(
         self, url: str, gauge: str, settings: Mapping[str, object], *, channel: int | None = None
@@ -133,46 +132,20 @@ class SharedSerialPorts:
         Raises:
             FileError: Another gauge uses the port with other settings, alone, or on this channel.
         """
-        shared = self._shared.get(url) or _PortUsers(
-            SharedSerialPort(url, settings, self._trace, self._worst_latency_s), settings
-        )
-        self._require_no_conflict(url, shared, gauge, settings, channel)
-        self._shared[url] = shared
-        shared.channels[gauge] = channel
-        shared.name_subject()
-        return shared.port
+        port = self._ports.get(url) or SharedSerialPort(url, settings, self._trace, self._worst_latency_s)
+        port.add_gauge(gauge, settings, channel)
+        self._ports[url] = port
+        return port
 
     async def release(self, url: str, gauge: str) -> None:
         """Stop using the port; the last gauge closes it. Releasing twice is harmless."""
-        shared = self._shared.get(url)
-        if shared is None or gauge not in shared.channels:
-            return
-        del shared.channels[gauge]
-        if shared.channels:
-            shared.name_subject()
-        else:
-            await self._shared.pop(url).port.close()
+        port = self._ports.get(url)
+        if port is not None and not port.remove_gauge(gauge):
+            del self._ports[url]
+            await port.close()
 
     async def close(self) -> None:
         """Close every port, used or not."""
-        ports = [shared.port for shared in self._shared.values()]
-        self._shared.clear()
+        ports = list(self._ports.values())
+        self._ports.clear()
         await asyncio.gather(*(port.close() for port in ports))
-
-    @staticmethod
-    def _require_no_conflict(
-        url: str, shared: _PortUsers, gauge: str, settings: Mapping[str, object], channel: int | None
-    ) -> None:
-        others = {name: taken for name, taken in shared.channels.items() if name != gauge}
-        if not others:
-            return
-        same = [name for name, taken in others.items() if channel is None or taken in {None, channel}]
-        problem = None
-        if same:
-            where = "" if channel is None else f", channel {channel},"
-            problem = f"port {url}{where} already belongs to gauge {same[0]}"
-        elif dict(settings) != dict(shared.settings):
-            problem = f"port {url} is shared with gauge {min(others)} under other serial settings"
-        if problem is not None:
-            action = "Correct port, channel or serial in the cell file"
-            raise FileError(problem, subject=f"gauge {gauge}", action=action)

@@ -10,7 +10,7 @@ from enum import StrEnum
 import numpy as np
 from pydantic import BaseModel
 
-from drivers.encoders.session import positions_mm
+from drivers.encoders.cia406 import positions_mm
 from hexacell.cell.devices import EncoderSettings
 from procedures.run.events import Reading
 

@@ -116,7 +116,7 @@ class RawBus:
     async def delivered_to(self, bank: Cia406Bank) -> None:
         """Return when the driver has received all that was sent so far: frames keep their order."""
         assert bank._session is not None
-        received, network = threading.Event(), bank._session._bus.network
+        received, network = threading.Event(), bank._session.bus.network
         network.subscribe(MARKER, lambda *_frame: received.set())
         self.send(MARKER)
         await until(received.is_set)

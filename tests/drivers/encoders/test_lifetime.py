@@ -154,7 +154,7 @@ async def test_a_bus_that_dies_is_an_error_with_its_cause(raw, bank, monkeypatch
     def fail(*_args, **_kwargs):
         raise can.CanOperationError("adapter gone")
 
-    network = bank._session._bus.network
+    network = bank._session.bus.network
     monkeypatch.setattr(network.bus, where, fail)
     for _ in range(2):
         with pytest.raises(BusError, match=r"encoder bus virtual raw-.*adapter gone.*the set .* is void"):
@@ -163,6 +163,6 @@ async def test_a_bus_that_dies_is_an_error_with_its_cause(raw, bank, monkeypatch
 
 async def test_a_bus_may_die_of_anything(raw, bank, monkeypatch):
     await bank.open()
-    monkeypatch.setattr(bank._session._bus.network.bus, "recv", lambda _timeout: 1 / 0)
+    monkeypatch.setattr(bank._session.bus.network.bus, "recv", lambda _timeout: 1 / 0)
     with pytest.raises(BusError, match="division by zero"):
         await bank.read()

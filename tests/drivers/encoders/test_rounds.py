@@ -109,7 +109,7 @@ async def test_after_silence_the_bank_reads_on(raw, bank, hurry):
 async def test_an_answer_just_late_is_waited_for_before_the_next_sync(raw, bank, monkeypatch):
     await bank.open()
     assert bank._session is not None
-    bus, timed_out = bank._session._bus, threading.Event()
+    bus, timed_out = bank._session.bus, threading.Event()
     wait_for = bus.wait_for
 
     def first_times_out(ready, _timeout_s):

@@ -39,12 +39,12 @@ async def test_gauges_on_one_port_share_a_link_until_the_last_lets_go(links, fak
     x = links.acquire("fake", "x", {"baudrate": 9600}, channel=1)
     y = links.acquire("fake", "y", {"baudrate": 9600}, channel=2)
     assert x is y
-    assert x.subject == "gauges x, y"
+    assert x._port.subject == "gauges x, y"
     await x.open()
     await links.release("fake", "x")
     await links.release("fake", "x")
     assert port.is_open
-    assert x.subject == "gauge y"
+    assert x._port.subject == "gauge y"
     await links.release("fake", "y")
     assert not port.is_open
     z = links.acquire("fake", "z", {"baudrate": 300})
@@ -64,7 +64,7 @@ async def test_what_cannot_be_shared_is_refused(links, settings, channel, words)
     with pytest.raises(FileError, match=words) as caught:
         links.acquire("loop://", "y", settings, channel=channel)
     assert caught.value.subject == "gauge y"
-    assert first.subject == "gauge x"
+    assert first._port.subject == "gauge x"
 
 
 async def test_a_port_of_ones_own_is_not_shared(links):

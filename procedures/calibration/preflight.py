@@ -13,7 +13,6 @@ from hexacell.kinematics.pose import Pose
 from procedures.calibration.workflow import Calibration, Mode
 from procedures.devices.device_set import Devices, gather_errors
 from procedures.guards import rules
-from procedures.guards.rules import free_bytes
 from procedures.run.cancellation import in_thread
 
 
@@ -72,7 +71,7 @@ async def start_failures(devices: Devices, folder: Path, free_disk_mb: float) ->
     pressed = await devices.stop_input.active_reason()
     trips = [
         None if pressed is None else rules.motion_forbidden(pressed),
-        rules.low_disk_space(str(folder), free_bytes(folder), free_disk_mb),
+        rules.low_disk_space(folder, free_disk_mb),
     ]
     return [trip.as_error() for trip in trips if trip is not None]
 

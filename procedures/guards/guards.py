@@ -24,17 +24,14 @@ from hexacell.clock import CellClock
 from hexacell.kinematics.rotations import Array
 from procedures.devices.device_set import Devices, MountedGauge
 from procedures.guards import rules
-from procedures.guards.polling import DevicePoller, DevicePollers, LineActivity
-from procedures.guards.snapshot import GaugeDeviation, GuardLimits
+from procedures.guards.polling import DevicePoller, GaugeDeviation, LineActivity, PolledDevices
+from procedures.guards.rules import GuardLimits
 from procedures.guards.supervision import MotionSupervisor, Supervised
 from procedures.run.state import RunState
 from procedures.run.steps import Move, ThreeNumbers
 from procedures.run.trips import GuardTripped, Trip
 
 Result = TypeVar("Result")
-
-POLL_PAUSE_S = 0.02
-"""Pause between two polls of one device, s of real time."""
 
 STOP_GRACE_S = 0.5
 """How long a motion may take to end after a stop before it is cancelled, s of real time."""
@@ -128,15 +125,13 @@ class Guards:
         controller: bool = False,
         encoders: bool = True,
         gauges: tuple[WatchedGauge, ...] = (),
-    ) -> DevicePollers:
+    ) -> PolledDevices:
         devices = self._devices
-        return DevicePollers(
+        return PolledDevices(
             gauges=self._gauge_pollers(gauges),
-            encoders=DevicePoller("encoders", devices.read_encoders, POLL_PAUSE_S) if encoders else None,
-            controller=DevicePoller("controller", devices.controller_status, POLL_PAUSE_S)
-            if controller
-            else None,
-            stop_input=DevicePoller(STOP_LINE, devices.stop_reason, POLL_PAUSE_S),
+            encoders=DevicePoller("encoders", devices.read_encoders) if encoders else None,
+            controller=DevicePoller("controller", devices.controller_status) if controller else None,
+            stop_input=DevicePoller(STOP_LINE, devices.stop_reason),
         )
 
     def _gauge_pollers(self, gauges: tuple[WatchedGauge, ...]) -> tuple[DevicePoller[GaugeDeviation], ...]:
@@ -144,8 +139,7 @@ class Guards:
         ports = {f"gauge {one.name}": one.port or one.name for one in self._settings.gauges}
         lines: defaultdict[str, LineActivity] = defaultdict(LineActivity)
         return tuple(
-            DevicePoller(gauge.device, gauge.read_deviation, POLL_PAUSE_S, lines[ports[gauge.device]])
-            for gauge in gauges
+            DevicePoller(gauge.device, gauge.read_deviation, lines[ports[gauge.device]]) for gauge in gauges
         )
 
     def _watched_gauges(self, step: Move, state: RunState) -> tuple[WatchedGauge, ...]:

@@ -1,4 +1,4 @@
-"""The guard rules: each is a function of a snapshot and gives a trip or nothing.
+"""The guard rules: each is a function of the latest answers and gives a trip or nothing.
 
 ``RULES`` lists the continuously evaluated ones in order of evaluation: a cause comes before its
 effects. An emergency stop, for example, comes before the encoder that lost its supply with it. The
@@ -8,7 +8,8 @@ other rules are evaluated once, before or after a move.
 from __future__ import annotations
 
 import shutil
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +18,7 @@ from drivers.errors import GaugeAtEnd
 from drivers.stop_input.stop_input import SUBJECT as STOP_LINE
 from hexacell.kinematics.rotations import Array
 from hexacell.storage import atomic_files
-from procedures.guards.snapshot import DeviceReport, GuardLimits, Snapshot
+from procedures.guards.polling import DevicePoller, PolledDevices
 from procedures.run.trips import Guard, Trip
 
 MAX_GARBLED = 3
@@ -26,23 +27,39 @@ MAX_GARBLED = 3
 STUCK_GAUGE_MM = 1.0
 """A gauge is stuck if its display did not change over an expected displacement larger than this."""
 
-Rule = Callable[[Snapshot, GuardLimits], Trip | None]
+
+@dataclass(frozen=True, slots=True)
+class GuardLimits:
+    """The limits of one action.
+
+    Attributes:
+        stale_s: longest silence of a device, s of real time.
+        plate_mm: largest deviation from the set's reference along any axis.
+        rest_mm: largest slider displacement at standstill; none while the robot moves.
+    """
+
+    stale_s: float
+    plate_mm: float
+    rest_mm: float | None = None
 
 
-def first_trip(snapshot: Snapshot, limits: GuardLimits) -> Trip | None:
+Rule = Callable[[PolledDevices, GuardLimits], Trip | None]
+
+
+def first_trip(devices: PolledDevices, limits: GuardLimits) -> Trip | None:
     """The first trip, in the order of ``RULES``."""
-    return next((trip for rule in RULES if (trip := rule(snapshot, limits))), None)
+    return next((trip for rule in RULES if (trip := rule(devices, limits))), None)
 
 
-def stop_requested(snapshot: Snapshot, _limits: GuardLimits) -> Trip | None:
+def stop_requested(devices: PolledDevices, _limits: GuardLimits) -> Trip | None:
     """A stop input forbids motion."""
-    line = snapshot.stop_input
+    line = devices.stop_input
     return None if line is None or not line.value else motion_forbidden(line.value)
 
 
-def controller_not_ready(snapshot: Snapshot, _limits: GuardLimits) -> Trip | None:
+def controller_not_ready(devices: PolledDevices, _limits: GuardLimits) -> Trip | None:
     """The controller is in emergency stop, off, or reports a following error."""
-    report = snapshot.controller
+    report = devices.controller
     if report is None or report.value is None or report.value.may_move:
         return None
     status = report.value
@@ -56,25 +73,25 @@ def controller_not_ready(snapshot: Snapshot, _limits: GuardLimits) -> Trip | Non
     return Trip(Guard.CONTROLLER, report.device, f"{problem}: {said}" if said else problem, action)
 
 
-def encoder_fault(snapshot: Snapshot, _limits: GuardLimits) -> Trip | None:
+def encoder_fault(devices: PolledDevices, _limits: GuardLimits) -> Trip | None:
     """An encoder has an alarm or restarted, or a sample is incomplete."""
-    report = snapshot.encoders
+    report = devices.encoders
     return None if report is None or report.error is None else _fault_trip(Guard.ENCODERS, report)
 
 
-def gauge_at_end(snapshot: Snapshot, _limits: GuardLimits) -> Trip | None:
+def gauge_at_end(devices: PolledDevices, _limits: GuardLimits) -> Trip | None:
     """A plunger reached an end of its travel; one that started there may leave it."""
-    for gauge in snapshot.gauges:
+    for gauge in devices.gauges:
         if isinstance(gauge.error, GaugeAtEnd) and gauge.value is not None:
             return _fault_trip(Guard.GAUGE_END, gauge)
     return None
 
 
-def device_faults(snapshot: Snapshot, _limits: GuardLimits) -> Trip | None:
+def device_faults(devices: PolledDevices, _limits: GuardLimits) -> Trip | None:
     """Devices report a fault, or only garbled answers; all of them are named."""
     trips = [
         _fault_trip(Guard.DEVICE, report)
-        for report in _all(snapshot)
+        for report in devices.all()
         if report.error is not None and not isinstance(report.error, GaugeAtEnd) and _is_fault(report)
     ]
     if not trips:
@@ -85,22 +102,22 @@ def device_faults(snapshot: Snapshot, _limits: GuardLimits) -> Trip | None:
     return Trip(Guard.DEVICE, trips[0].device, "; ".join(problems), ". ".join(actions), causes)
 
 
-def device_silent(snapshot: Snapshot, limits: GuardLimits) -> Trip | None:
+def device_silent(devices: PolledDevices, limits: GuardLimits) -> Trip | None:
     """A device is silent for longer than allowed."""
-    for report in _all(snapshot):
-        if report.silent_s > limits.stale_s:
+    for report in devices.all():
+        if report.line.silent_s > limits.stale_s:
             return Trip(
                 Guard.STALE,
                 report.device,
-                f"has not answered for {report.silent_s:.2g} s while it was needed",
+                f"has not answered for {report.line.silent_s:.2g} s while it was needed",
                 "Check its cable and supply, then resume",
             )
     return None
 
 
-def ball_off_gauge(snapshot: Snapshot, limits: GuardLimits) -> Trip | None:
+def ball_off_gauge(devices: PolledDevices, limits: GuardLimits) -> Trip | None:
     """The ball leaves the gauge plate: its deviation exceeds the limit and its first value."""
-    for gauge in snapshot.gauges:
+    for gauge in devices.gauges:
         if gauge.value is None or gauge.first is None:
             continue
         margin = max(limits.plate_mm, abs(gauge.first.deviation_mm))
@@ -115,9 +132,9 @@ def ball_off_gauge(snapshot: Snapshot, limits: GuardLimits) -> Trip | None:
     return None
 
 
-def unexpected_motion(snapshot: Snapshot, limits: GuardLimits) -> Trip | None:
+def unexpected_motion(devices: PolledDevices, limits: GuardLimits) -> Trip | None:
     """A slider moved during standstill."""
-    report = snapshot.encoders
+    report = devices.encoders
     if limits.rest_mm is None or report is None or report.value is None or report.first is None:
         return None
     moved = np.subtract(report.value.positions_mm, report.first.positions_mm)
@@ -178,30 +195,28 @@ def reference_drift(point: str, drift_mm: tuple[float, ...], limit_mm: float) ->
     )
 
 
-def low_disk_space(folder: str, free_bytes: int, limit_mb: float) -> Trip | None:
-    """The free disk space is below its limit."""
-    free_mb = free_bytes / 1e6
+def low_disk_space(folder: Path, limit_mb: float) -> Trip | None:
+    """The free disk space of a folder, which need not exist yet, is below its limit.
+
+    Raises:
+        FileError: it cannot be determined.
+    """
+    free_mb = _free_bytes(folder) / 1e6
     if free_mb >= limit_mb:
         return None
     return Trip(
         Guard.DISK,
-        folder,
+        str(folder),
         f"only {free_mb:.0f} MB are free where the run is kept, less than {limit_mb:g} MB",
         "Free some space, then resume",
     )
 
 
-def _all(snapshot: Snapshot) -> Iterator[DeviceReport[object]]:
-    for report in (*snapshot.gauges, snapshot.encoders, snapshot.controller, snapshot.stop_input):
-        if report is not None:
-            yield report
-
-
-def _is_fault(report: DeviceReport[object]) -> bool:
+def _is_fault(report: DevicePoller[object]) -> bool:
     return report.garbled_count == 0 or report.garbled_count >= MAX_GARBLED
 
 
-def _fault_trip(guard: Guard, report: DeviceReport[object]) -> Trip:
+def _fault_trip(guard: Guard, report: DevicePoller[object]) -> Trip:
     assert report.error is not None  # noqa: S101 - callers see to it
     error = report.error
     action = error.action or "Check it, then resume"
@@ -220,12 +235,7 @@ def _slider_trip(difference: Array, limit_mm: float, words: str) -> Trip | None:
     )
 
 
-def free_bytes(folder: Path) -> int:
-    """Free bytes on the file system of a folder, which need not exist yet.
-
-    Raises:
-        FileError: it cannot be determined.
-    """
+def _free_bytes(folder: Path) -> int:
     there = next((path for path in (folder, *folder.parents) if path.exists()), folder)
     try:
         return shutil.disk_usage(there).free

@@ -15,21 +15,28 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Awaitable, Callable
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, TypeVar
+from types import TracebackType
+from typing import Any, Self, TypeVar
 
 from drivers.interfaces import Controller
 from hexacell.clock import CellClock
 from hexacell.errors import HexacellError
 from procedures.guards import rules
-from procedures.guards.polling import DevicePollers, GuardMonitor
-from procedures.guards.rules import free_bytes
-from procedures.guards.snapshot import GuardLimits
-from procedures.run.cancellation import shielded
-from procedures.run.trips import GuardTripped, Trip
+from procedures.guards.polling import PolledDevices
+from procedures.guards.rules import GuardLimits
+from procedures.run.cancellation import cancel_and_wait, shielded
+from procedures.run.trips import Guard, GuardTripped, Trip
 
 Result = TypeVar("Result")
 Supervised = Callable[[], Awaitable[Result]]
+
+TICK_S = 0.01
+"""Period of the timer that looks for silent devices, s of real time."""
+
+MAX_DELAY_S = 0.02
+"""Longest scheduling delay of this process that counts as silence of a device, s of real time."""
 
 
 class MotionSupervisor:
@@ -58,7 +65,7 @@ class MotionSupervisor:
         """
         if self.latched is not None:
             raise self.latched.as_error()
-        if trip := rules.low_disk_space(str(self._folder), free_bytes(self._folder), self._free_disk_mb):
+        if trip := rules.low_disk_space(self._folder, self._free_disk_mb):
             raise self.latch(trip)
 
     def latch(self, trip: Trip) -> GuardTripped:
@@ -77,7 +84,7 @@ class MotionSupervisor:
     async def supervise(
         self,
         action: Supervised[Result],
-        pollers: DevicePollers,
+        devices: PolledDevices,
         limits: GuardLimits,
         stop_grace_s: float = 0.0,
     ) -> Result:
@@ -91,7 +98,7 @@ class MotionSupervisor:
             HexacellError: the action failed, and no guard explains it.
         """
         self.check()
-        async with GuardMonitor(pollers, limits, self._clock) as monitor:
+        async with GuardMonitor(devices, limits, self._clock) as monitor:
             if trip := await monitor.poll_all():
                 raise self.latch(trip)
             task = asyncio.ensure_future(action())
@@ -103,7 +110,7 @@ class MotionSupervisor:
                 await asyncio.wait([task], timeout=stop_grace_s)
                 raise tripped
             finally:
-                await shielded(_cancel_and_wait(task))
+                await cancel_and_wait(task)
 
     async def _result(self, task: asyncio.Future[Result], monitor: GuardMonitor) -> Result:
         try:
@@ -114,9 +121,89 @@ class MotionSupervisor:
             raise
 
 
-async def _cancel_and_wait(task: asyncio.Future[Any]) -> None:
-    """End a task whose result is no longer needed."""
-    task.cancel()
-    await asyncio.wait([task])
-    if not task.cancelled():
-        task.exception()
+@dataclass(eq=False)
+class GuardMonitor:
+    """Polls within ``async with``; ``trip`` is the first guard that tripped.
+
+    If this process itself was not scheduled for a while, its devices are not to blame: between two
+    ticks at most ``TICK_S + MAX_DELAY_S`` count as silence.
+    """
+
+    devices: PolledDevices
+    limits: GuardLimits
+    clock: CellClock
+    trip: Trip | None = None
+    _updated: asyncio.Event = field(default_factory=asyncio.Event)
+    _ended: asyncio.Event = field(default_factory=asyncio.Event)  # a guard tripped, or a task failed
+    _failure: BaseException | None = None
+    _tasks: tuple[asyncio.Task[None], ...] = ()
+
+    async def __aenter__(self) -> Self:
+        polling = [poller.run(self.clock, self._evaluate) for poller in self.devices.all()]
+        self._tasks = tuple(asyncio.ensure_future(task) for task in (*polling, self._measure_silence()))
+        for task in self._tasks:
+            task.add_done_callback(self._on_task_end)
+        return self
+
+    async def __aexit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        for task in self._tasks:
+            task.cancel()
+        await asyncio.gather(*self._tasks, return_exceptions=True)
+
+    async def wait_for(self, action: asyncio.Future[Any]) -> None:
+        """Wait until the action ends or a guard trips; raises an error of the monitor itself."""
+        ended = asyncio.ensure_future(self._ended.wait())
+        try:
+            await asyncio.wait([action, ended], return_when=asyncio.FIRST_COMPLETED)
+        finally:
+            ended.cancel()
+        self._raise_failure()
+
+    async def poll_all(self) -> Trip | None:
+        """Wait until every device has answered once more, or one is silent; the trip, if any.
+
+        The robot is at a standstill meanwhile, so the rules are evaluated once more when all
+        answers are in: the trip then names every faulty device, not only the first one.
+        """
+        before = [(poller, poller.answer_count) for poller in self.devices.all()]
+        while not self._is_waiting_useless() and any(poller.answer_count <= n for poller, n in before):
+            self._updated.clear()
+            await self._updated.wait()
+        self._raise_failure()
+        self.trip = rules.first_trip(self.devices, self.limits) or self.trip
+        return self.trip
+
+    async def _measure_silence(self) -> None:
+        before = self.clock.now()
+        while True:
+            await self.clock.sleep(TICK_S * self.clock.factor)
+            now = self.clock.now()
+            elapsed = min(self.clock.real_seconds(now - before), TICK_S + MAX_DELAY_S)
+            before = now
+            for line in {poller.line for poller in self.devices.all()}:
+                line.silent_s += elapsed
+            self._evaluate()
+
+    def _evaluate(self) -> None:
+        if self.trip is None:
+            self.trip = rules.first_trip(self.devices, self.limits)
+        if self.trip is not None:
+            self._ended.set()
+        self._updated.set()
+
+    def _is_waiting_useless(self) -> bool:
+        """Whether a device is silent, or the monitor itself failed."""
+        return self._failure is not None or (self.trip is not None and self.trip.guard is Guard.STALE)
+
+    def _raise_failure(self) -> None:
+        if self._failure is not None:
+            raise self._failure
+
+    def _on_task_end(self, task: asyncio.Task[None]) -> None:
+        """Release everybody who waits if a task has failed."""
+        if not task.cancelled() and (error := task.exception()) is not None:
+            self._failure = self._failure or error
+            self._ended.set()
+            self._updated.set()

@@ -31,7 +31,10 @@ async def cancel_and_wait(task: asyncio.Future[Any]) -> None:
         asyncio.CancelledError: the caller was cancelled; raised when the task has ended.
     """
     task.cancel()
-    if await _end_of(task):
+    was_cancelled = await _end_of(task)
+    if not task.cancelled():
+        task.exception()  # asyncio reports an error that was never asked for
+    if was_cancelled:
         raise asyncio.CancelledError
 
 

@@ -13,7 +13,7 @@ from typing import Any
 import pytest
 
 from hexacell.errors import ExitCode, HexacellError
-from procedures.guards import supervision
+from procedures.guards import rules
 from procedures.run import events
 from procedures.run.steps import CloseSet, Compute, Move, Phase, Place, Sample, SetKey
 from procedures.run.trips import Guard, GuardTripped
@@ -225,7 +225,7 @@ async def test_on_a_full_disk_nothing_begins(stage: Any, step: Any, monkeypatch:
     config = scene.rig.config
     doing = await step(scene)
     orders, still_since_s = len(scene.controller.log), scene.rig.physics.motion_end_s
-    monkeypatch.setattr(supervision, "free_bytes", lambda folder: 49_900_000)
+    monkeypatch.setattr(rules, "_free_bytes", lambda folder: 49_900_000)
     with pytest.raises(HexacellError) as refusal:
         await doing()
     assert root(refusal.value).trip.guard is Guard.DISK

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,8 @@ from drivers.errors import GaugeAtEnd, GaugeSilent, WrongAnswer, ZeroVoid
 from drivers.interfaces import ControllerStatus, EncoderSample
 from hexacell.errors import DeviceError, ExitCode, LimitError
 from procedures.guards import rules
-from procedures.guards.snapshot import DeviceReport, GaugeDeviation, GuardLimits, Snapshot
+from procedures.guards.polling import DevicePoller, GaugeDeviation, LineActivity, PolledDevices
+from procedures.guards.rules import GuardLimits
 from procedures.run import events
 from procedures.run.trips import DriftTripped, Guard, GuardTripped, Trip
 
@@ -21,29 +23,37 @@ LIMITS = GuardLimits(stale_s=0.12, plate_mm=5.5)
 AT_END = GaugeAtEnd("plunger at its end", subject="gauge x", action="Move the gauge or the ball")
 
 
+async def unread() -> Any:
+    raise NotImplementedError
+
+
+def polled(device: str, silent_s: float = 0.0, **changes: Any) -> DevicePoller[Any]:
+    return DevicePoller(device, unread, LineActivity(silent_s), **changes)
+
+
 def gauge(now: float | None = 0.0, first: float | None = 0.0, axis: int = 0, **changes: Any) -> Any:
     def seen(deviation: float | None) -> GaugeDeviation | None:
         return None if deviation is None else GaugeDeviation(axis, deviation)
 
-    return DeviceReport(f"gauge {'xyz'[axis]}", value=seen(now), first=seen(first), **changes)
+    return polled(f"gauge {'xyz'[axis]}", value=seen(now), first=seen(first), **changes)
 
 
 def sliders(now: tuple[float, ...], first: tuple[float, ...] = (0.0,) * 6) -> Any:
     def taken(positions: tuple[float, ...]) -> EncoderSample:
         return EncoderSample((0,) * 6, positions)
 
-    return DeviceReport("encoders", value=taken(now), first=taken(first))
+    return polled("encoders", value=taken(now), first=taken(first))
 
 
 def status(*complaints: str, estop: bool = False, enabled: bool = True) -> Any:
-    return DeviceReport("controller", value=ControllerStatus(estop, enabled, complaints))
+    return polled("controller", value=ControllerStatus(estop, enabled, complaints))
 
 
-WELL = Snapshot(
+WELL = PolledDevices(
     gauges=(gauge(axis=0), gauge(5.5, axis=1), gauge(-5.5, axis=2)),
     encoders=sliders((100.0,) * 6),
     controller=status(),
-    stop_input=DeviceReport("stop line", value=""),
+    stop_input=polled("stop line", value=""),
 )
 
 
@@ -57,22 +67,22 @@ def tripped(limits: GuardLimits = LIMITS, **changes: Any) -> Trip:
 
 def test_where_all_is_well_nothing_trips() -> None:
     assert rules.first_trip(WELL, LIMITS) is None
-    assert rules.first_trip(Snapshot(), LIMITS) is None
+    assert rules.first_trip(PolledDevices(), LIMITS) is None
 
 
 def test_what_was_not_heard_yet_trips_nothing_but_time() -> None:
-    unheard = Snapshot(
-        (DeviceReport("gauge x"),),
-        DeviceReport("encoders"),
-        DeviceReport("controller"),
-        DeviceReport("stop line"),
+    unheard = PolledDevices(
+        (polled("gauge x"),),
+        polled("encoders"),
+        polled("controller"),
+        polled("stop line"),
     )
     assert rules.first_trip(unheard, LIMITS) is None
-    assert tripped(encoders=DeviceReport("encoders", silent_s=0.13)).guard is Guard.STALE
+    assert tripped(encoders=polled("encoders", silent_s=0.13)).guard is Guard.STALE
 
 
 def test_the_stop_line_says_how_it_is_pressed() -> None:
-    trip = tripped(stop_input=DeviceReport("stop line", value="/cell/stop exists"))
+    trip = tripped(stop_input=polled("stop line", value="/cell/stop exists"))
     assert trip.guard is Guard.STOP_LINE
     assert "/cell/stop exists" in trip.problem
 
@@ -95,13 +105,13 @@ def test_a_controller_that_may_not_move(heard: Any, guard: Guard, words: str) ->
 
 
 def test_complaints_of_a_machine_that_is_on_trip_nothing() -> None:
-    talkative = Snapshot(controller=status("joint 3 following error"))
+    talkative = PolledDevices(controller=status("joint 3 following error"))
     assert rules.first_trip(talkative, LIMITS) is None
 
 
 def test_an_encoder_is_named_with_what_it_says() -> None:
     error = DeviceError("reports no magnet", subject="leg 3", action="Look at it")
-    trip = tripped(encoders=DeviceReport("encoders", error=error))
+    trip = tripped(encoders=polled("encoders", error=error))
     assert (trip.guard, trip.device, trip.action) == (Guard.ENCODERS, "leg 3", "Look at it")
 
 
@@ -111,14 +121,14 @@ def test_a_plunger_that_comes_to_its_end() -> None:
 
 
 def test_a_plunger_that_was_at_its_end_may_leave_it() -> None:
-    assert rules.first_trip(Snapshot((gauge(None, None, error=AT_END),)), LIMITS) is None
+    assert rules.first_trip(PolledDevices((gauge(None, None, error=AT_END),)), LIMITS) is None
 
 
 @given(deviation=st.floats(-20.0, 20.0), first=st.floats(-20.0, 20.0), axis=st.sampled_from([0, 1, 2]))
 def test_a_ball_must_not_go_farther_than_allowed_nor_than_it_was(
     deviation: float, first: float, axis: int
 ) -> None:
-    trip = rules.first_trip(Snapshot((gauge(deviation, first, axis),)), LIMITS)
+    trip = rules.first_trip(PolledDevices((gauge(deviation, first, axis),)), LIMITS)
     if abs(deviation) > max(5.5, abs(first)):
         assert trip is not None
         assert (trip.guard, trip.device) == (Guard.PLATE, f"gauge {'xyz'[axis]}")
@@ -131,7 +141,7 @@ def test_a_ball_must_not_go_farther_than_allowed_nor_than_it_was(
 def test_where_the_robot_must_stand_no_slider_moves(leg: int, way: float) -> None:
     now = [10.0] * 6
     now[leg] += way
-    snapshot = Snapshot(encoders=sliders(tuple(now), (10.0,) * 6))
+    snapshot = PolledDevices(encoders=sliders(tuple(now), (10.0,) * 6))
     assert rules.first_trip(snapshot, LIMITS) is None, "a robot that moves may"
     trip = rules.first_trip(snapshot, GuardLimits(0.12, 5.5, rest_mm=1.0))
     if abs(now[leg] - 10.0) > 1.0:
@@ -152,17 +162,17 @@ def test_devices_that_fail_are_all_named() -> None:
 @pytest.mark.parametrize(("garbled", "trips"), [(1, False), (2, False), (3, True), (4, True)])
 def test_a_noisy_line_is_no_broken_device(garbled: int, trips: bool) -> None:
     nonsense = WrongAnswer("answers b'0'", subject="gauge y", action="Check it")
-    snapshot = Snapshot((gauge(axis=1, error=nonsense, garbled_count=garbled),))
+    snapshot = PolledDevices((gauge(axis=1, error=nonsense, garbled_count=garbled),))
     trip = rules.first_trip(snapshot, LIMITS)
     assert (trip is not None and trip.guard is Guard.DEVICE) is trips
 
 
 @pytest.mark.parametrize("device", ["gauges", "encoders", "controller", "stop_input"])
 def test_any_device_may_be_silent_for_so_long_and_no_longer(device: str) -> None:
-    def snapshot(silent_s: float) -> Snapshot:
-        heard: Any = DeviceReport("it", silent_s)
+    def snapshot(silent_s: float) -> PolledDevices:
+        heard: Any = polled("it", silent_s)
         only: dict[str, Any] = {device: (heard,) if device == "gauges" else heard}
-        return Snapshot(**only)
+        return PolledDevices(**only)
 
     assert rules.first_trip(snapshot(0.12), LIMITS) is None
     trip = rules.first_trip(snapshot(0.121), LIMITS)
@@ -173,16 +183,16 @@ def test_any_device_may_be_silent_for_so_long_and_no_longer(device: str) -> None
 def test_the_plainest_cause_comes_first() -> None:
     everything: dict[str, Any] = {
         "gauges": (gauge(9.0, error=AT_END, silent_s=1.0),),
-        "encoders": DeviceReport("encoders", error=DeviceError("has an alarm"), silent_s=1.0),
+        "encoders": polled("encoders", error=DeviceError("has an alarm"), silent_s=1.0),
         "controller": status(estop=True, enabled=False),
-        "stop_input": DeviceReport("stop line", value="active_reason"),
+        "stop_input": polled("stop line", value="active_reason"),
     }
     order = []
     for key in ("stop_input", "controller", "encoders", "gauges"):
         order.append(tripped(**everything).guard)
         everything[key] = getattr(WELL, key)
     assert order == [Guard.STOP_LINE, Guard.CONTROLLER, Guard.ENCODERS, Guard.GAUGE_END]
-    assert rules.first_trip(Snapshot(**everything), LIMITS) is None
+    assert rules.first_trip(PolledDevices(**everything), LIMITS) is None
 
 
 def test_sliders_are_where_they_were_sent() -> None:
@@ -228,8 +238,9 @@ def test_drift_leaves_with_its_own_code() -> None:
 
 
 @pytest.mark.parametrize(("free", "trips"), [(50_000_000, False), (49_999_999, True), (0, True)])
-def test_the_disk_must_have_room(free: int, trips: bool) -> None:
-    assert (rules.low_disk_space("/runs", free, 50.0) is not None) is trips
+def test_the_disk_must_have_room(monkeypatch, free: int, trips: bool) -> None:
+    monkeypatch.setattr(rules, "_free_bytes", lambda folder: free)
+    assert (rules.low_disk_space(Path("/runs"), 50.0) is not None) is trips
 
 
 def test_a_robot_that_could_not_be_stopped_comes_first() -> None:

@@ -11,8 +11,9 @@ import pytest
 from drivers.errors import GaugeAtEnd, WrongAnswer
 from drivers.interfaces import GaugeReading
 from hexacell.errors import DeviceError, HexacellError, LimitError
-from procedures.guards.polling import DevicePoller, DevicePollers, GuardMonitor, LineActivity
-from procedures.guards.snapshot import GuardLimits
+from procedures.guards.polling import DevicePoller, LineActivity, PolledDevices
+from procedures.guards.rules import GuardLimits
+from procedures.guards.supervision import GuardMonitor
 from procedures.journal.journal import read_journal
 from procedures.run import events
 from procedures.run.steps import CloseSet, Expectation, Move, Phase, Sample, SetKey
@@ -281,8 +282,8 @@ async def test_lanes_of_one_line_are_silent_together(scene) -> None:
             await clock.sleep(0.05)
         return "here"
 
-    lanes = tuple(DevicePoller("it", queued, 0.0, shared) for _ in range(5))
-    async with GuardMonitor(DevicePollers(gauges=lanes), GuardLimits(0.12, 5.5), clock) as patrol:  # type: ignore[arg-type]
+    lanes = tuple(DevicePoller("it", queued, shared) for _ in range(5))
+    async with GuardMonitor(PolledDevices(gauges=lanes), GuardLimits(0.12, 5.5), clock) as patrol:  # type: ignore[arg-type]
         await clock.sleep(2.0)
         assert patrol.trip is None, "one answer in 0.25 s each, but one in 0.05 s altogether"
 
@@ -295,7 +296,7 @@ async def test_a_process_without_turns_is_deaf_not_its_devices_silent(scene) -> 
         await clock.sleep(0.05)
         return ""
 
-    lanes = DevicePollers(stop_input=DevicePoller("stop line", slow, 0.02))
+    lanes = PolledDevices(stop_input=DevicePoller("stop line", slow))
     async with GuardMonitor(lanes, GuardLimits(0.12, 5.5), clock) as patrol:
         await clock.sleep(0.2)
         clock.time_s += 5.0
@@ -312,10 +313,10 @@ async def test_errors_of_a_lane_do_not_hide_what_it_said() -> None:
             raise answer
         return float(answer)
 
-    lane = DevicePoller("g", ask, 0.0)
+    lane = DevicePoller("g", ask)
     seen = []
     for _ in range(4):
-        lane._report = await lane._poll()
-        seen.append((lane.report.value, lane.report.first, str(lane.report.error or "")))
+        await lane.poll()
+        seen.append((lane.value, lane.first, str(lane.error or "")))
     assert seen == [(1.0, 1.0, ""), (1.0, 1.0, "g: end"), (1.0, 1.0, "g: off"), (2.0, 1.0, "")]
-    assert np.isclose(lane.report.silent_s, 0.0)
+    assert np.isclose(lane.line.silent_s, 0.0)

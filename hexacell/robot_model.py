@@ -11,7 +11,7 @@ import numpy as np
 from hexacell.cell.loader import Cell
 from hexacell.cell.mechanism_sections import mechanism_named
 from hexacell.cell.model import CellSettings
-from hexacell.controller_config.interface import Branch, ConfigFormat, ControllerGeometry
+from hexacell.controller_config.interface import ConfigFormat, ControllerGeometry
 from hexacell.errors import ReachError
 from hexacell.identification.belief import Limits, RobotBelief
 from hexacell.identification.problem.problem import Noise, Prior, Problem, Tolerances, build_problem
@@ -19,7 +19,7 @@ from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.commanded_motion import CommandedRobot
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.inverse import inverse_kinematics
-from hexacell.kinematics.mechanism import FrameTransform, Mechanism
+from hexacell.kinematics.mechanism import Branch, FrameTransform, Mechanism
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.sensitivity import singularity_margin
 from hexacell.measurements.records import MeasurementSet

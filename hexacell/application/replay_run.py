@@ -15,7 +15,8 @@ from hexacell.cell.calibration import IdentificationSettings
 from hexacell.cell.loader import Cell, dump, load_cell
 from hexacell.cell.mechanism_sections import geometry_settings, mechanism_named
 from hexacell.cell.model import CellSettings
-from hexacell.controller_config.change import BEFORE, ConfigChange
+from hexacell.controller_config.change import ConfigChange
+from hexacell.controller_config.write_back import BEFORE
 from hexacell.errors import FileError, HexacellError
 from hexacell.runs.run_folder import RunFolder
 from hexacell.storage import atomic_files

@@ -1,4 +1,4 @@
-"""A change of the controller's config, complete and reviewable, and the receipt by which it is undone."""
+"""A change of the controller's config, complete and reviewable."""
 
 from __future__ import annotations
 
@@ -14,11 +14,6 @@ from hexacell.controller_config.interface import ConfigFormat
 from hexacell.errors import FileError
 from hexacell.kinematics.geometry import Geometry
 from hexacell.storage import atomic_files
-
-BEFORE = "config-before"
-AFTER = "config-after"
-RECEIPT = "write-back.json"
-FOUND = "config-found"
 
 
 class JsonRecord(BaseModel):
@@ -144,45 +139,3 @@ def diff(before: str, after: str) -> str:
 def _lines(text: str) -> list[str]:
     # str.splitlines also splits at form feeds and other characters that do not end a line in a file.
     return list(io.StringIO(text, newline="\n"))
-
-
-class Receipt(JsonRecord):
-    """What a commit did, and where the backup is.
-
-    ``backup_folder`` is where the receipt was found; a run folder may be moved.
-    """
-
-    noun: ClassVar[str] = "receipt of a write-back"
-
-    path: Path
-    format: str
-    sha256_before: str
-    sha256_after: str
-    backup_folder: Path
-
-    @classmethod
-    def of(cls, folder: Path) -> Receipt:
-        """The receipt kept in a run folder; raises ``FileError``."""
-        return cls.load(folder / RECEIPT).model_copy(update={"backup_folder": folder.absolute()})
-
-    @classmethod
-    def for_change(cls, change: ConfigChange, backup_folder: Path) -> Receipt:
-        """The receipt that a commit of ``change`` keeps in ``backup_folder``."""
-        return cls(
-            path=change.path,
-            format=change.format,
-            sha256_before=change.sha256_before,
-            sha256_after=change.sha256_after,
-            backup_folder=backup_folder.absolute(),
-        )
-
-    def backup(self) -> bytes:
-        """The config before the change; raises ``FileError`` if the backup is gone or damaged."""
-        data = atomic_files.read_bytes(self.backup_folder / BEFORE)
-        if atomic_files.sha256(data) != self.sha256_before:
-            raise FileError(
-                "the backup is damaged",
-                subject=self.backup_folder / BEFORE,
-                action="Restore it from another backup",
-            )
-        return data

@@ -4,22 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal, Protocol
+from typing import Protocol
 
 from hexacell.kinematics.geometry import Geometry
-
-Sign = Literal[1, -1]
-Branch = tuple[Sign, Sign, Sign, Sign, Sign, Sign]
+from hexacell.kinematics.mechanism import Branch
 
 
 @dataclass(frozen=True, slots=True)
 class ControllerGeometry:
-    """The geometry that a controller uses.
-
-    Attributes:
-        geometry: as the config states it.
-        branch: for each leg, which of the two solutions of the inverse kinematics the robot uses.
-    """
+    """The geometry that a controller uses, as its config states it, and the branch of the robot."""
 
     geometry: Geometry
     branch: Branch

@@ -20,9 +20,10 @@ from typing import Any, cast
 
 import numpy as np
 
-from hexacell.controller_config.interface import Branch, ControllerGeometry
+from hexacell.controller_config.interface import ControllerGeometry
 from hexacell.errors import FileError
 from hexacell.kinematics.geometry import Geometry
+from hexacell.kinematics.mechanism import Branch
 from hexacell.kinematics.parameters import LEGS, ParameterKind, ParameterSet, ParameterUnit
 from hexacell.storage import atomic_files
 from hexacell.storage.toml_document import TomlDocument

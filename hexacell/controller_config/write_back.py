@@ -9,24 +9,57 @@ from __future__ import annotations
 
 from contextlib import suppress
 from pathlib import Path
-from typing import NoReturn
+from typing import ClassVar, NoReturn
 
-from hexacell.controller_config.change import (
-    AFTER,
-    BEFORE,
-    FOUND,
-    RECEIPT,
-    ConfigChange,
-    Receipt,
-    diff,
-    fingerprint,
-    propose,
-    require_fingerprint,
-)
+from hexacell.controller_config.change import ConfigChange, JsonRecord, require_fingerprint
 from hexacell.errors import FileError, HexacellError, WriteBackUndone
 from hexacell.storage import atomic_files
 
-__all__ = ["ConfigChange", "Receipt", "commit", "diff", "fingerprint", "propose", "rollback"]
+BEFORE = "config-before"
+AFTER = "config-after"
+RECEIPT = "write-back.json"
+
+
+class Receipt(JsonRecord):
+    """What a commit did, and where the backup is.
+
+    ``backup_folder`` is where the receipt was found; a run folder may be moved.
+    """
+
+    noun: ClassVar[str] = "receipt of a write-back"
+
+    path: Path
+    format: str
+    sha256_before: str
+    sha256_after: str
+    backup_folder: Path
+
+    @classmethod
+    def of(cls, folder: Path) -> Receipt:
+        """The receipt kept in a run folder; raises ``FileError``."""
+        return cls.load(folder / RECEIPT).model_copy(update={"backup_folder": folder.absolute()})
+
+    @classmethod
+    def for_change(cls, change: ConfigChange, backup_folder: Path) -> Receipt:
+        """The receipt that a commit of ``change`` keeps in ``backup_folder``."""
+        return cls(
+            path=change.path,
+            format=change.format,
+            sha256_before=change.sha256_before,
+            sha256_after=change.sha256_after,
+            backup_folder=backup_folder.absolute(),
+        )
+
+    def backup(self) -> bytes:
+        """The config before the change; raises ``FileError`` if the backup is gone or damaged."""
+        data = atomic_files.read_bytes(self.backup_folder / BEFORE)
+        if atomic_files.sha256(data) != self.sha256_before:
+            raise FileError(
+                "the backup is damaged",
+                subject=self.backup_folder / BEFORE,
+                action="Restore it from another backup",
+            )
+        return data
 
 
 def commit(change: ConfigChange, backup_folder: Path) -> Receipt:
@@ -52,35 +85,25 @@ def commit(change: ConfigChange, backup_folder: Path) -> Receipt:
     return receipt
 
 
-def rollback(receipt: Receipt, *, force: bool = False) -> bool:
-    """Restore the config of before the commit, byte for byte.
-
-    Args:
-        receipt: of the commit.
-        force: overwrite a config that somebody changed since; that version is kept in the run folder.
-
-    Returns:
-        False if the config was restored already.
+def rollback(receipt: Receipt) -> None:
+    """Restore the config of before the commit, byte for byte; may be repeated.
 
     Raises:
         FileError: the config is not the one that was written, the backup is missing, or the config cannot
             be written; the message says so if it was replaced nevertheless.
     """
     before = receipt.backup()
-    found = _content(receipt.path) if force else atomic_files.read_bytes(receipt.path)
+    found = atomic_files.read_bytes(receipt.path)
     if found == before:
-        return False
-    if force:
-        _keep_foreign_version(receipt, found)
-    elif atomic_files.sha256(found or b"") != receipt.sha256_after:
+        return
+    if atomic_files.sha256(found) != receipt.sha256_after:
         raise FileError(
             "the config was changed since it was written; rolling back would lose that change",
             subject=receipt.path,
-            action="Review it, and roll back with force if it may be lost",
+            action=f"Review it; if it may be lost, copy {receipt.backup_folder / BEFORE} over it",
         )
     atomic_files.write_atomically(receipt.path, before, expected=found)
     _require_written(receipt.path, before)
-    return True
 
 
 def _is_complete(receipt: Receipt) -> bool:
@@ -154,7 +177,7 @@ def _keep_foreign_version(receipt: Receipt, found: bytes | None) -> None:
         return
     with suppress(FileError):
         atomic_files.write_atomically(
-            receipt.backup_folder / f"{FOUND}-{atomic_files.sha256(found)[:12]}", found
+            receipt.backup_folder / f"config-found-{atomic_files.sha256(found)[:12]}", found
         )
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cache
-from typing import Protocol
+from typing import Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +14,8 @@ from hexacell.kinematics.parameters import GeometricParameter, ParameterSet
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array
 
-Branch = tuple[int, int, int, int, int, int]
+Sign = Literal[1, -1]
+Branch = tuple[Sign, Sign, Sign, Sign, Sign, Sign]
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -24,8 +24,8 @@ from pathlib import Path
 
 from hexacell.acceptance import AcceptanceGate
 from hexacell.cell.loader import Cell
-from hexacell.controller_config.change import RECEIPT, ConfigChange, Receipt, fingerprint, propose
-from hexacell.controller_config.write_back import commit, rollback
+from hexacell.controller_config.change import ConfigChange, fingerprint, propose
+from hexacell.controller_config.write_back import RECEIPT, Receipt, commit, rollback
 from hexacell.errors import HexacellError, Interruption, LimitError, WriteBackUndone
 from hexacell.kinematics.geometry import Geometry
 from hexacell.robot_model import config_format

@@ -14,7 +14,7 @@ from drivers.interfaces import DeviceIdentity
 from hexacell.acceptance import AcceptanceGate, Verdict
 from hexacell.cell.fields import GeometryDocument
 from hexacell.cell.recovery import Action, FailureKind
-from hexacell.controller_config.interface import Branch
+from hexacell.kinematics.mechanism import Branch
 from hexacell.reporting.result import IdentificationResult
 from procedures.run.steps import Frozen, SetKey, SixNumbers, Step, ThreeNumbers
 from procedures.run.trips import Guard, Trip

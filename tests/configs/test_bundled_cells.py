@@ -13,13 +13,14 @@ from hexacell.cell.mechanism_sections import GeometrySettings
 from hexacell.controller_config.toml_format import NativeToml
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.inverse import inverse_kinematics
+from hexacell.kinematics.mechanism import Branch
 from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS, Hexaglide, hexaglide_geometry
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.sensitivity import singularity_margin
 
 CONFIGS = Path(__file__).parents[2] / "configs"
 NAMES = ["simulated-hexaglide", "paper-experiment"]
-BRANCH = (-1, -1, -1, 1, 1, 1)
+BRANCH: Branch = (-1, -1, -1, 1, 1, 1)
 
 # Table 3 of Abtahi et al. 2010: the ball's positions P1 to P6.
 P1, P2, P3 = (0, 0, 550), (0, -200, 550), (100, -100, 500)

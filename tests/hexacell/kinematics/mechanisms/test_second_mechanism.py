@@ -16,7 +16,7 @@ from hexacell.identification.estimator import identify
 from hexacell.identification.problem.problem import Noise, Prior, Tolerances, build_problem
 from hexacell.kinematics.forward import continue_solution
 from hexacell.kinematics.geometry import Geometry
-from hexacell.kinematics.mechanism import Mechanism
+from hexacell.kinematics.mechanism import Branch, Mechanism
 from hexacell.kinematics.parameters import ParameterKind, ParameterSet, ParameterUnit
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.rotations import Array
@@ -26,7 +26,7 @@ from hexacell.reporting.documents import identification_document
 from tests.hexacell.kinematics.mechanisms.gough_stewart import CONVENTION, PARAMETERS, GoughStewart
 
 MECHANISM: Mechanism = GoughStewart()
-BRANCH = (1, 1, 1, 1, 1, 1)
+BRANCH: Branch = (1, 1, 1, 1, 1, 1)
 TOLERANCES = Tolerances({"z": 1.0, "A": 2.0, "B": 2.0}, ball_mm=0.0)
 
 

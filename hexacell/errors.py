@@ -6,7 +6,6 @@ import difflib
 from collections.abc import Iterable
 from enum import IntEnum
 from pathlib import Path
-from typing import ClassVar
 
 
 class ExitCode(IntEnum):
@@ -29,7 +28,7 @@ class HexacellError(Exception):
     the next thing to do. ``str()`` gives one plain sentence made of them.
     """
 
-    exit_code: ClassVar[ExitCode] = ExitCode.USAGE
+    exit_code = ExitCode.USAGE
 
     def __init__(
         self,
@@ -113,20 +112,17 @@ class WriteBackUndone(HexacellError):
 
 
 class SeveralErrors(HexacellError):
-    """Several failures at once, in one indented report, with the exit code of the most serious."""
+    """Several failures at once, in one indented report.
+
+    The exit code is that of the most serious: busy before hardware before usage before the rest.
+    """
 
     def __init__(self, problem: str, errors: list[HexacellError]) -> None:
         self.errors = errors
         super().__init__(problem)
-
-    @property
-    def worst(self) -> ExitCode:
-        """The exit code: busy before hardware before usage before the rest."""
-        codes = [error.exit_code for error in self.errors]
-        for code in (ExitCode.BUSY, ExitCode.HARDWARE, ExitCode.USAGE):
-            if code in codes:
-                return code
-        return codes[0]
+        codes = [error.exit_code for error in errors]
+        by_severity = (ExitCode.BUSY, ExitCode.HARDWARE, ExitCode.USAGE)
+        self.exit_code = next((code for code in by_severity if code in codes), codes[0])
 
     def __str__(self) -> str:
         return "\n".join([f"{self.problem}:", *(f"  - {error}" for error in self.errors)])

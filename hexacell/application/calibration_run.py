@@ -27,7 +27,7 @@ from procedures.devices.live_values import LiveValues
 from procedures.devices.reconnection import require_known
 from procedures.engine.config_transactions import holds_provisional
 from procedures.engine.engine import Engine, Listener
-from procedures.engine.recovery_policy import RecoveryPolicy
+from procedures.engine.recovery import RecoveryPolicy
 from procedures.engine.step_executor import StepExecutor
 from procedures.journal.journal import Journal, read_journal
 from procedures.run import events

@@ -10,7 +10,7 @@ from importlib import import_module
 from hexacell.cli.console import Console
 from hexacell.cli.parser import make_parser
 from hexacell.cli.signals import stop_signals_as_sigint
-from hexacell.errors import ExitCode, HexacellError, SeveralErrors
+from hexacell.errors import ExitCode, HexacellError
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -31,8 +31,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except KeyboardInterrupt:
         return _failed("interrupted", ExitCode.INTERRUPTED, console)
     except HexacellError as error:
-        code = error.worst if isinstance(error, SeveralErrors) else error.exit_code
-        return _failed(str(error), code, console)
+        return _failed(str(error), error.exit_code, console)
     except Exception as error:
         # A bug: Python prints the traceback, and a reader of JSON still gets a document.
         console.document({"error": repr(error), "exit_code": int(ExitCode.OUT_OF_LIMITS)})

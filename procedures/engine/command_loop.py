@@ -1,10 +1,14 @@
-"""Running a coroutine while commands are taken: some cancel it, the others wait for its end."""
+"""Running a coroutine while commands are taken: some cancel it, the others wait for its end.
+
+The flags that the commands set decide the status of the engine.
+"""
 
 from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable, Coroutine
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from enum import StrEnum
 from typing import Any, TypeVar
 
 from procedures.run.cancellation import cancel_and_wait
@@ -20,9 +24,56 @@ from procedures.run.commands import (
     Undo,
 )
 from procedures.run.questions import QuestionBroker
-from procedures.run.status import EngineFlags, Status
 
 Result = TypeVar("Result")
+
+
+class Status(StrEnum):
+    """What an engine is doing, for screens."""
+
+    IDLE = "idle"
+    RUNNING = "running"
+    PAUSING = "pausing"
+    PAUSED = "paused"
+    AWAITING_OPERATOR = "awaiting operator"
+    STOPPING = "stopping"
+    ENDED = "ended"
+    FAULTED = "faulted"
+
+
+@dataclass(frozen=True, slots=True)
+class EngineFlags:
+    """Facts about the engine; several may hold at once.
+
+    Attributes:
+        fault: what failed, until somebody decides how to continue.
+        asking: a question waits for a person.
+        pausing: a pause is wanted, ``at_once`` in mid-step; ``paused``: it has begun.
+        stopping: why the run is to end; nothing where it is not.
+    """
+
+    begun: bool = False
+    ended: bool = False
+    fault: str | None = None
+    asking: bool = False
+    pausing: bool = False
+    at_once: bool = False
+    paused: bool = False
+    stopping: str | None = None
+
+    @property
+    def status(self) -> Status:
+        """The most severe fact decides; a fault stays until it is cleared, also after the end."""
+        words = (
+            (self.fault is not None, Status.FAULTED),
+            (self.ended, Status.ENDED),
+            (self.stopping is not None, Status.STOPPING),
+            (self.paused, Status.PAUSED),
+            (self.asking, Status.AWAITING_OPERATOR),
+            (self.pausing, Status.PAUSING),
+            (self.begun, Status.RUNNING),
+        )
+        return next((status for holds, status in words if holds), Status.IDLE)
 
 
 class StepCancelled(Exception):

@@ -6,11 +6,11 @@ import asyncio
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 
+from hexacell.acceptance import Verdict
 from hexacell.errors import ExitCode, HexacellError, Interruption, SeveralErrors
-from procedures.engine.command_loop import CommandLoop, StepCancelled
+from procedures.engine.command_loop import CommandLoop, Status, StepCancelled
 from procedures.engine.config_transactions import Reversal, revert_at_end, revert_unrecorded
-from procedures.engine.recovery import Recovery
-from procedures.engine.recovery_policy import GIVE_UP, RecoveryPolicy
+from procedures.engine.recovery import GIVE_UP, Recovery, RecoveryPolicy
 from procedures.engine.step_executor import StepExecutor
 from procedures.journal.journal import Journal
 from procedures.run import events
@@ -18,7 +18,6 @@ from procedures.run.cancellation import shielded
 from procedures.run.commands import Command, CommandQueue, MeasureAgain, PendingInvalidations, Undo
 from procedures.run.questions import Question, QuestionBroker, UnattendedOperator
 from procedures.run.state import RunState, apply, fold
-from procedures.run.status import Status, ending, exit_code
 from procedures.run.steps import Phase, Step
 from procedures.run.trips import GuardTripped
 
@@ -55,7 +54,9 @@ class Engine:
         self._commands = CommandLoop(
             self._queue, self._broker, invalidate=self._invalidate, reject=self._reject
         )
-        self._recovery = Recovery(executor, self._commands, self._broker, policy)
+        self._recovery = Recovery(
+            executor, self._commands, self._broker, policy, halt=self._halt, record=self.record
+        )
         self._invalidations = PendingInvalidations()
         self._is_prepared = False
         self._last: events.Event | None = None
@@ -99,7 +100,7 @@ class Engine:
             raise
         finally:
             self._commands.set_flags(ended=True)
-        ended = ending(self.state)
+        ended = _ending(self.state)
         if self.state.ended is None:
             self.record(ended)
         return ended
@@ -117,20 +118,20 @@ class Engine:
             if is_useless and not measured.closed:
                 self.record(events.SetInvalidated(at=key, reason="the run was interrupted in this set"))
 
-    def record(self, event: events.Event) -> None:
-        """Journal an event, then call the listeners; raises ``FileError`` if it cannot be journalled."""
+    def record(self, event: events.Event) -> RunState:
+        """Journal an event, then call the listeners; gives the state after it.
+
+        Raises:
+            FileError: it cannot be journalled.
+        """
         self._journal.append(event)
         self.state = apply(self.state, event)
         self._last = event
         for listener in self._listeners:
             listener(event, self.state)
+        return self.state
 
-    def record_trip(self, error: BaseException) -> None:
-        """Journal the guard that tripped, if the error is one."""
-        if isinstance(error, GuardTripped):
-            self.record(events.Tripped.of(error.trip))
-
-    async def halt(self) -> bool:
+    async def _halt(self) -> bool:
         """Stop motion in place; whether it is certain that the robot has stopped."""
         self._is_prepared = False
         try:
@@ -154,7 +155,7 @@ class Engine:
         except StepCancelled:
             pass
         except HexacellError as error:
-            await self._recovery.recover(self, error, step)
+            await self._recovery.recover(error, step, self.state)
         return True
 
     async def _prepare(self) -> None:
@@ -195,14 +196,15 @@ class Engine:
         """End a run early: stop the robot, revert what may not stay, journal the interruption."""
         reason = str(error) or type(error).__name__
         try:
-            await self.halt()
-            with suppress(HexacellError):
-                self.record_trip(error)
+            await self._halt()
+            if isinstance(error, GuardTripped):
+                with suppress(HexacellError):
+                    self.record(events.Tripped.of(error.trip))
             if reversal := revert_at_end(self.state, error):
                 await self._revert(reversal, error)
         finally:
             with suppress(HexacellError):
-                self.record(events.Interrupted(reason=reason, exit_code=int(exit_code(error))))
+                self.record(events.Interrupted(reason=reason, exit_code=int(_exit_code(error))))
 
     async def _obey_commands(self) -> None:
         """Between two steps: obey the commands that waited for the end of a step."""
@@ -239,3 +241,23 @@ class Engine:
 
     def _reject(self, command: Command, reason: str) -> None:
         self.record(events.CommandRejected(command=type(command).__name__, reason=reason))
+
+
+def _ending(state: RunState) -> events.Ended:
+    """The last event of a run with nothing left to do."""
+    if state.ended is not None:
+        return state.ended
+    judged = state.judged
+    passed = judged is not None and judged.verdict is Verdict.PASS
+    code = ExitCode.DONE if passed else ExitCode.OUT_OF_LIMITS
+    line = judged.line if judged is not None else "nothing was judged"
+    if state.rolled_back:
+        line += "; rolled back, the controller has its old config"
+    return events.Ended(exit_code=int(code), line=line)
+
+
+def _exit_code(error: BaseException) -> ExitCode:
+    """The code to leave with; an error of the program itself counts as no result."""
+    if isinstance(error, HexacellError):
+        return error.exit_code
+    return ExitCode.OUT_OF_LIMITS if isinstance(error, Exception) else ExitCode.INTERRUPTED

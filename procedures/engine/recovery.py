@@ -1,71 +1,173 @@
-"""Recovery from a failed step: stop, choose an action by policy or person, prepare the next attempt."""
+"""Recovery from a failed step: stop, choose an action by policy or person, prepare the next attempt.
+
+The policy is data: an escalation, a sequence of actions, for every kind of failure (``[recovery]`` in
+the cell file). Each attempt is an event, so the state of a run knows which action is next.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Awaitable, Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
-from hexacell.cell.recovery import Action
-from hexacell.errors import AnswerNeeded, HexacellError, Interruption
+from drivers import errors as device
+from drivers.controllers import errors as controller
+from hexacell.cell.recovery import Action, FailureKind, RecoverySettings
+from hexacell.errors import AnswerNeeded, DeviceError, FileError, HexacellError, Interruption
+from procedures.calibration.path_planning import NoSafePath
+from procedures.calibration.set_steps import TravelError
 from procedures.devices.reconnection import reconnect
+from procedures.devices.settling import NeverSettled
 from procedures.engine.command_loop import CommandLoop, StepCancelled
-from procedures.engine.recovery_policy import RecoveryPolicy, choices, failed
 from procedures.engine.step_executor import StepExecutor
 from procedures.run import events
 from procedures.run.questions import QuestionBroker, ask_recovery
 from procedures.run.state import RunState
-from procedures.run.steps import SetKey, Step
+from procedures.run.steps import Compute, SetKey, Step
+from procedures.run.trips import Guard, GuardTripped, Trip, causes_of
+
+KINDS: Mapping[type[HexacellError], FailureKind] = {
+    device.GaugeSilent: FailureKind.GAUGE_SILENT,
+    device.WrongAnswer: FailureKind.GAUGE_SILENT,
+    device.WrongSetting: FailureKind.GAUGE_SETTING,
+    device.GaugeAtEnd: FailureKind.GAUGE_AT_END,
+    device.GaugeUnsteady: FailureKind.UNSETTLED,
+    device.ZeroVoid: FailureKind.ZERO_VOID,
+    device.SilentNodeError: FailureKind.ENCODER_SILENT,
+    device.InvalidSampleError: FailureKind.ENCODER_ALARM,
+    device.RestartedNodeError: FailureKind.ENCODER_RESTARTED,
+    device.BusError: FailureKind.LINK_LOST,
+    controller.ConnectionLost: FailureKind.LINK_LOST,
+    controller.CommandRefused: FailureKind.CONTROLLER,
+    controller.MotionInterrupted: FailureKind.CONTROLLER,
+    device.PortLost: FailureKind.LINK_LOST,
+    NeverSettled: FailureKind.UNSETTLED,
+    TravelError: FailureKind.GAUGE_AT_END,
+    NoSafePath: FailureKind.NO_WAY,
+    FileError: FailureKind.FILE,
+    DeviceError: FailureKind.OTHER,
+}
+"""The nearest class that an error belongs to decides; any other is final."""
+
+OF_GUARDS: Mapping[Guard, FailureKind] = {
+    Guard.CONTROLLER: FailureKind.CONTROLLER,
+    Guard.FOLLOWING: FailureKind.CONTROLLER,
+    Guard.GAUGE_END: FailureKind.GAUGE_AT_END,
+    Guard.PLATE: FailureKind.GAUGE_AT_END,
+    Guard.ENCODERS: FailureKind.ENCODER_SILENT,
+    Guard.DRIFT: FailureKind.DRIFT,
+    Guard.DISK: FailureKind.FILE,
+}
+"""Guards that tripped on nothing that a device said; any other is a kind of its own."""
+
+SEVERITY = (Action.RETRY, Action.MEASURE_AGAIN, Action.REDO_SET, Action.ASK, Action.ABORT)
 
 
-class ActiveRun(Protocol):
-    """What recovery needs of the engine."""
+def kind_of(error: HexacellError) -> FailureKind:
+    """The kind of one failure."""
+    if isinstance(error, GuardTripped):
+        return _kind_of_trip(error.trip)
+    return next((KINDS[base] for base in type(error).__mro__ if base in KINDS), FailureKind.FINAL)
 
-    state: RunState
 
-    def record(self, event: events.Event) -> None:
-        """Journal an event."""
-        ...
+def _kind_of_trip(trip: Trip) -> FailureKind:
+    if trip.guard is Guard.STALE:
+        return FailureKind.GAUGE_SILENT if trip.device.startswith("gauge") else FailureKind.LINK_LOST
+    return OF_GUARDS.get(trip.guard, FailureKind.GUARD)
 
-    def record_trip(self, error: BaseException) -> None:
-        """Journal the guard that tripped, if the error is one."""
-        ...
 
-    async def halt(self) -> bool:
-        """Stop motion in place; whether it is certain that the robot has stopped."""
-        ...
+@dataclass(frozen=True, slots=True)
+class RecoveryPolicy:
+    """The actions after the failures of a run.
+
+    Attributes:
+        escalations: by kind; a kind without one ends the run.
+        wait_s: cell seconds before a device is tried again.
+    """
+
+    escalations: Mapping[FailureKind, tuple[Action, ...]]
+    wait_s: float = 0.0
+
+    @classmethod
+    def of(cls, settings: RecoverySettings, *, attended: bool) -> RecoveryPolicy:
+        """The policy that a cell file states."""
+        rules = settings.attended if attended else settings.unattended
+        return cls({kind: rules.escalation(kind) for kind in FailureKind}, settings.wait_s)
+
+    def action(self, kind: FailureKind, attempt: int) -> Action:
+        """The action after the ``attempt``-th failure of a kind, counted from 1."""
+        escalation = self.escalations.get(kind, (Action.ABORT,))
+        return escalation[min(attempt, len(escalation)) - 1]
+
+
+GIVE_UP = RecoveryPolicy({})
+"""Every failure ends the run."""
+
+
+def failed(
+    policy: RecoveryPolicy, error: HexacellError, step: Step | None, state: RunState
+) -> events.Failed:
+    """The event of a failure; of several at once, the one with the most severe action decides."""
+    verdicts = (_verdict(policy, kind, step, state) for kind in _kinds(error))
+    kind, attempt, action = max(verdicts, key=lambda verdict: SEVERITY.index(verdict[2]))
+    return events.Failed(step=step, failure=kind, attempt=attempt, reason=str(error), action=action)
+
+
+def choices(failure: events.Failed) -> tuple[Action, ...]:
+    """What a person may choose; where no set is being measured there is none to redo."""
+    if isinstance(failure.step, Compute):
+        return Action.RETRY, Action.ABORT
+    return Action.RETRY, Action.MEASURE_AGAIN, Action.REDO_SET, Action.ABORT
+
+
+def _kinds(error: HexacellError) -> Iterable[FailureKind]:
+    return dict.fromkeys(kind_of(one) for one in causes_of(error))
+
+
+def _verdict(
+    policy: RecoveryPolicy, kind: FailureKind, step: Step | None, state: RunState
+) -> tuple[FailureKind, int, Action]:
+    attempt = state.failures.get((kind.value, events.place_of(step)), 0) + 1
+    return kind, attempt, policy.action(kind, attempt)
 
 
 @dataclass(frozen=True, eq=False)
 class Recovery:
-    """Recovers from the failures of one run."""
+    """Recovers from the failures of one run.
+
+    Attributes:
+        halt: stops motion in place; whether it is certain that the robot has stopped.
+        record: journals an event and gives the state after it.
+    """
 
     executor: StepExecutor
     commands: CommandLoop
     broker: QuestionBroker
     policy: RecoveryPolicy
+    halt: Callable[[], Awaitable[bool]]
+    record: Callable[[events.Event], RunState]
 
-    async def recover(self, run: ActiveRun, error: HexacellError, step: Step | None) -> None:
+    async def recover(self, error: HexacellError, step: Step | None, state: RunState) -> None:
         """Return when the next step may be decided; a failure meanwhile is a failure of its own.
 
         Raises:
             HexacellError: the failure that ends the run.
         """
         while True:
-            failure = failed(self.policy, error, step, run.state)
+            failure = failed(self.policy, error, step, state)
             self.commands.set_flags(fault=str(error))
             if failure.action is Action.ABORT:
                 raise error
-            if not await run.halt() and failure.action is not Action.ASK:
+            if not await self.halt() and failure.action is not Action.ASK:
                 raise error  # without a person nothing is tried while the robot may still move
             if (decided := await self._decide(failure)) is None:
                 raise error
-            run.record_trip(error)
-            run.record(decided)
+            if isinstance(error, GuardTripped):
+                self.record(events.Tripped.of(error.trip))
+            state = self.record(decided)
             self.commands.set_flags(fault=None)
             try:
-                for event in await self.commands.run_cancellable(self.prepare(error, decided, run.state)):
-                    run.record(event)
+                for event in await self.commands.run_cancellable(self._prepare(error, decided, state)):
+                    state = self.record(event)
             except StepCancelled:
                 return
             except HexacellError as another:
@@ -90,7 +192,7 @@ class Recovery:
             return None
         return failure.model_copy(update={"action": action, "asked": True})
 
-    async def prepare(
+    async def _prepare(
         self, error: HexacellError, failure: events.Failed, state: RunState
     ) -> list[events.SetInvalidated]:
         """Wait, reconnect lost devices, and give the sets that are invalid by that or by the action.

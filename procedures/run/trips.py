@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
-from typing import ClassVar
 
 from hexacell.errors import DeviceError, ExitCode, HexacellError, LimitError, flatten_errors
 
@@ -58,7 +57,7 @@ class Trip:
 class GuardTripped(DeviceError):
     """A guard stopped the robot, or kept it from moving; latched until it is cleared."""
 
-    exit_code: ClassVar[ExitCode] = ExitCode.HARDWARE
+    exit_code = ExitCode.HARDWARE
 
     def __init__(self, trip: Trip) -> None:
         self.trip = trip
@@ -68,7 +67,7 @@ class GuardTripped(DeviceError):
 class DriftTripped(GuardTripped, LimitError):
     """The gauges show another value at a set's reference than before: the set does not count."""
 
-    exit_code: ClassVar[ExitCode] = ExitCode.OUT_OF_LIMITS
+    exit_code = ExitCode.OUT_OF_LIMITS
 
 
 def causes_of(error: HexacellError) -> list[HexacellError]:

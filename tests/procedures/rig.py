@@ -26,7 +26,7 @@ from hexacell.runs.run_folder import RunFolder
 from procedures.calibration import workflow as calibration_module
 from procedures.calibration.workflow import Calibration, Mode
 from procedures.engine.engine import Engine, Listener
-from procedures.engine.recovery_policy import GIVE_UP, RecoveryPolicy
+from procedures.engine.recovery import GIVE_UP, RecoveryPolicy
 from procedures.engine.step_executor import StepExecutor
 from procedures.journal.journal import Journal
 from procedures.run import events

@@ -75,7 +75,7 @@ async def test_every_failure_is_said_at_once(make_site) -> None:
     assert kinds[:3] == [ReachError, ReachError, AnswerNeeded]
     assert len(kinds) == 7
     assert all(issubclass(kind, DeviceError) for kind in kinds[3:])
-    assert refusal.value.worst is ExitCode.HARDWARE
+    assert refusal.value.exit_code is ExitCode.HARDWARE
     assert site.simulated.machine.joints() == before
 
 

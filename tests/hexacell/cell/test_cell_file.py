@@ -258,7 +258,7 @@ def test_several_mistakes_come_together_in_the_order_of_the_file(load_changed, c
     assert len(lines) == 3
     assert lines == sorted(lines, key=lambda line: line or 0)
     assert str(refused.value).startswith(f"{cell_path} has 3 mistakes:\n  - {cell_path}:")
-    assert refused.value.worst is ExitCode.USAGE
+    assert refused.value.exit_code is ExitCode.USAGE
 
 
 def _file_errors(several: SeveralErrors) -> list[FileError]:

@@ -10,7 +10,7 @@ from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.motion import paths as route_module
 from procedures.calibration import path_planning
 from procedures.calibration.path_planning import NoSafePath
-from procedures.engine.recovery_policy import RecoveryPolicy
+from procedures.engine.recovery import RecoveryPolicy
 from procedures.journal.journal import read_journal
 from procedures.run import events
 from procedures.run.state import fold

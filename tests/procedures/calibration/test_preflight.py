@@ -123,4 +123,4 @@ def test_several_are_raised_in_one_report() -> None:
     errors = [ReachError("too far"), DeviceError("dead"), AnswerNeeded("nobody")]
     with pytest.raises(SeveralErrors, match=r"(?s)3 problems .*too far.*dead.*nobody") as refusal:
         raise_all([*errors])
-    assert refusal.value.worst is ExitCode.HARDWARE
+    assert refusal.value.exit_code is ExitCode.HARDWARE

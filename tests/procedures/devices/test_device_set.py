@@ -33,7 +33,7 @@ async def test_all_that_cannot_be_opened_are_named_at_once(bench) -> None:
     with pytest.raises(SeveralErrors) as refusal:
         await bench.devices.open()
     assert [error.subject for error in refusal.value.errors] == ["gauge y", "encoders", "controller"]
-    assert refusal.value.worst is ExitCode.HARDWARE
+    assert refusal.value.exit_code is ExitCode.HARDWARE
     assert all(subject in str(refusal.value) for subject in ("gauge y", "encoders", "controller"))
 
 

@@ -11,12 +11,12 @@ from typing import Any
 import pytest
 
 from hexacell.errors import ExitCode, Interruption
+from procedures.engine.command_loop import Status
 from procedures.engine.engine import Engine
 from procedures.journal.journal import Journal, read_journal
 from procedures.run import events
 from procedures.run.commands import Abort, Answer, CommandQueue, MeasureAgain, Pause, Resume, Stop, Undo
 from procedures.run.state import RunState, fold
-from procedures.run.status import Status
 from procedures.run.steps import Move, Phase, Sample, SetKey, Step
 from tests.procedures.fakes import SilentOperator
 from tests.waiting import until

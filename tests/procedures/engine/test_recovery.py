@@ -38,12 +38,12 @@ from hexacell.errors import (
 from procedures.calibration.path_planning import NoSafePath
 from procedures.calibration.set_steps import TravelError
 from procedures.devices.settling import NeverSettled
-from procedures.engine.recovery_policy import GIVE_UP, RecoveryPolicy, failed, kind_of
+from procedures.engine.command_loop import Status
+from procedures.engine.recovery import GIVE_UP, RecoveryPolicy, failed, kind_of
 from procedures.journal.journal import read_journal
 from procedures.run import events
 from procedures.run.commands import Abort, Answer, Pause, Resume, Stop
 from procedures.run.state import RunState, fold
-from procedures.run.status import Status
 from procedures.run.steps import Phase, Sample, SetKey
 from procedures.run.trips import DriftTripped, Guard, Trip
 from tests.waiting import until
@@ -386,7 +386,7 @@ class TestANewGeometryThatCannotBeVerified:
 
         with pytest.raises(SeveralErrors, match="could not be taken back") as both:
             await rig.run(slip, break_down)
-        assert both.value.worst is ExitCode.HARDWARE
+        assert both.value.exit_code is ExitCode.HARDWARE
         assert rig.config == recording.config_before
         ended = await rig.run()
         assert ended.exit_code == ExitCode.DONE

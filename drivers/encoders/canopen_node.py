@@ -51,7 +51,11 @@ class NmtCommand(IntEnum):
 
 
 class EncoderNode:
-    """The CANopen node of one leg's encoder. Integers are read and written as unsigned."""
+    """The CANopen node of one leg's encoder. Integers are read and written as unsigned.
+
+    A node that does not respond is a ``SilentNodeError``; two that respond, and a device that refuses a
+    value or has no such entry, are a ``DeviceError``.
+    """
 
     def __init__(self, leg: Leg, bus: EncoderBus, timeout_s: float) -> None:
         self.leg = leg
@@ -59,19 +63,11 @@ class EncoderNode:
         self._bus = bus
 
     def command(self, command: NmtCommand) -> None:
-        """Send an NMT command; nodes do not acknowledge it.
-
-        Raises:
-            BusError: The bus does not accept the frame.
-        """
+        """Send an NMT command; nodes do not acknowledge it."""
         self._bus.network.send_message(_NMT, bytes((command, self.leg.node)))
 
     def read(self, entry: ObjectEntry) -> int:
-        """The value of a mandatory entry.
-
-        Raises:
-            DeviceError: The entry does not exist, or the node does not respond.
-        """
+        """The value of a mandatory entry."""
         value = self.read_optional(entry)
         if value is None:
             raise DeviceError(
@@ -82,11 +78,7 @@ class EncoderNode:
         return value
 
     def read_optional(self, entry: ObjectEntry) -> int | None:
-        """The value of an entry; none if the device does not have it.
-
-        Raises:
-            DeviceError: No response, or two.
-        """
+        """The value of an entry; none if the device does not have it."""
         try:
             return int.from_bytes(self.sdo.upload(entry.index, entry.subindex), "little")
         except SdoAbortedError:
@@ -95,11 +87,7 @@ class EncoderNode:
             raise self._communication_error(entry, error) from error
 
     def write(self, entry: ObjectEntry, value: int) -> None:
-        """Write an entry.
-
-        Raises:
-            DeviceError: The device refuses, or there is no response, or two.
-        """
+        """Write an entry."""
         try:
             self.sdo.download(entry.index, entry.subindex, value.to_bytes(entry.size, "little"))
         except SdoAbortedError as error:
@@ -108,11 +96,7 @@ class EncoderNode:
             raise self._communication_error(entry, error) from error
 
     def check_alone(self) -> None:
-        """Raise if a second device responded under this node id.
-
-        Raises:
-            DeviceError: It did.
-        """
+        """Raise if a second device responded under this node id."""
         if self.sdo.has_surplus_response:
             raise duplicated_node("responded twice to one request", self.leg)
 
@@ -150,6 +134,9 @@ _UPLOAD_DEVICE_TYPE = bytes((0x40, 0x00, 0x10, 0, 0, 0, 0, 0))
 class CountingSdoClient(SdoClient):
     """canopen's SDO client with interruptible waits and a count of outstanding responses.
 
+    Failures are those of :meth:`EncoderBus.check`, and a ``canopen.SdoError`` where there is no valid
+    response or it is an abort.
+
     Attributes:
         has_surplus_response: there were more responses than requests: two devices share the node id.
         has_responded: there was a response.
@@ -184,12 +171,7 @@ class CountingSdoClient(SdoClient):
         self._bus.condition.notify_all()
 
     def request_response(self, sdo_request: bytes) -> bytes:
-        """Send one request and return its response, after any outstanding earlier one.
-
-        Raises:
-            DeviceError: As :meth:`EncoderBus.check`.
-            canopen.SdoError: No response, an abort, or an invalid response.
-        """
+        """Send one request and return its response, after any outstanding earlier one."""
         self._bus.wait_for(lambda: self._outstanding <= 0, self._timeout_s)
         with self._bus.condition:
             self._outstanding = 1
@@ -197,12 +179,7 @@ class CountingSdoClient(SdoClient):
         return response
 
     def read_response(self) -> bytes:
-        """Wait for the response.
-
-        Raises:
-            DeviceError: As :meth:`EncoderBus.check`.
-            canopen.SdoError: No response, or an abort.
-        """
+        """Wait for the response."""
         self._bus.wait_for(lambda: not self.responses.empty(), self._timeout_s)
         response: bytes = super().read_response()  # type: ignore[no-untyped-call]
         return response

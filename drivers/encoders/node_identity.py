@@ -1,4 +1,7 @@
-"""Identification of the nodes: each must respond, be the only one with its id, and match the cell file."""
+"""Identification of the nodes: each must respond, be the only one with its id, and match the cell file.
+
+Every function raises a ``DeviceError`` that names the leg where that is not so.
+"""
 
 from __future__ import annotations
 
@@ -28,12 +31,7 @@ SECOND_RESPONSE_S = 0.03
 
 
 def detect_nodes(nodes: Sequence[EncoderNode], bus: EncoderBus, timeout_s: float) -> None:
-    """Probe all nodes at once.
-
-    Raises:
-        BusError: Some do not respond within ``timeout_s``.
-        DeviceError: More than one device responds under one node id.
-    """
+    """Make sure that one device responds under each node id within ``timeout_s``, all probed at once."""
     for node in nodes:
         node.sdo.probe()
     bus.wait_for(lambda: all(node.sdo.has_responded for node in nodes), timeout_s)
@@ -46,11 +44,7 @@ def detect_nodes(nodes: Sequence[EncoderNode], bus: EncoderBus, timeout_s: float
 
 
 def read_device_type(node: EncoderNode) -> DeviceType:
-    """The device type of a node.
-
-    Raises:
-        DeviceError: It is not an absolute linear encoder.
-    """
+    """The device type of a node, which must be an absolute linear encoder."""
     value = node.read(DEVICE_TYPE)
     try:
         return DeviceType(value)
@@ -63,11 +57,7 @@ def read_device_type(node: EncoderNode) -> DeviceType:
 
 
 def check_measuring_step(node: EncoderNode, step_nm: float) -> None:
-    """Compare the measuring step with the cell file.
-
-    Raises:
-        DeviceError: It differs, or the device does not report it.
-    """
+    """Compare the measuring step with the cell file."""
     found = node.read_optional(MEASURING_STEP_SETTING)
     if found is None:
         found = node.read(MEASURING_STEP)
@@ -95,11 +85,7 @@ def read_identity(node: EncoderNode, kind: DeviceType) -> DeviceIdentity:
 
 
 def check_serial_number(node: EncoderNode, identity: DeviceIdentity, settings: EncoderSettings) -> None:
-    """Compare the serial number with the cell file, if that has one.
-
-    Raises:
-        DeviceError: It differs.
-    """
+    """Compare the serial number with the cell file, if that has one."""
     if settings.serial_numbers is None:
         return
     expected = str(settings.serial_numbers[node.leg.number - 1])

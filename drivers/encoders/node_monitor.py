@@ -8,18 +8,21 @@ from __future__ import annotations
 import struct
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
-from enum import IntEnum
 
 from canopen.emcy import EmcyError
 
 from drivers.encoders.can_bus import EncoderBus
 from drivers.encoders.canopen_node import EncoderNode, Leg, subject_of
-from drivers.encoders.object_dictionary import ALARMS, ERROR_REGISTER, ObjectEntry
+from drivers.encoders.object_dictionary import ALARMS, ERROR_REGISTER
 from drivers.errors import InvalidSampleError, RestartedNodeError, SilentNodeError
 
 HEARTBEAT = 0x700
 EMERGENCY = 0x080
+
+BOOT_UP = 0x00
+"""The NMT state in the heartbeat that announces a start."""
+OPERATIONAL = 0x05
+"""The NMT state in the heartbeats of a started node."""
 
 MAX_MISSED_HEARTBEATS = 3
 """So many consecutive missing heartbeats are a failure."""
@@ -27,15 +30,6 @@ JITTER_S = 0.2
 """Scheduling delay that is tolerated on the PC."""
 
 _KNOWN_EMERGENCIES = {0xFF00: "no magnet", 0x8130: "its heartbeat monitoring tripped"}
-
-
-class NodeState(IntEnum):
-    """The NMT state in a heartbeat; 0 is the boot-up message."""
-
-    BOOT_UP = 0x00
-    STOPPED = 0x04
-    OPERATIONAL = 0x05
-    PRE_OPERATIONAL = 0x7F
 
 
 class NodeMonitor:
@@ -73,31 +67,26 @@ class NodeMonitor:
     def _on_heartbeat(self, _can_id: int, data: bytearray, _timestamp: float) -> None:
         if self._last_heartbeat is not None:
             self._last_heartbeat = time.monotonic()
-        state = data[0] & 0x7F if data else NodeState.BOOT_UP
-        if state == NodeState.OPERATIONAL:
+        state = data[0] & 0x7F if data else BOOT_UP
+        if state == OPERATIONAL:
             self._was_operational = True
-        elif state == NodeState.BOOT_UP or self._was_operational:
+        elif state == BOOT_UP or self._was_operational:
             self.restarted = True
             self._condition.notify_all()
 
-    def _on_emergency(self, _can_id: int, data: bytearray, timestamp: float) -> None:
-        error = _unpack_emergency(data, timestamp)
-        if error.code >> 8 == 0 and error.register == 0:
+    def _on_emergency(self, _can_id: int, data: bytearray, _timestamp: float) -> None:
+        # Error code and error register; missing bytes count as an error.
+        code, register = struct.unpack("<HB", bytes(data[:3]).ljust(3, b"\xff"))
+        if code >> 8 == 0 and register == 0:
             self.emergency = None
             return
         self.emergencies += 1
-        self.emergency = _text(error)
+        self.emergency = _text(code, register)
         self._condition.notify_all()
 
 
 def check_nodes(monitors: Sequence[NodeMonitor]) -> None:
-    """Raise if a node has failed.
-
-    Raises:
-        RestartedNodeError: It lost its configuration.
-        SilentNodeError: Its heartbeat is overdue.
-        InvalidSampleError: It reports an error.
-    """
+    """Raise if a node restarted, its heartbeat is overdue, or it reports an error."""
     restarted = [monitor.leg for monitor in monitors if monitor.restarted]
     if restarted:
         raise _restarted(restarted)
@@ -140,15 +129,9 @@ def _silent(monitors: Sequence[NodeMonitor], *, all_legs: bool) -> SilentNodeErr
     )
 
 
-def _unpack_emergency(data: bytearray, timestamp: float) -> EmcyError:
-    """Code, error register and the vendor's five bytes; missing bytes count as an error."""
-    code, register, details = struct.unpack("<HB5s", bytes(data[:8]).ljust(8, b"\xff"))
-    return EmcyError(code, register, details, timestamp)
-
-
-def _text(error: EmcyError) -> str:
-    known = _KNOWN_EMERGENCIES.get(error.code) or error.get_desc().lower()
-    return f"emergency {error.code:04X} ({known}, error register {error.register:#04x})"
+def _text(code: int, register: int) -> str:
+    description = _KNOWN_EMERGENCIES.get(code) or EmcyError(code, register, b"", 0.0).get_desc().lower()
+    return f"emergency {code:04X} ({description}, error register {register:#04x})"
 
 
 ALARM_POLL_S = 0.1
@@ -158,53 +141,31 @@ _COMMUNICATION = 0x10
 """Bit of the error register for communication errors, which do not concern positions."""
 
 
-@dataclass(frozen=True, slots=True)
-class _Supported:
-    node: EncoderNode
-    entries: tuple[ObjectEntry, ...]
-
-
 class AlarmPoll:
-    """Reads the alarm entries of all nodes: at first, then every ``PERIOD_S`` and after emergencies.
-
-    Raises:
-        DeviceError: As :meth:`check`.
-    """
+    """Reads the alarm entries of all nodes: at first, then every ``ALARM_POLL_S`` and after emergencies."""
 
     def __init__(self, nodes: Sequence[EncoderNode], monitors: Sequence[NodeMonitor]) -> None:
         self._monitors = monitors
         self._emergencies_seen = -1
         self._due = 0.0
-        self._supported = [
-            _Supported(node, tuple(entry for entry in (ERROR_REGISTER, ALARMS) if _has(node, entry)))
+        self._entries = [
+            (node, entry)
             for node in nodes
+            for entry in (ERROR_REGISTER, ALARMS)
+            if node.read_optional(entry) is not None
         ]
         self.check()
 
     def check(self) -> None:
-        """Read the alarm entries if they are due.
-
-        Raises:
-            InvalidSampleError: A device has an alarm.
-            DeviceError: It does not respond.
-        """
+        """Read the alarm entries if they are due; an alarm is an ``InvalidSampleError``."""
         emergencies = sum(monitor.emergencies for monitor in self._monitors)
         if time.monotonic() < self._due and emergencies == self._emergencies_seen:
             return
-        for supported in self._supported:
-            _check(supported)
+        for node, entry in self._entries:
+            value = node.read(entry)
+            if entry is ERROR_REGISTER:
+                value &= ~_COMMUNICATION
+            if value:
+                raise invalid_sample(f"has an alarm ({entry} is {value:#06x})", node.leg)
         self._emergencies_seen = emergencies
         self._due = time.monotonic() + ALARM_POLL_S
-
-
-def _has(node: EncoderNode, entry: ObjectEntry) -> bool:
-    return node.read_optional(entry) is not None
-
-
-def _check(supported: _Supported) -> None:
-    for entry in supported.entries:
-        value = supported.node.read(entry)
-        if entry is ERROR_REGISTER:
-            value &= ~_COMMUNICATION
-        if value:
-            raise invalid_sample(f"has an alarm ({entry} is {value:#06x})", supported.node.leg)

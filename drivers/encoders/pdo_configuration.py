@@ -29,46 +29,26 @@ _POSITION_BITS = 32
 
 
 @dataclass(frozen=True, slots=True)
-class MappedEntry:
-    """One mapped entry of a TPDO."""
-
-    index: int
-    subindex: int
-    bits: int
-
-    @classmethod
-    def of(cls, value: int) -> MappedEntry:
-        """Decode a mapping parameter (CiA 301: index, subindex, length)."""
-        return cls(value >> 16, value >> 8 & 0xFF, value & 0xFF)
-
-    @property
-    def value(self) -> int:
-        """The mapping parameter."""
-        return self.index << 16 | self.subindex << 8 | self.bits
-
-    @property
-    def is_position(self) -> bool:
-        """Whether it is a complete position."""
-        return self in (_mapped(POSITION), _mapped(POSITION_OF_MAGNET_1))
-
-
-@dataclass(frozen=True, slots=True)
 class Tpdo:
-    """A transmit PDO as configured in the device."""
+    """A transmit PDO as configured in the device.
+
+    A mapping parameter is made of index, subindex and length (CiA 301), the length in the lowest byte.
+    """
 
     number: int
     cob_id: int
     transmission_type: int
-    mapping: tuple[MappedEntry, ...]
+    mapping: tuple[int, ...]
 
     @property
     def position_offset(self) -> int | None:
         """The offset of the position in its data, bits; none if it is not mapped."""
+        positions = (_mapping_parameter(POSITION), _mapping_parameter(POSITION_OF_MAGNET_1))
         bits = 0
-        for entry in self.mapping:
-            if entry.is_position:
+        for parameter in self.mapping:
+            if parameter in positions:
                 return bits
-            bits += entry.bits
+            bits += parameter & 0xFF
         return None
 
 
@@ -90,11 +70,7 @@ class PositionChannel:
 
 
 def configure_position_tpdo(node: EncoderNode, kind: DeviceType, heartbeat_ms: int) -> PositionChannel:
-    """Set one TPDO to the position with every SYNC, switch the others off, start the heartbeat.
-
-    Raises:
-        DeviceError: The device does not take that, or does not answer.
-    """
+    """Set one TPDO to the position with every SYNC, switch the others off, start the heartbeat."""
     tpdos = [tpdo for number in range(1, TPDO_COUNT + 1) if (tpdo := _read(node, number)) is not None]
     if not tpdos:
         raise setting_refused("has no transmit PDO", node.leg)
@@ -116,7 +92,7 @@ def _read(node: EncoderNode, number: int) -> Tpdo | None:
         number,
         cob_id,
         node.read(tpdo_transmission_type(number)),
-        tuple(MappedEntry.of(node.read(tpdo_mapping(number, slot))) for slot in slots),
+        tuple(node.read(tpdo_mapping(number, slot)) for slot in slots),
     )
 
 
@@ -146,7 +122,7 @@ def _set_up(node: EncoderNode, tpdo: Tpdo, kind: DeviceType) -> PositionChannel:
 
 def _map_only(node: EncoderNode, number: int, position: ObjectEntry) -> None:
     node.write(tpdo_mapping(number, 0), 0)
-    node.write(tpdo_mapping(number, 1), _mapped(position).value)
+    node.write(tpdo_mapping(number, 1), _mapping_parameter(position))
     node.write(tpdo_mapping(number, 0), 1)
 
 
@@ -158,5 +134,5 @@ def _verify(node: EncoderNode, number: int) -> None:
         raise setting_refused(f"acknowledges, but does not do, switching TPDO {number} on", node.leg)
 
 
-def _mapped(entry: ObjectEntry) -> MappedEntry:
-    return MappedEntry(entry.index, entry.subindex, _POSITION_BITS)
+def _mapping_parameter(position: ObjectEntry) -> int:
+    return position.index << 16 | position.subindex << 8 | _POSITION_BITS

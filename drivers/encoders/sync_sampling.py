@@ -47,12 +47,7 @@ class SyncSampler:
         bus.network.subscribe(SYNC, self._on_foreign_sync)
 
     def sample(self, *, signed: bool) -> tuple[int, ...]:
-        """One complete sample: the counts of all legs.
-
-        Raises:
-            SilentNodeError: Some leg did not respond to any of ``MAX_SYNCS`` SYNCs.
-            DeviceError: As :meth:`EncoderBus.check`.
-        """
+        """One complete sample, the counts of all legs, after at most ``MAX_SYNCS`` SYNCs."""
         for _ in range(MAX_SYNCS):
             is_synchronized = self._await_late_responses()
             self._send_sync()
@@ -65,21 +60,12 @@ class SyncSampler:
         raise self._silent()
 
     def self_test(self, *, signed: bool) -> None:
-        """Take one sample and listen for surplus responses.
-
-        Raises:
-            DeviceError: As :meth:`take`.
-        """
+        """Take one sample and listen for surplus responses."""
         self.sample(signed=signed)
         self._bus.listen(SECOND_RESPONSE_S)
 
     def check(self) -> None:
-        """Raise if there were unsolicited frames.
-
-        Raises:
-            DeviceError: A leg sent more positions than there were SYNCs.
-            BusError: Another master sends SYNC.
-        """
+        """Raise if a leg sent more positions than there were SYNCs, or another master sends SYNC."""
         for leg, outstanding in zip(self._legs, self._outstanding, strict=True):
             if outstanding < 0:
                 raise duplicated_node("sent more positions than there were SYNCs", leg)
@@ -107,6 +93,7 @@ class SyncSampler:
         return not any(outstanding > 0 for outstanding in self._outstanding)
 
     def _decode(self, *, signed: bool) -> tuple[int, ...]:
+        counts = []
         for leg, channel, frame in zip(self._legs, self._channels, self._frames, strict=True):
             if len(frame) < channel.length:
                 raise DeviceError(
@@ -114,8 +101,8 @@ class SyncSampler:
                     subject=leg.subject,
                     action="Open the encoders again; if it stays so, use another device",
                 )
-        pairs = zip(self._channels, self._frames, strict=True)
-        return tuple(channel.counts(frame, signed=signed) for channel, frame in pairs)
+            counts.append(channel.counts(frame, signed=signed))
+        return tuple(counts)
 
     def _silent(self) -> SilentNodeError:
         silent = [

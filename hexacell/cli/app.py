@@ -26,8 +26,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     try:
         with stop_signals_as_sigint():
             options = parser.parse_args(typed)
-            command = import_module(f"hexacell.cli.commands.{options.module}")
-            return int(command.main(options))
+            module, _, command = options.target.partition(".")
+            return int(getattr(import_module(f"hexacell.cli.commands.{module}"), command)(options))
     except KeyboardInterrupt:
         return _failed("interrupted", ExitCode.INTERRUPTED, console)
     except HexacellError as error:

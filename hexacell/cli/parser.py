@@ -32,7 +32,7 @@ class Parser(argparse.ArgumentParser):
 
 
 def make_parser() -> Parser:
-    """The parser of all commands; ``options.module`` names the command's module.
+    """The parser of all commands; ``options.target`` is the command's module and function.
 
     Its ``parse_args`` raises ``UsageError``.
     """
@@ -66,9 +66,9 @@ def _add(commands: Any, name: str, summary: str) -> Parser:  # noqa: ANN401 - ar
     return parser
 
 
-def _command(commands: Any, name: str, summary: str) -> Parser:  # noqa: ANN401
+def _command(commands: Any, name: str, summary: str, target: str = "") -> Parser:  # noqa: ANN401
     parser = _add(commands, name, summary)
-    parser.set_defaults(module=name)
+    parser.set_defaults(target=target or f"{name}.main")
     return parser
 
 
@@ -83,7 +83,9 @@ def _add_json(parser: Parser) -> None:
 
 
 def _demo(commands: Any) -> None:  # noqa: ANN401
-    parser = _command(commands, "demo", "do the whole job on a simulated cell, nothing attached")
+    parser = _command(
+        commands, "demo", "do the whole job on a simulated cell, nothing attached", "run.demo"
+    )
     parser.add_argument(
         "--config",
         default="simulated-hexaglide",
@@ -101,7 +103,7 @@ def _demo(commands: Any) -> None:  # noqa: ANN401
 
 
 def _run(commands: Any) -> None:  # noqa: ANN401
-    parser = _command(commands, "run", "measure, identify, propose, write back and verify")
+    parser = _command(commands, "run", "measure, identify, propose, write back and verify", "run.run")
     _add_cell(parser)
     parser.add_argument("--resume", metavar="RUN", help="resume an interrupted run: its folder or name")
     parser.add_argument("--unattended", action="store_true", help="no person can place gauges or approve")
@@ -133,7 +135,7 @@ def _simulate(commands: Any) -> None:  # noqa: ANN401
 
 
 def _next(commands: Any) -> None:  # noqa: ANN401
-    parser = _command(commands, "next", "print the pose worth measuring next")
+    parser = _command(commands, "next", "print the pose worth measuring next", "records.propose_next")
     _add_cell(parser)
     parser.add_argument(
         "--measurements", type=Path, required=True, metavar="FILE", help="the records so far (CSV)"
@@ -156,7 +158,7 @@ def _count(text: str) -> int:
 
 
 def _fit(commands: Any) -> None:  # noqa: ANN401
-    parser = _command(commands, "fit", "identify the geometry from a measurement file")
+    parser = _command(commands, "fit", "identify the geometry from a measurement file", "records.fit")
     _add_cell(parser)
     parser.add_argument(
         "--measurements", type=Path, required=True, metavar="FILE", help="the records (CSV)"

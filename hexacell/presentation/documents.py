@@ -8,7 +8,7 @@ from typing import Any
 
 from drivers.interfaces import DeviceIdentity
 from hexacell.application.calibration_run import RunRequest
-from hexacell.application.planning import NextPose, PlanTrial
+from hexacell.application.offline import NextPose, PlanTrial
 from hexacell.application.replay_run import Replay
 from hexacell.campaign.decisions import Finished, Forecast, MeasurePose, StartPoint
 from hexacell.reporting.documents import pose_document

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from hexacell.application.fit import FitResult
+from hexacell.application.offline import FitResult
 from hexacell.identification.diagnostics.pose_accuracy import PoseErrors
 from hexacell.identification.diagnostics.repeatability import Repeatability
 from hexacell.identification.diagnostics.variance_components import NoiseLevel, NoiseLevels

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from drivers.interfaces import DeviceIdentity
-from hexacell.application.planning import NextPose, PlanTrial
+from hexacell.application.offline import NextPose, PlanTrial
 from hexacell.campaign.decisions import Finished, Forecast, MeasurePose, StartPoint
 
 

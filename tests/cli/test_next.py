@@ -107,7 +107,7 @@ def stranger(cell_folder: Any, tmp_path: Path) -> Stranger:
 @pytest.fixture(autouse=True)
 def few(monkeypatch: pytest.MonkeyPatch) -> None:
     """Choose among few poses in this process; the quality of the choice is not under test."""
-    monkeypatch.setattr("hexacell.application.planning.Plan", partial(Plan, candidates=128))
+    monkeypatch.setattr("hexacell.application.offline.Plan", partial(Plan, candidates=128))
 
 
 def test_record_by_record_to_the_end(typed_here, short_cell, stranger):

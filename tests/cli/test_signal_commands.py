@@ -136,7 +136,7 @@ def test_a_bug_gives_a_document_and_a_traceback(monkeypatch, capsys) -> None:
     def mistake(_: Any) -> Any:
         raise ZeroDivisionError("division by zero")
 
-    monkeypatch.setattr(app, "import_module", lambda _: SimpleNamespace(main=mistake))
+    monkeypatch.setattr(app, "import_module", lambda _: SimpleNamespace(demo=mistake))
     with pytest.raises(ZeroDivisionError):
         app.main(["demo", "--json"])
     document = capsys.readouterr().out

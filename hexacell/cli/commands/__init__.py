@@ -1,1 +1,1 @@
-"""One module a command, imported only when that command runs."""
+"""The commands, each imported only when it runs."""

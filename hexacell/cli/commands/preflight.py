@@ -6,7 +6,7 @@ import argparse
 import asyncio
 
 from hexacell.application.calibration_run import preflight
-from hexacell.application.planning import try_plan
+from hexacell.application.offline import try_plan
 from hexacell.cell.loader import load_cell
 from hexacell.cli.console import Console
 from hexacell.errors import ExitCode

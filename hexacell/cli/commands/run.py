@@ -1,22 +1,30 @@
-"""``hexacell run``: the whole job on a cell."""
+"""``hexacell run`` and ``hexacell demo``: the whole job, with progress, signals, keys and its outcome."""
 
 from __future__ import annotations
 
 import argparse
+import sys
 
-from hexacell.application.calibration_run import RunRequest
+from hexacell.application.calibration_run import RunRequest, calibrate, is_unverified
+from hexacell.application.demo import prepare_demo
+from hexacell.campaign.pose_list import pose_list_of
 from hexacell.cell.loader import load_cell
 from hexacell.cli.console import Console
-from hexacell.cli.run_session import run_to_end
-from hexacell.cli.terminal import TerminalOperator, is_interactive
-from hexacell.errors import ExitCode
+from hexacell.cli.progress import RunProgress
+from hexacell.cli.signal_commands import SignalCommands
+from hexacell.cli.terminal import HELP, KeyboardCommands, TerminalOperator, is_interactive
+from hexacell.errors import ExitCode, HexacellError
+from hexacell.presentation.documents import run_document
+from hexacell.presentation.run import UNVERIFIED, clock_notice, closing_lines, demo_opening, resume_hint
 from hexacell.runs.run_folder import find_run, new_run
-from procedures.calibration.workflow import Mode
+from procedures.calibration.workflow import Mode, expected_records
+from procedures.run import events
+from procedures.run.commands import CommandQueue
 from procedures.run.questions import UnattendedOperator
 
 
-def main(options: argparse.Namespace) -> ExitCode:
-    """Calibrate, or check."""
+def run(options: argparse.Namespace) -> ExitCode:
+    """Calibrate a cell, or check it."""
     console = Console(options.json)
     cell = load_cell(options.cell)
     attended = is_interactive() and not options.unattended
@@ -28,10 +36,64 @@ def main(options: argparse.Namespace) -> ExitCode:
         unattended=not attended,
         resume=options.resume is not None,
     )
-    return run_to_end(request, console)
+    return _run_to_end(request, console)
+
+
+def demo(options: argparse.Namespace) -> ExitCode:
+    """Copy a simulated cell into a folder of its own and calibrate it there."""
+    console = Console(options.json)
+    request = prepare_demo(options.folder, options.config)
+    console.print(demo_opening(request.cell.config_path))
+    return _run_to_end(request, console)
 
 
 def _mode(options: argparse.Namespace) -> Mode:
     if options.mode:
         return Mode(options.mode)
     return Mode.CHECK if options.unattended else Mode.OPTIMISE
+
+
+def _run_to_end(request: RunRequest, console: Console) -> ExitCode:
+    """Carry out a run and print its outcome."""
+    factor = request.cell.settings.timing.clock_factor
+    if factor != 1.0:
+        console.print(clock_notice(factor))
+    ended = execute_run(request, console)
+    console.document(run_document(request, ended))
+    for line in closing_lines(request, ended):
+        console.print(line)
+    return ExitCode(ended.exit_code)
+
+
+def execute_run(request: RunRequest, console: Console) -> events.Ended:
+    """Carry out a run with a progress bar.
+
+    Ctrl-C, SIGTERM or SIGHUP ends it after the step in progress, a second Ctrl-C at once.
+
+    Raises:
+        HexacellError: it could not begin, could not continue, or was stopped.
+    """
+    listed = pose_list_of(request.cell)
+    progress = RunProgress(console, expected_records(request.cell.settings, request.mode, listed))
+    signals = SignalCommands(console)
+    try:
+        with progress:
+            return signals.run(_calibrate(request, console, progress, signals.queue))
+    except HexacellError:
+        if progress.has_started:
+            console.print(resume_hint(request))
+        if (progress.has_started or request.resume) and is_unverified(request.folder):
+            console.error(UNVERIFIED)
+        raise
+
+
+async def _calibrate(
+    request: RunRequest, console: Console, progress: RunProgress, queue: CommandQueue
+) -> events.Ended:
+    """Calibrate; a person at a terminal may also type commands."""
+    if not isinstance(request.operator, TerminalOperator):
+        return await calibrate(request, [progress], queue)
+    keys = KeyboardCommands(console, queue, sys.stdin)
+    request.operator.before_question, request.operator.after_question = progress.hide, keys.listen
+    console.print(HELP)
+    return await keys.listen_during(calibrate(request, [progress, keys], queue))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from hexacell.application.planning import NextPose, PlanTrial
+from hexacell.application.offline import NextPose, PlanTrial
 from hexacell.campaign.decisions import Finished, Forecast, MeasurePose, StartPoint
 from hexacell.campaign.dry_run import DryRunResult
 from hexacell.kinematics.pose import Pose

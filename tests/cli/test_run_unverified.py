@@ -6,8 +6,8 @@ import pytest
 
 from hexacell.application.calibration_run import RunRequest
 from hexacell.cell.loader import load_cell
+from hexacell.cli.commands.run import execute_run
 from hexacell.cli.console import Console
-from hexacell.cli.run_session import execute_run
 from hexacell.errors import CellBusy
 from hexacell.runs.run_folder import RunFolder
 from hexacell.storage.cell_lock import cell_lock

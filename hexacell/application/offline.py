@@ -1,4 +1,4 @@
-"""Questions to a plan without a run: the next pose after the records of a file, a trial on robots."""
+"""What a cell file and a measurement file tell without a run: the geometry, the next pose, a dry run."""
 
 from __future__ import annotations
 
@@ -19,8 +19,26 @@ from hexacell.campaign.planner import Plan
 from hexacell.campaign.pose_list import pose_list_of
 from hexacell.cell.loader import Cell
 from hexacell.errors import UsageError
+from hexacell.identification.estimator import identify
+from hexacell.identification.solver.result import Identification
+from hexacell.kinematics.geometry import Geometry
 from hexacell.measurements.records import MeasurementSet
+from hexacell.reporting.assessment import Assessment, assess
 from hexacell.robot_model import robot_of
+
+
+@dataclass(frozen=True, slots=True)
+class FitResult:
+    """An identified geometry beside the drawing, and how far it can be trusted."""
+
+    identified: Identification
+    drawing: Geometry
+    assessed: Assessment
+
+    @property
+    def is_usable(self) -> bool:
+        """Whether the solver converged and nothing refuses the result."""
+        return self.identified.converged and not self.assessed.refused
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,20 +63,30 @@ class PlanTrial:
     target_mm: float | None
 
 
+def fit_measurements(cell: Cell, measurements: MeasurementSet) -> FitResult:
+    """Identify the geometry of a cell's robot from records.
+
+    Raises:
+        IdentifiabilityError: the records cannot determine it.
+        FileError: the controller's config cannot be read.
+    """
+    robot = robot_of(cell)
+    identified = identify(robot.problem(measurements))
+    assessed = assess(cell.settings, robot, measurements, identified)
+    return FitResult(identified, robot.drawing, assessed)
+
+
 def next_pose(cell: Cell, measurements: MeasurementSet, *, rejections: int = 0) -> NextPose:
     """The pose worth measuring after these records.
 
-    Args:
-        cell: the robot, its tolerances, limits and points.
-        measurements: the records so far; may be empty.
-        rejections: poses at the present point that could not be measured.
+    ``rejections`` counts the poses at the present point that could not be measured.
 
     Raises:
         HexacellError: the records do not belong to this cell, or no geometry fits them.
     """
     plan = _plan_of(cell)
-    state = state_of_records(plan, measurements, rejections=rejections)
-    decision = decide(plan, state)
+    state = _state_of_records(plan, measurements, rejections)
+    decision = _decide(plan, state)
     forecast = decision.forecast if isinstance(decision, MeasurePose) else plan.forecast(state)
     return NextPose(decision, forecast)
 
@@ -73,12 +101,8 @@ def _plan_of(cell: Cell) -> Plan:
     return Plan(cell.settings, robot_of(cell), pose_list_of(cell))
 
 
-def state_of_records(plan: Plan, measurements: MeasurementSet, *, rejections: int = 0) -> CampaignState:
-    """The state after the last record: the gauges are at its point, all other points are done.
-
-    Raises:
-        UsageError: a record is of a point that the plan does not have.
-    """
+def _state_of_records(plan: Plan, measurements: MeasurementSet, rejections: int) -> CampaignState:
+    """The state after the last record: the gauges are at its point, all other points are done."""
     for point in measurements.points.tolist():
         if point not in plan.points:
             raise UsageError(
@@ -92,12 +116,8 @@ def state_of_records(plan: Plan, measurements: MeasurementSet, *, rejections: in
     return CampaignState(measurements, last.point, others, last.pose, rejections)
 
 
-def decide(plan: Plan, state: CampaignState) -> StartPoint | MeasurePose | Finished:
-    """What to measure now; where a point is done, at the next one.
-
-    Raises:
-        HexacellError: no geometry fits the records.
-    """
+def _decide(plan: Plan, state: CampaignState) -> StartPoint | MeasurePose | Finished:
+    """What to measure now; where a point is done, at the next one."""
     decision = plan.decide(state)
     if isinstance(decision, FinishPoint):
         leaving = replace(state, point=None, done=state.done | {decision.point}, present=None, rejections=0)

@@ -1,0 +1,40 @@
+"""``hexacell fit`` and ``hexacell next``: what the records in a measurement file tell."""
+
+from __future__ import annotations
+
+import argparse
+
+from hexacell.application.offline import fit_measurements, next_pose
+from hexacell.cell.loader import load_cell
+from hexacell.cli.console import Console
+from hexacell.errors import ExitCode
+from hexacell.measurements.csv_file import read_measurements
+from hexacell.presentation.documents import next_document
+from hexacell.presentation.identification import identification_report
+from hexacell.presentation.layout import wrapped
+from hexacell.presentation.planning import next_pose_text
+from hexacell.reporting.documents import fit_document
+
+
+def fit(options: argparse.Namespace) -> ExitCode:
+    """Identify the geometry and report all that is known of the result."""
+    console = Console(options.json)
+    cell = load_cell(options.cell)
+    result = fit_measurements(cell, read_measurements(options.measurements))
+    console.document(fit_document(result.identified, result.assessed))
+    if not options.json:
+        console.print(identification_report(result))
+    return ExitCode.DONE if result.is_usable else ExitCode.OUT_OF_LIMITS
+
+
+def propose_next(options: argparse.Namespace) -> ExitCode:
+    """Propose the pose worth measuring next, for controllers that hexacell does not drive."""
+    console = Console(options.json)
+    cell = load_cell(options.cell)
+    measurements = read_measurements(options.measurements, allow_partial=True)
+    proposed = next_pose(cell, measurements, rejections=options.refused)
+    console.document(next_document(proposed))
+    if not options.json:
+        for line in next_pose_text(proposed):
+            console.print(wrapped(line))
+    return ExitCode.DONE

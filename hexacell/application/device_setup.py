@@ -9,7 +9,7 @@ from pathlib import Path
 
 from drivers.interfaces import DeviceIdentity
 from drivers.serial.shared_port import SharedSerialPorts
-from drivers.stop_input.stop_input import stop_input_of
+from drivers.stop_input import stop_input_of
 from drivers.wire_trace import WireTrace
 from hexacell.cell.loader import Cell
 from hexacell.cell.model import CellSettings

@@ -19,7 +19,7 @@ from drivers.interfaces import (
     StopInput,
     Thermometer,
 )
-from drivers.stop_input.stop_input import CombinedStopInput
+from drivers.stop_input import CombinedStopInput
 from hexacell.cell.devices import GaugeAxis
 from hexacell.errors import HexacellError, SeveralErrors, flatten_errors
 from procedures.devices.live_values import LiveValues

@@ -18,7 +18,7 @@ from typing import TypeVar
 import numpy as np
 
 from drivers.interfaces import EncoderSample
-from drivers.stop_input.stop_input import SUBJECT as STOP_LINE
+from drivers.stop_input import SUBJECT as STOP_LINE
 from hexacell.cell.model import CellSettings
 from hexacell.clock import CellClock
 from hexacell.kinematics.rotations import Array

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 
 from drivers.errors import GaugeAtEnd
-from drivers.stop_input.stop_input import SUBJECT as STOP_LINE
+from drivers.stop_input import SUBJECT as STOP_LINE
 from hexacell.kinematics.rotations import Array
 from hexacell.storage import atomic_files
 from procedures.guards.polling import DevicePoller, PolledDevices

@@ -9,10 +9,8 @@ programs, and for cells without such a contact: while it exists, nothing moves.
 from __future__ import annotations
 
 import termios
-from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import Protocol
 
 import serial
 
@@ -25,49 +23,6 @@ SUBJECT = "stop line"
 _OUTPUTS = {"dsr": "DTR", "cts": "RTS"}
 
 
-class StopSource(Protocol):
-    """One source that can forbid motion; ``device`` is the port and line it is wired to, if any."""
-
-    device: str
-
-    def open(self) -> None:
-        """Connect; it is closed again even if this fails."""
-        ...
-
-    def active_reason(self) -> str | None:
-        """Why motion is forbidden, or nothing."""
-        ...
-
-    def close(self) -> None:
-        """Release it."""
-        ...
-
-
-class StopFile:
-    """Forbids motion while a file exists, or while that cannot be determined."""
-
-    device = ""
-
-    def __init__(self, path: Path) -> None:
-        self._path = path
-
-    def open(self) -> None:
-        """Nothing to do."""
-
-    def active_reason(self) -> str | None:
-        """The reason, if the file exists."""
-        try:
-            self._path.lstat()
-        except FileNotFoundError:
-            return None
-        except OSError as error:
-            return f"{self._path} cannot be checked: {error.strerror}"
-        return f"{self._path} exists"
-
-    def close(self) -> None:
-        """Nothing to do."""
-
-
 class StopContact:
     """Forbids motion while a contact on a serial port is open; ``line`` is dsr or cts."""
 
@@ -78,7 +33,7 @@ class StopContact:
         self._port: serial.Serial | None = None
 
     def open(self) -> None:
-        """Open the port and set its outputs.
+        """Open the port and set its outputs; :meth:`close` it even if this fails.
 
         Raises:
             DeviceError: The port is absent, in use, or has no such lines.
@@ -111,42 +66,48 @@ class StopContact:
 
 
 class CombinedStopInput:
-    """A :class:`drivers.interfaces.StopInput` made of several sources: any of them forbids motion."""
+    """A :class:`drivers.interfaces.StopInput`: a file and a contact, each of which forbids motion."""
 
-    def __init__(self, sources: Sequence[StopSource] = ()) -> None:
-        self._sources = tuple(sources)
+    def __init__(self, file: Path | None = None, contact: StopContact | None = None) -> None:
+        self._file = file
+        self._contact = contact
 
     async def open(self) -> DeviceIdentity | None:
-        """Connect all of them, active or not; the identity names those that are wired.
-
-        Raises:
-            HexacellError: One cannot be connected.
-        """
+        """Connect the contact, open or not; the identity names the port and line it is wired to."""
+        if self._contact is None:
+            return None
         try:
-            for source in self._sources:
-                source.open()
+            self._contact.open()
         except HexacellError:
-            await self.close()
+            self._contact.close()
             raise
-        devices = [source.device for source in self._sources if source.device]
-        return DeviceIdentity(SUBJECT, "contact", ", ".join(devices)) if devices else None
+        return DeviceIdentity(SUBJECT, "contact", self._contact.device)
 
     async def active_reason(self) -> str | None:
         """Why motion is forbidden now, or nothing."""
-        reasons = [source.active_reason() for source in self._sources]
-        return "; ".join(reason for reason in reasons if reason) or None
+        of_file = None if self._file is None else _file_reason(self._file)
+        of_contact = None if self._contact is None else self._contact.active_reason()
+        return "; ".join(filter(None, (of_file, of_contact))) or None
 
     async def close(self) -> None:
-        """Release all of them; closing twice is harmless."""
-        for source in self._sources:
-            source.close()
+        """Release the contact; closing twice is harmless."""
+        if self._contact is not None:
+            self._contact.close()
+
+
+def _file_reason(path: Path) -> str | None:
+    """The reason, if the file exists or that cannot be determined."""
+    try:
+        path.lstat()
+    except FileNotFoundError:
+        return None
+    except OSError as error:
+        return f"{path} cannot be checked: {error.strerror}"
+    return f"{path} exists"
 
 
 def stop_input_of(settings: GuardSettings, folder: Path) -> CombinedStopInput:
     """The stop input of a cell file in ``folder``, from its section [guards]."""
-    sources: list[StopSource] = []
-    if settings.stop_file is not None:
-        sources.append(StopFile(folder / settings.stop_file))
-    if settings.stop_port is not None:
-        sources.append(StopContact(settings.stop_port, settings.stop_contact))
-    return CombinedStopInput(sources)
+    file = None if settings.stop_file is None else folder / settings.stop_file
+    port = settings.stop_port
+    return CombinedStopInput(file, None if port is None else StopContact(port, settings.stop_contact))

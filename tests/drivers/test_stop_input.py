@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 import serial
 
-from drivers.stop_input.stop_input import CombinedStopInput, StopContact, StopFile, stop_input_of
+from drivers.stop_input import CombinedStopInput, StopContact, stop_input_of
 from hexacell.cell.limits import GuardSettings
 from hexacell.errors import DeviceError, FileError
 
@@ -70,12 +70,14 @@ async def test_a_file_forbids_while_it_exists(tmp_path: Path) -> None:
 
 async def test_a_link_that_leads_nowhere_is_a_file_too(tmp_path: Path) -> None:
     (tmp_path / "stop").symlink_to("nowhere")
-    assert StopFile(tmp_path / "stop").active_reason() is not None
+    assert await CombinedStopInput(tmp_path / "stop").active_reason() is not None
 
 
 async def test_a_file_that_cannot_be_looked_for_forbids(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
-    assert "cannot be checked" in (StopFile(tmp_path / "file" / "stop").active_reason() or "")
+    assert "cannot be checked" in (
+        await CombinedStopInput(tmp_path / "file" / "stop").active_reason() or ""
+    )
 
 
 @pytest.mark.parametrize("contact", ["dsr", "cts"])
@@ -128,7 +130,7 @@ async def test_a_port_without_modem_lines_is_refused_or_forbids() -> None:
     import os
 
     near, far = os.openpty()
-    line = CombinedStopInput([StopContact(os.ttyname(far), "dsr")])
+    line = CombinedStopInput(contact=StopContact(os.ttyname(far), "dsr"))
     try:
         try:
             await line.open()

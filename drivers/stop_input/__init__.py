@@ -1,1 +1,0 @@
-"""The stop input: a contact or a file that forbids motion."""

@@ -22,7 +22,7 @@ from procedures.engine.step_executor import StepExecutor
 from procedures.run import events
 from procedures.run.questions import QuestionBroker, ask_recovery
 from procedures.run.state import RunState
-from procedures.run.steps import Compute, SetKey, Step
+from procedures.run.steps import Compute, SetKey, Step, StepOfSet
 from procedures.run.trips import Guard, GuardTripped, Trip, causes_of
 
 KINDS: Mapping[type[HexacellError], FailureKind] = {
@@ -219,8 +219,8 @@ def _invalidated(keys: Sequence[SetKey], reason: str) -> list[events.SetInvalida
 
 def _failed_sets(failure: events.Failed, state: RunState) -> list[SetKey]:
     """The set of the failed step; all open sets if it has none."""
-    key = getattr(failure.step, "at", None)
-    return [one for one in _open_sets(state) if key is None or one == key]
+    opened, step = _open_sets(state), failure.step
+    return [key for key in opened if key == step.at] if isinstance(step, StepOfSet) else opened
 
 
 def _open_sets(state: RunState) -> list[SetKey]:

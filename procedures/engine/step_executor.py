@@ -147,12 +147,8 @@ class StepExecutor:
                 raise
             return events.SetInvalidated(at=step.at, reason=str(error))
         await self._check_gauges()
-        return check_reference(step.at, state.set(step.at).samples[0].reading, reading, self.agreement_mm)
-
-    @property
-    def agreement_mm(self) -> float:
-        """The largest change of a reference with which a set goes on after an interruption."""
-        return self.cell.settings.recovery.agreement_mm
+        limit_mm = self.cell.settings.recovery.agreement_mm
+        return check_reference(step.at, state.set(step.at).samples[0].reading, reading, limit_mm)
 
     async def _check_gauges(self) -> None:
         checks = [mounted.gauge.check() for mounted in self.devices.gauges]

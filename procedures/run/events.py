@@ -16,16 +16,15 @@ from hexacell.cell.fields import GeometryDocument
 from hexacell.cell.recovery import Action, FailureKind
 from hexacell.kinematics.mechanism import Branch
 from hexacell.reporting.result import IdentificationResult
-from procedures.run.steps import Frozen, SetKey, SixNumbers, Step, ThreeNumbers
+from procedures.run.steps import Frozen, SetKey, SixNumbers, Step, StepOfSet, ThreeNumbers
 from procedures.run.trips import Guard, Trip
 
 
 def place_of(step: Step | None) -> str:
-    """The set that a step belongs to, or the step's own key."""
+    """Where failures are counted: the set of a step, or the key of a step that belongs to none."""
     if step is None:
         return "deciding"
-    key = getattr(step, "at", None)
-    return step.key if key is None else str(key)
+    return str(step.at) if isinstance(step, StepOfSet) else step.key
 
 
 class RunStarted(Frozen):
@@ -257,11 +256,6 @@ class Failed(Frozen):
     reason: str
     action: Action
     asked: bool = False
-
-    @property
-    def place(self) -> str:
-        """Where attempts are counted: the set, or the step that belongs to none."""
-        return place_of(self.step)
 
 
 class CommandRejected(Frozen):

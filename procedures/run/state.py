@@ -152,13 +152,7 @@ def apply(state: RunState, event: events.Event) -> RunState:  # noqa: C901, PLR0
             applied = replace(state, provisional=event, provisional_active=True, config_write_pending=False)
             return _without_position(applied)
         case events.ProvisionalReverted():
-            return replace(
-                state,
-                provisional_active=False,
-                config_write_pending=False,
-                at_pose=None,
-                position_unknown=True,
-            )
+            return _without_position(replace(state, provisional_active=False, config_write_pending=False))
         case events.Located():
             return replace(state, at_pose=None, off_plan=True, target=event.pose, position_unknown=False)
         case events.Arrived():
@@ -236,17 +230,14 @@ def _unverified(state: RunState, but: SetKey | None = None) -> RunState:
 
 
 def _failed(state: RunState, event: events.Failed) -> RunState:
-    where = (event.failure.value, event.place)
+    where = (event.failure.value, events.place_of(event.step))
     counted = replace(state, failures={**state.failures, where: event.attempt})
+    is_off_plate = event.failure is FailureKind.GAUGE_AT_END and event.action is not Action.REDO_SET
     match event.step:
         # The ball left its plate on the move to a chosen pose: another pose is chosen.
-        case Move(at=at, orientation=orientation) if _is_plate(event) and at.phase is Phase.IDENTIFY:
+        case Move(at=at, orientation=orientation) if is_off_plate and at.phase is Phase.IDENTIFY:
             counted = _with_set(counted, at, counted.set(at).with_rejection(orientation))
     return _unverified(counted) if event.action is Action.MEASURE_AGAIN else counted
-
-
-def _is_plate(event: events.Failed) -> bool:
-    return event.failure is FailureKind.GAUGE_AT_END and event.action is not Action.REDO_SET
 
 
 def _rolled_back(state: RunState) -> RunState:

@@ -47,10 +47,10 @@ class Expectation(Frozen):
     forecast: Forecast | None = None
 
 
-class Locate(Frozen):
-    """Ask the controller for its pose: no path can be checked from an unknown one."""
+class BaseStep(Frozen):
+    """A step; ``key`` is its stable name."""
 
-    kind: Literal["locate"] = "locate"
+    kind: str
 
     @property
     def key(self) -> str:
@@ -58,22 +58,40 @@ class Locate(Frozen):
         return self.kind
 
 
-class Move(Frozen):
-    """Send the robot to a pose; the first orientation of a set is its reference.
+class StepOfSet(BaseStep):
+    """A step within a set."""
 
-    Orientation 0 is a waypoint, at which nothing is measured.
-    """
-
-    kind: Literal["move"] = "move"
     at: SetKey
-    orientation: int
-    pose: SixNumbers
-    expected: Expectation | None = None
 
     @property
     def key(self) -> str:
         """Stable name of the step."""
-        return f"{self.at}/o{self.orientation:02d}/move"
+        return f"{self.at}/{self.kind}"
+
+
+class StepAtPose(StepOfSet):
+    """A step at one pose of a set; the first orientation is its reference."""
+
+    orientation: int
+    pose: SixNumbers
+
+    @property
+    def key(self) -> str:
+        """Stable name of the step."""
+        return f"{self.at}/o{self.orientation:02d}/{self.kind}"
+
+
+class Locate(BaseStep):
+    """Ask the controller for its pose: no path can be checked from an unknown one."""
+
+    kind: Literal["locate"] = "locate"
+
+
+class Move(StepAtPose):
+    """Send the robot to a pose. Orientation 0 is a waypoint, at which nothing is measured."""
+
+    kind: Literal["move"] = "move"
+    expected: Expectation | None = None
 
     @property
     def target(self) -> Pose:
@@ -81,66 +99,35 @@ class Move(Frozen):
         return Pose(*self.pose)
 
 
-class Place(Frozen):
+class Place(StepOfSet):
     """Have the gauges put around the ball, plungers in the middle of their travel."""
 
     kind: Literal["place"] = "place"
-    at: SetKey
     pose: SixNumbers
 
-    @property
-    def key(self) -> str:
-        """Stable name of the step."""
-        return f"{self.at}/place"
 
-
-class Sample(Frozen):
+class Sample(StepAtPose):
     """Wait for settled readings and record them; the first of a set is the gauges' zero."""
 
     kind: Literal["sample"] = "sample"
-    at: SetKey
-    orientation: int
-    pose: SixNumbers
-
-    @property
-    def key(self) -> str:
-        """Stable name of the step."""
-        return f"{self.at}/o{self.orientation:02d}/sample"
 
 
-class Revisit(Frozen):
+class Revisit(StepOfSet):
     """Back at a set's reference after an interruption: see whether the gauges kept their zero."""
 
     kind: Literal["revisit"] = "revisit"
-    at: SetKey
-
-    @property
-    def key(self) -> str:
-        """Stable name of the step."""
-        return f"{self.at}/revisit"
 
 
-class CloseSet(Frozen):
+class CloseSet(StepOfSet):
     """Back at the set's reference pose: read again; the difference is drift."""
 
     kind: Literal["close"] = "close"
-    at: SetKey
-
-    @property
-    def key(self) -> str:
-        """Stable name of the step."""
-        return f"{self.at}/close"
 
 
-class Compute(Frozen):
+class Compute(BaseStep):
     """A step that moves nothing."""
 
     kind: Literal["lend", "take back", "identify", "propose", "commit", "judge", "roll back"]
-
-    @property
-    def key(self) -> str:
-        """Stable name of the step."""
-        return self.kind
 
 
 Step = Annotated[Locate | Move | Place | Sample | Revisit | CloseSet | Compute, Field(discriminator="kind")]

@@ -65,24 +65,24 @@ class Devices:
     async def read_gauges(self) -> list[GaugeReading]:
         """One reading of each gauge, in the order of ``gauges``."""
         gauges = [mounted.gauge for mounted in self.gauges]
-        calls = [self.live.gauge(gauge.name).of(gauge.read()) for gauge in gauges]
+        calls = [self.live.gauge(gauge.name).of(gauge.read) for gauge in gauges]
         return await gather_errors("gauges cannot be read", calls)
 
     async def read_gauge_once(self, gauge: Gauge) -> GaugeReading:
         """See :meth:`Gauge.read_once`."""
-        return await self.live.gauge(gauge.name).of(gauge.read_once())
+        return await self.live.gauge(gauge.name).of(gauge.read_once)
 
     async def read_encoders(self) -> EncoderSample:
         """See :meth:`EncoderBank.read`."""
-        return await self.live.encoders.of(self.encoders.read())
+        return await self.live.encoders.of(self.encoders.read)
 
     async def controller_status(self) -> ControllerStatus:
         """See :meth:`Controller.status`."""
-        return await self.live.controller.of(self.controller.status())
+        return await self.live.controller.of(self.controller.status)
 
     async def stop_reason(self) -> str:
         """Why motion is forbidden; empty while it is not."""
-        return await self.live.stop_reason.of(self._stop_reason())
+        return await self.live.stop_reason.of(self._stop_reason)
 
     async def close(self) -> None:
         """Let all of them go, whatever happens to one."""

@@ -41,10 +41,10 @@ class LiveValue(Generic[T]):
         """How long ago the device answered, s; infinite before the first answer."""
         return self._live.now() - self._at_s
 
-    async def of(self, asking: Awaitable[T]) -> T:
-        """Wait for an answer and keep it, or why there is none."""
+    async def of(self, read: Callable[[], Awaitable[T]]) -> T:
+        """Ask for a value and keep it, or why there is none."""
         try:
-            value = await asking
+            value = await read()
         except HexacellError as error:
             self.problem = str(error)
             raise

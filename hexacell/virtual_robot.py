@@ -11,7 +11,7 @@ from hexacell.kinematics.inverse import inverse_kinematics
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.rotations import Array, Mask
 from hexacell.kinematics.sensitivity import singularity_margin
-from hexacell.measurements.records import Record
+from hexacell.measurements.records import Record, deviation_of, joints_of
 from hexacell.motion.trajectory import interpolate_line, trace_path
 from hexacell.robot_model import Robot
 
@@ -124,9 +124,8 @@ class VirtualRobot:
         joints = self._joints(self._commanded)[0]
         joints = joints + model.noise.encoder_mm * self._random.standard_normal(6)
         self._zero = shown if self._zero is None else self._zero
-        q1, q2, q3, q4, q5, q6 = (float(value) for value in joints)
-        x, y, z = (float(value) for value in shown - self._zero)
-        return Record(point, orientation, self.command, (q1, q2, q3, q4, q5, q6), (x, y, z))
+        deviation = deviation_of(shown - self._zero)
+        return Record(point, orientation, self.command, joints_of(joints), deviation)
 
     @property
     def command(self) -> Pose:

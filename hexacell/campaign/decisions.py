@@ -8,9 +8,7 @@ from typing import Literal
 from pydantic import BaseModel, ConfigDict
 
 from hexacell.kinematics.pose import Pose
-from hexacell.measurements.records import Joints, MeasurementSet
-
-Three = tuple[float, float, float]
+from hexacell.measurements.records import Deviation, Joints, MeasurementSet
 
 
 @dataclass(frozen=True)
@@ -99,8 +97,8 @@ class MeasurePose:
     orientation: int
     pose: Pose
     joints: Joints
-    deviation: Three
-    sigma: Three
+    deviation: Deviation
+    sigma: Deviation
     gain: float
     forecast: Forecast | None
     via: tuple[Pose, ...] = ()

@@ -69,7 +69,7 @@ def _out_of_travel(plan: Plan, name: str, point: int, pose: Pose) -> Iterator[He
 def too_few_records(plan: Plan) -> Iterator[HexacellError]:
     """That points, orientations and budget give fewer equations than there are parameters."""
     unknowns = len(plan.robot.mechanism.convention.free_names())
-    planned = plan.planned(CampaignState())
+    planned = plan.forecaster.planned(CampaignState())
     equations = sum(3 * (records - 1) for records in planned.values())
     if equations >= unknowns:
         return
@@ -181,9 +181,8 @@ def _points_without_poses(plan: Plan) -> Iterator[list[HexacellError]]:
 
 def _no_safe_pose(plan: Plan, belief: RobotBelief, point: int) -> HexacellError | None:
     """The reason if no record after a point's reference is possible."""
-    state = CampaignState(point=point, present=plan.reference_pose(point))
     try:
-        plan.chooser.choose(belief, _expected_zero(plan, belief, point), state)
+        plan.chooser.choose(belief, _expected_zero(plan, belief, point), CampaignState(point=point))
     except LimitError as error:
         travel = plan.settings.limits.gauge_travel_mm
         return UsageError(

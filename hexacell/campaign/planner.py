@@ -21,10 +21,8 @@ from hexacell.campaign.decisions import (
     Forecast,
     MeasurePose,
     StartPoint,
-    Three,
 )
-from hexacell.campaign.gain_forecast import Forecaster
-from hexacell.campaign.information_forecast import PlannedSets
+from hexacell.campaign.forecast import Forecaster, select_sets
 from hexacell.campaign.pose_chooser import PoseChooser
 from hexacell.campaign.pose_list import PoseList
 from hexacell.campaign.recursive_estimator import OnlineEstimate, OnlineEstimator
@@ -36,8 +34,7 @@ from hexacell.experiment_design.candidates import ReachableTargets
 from hexacell.experiment_design.travel_monte_carlo import orientation_sigma
 from hexacell.identification.belief import RobotBelief
 from hexacell.kinematics.pose import Pose, PoseBatch
-from hexacell.kinematics.rotations import Array
-from hexacell.measurements.records import Joints
+from hexacell.measurements.records import deviation_of, joints_of
 from hexacell.motion.path_check import is_clear
 from hexacell.robot_model import Robot
 
@@ -94,15 +91,11 @@ class Plan:
 
     def forecast(self, state: CampaignState) -> Forecast | None:
         """The gain of further records; None without task poses."""
-        return self._forecaster.forecast(state, self.estimate(state))
-
-    def planned(self, state: CampaignState) -> dict[int, int]:
-        """How many more records each point will get, as far as the budget goes."""
-        return self._forecaster.planned(state)
+        return self.forecaster.forecast(state, self.estimate(state).belief)
 
     def predicted_belief(self) -> RobotBelief:
         """What will be known at the end, if the robot is as drawn."""
-        return self._forecaster.predicted_belief(self.robot.belief(), CampaignState())
+        return self.forecaster.predicted_belief(self.robot.belief(), CampaignState())
 
     def poses_at(self, point: int) -> tuple[Pose, ...]:
         """The poses of a point that are given beforehand, its reference first."""
@@ -141,26 +134,27 @@ class Plan:
         return Task.of(self.settings, self.robot, self.robot.belief())
 
     @cached_property
-    def planned_sets(self) -> PlannedSets:
+    def planned_sets(self) -> tuple[PoseBatch, ...]:
         """A set of poses at each point, as a forecast of those that will be selected."""
         if self.pose_list is not None:
-            return PlannedSets(tuple(map(self.robot.from_commands, self.pose_list.poses)))
+            return tuple(map(self.robot.from_commands, self.pose_list.poses))
         plan = self.settings.identification
         balls = self.robot.from_commands(Pose(*point) for point in plan.points).positions
-        return PlannedSets.select(self.robot.belief(), balls, plan.orientations, plan.seed)
+        return select_sets(self.robot.belief(), balls, plan.orientations, plan.seed)
+
+    @cached_property
+    def forecaster(self) -> Forecaster:
+        """Forecasts what further records gain."""
+        sizes = {point: self.records_at(point) for point in self.points}
+        return Forecaster(sizes, self.budget, self.task, lambda: self.planned_sets)
 
     @cached_property
     def _estimator(self) -> OnlineEstimator:
         return OnlineEstimator(self.robot)
 
     @cached_property
-    def _forecaster(self) -> Forecaster:
-        sizes = {point: self.records_at(point) for point in self.points}
-        return Forecaster(sizes, self.budget, self.task, lambda: self.planned_sets)
-
-    @cached_property
     def _stopping(self) -> StoppingRules:
-        return StoppingRules(self.settings, self.budget, self._forecaster, self._estimator)
+        return StoppingRules(self.settings, self.forecaster, self._estimator)
 
     def _between_points(self, state: CampaignState) -> Decision:
         if reason := self._stopping.end_of_campaign(state):
@@ -179,7 +173,7 @@ class Plan:
         plan = self.settings.identification
         if not plan.least_gain_mm and not plan.choose_points:
             return points
-        ranking = self._forecaster.rank_points(state, self.estimate(state), points)
+        ranking = self.forecaster.rank_points(state, self.estimate(state).belief, points)
         worthwhile = [point for point in points if ranking.gains_mm[point] >= plan.least_gain_mm]
         return [ranking.best] if plan.choose_points and ranking.best in worthwhile else worthwhile
 
@@ -195,19 +189,19 @@ class Plan:
 
     def _next_pose(self, state: CampaignState, point: int) -> MeasurePose:
         estimate = self.estimate(state)
-        zero = estimate.gauge_zero(point)
-        selected, via = self.chooser.choose_with_path(estimate.belief, zero, state)
+        belief = estimate.belief
+        selected, via = self.chooser.choose(belief, estimate.gauge_zero(point), state)
         base = self.robot.frames.base.T
         covariance = base @ np.diag(selected.sigma**2) @ base.T
         return MeasurePose(
             point=point,
             orientation=state.records_at(point) + 1,
             pose=self.robot.to_command(selected.command),
-            joints=_joints(selected.joints),
-            deviation=_three(base @ selected.deviation),
-            sigma=_three(np.sqrt(np.diag(covariance))),
+            joints=joints_of(selected.joints),
+            deviation=deviation_of(base @ selected.deviation),
+            sigma=deviation_of(np.sqrt(np.diag(covariance))),
             gain=selected.gain,
-            forecast=self._forecaster.forecast(state, estimate, selected) if self.with_forecast else None,
+            forecast=self.forecaster.forecast(state, belief, selected) if self.with_forecast else None,
             via=via,
         )
 
@@ -227,14 +221,4 @@ class Plan:
         joints = self.robot.mechanism.inverse(
             self.robot.controller, self.robot.branch, PoseBatch.of([pose])
         )
-        return StartPoint(point, pose, _joints(joints[0]))
-
-
-def _joints(values: Array) -> Joints:
-    q1, q2, q3, q4, q5, q6 = (float(value) for value in values)
-    return q1, q2, q3, q4, q5, q6
-
-
-def _three(values: Array) -> Three:
-    x, y, z = (float(value) for value in values)
-    return x, y, z
+        return StartPoint(point, pose, joints_of(joints[0]))

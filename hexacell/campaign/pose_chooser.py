@@ -54,12 +54,15 @@ class PoseChooser:
     task: Task
     candidates: int
 
-    def choose_with_path(
+    def choose(
         self, belief: RobotBelief, zero: GaugeZero, state: CampaignState
     ) -> tuple[SelectedPose, tuple[Pose, ...]]:
-        """As :meth:`choose`, and the poses to pass on the path from where the robot is now.
+        """The pose to measure next, and the poses to pass on the path from where the robot is now.
 
-        These are in the controller's frames.
+        The pose is in the mechanism's frame convention, the path in the controller's frames. The pose
+        can be reached from the pose of the last record, or else from the reference, wherever the robot
+        is now: an interrupted run measures the same poses as an undisturbed one. Where that is not
+        known, there is no path.
 
         Raises:
             LimitError: there is no pose, or no path to it, within the limits.
@@ -79,17 +82,6 @@ class PoseChooser:
         if route is None:
             raise LimitError("no safe straight line starts here")
         return selected, tuple(via[row] for row in route)
-
-    def choose(self, belief: RobotBelief, zero: GaugeZero, state: CampaignState) -> SelectedPose:
-        """The pose to measure next, in the mechanism's frame convention.
-
-        It can be reached from the pose of the last record, or else from the reference, wherever the
-        robot is now: an interrupted run measures the same poses as an undisturbed one.
-
-        Raises:
-            LimitError: there is none within the limits.
-        """
-        return self._choose(belief, zero, state)[0]
 
     def _choose(
         self, belief: RobotBelief, zero: GaugeZero, state: CampaignState

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from hexacell.campaign.budget import Budget
 from hexacell.campaign.decisions import CampaignState, MeasurePose
-from hexacell.campaign.gain_forecast import Forecaster
+from hexacell.campaign.forecast import Forecaster
 from hexacell.campaign.recursive_estimator import OnlineEstimator
 from hexacell.cell.model import CellSettings
 from hexacell.identification.problem.data_requirements import is_determined
@@ -20,7 +19,6 @@ class StoppingRules:
     """The rules of one plan. Each gives the reason to stop, or none."""
 
     settings: CellSettings
-    budget: Budget
     forecaster: Forecaster
     estimator: OnlineEstimator
 
@@ -57,8 +55,9 @@ class StoppingRules:
 
     def _budget_used(self, state: CampaignState, *, points: int, records: int) -> str | None:
         """That so many more points and records cannot be paid."""
-        left = self.budget.records_left(len(state.measurements), state.begun_points + points)
-        return None if left >= records else f"the budget of {self.budget.description} is used"
+        budget = self.forecaster.budget
+        left = budget.records_left(len(state.measurements), state.begun_points + points)
+        return None if left >= records else f"the budget of {budget.description} is used"
 
     def _target_reached(self, state: CampaignState) -> str | None:
         """That the accuracy asked for is reached."""
@@ -68,7 +67,7 @@ class StoppingRules:
         estimate = self.estimator.estimate(state.measurements)
         if estimate.identification is None or not is_determined(estimate.identification.problem):
             return None
-        worst = self.forecaster.worst_error(estimate)
+        worst = self.forecaster.worst_error(estimate.belief)
         if worst is None or worst > target:
             return None
         return f"the predicted error at the task poses is {worst:.3f} mm, within {target:g}"
@@ -78,6 +77,6 @@ class StoppingRules:
         others = [other for other in self.forecaster.sizes if other not in state.done and other != point]
         if not self.settings.identification.choose_points or not others:
             return None
-        estimate = self.estimator.estimate(state.measurements)
-        best = self.forecaster.rank_points(state, estimate, [point, *others]).best
+        belief = self.estimator.estimate(state.measurements).belief
+        best = self.forecaster.rank_points(state, belief, [point, *others]).best
         return None if best == point else f"point {best} gains more in the same time"

@@ -54,25 +54,6 @@ class ReachableTargets:
         return ReachableTargets(self.poses[rows], self.joints[rows])
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Candidates:
-    """Targets (n) that the robot can be commanded to.
-
-    Attributes:
-        targets: poses and joint variables of the estimated robot.
-        commands: poses that make the controller, with its own geometry, go to these joint variables.
-    """
-
-    targets: ReachableTargets
-    commands: PoseBatch
-
-    def __len__(self) -> int:
-        return len(self.targets)
-
-    def __getitem__(self, rows: Mask | NDArray[np.intp]) -> Candidates:
-        return Candidates(self.targets[rows], self.commands[rows])
-
-
 def orientations(
     count: int, tilt: float, seed: int, amplitudes: Amplitudes = Amplitudes.ALL_SCALES
 ) -> Array:
@@ -137,11 +118,11 @@ def outcomes_of(belief: RobotBelief, commands: PoseBatch) -> tuple[ReachableTarg
     return targets[clear], rows[clear]
 
 
-def reachable(belief: RobotBelief, poses: PoseBatch) -> Candidates:
-    """Those of the poses that the estimated robot can be commanded to within its limits."""
+def reachable(belief: RobotBelief, poses: PoseBatch) -> tuple[ReachableTargets, PoseBatch]:
+    """Those of the poses that the estimated robot can be commanded to within its limits, and how."""
     targets = reachable_targets(belief, poses)
     commands, found = commands_for(belief, targets)
-    return Candidates(targets, commands)[found]
+    return targets[found], commands[found]
 
 
 def within_limits(limits: Limits, poses: PoseBatch, joints: Array) -> Mask:
@@ -162,4 +143,4 @@ def workspace_poses(belief: RobotBelief, points: Array) -> PoseBatch:
     rotated = rotations.from_vector(vectors)
     positions = np.repeat(points, len(rotated), axis=0)
     poses = PoseBatch(positions, np.tile(rotated, (len(points), 1, 1)))
-    return reachable(belief, poses).targets.poses
+    return reachable(belief, poses)[0].poses

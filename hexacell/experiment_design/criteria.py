@@ -1,9 +1,10 @@
 """Criteria of optimal experiment design: what a record would be worth.
 
 A record with Jacobian H against its point's reference and covariance V changes the covariance C of the
-parameters to ``C - C H^T (H C H^T + V)^-1 H C``, which is known before it is measured. Records are
-chosen one at a time, each the best beside those taken (Fedorov, Theory of Optimal Experiments, 1972;
-Atkinson & Donev, Optimum Experimental Designs, 1992), for one of the criteria
+parameters to ``C - C H^T S^-1 H C`` with the innovation covariance ``S = H C H^T + V`` (the Kalman
+update), which is known before it is measured. Records are chosen one at a time, each the best beside
+those taken (Fedorov, Theory of Optimal Experiments, 1972; Atkinson & Donev, Optimum Experimental Designs,
+1992), for one of the criteria
 
 - D: the volume of the confidence ellipsoid, ``log det C``;
 - A: the sum of the variances of all parameters, ``tr C``;
@@ -46,13 +47,36 @@ class Criterion:
             jacobian: of the records (n, 3, p).
             noise: covariance of the records themselves (n, 3, 3), mm^2.
         """
-        crossing = jacobian @ covariance
-        total = crossing @ np.swapaxes(jacobian, -1, -2) + noise
         if self.weight is None:
+            total = innovation_covariance(covariance, jacobian, noise)
             return np.asarray(0.5 * (np.linalg.slogdet(total)[1] - np.linalg.slogdet(noise)[1]))
-        factor = np.linalg.solve(np.linalg.cholesky(total), crossing)
-        gain: Array = np.einsum("nij,jk,nik->n", factor, self.weight, factor, optimize=True)
+        factors = update_factors(covariance, jacobian, noise)
+        gain: Array = np.einsum("nij,jk,nik->n", factors, self.weight, factors, optimize=True)
         return gain
 
 
 D_OPTIMAL = Criterion()
+
+
+def innovation_covariance(covariance: Array, jacobian: Array, noise: Array) -> Array:
+    """Covariance S (n, 3, 3), mm^2, of n predicted deviations; arguments as of :meth:`Criterion.gain`."""
+    return jacobian @ covariance @ np.swapaxes(jacobian, -1, -2) + noise
+
+
+def update_factors(covariance: Array, jacobian: Array, noise: Array) -> Array:
+    """Factors F (n, 3, p): each of n records would change the covariance C to ``C - F^T F``."""
+    root = np.linalg.cholesky(innovation_covariance(covariance, jacobian, noise))
+    return np.linalg.solve(root, jacobian @ covariance)
+
+
+def covariance_update(covariance: Array, jacobian: Array, noise: Array) -> Array:
+    """A covariance (p, p) after one record of Jacobian (3, p) and covariance (3, 3)."""
+    crossing = covariance @ jacobian.T
+    after: Array = covariance - crossing @ np.linalg.solve(jacobian @ crossing + noise, crossing.T)
+    return 0.5 * (after + after.T)
+
+
+def add_information(covariance: Array, information: Array) -> Array:
+    """A covariance (p, p) after records that add ``information`` (p, p), the inverse of a covariance."""
+    after: Array = np.linalg.inv(np.linalg.inv(covariance) + information)
+    return 0.5 * (after + after.T)

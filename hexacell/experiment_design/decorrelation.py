@@ -1,10 +1,7 @@
 """The record that would best separate two parameters whose estimates are strongly correlated.
 
 One more record is tried at each point measured so far: the level platform tilted about x or y, or rotated
-about z. The covariance C after it is predicted from the record's Jacobian H, relative to the point's
-reference, and its covariance V (Kalman update):
-
-    C' = C - C H^T (H C H^T + V)^-1 H C = C - F^T F.
+about z. The covariance after it is predicted as in :mod:`hexacell.experiment_design.criteria`.
 """
 
 from __future__ import annotations
@@ -14,11 +11,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hexacell.experiment_design.candidates import Candidates, reachable
+from hexacell.experiment_design.candidates import reachable
+from hexacell.experiment_design.criteria import update_factors
 from hexacell.experiment_design.predicted_records import (
     SAFETY_SIGMAS,
     TRAVEL_SHARE,
-    GaugeZero,
+    PredictedRecords,
     estimate_gauge_zero,
     predict_records,
 )
@@ -42,21 +40,16 @@ class DecorrelatingPose:
     Attributes:
         point: counted from 1.
         axis: of the base frame, ``x``, ``y`` or ``z``.
-        angle: away from the level platform, rad.
+        degrees: angle away from the level platform, deg.
         command: what brings the controller there, in the mechanism's frame convention.
         correlation: of the pair afterwards.
     """
 
     point: int
     axis: str
-    angle: float
+    degrees: float
     command: Pose
     correlation: float
-
-    @property
-    def degrees(self) -> float:
-        """:attr:`angle`, deg."""
-        return float(np.degrees(self.angle))
 
 
 def decorrelating_poses(
@@ -73,25 +66,26 @@ def decorrelating_poses(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Trials:
-    """Candidates (n) at a point, and ``factors`` F (n, 3, p) with ``C' = C - F^T F``."""
+    """Records (n) at a point, their commands, and their :func:`update_factors` (n, 3, p)."""
 
     point: int
-    candidates: Candidates
+    orientations: Array
+    commands: PoseBatch
     factors: Array
     covariance: Array
 
     def correlations(self, rows: tuple[int, int]) -> Array:
-        """The correlation (n,) of two parameters after each candidate."""
+        """The correlation (n,) of two parameters after each record."""
         factors = self.factors[..., rows]
         block = self.covariance[np.ix_(rows, rows)] - np.swapaxes(factors, -1, -2) @ factors
         correlations: Array = block[:, 0, 1] / np.sqrt(block[:, 0, 0] * block[:, 1, 1])
         return correlations
 
     def pose(self, row: int, correlation: float) -> DecorrelatingPose:
-        vector = rotations.to_vector(self.candidates.targets.poses.rotations[row])
-        axis = int(np.argmax(np.abs(vector)))
-        command = self.candidates.commands.pose(row)
-        return DecorrelatingPose(self.point, "xyz"[axis], float(vector[axis]), command, correlation)
+        angles = np.degrees(rotations.to_vector(self.orientations[row]))
+        axis = int(np.argmax(np.abs(angles)))
+        command = self.commands.pose(row)
+        return DecorrelatingPose(self.point, "xyz"[axis], float(angles[axis]), command, correlation)
 
 
 def _trials(belief: RobotBelief, found: Identification) -> Iterator[_Trials]:
@@ -104,9 +98,10 @@ def _trials(belief: RobotBelief, found: Identification) -> Iterator[_Trials]:
         zero = estimate_gauge_zero(
             belief, found.poses[rows], problem.joints[rows], problem.deviations[rows]
         )
-        candidates = reachable(belief, PoseBatch.at(zero.reference, _rotations()))
-        if len(candidates):
-            yield _trials_at(belief, zero, int(problem.labels[first, 0]), candidates)
+        targets, commands = reachable(belief, PoseBatch.at(zero.reference, _rotations()))
+        if len(targets):
+            records = predict_records(belief, zero, targets)
+            yield _trials_at(belief, int(problem.labels[first, 0]), records, commands)
 
 
 def _rotations() -> Array:
@@ -115,13 +110,11 @@ def _rotations() -> Array:
     return rotations.from_vector((angles[:, None, None] * np.eye(3)).reshape(-1, 3))
 
 
-def _trials_at(belief: RobotBelief, zero: GaugeZero, point: int, candidates: Candidates) -> _Trials:
-    records = predict_records(belief, zero, candidates.targets)
+def _trials_at(belief: RobotBelief, point: int, records: PredictedRecords, commands: PoseBatch) -> _Trials:
     inside = SAFETY_SIGMAS * records.sigma.max(axis=-1) <= TRAVEL_SHARE * belief.limits.gauge_travel_mm
-    crossing = records.jacobian @ belief.covariance
-    total = crossing @ np.swapaxes(records.jacobian, -1, -2) + records.covariance
-    factors = np.linalg.solve(np.linalg.cholesky(total), crossing)
-    return _Trials(point, candidates[inside], factors[inside], belief.covariance)
+    factors = update_factors(belief.covariance, records.jacobian, records.covariance)
+    orientations = records.targets.poses.rotations
+    return _Trials(point, orientations[inside], commands[inside], factors[inside], belief.covariance)
 
 
 def _best(

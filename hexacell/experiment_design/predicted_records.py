@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from hexacell.errors import LimitError
 from hexacell.experiment_design.candidates import ReachableTargets, commands_for
+from hexacell.experiment_design.criteria import innovation_covariance
 from hexacell.identification.belief import RobotBelief
 from hexacell.identification.solver.measurement_model import record_covariance, record_weights
 from hexacell.kinematics.forward import assembly_mode
@@ -133,7 +134,7 @@ def predict_records(belief: RobotBelief, zero: GaugeZero, targets: ReachableTarg
     by_parameters, by_joints = position_derivatives(belief, targets)
     covariance = record_covariance(by_joints, belief.noise) + zero.covariance
     jacobian = by_parameters - zero.jacobian
-    total = jacobian @ belief.covariance @ np.swapaxes(jacobian, -1, -2) + covariance
+    total = innovation_covariance(belief.covariance, jacobian, covariance)
     sigma = np.sqrt(np.diagonal(total, axis1=-2, axis2=-1))
     deviation = targets.poses.positions - zero.reference
     return PredictedRecords(targets, jacobian, covariance, deviation, sigma)

@@ -11,9 +11,9 @@ robots are sampled from the belief and the forward kinematics of each is solved,
 approach to chance constraints (Calafiore & Campi, IEEE Trans. Automatic Control 51, 2006), with antithetic
 variates. How cautious the evaluation is depends on the standard deviation s of the orientation:
 
-- s <= ``uncertain_sigma``: few samples. All of them, and their mean and ``sigmas`` standard deviations,
-  must be inside ``travel / (1 + s / half_travel_sigma)``: the less is known, the heavier the tails.
-- above: many samples, of which all but the worst must stay within ``uncertain_share`` of the travel.
+- s <= ``UNCERTAIN_SIGMA``: few samples. All of them, and their mean and ``SIGMAS`` standard deviations,
+  must be inside ``travel / (1 + s / HALF_TRAVEL_SIGMA)``: the less is known, the heavier the tails.
+- above: many samples, of which all but the worst must stay within ``UNCERTAIN_SHARE`` of the travel.
 
 The constants were chosen so that of 1,000 simulated robots none left the travel.
 """
@@ -35,37 +35,29 @@ from hexacell.kinematics.rotations import Array, Mask
 from hexacell.kinematics.sensitivity import Sensitivity, has_singularity_margin, pose_sensitivity
 from hexacell.motion.paths import Path
 
+LINEAR_SHARE = 0.4
+"""Of the travel. Within it, at four sigma, linear propagation is believed unless the orientation is
+uncertain: the ball stays inside even if the prediction is wrong by a factor of two."""
 
-@dataclass(frozen=True, slots=True)
-class TravelCheckSettings:
-    """Constants of the evaluation; standard deviations of the platform's orientation in rad.
+UNCERTAIN_SIGMA = float(np.radians(3.0))
+"""Standard deviation, rad, beyond which the orientation is uncertain. Under the drawing's tolerances one
+robot in a hundred then deviates twenty times as far as linear propagation says."""
 
-    Attributes:
-        linear_share: of the travel. Within it, at four sigma, linear propagation is believed unless the
-            orientation is uncertain: the ball stays inside even if the prediction is wrong by a factor
-            of two.
-        uncertain_sigma: standard deviation beyond which the orientation is uncertain. Under the drawing's
-            tolerances one robot in a hundred then deviates twenty times as far as linear propagation says.
-        samples: robots sampled, and ``samples_uncertain`` where the orientation is uncertain.
-        uncertain_share: of the travel, where the orientation is uncertain.
-        half_travel_sigma: standard deviation at which half of the travel may be used.
-        sigmas: standard deviations of the sampled deviations that must be inside the travel.
-        fewest_samples: sampled robots that can take the reference pose; fewer are not sufficient.
-        margin_share: of the singularity margin, which all sampled robots must keep.
-    """
+HALF_TRAVEL_SIGMA = float(np.radians(6.0))
+"""Standard deviation of the orientation, rad, at which half of the travel may be used."""
 
-    linear_share: float = 0.4
-    uncertain_sigma: float = float(np.radians(3.0))
-    samples: int = 24
-    samples_uncertain: int = 240
-    uncertain_share: float = 0.4
-    half_travel_sigma: float = float(np.radians(6.0))
-    sigmas: float = 4.0
-    fewest_samples: int = 6
-    margin_share: float = 0.5
+UNCERTAIN_SHARE = 0.4
+"""Of the travel, where the orientation is uncertain."""
 
+SAMPLES = 24
+SAMPLES_UNCERTAIN = 240
+SIGMAS = 4.0
 
-SETTINGS = TravelCheckSettings()
+FEWEST_SAMPLES = 6
+"""Sampled robots that can take the reference pose; fewer are not sufficient."""
+
+MARGIN_SHARE = 0.5
+"""Of the singularity margin, which all sampled robots must keep."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,7 +66,6 @@ class TravelConstraint:
 
     belief: RobotBelief
     zero: GaugeZero
-    settings: TravelCheckSettings = SETTINGS
 
     def holds(self, records: PredictedRecords) -> Mask:
         """At which of n predicted records the ball almost surely stays inside the travel."""
@@ -95,45 +86,30 @@ class TravelConstraint:
     def _holds_linearly(self, records: PredictedRecords) -> Mask:
         if self._is_uncertain:
             return np.zeros(len(records), dtype=bool)
-        return records.within(self.settings.linear_share * self.belief.limits.gauge_travel_mm)
+        return records.within(LINEAR_SHARE * self.belief.limits.gauge_travel_mm)
 
     def _holds_for_samples(self, targets: ReachableTargets) -> Mask:
-        return stays_in_travel(
-            self.belief, self.zero.joints, self.zero.target.poses, targets, self.settings
-        )
+        """At which of n targets the constraint holds on the robots sampled from the belief."""
+        belief, zero = self.belief, self.zero
+        joints = np.concatenate([zero.joints[None], targets.joints])
+        poses = PoseBatch.concatenate((zero.target.poses, targets.poses))
+        # The reference is estimated from its records, so that it closes the legs only approximately.
+        poses = forward_kinematics(belief.mechanism, belief.estimate, joints, poses).poses
+        sensitivity = pose_sensitivity(belief.mechanism, belief.estimate, poses, joints)
+        sigma = _orientation_sigma(belief, sensitivity)
+        is_uncertain = sigma > UNCERTAIN_SIGMA
+        samples = SAMPLES_UNCERTAIN if is_uncertain else SAMPLES
+        sampled = _sample(belief, samples, joints, poses, sensitivity)
+        if len(sampled.found) < FEWEST_SAMPLES:
+            return np.zeros(len(targets), dtype=bool)
+        travel = belief.limits.gauge_travel_mm
+        if is_uncertain:
+            return _nearly_all_within(sampled, UNCERTAIN_SHARE * travel)
+        return _all_within(sampled, travel / (1.0 + sigma / HALF_TRAVEL_SIGMA))
 
     @cached_property
     def _is_uncertain(self) -> bool:
-        return orientation_sigma(self.belief, self.zero.target) > self.settings.uncertain_sigma
-
-
-def stays_in_travel(
-    belief: RobotBelief,
-    reference_joints: Array,
-    reference: PoseBatch,
-    targets: ReachableTargets,
-    settings: TravelCheckSettings = SETTINGS,
-) -> Mask:
-    """At which of n targets the ball stays inside the travel on the robots sampled from the belief.
-
-    The gauges are zeroed at the ``reference`` pose (1), where the joint variables are
-    ``reference_joints`` (6,), mm. Samples that cannot take it are dropped: the true robot could.
-    """
-    joints = np.concatenate([reference_joints[None], targets.joints])
-    poses = PoseBatch.concatenate((reference, targets.poses))
-    # The reference is estimated from its records, so that it closes the legs only approximately.
-    poses = forward_kinematics(belief.mechanism, belief.estimate, joints, poses).poses
-    sensitivity = pose_sensitivity(belief.mechanism, belief.estimate, poses, joints)
-    sigma = _orientation_sigma(belief, sensitivity)
-    is_uncertain = sigma > settings.uncertain_sigma
-    samples = settings.samples_uncertain if is_uncertain else settings.samples
-    sampled = _sample(belief, samples, joints, poses, sensitivity, settings)
-    if len(sampled.found) < settings.fewest_samples:
-        return np.zeros(len(targets), dtype=bool)
-    travel = belief.limits.gauge_travel_mm
-    if is_uncertain:
-        return _nearly_all_within(sampled, settings.uncertain_share * travel)
-    return _all_within(sampled, travel / (1.0 + sigma / settings.half_travel_sigma), settings.sigmas)
+        return orientation_sigma(self.belief, self.zero.target) > UNCERTAIN_SIGMA
 
 
 def orientation_sigma(belief: RobotBelief, targets: ReachableTargets) -> float:
@@ -164,14 +140,12 @@ class _SampledRobots:
 
 
 def _sample(
-    belief: RobotBelief,
-    samples: int,
-    joints: Array,
-    poses: PoseBatch,
-    sensitivity: Sensitivity,
-    settings: TravelCheckSettings,
+    belief: RobotBelief, samples: int, joints: Array, poses: PoseBatch, sensitivity: Sensitivity
 ) -> _SampledRobots:
-    """Solve n poses, the reference first, for robots sampled from the belief."""
+    """Solve n poses, the reference first, for robots sampled from the belief.
+
+    Samples that cannot take the reference are dropped: the true robot could.
+    """
     root = np.linalg.cholesky(belief.covariance)
     errors = _standard_normal(samples, len(belief.free)) @ root.T @ belief.basis.T
     count, margin = len(joints), belief.limits.singularity_margin
@@ -187,7 +161,7 @@ def _sample(
     at_reference = (robots.subset(first), result.poses[first], joints[np.zeros(samples, dtype=int)], margin)
     # A robot next to a singularity at its reference is refused before anything moves.
     kept = found[:, 0] & has_singularity_margin(belief.mechanism, *at_reference)
-    everywhere = (robots, result.poses, joints[rows], settings.margin_share * margin)
+    everywhere = (robots, result.poses, joints[rows], MARGIN_SHARE * margin)
     found &= has_singularity_margin(belief.mechanism, *everywhere).reshape(samples, count)
     positions = result.poses.positions.reshape(samples, count, 3)[kept]
     return _SampledRobots(found[kept, 1:], positions[:, 1:] - positions[:, :1])
@@ -200,10 +174,10 @@ def _nearly_all_within(sampled: _SampledRobots, distance_mm: float) -> Mask:
     return within
 
 
-def _all_within(sampled: _SampledRobots, distance_mm: float, sigmas: float) -> Mask:
-    """At which targets all sampled robots, and those that some sigmas predict, stay within a distance."""
+def _all_within(sampled: _SampledRobots, distance_mm: float) -> Mask:
+    """At which targets all sampled robots, and those that ``SIGMAS`` predict, stay within a distance."""
     deviations = sampled.deviations
-    predicted = np.abs(deviations.mean(axis=0)) + sigmas * deviations.std(axis=0)
+    predicted = np.abs(deviations.mean(axis=0)) + SIGMAS * deviations.std(axis=0)
     farthest = np.maximum(predicted, np.abs(deviations).max(axis=0)).max(axis=-1)
     within: Mask = np.all(sampled.found, axis=0) & (farthest <= distance_mm)
     return within

@@ -10,14 +10,14 @@ from __future__ import annotations
 import numpy as np
 
 from hexacell.errors import LimitError
-from hexacell.experiment_design.candidates import within_limits
-from hexacell.experiment_design.predicted_records import TRAVEL_SHARE
+from hexacell.experiment_design.candidates import ReachableTargets, reachable_targets, within_limits
+from hexacell.experiment_design.criteria import innovation_covariance
+from hexacell.experiment_design.predicted_records import TRAVEL_SHARE, position_derivatives
 from hexacell.identification.belief import RobotBelief
 from hexacell.kinematics import rotations
 from hexacell.kinematics.commanded_motion import ActualPoses
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array, Mask
-from hexacell.kinematics.sensitivity import pose_sensitivity, singularity_margin
 from hexacell.motion.path_check import is_clear
 
 SAFETY_SIGMAS = 3.0
@@ -38,12 +38,11 @@ def select_validation_poses(
     Raises:
         LimitError: too few of them do.
     """
-    poses = PoseBatch.at(point, np.concatenate([np.eye(3)[None], orientations]))
-    joints = belief.commanded.joints(poses)
-    usable = np.flatnonzero(within_limits(belief.limits, poses, joints) & _after(belief, poses))
-    if not len(usable) or usable[0] != 0:
-        raise LimitError(f"the untilted platform cannot reach {poses.pose(0)} within the limits")
-    poses = poses[usable]
+    every = PoseBatch.at(point, np.concatenate([np.eye(3)[None], orientations]))
+    in_range = within_limits(belief.limits, every, belief.commanded.joints(every))
+    poses = reachable_targets(belief, every[in_range]).poses
+    if not len(poses) or not np.array_equal(poses.rotations[0], every.rotations[0]):
+        raise LimitError(f"the untilted platform cannot reach {every.pose(0)} within the limits")
     actual = belief.commanded.actual_poses(poses)
     if not actual.found[0]:
         raise LimitError(f"the actual pose at the command {poses.pose(0)} cannot be computed")
@@ -56,23 +55,12 @@ def select_validation_poses(
     return poses[inside][selected]
 
 
-def _after(belief: RobotBelief, poses: PoseBatch) -> Mask:
-    """Which poses the estimated geometry can take within the limits, once it commands."""
-    joints = belief.mechanism.inverse(belief.estimate, belief.branch, poses)
-    fits = within_limits(belief.limits, poses, joints)
-    rows = np.flatnonzero(fits)
-    margin = singularity_margin(belief.mechanism, belief.estimate, poses[rows], joints[rows])
-    fits[rows] &= margin >= belief.limits.singularity_margin
-    return fits
-
-
 def _stays_inside(belief: RobotBelief, actual: ActualPoses) -> Mask:
     """At which poses the ball stays inside the travel of gauges that are zeroed at the first of them."""
-    sensitivity = pose_sensitivity(belief.mechanism, belief.estimate, actual.poses, actual.joints)
-    jacobian = sensitivity.parameters[:, :3] @ belief.basis
-    change = jacobian - jacobian[0]
-    covariance = change @ belief.covariance @ np.swapaxes(change, -1, -2)
-    sigma = np.sqrt(np.diagonal(covariance, axis1=-2, axis2=-1) + 2.0 * belief.noise.gauge_mm**2)
+    jacobian, _ = position_derivatives(belief, ReachableTargets(actual.poses, actual.joints))
+    noise = 2.0 * belief.noise.gauge_mm**2 * np.eye(3)
+    covariance = innovation_covariance(belief.covariance, jacobian - jacobian[0], noise)
+    sigma = np.sqrt(np.diagonal(covariance, axis1=-2, axis2=-1))
     deviation = actual.poses.positions - actual.poses.positions[0]
     limit = TRAVEL_SHARE * belief.limits.gauge_travel_mm
     inside: Mask = (np.abs(deviation) + SAFETY_SIGMAS * sigma <= limit).all(axis=-1) & actual.found

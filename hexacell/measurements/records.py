@@ -22,6 +22,18 @@ RecordId = tuple[int, int]
 """Point and orientation of a record, as the user counts them."""
 
 
+def joints_of(values: Array) -> Joints:
+    """Joint variables (6,), mm, as numbers."""
+    q1, q2, q3, q4, q5, q6 = (float(value) for value in values)
+    return q1, q2, q3, q4, q5, q6
+
+
+def deviation_of(values: Array) -> Deviation:
+    """Values (3,), mm, along base x, y, z as numbers."""
+    x, y, z = (float(value) for value in values)
+    return x, y, z
+
+
 @dataclass(frozen=True, slots=True)
 class Record:
     """One settled measurement.

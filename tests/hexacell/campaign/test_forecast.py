@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from hexacell.campaign.decisions import CampaignState
-from hexacell.campaign.information_forecast import add_information, covariance_update
+from hexacell.campaign.forecast import PlannedInformation
+from hexacell.experiment_design.criteria import add_information, covariance_update
 from hexacell.identification.diagnostics.pose_accuracy import predicted_accuracy
 from hexacell.identification.estimator import estimate_online
 from hexacell.kinematics.rotations import Array
@@ -31,13 +32,13 @@ def test_a_set_tells_what_the_estimator_then_knows(plan):
     belief = plan.robot.belief()
     virtual_robot = VirtualRobot(plan.robot, belief.estimate, np.random.default_rng(0))
     records = []
-    for point, poses in enumerate(plan.planned_sets.sets, start=1):
+    for point, poses in enumerate(plan.planned_sets, start=1):
         virtual_robot.zero_gauges()
         for row in range(len(poses)):
             virtual_robot.place(plan.robot.to_command(poses.pose(row)))
             records.append(virtual_robot.measure(point, row + 1))
     found = estimate_online(plan.robot.problem(MeasurementSet(tuple(records))))
-    seen = plan.planned_sets.information_under(belief)
+    seen = PlannedInformation.of(plan.planned_sets, belief)
     predicted = add_information(belief.covariance, seen.information(1, 8) + seen.information(2, 8))
     np.testing.assert_allclose(
         np.sqrt(np.diag(found.free_covariance)), np.sqrt(np.diag(predicted)), rtol=0.02
@@ -45,7 +46,7 @@ def test_a_set_tells_what_the_estimator_then_knows(plan):
 
 
 def test_more_records_tell_more_and_one_nothing(plan):
-    seen = plan.planned_sets.information_under(plan.robot.belief())
+    seen = PlannedInformation.of(plan.planned_sets, plan.robot.belief())
     traces = [np.trace(seen.information(1, count)) for count in range(9)]
     assert traces[0] == traces[1] == 0.0
     assert (np.diff(traces[1:]) > 0.0).all()
@@ -54,7 +55,7 @@ def test_more_records_tell_more_and_one_nothing(plan):
 
 
 def test_sets_begin_at_the_point_untilted_and_keep_to_the_limits(plan):
-    for point, poses in zip(TWO_POINTS, plan.planned_sets.sets, strict=True):
+    for point, poses in zip(TWO_POINTS, plan.planned_sets, strict=True):
         assert len(poses) == 8
         np.testing.assert_allclose(poses.rotations[0], np.eye(3), atol=1e-12)
         np.testing.assert_allclose(poses.positions, np.broadcast_to(point, (8, 3)), atol=1e-9)
@@ -63,8 +64,8 @@ def test_sets_begin_at_the_point_untilted_and_keep_to_the_limits(plan):
 
 def test_a_point_that_cannot_be_reached_has_no_set(make_plan):
     plan = make_plan(identification__points=(TWO_POINTS[0], (0.0, 0.0, 1500.0)))
-    assert len(plan.planned_sets.sets[1]) == 0
-    seen = plan.planned_sets.information_under(plan.robot.belief())
+    assert len(plan.planned_sets[1]) == 0
+    seen = PlannedInformation.of(plan.planned_sets, plan.robot.belief())
     assert not seen.information(2, 8).any()
 
 

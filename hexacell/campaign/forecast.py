@@ -1,0 +1,235 @@
+"""Forecast of the gain of further records, for display and for the choice of points.
+
+The poses that will be selected at a point are represented by a set of well spread ones: the greedy
+D-optimal set for the robot as drawn. The information that n records add is computed from their
+Jacobians H and covariances V at the present estimate. The point's unknown zero is eliminated by the Schur
+complement:
+
+    I = sum H^T V^-1 H - (sum H^T V^-1) (sum V^-1)^-1 (sum V^-1 H).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hexacell.campaign.budget import Budget
+from hexacell.campaign.decisions import CampaignState, Forecast
+from hexacell.campaign.task_accuracy import Task, TaskError
+from hexacell.experiment_design import candidates
+from hexacell.experiment_design.candidates import ReachableTargets, reachable
+from hexacell.experiment_design.criteria import D_OPTIMAL, add_information, covariance_update
+from hexacell.experiment_design.pose_selection import SelectedPose
+from hexacell.experiment_design.predicted_records import position_derivatives
+from hexacell.identification.belief import RobotBelief
+from hexacell.identification.solver.measurement_model import record_covariance, record_weights
+from hexacell.kinematics.pose import PoseBatch
+from hexacell.kinematics.rotations import Array
+
+SET_SIZES = (1, 2, 4, 8, 16, 32)
+"""Numbers of records at a point whose gain is compared with their time."""
+
+CANDIDATES = 64
+
+
+@dataclass(frozen=True, slots=True)
+class PointRanking:
+    """Points compared.
+
+    Attributes:
+        gains_mm: what a record at each point is expected to take off the worst error, mm.
+        best: the point that takes most off the mean square error per minute.
+    """
+
+    gains_mm: Mapping[int, float]
+    best: int
+
+
+@dataclass(frozen=True, eq=False)
+class Forecaster:
+    """Forecasts the error at the task poses.
+
+    Attributes:
+        sizes: how many records each point gets at most.
+        planned_sets: gives a set of poses at each point, which represent those not selected yet.
+    """
+
+    sizes: Mapping[int, int]
+    budget: Budget
+    task: Task
+    planned_sets: Callable[[], Sequence[PoseBatch]]
+
+    def worst_error(self, belief: RobotBelief) -> float | None:
+        """The error at the worst task pose now, 1 sigma, mm; none without task poses."""
+        error = self.task.error(belief)
+        return None if error is None else error.worst(belief.covariance)
+
+    def forecast(
+        self, state: CampaignState, belief: RobotBelief, selected: SelectedPose | None = None
+    ) -> Forecast | None:
+        """The effect of a selected record and of completing the plan; None without task poses."""
+        error = self.task.error(belief)
+        if error is None:
+            return None
+        now = after = error.worst(belief.covariance)
+        if selected is not None:
+            after = error.worst(
+                covariance_update(belief.covariance, selected.jacobian, selected.covariance)
+            )
+        planned = self.planned(state)
+        end = error.worst(self.predicted_belief(belief, state).covariance)
+        records = sum(planned.values())
+        begun_later = len(set(planned) - {state.point})
+        return Forecast(
+            now_mm=now,
+            next_mm=after,
+            # The planned sets may give less information than the record actually selected.
+            end_mm=after if selected and records == 1 else min(end, after),
+            records=records,
+            minutes=self.budget.time_model.minutes(records, begun_later),
+        )
+
+    def planned(self, state: CampaignState) -> dict[int, int]:
+        """How many more records each point will get, as far as the budget goes."""
+        planned: dict[int, int] = {}
+        records, points = len(state.measurements), state.begun_points
+        # The present point comes first.
+        left = sorted(set(self.sizes) - state.done, key=lambda point: (point != state.point, point))
+        for point in left:
+            is_begun = state.point == point
+            more = self._most(state, point, records, points)
+            if more < (1 if is_begun else 2):
+                continue
+            planned[point] = more
+            records, points = records + more, points + (not is_begun)
+        return planned
+
+    def rank_points(self, state: CampaignState, belief: RobotBelief, points: Sequence[int]) -> PointRanking:
+        """Compare what records at some points would gain, and in what time."""
+        error = self.task.error(belief)
+        if error is None:
+            return PointRanking(dict.fromkeys(points, math.inf), points[0])
+        information = PlannedInformation.of(self.planned_sets(), belief)
+        gains: dict[int, float] = {}
+        rates: dict[int, float] = {}
+        for point in points:
+            options = self._options(state, belief.covariance, information, error, point)
+            gains[point] = max((gain for gain, _ in options), default=0.0)
+            rates[point] = max((rate for _, rate in options), default=-math.inf)
+        return PointRanking(gains, max(points, key=rates.__getitem__))
+
+    def predicted_belief(self, belief: RobotBelief, state: CampaignState) -> RobotBelief:
+        """What will be known once everything that is still planned is measured."""
+        planned = self.planned(state).items()
+        if not planned:
+            return belief
+        information = PlannedInformation.of(self.planned_sets(), belief)
+        added = [information.added(state, point, more) for point, more in planned]
+        return replace(belief, covariance=add_information(belief.covariance, np.sum(added, axis=0)))
+
+    def _options(
+        self,
+        state: CampaignState,
+        covariance: Array,
+        information: PlannedInformation,
+        error: TaskError,
+        point: int,
+    ) -> list[tuple[float, float]]:
+        """What different numbers of records at a point would do.
+
+        What each record takes off the worst error, mm, and all of them off the mean square a minute.
+        """
+        is_begun = state.point == point
+        most = self._most(state, point, len(state.measurements), state.begun_points)
+        sizes = sorted({min(size, most) for size in SET_SIZES} - ({0} if is_begun else {0, 1}))
+        options = []
+        for size in sizes:
+            after = add_information(covariance, information.added(state, point, size))
+            minutes = self.budget.time_model.minutes(size, 0 if is_begun else 1)
+            gain = (error.worst(covariance) - error.worst(after)) / size
+            options.append((gain, (error.mean_square(covariance) - error.mean_square(after)) / minutes))
+        return options
+
+    def _most(self, state: CampaignState, point: int, records: int, points: int) -> int:
+        """How many more records a point may get after some records at some points."""
+        affordable = self.budget.records_left(records, points + (state.point != point))
+        return int(min(self.sizes[point] - state.records_at(point), affordable))
+
+
+@dataclass(frozen=True, eq=False)
+class PlannedInformation:
+    """The records of a set of poses at each point, linearized.
+
+    Attributes:
+        jacobian: of all sets' records (n, 3, p) by the free parameters.
+        weights: inverse covariances of the records (n, 3, 3), 1/mm^2.
+        bounds: (m + 1,) rows at which the sets begin, and the last one ends.
+    """
+
+    jacobian: Array
+    weights: Array
+    bounds: NDArray[np.intp]
+
+    @classmethod
+    def of(cls, sets: Sequence[PoseBatch], belief: RobotBelief) -> PlannedInformation:
+        """The records at the present estimate; poses it cannot reach are left out."""
+        poses = PoseBatch.concatenate(sets)
+        joints = belief.mechanism.inverse(belief.estimate, belief.branch, poses)
+        rows = np.flatnonzero(np.isfinite(joints).all(axis=-1))
+        jacobian, by_joints = position_derivatives(belief, ReachableTargets(poses[rows], joints[rows]))
+        ends = np.cumsum([len(poses) for poses in sets])
+        return cls(jacobian, record_weights(by_joints, belief.noise), np.searchsorted(rows, [0, *ends]))
+
+    def information(self, point: int, records: int) -> Array:
+        """The information (p, p), 1/mm^2, of the first ``records`` of a point, counted from 1."""
+        first, last = self.bounds[point - 1], self.bounds[point]
+        rows = slice(int(first), int(min(first + max(records, 0), last)))
+        jacobian, weights = self.jacobian[rows], self.weights[rows]
+        size = self.jacobian.shape[-1]
+        if len(jacobian) < 2:
+            return np.zeros((size, size))
+        weighted = weights @ jacobian
+        total = weighted.sum(axis=0)
+        mean = np.linalg.solve(weights.sum(axis=0), total)
+        information: Array = jacobian.reshape(-1, size).T @ weighted.reshape(-1, size) - total.T @ mean
+        return information
+
+    def added(self, state: CampaignState, point: int, records: int) -> Array:
+        """What more records at a point would add; those it has count for its zero only."""
+        before = state.records_at(point)
+        added = self.information(point, before + records)
+        return added - self.information(point, before) if before else added
+
+
+def select_sets(drawn: RobotBelief, points: Array, records: int, seed: int) -> tuple[PoseBatch, ...]:
+    """Sets of ``records`` poses at ball positions (m, 3), mm, the reference first in each.
+
+    In the mechanism's frame convention; empty where the robot cannot go.
+    """
+    rotated = candidates.orientations(CANDIDATES, drawn.limits.tilt, seed)
+    orientations = np.concatenate([np.eye(3)[None], rotated])
+    return tuple(_select(drawn, PoseBatch.at(point, orientations), records) for point in points)
+
+
+def _select(drawn: RobotBelief, poses: PoseBatch, records: int) -> PoseBatch:
+    """The first of the poses, then greedily those that gain most beside the ones selected."""
+    targets, _ = reachable(drawn, poses)
+    if not len(targets) or not np.array_equal(targets.poses.rotations[0], poses.rotations[0]):
+        return poses[[]]
+    selected = [0]
+    jacobian, by_joints = position_derivatives(drawn, targets)
+    change = jacobian - jacobian[0]
+    noise = record_covariance(by_joints, drawn.noise)
+    noise = noise + noise[0]
+    covariance = drawn.covariance
+    for _ in range(min(records, len(targets)) - 1):
+        gain = D_OPTIMAL.gain(covariance, change, noise)
+        gain[selected] = -np.inf
+        best = int(np.argmax(gain))
+        selected.append(best)
+        covariance = covariance_update(covariance, change[best], noise[best])
+    return targets.poses[selected]

@@ -82,8 +82,7 @@ class Robot:
     def belief(self, identified: Identification | None = None) -> RobotBelief:
         """What is known of the robot: by an identification, or by its drawing alone."""
         prior = self.prior
-        free = self.mechanism.convention.free_parameters(prior.centre)
-        covariance = prior.covariance
+        free, covariance = prior.free, prior.covariance
         if identified is not None:
             free, covariance = identified.free, identified.free_covariance
         return RobotBelief(

@@ -96,14 +96,11 @@ def update_estimate(problem: Problem, before: Identification | None) -> Identifi
 
 def cost(found: Identification) -> float:
     """What the estimate minimized: squared residuals and distance from the drawing, both by sigma."""
-    prior = found.problem.prior
-    moved = found.free - found.problem.mechanism.convention.free_parameters(prior.centre)
-    return float(found.chi2 + moved @ np.linalg.solve(prior.covariance, moved))
+    return found.chi2 + found.problem.prior.squared_distance(found.free)
 
 
 def _is_plausible(problem: Problem, found: Identification) -> bool:
-    residuals = 3 * (found.records - found.points)
-    is_small = cost(found) <= IMPLAUSIBLE_COST * residuals + FEW_RESIDUALS
+    is_small = cost(found) <= IMPLAUSIBLE_COST * found.problem.coordinates + FEW_RESIDUALS
     return found.converged and found.records == problem.records and is_small
 
 

@@ -9,10 +9,9 @@ import numpy as np
 from hexacell.cell.model import CellSettings
 from hexacell.experiment_design.candidates import workspace_poses
 from hexacell.identification.belief import RobotBelief
-from hexacell.identification.diagnostics.frame_alignment import FrameFit
+from hexacell.identification.diagnostics.pose_accuracy import error_jacobian
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.rotations import Array
-from hexacell.kinematics.sensitivity import pose_sensitivity
 from hexacell.robot_model import Robot
 
 
@@ -67,18 +66,13 @@ class Task:
 
     def error(self, belief: RobotBelief) -> TaskError | None:
         """How the error depends on the parameters; none if the estimated robot can take no task pose."""
-        task, by_task = _derivatives(belief, self.poses)
-        workspace, by_workspace = _derivatives(belief, self.workspace)
+        task, workspace = _reachable(belief, self.poses), _reachable(belief, self.workspace)
         if not len(task) or not len(workspace):
             return None
-        fit = FrameFit(workspace, float(belief.mechanism.platform_radius(belief.estimate)))
-        return TaskError(fit.remove_frame_motion(task, by_task, by_workspace)[:, :3])
+        return TaskError(error_jacobian(belief, task, workspace)[:, :3])
 
 
-def _derivatives(belief: RobotBelief, poses: PoseBatch) -> tuple[PoseBatch, Array]:
-    """The poses that the estimated robot reaches, and their derivatives (n, 6, p)."""
+def _reachable(belief: RobotBelief, poses: PoseBatch) -> PoseBatch:
+    """The poses that the estimated robot reaches."""
     joints = belief.mechanism.inverse(belief.estimate, belief.branch, poses)
-    rows = np.flatnonzero(np.isfinite(joints).all(axis=-1))
-    reached = poses[rows]
-    sensitivity = pose_sensitivity(belief.mechanism, belief.estimate, reached, joints[rows])
-    return reached, sensitivity.parameters @ belief.basis
+    return poses[np.flatnonzero(np.isfinite(joints).all(axis=-1))]

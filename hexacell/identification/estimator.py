@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import numpy as np
-
-from hexacell.identification.data_faults.rejection import fit_unscreened, screen
+from hexacell.identification.data_faults.rejection import screen
 from hexacell.identification.problem.data_requirements import (
     require_enough_records,
     require_rotation_diversity,
 )
 from hexacell.identification.problem.problem import Problem
-from hexacell.identification.solver import nuisance_parameters, singular_records
-from hexacell.identification.solver.chi_square import chi_square_test
-from hexacell.identification.solver.levenberg_marquardt import COARSE, Solution, SolverOptions
-from hexacell.identification.solver.result import DataFault, Identification
+from hexacell.identification.solver.levenberg_marquardt import COARSE, SolverOptions
+from hexacell.identification.solver.regularized_fit import fit
+from hexacell.identification.solver.result import Identification
+from hexacell.identification.solver.singular_records import solve_around_singularities
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array
 
@@ -29,10 +27,9 @@ def identify(problem: Problem, *, find_outliers: bool = True) -> Identification:
     """
     require_enough_records(problem)
     require_rotation_diversity(problem)
-    screened = screen(problem) if find_outliers else fit_unscreened(problem)
-    fit = screened.fit
-    require_enough_records(fit.problem)
-    return _result(fit.problem, fit.solution, fit.covariance, screened.data_faults)
+    found = screen(problem) if find_outliers else fit(problem)
+    require_enough_records(found.problem)
+    return found
 
 
 def estimate_online(
@@ -47,37 +44,8 @@ def estimate_online(
     The solver starts at ``free`` (p,), mm, with ``poses`` that close it at the problem's records, or
     at the problem's initial parameters.
     """
-    precision = np.linalg.inv(problem.prior.covariance)
     if free is None or poses is None:
         free, poses = problem.initial_parameters, problem.start
-    kept, solution = singular_records.solve_around_singularities(
-        problem, precision, free=free, poses=poses, options=options
-    )
-    covariance = np.linalg.inv(solution.information + precision)
-    return _result(kept, solution, covariance)
-
-
-def _result(
-    problem: Problem, solution: Solution, covariance: Array, data_faults: tuple[DataFault, ...] = ()
-) -> Identification:
-    basis = problem.basis
-    covariance = 0.5 * (covariance + covariance.T)  # an inverse is symmetric to rounding only
-    residuals = nuisance_parameters.centred(
-        problem, solution.prediction.weights, solution.prediction.residuals
-    )
-    return Identification(
-        geometry=problem.mechanism.convention.geometry(solution.free),
-        covariance=basis @ covariance @ basis.T,
-        free=solution.free,
-        free_covariance=covariance,
-        prior_sigma=basis @ np.sqrt(np.diag(problem.prior.covariance)),
-        problem=problem,
-        poses=solution.prediction.poses,
-        residual_rms_mm=float(np.sqrt(np.mean(residuals**2))),
-        goodness=chi_square_test(problem, solution.chi2, covariance, solution.information),
-        dof=3 * (problem.records - problem.points) - len(solution.free),
-        iterations=solution.iterations,
-        termination=solution.termination,
-        frame=problem.mechanism.convention.name,
-        data_faults=data_faults,
-    )
+    precision = problem.prior.precision
+    kept, solution = solve_around_singularities(problem, precision, free=free, poses=poses, options=options)
+    return Identification(kept, solution, precision)

@@ -62,7 +62,7 @@ def _error_row(name: str, errors: PoseErrors) -> str:
 def _data_and_termination(found: Identification) -> str:
     return wrapped(
         f"{len(found.free)} parameters from {found.records} records at {found.points} points; the "
-        f"solver ended because {found.termination.value} ({found.iterations} iterations)."
+        f"solver ended because {found.termination.value} ({found.solution.iterations} iterations)."
     )
 
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from hexacell.campaign.task_accuracy import Task
 from hexacell.cell.model import CellSettings
 from hexacell.experiment_design.decorrelation import DecorrelatingPose, decorrelating_poses
@@ -14,7 +16,7 @@ from hexacell.identification.diagnostics.repeatability import Repeatability, rep
 from hexacell.identification.diagnostics.tolerance_check import ToleranceViolation, tolerance_violations
 from hexacell.identification.diagnostics.variance_components import NoiseLevels, noise_levels
 from hexacell.identification.solver.chi_square import ChiSquareTest
-from hexacell.identification.solver.linearized_solution import LinearizedSolution
+from hexacell.identification.solver.measurement_model import record_covariance
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.measurements.records import MeasurementSet
@@ -76,22 +78,26 @@ def assess(
     settings: CellSettings, robot: Robot, measurements: MeasurementSet, found: Identification
 ) -> Assessment:
     """Check an identification of some measurements, and predict the accuracy with it."""
-    model = LinearizedSolution.at(found)
     pairs = strongly_correlated(found)
     left_out = {record for record, _ in found.left_out}
     task, accuracy = _accuracy(settings, robot, found)
     return Assessment(
         goodness=found.goodness,
-        noise=noise_levels(model),
+        noise=noise_levels(found),
         repeatability=repeatability(measurements, left_out),
-        record_noise_mm=model.record_noise_mm,
+        record_noise_mm=_record_noise_mm(found),
         correlated=pairs,
         decorrelating_poses=_decorrelating_poses(robot, found, pairs[:SEPARATED_PAIRS]),
         task=tuple(robot.to_command(task.pose(row)) for row in range(len(task))),
         task_named=bool(settings.task.poses),
         accuracy=accuracy and replace(accuracy, after=accuracy.after.times(found.goodness.noise_factor)),
-        tolerance_violations=tolerance_violations(found, robot.drawing, robot.tolerances),
+        tolerance_violations=tolerance_violations(found.estimate, robot.drawing, robot.tolerances),
     )
+
+
+def _record_noise_mm(found: Identification) -> float:
+    covariance = record_covariance(found.prediction.by_joints, found.problem.noise)
+    return float(np.sqrt(np.mean(np.trace(covariance, axis1=-2, axis2=-1))))
 
 
 def _decorrelating_poses(
@@ -109,7 +115,4 @@ def _accuracy(
     """The task poses in the convention's frames, and the accuracy there."""
     belief = robot.belief(found)
     task = Task.of(settings, robot, belief)
-    accuracy = predicted_accuracy(
-        found, belief.controller, robot.branch, task=task.poses, workspace=task.workspace
-    )
-    return task.poses, accuracy
+    return task.poses, predicted_accuracy(belief, task=task.poses, workspace=task.workspace)

@@ -5,17 +5,20 @@ The acceptance gates and the write-back are derived from it without further comp
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any, Self
 
 from pydantic import BaseModel, ConfigDict
 
 from hexacell.cell.fields import GeometryDocument
 from hexacell.identification.solver.levenberg_marquardt import Termination
-from hexacell.identification.solver.result import DataFault, DataFaultKind, Identification
+from hexacell.identification.solver.result import (
+    DataFault,
+    DataFaultKind,
+    GeometryEstimate,
+    Identification,
+)
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.parameters import ParameterSet
-from hexacell.kinematics.rotations import Array
 from hexacell.measurements.records import Deviation, RecordId
 
 
@@ -45,16 +48,6 @@ class OutlierRecord(_Frozen):
         )
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class KeptEstimate:
-    """A :class:`~hexacell.identification.solver.result.GeometryEstimate` from the journal."""
-
-    geometry: Geometry
-    sigma: Array
-    termination: Termination
-    undetermined: tuple[str, ...]
-
-
 class IdentificationResult(_Frozen):
     """The identified geometry and its uncertainty: the first part of ``result.json``."""
 
@@ -80,7 +73,7 @@ class IdentificationResult(_Frozen):
         return cls(
             converged=found.converged,
             termination=found.termination,
-            iterations=found.iterations,
+            iterations=found.solution.iterations,
             records=found.records,
             points=found.points,
             residual_rms_mm=found.residual_rms_mm,
@@ -91,7 +84,7 @@ class IdentificationResult(_Frozen):
             covariance=found.covariance.tolist(),
             undetermined=found.undetermined,
             outliers=tuple(OutlierRecord.of(record, fault) for record, fault in found.left_out),
-            frame=found.frame,
+            frame=found.problem.mechanism.convention.name,
         )
 
     def document(self, parameters: ParameterSet) -> dict[str, Any]:
@@ -115,10 +108,10 @@ class IdentificationResult(_Frozen):
             )
         ]
 
-    def estimate(self, parameters: ParameterSet) -> KeptEstimate:
+    def estimate(self, parameters: ParameterSet) -> GeometryEstimate:
         """What the acceptance gates need."""
         sigma = parameters.vector(self.sigma)
-        return KeptEstimate(self.identified(parameters), sigma, self.termination, self.undetermined)
+        return GeometryEstimate(self.identified(parameters), sigma, self.termination, self.undetermined)
 
     def identified(self, parameters: ParameterSet) -> Geometry:
         """The geometry in the mechanism's frame convention."""

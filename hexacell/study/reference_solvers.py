@@ -60,7 +60,7 @@ def gauss_newton(
         jacobian = prediction.jacobian[rows[:, 0]] - prediction.jacobian[rows[:, 1]]
         step: Array = -np.linalg.lstsq(jacobian.reshape(len(error), -1), error)[0]
         free = free + step
-        geometry = problem.mechanism.convention.geometry(free)
+        geometry = problem.geometry(free)
         reached = forward_kinematics(problem.mechanism, geometry, problem.joints, poses)
         if not reached.found.all():
             raise ConvergenceError("Gauss-Newton left the assembly mode of a record")
@@ -78,7 +78,7 @@ def least_squares_without_jacobian(problem: Problem) -> Geometry:
     """
 
     def reached(free: Array) -> ForwardResult:
-        return problem.commands.solve_poses(problem.mechanism.convention.geometry(free), problem.joints)
+        return problem.solve_poses(free)
 
     def error(free: Array) -> Array:
         return error_vector(problem, reached(free).poses.positions - problem.deviations)
@@ -95,4 +95,4 @@ def least_squares_without_jacobian(problem: Problem) -> Geometry:
     )
     if not found.success or not reached(found.x).found.all():
         raise ConvergenceError(f"the least-squares solver ended without a solution: {found.message}")
-    return problem.mechanism.convention.geometry(found.x)
+    return problem.geometry(found.x)

@@ -30,7 +30,7 @@ def peer(casadi, problem: Problem, weights: np.ndarray):
     vector = casadi.DM(problem.basis) @ parameters
     S, B = (casadi.reshape(vector[part], 3, 6) for part in (slice(0, 18), slice(18, 36)))
     constants = [casadi.SX.sym(f"c{point}", 3) for point in range(problem.points)]
-    unknowns, start = [parameters], [problem.mechanism.convention.free_parameters(problem.prior.centre)]
+    unknowns, start = [parameters], [problem.prior.free]
     legs, residuals = [], []
     points = np.cumsum(np.isin(np.arange(problem.records), problem.first_rows)) - 1
     factors = np.swapaxes(np.linalg.cholesky(weights), 1, 2)

@@ -79,7 +79,7 @@ def as_the_paper_says(problem: Problem) -> np.ndarray:
         found = np.array([position(row, geometry) for row in range(problem.records)])
         return error_vector(problem, found - problem.deviations)
 
-    centre = problem.mechanism.convention.free_parameters(problem.prior.centre)
+    centre = problem.prior.free
     solution: np.ndarray = least_squares(errors, centre).x
     return solution
 

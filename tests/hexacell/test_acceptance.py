@@ -33,7 +33,9 @@ spreads = st.builds(DeviationStatistics, positive, positive, st.integers(1, 50))
 def judged(identified, paper):
     """The gates by name, of an identification that may be spoiled first."""
 
-    def judge(found=identified, tolerances=TOLERANCES, largest_change_mm=15.0, before=paper.nominal):
+    def judge(
+        found=identified.estimate, tolerances=TOLERANCES, largest_change_mm=15.0, before=paper.nominal
+    ):
         found_gates = gates(
             found, paper.nominal, tolerances, largest_change_mm=largest_change_mm, before=before
         )
@@ -51,7 +53,7 @@ def shifted(identified, paper):
         for name, error in errors.items():
             row = HEXAGLIDE_PARAMETERS.names.index(name)
             vector[row] = paper.nominal.vector[row] + error
-        return replace(identified, geometry=Geometry(HEXAGLIDE_PARAMETERS, vector))
+        return replace(identified.estimate, geometry=Geometry(HEXAGLIDE_PARAMETERS, vector))
 
     return shift
 
@@ -70,17 +72,13 @@ def test_two_gates_may_be_overruled_by_a_person(judged):
 
 
 def test_a_solver_that_did_not_converge_fails_the_gate(judged, identified):
-    gate = judged(replace(identified, termination=Termination.ITERATIONS))["converged"]
+    gate = judged(replace(identified.estimate, termination=Termination.ITERATIONS))["converged"]
     assert not gate.passed
     assert gate.sentence == "The solver ended because the largest number of iterations was used."
 
 
 def test_undetermined_parameters_are_named(judged, identified):
-    covariance = identified.covariance.copy()
-    for name in ("S4z", "l3"):
-        row = HEXAGLIDE_PARAMETERS.names.index(name)
-        covariance[row, row] = identified.prior_sigma[row] ** 2
-    gate = judged(replace(identified, covariance=covariance))["determined"]
+    gate = judged(replace(identified.estimate, undetermined=("S4z", "l3")))["determined"]
     assert not gate.passed
     assert gate.sentence == "Not determined by these data: S4z, l3."
 
@@ -100,7 +98,7 @@ def test_a_violation_below_three_sigma_is_none(judged, shifted, identified):
 
 def test_an_allowed_offset_of_the_ball_is_no_violation(judged, identified, paper):
     """As the paper's own did: 30 mm in z."""
-    moved = replace(identified, geometry=paper.calibrated)
+    moved = replace(identified.estimate, geometry=paper.calibrated)
     assert not judged(moved, largest_change_mm=50.0)["within tolerance"].passed
     allowed = replace(TOLERANCES, ball_mm=40.0)
     assert judged(moved, tolerances=allowed, largest_change_mm=50.0)["within tolerance"].passed
@@ -125,7 +123,7 @@ def test_the_change_is_from_the_controllers_geometry(judged, identified, paper):
 def test_nan_passes_no_gate(judged, identified):
     vector = identified.geometry.vector.copy()
     vector[3 * 7] = np.nan
-    broken = judged(replace(identified, geometry=Geometry(HEXAGLIDE_PARAMETERS, vector)))
+    broken = judged(replace(identified.estimate, geometry=Geometry(HEXAGLIDE_PARAMETERS, vector)))
     assert not broken["within tolerance"].passed
     assert not broken["small change"].passed
 

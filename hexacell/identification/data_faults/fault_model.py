@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Hashable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 from hexacell.identification.problem.problem import Problem
 from hexacell.identification.solver import regularized_fit
 from hexacell.identification.solver.chi_square import ChiSquareVerdict
-from hexacell.identification.solver.regularized_fit import QUICK, Fit
+from hexacell.identification.solver.regularized_fit import QUICK
+from hexacell.identification.solver.result import Identification
 
 PENALTY_PER_UNKNOWN = 10.0
 """By how much a hypothesis must lower the chi-square for each number that it is free to choose."""
@@ -18,27 +18,22 @@ LARGEST_TRUSTED_RATIO = 10.0
 """Residuals over the stated noise up to which first-order tests around the solution are valid."""
 
 
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class FaultHypothesis(ABC):
-    """One explanation of records that disagree with the others.
+    """One explanation of records that disagree with the others; equal however it was found.
 
     Attributes:
         gain: the decrease of the chi-square if it is true, to first order.
         unknowns: how many numbers it is free to choose.
     """
 
-    gain: float
-    unknowns: int
+    gain: float = field(compare=False)
+    unknowns: int = field(compare=False)
 
     @property
     def cost(self) -> float:
         """The penalized gain, negative: the most likely hypothesis has the lowest cost."""
         return PENALTY_PER_UNKNOWN * self.unknowns - self.gain
-
-    @property
-    @abstractmethod
-    def key(self) -> Hashable:
-        """Equal for equal hypotheses, however they were found."""
 
     @abstractmethod
     def corrected(self, problem: Problem) -> Problem:
@@ -66,7 +61,7 @@ class CorrectedFit:
 
     original: Problem
     problem: Problem
-    fit: Fit
+    fit: Identification
     faults: tuple[FaultHypothesis, ...] = ()
 
     @classmethod
@@ -82,20 +77,20 @@ class CorrectedFit:
 
     def converged(self) -> CorrectedFit:
         """The same with the solver's full number of iterations where the quick fit was cut short."""
-        if self.fit.solution.termination.converged:
+        if self.fit.converged:
             return self
         return replace(self, fit=regularized_fit.fit(self.problem))
 
     @property
     def lost(self) -> int:
         """How many records the solver left out."""
-        return self.problem.records - self.fit.problem.records
+        return self.problem.records - self.fit.records
 
     @property
     def is_reliable(self) -> bool:
         """Whether the solution is good enough for first-order tests around it."""
-        converged = self.fit.solution.termination.converged
-        return not self.lost and converged and self.fit.goodness.ratio <= LARGEST_TRUSTED_RATIO
+        is_near = self.fit.goodness.ratio <= LARGEST_TRUSTED_RATIO
+        return not self.lost and self.fit.converged and is_near
 
     @property
     def is_consistent(self) -> bool:

@@ -6,8 +6,8 @@ reading in inches. The readings were d and should have been T d.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Hashable, Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Collection, Iterator
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.special import chdtri
@@ -17,7 +17,6 @@ from hexacell.identification.data_faults.fault_model import (
     CorrectedFit,
     FaultHypothesis,
 )
-from hexacell.identification.data_faults.linearized_model import LinearizedModel
 from hexacell.identification.data_faults.score_tests import (
     OutlierStatistics,
     ZeroShiftStatistics,
@@ -26,6 +25,7 @@ from hexacell.identification.data_faults.score_tests import (
 from hexacell.identification.problem.data_requirements import is_determined
 from hexacell.identification.problem.problem import Problem
 from hexacell.identification.solver.chi_square import ChiSquareTest
+from hexacell.identification.solver.linearized_model import LinearizedModel
 from hexacell.identification.solver.result import GAUGES, DataFaultKind
 from hexacell.kinematics.rotations import Array, Mask
 from hexacell.measurements.records import RecordId
@@ -56,16 +56,11 @@ def record_mask(problem: Problem, records: Collection[RecordId]) -> Mask:
     return np.array([record in records for record in record_ids(problem)], dtype=bool)
 
 
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class OutlierHypothesis(FaultHypothesis):
     """Gross errors: these records disagree with all the others and are left out."""
 
     records: tuple[RecordId, ...]
-
-    @property
-    def key(self) -> Hashable:
-        """The records."""
-        return self.records
 
     def corrected(self, problem: Problem) -> Problem:
         """The problem without these records."""
@@ -76,7 +71,7 @@ class OutlierHypothesis(FaultHypothesis):
         return self.trial(current) if is_determined(self.corrected(current.problem)) else None
 
 
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class ZeroShiftHypothesis(FaultHypothesis):
     """The gauges' zero shifted right before a record; it and the later ones of the point are left out.
 
@@ -86,12 +81,7 @@ class ZeroShiftHypothesis(FaultHypothesis):
 
     point: int
     orientation: int
-    shift: Array
-
-    @property
-    def key(self) -> Hashable:
-        """The first record after the shift."""
-        return self.point, self.orientation
+    shift: Array = field(compare=False)
 
     def rows(self, problem: Problem) -> Mask:
         """The records (n,) after the shift."""
@@ -131,17 +121,12 @@ class GaugeFault:
     remedy: Array
 
 
-@dataclass(frozen=True, slots=True, eq=False, kw_only=True)
+@dataclass(frozen=True, slots=True, kw_only=True)
 class GaugeFaultHypothesis(FaultHypothesis):
     """A gauge fault at one point, or at every point (``point`` is none)."""
 
     gauge_fault: GaugeFault
     point: int | None
-
-    @property
-    def key(self) -> Hashable:
-        """The correction, and where."""
-        return self.gauge_fault.kind, self.gauge_fault.remedy.tobytes(), self.point
 
     def corrected(self, problem: Problem) -> Problem:
         """The problem with true readings."""

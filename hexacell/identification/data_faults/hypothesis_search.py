@@ -28,13 +28,11 @@ from hexacell.identification.data_faults.hypotheses import (
     record_ids,
     score_gauge_faults,
 )
-from hexacell.identification.data_faults.linearized_model import LinearizedModel
-from hexacell.identification.data_faults.record_test import poses_at
 from hexacell.identification.data_faults.score_tests import OutlierStatistics
 from hexacell.identification.problem.problem import Problem
 from hexacell.identification.solver import measurement_model
 from hexacell.identification.solver.chi_square import ChiSquareTest
-from hexacell.identification.solver.levenberg_marquardt import LARGEST_AMPLIFICATION
+from hexacell.identification.solver.linearized_model import LinearizedModel
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array, Mask
 
@@ -75,7 +73,7 @@ def _trials(current: CorrectedFit) -> Iterator[CorrectedFit]:
         _ExpansionPoint.solution(current).hypotheses(),
     )
     ranks = [*zip_longest(*(hypotheses[:TRIED_FROM_EACH_LIST] for hypotheses in lists))]
-    tried: set[object] = set()
+    tried: set[FaultHypothesis] = set()
     yield from _one_by_one(current, chain(*ranks[:1]), tried)
     yield _greedy_deletion(current)
     yield from _one_by_one(current, [start.gross_errors()], tried)
@@ -84,12 +82,12 @@ def _trials(current: CorrectedFit) -> Iterator[CorrectedFit]:
 
 
 def _one_by_one(
-    current: CorrectedFit, hypotheses: Iterable[FaultHypothesis | None], tried: set[object]
+    current: CorrectedFit, hypotheses: Iterable[FaultHypothesis | None], tried: set[FaultHypothesis]
 ) -> Iterator[CorrectedFit]:
     for hypothesis in hypotheses:
-        if hypothesis is None or hypothesis.key in tried:
+        if hypothesis is None or hypothesis in tried:
             continue
-        tried.add(hypothesis.key)
+        tried.add(hypothesis)
         trial = hypothesis.trial(current)
         if trial is not None:
             yield trial
@@ -131,23 +129,22 @@ class _ExpansionPoint:
     @classmethod
     def start(cls, problem: Problem) -> _ExpansionPoint:
         """Where a fit starts, as a rule the drawing, with the full prior."""
-        active_prior = np.linalg.inv(problem.prior.covariance)
-        return cls(problem, problem.initial_parameters, active_prior, problem.start, problem.has_start_pose)
+        precision = problem.prior.precision
+        return cls(problem, problem.initial_parameters, precision, problem.start, problem.has_start_pose)
 
     @classmethod
     def solution(cls, current: CorrectedFit) -> _ExpansionPoint:
         """The solution, with the records that the solver left out."""
-        poses, found = poses_at(current.problem, current.fit)
-        fit = current.fit
-        return cls(current.problem, fit.solution.free, fit.active_prior, poses, found)
+        free = current.fit.free
+        solved = current.problem.solve_poses(free)
+        return cls(current.problem, free, current.fit.active_prior, solved.poses, solved.found)
 
     def hypotheses(self) -> list[FaultHypothesis]:
         """The significant hypotheses, the most likely first."""
         model = self._model(self.found)
         if model is None:
             return []
-        freedom = 3.0 * (model.problem.records - model.problem.points)
-        return rank_hypotheses(model, ChiSquareTest(model.chi2, freedom))
+        return rank_hypotheses(model, ChiSquareTest(model.chi2, model.problem.coordinates))
 
     def gauge_faults(self) -> list[GaugeFaultHypothesis]:
         """All gauge faults, the one with the largest gain first."""
@@ -180,7 +177,7 @@ class _ExpansionPoint:
         """The linear model of those of some records (n,) that are not next to a singularity."""
         rows = np.flatnonzero(kept)
         prediction = measurement_model.predict(self.problem.subset(kept), self.free, self.poses[rows])
-        rows = rows[prediction.amplification < LARGEST_AMPLIFICATION]
+        rows = rows[~prediction.singular]
         if not len(rows):
             return None
         clear = np.zeros_like(kept)

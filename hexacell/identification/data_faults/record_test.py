@@ -9,16 +9,13 @@ from scipy.special import chdtri
 
 from hexacell.identification.data_faults import messages
 from hexacell.identification.data_faults.hypotheses import GAUGE_FAULTS, record_ids, record_mask
-from hexacell.identification.data_faults.linearized_model import LinearizedModel
 from hexacell.identification.data_faults.score_tests import OutlierStatistics
 from hexacell.identification.problem.encoder_consistency import inconsistent_leg
 from hexacell.identification.problem.problem import Problem
 from hexacell.identification.solver import measurement_model
-from hexacell.identification.solver.levenberg_marquardt import LARGEST_AMPLIFICATION
-from hexacell.identification.solver.regularized_fit import Fit
-from hexacell.identification.solver.result import GAUGES, DataFault, DataFaultKind
-from hexacell.kinematics.pose import PoseBatch
-from hexacell.kinematics.rotations import Array, Mask
+from hexacell.identification.solver.linearized_model import LinearizedModel
+from hexacell.identification.solver.result import GAUGES, DataFault, DataFaultKind, Identification
+from hexacell.kinematics.rotations import Array
 from hexacell.measurements.records import RecordId
 
 SMALLEST_GAUGE_FAULT_MM = 1.0
@@ -48,7 +45,7 @@ class DeletionTest:
         return bool(self.statistics.threshold_ratio(found_before)[self.row] <= 1.0)
 
 
-def deletion_test(problem: Problem, record: RecordId, fit: Fit) -> DeletionTest:
+def deletion_test(problem: Problem, record: RecordId, fit: Identification) -> DeletionTest:
     """Test one record of a problem against a fit that it took no part in."""
     leg = _inconsistent_leg(problem, record)
     model = _model_with(problem, record, fit)
@@ -75,13 +72,6 @@ def deletion_test(problem: Problem, record: RecordId, fit: Fit) -> DeletionTest:
     return DeletionTest(fault, statistics, row)
 
 
-def poses_at(problem: Problem, fit: Fit) -> tuple[PoseBatch, Mask]:
-    """Poses that close a fit's geometry at all records of a problem, and which (n,) were found."""
-    geometry = problem.mechanism.convention.geometry(fit.solution.free)
-    reached = problem.commands.solve_poses(geometry, problem.joints)
-    return reached.poses, reached.found
-
-
 def _row(problem: Problem, record: RecordId) -> int:
     return int(np.flatnonzero(record_mask(problem, [record]))[0])
 
@@ -93,14 +83,14 @@ def _inconsistent_leg(problem: Problem, record: RecordId) -> tuple[int, float] |
     return inconsistent_leg(problem.commands, problem.joints, row, others)
 
 
-def _model_with(problem: Problem, record: RecordId, fit: Fit) -> LinearizedModel | None:
+def _model_with(problem: Problem, record: RecordId, fit: Identification) -> LinearizedModel | None:
     """The linear model of a fit's records and one more; none if that is next to a singularity."""
     some = problem.subset(record_mask(problem, {record, *record_ids(fit.problem)}))
-    poses, reached = poses_at(some, fit)
-    if not reached.all():
+    solved = some.solve_poses(fit.free)
+    if not solved.found.all():
         return None
-    prediction = measurement_model.predict(some, fit.solution.free, poses)
-    if prediction.amplification[_row(some, record)] > LARGEST_AMPLIFICATION:
+    prediction = measurement_model.predict(some, fit.free, solved.poses)
+    if prediction.singular[_row(some, record)]:
         return None
     return LinearizedModel.around(some, prediction, fit.active_prior)
 

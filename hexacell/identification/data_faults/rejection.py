@@ -23,7 +23,7 @@ Statistics 6, 1978.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import islice
 
 import numpy as np
@@ -43,13 +43,12 @@ from hexacell.identification.data_faults.hypothesis_search import (
     hypotheses_at_solution,
     search,
 )
-from hexacell.identification.data_faults.record_test import DeletionTest, deletion_test, poses_at
+from hexacell.identification.data_faults.record_test import DeletionTest, deletion_test
 from hexacell.identification.problem.data_requirements import equations, is_determined
 from hexacell.identification.problem.problem import Problem
 from hexacell.identification.solver.multistart import start_points
-from hexacell.identification.solver.regularized_fit import Fit, fit, refit
-from hexacell.identification.solver.result import DataFault, GaugeFaultError
-from hexacell.kinematics.rotations import Array
+from hexacell.identification.solver.regularized_fit import refit
+from hexacell.identification.solver.result import DataFault, GaugeFaultError, Identification
 from hexacell.measurements.records import RecordId
 
 FEW_RECORDS = 60
@@ -62,15 +61,7 @@ LARGEST_MEAN_SQUARE = 3.0
 """Of the difference from the drawing, in sigma, of a solution found from another start point."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class ScreenedFit:
-    """A fit of the records that agree, and what is wrong with the others."""
-
-    fit: Fit
-    data_faults: tuple[DataFault, ...] = ()
-
-
-def screen(problem: Problem) -> ScreenedFit:
+def screen(problem: Problem) -> Identification:
     """Fit a problem without the records that disagree with the others.
 
     Raises:
@@ -82,13 +73,8 @@ def screen(problem: Problem) -> ScreenedFit:
         other = _other_minimum(problem)
         if other is None:
             raise
-        return ScreenedFit(other.fit)
-    return ScreenedFit(selected.fit, _data_faults(selected))
-
-
-def fit_unscreened(problem: Problem) -> ScreenedFit:
-    """Fit a problem with all records that the solver can keep."""
-    return ScreenedFit(fit(problem))
+        return other
+    return replace(selected.fit, data_faults=_data_faults(selected))
 
 
 def _stepwise_selection(problem: Problem) -> CorrectedFit:
@@ -147,12 +133,12 @@ def _readmit(selected: CorrectedFit) -> CorrectedFit | None:
     agreeing = _agreeing(selected)
     if not agreeing:
         return None
-    original, solution = selected.original, selected.fit.solution
+    original = selected.original
     problem = original.subset(record_mask(original, agreeing.union(record_ids(selected.fit.problem))))
-    poses, reached = poses_at(problem, selected.fit)
-    if not reached.all():
+    solved = problem.solve_poses(selected.fit.free)
+    if not solved.found.all():
         return None
-    again = refit(replace(problem, has_start_pose=reached), solution.free, poses)
+    again = refit(replace(problem, has_start_pose=solved.found), selected.fit.free, solved.poses)
     readmitted = CorrectedFit(original, problem, again, _without(agreeing, selected.faults))
     return readmitted if readmitted.is_reliable else None
 
@@ -176,7 +162,7 @@ def _agreeing(selected: CorrectedFit) -> set[RecordId]:
 
 def _deletion_tests(selected: CorrectedFit) -> dict[RecordId, DeletionTest]:
     """Tests of gross errors and of records that the solver left out, not of those after a zero shift."""
-    if selected.fit.problem.records == selected.original.records:
+    if selected.fit.records == selected.original.records:
         return {}
     excluded = {record for shift in _zero_shifts(selected) for record in _after(shift, selected)}
     excluded.update(record_ids(selected.fit.problem))
@@ -209,7 +195,7 @@ def _data_faults(selected: CorrectedFit) -> tuple[DataFault, ...]:
     return (*records, *shifts)
 
 
-def _other_minimum(problem: Problem) -> CorrectedFit | None:
+def _other_minimum(problem: Problem) -> Identification | None:
     """A fit within the tolerances that explains all readings as they are, from another start."""
     if problem.records > FEW_RECORDS:
         return None
@@ -217,13 +203,7 @@ def _other_minimum(problem: Problem) -> CorrectedFit | None:
     for free, poses in islice(start_points(problem), OTHER_STARTS):
         restarted = replace(problem, initial_parameters=free, start=poses, has_start_pose=everywhere)
         found = CorrectedFit.uncorrected(restarted)
-        if found.is_consistent and _is_within_tolerances(problem, found.fit.solution.free):
-            return found
+        largest = LARGEST_MEAN_SQUARE * len(free)
+        if found.is_consistent and problem.prior.squared_distance(found.fit.free) <= largest:
+            return found.fit
     return None
-
-
-def _is_within_tolerances(problem: Problem, free: Array) -> bool:
-    """Whether a robot is as near to the drawing as some robots within the tolerances are."""
-    change = free - problem.mechanism.convention.free_parameters(problem.prior.centre)
-    squares = change @ np.linalg.solve(problem.prior.covariance, change)
-    return bool(squares <= LARGEST_MEAN_SQUARE * len(change))

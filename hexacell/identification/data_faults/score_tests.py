@@ -5,8 +5,8 @@ estimate and the gain
 
     b = (Z^T M Z)^-1 Z^T M r,    gain = r^T M Z b,
 
-with M of :class:`~.linearized_model.LinearizedModel`. No second fit is needed, and of M only the
-blocks of the records concerned. Three choices of Z:
+with M of :mod:`hexacell.identification.solver.linearized_model`. No second fit is needed, and of M
+only the blocks of the records concerned. Three choices of Z:
 
 - one record, along one gauge or in any direction: a gross error. The record is tested against what
   the others predict (deletion residual), however strongly it pulls the solution.
@@ -28,7 +28,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtri, ndtri
 
-from hexacell.identification.data_faults.linearized_model import LinearizedModel
+from hexacell.identification.problem.problem import Problem
+from hexacell.identification.solver.linearized_model import LinearizedModel
 from hexacell.kinematics.rotations import Array
 
 FALSE_ALARMS_PER_RECORD = 2e-4
@@ -120,10 +121,10 @@ class ZeroShiftStatistics:
     def of(cls, model: LinearizedModel) -> ZeroShiftStatistics:
         """All shifts that the records of a model could show."""
         problem, weights = model.problem, model.weights
-        rows = _testable_rows(problem.first_rows, problem.records)
-        score = _sums_from(problem.first_rows, model.scores)[rows]
-        weight = _sums_from(problem.first_rows, weights)[rows]
-        by_parameters = _sums_from(problem.first_rows, weights @ model.jacobian)[rows]
+        rows = _testable_rows(problem)
+        score = _sums_from(problem, model.scores)[rows]
+        weight = _sums_from(problem, weights)[rows]
+        by_parameters = _sums_from(problem, weights @ model.jacobian)[rows]
         station = np.linalg.inv(problem.per_record(problem.group_sums(weights))[rows])
         taken = by_parameters @ model.covariance @ np.swapaxes(by_parameters, -1, -2)
         information = weight - weight @ station @ weight - taken
@@ -131,20 +132,18 @@ class ZeroShiftStatistics:
         return cls(rows, np.sum(score * shift, axis=-1), -shift @ problem.gauges)
 
 
-def _testable_rows(first_rows: NDArray[np.intp], records: int) -> NDArray[np.intp]:
+def _testable_rows(problem: Problem) -> NDArray[np.intp]:
     """Rows (k,) with two records of their point before them; a single shifted record is a gross error."""
-    ends = np.append(first_rows[1:], records)
-    spans = [np.arange(first + 2, end - 1) for first, end in zip(first_rows, ends, strict=True)]
-    return np.concatenate(spans) if spans else np.zeros(0, dtype=np.intp)
+    later = _sums_from(problem, np.ones(problem.records))
+    before = problem.per_record(later[problem.first_rows]) - later
+    return np.flatnonzero((before >= 2) & (later >= 2))
 
 
-def _sums_from(first_rows: NDArray[np.intp], values: Array) -> Array:
+def _sums_from(problem: Problem, values: Array) -> Array:
     """Sums (n, ...) over each record and the later ones of its point."""
-    totals = np.add.reduceat(values, first_rows, axis=0)
-    lengths = np.diff(np.append(first_rows, len(values)))
     before = np.cumsum(values, axis=0) - values
-    at_start = np.repeat(before[first_rows], lengths, axis=0)
-    sums: Array = np.repeat(totals, lengths, axis=0) - (before - at_start)
+    in_point = before - problem.per_record(before[problem.first_rows])
+    sums: Array = problem.per_record(problem.group_sums(values)) - in_point
     return sums
 
 

@@ -19,11 +19,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from hexacell.identification.belief import RobotBelief
 from hexacell.identification.diagnostics.frame_alignment import FrameFit, pose_errors
-from hexacell.identification.solver.result import Identification
-from hexacell.kinematics.commanded_motion import CommandedRobot
-from hexacell.kinematics.geometry import Geometry
-from hexacell.kinematics.mechanism import Branch
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array, Mask
 from hexacell.kinematics.sensitivity import pose_sensitivity
@@ -87,30 +84,22 @@ class Accuracy:
         return float(np.sqrt(max(squares, 0.0)))
 
 
-def predicted_accuracy(
-    found: Identification, controller: Geometry, branch: Branch, *, task: PoseBatch, workspace: PoseBatch
-) -> Accuracy | None:
+def predicted_accuracy(belief: RobotBelief, *, task: PoseBatch, workspace: PoseBatch) -> Accuracy | None:
     """The accuracy at task poses; None if no task pose or no workspace pose is reachable.
 
-    Args:
-        found: the estimate and its covariance.
-        controller: the controller's present geometry, in the mechanism's frame convention.
-        branch: of the inverse kinematics.
-        task: poses whose accuracy is computed.
-        workspace: poses over which the frames are fitted.
+    The frames are fitted over the ``workspace`` poses.
     """
-    reached, task_reachable = _reached(found, controller, branch, task)
-    reached_workspace, workspace_reachable = _reached(found, controller, branch, workspace)
+    reached, task_reachable = _reached(belief, task)
+    reached_workspace, workspace_reachable = _reached(belief, workspace)
     if not task_reachable.any() or not workspace_reachable.any():
         return None
     task, workspace = task[task_reachable], workspace[workspace_reachable]
-    fit = FrameFit(workspace, float(found.problem.mechanism.platform_radius(found.geometry)))
-    aligned = fit.aligned(reached_workspace[workspace_reachable], reached[task_reachable])
-    jacobian = fit.remove_frame_motion(
-        task, _derivatives(found, branch, task), _derivatives(found, branch, workspace)
+    aligned = _frame_fit(belief, workspace).aligned(
+        reached_workspace[workspace_reachable], reached[task_reachable]
     )
+    jacobian = error_jacobian(belief, task, workspace)
     # The trace of a covariance is the mean square length.
-    mean_squares = np.einsum("nap,pq,naq->na", jacobian, found.free_covariance, jacobian)
+    mean_squares = np.einsum("nap,pq,naq->na", jacobian, belief.covariance, jacobian)
     return Accuracy(
         poses=task,
         reachable=task_reachable,
@@ -119,25 +108,34 @@ def predicted_accuracy(
     )
 
 
-def _reached(
-    found: Identification, controller: Geometry, branch: Branch, commanded: PoseBatch
-) -> tuple[PoseBatch, Mask]:
+def error_jacobian(belief: RobotBelief, task: PoseBatch, workspace: PoseBatch) -> Array:
+    """Derivatives (n, 6, p) of the errors at task poses by the free parameters of the estimate.
+
+    The estimated robot reaches all poses, and the frames are fitted over the workspace.
+    """
+    fit = _frame_fit(belief, workspace)
+    return fit.remove_frame_motion(task, _derivatives(belief, task), _derivatives(belief, workspace))
+
+
+def _frame_fit(belief: RobotBelief, workspace: PoseBatch) -> FrameFit:
+    return FrameFit(workspace, float(belief.mechanism.platform_radius(belief.estimate)))
+
+
+def _reached(belief: RobotBelief, commanded: PoseBatch) -> tuple[PoseBatch, Mask]:
     """Actual poses of the estimated robot at n commanded poses, and which are reachable.
 
     Reachable means: with the controller's present geometry, and with the estimate in the controller.
     """
-    mechanism = found.problem.mechanism
-    actual = CommandedRobot(mechanism, branch, controller, found.geometry).actual_poses(commanded)
-    corrected = mechanism.inverse(found.geometry, branch, commanded)
+    actual = belief.commanded.actual_poses(commanded)
+    corrected = belief.mechanism.inverse(belief.estimate, belief.branch, commanded)
     return actual.poses, actual.found & np.isfinite(corrected).all(axis=-1)
 
 
-def _derivatives(found: Identification, branch: Branch, poses: PoseBatch) -> Array:
+def _derivatives(belief: RobotBelief, poses: PoseBatch) -> Array:
     """Derivatives (n, 6, p) of the poses by the free parameters, at the estimate's joint variables."""
-    mechanism = found.problem.mechanism
-    joints = mechanism.inverse(found.geometry, branch, poses)
-    sensitivity = pose_sensitivity(mechanism, found.geometry, poses, joints)
-    return sensitivity.parameters @ found.problem.basis
+    joints = belief.mechanism.inverse(belief.estimate, belief.branch, poses)
+    sensitivity = pose_sensitivity(belief.mechanism, belief.estimate, poses, joints)
+    return sensitivity.parameters @ belief.basis
 
 
 def _norms(squares: Array) -> PoseErrors:

@@ -20,12 +20,13 @@ iteration ``s_k <- s_k r^T W Qk W r / tr(P Qk)`` (Horn, Horn and Duncan 1975).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hexacell.identification.solver.linearized_solution import LinearizedSolution
-from hexacell.identification.solver.nuisance_parameters import NuisanceElimination
+from hexacell.identification.solver.linearized_model import LinearizedModel
+from hexacell.identification.solver.measurement_model import record_weights
+from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.rotations import Array
 
 MAX_STEPS = 60
@@ -74,11 +75,11 @@ class NoiseLevels:
         return self.correlation > MIN_CORRELATION and (self.encoder.is_resolved or self.gauge.is_resolved)
 
 
-def noise_levels(model: LinearizedSolution) -> NoiseLevels | None:
+def noise_levels(found: Identification) -> NoiseLevels | None:
     """The noise levels from the residuals; None without redundancy."""
-    noise = model.problem.noise
+    noise = found.problem.noise
     stated = np.array([noise.encoder_mm, noise.gauge_mm]) ** 2
-    estimation = _Estimation.of(model)
+    estimation = _Estimation.of(found)
     if estimation.equations(stated).redundancy < 1.0:
         return None
     variances = estimation.solve(stated)
@@ -123,15 +124,14 @@ class _Equations:
 class _Estimation:
     """Restricted maximum likelihood estimation; ``cofactors`` are Q1 and Q2 (n, 3, 3)."""
 
-    model: LinearizedSolution
+    identified: Identification
     cofactors: tuple[Array, Array]
-    active_prior: Array
 
     @classmethod
-    def of(cls, model: LinearizedSolution) -> _Estimation:
-        encoder = model.by_joints @ np.swapaxes(model.by_joints, -1, -2)
-        gauge = np.broadcast_to(np.eye(3), encoder.shape)
-        return cls(model, (encoder, gauge), model.active_prior())
+    def of(cls, identified: Identification) -> _Estimation:
+        by_joints = identified.prediction.by_joints
+        encoder = by_joints @ np.swapaxes(by_joints, -1, -2)
+        return cls(identified, (encoder, np.broadcast_to(np.eye(3), encoder.shape)))
 
     def solve(self, stated: Array) -> Array:
         """The variances (2,), mm^2, that solve the estimating equation."""
@@ -146,10 +146,9 @@ class _Estimation:
 
     def equations(self, variances: Array) -> _Equations:
         """The estimating equation at some variances (2,), with the parameters refitted under them."""
-        weights = self.model.weights(variances)
-        residuals, explained = self._refitted(weights)
-        weighted = np.einsum("nij,nj->ni", weights, residuals)
-        projected = weights - weights @ explained @ weights
+        model = self._refitted(variances)
+        weighted = model.scores
+        projected = model.weights - model.weights @ model.explained @ model.weights
         products = [projected @ cofactor for cofactor in self.cofactors]
         information = np.array([[np.einsum("nij,nji->", a, b) for b in products] for a in products])
         expected = np.array([np.einsum("nii->", product) for product in products])
@@ -163,14 +162,12 @@ class _Estimation:
             0.5 * information * redundancy / (variances @ information @ variances),
         )
 
-    def _refitted(self, weights: Array) -> tuple[Array, Array]:
-        """Centred residuals (n, 3), mm, and their covariance (n, 3, 3), mm^2, explained by the unknowns."""
-        model = self.model
-        centring = NuisanceElimination(model.problem, weights)
-        system = model.system(centring)
-        covariance = np.linalg.inv(system.information() + self.active_prior)
-        step = -covariance @ (system.gradient() + self.active_prior @ model.from_centre)
-        jacobian = centring.centred(model.jacobian)
-        residuals = centring.centred(model.residuals) + jacobian @ step
-        explained = centring.nuisance_covariance() + jacobian @ covariance @ np.swapaxes(jacobian, -1, -2)
-        return residuals, explained
+    def _refitted(self, variances: Array) -> LinearizedModel:
+        """The linear model with the parameters that are best under some variances (2,), mm^2."""
+        problem, prediction = self.identified.problem, self.identified.prediction
+        encoder, gauge = np.sqrt(variances).tolist()
+        weights = record_weights(
+            prediction.by_joints, replace(problem.noise, encoder_mm=encoder, gauge_mm=gauge)
+        )
+        reweighted = replace(prediction, weights=weights)
+        return LinearizedModel.around(problem, reweighted, self.identified.active_prior)

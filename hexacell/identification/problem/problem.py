@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 from hexacell.errors import IdentifiabilityError
 from hexacell.identification.problem.commanded_poses import CommandedPoses
 from hexacell.identification.problem.encoder_consistency import EncoderConsistency
+from hexacell.kinematics.forward import ForwardResult
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import Branch, Mechanism
 from hexacell.kinematics.parameters import ParameterSet, ParameterUnit
@@ -64,16 +66,18 @@ class Tolerances:
         return sum(lengths) + self.ball_mm
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Prior:
     """The Gaussian prior of the geometry: the drawing and its tolerances.
 
     Attributes:
         centre: the drawing, in the mechanism's frame convention.
+        free: its free parameters (p,), mm.
         covariance: (p, p) of the free parameters, mm^2.
     """
 
     centre: Geometry
+    free: Array
     covariance: Array
 
     @classmethod
@@ -84,7 +88,17 @@ class Prior:
         covariance = np.diag(tolerances.widths(mechanism.parameters)[rows] ** 2 / 3.0)
         for common in mechanism.parameters.ball_offset[:, rows]:
             covariance += tolerances.ball_mm**2 / 3.0 * np.outer(common, common)
-        return cls(centre, covariance)
+        return cls(centre, mechanism.convention.free_parameters(centre), covariance)
+
+    @cached_property
+    def precision(self) -> Array:
+        """(p, p), 1/mm^2."""
+        return np.linalg.inv(self.covariance)
+
+    def squared_distance(self, free: Array) -> float:
+        """Squared distance of free parameters (p,), mm, from the drawing, in standard deviations."""
+        change = free - self.free
+        return float(change @ np.linalg.solve(self.covariance, change))
 
     def leg_widths(self, mechanism: Mechanism) -> Array:
         """The largest tolerances (c,) of the numbers of one leg, the ball's offset included."""
@@ -141,6 +155,19 @@ class Problem:
     def records(self) -> int:
         """The number of records."""
         return len(self.joints)
+
+    @property
+    def coordinates(self) -> int:
+        """The number of measured coordinates, less the unknown constants of the points."""
+        return 3 * (self.records - self.points)
+
+    def geometry(self, free: Array) -> Geometry:
+        """The geometry of free parameters (p,), mm."""
+        return self.mechanism.convention.geometry(free)
+
+    def solve_poses(self, free: Array) -> ForwardResult:
+        """Poses that close the geometry of free parameters (p,), mm, at the records' joint variables."""
+        return self.commands.solve_poses(self.geometry(free), self.joints)
 
     def group_sums(self, values: Array) -> Array:
         """Sums over the records of each point: (n, ...) to (m, ...)."""

@@ -4,6 +4,9 @@ The expected chi-square of the residuals is the number of measured coordinates, 
 constants of the stations, less the trace of C M for the parameters (C their covariance, M the
 information of the data). Where the data alone determine the parameters, that trace is their number
 and the expected chi-square the degrees of freedom. A parameter that the prior determines counts less.
+
+Source: Hastie, Tibshirani and Friedman, The Elements of Statistical Learning, 2nd ed. 2009 (effective
+degrees of freedom of ridge regression, the trace of the hat matrix).
 """
 
 from __future__ import annotations
@@ -13,9 +16,6 @@ from enum import Enum
 
 import numpy as np
 from scipy.special import chdtr, chdtrc
-
-from hexacell.identification.problem.problem import Problem
-from hexacell.kinematics.rotations import Array
 
 SMALLEST_PROBABILITY = 1e-3
 RATIOS_THAT_MATTER = (0.9, 1.1)
@@ -70,9 +70,3 @@ class ChiSquareTest:
     def noise_factor(self) -> float:
         """Factor for every standard deviation, above 1 where the residuals are significantly too large."""
         return self.ratio if self.agreement is ChiSquareVerdict.TOO_LARGE else 1.0
-
-
-def chi_square_test(problem: Problem, chi2: float, covariance: Array, information: Array) -> ChiSquareTest:
-    """The test of a solution with the parameters' covariance (p, p) and the data's information (p, p)."""
-    trace = float(np.sum(covariance * information))
-    return ChiSquareTest(chi2, 3.0 * (problem.records - problem.points) - trace)

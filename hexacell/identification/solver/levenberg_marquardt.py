@@ -17,7 +17,8 @@ from enum import Enum
 import numpy as np
 
 from hexacell.identification.problem.problem import Problem
-from hexacell.identification.solver import measurement_model, nuisance_parameters
+from hexacell.identification.solver import measurement_model
+from hexacell.identification.solver.nuisance_parameters import NuisanceElimination, ReducedSystem
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array, Mask
 
@@ -29,8 +30,6 @@ FINAL_STEP_MM = 1e-9
 ITERATIONS = 200
 SEARCHES = 1000
 REJECTIONS_BEFORE_SINGULAR = 6
-LARGEST_AMPLIFICATION = 100.0
-"""mm of the ball per mm of a slider. Beyond it a record has no information and its linearization fails."""
 
 
 class Termination(Enum):
@@ -133,16 +132,16 @@ class _Search:
     ) -> None:
         self.problem = problem
         self.precision = precision
-        self.centre = problem.mechanism.convention.free_parameters(problem.prior.centre)
+        self.centre = problem.prior.free
         self.now = start
-        self.centring = nuisance_parameters.NuisanceElimination(problem, start.weights)
+        self.centring = NuisanceElimination(problem, start.weights)
         self.options = options
         self.damping = options.damping
         self.growth = 2.0
         self.rejections = 0
-        self.singular = start.amplification > LARGEST_AMPLIFICATION
+        self.singular = start.singular
 
-    def linear(self) -> nuisance_parameters.ReducedSystem:
+    def linear(self) -> ReducedSystem:
         """The linear problem at the iterate."""
         return self.centring.system(self.now.residuals, self.now.jacobian)
 
@@ -156,7 +155,7 @@ class _Search:
         trial = measurement_model.evaluate_step(self.problem, self.now, step.free)
         if not trial.found.all():
             return self._reject(trial.found)
-        gain = self._gain(trial.residuals, step)
+        gain = self._gain(trial.poses.positions - self.problem.deviations, step)
         if gain.actual > 0.0:
             self._accept(step, trial.poses, gain)
             return None
@@ -164,11 +163,11 @@ class _Search:
 
     def _accept(self, step: _Step, poses: PoseBatch, gain: _Gain) -> None:
         self.now = measurement_model.predict(self.problem, self.now.free + step.free, poses)
-        self.centring = nuisance_parameters.NuisanceElimination(self.problem, self.now.weights)
+        self.centring = NuisanceElimination(self.problem, self.now.weights)
         self.damping *= max(0.1, 1.0 - (2.0 * gain.ratio - 1.0) ** 3)
         self.damping = max(self.damping, SMALLEST_DAMPING)
         self.growth, self.rejections = 2.0, 0
-        self.singular = self.now.amplification > LARGEST_AMPLIFICATION
+        self.singular = self.now.singular
 
     def _reject(self, found: Mask) -> Termination | None:
         self.rejections += 1
@@ -195,9 +194,7 @@ class _Step:
     predicted_gain: float
 
     @classmethod
-    def of(
-        cls, linear: nuisance_parameters.ReducedSystem, precision: Array, from_centre: Array, damping: float
-    ) -> _Step:
+    def of(cls, linear: ReducedSystem, precision: Array, from_centre: Array, damping: float) -> _Step:
         normal = linear.information() + precision
         gradient = linear.gradient() + precision @ from_centre
         scaling = damping * np.diag(normal)

@@ -1,13 +1,14 @@
 """The measurement model: residuals of every record, their derivatives and their weights.
 
-A record predicts the ball's position P(p, q) by forward kinematics at the measured joint variables q. Its
-residual is P minus the measured deviation; the unknown constant of each point stays in it. The noise of
-the encoders reaches the residual through ``G = dP/dq``, so that a record's covariance is
+A record predicts the ball's position P(p, q) by forward kinematics at the measured joint variables q
+(Abtahi et al. 2010, eq. 4). Its residual is P minus the measured deviation; the unknown constant of each
+point, which the differences of eq. 5 remove, stays in it. The noise of the encoders reaches the residual
+through ``G = dP/dq``, so that, to first order, a record's covariance is
 
     V = s_encoder^2 G G^T + s_gauge^2 I.
 
-Near a singularity the first term is large, and ordinary least squares would weight such a record
-wrongly. The weight is the inverse of V.
+Near a singularity the first term is large, and ordinary least squares (eq. 13) would weight such a record
+wrongly. The weight is the inverse of V (generalized least squares; Aitken 1936).
 """
 
 from __future__ import annotations
@@ -17,15 +18,18 @@ from dataclasses import dataclass
 import numpy as np
 
 from hexacell.identification.problem.problem import Noise, Problem
-from hexacell.kinematics.forward import apply_twist, forward_kinematics
+from hexacell.kinematics.forward import ForwardResult, apply_twist, forward_kinematics
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array, Mask
 from hexacell.kinematics.sensitivity import pose_sensitivity
 
+LARGEST_AMPLIFICATION = 100.0
+"""mm of the ball per mm of a slider. Beyond it a record has no information and its linearization fails."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Prediction:
-    """The measurement model at one geometry, linearised.
+    """The measurement model at one geometry, linearized.
 
     Attributes:
         free: free parameters (p,), mm.
@@ -34,8 +38,9 @@ class Prediction:
             constant.
         weights: (n, 3, 3), 1/mm^2: inverse covariance of one record.
         pose_jacobian: (n, 6, p) of position, mm, and rotation vector, rad, by the free parameters.
+        by_joints: (n, 3, 6) of the ball's position by the joint variables.
         mode: (n,) the assembly mode, see :func:`hexacell.kinematics.sensitivity.assembly_mode`.
-        amplification: (n,) ball motion per slider motion, Frobenius norm; large near a singularity.
+        singular: (n,) whether a record is next to a singularity.
     """
 
     free: Array
@@ -43,8 +48,9 @@ class Prediction:
     residuals: Array
     weights: Array
     pose_jacobian: Array
+    by_joints: Array
     mode: Array
-    amplification: Array
+    singular: Mask
 
     @property
     def jacobian(self) -> Array:
@@ -52,38 +58,22 @@ class Prediction:
         return self.pose_jacobian[:, :3]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class TrialStep:
-    """The residuals after a trial step.
+def evaluate_step(problem: Problem, present: Prediction, step: Array) -> ForwardResult:
+    """The poses after a step (p,), mm, of the free parameters.
 
-    Attributes:
-        poses: n poses that close the geometry.
-        residuals: (n, 3), mm, as in :class:`Prediction`.
-        found: (n,) bool: whether the pose was found on its assembly mode.
+    Forward kinematics starts at the linearized poses. If that fails, it starts at the present ones.
     """
-
-    poses: PoseBatch
-    residuals: Array
-    found: Mask
-
-
-def evaluate_step(problem: Problem, present: Prediction, step: Array) -> TrialStep:
-    """The residuals after a step (p,), mm, of the free parameters.
-
-    Forward kinematics starts at the linearised poses. If that fails, it starts at the present ones.
-    """
-    geometry = problem.mechanism.convention.geometry(present.free + step)
+    geometry = problem.geometry(present.free + step)
     for start in (apply_twist(present.poses, present.pose_jacobian @ step), present.poses):
         result = forward_kinematics(problem.mechanism, geometry, problem.joints, start, mode=present.mode)
         if result.found.all():
             break
-    return TrialStep(result.poses, result.poses.positions - problem.deviations, result.found)
+    return result
 
 
 def predict(problem: Problem, free: Array, poses: PoseBatch) -> Prediction:
-    """The linearised measurement model at poses that close the geometry."""
-    geometry = problem.mechanism.convention.geometry(free)
-    sensitivity = pose_sensitivity(problem.mechanism, geometry, poses, problem.joints)
+    """The linearized measurement model at poses that close the geometry."""
+    sensitivity = pose_sensitivity(problem.mechanism, problem.geometry(free), poses, problem.joints)
     by_joints = sensitivity.joints[:, :3]
     return Prediction(
         free=free,
@@ -91,9 +81,16 @@ def predict(problem: Problem, free: Array, poses: PoseBatch) -> Prediction:
         residuals=poses.positions - problem.deviations,
         weights=record_weights(by_joints, problem.noise),
         pose_jacobian=sensitivity.parameters @ problem.basis,
+        by_joints=by_joints,
         mode=sensitivity.mode,
-        amplification=np.linalg.norm(by_joints, axis=(-2, -1)),
+        singular=is_singular(by_joints),
     )
+
+
+def is_singular(position_by_joints: Array) -> Mask:
+    """Whether each record is next to a singularity, by ``dP/dq`` (n, 3, 6)."""
+    singular: Mask = np.linalg.norm(position_by_joints, axis=(-2, -1)) > LARGEST_AMPLIFICATION
+    return singular
 
 
 def record_covariance(position_by_joints: Array, noise: Noise) -> Array:

@@ -3,6 +3,8 @@
 With few records, and a pose near a singularity at the drawing, the true geometry may lie beyond that
 singularity, where no descent from the drawing ends. Geometries are drawn from the tolerance prior,
 and those of lowest cost are the start points.
+
+Source: Rinnooy Kan and Timmer, Stochastic global optimization methods, Mathematical Programming 39, 1987.
 """
 
 from __future__ import annotations
@@ -12,7 +14,6 @@ from collections.abc import Iterator
 import numpy as np
 
 from hexacell.identification.problem.problem import Problem
-from hexacell.identification.solver.levenberg_marquardt import LARGEST_AMPLIFICATION
 from hexacell.identification.solver.measurement_model import predict
 from hexacell.identification.solver.nuisance_parameters import NuisanceElimination
 from hexacell.kinematics.pose import PoseBatch
@@ -30,20 +31,15 @@ def start_points(problem: Problem) -> Iterator[tuple[Array, PoseBatch]]:
     order = np.argsort(costs, kind="stable")[:START_POINTS]
     for row in order[np.isfinite(costs[order])]:
         free = problem.initial_parameters + root @ draws[row]
-        yield free, _poses(problem, free)[0]
+        yield free, problem.solve_poses(free).poses
 
 
 def _cost(problem: Problem, free: Array) -> float:
     """The chi-square of the residuals; infinite where a pose is not found or next to a singularity."""
-    poses, found = _poses(problem, free)
-    if not found:
+    solved = problem.solve_poses(free)
+    if not solved.found.all():
         return np.inf
-    prediction = predict(problem, free, poses)
-    if prediction.amplification.max() > LARGEST_AMPLIFICATION:
+    prediction = predict(problem, free, solved.poses)
+    if prediction.singular.any():
         return np.inf
-    return float(NuisanceElimination(problem, prediction.weights).cost(prediction.residuals))
-
-
-def _poses(problem: Problem, free: Array) -> tuple[PoseBatch, bool]:
-    result = problem.commands.solve_poses(problem.mechanism.convention.geometry(free), problem.joints)
-    return result.poses, bool(result.found.all())
+    return NuisanceElimination(problem, prediction.weights).cost(prediction.residuals)

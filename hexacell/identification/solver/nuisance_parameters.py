@@ -48,7 +48,7 @@ class NuisanceElimination:
     """The elimination for one set of weights (n, 3, 3), 1/mm^2."""
 
     def __init__(self, problem: Problem, weights: Array) -> None:
-        self._problem = problem
+        self.problem = problem
         self._weights = weights
         self._local = _local_design(problem)
         self._local_prior = np.full(self._local.shape[-1] - 3, problem.noise.alignment)
@@ -82,7 +82,7 @@ class NuisanceElimination:
 
     def nuisance_covariance(self) -> Array:
         """Covariance (n, 3, 3), mm^2, of what is subtracted from each record."""
-        spread = self._problem.per_record(self._normal)
+        spread = self.problem.per_record(self._normal)
         taken = self._local @ spread @ np.swapaxes(self._local, -1, -2)
         if self._has_scale:
             design = self._scale_design
@@ -91,7 +91,7 @@ class NuisanceElimination:
 
     def _local_normal(self) -> Array:
         transposed = np.swapaxes(self._local, -1, -2)
-        normal = self._problem.group_sums(transposed @ self._weights @ self._local)
+        normal = self.problem.group_sums(transposed @ self._weights @ self._local)
         for axis, sigma in enumerate(self._local_prior, start=3):
             normal[:, axis, axis] += sigma**-2
         return normal
@@ -103,15 +103,15 @@ class NuisanceElimination:
         if self._has_scale:
             scale = self._scale_normal @ self._gram(reduced, penalties)
             reduced = reduced - self._scale_design @ scale
-            prior = scale / self._problem.noise.gauge_scale
+            prior = scale / self.problem.noise.gauge_scale
             penalties = np.concatenate([penalties - self._scale_rows @ scale, prior])
         return reduced.reshape(values.shape), penalties
 
     def _without_stations(self, values: Array) -> tuple[Array, Array]:
         """Values (n, 3, k) less the best c and w of each point, and the rows of the prior on w."""
         transposed = np.swapaxes(self._local, -1, -2)
-        best = self._normal @ self._problem.group_sums(transposed @ (self._weights @ values))
-        reduced = values - self._local @ self._problem.per_record(best)
+        best = self._normal @ self.problem.group_sums(transposed @ (self._weights @ values))
+        reduced = values - self._local @ self.problem.per_record(best)
         turned = best[:, 3:] / self._local_prior[:, None]
         return reduced, turned.reshape(-1, values.shape[-1])
 
@@ -119,11 +119,6 @@ class NuisanceElimination:
         """Weighted products (3, k) of the design of k with values that contain no c and w."""
         products: Array = np.einsum("nai,nab,nbj->ij", self._scale_design, self._weights, values)
         return products + self._scale_rows.T @ penalties
-
-
-def centred(problem: Problem, weights: Array, values: Array) -> Array:
-    """Values (n, 3, ...) centred under weights (n, 3, 3)."""
-    return NuisanceElimination(problem, weights).centred(values)
 
 
 def _local_design(problem: Problem) -> Array:

@@ -10,13 +10,9 @@ Discrete Ill-Posed Problems, 1998).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from hexacell.identification.problem.problem import Problem
-from hexacell.identification.solver import singular_records
-from hexacell.identification.solver.chi_square import ChiSquareTest, chi_square_test
 from hexacell.identification.solver.levenberg_marquardt import (
     COARSE,
     FINE,
@@ -25,6 +21,8 @@ from hexacell.identification.solver.levenberg_marquardt import (
     SolverOptions,
     solve,
 )
+from hexacell.identification.solver.result import Identification
+from hexacell.identification.solver.singular_records import solve_around_singularities
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array
 
@@ -40,49 +38,26 @@ QUICK = SolverOptions(INITIAL_DAMPING, 1e-3, iterations=60, searches=12)
 """Twice the iterations that consistent records need."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Fit:
-    """A solution, with the records and the prior that it used.
-
-    Attributes:
-        problem: the records that were used.
-        active_prior: precision (p, p), 1/mm^2, of the prior where it was not released.
-        covariance: of the free parameters (p, p), mm^2.
-    """
-
-    problem: Problem
-    solution: Solution
-    active_prior: Array
-    covariance: Array
-
-    @property
-    def goodness(self) -> ChiSquareTest:
-        """The chi-square test of the residuals."""
-        solution = self.solution
-        return chi_square_test(self.problem, solution.chi2, self.covariance, solution.information)
-
-
-def fit(problem: Problem, *, options: SolverOptions = COARSE) -> Fit:
+def fit(problem: Problem, *, options: SolverOptions = COARSE) -> Identification:
     """Fit the records, from the initial parameters of the problem."""
     return _released(problem, problem.initial_parameters, problem.start, options)
 
 
-def refit(problem: Problem, free: Array, poses: PoseBatch) -> Fit:
+def refit(problem: Problem, free: Array, poses: PoseBatch) -> Identification:
     """Fit the records from free parameters (p,), mm, near the solution, and poses that close them."""
     return _released(problem, free, poses, FINE)
 
 
-def _released(problem: Problem, free: Array, poses: PoseBatch, options: SolverOptions) -> Fit:
-    precision = np.linalg.inv(problem.prior.covariance)
-    kept, regularized = singular_records.solve_around_singularities(
-        problem, precision, free=free, poses=poses, options=options
+def _released(problem: Problem, free: Array, poses: PoseBatch, options: SolverOptions) -> Identification:
+    kept, regularized = solve_around_singularities(
+        problem, problem.prior.precision, free=free, poses=poses, options=options
     )
     information = _noise_correction(kept, regularized) * regularized.information
     active_prior = _unreleased_precision(information, problem.prior.covariance)
     solution = solve(
         kept, active_prior, free=regularized.free, poses=regularized.prediction.poses, options=FINE
     )
-    return Fit(kept, solution, active_prior, np.linalg.inv(solution.information + active_prior))
+    return Identification(kept, solution, active_prior)
 
 
 def _noise_correction(problem: Problem, solution: Solution) -> float:
@@ -90,7 +65,7 @@ def _noise_correction(problem: Problem, solution: Solution) -> float:
 
     Without it, a prior would bias records with hardly any noise, which have far more information.
     """
-    redundancy = 3 * (problem.records - problem.points) - len(solution.free)
+    redundancy = problem.coordinates - len(solution.free)
     if redundancy < LEAST_REDUNDANCY:
         return 1.0
     return max(1.0, redundancy / max(solution.chi2, SMALLEST_CHI2))

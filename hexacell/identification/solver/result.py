@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Protocol
+from functools import cached_property
 
 import numpy as np
 
 from hexacell.errors import IdentifiabilityError
 from hexacell.identification.problem.problem import Problem
 from hexacell.identification.solver.chi_square import ChiSquareTest
-from hexacell.identification.solver.levenberg_marquardt import Termination
+from hexacell.identification.solver.levenberg_marquardt import Solution, Termination
+from hexacell.identification.solver.measurement_model import Prediction
+from hexacell.identification.solver.nuisance_parameters import NuisanceElimination
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array
@@ -74,61 +76,91 @@ class GaugeFaultError(IdentifiabilityError):
         super().__init__(fault.sentence, action=fault.action)
 
 
-class GeometryEstimate(Protocol):
-    """An identified geometry with its uncertainty: an :class:`Identification`, or what is kept of one."""
-
-    @property
-    def geometry(self) -> Geometry:
-        """In the mechanism's frame convention, mm."""
-        ...
-
-    @property
-    def sigma(self) -> Array:
-        """Standard deviations of the parameters, mm."""
-        ...
-
-    @property
-    def termination(self) -> Termination:
-        """Why the solver ended."""
-        ...
-
-    @property
-    def undetermined(self) -> tuple[str, ...]:
-        """Parameters about which the data have almost no information."""
-        ...
-
-
 @dataclass(frozen=True, slots=True, eq=False)
+class GeometryEstimate:
+    """An identified geometry with its uncertainty, what the acceptance depends on.
+
+    Attributes:
+        geometry: in the mechanism's frame convention, mm.
+        sigma: standard deviations (P,), mm, of its parameters.
+        termination: why the solver ended.
+        undetermined: parameters about which the data have almost no information.
+    """
+
+    geometry: Geometry
+    sigma: Array
+    termination: Termination
+    undetermined: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
 class Identification:
     """The identified geometry, its covariance, and how it was found.
 
     Attributes:
-        geometry: in the mechanism's frame convention, mm.
-        covariance: (P, P), mm^2, in that convention; zero for what it fixes.
-        free: the free parameters (p,), mm, and ``free_covariance`` (p, p) theirs.
-        prior_sigma: (P,), mm, before measuring.
         problem: the records that were used.
-        poses: of the platform at each record, under the identified geometry.
-        residual_rms_mm: of the centred residuals of the deviations.
-        goodness: the chi-square test of those residuals.
-        dof: equations less parameters: the expected chi-square if the data determine every parameter.
+        solution: the solver's last iterate.
+        active_prior: precision (p, p), 1/mm^2, of the prior where it was not released.
         data_faults: what is wrong with the records that were left out.
     """
 
-    geometry: Geometry
-    covariance: Array
-    free: Array
-    free_covariance: Array
-    prior_sigma: Array
     problem: Problem
-    poses: PoseBatch
-    residual_rms_mm: float
-    goodness: ChiSquareTest
-    dof: int
-    iterations: int
-    termination: Termination
-    frame: str
+    solution: Solution
+    active_prior: Array
     data_faults: tuple[DataFault, ...] = ()
+
+    @property
+    def prediction(self) -> Prediction:
+        """The measurement model at the identified geometry."""
+        return self.solution.prediction
+
+    @property
+    def free(self) -> Array:
+        """The free parameters (p,), mm."""
+        return self.solution.free
+
+    @cached_property
+    def free_covariance(self) -> Array:
+        """Theirs (p, p), mm^2."""
+        covariance = np.linalg.inv(self.solution.information + self.active_prior)
+        return 0.5 * (covariance + covariance.T)  # an inverse is symmetric to rounding only
+
+    @cached_property
+    def geometry(self) -> Geometry:
+        """In the mechanism's frame convention, mm."""
+        return self.problem.geometry(self.free)
+
+    @cached_property
+    def covariance(self) -> Array:
+        """(P, P), mm^2, in that convention; zero for what it fixes."""
+        return self.problem.basis @ self.free_covariance @ self.problem.basis.T
+
+    @property
+    def sigma(self) -> Array:
+        """Standard deviations (P,), mm, of the parameters; zero for what the convention fixes."""
+        return np.sqrt(np.diag(self.covariance))
+
+    @property
+    def prior_sigma(self) -> Array:
+        """The same before measuring."""
+        return self.problem.basis @ np.sqrt(np.diag(self.problem.prior.covariance))
+
+    @property
+    def undetermined(self) -> tuple[str, ...]:
+        """Parameters that the data hardly determine: their sigma is still near the prior's."""
+        undetermined = self.sigma > UNDETERMINED_RATIO * self.prior_sigma
+        rows = np.flatnonzero(undetermined & (self.prior_sigma > 0.0))
+        return tuple(self.geometry.parameters.names[row] for row in rows)
+
+    @property
+    def estimate(self) -> GeometryEstimate:
+        """The geometry with its uncertainty."""
+        return GeometryEstimate(self.geometry, self.sigma, self.termination, self.undetermined)
+
+    @property
+    def poses(self) -> PoseBatch:
+        """Of the platform at each record, under the identified geometry."""
+        return self.prediction.poses
 
     @property
     def records(self) -> int:
@@ -141,9 +173,31 @@ class Identification:
         return self.problem.points
 
     @property
+    def residual_rms_mm(self) -> float:
+        """Root mean square of the centred residuals of the deviations."""
+        centring = NuisanceElimination(self.problem, self.prediction.weights)
+        return float(np.sqrt(np.mean(centring.centred(self.prediction.residuals) ** 2)))
+
+    @property
     def chi2(self) -> float:
         """Weighted sum of squares of the centred residuals."""
-        return self.goodness.chi2
+        return self.solution.chi2
+
+    @property
+    def dof(self) -> int:
+        """Equations less parameters: the expected chi-square if the data determine every parameter."""
+        return self.problem.coordinates - len(self.free)
+
+    @property
+    def goodness(self) -> ChiSquareTest:
+        """The chi-square test of the residuals."""
+        trace = float(np.sum(self.free_covariance * self.solution.information))
+        return ChiSquareTest(self.chi2, self.problem.coordinates - trace)
+
+    @property
+    def termination(self) -> Termination:
+        """Why the solver ended."""
+        return self.solution.termination
 
     @property
     def converged(self) -> bool:
@@ -151,18 +205,6 @@ class Identification:
         return self.termination.converged
 
     @property
-    def sigma(self) -> Array:
-        """Standard deviations (P,), mm, of the parameters; zero for what the convention fixes."""
-        return np.sqrt(np.diag(self.covariance))
-
-    @property
     def left_out(self) -> tuple[tuple[RecordId, DataFault], ...]:
         """The records left out, each with its fault."""
         return tuple((record, fault) for fault in self.data_faults for record in fault.left_out)
-
-    @property
-    def undetermined(self) -> tuple[str, ...]:
-        """Parameters that the data hardly determine: their sigma is still near the prior's."""
-        undetermined = self.sigma > UNDETERMINED_RATIO * self.prior_sigma
-        rows = np.flatnonzero(undetermined & (self.prior_sigma > 0.0))
-        return tuple(self.geometry.parameters.names[row] for row in rows)

@@ -5,6 +5,9 @@ at the start and at the solution. Or a singularity lies between the geometry tha
 record and the start, so that the record has no start pose. Such a record would stop the iteration.
 It is therefore set aside, the others are solved, and it is restored at their solution, where its pose
 is continued from the commanded one. A record that cannot be restored is left out.
+
+Source of the singularities: Gosselin and Angeles, Singularity analysis of closed-loop kinematic chains,
+IEEE Transactions on Robotics and Automation 6, 1990. Setting records aside is this program's own method.
 """
 
 from __future__ import annotations
@@ -15,14 +18,15 @@ import numpy as np
 
 from hexacell.identification.problem.problem import Problem
 from hexacell.identification.solver import levenberg_marquardt
-from hexacell.identification.solver.levenberg_marquardt import COARSE, Solution, SolverOptions, Termination
+from hexacell.identification.solver.levenberg_marquardt import Solution, SolverOptions, Termination
+from hexacell.identification.solver.measurement_model import is_singular
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array, Mask
 from hexacell.kinematics.sensitivity import pose_sensitivity
 
 
 def solve_around_singularities(
-    problem: Problem, precision: Array, *, free: Array, poses: PoseBatch, options: SolverOptions = COARSE
+    problem: Problem, precision: Array, *, free: Array, poses: PoseBatch, options: SolverOptions
 ) -> tuple[Problem, Solution]:
     """As :func:`levenberg_marquardt.solve`; returns the problem of the records used as well.
 
@@ -55,16 +59,13 @@ def solve_around_singularities(
 
 def _restorable(problem: Problem, free: Array, aside: Mask) -> tuple[Mask, PoseBatch]:
     """Which of the records set aside are clear of singularities at a geometry, and their poses."""
-    geometry = problem.mechanism.convention.geometry(free)
-    rows = np.flatnonzero(aside)
-    found = problem.commands[rows].solve_poses(geometry, problem.joints[rows])
-    by_joints = pose_sensitivity(problem.mechanism, geometry, found.poses, problem.joints[rows]).joints[
-        :, :3
-    ]
-    clear = np.linalg.norm(by_joints, axis=(-2, -1)) < levenberg_marquardt.LARGEST_AMPLIFICATION
+    some = problem.subset(aside)
+    solved = some.solve_poses(free)
+    sensitivity = pose_sensitivity(some.mechanism, some.geometry(free), solved.poses, some.joints)
+    clear = solved.found & ~is_singular(sensitivity.joints[:, :3])
     restorable = np.zeros(problem.records, dtype=bool)
-    restorable[rows] = found.found & clear
-    return restorable, found.poses[found.found & clear]
+    restorable[aside] = clear
+    return restorable, solved.poses[clear]
 
 
 def _merged(records: int, used: Mask, poses: PoseBatch, others: Mask, other_poses: PoseBatch) -> PoseBatch:

@@ -71,7 +71,9 @@ def test_an_implausible_estimate_is_started_again(two_points, records):
     problem = two_points.robot.problem(MeasurementSet(records))
     good = estimate_online(problem)
     before = estimate_online(two_points.robot.problem(MeasurementSet(records[:-1])))
-    worse = replace(before, free=before.free + 40.0 * np.sign(np.sin(np.arange(len(before.free)))))
+    far = before.free + 10.0 * np.sign(np.sin(2.0 * np.arange(len(before.free))))
+    prediction = replace(before.prediction, free=far)
+    worse = replace(before, solution=replace(before.solution, prediction=prediction))
     found = recursive_estimator.update_estimate(problem, worse)
     assert recursive_estimator.cost(found) <= recursive_estimator.cost(good) * (1.0 + 1e-6)
 

@@ -106,7 +106,7 @@ def test_a_few_undetermined_parameters_are_named(good, monkeypatch):
 
 def test_a_solver_that_did_not_converge_gives_no_result(good):
     found, assessed = good
-    stuck = replace(found, termination=Termination.STUCK)
+    stuck = replace(found, solution=replace(found.solution, termination=Termination.STUCK))
     assert findings(stuck, assessed)[0] == f"No result: the solver ended because {Termination.STUCK.value}."
 
 

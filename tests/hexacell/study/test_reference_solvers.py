@@ -41,7 +41,7 @@ def test_the_pairwise_minimum_is_the_unweighted_centred_one(noisy, make_problem,
     centred = levenberg_marquardt.solve(
         unweighted,
         np.zeros((parameters, parameters)),
-        free=unweighted.mechanism.convention.free_parameters(unweighted.prior.centre),
+        free=unweighted.prior.free,
         poses=unweighted.start,
         options=FINE,
     )

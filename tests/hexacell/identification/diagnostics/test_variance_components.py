@@ -12,17 +12,17 @@ from scipy.optimize import minimize
 from hexacell.identification.diagnostics.variance_components import NoiseLevel, NoiseLevels, noise_levels
 from hexacell.identification.estimator import identify
 from hexacell.identification.problem.problem import Noise
-from hexacell.identification.solver.linearized_solution import LinearizedSolution
+from hexacell.identification.solver.result import Identification
 from hexacell.measurements.records import MeasurementSet
 from hexacell.reporting.findings import noise_sentence
 
 REPETITIONS = 30
 
 
-def levels_in(model: LinearizedSolution) -> NoiseLevels:
-    found = noise_levels(model)
-    assert found is not None
-    return found
+def levels_in(found: Identification) -> NoiseLevels:
+    levels = noise_levels(found)
+    assert levels is not None
+    return levels
 
 
 def with_noise(exact, encoder_mm, gauge_mm, seed):
@@ -42,7 +42,7 @@ def with_noise(exact, encoder_mm, gauge_mm, seed):
 def levels_of(visit, make_problem):
     def found(encoder_mm, gauge_mm, seed=0, **how):
         measured = with_noise(visit(seed=2, **how), encoder_mm, gauge_mm, seed)
-        return levels_in(LinearizedSolution.at(identify(make_problem(measured), find_outliers=False)))
+        return levels_in(identify(make_problem(measured), find_outliers=False))
 
     return found
 
@@ -72,9 +72,7 @@ def test_an_encoder_noise_four_times_the_gauges_hides_it_and_is_itself_seen(leve
 def test_levels_do_not_depend_on_what_was_stated(visit, make_problem):
     measured = with_noise(visit(seed=2), 0.02, 0.01, 3)
     first, second = (
-        levels_in(
-            LinearizedSolution.at(identify(make_problem(measured, noise=stated), find_outliers=False))
-        )
+        levels_in(identify(make_problem(measured, noise=stated), find_outliers=False))
         for stated in (Noise(0.01, 0.01), Noise(0.03, 0.004))
     )
     assert second.encoder.estimated == pytest.approx(first.encoder.estimated, rel=1e-2)
@@ -84,8 +82,8 @@ def test_levels_do_not_depend_on_what_was_stated(visit, make_problem):
 class Dense:
     """The linear model of the records with all its matrices written out."""
 
-    def __init__(self, model: LinearizedSolution) -> None:
-        problem = model.problem
+    def __init__(self, found: Identification) -> None:
+        problem, model = found.problem, found.prediction
         n, p = problem.records, model.jacobian.shape[-1]
         place = np.searchsorted(problem.first_rows, np.arange(n), side="right") - 1
         constants = (np.eye(3)[None, :, None, :] * np.eye(problem.points)[place][:, None, :, None]).reshape(
@@ -121,7 +119,7 @@ class Dense:
 def modelled(visit, make_problem):
     """Every parameter determined, so that no prior takes part."""
     measured = with_noise(visit(seed=2), 0.02, 0.01, 4)
-    return LinearizedSolution.at(identify(make_problem(measured), find_outliers=False))
+    return identify(make_problem(measured), find_outliers=False)
 
 
 def test_the_estimate_is_the_maximum_of_the_restricted_likelihood(modelled):
@@ -156,7 +154,7 @@ def test_few_records_do_not_separate_the_two(visit, make_problem):
     """14 records at 2 points: one equation more than parameters."""
     measured = with_noise(visit(seed=2, points=2, orientations=7), 0.01, 0.01, 0)
     found = identify(make_problem(measured), find_outliers=False)
-    levels = noise_levels(LinearizedSolution.at(found))
+    levels = noise_levels(found)
     assert levels is None or not (levels.encoder.is_resolved and levels.gauge.is_resolved)
 
 

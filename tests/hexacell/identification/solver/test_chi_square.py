@@ -8,7 +8,6 @@ import pytest
 from hexacell.identification.estimator import identify
 from hexacell.identification.problem.problem import Noise
 from hexacell.identification.solver.chi_square import ChiSquareTest, ChiSquareVerdict
-from hexacell.identification.solver.linearized_solution import LinearizedSolution
 from hexacell.reporting.findings import residual_sentence
 
 
@@ -38,12 +37,11 @@ def test_the_prior_reduces_the_degrees_of_freedom_of_parameters(visit, make_prob
     measured = visit(points=2, orientations=9, degrees=3.0).measured(0.01)
     found = identify(make_problem(measured, noise=stations))
     assert found.undetermined
-    model = LinearizedSolution.at(found)
-    weights, held = model.weights(), model.active_prior()
+    model, held = found.prediction, found.active_prior
     n, p = found.records, len(found.free)
     local = _station_columns(found.problem)
     design = np.concatenate([model.jacobian.reshape(3 * n, p), local], axis=1)
-    root = np.linalg.cholesky(np.linalg.inv(weights))
+    root = np.linalg.cholesky(np.linalg.inv(model.weights))
     whitened = np.linalg.solve(root, design.reshape(n, 3, -1)).reshape(3 * n, -1)
     prior = np.zeros((design.shape[1],) * 2)
     prior[:p, :p] = held

@@ -48,8 +48,8 @@ def test_some_of_these_data_need_the_solver_around_singularities(visit, make_pro
         ends.append(
             levenberg_marquardt.solve(
                 problem,
-                np.linalg.inv(problem.prior.covariance),
-                free=problem.mechanism.convention.free_parameters(problem.prior.centre),
+                problem.prior.precision,
+                free=problem.prior.free,
                 poses=problem.start,
             )
         )

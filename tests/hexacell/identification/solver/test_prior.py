@@ -99,5 +99,5 @@ def test_the_online_estimate_continues_from_the_previous_one(visit, make_problem
     cold = estimate_online(problem)
     warm = estimate_online(problem, free=cold.free, poses=cold.poses)
     assert warm.geometry.largest_difference(cold.geometry) < 1e-6
-    assert warm.iterations <= 2
-    assert warm.iterations < cold.iterations
+    assert warm.solution.iterations <= 2
+    assert warm.solution.iterations < cold.solution.iterations

@@ -1,4 +1,4 @@
-"""The linear model of some records, which the score tests of data faults start from.
+"""The measurement model linearized around a geometry, for tests of its residuals.
 
 With residuals r, their Jacobian J and weights W, all with the stations' unknowns eliminated, the
 estimate of further unknowns b that add ``Z b`` to the residuals needs only ``M r`` and blocks of
@@ -9,7 +9,7 @@ where A is what the stations and the gauges' scale absorb and C the covariance o
 At a minimum ``M r = W r``. Around any other geometry the residuals are those that remain after the
 linear problem's own step.
 
-Source: Cook and Weisberg, Residuals and Influence in Regression, 1982, chapter 2 (added variables).
+Source: Cook and Weisberg, Residuals and Influence in Regression, 1982 (added variables).
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ import numpy as np
 from hexacell.identification.problem.problem import Problem
 from hexacell.identification.solver.measurement_model import Prediction
 from hexacell.identification.solver.nuisance_parameters import NuisanceElimination
-from hexacell.identification.solver.regularized_fit import Fit
+from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.rotations import Array
 
 
@@ -35,7 +35,7 @@ class LinearizedModel:
         residuals: (n, 3), mm, centred: predicted position less measured deviation.
         jacobian: (n, 3, p), centred.
         covariance: of the free parameters (p, p), mm^2.
-        nuisance_covariance: (n, 3, 3), mm^2, the covariance of what centring takes from each record.
+        explained: (n, 3, 3), mm^2, ``A + J C J^T``, the covariance that the unknowns absorb.
     """
 
     problem: Problem
@@ -43,34 +43,36 @@ class LinearizedModel:
     residuals: Array
     jacobian: Array
     covariance: Array
-    nuisance_covariance: Array
+    explained: Array
 
     @classmethod
-    def at_solution(cls, fit: Fit) -> LinearizedModel:
-        """Around a fit, where the linear problem's step is zero."""
-        return cls._of(fit.problem, fit.solution.prediction, fit.covariance)
+    def at_solution(cls, found: Identification) -> LinearizedModel:
+        """Around an identification, where the linear problem's step is zero."""
+        centring = NuisanceElimination(found.problem, found.prediction.weights)
+        return cls._of(centring, found.prediction, found.free_covariance, np.zeros_like(found.free))
 
     @classmethod
     def around(cls, problem: Problem, prediction: Prediction, active_prior: Array) -> LinearizedModel:
         """Around any geometry; ``active_prior`` (p, p), 1/mm^2, is the precision of the prior used."""
-        system = NuisanceElimination(problem, prediction.weights).system(
-            prediction.residuals, prediction.jacobian
-        )
+        centring = NuisanceElimination(problem, prediction.weights)
+        system = centring.system(prediction.residuals, prediction.jacobian)
         covariance = np.linalg.inv(system.information() + active_prior)
-        from_centre = prediction.free - problem.mechanism.convention.free_parameters(problem.prior.centre)
-        step = -covariance @ (system.gradient() + active_prior @ from_centre)
-        return cls._of(problem, prediction, covariance, step)
+        gradient = system.gradient() + active_prior @ (prediction.free - problem.prior.free)
+        return cls._of(centring, prediction, covariance, -covariance @ gradient)
 
     @classmethod
     def _of(
-        cls, problem: Problem, prediction: Prediction, covariance: Array, step: Array | None = None
+        cls, centring: NuisanceElimination, prediction: Prediction, covariance: Array, step: Array
     ) -> LinearizedModel:
-        centring = NuisanceElimination(problem, prediction.weights)
-        residuals, jacobian = centring.centred(prediction.residuals), centring.centred(prediction.jacobian)
-        if step is not None:
-            residuals = residuals + jacobian @ step
+        jacobian = centring.centred(prediction.jacobian)
+        by_parameters = jacobian @ covariance @ np.swapaxes(jacobian, -1, -2)
         return cls(
-            problem, prediction.weights, residuals, jacobian, covariance, centring.nuisance_covariance()
+            problem=centring.problem,
+            weights=prediction.weights,
+            residuals=centring.centred(prediction.residuals) + jacobian @ step,
+            jacobian=jacobian,
+            covariance=covariance,
+            explained=centring.nuisance_covariance() + by_parameters,
         )
 
     @property
@@ -82,8 +84,7 @@ class LinearizedModel:
     @property
     def residual_covariance(self) -> Array:
         """Covariance V (n, 3, 3), mm^2, of each residual; ``W V W`` is the record's block of M."""
-        taken = self.jacobian @ self.covariance @ np.swapaxes(self.jacobian, -1, -2)
-        remaining: Array = np.linalg.inv(self.weights) - self.nuisance_covariance - taken
+        remaining: Array = np.linalg.inv(self.weights) - self.explained
         return remaining
 
     @property

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import asyncio
 import signal
-from collections.abc import Callable, Coroutine, Iterator
-from contextlib import contextmanager
+from collections.abc import Coroutine
 from types import FrameType
 from typing import Any, TypeVar
 
 from hexacell.cli.console import Console
-from hexacell.cli.signals import STOP_SIGNALS, in_main_thread
+from hexacell.cli.signals import STOP_SIGNALS, handled
 from hexacell.errors import Interruption
 from procedures.run.commands import Abort, CommandQueue, Stop
 
@@ -47,7 +46,9 @@ class SignalCommands:
         def handle(number: int, _: FrameType | None) -> None:
             loop.call_soon_threadsafe(self._handle, signal.Signals(number), task)
 
-        with _handled(handle):
+        # An ignored one stays so, as Ctrl-C in a script's background job.
+        heeded = [number for number in ENDING_SIGNALS if signal.getsignal(number) is not signal.SIG_IGN]
+        with handled(heeded, handle):
             return await task
 
     def _handle(self, number: signal.Signals, task: asyncio.Task[Any]) -> None:
@@ -65,19 +66,3 @@ class SignalCommands:
         self.queue.put(Stop("interrupted"))
         if number is signal.SIGINT:
             self._console.print("Stopping after this step; Ctrl-C again stops motion at once.")
-
-
-@contextmanager
-def _handled(handler: Callable[[int, FrameType | None], object]) -> Iterator[None]:
-    """Handle the signals that end a program, except ignored ones, as in a script's background job."""
-    before: dict[signal.Signals, Any] = {}
-    if in_main_thread():
-        now = {number: signal.getsignal(number) for number in ENDING_SIGNALS}
-        before = {number: former for number, former in now.items() if former is not signal.SIG_IGN}
-    for number in before:
-        signal.signal(number, handler)
-    try:
-        yield
-    finally:
-        for number, former in before.items():
-            signal.signal(number, former)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import signal
 import threading
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import AbstractContextManager, contextmanager
 from types import FrameType
 
 STOP_SIGNALS = (signal.SIGTERM, signal.SIGHUP)
@@ -13,29 +13,29 @@ STOP_SIGNALS = (signal.SIGTERM, signal.SIGHUP)
 
 
 @contextmanager
-def stop_signals_as_sigint() -> Iterator[None]:
-    """Let SIGTERM and SIGHUP do what Ctrl-C does: motion stops, devices and files are released.
+def handled(
+    numbers: Iterable[signal.Signals], handler: Callable[[int, FrameType | None], object]
+) -> Iterator[None]:
+    """Handle signals within this context.
 
-    A signal that is already handled or ignored, as under ``nohup``, is left alone. Python handles
-    signals in the main thread only; elsewhere nothing changes.
+    Python handles signals in the main thread only; elsewhere nothing changes.
     """
-    taken = [number for number in STOP_SIGNALS if _is_default(number)]
+    in_main_thread = threading.current_thread() is threading.main_thread()
+    before = {number: signal.signal(number, handler) for number in numbers} if in_main_thread else {}
     try:
-        for number in taken:
-            signal.signal(number, _forward_to_sigint)
         yield
     finally:
-        for number in taken:
-            signal.signal(number, signal.SIG_DFL)
+        for number, former in before.items():
+            signal.signal(number, former)
 
 
-def _is_default(number: signal.Signals) -> bool:
-    return in_main_thread() and signal.getsignal(number) is signal.SIG_DFL
+def stop_signals_as_sigint() -> AbstractContextManager[None]:
+    """Let SIGTERM and SIGHUP do what Ctrl-C does: motion stops, devices and files are released.
 
-
-def in_main_thread() -> bool:
-    """Whether this thread may install signal handlers."""
-    return threading.current_thread() is threading.main_thread()
+    A signal that is already handled or ignored, as under ``nohup``, is left alone.
+    """
+    free = [number for number in STOP_SIGNALS if signal.getsignal(number) is signal.SIG_DFL]
+    return handled(free, _forward_to_sigint)
 
 
 def _forward_to_sigint(_number: int, frame: FrameType | None) -> None:

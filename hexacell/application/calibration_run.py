@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import AsyncIterator, Sequence
+from contextlib import asynccontextmanager, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from drivers.interfaces import DeviceIdentity
 from hexacell import __version__
-from hexacell.application.device_setup import Connected, device_addresses, open_devices, with_settings
+from hexacell.application.device_setup import Connected, device_addresses, open_devices
 from hexacell.campaign.pose_list import pose_list_of
 from hexacell.cell.loader import Cell
 from hexacell.cell.mechanism_sections import mechanism_named
@@ -56,11 +56,8 @@ async def preflight(cell: Cell, mode: Mode, *, unattended: bool) -> tuple[Device
     """
     calibration = Calibration(cell.settings, robot_of(cell), mode, pose_list_of(cell))
     with cell_lock(cell.config_path):
-        failures = await _plan_failures(calibration, unattended=unattended)
-        with _one_report(failures), device_addresses(cell) as settings:
-            async with open_devices(settings, cell.path.parent) as connected:
-                failures.extend(await _start_failures(cell, connected, runs_folder(cell)))
-                return connected.identities
+        async with _checked_devices(cell, calibration, runs_folder(cell), unattended) as connected:
+            return connected.identities
 
 
 async def calibrate(
@@ -75,13 +72,13 @@ async def calibrate(
         request: the run.
         listeners: called with every event.
         queue: commands for the engine (:mod:`procedures.run.commands`).
-        live: gets what the devices show while the run goes on.
+        live: gets what the devices show during the run.
 
     Raises:
         Interruption: a command ended it.
         HexacellError: it could not begin, or a step failed.
     """
-    cell = request.cell
+    cell, folder = request.cell, request.folder
     with cell_lock(cell.config_path):
         remove_stale_temporaries(cell.config_path)
         started = _resumed_start(request) if request.resume else None
@@ -89,16 +86,36 @@ async def calibrate(
             _require_own_geometry(cell)
         robot = robot_of(cell) if started is None else robot_of_run(cell, started)
         calibration = Calibration(cell.settings, robot, request.mode, pose_list_of(cell))
-        failures = await _plan_failures(calibration, unattended=request.unattended)
-        with _one_report(failures), device_addresses(cell) as settings:
+        async with _checked_devices(cell, calibration, folder.path, request.unattended) as connected:
+            require_known(connected.identities, started.devices if started else ())
+            devices = connected.devices if live is None else replace(connected.devices, live=live)
+            return await _run(request, calibration, replace(connected, devices=devices), listeners, queue)
+
+
+@asynccontextmanager
+async def _checked_devices(
+    cell: Cell, calibration: Calibration, folder: Path, unattended: bool
+) -> AsyncIterator[Connected]:
+    """Connect the devices; ``folder`` is where the run is kept.
+
+    Raises:
+        HexacellError: every failure of the plan, the devices, the stop input and the disk, in one report.
+    """
+    failures = await plan_failures(calibration, unattended=unattended)
+    if cell.settings.simulation is not None:
+        # A simulated robot starts at its first point and cannot be served if that is out of reach.
+        raise_all(failures)
+    try:
+        with device_addresses(cell) as settings:
             async with open_devices(settings, cell.path.parent) as connected:
-                failures.extend(await _start_failures(cell, connected, request.folder.path))
+                failures += await device_failures(connected.devices)
+                failures += await start_failures(connected.devices, folder, settings.guards.free_disk_mb)
                 raise_all(failures)
-                require_known(connected.identities, started.devices if started else ())
-                devices = connected.devices if live is None else replace(connected.devices, live=live)
-                observed = replace(connected, devices=devices)
-                request = replace(request, cell=with_settings(cell, settings))
-                return await _run(request, calibration, observed, listeners, queue)
+                yield connected
+    except HexacellError as error:
+        if not failures:
+            raise
+        raise_all([*failures, *(one for one in flatten_errors(error) if one not in failures)])
 
 
 def is_unverified(folder: RunFolder) -> bool:
@@ -125,14 +142,6 @@ def _require_own_geometry(cell: Cell) -> None:
             )
 
 
-async def _start_failures(cell: Cell, connected: Connected, folder: Path) -> list[HexacellError]:
-    """What the devices, the stop input and the disk of ``folder`` have against a run."""
-    return [
-        *await device_failures(connected.devices),
-        *await start_failures(connected.devices, folder, cell.settings.guards.free_disk_mb),
-    ]
-
-
 async def _run(
     request: RunRequest,
     calibration: Calibration,
@@ -140,7 +149,7 @@ async def _run(
     listeners: Sequence[Listener],
     queue: CommandQueue | None,
 ) -> events.Ended:
-    cell, folder = request.cell, request.folder
+    cell, folder = replace(request.cell, settings=connected.settings), request.folder
     if not request.resume:
         folder.create(cell)
     broker = QuestionBroker(request.operator)
@@ -166,27 +175,6 @@ async def _run(
         # The trace only helps to find faults: whether it can be kept does not decide how a run ends.
         with suppress(FileError):
             write_atomically(folder.new_wire(), connected.trace.text().encode())
-
-
-async def _plan_failures(calibration: Calibration, *, unattended: bool) -> list[HexacellError]:
-    """What is wrong with the plan; reported together with the failures of the devices."""
-    failures = await plan_failures(calibration, unattended=unattended)
-    if calibration.settings.simulation is not None:
-        # A simulated robot starts at its first point and cannot be served if that is out of reach.
-        raise_all(failures)
-    return failures
-
-
-@contextmanager
-def _one_report(failures: list[HexacellError]) -> Iterator[None]:
-    """Raise ``failures`` and those found within the context in one report."""
-    try:
-        yield
-    except HexacellError as error:
-        if not failures:
-            raise
-        raise_all([*failures, *(one for one in flatten_errors(error) if one not in failures)])
-    raise_all(failures)
 
 
 def run_started(

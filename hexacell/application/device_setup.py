@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import AsyncIterator, Iterator
 from contextlib import asynccontextmanager, contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 from drivers.interfaces import DeviceIdentity
@@ -75,6 +75,7 @@ def require_drivers(settings: CellSettings) -> None:
 class Connected:
     """A cell's open devices, and the trace of their traffic."""
 
+    settings: CellSettings
     devices: Devices
     identities: tuple[DeviceIdentity, ...]
     clock: CellClock
@@ -111,26 +112,18 @@ async def open_devices(settings: CellSettings, folder: Path | None = None) -> As
     trace = WireTrace()
     links = SharedSerialPorts(trace=trace)
     devices = devices_of(settings, links, trace, folder)
-    thermometers = thermometers_of(settings)
+    thermometers = Thermometers(
+        [load(Group.THERMOMETERS, one.protocol)(one) for one in settings.thermometers]
+    )
     try:
         identities = (*await devices.open(), *await thermometers.open())
         clock = CellClock(settings.timing.clock_factor)
-        yield Connected(devices, identities, clock, trace, thermometers)
+        yield Connected(settings, devices, identities, clock, trace, thermometers)
     finally:
         await shielded(_close(devices, links, thermometers))
-
-
-def thermometers_of(settings: CellSettings) -> Thermometers:
-    """The thermometers that the settings name, not yet connected; raises ``UsageError``."""
-    return Thermometers([load(Group.THERMOMETERS, one.protocol)(one) for one in settings.thermometers])
 
 
 async def _close(devices: Devices, links: SharedSerialPorts, thermometers: Thermometers) -> None:
     await thermometers.close()
     await devices.close()
     await links.close()
-
-
-def with_settings(cell: Cell, settings: CellSettings) -> Cell:
-    """The cell with the settings of :func:`device_addresses`."""
-    return replace(cell, settings=settings)

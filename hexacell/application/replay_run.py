@@ -9,7 +9,6 @@ from tempfile import TemporaryDirectory
 
 from hexacell import __version__
 from hexacell.application.calibration_run import robot_of_run
-from hexacell.application.device_setup import with_settings
 from hexacell.campaign.pose_list import pose_list_of
 from hexacell.cell.calibration import IdentificationSettings
 from hexacell.cell.loader import Cell, dump, load_cell
@@ -117,7 +116,7 @@ def _set_up(
         native = settings.controller.model_copy(update={"config_format": "toml"})
         settings = settings.model_copy(update={"controller": native})
         text = _native_config(settings, started)
-    cell = with_settings(cell, settings)
+    cell = replace(cell, settings=settings)
     cell.config_path.write_bytes(text)
     run = RunFolder(scratch / "run")
     run.path.mkdir()

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 from drivers.encoders.cia406 import Cia406Bank
@@ -9,7 +11,7 @@ from drivers.gauges.mux10 import Mux10Gauge
 from drivers.serial.shared_port import SharedSerialPorts
 from drivers.simulated.gauges.faults import InjectedGaugeFault
 from drivers.wire_trace import WireTrace
-from hexacell.application.device_setup import device_addresses, devices_of, open_devices, with_settings
+from hexacell.application.device_setup import device_addresses, devices_of, open_devices
 from hexacell.errors import DeviceError, UsageError
 from procedures.devices.settling import read_all
 
@@ -90,7 +92,7 @@ async def test_all_are_let_go_after_an_error_inside(make_site) -> None:
 
 def test_a_real_cell_is_served_by_nobody(make_site) -> None:
     site = make_site()
-    cell = with_settings(site.cell, site.simulated.settings)
+    cell = replace(site.cell, settings=site.simulated.settings)
     with device_addresses(cell) as settings:
         assert settings is site.simulated.settings
 
@@ -107,6 +109,6 @@ def test_a_simulated_cell_is_served_while_the_context_lasts(make_cell) -> None:
 
 def test_only_the_settings_are_others(make_site) -> None:
     site = make_site()
-    cell = with_settings(site.cell, site.simulated.settings)
+    cell = replace(site.cell, settings=site.simulated.settings)
     assert (cell.path, cell.text) == (site.cell.path, site.cell.text)
     assert cell.settings is site.simulated.settings

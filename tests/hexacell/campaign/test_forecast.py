@@ -84,11 +84,7 @@ def test_the_error_at_the_task_is_that_of_the_assessment(campaign, two_points):
     state = campaign[-1].state
     known = two_points.estimate(state)
     accuracy = predicted_accuracy(
-        known.identification,
-        known.belief.controller,
-        two_points.robot.branch,
-        task=two_points.task.poses,
-        workspace=two_points.task.workspace,
+        known.belief, task=two_points.task.poses, workspace=two_points.task.workspace
     )
     assert accuracy is not None
     assert accuracy.reachable.all()

@@ -20,25 +20,9 @@ from hexacell.campaign.pose_list import pose_list_of
 from hexacell.cell.loader import Cell
 from hexacell.errors import UsageError
 from hexacell.identification.estimator import identify
-from hexacell.identification.solver.result import Identification
-from hexacell.kinematics.geometry import Geometry
 from hexacell.measurements.records import MeasurementSet
 from hexacell.reporting.assessment import Assessment, assess
 from hexacell.robot_model import robot_of
-
-
-@dataclass(frozen=True, slots=True)
-class FitResult:
-    """An identified geometry beside the drawing, and how far it can be trusted."""
-
-    identified: Identification
-    drawing: Geometry
-    assessed: Assessment
-
-    @property
-    def is_usable(self) -> bool:
-        """Whether the solver converged and nothing refuses the result."""
-        return self.identified.converged and not self.assessed.refused
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,17 +47,15 @@ class PlanTrial:
     target_mm: float | None
 
 
-def fit_measurements(cell: Cell, measurements: MeasurementSet) -> FitResult:
-    """Identify the geometry of a cell's robot from records.
+def fit_measurements(cell: Cell, measurements: MeasurementSet) -> Assessment:
+    """Identify the geometry of a cell's robot from records, and check it.
 
     Raises:
         IdentifiabilityError: the records cannot determine it.
         FileError: the controller's config cannot be read.
     """
     robot = robot_of(cell)
-    identified = identify(robot.problem(measurements))
-    assessed = assess(cell.settings, robot, measurements, identified)
-    return FitResult(identified, robot.drawing, assessed)
+    return assess(cell.settings, robot, measurements, identify(robot.problem(measurements)))
 
 
 def next_pose(cell: Cell, measurements: MeasurementSet, *, rejections: int = 0) -> NextPose:

@@ -11,8 +11,6 @@ from hexacell.application.calibration_run import RunRequest
 from hexacell.application.offline import NextPose, PlanTrial
 from hexacell.application.replay_run import Replay
 from hexacell.campaign.decisions import Finished, Forecast, MeasurePose, StartPoint
-from hexacell.reporting.documents import pose_document
-from procedures.replay.comparison import Difference
 from procedures.run import events
 
 
@@ -26,7 +24,7 @@ def next_document(proposed: NextPose) -> dict[str, Any]:
         "done": False,
         "point": decision.point,
         **_expected_record(decision),
-        "pose": pose_document(decision.pose),
+        "pose": asdict(decision.pose),
         "joint_targets": list(decision.joints),
         "present_worst_sigma_mm": now,
         "predicted_worst_sigma_mm": None if forecast is None else forecast.next_mm,
@@ -51,7 +49,7 @@ def _expected_record(decision: StartPoint | MeasurePose) -> dict[str, Any]:
         "predicted_deviation": list(decision.deviation),
         "sigma": list(decision.sigma),
         "gain": decision.gain,
-        "via": [pose_document(pose) for pose in decision.via],
+        "via": [asdict(pose) for pose in decision.via],
     }
 
 
@@ -66,18 +64,11 @@ def _remainder(forecast: Forecast) -> dict[str, Any]:
 
 def preflight_document(devices: Sequence[DeviceIdentity], trial: PlanTrial) -> dict[str, Any]:
     """What ``preflight --json`` prints."""
-    result = trial.result
     return {
         "ready": True,
         "devices": [asdict(identity) for identity in devices],
         "expected": {
-            "drawn": result.drawn,
-            "robots": result.robots,
-            "points": result.points,
-            "records": result.records,
-            "outside": result.outside,
-            "worst_sigma_mm": result.worst_sigma_mm,
-            "minutes": result.minutes,
+            **asdict(trial.result),
             "lost": {str(point): share for point, share in trial.unreachable.items()},
         },
     }
@@ -107,17 +98,14 @@ def replay_document(replayed: Replay) -> dict[str, Any]:
         "taken": tally.taken,
         "recorded_by": replayed.recorded_by,
         "replayed_by": replayed.replayed_by,
-        "differences": [_difference(replayed, difference) for difference in tally.differences],
-    }
-
-
-def _difference(replayed: Replay, difference: Difference) -> dict[str, Any]:
-    return {
-        "line": difference.line,
-        "place": difference.place,
-        "aspect": difference.aspect.value,
-        "counts": replayed.counts(difference),
-        "field": difference.change.field,
-        "recorded": difference.change.recorded,
-        "replayed": difference.change.replayed,
+        "differences": [
+            {
+                "line": difference.line,
+                "place": difference.place,
+                "aspect": difference.aspect.value,
+                "counts": replayed.counts(difference),
+                **asdict(difference.change),
+            }
+            for difference in tally.differences
+        ],
     }

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from hexacell.application.offline import FitResult
 from hexacell.identification.diagnostics.pose_accuracy import PoseErrors
 from hexacell.identification.diagnostics.repeatability import Repeatability
 from hexacell.identification.diagnostics.variance_components import NoiseLevel, NoiseLevels
-from hexacell.identification.solver.chi_square import ChiSquareTest
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.geometry import Geometry
 from hexacell.presentation.layout import blocks, wrapped
@@ -18,19 +16,19 @@ from hexacell.reporting.findings import findings, noise_sentence, pair_sentences
 PARAMETER_HEADER = f"{'mm':4}{'drawing':>10}{'identified':>12}{'change':>9}{'sigma':>8}"
 
 
-def identification_report(result: FitResult) -> str:
+def identification_report(assessed: Assessment) -> str:
     """The whole report that ``hexacell fit`` prints."""
-    found, assessed = result.identified, result.assessed
+    found = assessed.found
     return blocks(
         [
-            "\n".join(wrapped(sentence) for sentence in findings(found, assessed)),
+            "\n".join(wrapped(sentence) for sentence in findings(assessed)),
             accuracy_table(assessed),
             _data_and_termination(found),
-            parameter_table(found, result.drawing),
-            residual_line(found, assessed.goodness),
+            parameter_table(found, assessed.drawing),
+            residual_line(found),
             noise_table(assessed.noise),
             repeatability_lines(assessed.repeatability),
-            correlation_lines(pair_sentences(found, assessed), len(assessed.correlated)),
+            correlation_lines(pair_sentences(assessed), len(assessed.correlated)),
         ]
     )
 
@@ -85,8 +83,9 @@ def _significance(change: float, sigma: float) -> str:
     return f"moved {times:.1f} sigma" if times < 99.95 else f"moved {times:.0f} sigma"
 
 
-def residual_line(found: Identification, goodness: ChiSquareTest) -> str:
+def residual_line(found: Identification) -> str:
     """The residuals and the chi-square test."""
+    goodness = found.goodness
     probability = goodness.probability
     shown = f"{probability:.2g}" if probability >= 1e-4 else "below 0.0001"
     return wrapped(

@@ -15,9 +15,9 @@ from hexacell.identification.diagnostics.pose_accuracy import Accuracy, predicte
 from hexacell.identification.diagnostics.repeatability import Repeatability, repeatability
 from hexacell.identification.diagnostics.tolerance_check import ToleranceViolation, tolerance_violations
 from hexacell.identification.diagnostics.variance_components import NoiseLevels, noise_levels
-from hexacell.identification.solver.chi_square import ChiSquareTest
 from hexacell.identification.solver.measurement_model import record_covariance
 from hexacell.identification.solver.result import Identification
+from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.measurements.records import MeasurementSet
 from hexacell.robot_model import Robot
@@ -31,10 +31,9 @@ SEPARATED_PAIRS = 5
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Assessment:
-    """The checks of an identification against its data, and the accuracy they predict.
+    """An identification beside the drawing, its checks against the data, and the accuracy they predict.
 
     Attributes:
-        goodness: residuals against the stated noise.
         noise: noise levels estimated from the residuals; none without redundancy.
         repeatability: none where no pose was visited twice.
         record_noise_mm: scatter of a deviation by the stated noise (root mean square distance), to
@@ -46,10 +45,10 @@ class Assessment:
         task_named: whether the cell file names them; else they span the workspace.
         accuracy: at these poses; none where the robot can reach none of them. Where the residuals
             are larger than the stated noise, the predicted error is as well.
-        tolerance_violations: parameters beyond the drawing's tolerances.
     """
 
-    goodness: ChiSquareTest
+    found: Identification
+    drawing: Geometry
     noise: NoiseLevels | None
     repeatability: Repeatability | None
     record_noise_mm: float
@@ -63,8 +62,13 @@ class Assessment:
     @property
     def refused(self) -> bool:
         """Whether the geometry must not be used, regardless of the other checks."""
-        contradicted = self.goodness.ratio > CONTRADICTED_RATIO and not self.does_not_repeat
+        contradicted = self.found.goodness.ratio > CONTRADICTED_RATIO and not self.does_not_repeat
         return contradicted or bool(self.tolerance_violations)
+
+    @property
+    def is_usable(self) -> bool:
+        """Whether the solver converged and nothing refuses the geometry."""
+        return self.found.converged and not self.refused
 
     @property
     def does_not_repeat(self) -> bool:
@@ -82,7 +86,8 @@ def assess(
     left_out = {record for record, _ in found.left_out}
     task, accuracy = _accuracy(settings, robot, found)
     return Assessment(
-        goodness=found.goodness,
+        found=found,
+        drawing=robot.drawing,
         noise=noise_levels(found),
         repeatability=repeatability(measurements, left_out),
         record_noise_mm=_record_noise_mm(found),

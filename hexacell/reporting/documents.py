@@ -12,28 +12,18 @@ from hexacell.experiment_design.decorrelation import DecorrelatingPose
 from hexacell.identification.diagnostics.pose_accuracy import PoseErrors
 from hexacell.identification.diagnostics.variance_components import NoiseLevels
 from hexacell.identification.solver.chi_square import ChiSquareTest
-from hexacell.identification.solver.result import Identification
-from hexacell.kinematics.pose import Pose
 from hexacell.reporting.assessment import Assessment
 from hexacell.reporting.findings import findings
 from hexacell.reporting.result import IdentificationResult
 
 
-def fit_document(found: Identification, assessed: Assessment) -> dict[str, Any]:
+def fit_document(assessed: Assessment) -> dict[str, Any]:
     """What ``hexacell fit --json`` prints and ``result.json`` holds (``docs/interface.md``)."""
-    return identification_document(found) | assessment_document(found, assessed)
-
-
-def identification_document(found: Identification) -> dict[str, Any]:
-    """The identified geometry and its uncertainty."""
-    return IdentificationResult.of(found).document(found.geometry.parameters)
-
-
-def assessment_document(found: Identification, assessed: Assessment) -> dict[str, Any]:
-    """The checks of the result, and its predicted accuracy."""
+    found = assessed.found
     return {
-        "findings": list(findings(found, assessed)),
-        "goodness": _goodness(assessed.goodness),
+        **IdentificationResult.of(found).document(found.geometry.parameters),
+        "findings": list(findings(assessed)),
+        "goodness": _goodness(found.goodness),
         "noise": _noise(assessed.noise),
         "repeatability": _repeatability(assessed),
         "correlated": _correlated(assessed),
@@ -56,13 +46,7 @@ def _noise(noise: NoiseLevels | None) -> dict[str, Any] | None:
     if noise is None:
         return None
     levels = {
-        name: {
-            "stated": level.stated,
-            "estimated": level.estimated,
-            "standard_error": level.standard_error,
-            "at_most": level.at_most,
-            "seen": level.is_resolved,
-        }
+        name: asdict(level) | {"seen": level.is_resolved}
         for name, level in (("encoder_mm", noise.encoder), ("gauge_mm", noise.gauge))
     }
     return levels | {"correlation": noise.correlation, "told_apart": noise.are_separable}
@@ -98,7 +82,7 @@ def _decorrelating_pose(pose: DecorrelatingPose) -> dict[str, Any]:
         "point": pose.point,
         "axis": pose.axis,
         "angle_deg": pose.degrees,
-        "pose": pose_document(pose.command),
+        "pose": asdict(pose.command),
         "correlation": pose.correlation,
     }
 
@@ -111,7 +95,7 @@ def _accuracy(assessed: Assessment) -> dict[str, Any] | None:
         "task_named": assessed.task_named,
         "before": _errors(accuracy.before),
         "after": _errors(accuracy.after),
-        "poses": [pose_document(pose) for pose in assessed.task],
+        "poses": [asdict(pose) for pose in assessed.task],
         "reachable": accuracy.reachable.tolist(),
     }
 
@@ -125,8 +109,3 @@ def _errors(errors: PoseErrors) -> dict[str, Any]:
         "position_mm": errors.distances_mm.tolist(),
         "orientation_deg": np.degrees(errors.angles).tolist(),
     }
-
-
-def pose_document(pose: Pose) -> dict[str, float]:
-    """A pose in the controller's frames, mm and deg, by its six letters."""
-    return dict(zip("xyzabc", pose.as_tuple(), strict=True))

@@ -21,22 +21,22 @@ NAMED_PARAMETERS = 4
 """More undetermined parameters than these are counted, not named."""
 
 
-def findings(found: Identification, assessed: Assessment) -> tuple[str, ...]:
+def findings(assessed: Assessment) -> tuple[str, ...]:
     """The verdict, the accuracy, and everything else to know before the result is used."""
     sentences = (
-        _verdict(found, assessed),
+        _verdict(assessed),
         _accuracy(assessed),
         _poor_repeatability(assessed),
         _noise(assessed),
         _unreachable(assessed),
-        *map(str, found.data_faults),
+        *map(str, assessed.found.data_faults),
     )
     return tuple(sentence for sentence in sentences if sentence)
 
 
-def pair_sentences(found: Identification, assessed: Assessment) -> tuple[str, ...]:
+def pair_sentences(assessed: Assessment) -> tuple[str, ...]:
     """For the strongest correlations: the pair, and the measurement that would separate it."""
-    convention = found.problem.mechanism.convention
+    convention = assessed.found.problem.mechanism.convention
     sentences = []
     for pair, pose in zip(assessed.correlated, assessed.decorrelating_poses, strict=False):
         first, second = (convention.display_name(name) for name in (pair.first, pair.second))
@@ -84,7 +84,8 @@ def _noise_level(kind: str, level: NoiseLevel) -> str:
     return f"{kind} {level.estimated:.4f} +- {level.standard_error:.4f} mm (stated {level.stated:g})"
 
 
-def _verdict(found: Identification, assessed: Assessment) -> str:
+def _verdict(assessed: Assessment) -> str:
+    found = assessed.found
     if not found.converged:
         return f"No result: the solver ended because {found.termination.value}."
     if assessed.tolerance_violations:
@@ -92,10 +93,10 @@ def _verdict(found: Identification, assessed: Assessment) -> str:
     if assessed.does_not_repeat:
         return _no_gain(assessed)
     if assessed.refused:
-        return _contradicted(assessed.goodness)
+        return _contradicted(found.goodness)
     if found.undetermined:
         return f"Incomplete: {_undetermined(found)} not determined by these data."
-    return _residual_verdict(assessed.goodness)
+    return _residual_verdict(found.goodness)
 
 
 def _beyond_tolerance(violations: Sequence[ToleranceViolation], convention: FrameConvention) -> str:
@@ -176,7 +177,7 @@ def _poor_repeatability(assessed: Assessment) -> str:
 
 def _noise(assessed: Assessment) -> str:
     """The noise levels, where the residuals contradict the stated ones."""
-    if assessed.noise is None or assessed.goodness.agreement in {
+    if assessed.noise is None or assessed.found.goodness.agreement in {
         ChiSquareVerdict.AGREES,
         ChiSquareVerdict.NOT_EVALUATED,
     }:

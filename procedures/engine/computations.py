@@ -42,7 +42,7 @@ class Computations:
         robot = self.calibration.robot_of(state)
         identified = identify(robot.problem(measurements))
         assessed = assess(self.cell.settings, robot, measurements, identified)
-        self.folder.write_result(fit_document(identified, assessed))
+        self.folder.write_result(fit_document(assessed))
         result = IdentificationResult.of(identified)
         return events.Identified(result=result, held_out=self.calibration.held_out_poses(identified))
 

@@ -20,11 +20,11 @@ def fit(options: argparse.Namespace) -> ExitCode:
     """Identify the geometry and report all that is known of the result."""
     console = Console(options.json)
     cell = load_cell(options.cell)
-    result = fit_measurements(cell, read_measurements(options.measurements))
-    console.document(fit_document(result.identified, result.assessed))
+    assessed = fit_measurements(cell, read_measurements(options.measurements))
+    console.document(fit_document(assessed))
     if not options.json:
-        console.print(identification_report(result))
-    return ExitCode.DONE if result.is_usable else ExitCode.OUT_OF_LIMITS
+        console.print(identification_report(assessed))
+    return ExitCode.DONE if assessed.is_usable else ExitCode.OUT_OF_LIMITS
 
 
 def propose_next(options: argparse.Namespace) -> ExitCode:

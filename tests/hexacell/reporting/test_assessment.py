@@ -22,7 +22,7 @@ from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS, Hexag
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.measurements.records import MeasurementSet
 from hexacell.reporting.assessment import assess
-from hexacell.reporting.documents import assessment_document, identification_document
+from hexacell.reporting.documents import fit_document
 from hexacell.reporting.findings import findings, pair_sentences
 from hexacell.robot_model import make_robot
 
@@ -42,11 +42,11 @@ def robot(settings, paper):
 
 @pytest.fixture(scope="module")
 def assessed_of(settings, robot):
-    def both(measurements, robot=robot, settings=settings):
+    def assessed(measurements, robot=robot, settings=settings):
         found = identify(robot.problem(measurements), find_outliers=False)
-        return found, assess(settings, robot, measurements, found)
+        return assess(settings, robot, measurements, found)
 
-    return both
+    return assessed
 
 
 @pytest.fixture(scope="module")
@@ -69,45 +69,44 @@ def visited_twice(measurements, scatter_mm, seed=0):
 
 
 def test_a_good_result_has_the_verdict_first_and_then_the_accuracy(good):
-    found, assessed = good
-    verdict, accuracy, *more = findings(found, assessed)
+    verdict, accuracy, *more = findings(good)
     assert verdict.startswith("Good: the records determine every parameter")
     assert "At 6 task poses the position error is now 19 mm (rms)" in accuracy
-    assert f"{assessed.accuracy.after.position_rms_mm:.2g} mm with the identified geometry" in accuracy
+    assert f"{good.accuracy.after.position_rms_mm:.2g} mm with the identified geometry" in accuracy
     assert more == []
 
 
 def test_far_too_much_noise_makes_it_doubtful_and_names_the_levels(visit, assessed_of):
-    verdict, *more = findings(*assessed_of(visit(seed=2).measured(0.03, seed=1)))
+    verdict, *more = findings(assessed_of(visit(seed=2).measured(0.03, seed=1)))
     assert verdict.startswith("Doubtful: the residuals are ")
     assert "times the stated noise" in verdict
     assert any("encoders 0.0" in sentence and "gauges 0.0" in sentence for sentence in more)
 
 
 def test_more_noise_increases_the_predicted_error(visit, assessed_of, good):
-    _, loud = assessed_of(visit(seed=2).measured(0.03, seed=1))
-    _, quiet = good
+    loud = assessed_of(visit(seed=2).measured(0.03, seed=1))
+    quiet = good
     ratio = loud.accuracy.after.position_rms_mm / quiet.accuracy.after.position_rms_mm
-    assert ratio == pytest.approx(loud.goodness.ratio, rel=0.1)
+    assert ratio == pytest.approx(loud.found.goodness.ratio, rel=0.1)
 
 
 def test_undetermined_parameters_make_a_result_incomplete(visit, assessed_of):
-    found, assessed = assessed_of(visit(points=2, orientations=9, degrees=3.0).measured(0.01))
-    verdict = findings(found, assessed)[0]
+    assessed = assessed_of(visit(points=2, orientations=9, degrees=3.0).measured(0.01))
+    verdict = findings(assessed)[0]
     assert verdict.startswith("Incomplete: ")
     assert "of 35 parameters are not determined by these data" in verdict
 
 
 def test_a_few_undetermined_parameters_are_named(good, monkeypatch):
-    found, assessed = good
-    monkeypatch.setattr(type(found), "undetermined", ("B2z", "B3z", "B5z", "l3"))
-    assert "B2/B3/B5 z, leg 3 length are not determined" in findings(found, assessed)[0]
+    monkeypatch.setattr(type(good.found), "undetermined", ("B2z", "B3z", "B5z", "l3"))
+    assert "B2/B3/B5 z, leg 3 length are not determined" in findings(good)[0]
 
 
 def test_a_solver_that_did_not_converge_gives_no_result(good):
-    found, assessed = good
-    stuck = replace(found, solution=replace(found.solution, termination=Termination.STUCK))
-    assert findings(stuck, assessed)[0] == f"No result: the solver ended because {Termination.STUCK.value}."
+    solution = replace(good.found.solution, termination=Termination.STUCK)
+    stuck = replace(good, found=replace(good.found, solution=solution))
+    assert findings(stuck)[0] == f"No result: the solver ended because {Termination.STUCK.value}."
+    assert not stuck.is_usable
 
 
 def test_where_repeatability_dominates_recalibrating_will_not_help(visit, assessed_of, robot, paper):
@@ -120,26 +119,26 @@ def test_where_repeatability_dominates_recalibrating_will_not_help(visit, assess
         robot, drawing=nearly, controller=nearly, frames=robot.mechanism.normalize_frames(nearly)[1]
     )
     measured = visited_twice(visit(commanding=nearly, seed=2).measured(0.01), scatter_mm=0.3)
-    found, assessed = assessed_of(measured, known)
+    assessed = assessed_of(measured, known)
     assert assessed.repeatability.degrees_of_freedom == 55
     assert assessed.repeatability.distance_mm == pytest.approx(0.3 * np.sqrt(3 / 2), rel=0.2)
     assert assessed.accuracy.removable_mm < 0.3
-    assert findings(found, assessed)[0].startswith("Recalibrating will not help: the machine repeats")
-    assert assessment_document(found, assessed)["repeatability"]["recalibrating_helps"] is False
+    assert findings(assessed)[0].startswith("Recalibrating will not help: the machine repeats")
+    assert fit_document(assessed)["repeatability"]["recalibrating_helps"] is False
 
 
 def test_play_is_named_but_calibration_helps_where_the_error_is_larger(visit, assessed_of):
-    found, assessed = assessed_of(visited_twice(visit(seed=2).measured(0.01), scatter_mm=0.3))
+    assessed = assessed_of(visited_twice(visit(seed=2).measured(0.01), scatter_mm=0.3))
     assert not assessed.does_not_repeat
-    sentences = findings(found, assessed)
+    sentences = findings(assessed)
     assert not sentences[0].startswith("Recalibrating")
     assert any(sentence.startswith("On returning to a pose the ball is 0.") for sentence in sentences)
 
 
 def test_good_repeatability_is_no_finding(visit, assessed_of):
-    found, assessed = assessed_of(visited_twice(visit(seed=2).measured(0.01), scatter_mm=0.01))
-    assert not any("return" in sentence for sentence in findings(found, assessed))
-    assert assessment_document(found, assessed)["repeatability"]["recalibrating_helps"] is True
+    assessed = assessed_of(visited_twice(visit(seed=2).measured(0.01), scatter_mm=0.01))
+    assert not any("return" in sentence for sentence in findings(assessed))
+    assert fit_document(assessed)["repeatability"]["recalibrating_helps"] is True
 
 
 def gross_error(point, orientation):
@@ -155,32 +154,28 @@ def gross_error(point, orientation):
 
 
 def test_records_left_out_are_named_and_not_counted_in_the_repeatability(good, settings, robot, visit):
-    found, _ = good
     twice = visited_twice(visit(seed=2).measured(0.01, seed=1), scatter_mm=0.0)
     wrong = replace(twice.records[-1], deviation=(25.4, 0.0, 0.0))
     measured = MeasurementSet((*twice.records[:-1], wrong))
-    left = replace(found, data_faults=(gross_error(wrong.point, wrong.orientation),))
+    left = replace(good.found, data_faults=(gross_error(wrong.point, wrong.orientation),))
     assessed = assess(settings, robot, measured, left)
     assert assessed.repeatability is not None
     assert assessed.repeatability.distance_mm < 1e-9
-    assert any(
-        f"point {wrong.point}, orientation {wrong.orientation}" in s for s in findings(left, assessed)
-    )
+    assert any(f"point {wrong.point}, orientation {wrong.orientation}" in s for s in findings(assessed))
 
 
 def test_a_data_fault_is_a_finding_in_its_own_words(good):
-    found, assessed = good
-    spoiled = replace(found, data_faults=(gross_error(2, 7),))
+    spoiled = replace(good, found=replace(good.found, data_faults=(gross_error(2, 7),)))
     expected = "gauge y is 0.2 mm off at point 2, orientation 7. Measure it again."
-    assert findings(spoiled, assessed)[-1] == expected
+    assert findings(spoiled)[-1] == expected
 
 
 def test_task_poses_out_of_reach_are_numbered_as_in_the_cell_file(visit, assessed_of, settings):
     poses = ((0.0, 0.0, 550.0, 0.0, 0.0, 0.0), (0.0, 900.0, 550.0, 0.0, 0.0, 0.0))
     task = settings.model_copy(update={"task": TaskSettings(poses=poses)})
-    found, assessed = assessed_of(visit(seed=2).measured(0.01, seed=1), settings=task)
-    assert "Task poses that the robot cannot reach are left out: 2." in findings(found, assessed)
-    document = assessment_document(found, assessed)["accuracy"]
+    assessed = assessed_of(visit(seed=2).measured(0.01, seed=1), settings=task)
+    assert "Task poses that the robot cannot reach are left out: 2." in findings(assessed)
+    document = fit_document(assessed)["accuracy"]
     assert document["reachable"] == [True, False]
     assert document["poses"][1]["y"] == pytest.approx(900.0)
     assert len(document["after"]["position_mm"]) == 1
@@ -188,10 +183,10 @@ def test_task_poses_out_of_reach_are_numbered_as_in_the_cell_file(visit, assesse
 
 def test_without_task_poses_the_accuracy_is_that_across_the_workspace(visit, assessed_of, settings):
     bare = settings.model_copy(update={"task": TaskSettings()})
-    found, assessed = assessed_of(visit(seed=2).measured(0.01, seed=1), settings=bare)
+    assessed = assessed_of(visit(seed=2).measured(0.01, seed=1), settings=bare)
     assert not assessed.task_named
     assert len(assessed.accuracy.poses) > 20
-    assert "poses across the workspace" in findings(found, assessed)[1]
+    assert "poses across the workspace" in findings(assessed)[1]
 
 
 def seen_from(change, settings):
@@ -226,8 +221,8 @@ def test_the_frames_of_the_controller_s_config_do_not_matter(good, visit, assess
     )
     elsewhere = seen_from(change, settings)
     controller = ControllerGeometry(Hexaglide().change_frames(paper.nominal, change), paper.branch)
-    _, assessed = assessed_of(told, make_robot(elsewhere, controller), elsewhere)
-    _, before = good
+    assessed = assessed_of(told, make_robot(elsewhere, controller), elsewhere)
+    before = good
     for name in ("before", "after"):
         mine, other = getattr(assessed.accuracy, name), getattr(before.accuracy, name)
         np.testing.assert_allclose(mine.distances_mm, other.distances_mm, rtol=1e-4)
@@ -248,25 +243,21 @@ def test_the_frames_of_the_controller_s_config_do_not_matter(good, visit, assess
 
 
 def test_pairs_are_named_with_the_measurement_that_separates_them(good):
-    found, assessed = good
-    assert assessed.correlated[0].first == "l2"
-    sentences = pair_sentences(found, assessed)
+    assert good.correlated[0].first == "l2"
+    sentences = pair_sentences(good)
     assert sentences
     assert all("cannot be separated from these poses" in sentence for sentence in sentences)
     assert sentences[0].startswith("leg 2 length and leg 3 length cannot be separated")
-    named = [part for part in assessed.decorrelating_poses if part]
+    named = [part for part in good.decorrelating_poses if part]
     for part in named:
         way = "turn" if part.axis == "z" else "tilt"
         words = f"{way} {part.degrees:+.0f} deg about {part.axis} at point {part.point}"
         assert any(words in sentence for sentence in sentences)
 
 
-def test_the_two_documents_are_json_and_share_no_key(good):
-    found, assessed = good
-    first, second = identification_document(found), assessment_document(found, assessed)
-    assert not set(first) & set(second)
-    document = json.loads(json.dumps(first | second, allow_nan=False))
-    assert document["findings"] == list(findings(found, assessed))
+def test_the_document_is_json_and_has_the_findings(good):
+    document = json.loads(json.dumps(fit_document(good), allow_nan=False))
+    assert document["findings"] == list(findings(good))
     assert document["goodness"]["agreement"] == "agrees"
     assert document["goodness"]["expected_chi2"] == pytest.approx(document["dof"], abs=0.1)
     assert document["noise"]["encoder_mm"]["stated"] == 0.01

@@ -22,7 +22,7 @@ from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.rotations import Array
 from hexacell.kinematics.sensitivity import pose_sensitivity, singularity_margin
 from hexacell.measurements.records import MeasurementSet, Record
-from hexacell.reporting.documents import identification_document
+from hexacell.reporting.result import IdentificationResult
 from tests.hexacell.kinematics.mechanisms.gough_stewart import CONVENTION, PARAMETERS, GoughStewart
 
 MECHANISM: Mechanism = GoughStewart()
@@ -121,7 +121,7 @@ def test_it_is_identified_from_exact_records(
     assert found.converged
     assert found.undetermined == ()
     assert found.geometry.largest_difference(truth) < 1e-5
-    document = identification_document(found)
+    document = IdentificationResult.of(found).document(PARAMETERS)
     assert list(document["geometry"]) == ["z", "A", "B"]
     assert [entry["name"] for entry in document["parameters"]] == list(PARAMETERS.names)
     assert np.array(document["covariance"]).shape == (42, 42)

@@ -24,7 +24,6 @@ from drivers.gauges.protocol import (
 )
 from drivers.gauges.serial_gauge import SerialGauge
 
-VALUE_REQUEST = b"R\r"
 VALUE_FRAME = re.compile(rb"([+-])(?=.{8}, )( *\d+\.\d+ *), (IN|MM)\r")
 PARAMETER = re.compile(rb"(?:[pP](\d{3}) ?= ?)?(\d{1,3})\r")
 UNITS = {b"IN": Unit.INCH, b"MM": Unit.MM}
@@ -86,13 +85,9 @@ class CdiGauge(SerialGauge):
         "cdi", "CDI or Starrett indicator", LineSettings(9600), "+  2.1380, MM\r\n"
     )
     normal_modes: ClassVar[frozenset[str]] = frozenset({"ABS", "INCR"})
+    value_request = b"R\r"
 
     _knows_parameters: bool | None = None
-
-    @property
-    def value_request(self) -> bytes:
-        """The request for the displayed value."""
-        return VALUE_REQUEST
 
     def _parse_value(self, frame: bytes) -> DisplayedValue:
         answer = parse_value(frame)

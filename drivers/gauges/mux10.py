@@ -18,6 +18,8 @@ from drivers.errors import GaugeAtEnd, GaugeSilent, WrongAnswer
 from drivers.gauges.protocol import DisplayedValue, FrameRejected, GaugeState, LineSettings, ProtocolSpec
 from drivers.gauges.serial_gauge import SerialGauge
 from drivers.interfaces import GaugeReading
+from drivers.serial.shared_port import SharedSerialPorts
+from hexacell.cell.devices import GaugeSettings
 from hexacell.errors import DeviceError
 
 VALUE_FRAME = re.compile(rb"0(\d{1,2})A([+-])(?=.{8}\r)(\d+\.\d+)\r")
@@ -74,15 +76,10 @@ class Mux10Gauge(SerialGauge):
         "mux10", "Mitutoyo MUX-10 channel", LineSettings(9600), "01A+0000.123\r"
     )
 
-    @property
-    def channel(self) -> int:
-        """Its input of the multiplexer, from 1."""
-        return self.settings.channel
-
-    @property
-    def value_request(self) -> bytes:
-        """The request for the displayed value."""
-        return b"%d\r" % self.channel
+    def __init__(self, settings: GaugeSettings, ports: SharedSerialPorts) -> None:
+        super().__init__(settings, ports)
+        self.channel = settings.channel
+        self.value_request = b"%d\r" % settings.channel
 
     async def read_once(self) -> GaugeReading:
         """As :meth:`SerialGauge.read_once`; a busy multiplexer counts as a garbled answer."""
@@ -108,7 +105,7 @@ class Mux10Gauge(SerialGauge):
         )
 
     def _parse_value(self, frame: bytes) -> DisplayedValue:
-        answer = parse_value(frame, self.channel)
+        answer = parse_value(frame, self.settings.channel)
         if isinstance(answer, DisplayedValue):
             return answer
         if answer.code == BUSY:

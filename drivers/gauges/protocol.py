@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field, fields
+from dataclasses import dataclass, field, fields
 from enum import StrEnum
 
 from drivers.errors import GaugeSilent, WrongAnswer
@@ -14,7 +13,10 @@ TERMINATOR = b"\r"  # ends every request, and is the first line end of every ans
 
 @dataclass(frozen=True, slots=True)
 class LineSettings:
-    """A protocol's defaults for the serial port, as pyserial names them."""
+    """A protocol's defaults for the serial port, as pyserial names them.
+
+    The cell file's ``serial`` table overrides them.
+    """
 
     baudrate: int
     bytesize: int = 8
@@ -23,10 +25,6 @@ class LineSettings:
     dtr: bool = True
     rts: bool = True
     exclusive: bool = True
-
-    def merged_with(self, settings: Mapping[str, object]) -> dict[str, object]:
-        """These defaults with the cell file's ``serial`` table over them."""
-        return {**asdict(self), **settings}
 
     def __str__(self) -> str:
         return f"{self.baudrate} baud {self.bytesize}{self.parity}{self.stopbits}"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
+from dataclasses import asdict
 from typing import ClassVar, TypeVar
 
 from drivers.errors import GaugeAtEnd, GaugeUnsteady, WrongSetting, ZeroVoid
@@ -33,14 +34,21 @@ Parsed = TypeVar("Parsed")
 class SerialGauge(ABC):
     """A :class:`drivers.interfaces.Gauge` on a serial line; each protocol is a subclass.
 
-    Values are as displayed, mm, in the instrument's own zero and direction.
+    Values are as displayed, mm, in the instrument's own zero and direction. Failures have the meaning
+    that :mod:`drivers.errors` gives them; a ``ZeroVoid`` is repeated until the gauge is opened again.
+
+    Attributes:
+        value_request: the request for the displayed value.
+        channel: the input of a shared multiplexer; None if the gauge uses the line alone.
     """
 
     spec: ClassVar[ProtocolSpec]
     normal_modes: ClassVar[frozenset[str]] = frozenset()
+    value_request: bytes
 
     def __init__(self, settings: GaugeSettings, ports: SharedSerialPorts) -> None:
         self.settings = settings
+        self.channel: int | None = None
         self.subject = f"gauge {settings.name}"
         self._ports = ports
         self._port: SharedSerialPort | None = None
@@ -52,16 +60,6 @@ class SerialGauge(ABC):
     def name(self) -> str:
         """Its name in the cell file."""
         return self.settings.name
-
-    @property
-    def channel(self) -> int | None:
-        """Its input of a shared multiplexer; None if it uses the line alone."""
-        return None
-
-    @property
-    @abstractmethod
-    def value_request(self) -> bytes:
-        """The request for the displayed value."""
 
     @abstractmethod
     def _parse_value(self, frame: bytes) -> DisplayedValue:
@@ -75,7 +73,7 @@ class SerialGauge(ABC):
         """Connect, identify, and refuse inches, hold, peak modes and a low battery.
 
         Raises:
-            DeviceError: The port or the instrument is absent, has wrong settings, or is of another type.
+            DeviceError: The port or the instrument is absent, or has wrong settings.
             FileError: The settings of the port are refused, or another gauge uses it.
         """
         self._state = self._void = None
@@ -91,14 +89,7 @@ class SerialGauge(ABC):
         return DeviceIdentity(self.name, self.spec.protocol, description)
 
     async def read(self) -> GaugeReading:
-        """The displayed value, mm, as soon as two consecutive readings agree.
-
-        Raises:
-            GaugeAtEnd: The plunger is at an end of its travel.
-            GaugeUnsteady: No two consecutive readings agree.
-            ZeroVoid: The instrument or its port was off meanwhile; open it again.
-            DeviceError: No answer, a garbled one, inches, or not open.
-        """
+        """The displayed value, mm, as soon as two consecutive readings agree."""
         self._opened_state()
         readings = [self._in_mm(await self._read_value())]
         while len(readings) < MAX_READINGS:
@@ -112,13 +103,7 @@ class SerialGauge(ABC):
         )
 
     async def read_once(self) -> GaugeReading:
-        """The value displayed at this moment, mm, from a single query.
-
-        Raises:
-            GaugeAtEnd: The plunger is at an end of its travel.
-            WrongAnswer: The answer is garbled.
-            DeviceError: As :meth:`read`.
-        """
+        """The value displayed at this moment, mm, from a single query."""
         self._opened_state()
         try:
             displayed = self._in_mm(self._parse_value(await self._ask(self.value_request)))
@@ -128,12 +113,7 @@ class SerialGauge(ABC):
         return GaugeReading(displayed.value, displayed.text)
 
     async def check(self) -> None:
-        """Query the settings again and compare them with those found by ``open``.
-
-        Raises:
-            ZeroVoid: One of them has changed, or the instrument was off meanwhile.
-            DeviceError: No answer, or a unit or mode that makes readings wrong.
-        """
+        """Query the settings again; a ``ZeroVoid`` if one has changed since ``open``."""
         before = self._opened_state()
         now = await self._read_state()
         self._require_usable(now)
@@ -149,7 +129,7 @@ class SerialGauge(ABC):
     async def _connect(self) -> None:
         if self.settings.port is None:
             raise FileError("has no port", subject=self.subject, action="Name it in the cell file")
-        serial = self.spec.line.merged_with(self.settings.serial)
+        serial = {**asdict(self.spec.line), **self.settings.serial}
         port = self._ports.acquire(self.settings.port, self.name, serial, channel=self.channel)
         self._port = port
         self._session = await port.open()

@@ -26,7 +26,6 @@ from drivers.gauges.protocol import (
 from drivers.gauges.serial_gauge import SerialGauge
 from hexacell.errors import DeviceError
 
-VALUE_REQUEST = b"?\r"
 VALUE_FRAME = re.compile(rb"([+\- ])(\d{1,5}\.\d{1,6})[<=>]?\r")
 POWER_UP = re.compile(rb"(?<![A-Z])[A-Z]{2}\d{2,}[\w.]*\r")  # maker, instrument, options
 
@@ -95,11 +94,7 @@ class SylvacGauge(SerialGauge):
         "sylvac", "Sylvac opto-RS indicator", LineSettings(4800, 7, "E", 2, rts=False), "+12.345\r"
     )
     normal_modes: ClassVar[frozenset[str]] = frozenset({"NOR", "REF", "REF1", "REF2"})
-
-    @property
-    def value_request(self) -> bytes:
-        """The request for the displayed value."""
-        return VALUE_REQUEST
+    value_request = b"?\r"
 
     def _parse_value(self, frame: bytes) -> DisplayedValue:
         match parse_value(frame):

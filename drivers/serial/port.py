@@ -85,11 +85,13 @@ class SerialPort:
         return self.open_count
 
     def exchange(self, request: bytes, terminator: bytes, timeout_s: float) -> bytes:
-        """Send ``request``; the first complete frame after it, ``terminator`` included.
+        """Send ``request``; the first complete frame after it, as :func:`cut_frame` gives it.
 
         Raises:
-            NoAnswer: No complete frame within ``timeout_s``.
-            DeviceError: The port is not open, was lost, or is being closed.
+            NoAnswer: No complete frame within ``timeout_s``. The next exchange then waits until no
+                late response can come.
+            DeviceError: The port is not open, was lost, or is being closed, or the device sends
+                continuously.
         """
         if self._port is None:
             raise self._lost("it is not open")

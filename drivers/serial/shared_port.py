@@ -68,24 +68,11 @@ class SharedSerialPort:
         return bool(self._channels)
 
     async def open(self) -> int:
-        """Open the port unless it is open and usable; how often it has been opened.
-
-        Raises:
-            DeviceError: The port is absent, in use, or refused.
-            FileError: pyserial does not accept the URL or a setting.
-        """
+        """As :meth:`SerialPort.open`."""
         return await self._run(self._port.open)
 
     async def exchange(self, request: bytes, terminator: bytes, timeout_s: float) -> bytes:
-        """Send ``request`` and return the first complete frame, ``terminator`` included.
-
-        Leading line ends and an echo of the request are removed.
-
-        Raises:
-            NoAnswer: No complete frame within ``timeout_s``. The next exchange then waits until no
-                late response can come.
-            DeviceError: The port was lost or is closed, or the device sends continuously.
-        """
+        """As :meth:`SerialPort.exchange`."""
         return await self._run(partial(self._port.exchange, request, terminator, timeout_s))
 
     def require_silence(self) -> None:

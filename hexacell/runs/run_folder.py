@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -45,12 +46,8 @@ class RunFolder:
         return self.path / "wire"
 
     def new_wire(self) -> Path:
-        """The same for a run that goes on: what went over the wires before stays."""
-        path, part = self.wire, 1
-        while path.exists():
-            part += 1
-            path = self.wire.with_name(f"{self.wire.name}-{part}")
-        return path
+        """The same for a run that is resumed: what went over the wires before is kept."""
+        return _unused(self.wire)
 
     def create(self, cell: Cell) -> None:
         """Make the folder and keep the cell file's text in it.
@@ -78,14 +75,7 @@ def runs_folder(cell: Cell) -> Path:
 
 def new_run(cell: Cell) -> RunFolder:
     """A folder for a run that begins now; nothing is made yet."""
-    name = datetime.now(UTC).strftime("%Y-%m-%dT%H%M%SZ")
-    parent = runs_folder(cell)
-    attempt = 1
-    path = parent / name
-    while path.exists():
-        attempt += 1
-        path = parent / f"{name}-{attempt}"
-    return RunFolder(path)
+    return RunFolder(_unused(runs_folder(cell) / datetime.now(UTC).strftime("%Y-%m-%dT%H%M%SZ")))
 
 
 def find_run(cell: Cell, named: str) -> RunFolder:
@@ -98,3 +88,9 @@ def find_run(cell: Cell, named: str) -> RunFolder:
         if RunFolder(path).journal.is_file():
             return RunFolder(path)
     raise UsageError(f"there is no run '{named}'", action=f"The cell's runs are in {runs_folder(cell)}")
+
+
+def _unused(path: Path) -> Path:
+    """The path, or the first of ``<path>-2``, ``<path>-3`` ... that does not exist."""
+    others = (path.with_name(f"{path.name}-{number}") for number in itertools.count(2))
+    return next(one for one in itertools.chain([path], others) if not one.exists())

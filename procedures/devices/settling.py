@@ -31,14 +31,6 @@ class DeviceSnapshot:
     gauges: tuple[GaugeReading, ...]
     encoders: EncoderSample
 
-    def gauge_values(self) -> Array:
-        """What the gauges show (3,), mm."""
-        return np.array([reading.value_mm for reading in self.gauges])
-
-    def joints(self) -> Array:
-        """Slider positions (6,), mm."""
-        return np.array(self.encoders.positions_mm)
-
 
 @dataclass(frozen=True, slots=True)
 class Settled:
@@ -46,21 +38,15 @@ class Settled:
 
     window: tuple[DeviceSnapshot, ...]
 
-    def gauge_means(self) -> Array:
-        """Means (3,), mm, of what the gauges showed."""
-        return np.asarray(np.mean([glance.gauge_values() for glance in self.window], axis=0))
+    @property
+    def gauges(self) -> Array:
+        """What the gauges showed (n, 3), mm."""
+        return np.array([[reading.value_mm for reading in one.gauges] for one in self.window])
 
-    def joint_means(self) -> Array:
-        """Means (6,), mm, of the slider positions."""
-        return np.asarray(np.mean([glance.joints() for glance in self.window], axis=0))
-
-    def gauge_spread(self) -> Array:
-        """Ranges (3,), mm, of what the gauges showed."""
-        return np.asarray(np.ptp([glance.gauge_values() for glance in self.window], axis=0))
-
-    def joint_spread(self) -> Array:
-        """Ranges (6,), mm, of the slider positions."""
-        return np.asarray(np.ptp([glance.joints() for glance in self.window], axis=0))
+    @property
+    def joints(self) -> Array:
+        """Slider positions (n, 6), mm."""
+        return np.array([one.encoders.positions_mm for one in self.window])
 
 
 async def read_all(devices: Devices, clock: CellClock) -> DeviceSnapshot:
@@ -118,13 +104,13 @@ def _still_swings(error: HexacellError) -> bool:
 
 def _moving(devices: Devices, timing: TimingSettings, settled: Settled) -> list[str]:
     """Names of what moved within the window, with how much."""
-    gauges = zip(devices.gauges, settled.gauge_spread(), strict=True)
+    gauges = zip(devices.gauges, np.ptp(settled.gauges, axis=0), strict=True)
     moving = [
         f"gauge {m.gauge.name} by {spread:.3f} mm"
         for m, spread in gauges
         if spread > timing.spread_gauge_mm
     ]
-    legs = enumerate(settled.joint_spread(), start=1)
+    legs = enumerate(np.ptp(settled.joints, axis=0), start=1)
     return moving + [
         f"slider {leg} by {spread:.3f} mm" for leg, spread in legs if spread > timing.spread_encoder_mm
     ]

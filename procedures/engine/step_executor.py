@@ -184,17 +184,17 @@ class StepExecutor:
 def _reading(
     devices: Devices, settled: Settled, temperatures: tuple[events.Temperature, ...]
 ) -> events.Reading:
-    means, spreads = settled.gauge_means(), settled.gauge_spread()
+    means, spreads = settled.gauges.mean(axis=0), np.ptp(settled.gauges, axis=0)
     on_axes, spread = np.zeros(3), np.zeros(3)
     for row, mounted in enumerate(devices.gauges):
         on_axes[mounted.axis.index] = mounted.axis.coordinate(means[row])
         spread[mounted.axis.index] = spreads[row]
-    q1, q2, q3, q4, q5, q6 = (float(value) for value in settled.joint_means())
+    q1, q2, q3, q4, q5, q6 = (float(value) for value in settled.joints.mean(axis=0))
     return events.Reading(
         gauges_mm=three_numbers(on_axes),
         spread_mm=three_numbers(spread),
         joints_mm=(q1, q2, q3, q4, q5, q6),
-        answers=tuple(tuple(reading.raw for reading in glance.gauges) for glance in settled.window),
-        counts=tuple(glance.encoders.counts for glance in settled.window),
+        answers=tuple(tuple(reading.raw for reading in one.gauges) for one in settled.window),
+        counts=tuple(one.encoders.counts for one in settled.window),
         temperatures=temperatures,
     )

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import asyncio
 import json
-from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from hexacell.acceptance import Verdict
 from hexacell.application.calibration_run import calibrate
+from hexacell.cell.loader import load_cell
 from hexacell.controller_config.change import ConfigChange, fingerprint
 from hexacell.controller_config.write_back import Receipt
 from hexacell.errors import CellBusy, ExitCode, FileError, UsageError
@@ -150,7 +150,8 @@ async def test_a_run_without_a_beginning_cannot_be_resumed(make_site) -> None:
 async def test_a_run_is_resumed_with_the_cell_file_it_began_with(make_site, finished) -> None:
     site = make_site()
     site.write(finished.until(events.RecordTaken), finished)
-    site.cell = replace(site.cell, text=site.cell.text + "# changed\n")
+    site.cell.path.write_text(site.cell.text + "# changed\n")
+    site.cell = load_cell(site.cell.path)
     with pytest.raises(UsageError, match="has changed since the run began"):
         await site.calibrate(resume=True)
 

@@ -65,7 +65,7 @@ async def test_a_failure_is_kept_with_the_age_of_the_last_value(live, devices, b
 
 async def test_what_settles_is_seen(live, devices, bench) -> None:
     settled = await settle(devices, TimingSettings(), bench.clock)
-    assert settled.gauge_means().tolist() == [0.0, 0.0, 0.0]
+    assert settled.gauges.mean(axis=0).tolist() == [0.0, 0.0, 0.0]
     assert live.encoders.value == settled.window[-1].encoders
     assert live.gauge("z").value == settled.window[-1].gauges[2]
 

@@ -55,15 +55,15 @@ async def test_ringing_is_waited_for(bench, axis: int) -> None:
     settled = await settle(bench.devices, TIMING, bench.clock)
     # Its swing is within the limit from here on at the earliest: 2 * 0.5 * exp(-t / 0.5) = 0.06.
     assert settled.window[-1].at_s > 0.5 * math.log(1.0 / 0.06)
-    assert settled.gauge_spread()[axis] <= TIMING.spread_gauge_mm
-    assert settled.gauge_means()[axis] == pytest.approx(1.5, abs=TIMING.spread_gauge_mm)
+    assert np.ptp(settled.gauges[:, axis]) <= TIMING.spread_gauge_mm
+    assert settled.gauges[:, axis].mean() == pytest.approx(1.5, abs=TIMING.spread_gauge_mm)
 
 
 async def test_a_jump_empties_nothing_but_is_waited_out(bench) -> None:
     """Readings from before a jump are no part of the window that counts."""
     bench.gauges[0].shown = lambda: 0.0 if bench.clock.now() < 0.45 else 1.0
     settled = await settle(bench.devices, TIMING, bench.clock)
-    assert {look.gauge_values()[0] for look in settled.window} == {1.0}
+    assert set(settled.gauges[:, 0]) == {1.0}
 
 
 async def test_means_and_ranges_are_those_of_the_window(bench) -> None:
@@ -71,10 +71,10 @@ async def test_means_and_ranges_are_those_of_the_window(bench) -> None:
     bench.encoders.shown = lambda: (1.0, 2.0, 3.0, 4.0, 5.0, 6.0)
     settled = await settle(bench.devices, TIMING, bench.clock)
     values = [look.gauges[1].value_mm for look in settled.window]
-    assert settled.gauge_means()[1] == pytest.approx(np.mean(values))
-    assert settled.gauge_spread() == pytest.approx([0.0, 0.02, 0.0])
-    assert settled.joint_means().tolist() == [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]
-    assert settled.joint_spread().tolist() == [0.0] * 6
+    assert settled.gauges[:, 1].mean() == pytest.approx(np.mean(values))
+    assert np.ptp(settled.gauges, axis=0) == pytest.approx([0.0, 0.02, 0.0])
+    assert settled.joints.mean(axis=0).tolist() == [1.0, 2.0, 3.0, 4.0, 5.0, 6.0]
+    assert np.ptp(settled.joints, axis=0).tolist() == [0.0] * 6
 
 
 @pytest.mark.parametrize("name", ["x", "y", "z"])
@@ -102,7 +102,8 @@ async def test_all_that_moves_is_named(bench) -> None:
 async def test_limits_are_ranges_and_included(bench) -> None:
     values = iter(np.tile([0.0, TIMING.spread_gauge_mm], 200).tolist())
     bench.gauges[0].shown = values.__next__
-    assert (await settle(bench.devices, TIMING, bench.clock)).gauge_spread()[0] == TIMING.spread_gauge_mm
+    settled = await settle(bench.devices, TIMING, bench.clock)
+    assert np.ptp(settled.gauges[:, 0]) == TIMING.spread_gauge_mm
 
 
 async def test_an_unsteady_gauge_has_not_settled_yet(bench) -> None:
@@ -205,10 +206,10 @@ async def test_a_window_longer_than_the_patience_is_said(bench) -> None:
         await settle(bench.devices, timing, bench.clock)
 
 
-async def test_a_glance_keeps_what_was_answered(bench) -> None:
+async def test_a_snapshot_keeps_what_was_answered(bench) -> None:
     bench.gauges[1].shown = lambda: -1.25
     bench.encoders.shown = lambda: (0.001, 0.0, 0.0, 0.0, 0.0, -2.5)
     look = await read_all(bench.devices, bench.clock)
     assert [reading.raw for reading in look.gauges] == ["+0.000", "-1.250", "+0.000"]
     assert look.encoders.counts == (1, 0, 0, 0, 0, -2500)
-    assert look.joints().tolist() == [0.001, 0.0, 0.0, 0.0, 0.0, -2.5]
+    assert look.encoders.positions_mm == (0.001, 0.0, 0.0, 0.0, 0.0, -2.5)

@@ -56,7 +56,7 @@ _ABORT: tuple[Word, ...] = ("abort",)
 _REDO: tuple[Word, ...] = ("redo-set", "redo-set", "abort")
 
 
-class _Escalations(Section):
+class Escalations(Section):
     """One escalation a kind of failure. Each ends with ask or abort, so that attempts are bounded."""
 
     @model_validator(mode="after")
@@ -66,13 +66,13 @@ class _Escalations(Section):
                 raise broken_rule(f"{name} must end with ask or abort", "Append one of them")
         return self
 
-    def escalation(self, kind: FailureKind) -> tuple[Action, ...]:
-        """The actions after successive failures of a kind."""
-        words: tuple[str, ...] = getattr(self, kind.value, _ABORT)
-        return tuple(Action(word) for word in words)
+    def action(self, kind: FailureKind, attempt: int) -> Action:
+        """The action after the ``attempt``-th failure of a kind, counted from 1."""
+        escalation: Escalation = getattr(self, kind.value, _ABORT)
+        return Action(escalation[min(attempt, len(escalation)) - 1])
 
 
-class AttendedRecovery(_Escalations):
+class AttendedRecovery(Escalations):
     """With a technician at the machine."""
 
     gauge_silent: Escalation = Field(_ASK, description="no answer, or an invalid one")
@@ -92,7 +92,7 @@ class AttendedRecovery(_Escalations):
     other: Escalation = Field(_ASK, description="any other failure of a device")
 
 
-class UnattendedRecovery(_Escalations):
+class UnattendedRecovery(Escalations):
     """Without a technician: a bounded number of attempts, then the run ends."""
 
     gauge_silent: Escalation = Field(("retry", *_REDO), description="no answer, or an invalid one")
@@ -125,10 +125,10 @@ class UnattendedRecovery(_Escalations):
     other: Escalation = Field(_ABORT, description="any other failure of a device")
 
     @model_validator(mode="after")
-    def _nobody_is_asked(self) -> Self:
+    def _never_asks(self) -> Self:
         for name, escalation in self:
             if "ask" in escalation:
-                raise broken_rule(f"{name} asks, and nobody is there", "Replace ask by abort")
+                raise broken_rule(f"{name} asks, but the run is unattended", "Replace ask by abort")
         return self
 
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 from drivers import errors as device
 from drivers.controllers import errors as controller
-from hexacell.cell.recovery import Action, FailureKind, RecoverySettings
+from hexacell.cell.recovery import Action, Escalations, FailureKind, RecoverySettings
 from hexacell.errors import AnswerNeeded, DeviceError, FileError, HexacellError, Interruption
 from procedures.calibration.path_planning import NoSafePath
 from procedures.calibration.set_steps import TravelError
@@ -80,26 +80,24 @@ class RecoveryPolicy:
     """The actions after the failures of a run.
 
     Attributes:
-        escalations: by kind; a kind without one ends the run.
+        escalations: by kind; without any, every failure ends the run.
         wait_s: cell seconds before a device is tried again.
     """
 
-    escalations: Mapping[FailureKind, tuple[Action, ...]]
+    escalations: Escalations | None = None
     wait_s: float = 0.0
 
     @classmethod
     def of(cls, settings: RecoverySettings, *, attended: bool) -> RecoveryPolicy:
         """The policy that a cell file states."""
-        rules = settings.attended if attended else settings.unattended
-        return cls({kind: rules.escalation(kind) for kind in FailureKind}, settings.wait_s)
+        return cls(settings.attended if attended else settings.unattended, settings.wait_s)
 
     def action(self, kind: FailureKind, attempt: int) -> Action:
         """The action after the ``attempt``-th failure of a kind, counted from 1."""
-        escalation = self.escalations.get(kind, (Action.ABORT,))
-        return escalation[min(attempt, len(escalation)) - 1]
+        return Action.ABORT if self.escalations is None else self.escalations.action(kind, attempt)
 
 
-GIVE_UP = RecoveryPolicy({})
+GIVE_UP = RecoveryPolicy()
 """Every failure ends the run."""
 
 

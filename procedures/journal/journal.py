@@ -21,7 +21,7 @@ from typing import BinaryIO, Self
 
 from hexacell.errors import CellBusy, FileError
 from hexacell.storage import atomic_files
-from procedures.journal.line_format import RESTORE, Entry, LineRefused, begins_whole, decode, encode, now
+from procedures.journal.line_format import RESTORE, Entry, begins_whole, decode, encode, now
 from procedures.run.events import Event
 
 LONGEST_LINE = 16 << 20
@@ -164,10 +164,11 @@ def _parse(path: Path, stream: BinaryIO) -> tuple[tuple[Entry, ...], int]:
     with _collector_at_rest():
         while line := stream.readline(LONGEST_LINE):
             due = len(entries) + 1
-            entry = _decoded(path, line, due)
+            entry = decode(line, path, due)
             if entry is None:
                 if begins_whole(line) or _has_more_data(stream):
-                    raise _damaged(path, due)
+                    problem = "this line of the journal is damaged"
+                    raise FileError(problem, subject=path, line=due, action=RESTORE)
                 break
             entries.append(entry)
             whole += len(line)
@@ -176,17 +177,6 @@ def _parse(path: Path, stream: BinaryIO) -> tuple[tuple[Entry, ...], int]:
 
 def _has_more_data(stream: BinaryIO) -> bool:
     return any(part.strip(b"\0") for part in iter(partial(stream.read, LONGEST_LINE), b""))
-
-
-def _decoded(path: Path, line: bytes, due: int) -> Entry | None:
-    try:
-        return decode(line, due)
-    except LineRefused as refusal:
-        raise FileError(refusal.problem, subject=path, line=due, action=refusal.action) from refusal
-
-
-def _damaged(path: Path, line: int) -> FileError:
-    return FileError("this line of the journal is damaged", subject=path, line=line, action=RESTORE)
 
 
 @contextmanager

@@ -12,10 +12,12 @@ import time
 import zlib
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from pathlib import Path
 
 from pydantic import TypeAdapter, ValidationError
 from pydantic_core import PydanticSerializationError
 
+from hexacell.errors import FileError
 from procedures.run.events import Event
 
 VERSION = 2
@@ -49,15 +51,6 @@ class Entry:
     event: Event
 
 
-class LineRefused(Exception):
-    """An undamaged line that this version cannot use."""
-
-    def __init__(self, problem: str, action: str) -> None:
-        self.problem = problem
-        self.action = action
-        super().__init__(problem)
-
-
 def now() -> tuple[datetime, float]:
     """The time of a record: the wall's, UTC, and that of a clock which only goes forward, s."""
     return datetime.now(UTC), round(time.monotonic(), 3)
@@ -81,32 +74,29 @@ def encode(entry: Entry) -> bytes:
     return b'%b,"crc":"%08x"}\n' % (body, _checksum(body))
 
 
-def decode(line: bytes, due: int) -> Entry | None:
-    """The entry in a line, None if the line is damaged.
-
-    ``due`` is the number that it should have.
+def decode(line: bytes, path: Path, due: int) -> Entry | None:
+    """The entry in line ``due`` of the journal ``path``, None if the line is damaged.
 
     Raises:
-        LineRefused: the line is whole, but not the one that is due, or of a version or an event that
+        FileError: the line is whole, but not the one that is due, or of a version or an event that
             this program does not know.
     """
     if not line.endswith(b"\n") or not is_whole(line[:-1]):
         return None
     if due == 1:
-        _require_known_version(line)
+        _require_known_version(line, path)
     match = _LINE.fullmatch(line[: -_TAIL_LENGTH - 1] + b"}")
     if match is None:
-        raise _foreign("it has an unknown form")
+        raise _foreign("it has an unknown form", path, due)
     number, at, monotonic, event = match.groups()
     if int(number) != due:
-        raise LineRefused(
-            f"the journal is damaged: record {int(number)} is in the place of record {due}", RESTORE
-        )
+        problem = f"the journal is damaged: record {int(number)} is in the place of record {due}"
+        raise FileError(problem, subject=path, line=due, action=RESTORE)
     try:
         found = _EVENTS.validate_json(event)
         when = datetime.fromisoformat(at.decode())
-    except (ValidationError, ValueError) as error:
-        raise _foreign(_first_words(error)) from error
+    except ValueError as error:
+        raise _foreign(_first_words(error), path, due) from error
     return Entry(due, when, float(monotonic) if monotonic else None, found)
 
 
@@ -129,21 +119,21 @@ def _checksum(body: bytes) -> int:
     return zlib.crc32(b"}", zlib.crc32(body))
 
 
-def _require_known_version(line: bytes) -> None:
+def _require_known_version(line: bytes, path: Path) -> None:
     stated = _FIRST.match(line)
     if stated is not None and int(stated[1]) > VERSION:
-        raise LineRefused(
+        raise FileError(
             f"a newer hexacell wrote this journal: its format has version {int(stated[1])}, known are "
             f"1 to {VERSION}",
-            "Use that hexacell, or update this one",
+            subject=path,
+            line=1,
+            action="Use that hexacell, or update this one",
         )
 
 
-def _foreign(reason: str) -> LineRefused:
-    return LineRefused(
-        f"this line of the journal is not understood ({reason})",
-        "Use the version of hexacell that wrote it",
-    )
+def _foreign(reason: str, path: Path, due: int) -> FileError:
+    problem = f"this line of the journal is not understood ({reason})"
+    return FileError(problem, subject=path, line=due, action="Use the version of hexacell that wrote it")
 
 
 def _first_words(error: ValueError) -> str:

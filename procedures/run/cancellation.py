@@ -1,4 +1,7 @@
-"""Coroutines that must run to their end although the caller is cancelled."""
+"""Coroutines that must run to their end although the caller is cancelled.
+
+The caller's ``asyncio.CancelledError`` is raised when they have ended.
+"""
 
 from __future__ import annotations
 
@@ -11,11 +14,7 @@ Result = TypeVar("Result")
 
 
 async def shielded(action: Coroutine[Any, Any, Result]) -> Result:
-    """Wait for an action to its end, however often the caller is cancelled.
-
-    Raises:
-        asyncio.CancelledError: the caller was cancelled; raised when the action has ended.
-    """
+    """Wait for an action to its end, however often the caller is cancelled."""
     task = asyncio.ensure_future(action)
     was_cancelled = await _end_of(task)
     result = task.result()
@@ -25,11 +24,7 @@ async def shielded(action: Coroutine[Any, Any, Result]) -> Result:
 
 
 async def cancel_and_wait(task: asyncio.Future[Any]) -> None:
-    """Cancel a task and wait for its end, however often the caller is cancelled.
-
-    Raises:
-        asyncio.CancelledError: the caller was cancelled; raised when the task has ended.
-    """
+    """Cancel a task and wait for its end, however often the caller is cancelled."""
     task.cancel()
     was_cancelled = await _end_of(task)
     if not task.cancelled():

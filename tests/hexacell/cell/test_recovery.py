@@ -34,15 +34,15 @@ def test_a_cell_states_its_own_escalations(with_section) -> None:
     path = with_section('[recovery]\nagreement_mm = 0.02\n[recovery.unattended]\ndrift = ["abort"]\n')
     recovery = load_cell(path).settings.recovery
     assert recovery.agreement_mm == 0.02
-    assert recovery.unattended.escalation(FailureKind.DRIFT) == (Action.ABORT,)
-    assert recovery.unattended.escalation(FailureKind.ZERO_VOID)[0] is Action.REDO_SET
+    assert recovery.unattended.action(FailureKind.DRIFT, 1) is Action.ABORT
+    assert recovery.unattended.action(FailureKind.ZERO_VOID, 1) is Action.REDO_SET
 
 
 @pytest.mark.parametrize(
     ("text", "words"),
     [
         ('[recovery.unattended]\ndrift = ["redo-set"]\n', "drift must end with ask or abort"),
-        ('[recovery.unattended]\ndrift = ["ask"]\n', "drift asks, and nobody is there"),
+        ('[recovery.unattended]\ndrift = ["ask"]\n', "drift asks, but the run is unattended"),
         ("[recovery.attended]\ndrift = []\n", "drift must end with ask or abort"),
         ('[recovery.attended]\ndrift = ["pray"]\n', "retry"),
         ('[recovery.attended]\ndrifft = ["ask"]\n', "drift"),
@@ -57,7 +57,7 @@ def test_what_a_cell_may_not_state(with_section, text: str, words: str) -> None:
 def test_there_is_an_escalation_for_every_kind_but_the_final_ones(escalations: AttendedRecovery) -> None:
     named = set(type(escalations).model_fields)
     assert named == {kind.value for kind in FailureKind} - {FailureKind.FINAL.value}
-    assert escalations.escalation(FailureKind.FINAL) == (Action.ABORT,)
+    assert escalations.action(FailureKind.FINAL, 1) is Action.ABORT
 
 
 def test_the_limit_of_agreement_is_tighter_than_that_of_drift() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import zlib
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -72,7 +73,7 @@ def test_what_differs_is_named(recorded: Any, replayed: Any, field: str) -> None
 def test_a_field_that_the_recorded_event_does_not_know_is_no_difference() -> None:
     body = b'{"kind":"closed","at":{"phase":"before-V","point":2},"drift_mm":[0.0,0.0,0.0]}'
     line = b'{"n":2,"at":"2026-11-20T10:30:00.000Z","event":%b}' % body
-    entry = decode(checked(line), 2)
+    entry = decode(checked(line), Path("journal.jsonl"), 2)
     assert entry is not None
     reading = events.Reading(
         gauges_mm=(0.0,) * 3, spread_mm=(0.0,) * 3, joints_mm=(0.0,) * 6, answers=(), counts=()

@@ -8,13 +8,13 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from drivers.simulated.closeable import Closeable
-from drivers.simulated.encoders import SimulatedEncoderBank
+from drivers.simulated.encoders.bank import SimulatedEncoderBank
 from drivers.simulated.fault_schedule import CellFaults, FaultSchedule
 from drivers.simulated.gauges.bank import SimulatedGaugeBank
 from drivers.simulated.linuxcnc.server import SimulatedController
 from drivers.simulated.physics import RobotPhysics
 from drivers.simulated.robot import SimulatedMachine
+from drivers.simulated.served_device import Closeable
 from drivers.simulated.slcan import serve_slcan
 from hexacell.cell.devices import GaugeSettings
 from hexacell.cell.model import CellSettings
@@ -113,7 +113,7 @@ def _gauge_bank(
     settings: CellSettings, simulation: SimulationSettings, physics: RobotPhysics, clock: CellClock
 ) -> SimulatedGaugeBank:
     plungers = {gauge.name: partial(_plunger_position, physics, gauge) for gauge in settings.gauges}
-    return SimulatedGaugeBank(settings.gauges, plungers, simulation.gauges, clock, seed=simulation.seed)
+    return SimulatedGaugeBank(settings.gauges, plungers, simulation.gauges, clock)
 
 
 def _encoder_bank(

@@ -15,7 +15,7 @@ from typing import Any, Literal
 
 import can
 
-from drivers.simulated.closeable import Closeable
+from drivers.simulated.served_device import Closeable
 from drivers.simulated.transports.interface import Transport
 from drivers.simulated.transports.pty import PtyTransport
 from drivers.simulated.transports.tcp import SocketTransport

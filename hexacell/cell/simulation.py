@@ -9,6 +9,18 @@ from pydantic import Field
 from hexacell.cell.fields import NotNegative, Positive, Section
 from hexacell.cell.mechanism_sections import GeometrySettings
 
+FaultKind = Literal[
+    "emergency stop",
+    "following error",
+    "stop line",
+    "unplugged",
+    "silent",
+    "at its end",
+    "off its plate",
+    "frozen",
+    "alarm",
+]
+
 
 class SimulatedGauges(Section):
     """How the simulated dial indicators behave."""
@@ -43,17 +55,7 @@ class SimulatedMotion(Section):
 class SimulatedFault(Section):
     """A fault that begins at a given time and may end."""
 
-    kind: Literal[
-        "emergency stop",
-        "following error",
-        "stop line",
-        "unplugged",
-        "silent",
-        "at its end",
-        "off its plate",
-        "frozen",
-        "alarm",
-    ] = Field(description="kind of fault")
+    kind: FaultKind = Field(description="kind of fault")
     device: str = Field(
         "", description="a gauge's name, encoder 1 to encoder 6, or controller; empty where there is one"
     )

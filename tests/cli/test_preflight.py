@@ -14,6 +14,7 @@ import pytest
 
 from drivers.simulated.cell import SimulatedCell
 from drivers.simulated.robot import SimulatedMachine
+from tests.drivers.simulated.encoders import faults
 
 COMMANDS = ["preflight", "run"]
 
@@ -200,17 +201,18 @@ def test_everything_at_once(typed_here, served, closed_port, command):
 @pytest.mark.parametrize(
     ("fault", "words"),
     [
-        ("add_duplicate", ("leg 3", "node 3")),
-        ("unplug", ("leg 3", "node 3")),
-        ("alarm", ("leg 3",)),
+        (lambda cell: faults.add_duplicate(cell.encoders, 3), ("leg 3", "node 3")),
+        (lambda cell: cell.faults.inject("unplugged", "encoder 3"), ("leg 3", "node 3")),
+        (lambda cell: faults.set_alarms(cell.encoders, 3), ("leg 3",)),
     ],
+    ids=["duplicated", "unplugged", "alarm"],
 )
 def test_an_encoder_that_is_not_as_it_should_be(
     typed_here, cell_folder, monkeypatch, command, fault, words
 ):
     class Faulty(SimulatedCell):
         def __enter__(self) -> Self:
-            getattr(self.encoders.faults, fault)(3)
+            fault(self)
             return super().__enter__()
 
     monkeypatch.setattr("drivers.simulated.cell.SimulatedCell", Faulty)

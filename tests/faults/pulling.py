@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any
 
 from drivers.simulated import cell as simulated_cell
-from drivers.simulated.gauges.faults import InjectedGaugeFault
 from procedures.journal import journal
 from procedures.run import events
 from tests.faults.matrix import step_of
@@ -43,12 +42,8 @@ def pull_out(device: str, step: str, back: str = "") -> None:
 
 
 def _set(cell: Any, device: str, *, out: bool) -> None:
-    if device == "controller":
-        (cell.controller.unplug if out else cell.controller.plug_in)()
-    elif device.startswith("gauge"):
-        (cell.gauges.inject if out else cell.gauges.clear)(device.split()[1], InjectedGaugeFault.UNPLUGGED)
-    else:
-        faults = cell.encoders.faults
-        legs = range(1, 7) if device == "all encoders" else [int(device.split()[1])]
-        for leg in legs:
-            (faults.unplug if out else faults.plug_in)(leg)
+    names = [device.removeprefix("gauge ")]
+    if device == "all encoders":
+        names = [f"encoder {leg}" for leg in range(1, 7)]
+    for name in names:
+        (cell.faults.inject if out else cell.faults.clear)("unplugged", name)

@@ -1,16 +1,18 @@
-"""The simulated encoder bank: samples positions at every SYNC and sends counts; and its faults."""
+"""The simulated encoder bank: samples positions at every SYNC and sends counts."""
 
 from __future__ import annotations
 
 import uuid
 from collections.abc import Callable, Sequence
-from typing import Any, Self
+from functools import partial
+from typing import Any
 
-from drivers.simulated.closeable import Closeable
 from drivers.simulated.encoders.can_bus import SimulatedCanBus
-from drivers.simulated.encoders.node import DeviceData, SimulatedEncoder
-from drivers.simulated.encoders.object_dictionary import EVENTS_AND_SYNC, Vendor
+from drivers.simulated.encoders.node import SimulatedEncoder
+from drivers.simulated.encoders.object_dictionary import EVENTS_AND_SYNC, DeviceData, Vendor
+from drivers.simulated.served_device import Closeable, Switch
 from hexacell.cell.devices import EncoderSettings
+from hexacell.cell.simulation import FaultKind
 from hexacell.clock import CellClock
 
 Positions = Callable[[], Sequence[float]]
@@ -21,11 +23,11 @@ FIRST_SERIAL_NUMBER = 1001
 
 
 class SimulatedEncoderBank(Closeable):
-    """Six encoders on a virtual CAN bus of their own; a context manager, or started and closed.
+    """Six encoders on a virtual CAN bus of their own.
 
     ``positions`` gives the six joint variables now, mm, with noise; it is called at the start, and at
     every SYNC on the thread of the bus. Responses to a SYNC are spread over ``latency_s`` of the cell's
-    time. Serial numbers are those of the cell file, or 1001 and up. ``faults`` injects faults.
+    time. Serial numbers are those of the cell file, or 1001 and up.
     """
 
     def __init__(
@@ -38,8 +40,6 @@ class SimulatedEncoderBank(Closeable):
     ) -> None:
         self.channel = f"hexacell-encoders-{uuid.uuid4().hex}"
         self.bus = SimulatedCanBus(self.channel)
-        self.unplugged: set[int] = set()
-        self.faults = EncoderFaults(self)
         self._settings = settings
         self._positions = positions
         self._clock = clock
@@ -49,40 +49,37 @@ class SimulatedEncoderBank(Closeable):
         self._encoders = tuple(
             self._make(leg, serial_number) for leg, serial_number in enumerate(serial_numbers, 1)
         )
-        self._duplicates: list[tuple[int, SimulatedEncoder]] = []
+        self._start()
 
     @property
     def bus_settings(self) -> dict[str, Any]:
         """The settings for ``can.Bus`` to reach the bank from this process."""
         return {"interface": "virtual", "channel": self.channel}
 
-    def start(self) -> None:
-        """Switch the encoders on."""
-        with self.bus.lock:
-            self._sample()
-            self.bus.subscribe(_SYNC, self._on_sync)
-            for leg, encoder in enumerate(self._encoders, 1):
-                if leg not in self.unplugged:
-                    encoder.plug_in()
-        self.bus.start()
-
     def close(self) -> None:
         """Switch them off and close the channel; closing twice is harmless."""
         self.bus.close()
 
-    def __enter__(self) -> Self:
-        self.start()
-        return self
+    def faults(self, leg: int) -> dict[FaultKind, Switch]:
+        """The faults of the encoder of a leg, from 1."""
+        encoder = self._encoders[leg - 1]
+        return {
+            "unplugged": partial(self._set_fault, encoder.set_unplugged),
+            "silent": partial(self._set_fault, encoder.set_silent),
+            "alarm": partial(self._set_fault, encoder.set_alarm),
+        }
 
-    def encoder(self, leg: int) -> SimulatedEncoder:
-        """The encoder of a leg, from 1."""
-        return self._encoders[leg - 1]
+    def _set_fault(self, switch: Switch, *, on: bool) -> None:
+        with self.bus.lock:
+            switch(on=on)
 
-    def add_duplicate(self, leg: int) -> None:
-        """Add a second device with the node id of a leg."""
-        duplicate = self._make(leg, self.encoder(leg).data.serial_number + 1000)
-        self._duplicates.append((leg, duplicate))
-        duplicate.plug_in()
+    def _start(self) -> None:
+        with self.bus.lock:
+            self._sample()
+            self.bus.subscribe(_SYNC, self._on_sync)
+            for encoder in self._encoders:
+                encoder.set_unplugged(on=False)
+        self.bus.start()
 
     def _make(self, leg: int, serial_number: int) -> SimulatedEncoder:
         settings = self._settings
@@ -93,9 +90,8 @@ class SimulatedEncoderBank(Closeable):
 
     def _on_sync(self, _can_id: int, _data: bytearray, _timestamp: float) -> None:
         self._sample()
-        devices = [*self._encoders, *(duplicate for _, duplicate in self._duplicates)]
-        for place, encoder in enumerate(devices, 1):
-            delay_s = self._latency_s * place / len(devices) + encoder.delay_s
+        for place, encoder in enumerate(self._encoders, 1):
+            delay_s = self._latency_s * place / len(self._encoders)
             for cob_id, data in encoder.on_sync():
                 self._send_later(encoder, cob_id, data, delay_s)
 
@@ -109,8 +105,6 @@ class SimulatedEncoderBank(Closeable):
         positions = self._positions()
         for leg, (encoder, position) in enumerate(zip(self._encoders, positions, strict=True), 1):
             encoder.counts = self._counts(leg, position)
-        for leg, duplicate in self._duplicates:
-            duplicate.counts = self.encoder(leg).counts
 
     def _counts(self, leg: int, position_mm: float) -> int:
         """The counts at a position; they wrap around at 32 bits."""
@@ -119,70 +113,3 @@ class SimulatedEncoderBank(Closeable):
         from_zero = (position_mm - settings.offset_mm[leg - 1]) * settings.direction[leg - 1]
         counts = round(from_zero / step_mm) % _ALL_BITS
         return counts - _ALL_BITS if settings.signed and counts >= _ALL_BITS // 2 else counts
-
-
-NO_MAGNET = 0xFF00
-POSITION_ERROR = 0x21
-"""Error register: generic and device profile specific."""
-
-
-class EncoderFaults:
-    """Injects faults into a bank, at once, from any thread."""
-
-    def __init__(self, bank: SimulatedEncoderBank) -> None:
-        self._bank = bank
-
-    def unplug(self, leg: int) -> None:
-        """The node disappears; before ``start``: it does not appear."""
-        with self._bank.bus.lock:
-            self._bank.encoder(leg).unplug()
-            self._bank.unplugged.add(leg)
-
-    def plug_in(self, leg: int) -> None:
-        """The node comes back, without configuration."""
-        with self._bank.bus.lock:
-            self._bank.unplugged.discard(leg)
-            self._bank.encoder(leg).plug_in()
-
-    def add_duplicate(self, leg: int) -> None:
-        """A second device with the same node id and another serial number appears."""
-        with self._bank.bus.lock:
-            self._bank.add_duplicate(leg)
-
-    def silence(self, leg: int, *, silent: bool = True) -> None:
-        """The node no longer responds to SYNC, but to everything else."""
-        with self._bank.bus.lock:
-            self._bank.encoder(leg).is_silent = silent
-
-    def emergency(self, leg: int, code: int = NO_MAGNET, register: int = POSITION_ERROR) -> None:
-        """The node reports an error; ``clear_emergency`` ends it."""
-        with self._bank.bus.lock:
-            self._bank.encoder(leg).emergency(code, register)
-
-    def clear_emergency(self, leg: int) -> None:
-        """The node reports that the error is gone."""
-        self.emergency(leg, 0, 0)
-
-    def alarm(self, leg: int, bits: int = 1) -> None:
-        """The node sets alarms in 6503h without a message; 0 clears them."""
-        with self._bank.bus.lock:
-            self._bank.encoder(leg).set_alarms(bits)
-
-    def reboot(self, leg: int) -> None:
-        """The node restarts and loses its configuration."""
-        with self._bank.bus.lock:
-            self._bank.encoder(leg).boot()
-
-    def stop_heartbeat(self, leg: int) -> None:
-        """The heartbeat of the node ends; it still responds."""
-        with self._bank.bus.lock:
-            self._bank.encoder(leg).stop_heartbeat()
-
-    def delay(self, leg: int, seconds: float) -> None:
-        """The responses of the node are delayed; they keep the sample of their SYNC."""
-        with self._bank.bus.lock:
-            self._bank.encoder(leg).delay_s = seconds
-
-    def kill_bus(self) -> None:
-        """All nodes become silent permanently."""
-        self._bank.bus.stop()

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import heapq
-import itertools
 import logging
+import sched
 import threading
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
 
 import can
 import canopen
@@ -17,20 +15,6 @@ _log = logging.getLogger(__name__)
 
 SLICE_S = 0.02
 """Longest wait for a frame; a timer set by another thread may be so late."""
-
-
-@dataclass(order=True, slots=True)
-class Timer:
-    """An action at a time, which can be cancelled before."""
-
-    due: float
-    sequence: int
-    action: Callable[[], None] = field(compare=False)
-    cancelled: bool = field(default=False, compare=False)
-
-    def cancel(self) -> None:
-        """Cancel the action."""
-        self.cancelled = True
 
 
 class SimulatedCanBus(canopen.Network):
@@ -43,8 +27,9 @@ class SimulatedCanBus(canopen.Network):
         # A bounded receive queue would make senders on this interface block for ever.
         super().__init__(can.Bus(channel, interface="virtual"))
         self.lock = threading.RLock()
-        self._timers: list[Timer] = []
-        self._sequence = itertools.count()
+        self._now_s = time.monotonic()
+        # The time stands still during a run: periodic frames that take longer than their period end it.
+        self._timers = sched.scheduler(lambda: self._now_s)
         self._stopping = threading.Event()
         self._thread = threading.Thread(target=self._run, name="simulated encoders", daemon=True)
 
@@ -64,12 +49,13 @@ class SimulatedCanBus(canopen.Network):
         if self.bus is not None:
             self.bus.shutdown()
 
-    def call_later(self, seconds: float, action: Callable[[], None]) -> Timer:
+    def call_later(self, seconds: float, action: Callable[[], None]) -> sched.Event:
         """Run ``action`` after so many seconds of real time."""
-        timer = Timer(time.monotonic() + seconds, next(self._sequence), action)
-        with self.lock:
-            heapq.heappush(self._timers, timer)
-        return timer
+        return self._timers.enterabs(time.monotonic() + seconds, 0, action)
+
+    def cancel(self, timer: sched.Event) -> None:
+        """Cancel an action that has not run yet."""
+        self._timers.cancel(timer)
 
     def send_message(self, can_id: int, data: bytes, remote: bool = False) -> None:
         """Send one frame, unless the bus was stopped."""
@@ -94,27 +80,17 @@ class SimulatedCanBus(canopen.Network):
             self._stopping.set()
 
     def _serve(self) -> None:
+        left_s: float | None = None
         while not self._stopping.is_set():
-            message = self._receive(self._until_next_timer())
+            message = self._receive(SLICE_S if left_s is None else min(left_s, SLICE_S))
             with self.lock:
                 if message is not None:
                     self.notify(message.arbitration_id, message.data, message.timestamp)
-                self._run_due_timers()
+                self._now_s = time.monotonic()
+                left_s = self._timers.run(blocking=False)
 
     def _receive(self, timeout_s: float) -> can.Message | None:
         return None if self.bus is None else self.bus.recv(timeout_s)
-
-    def _until_next_timer(self) -> float:
-        with self.lock:
-            due = self._timers[0].due if self._timers else float("inf")
-        return min(max(due - time.monotonic(), 0.0), SLICE_S)
-
-    def _run_due_timers(self) -> None:
-        now = time.monotonic()
-        while self._timers and self._timers[0].due <= now:
-            timer = heapq.heappop(self._timers)
-            if not timer.cancelled:
-                timer.action()
 
 
 class PeriodicFrame:
@@ -133,7 +109,7 @@ class PeriodicFrame:
 
     def stop(self) -> None:
         """Send no more."""
-        self._timer.cancel()
+        self._bus.cancel(self._timer)
 
     def _send(self) -> None:
         self._timer = self._bus.call_later(self._period_s, self._send)

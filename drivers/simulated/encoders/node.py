@@ -6,34 +6,28 @@ CiA 301 for changing PDOs.
 
 from __future__ import annotations
 
+import sched
 import struct
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 
 import canopen
 from canopen.objectdictionary import ODVariable
 from canopen.sdo.exceptions import SdoAbortedError
 
 from drivers.simulated.encoders import object_dictionary
-from drivers.simulated.encoders.can_bus import SimulatedCanBus, Timer
-from drivers.simulated.encoders.object_dictionary import Vendor
+from drivers.simulated.encoders.can_bus import SimulatedCanBus
+from drivers.simulated.encoders.object_dictionary import DeviceData, Vendor
 
 _NMT = 0x000
 _RESET_COMMANDS = (0x81, 0x82)
 _SYNCHRONOUS = range(1, 241)
+NO_MAGNET = 0xFF00
+POSITION_ERROR = 0x21
+"""Error register: generic and device profile specific."""
+
 _NOT_NOW = 0x0800_0022
 _READ_ONLY = 0x0601_0002
 _WRONG_VALUE = 0x0609_0030
-
-
-@dataclass(frozen=True, slots=True)
-class DeviceData:
-    """Serial number and settings of one device."""
-
-    node: int
-    serial_number: int
-    step_nm: int
-    signed: bool
 
 
 class SimulatedEncoder:
@@ -44,17 +38,13 @@ class SimulatedEncoder:
     ) -> None:
         self.data = data
         self.counts = 0
-        self.is_silent = False
-        self.delay_s = 0.0
+        self._is_silent = False
         self._bus = bus
         self._vendor = vendor
         self._real_seconds = real_seconds
-        self._event_timers: list[Timer] = []
+        self._event_timers: list[sched.Event] = []
         self._syncs = 0
-        objects = object_dictionary.build(
-            vendor, data.node, data.serial_number, data.step_nm, signed=data.signed
-        )
-        self._node = canopen.LocalNode(data.node, objects)
+        self._node = canopen.LocalNode(data.node, object_dictionary.build(vendor, data))
         self._node.add_read_callback(self._read_position)  # type: ignore[no-untyped-call]
         self._node.add_write_callback(self._check_pdo_rules)  # type: ignore[no-untyped-call]
 
@@ -63,20 +53,27 @@ class SimulatedEncoder:
         """Whether it may send PDOs."""
         return self._node.has_network() and self._node.nmt.state == "OPERATIONAL"
 
-    def plug_in(self) -> None:
-        """Connect to the bus and boot, unless connected."""
-        if not self._node.has_network():
-            self._node.associate_network(self._bus)
-            self._bus.subscribe(_NMT, self._on_nmt)
-            self.boot()
-
-    def unplug(self) -> None:
-        """Disconnect from the bus without a message."""
-        if self._node.has_network():
+    def set_unplugged(self, *, on: bool) -> None:
+        """Disconnect from the bus without a message, or connect and boot."""
+        if on and self._node.has_network():
             self._node.nmt.stop_heartbeat()  # type: ignore[no-untyped-call]
             self._stop_event_timers()
             self._bus.unsubscribe(_NMT, self._on_nmt)
             self._node.remove_network()
+        elif not on and not self._node.has_network():
+            self._node.associate_network(self._bus)
+            self._bus.subscribe(_NMT, self._on_nmt)
+            self.boot()
+
+    def set_silent(self, *, on: bool) -> None:
+        """Respond to SYNC no longer, or again; the node responds to everything else."""
+        self._is_silent = on
+
+    def set_alarm(self, *, on: bool) -> None:
+        """Report that there is no magnet, or that it is back, and set the error register."""
+        code, register = (NO_MAGNET, POSITION_ERROR) if on else (0, 0)
+        self._node.set_data(object_dictionary.ERROR_REGISTER, 0, bytes((register,)))
+        self._bus.send_message(0x80 + self.data.node, struct.pack("<HB5x", code, register))
 
     def boot(self) -> None:
         """Boot with default settings: boot-up message, then PRE-OPERATIONAL."""
@@ -90,7 +87,7 @@ class SimulatedEncoder:
     def on_sync(self) -> Iterator[tuple[int, bytes]]:
         """The frames (COB-ID, data) sent at this SYNC, with the present sample."""
         self._syncs += 1
-        if not self.is_operational or self.is_silent:
+        if not self.is_operational or self._is_silent:
             return
         for number in range(1, len(self._vendor.tpdos) + 1):
             transmission_type = self._value(0x1800 + number - 1, 2)
@@ -101,19 +98,6 @@ class SimulatedEncoder:
         """Send a PDO, if the node is operational."""
         if self.is_operational:
             self._bus.send_message(cob_id, data)
-
-    def emergency(self, code: int, register: int) -> None:
-        """Report an error (code 0: no error) and store it in the error register."""
-        self._node.set_data(object_dictionary.ERROR_REGISTER, 0, bytes((register,)))
-        self._bus.send_message(0x80 + self.data.node, struct.pack("<HB5x", code, register))
-
-    def set_alarms(self, bits: int) -> None:
-        """Set alarms in 6503h without a message."""
-        self._node.set_data(object_dictionary.ALARMS, 0, struct.pack("<H", bits))
-
-    def stop_heartbeat(self) -> None:
-        """Send no more heartbeats."""
-        self._node.nmt.stop_heartbeat()  # type: ignore[no-untyped-call]
 
     def _on_nmt(self, _can_id: int, data: bytearray, _timestamp: float) -> None:
         command, addressed = data[:2]
@@ -156,7 +140,7 @@ class SimulatedEncoder:
 
     def _stop_event_timers(self) -> None:
         for timer in self._event_timers:
-            timer.cancel()
+            self._bus.cancel(timer)
         self._event_timers.clear()
 
     def _read_position(self, index: int, subindex: int, **_: object) -> int | None:

@@ -36,10 +36,18 @@ class Vendor:
     magnets: int = 1
 
 
+@dataclass(frozen=True, slots=True)
+class DeviceData:
+    """Serial number and settings of one device."""
+
+    node: int
+    serial_number: int
+    step_nm: int
+    signed: bool
+
+
 _POSITION = (0x6004, 0, 32)
 _SPEED = (0x6030, 1, 16)
-_MAGNET_1 = (0x6020, 1, 32)
-_MAGNET_2 = (0x6020, 2, 32)
 
 EVENTS_AND_SYNC = Vendor(
     device_type=0x0008_0196,
@@ -49,28 +57,6 @@ EVENTS_AND_SYNC = Vendor(
     ),
 )
 """TPDO1 on its event timer, TPDO2 with every SYNC."""
-
-EVENTS_ONLY = Vendor(
-    device_type=0x0008_0196,
-    tpdos=(
-        TpdoDefaults((_POSITION,), transmission_type=254, event_timer_ms=1),
-        TpdoDefaults((), transmission_type=1, enabled=False),
-    ),
-    step_in_6005=False,
-)
-"""TPDO1 every millisecond, TPDO2 off and empty; the step is in 6501h."""
-
-TWO_MAGNETS = Vendor(
-    device_type=0x000A_0196,
-    tpdos=(
-        TpdoDefaults((_MAGNET_1, _SPEED), transmission_type=254, event_timer_ms=10),
-        TpdoDefaults((_MAGNET_2, _MAGNET_1), transmission_type=1),
-    ),
-    mapping_writable=False,
-    magnets=2,
-)
-"""Positions in 6020h, and a fixed mapping in which the first magnet comes second."""
-
 
 POSITION = 0x6004
 POSITION_OF_MAGNET = 0x6020
@@ -90,13 +76,13 @@ class _Row:
     access: str = "ro"
 
 
-def build(vendor: Vendor, node: int, serial_number: int, step_nm: int, *, signed: bool) -> ObjectDictionary:
+def build(vendor: Vendor, data: DeviceData) -> ObjectDictionary:
     """The object dictionary of a device after power-on."""
     dictionary = ObjectDictionary()  # type: ignore[no-untyped-call]
-    position = INTEGER32 if signed else UNSIGNED32
-    rows = [*_communication(vendor, serial_number), *_profile(vendor, step_nm, position)]
+    position = INTEGER32 if data.signed else UNSIGNED32
+    rows = [*_communication(vendor, data.serial_number), *_profile(vendor, data.step_nm, position)]
     for number, tpdo in enumerate(vendor.tpdos, 1):
-        rows += _tpdo(number, tpdo, node)
+        rows += _tpdo(number, tpdo, data.node)
     for row in rows:
         _add(dictionary, row)
     return dictionary

@@ -5,15 +5,16 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 
-from drivers.simulated.closeable import Closeable
 from drivers.simulated.gauges.cdi import CdiDevice
 from drivers.simulated.gauges.device import Indicator, LineDevice, PlungerPosition
-from drivers.simulated.gauges.faults import InjectedGaugeFault
 from drivers.simulated.gauges.mux10 import Mux10Device
-from drivers.simulated.gauges.server import GaugeLineServer, serve_gauges
+from drivers.simulated.gauges.server import GaugeLineServer
 from drivers.simulated.gauges.sylvac import SylvacDevice
+from drivers.simulated.served_device import Closeable, Switch
+from drivers.simulated.transports.pty import PtyTransport
+from drivers.simulated.transports.tcp import SocketTransport
 from hexacell.cell.devices import GaugeSettings
-from hexacell.cell.simulation import SimulatedGauges
+from hexacell.cell.simulation import FaultKind, SimulatedGauges
 from hexacell.clock import CellClock
 from hexacell.errors import FileError
 
@@ -55,19 +56,16 @@ class SimulatedGaugeBank(Closeable):
         plungers: Mapping[str, PlungerPosition],
         settings: SimulatedGauges,
         clock: CellClock,
-        *,
-        seed: int = 0,
     ) -> None:
         self.indicators = {gauge.name: Indicator(plungers[gauge.name], gauge.travel_mm) for gauge in gauges}
         self._settings = settings
         self._clock = clock
         self._lines: dict[str, GaugeLineServer] = {}
         with ExitStack() as served:
-            for number, group in enumerate(_by_line(gauges)):
-                line = served.enter_context(self._serve(group, seed + number))
+            for group in _by_line(gauges):
+                line = served.enter_context(self._serve(group))
                 self._lines |= {gauge.name: line for gauge in group}
             self._served = served.pop_all()
-        self._channels = {gauge.name: _channel(gauge) for gauge in gauges}
         self.gauges = tuple(
             gauge.model_copy(update={"port": self._lines[gauge.name].url}) for gauge in gauges
         )
@@ -77,26 +75,27 @@ class SimulatedGaugeBank(Closeable):
         """The line of ``gauge``."""
         return self._lines[gauge]
 
-    def inject(
-        self, gauge: str, fault: InjectedGaugeFault, *, answers: int | None = None, seconds: float = 1.0
-    ) -> None:
-        """Inject ``fault`` into a gauge or its line; see :meth:`GaugeLineServer.inject`."""
-        self.line(gauge).inject(fault, channel=self._channels[gauge], answers=answers, seconds=seconds)
+    def faults(self, gauge: str) -> dict[FaultKind, Switch]:
+        """The faults of ``gauge`` and of its line."""
+        line, indicator = self._lines[gauge], self.indicators[gauge]
+        return {
+            "unplugged": line.set_unplugged,
+            "silent": line.set_silent,
+            "at its end": indicator.set_at_end,
+            "off its plate": indicator.set_pushed,
+            "frozen": indicator.set_frozen,
+        }
 
-    def clear(self, gauge: str, fault: InjectedGaugeFault) -> None:
-        """Clear an injected fault."""
-        self.line(gauge).clear(fault, channel=self._channels[gauge])
-
-    def _serve(self, group: Sequence[GaugeSettings], seed: int) -> GaugeLineServer:
+    def _serve(self, group: Sequence[GaugeSettings]) -> GaugeLineServer:
         indicators = {_channel(gauge): self.indicators[gauge.name] for gauge in group}
-        return serve_gauges(
-            simulated_device(group[0].protocol, indicators),
-            self._settings.transport,
+        device = simulated_device(group[0].protocol, indicators)
+        name = "-".join(gauge.name for gauge in group)
+        return GaugeLineServer(
+            device,
+            PtyTransport(name) if self._settings.transport == "pty" else SocketTransport(),
             self._clock,
-            name="-".join(gauge.name for gauge in group),
             latency_s=self._settings.latency_s,
             baudrate=self._settings.baudrate,
-            seed=seed,
         )
 
     def close(self) -> None:

@@ -18,70 +18,44 @@ Called from the thread of the line.
 
 
 class Indicator:
-    """One instrument. Its keys are the methods, its settings the attributes."""
+    """One instrument. Its settings and its power are attributes; ``held_mm`` is the value on hold."""
 
     def __init__(self, plunger: PlungerPosition, travel_mm: float = 12.5) -> None:
         self.inch = False
         self.reversed = False
         self.battery_low = False
-        self.preset_mm = 0.0
         self.powered = True
-        self.at_end = False
+        self.held_mm: float | None = None
         self._plunger = plunger
         self._travel_mm = travel_mm
-        self._offset_mm = 0.0
-        self._held_mm: float | None = None
+        self._at_end = False
         self._jammed_mm: float | None = None
         self._pushed_mm = 0.0
 
-    @property
-    def on_hold(self) -> bool:
-        """Whether the display is on hold."""
-        return self._held_mm is not None
-
     def shown(self) -> float | None:
         """The number on the display, mm or inch; None with the plunger at an end of its travel."""
-        value = self._live_mm() if self._held_mm is None else self._held_mm
+        value = self._live_mm() if self.held_mm is None else self.held_mm
         if value is None:
             return None
         return value / MM_PER_INCH if self.inch else value
 
-    def hold(self) -> None:
-        """Hold the display; without effect at an end of the travel."""
-        self._held_mm = self._live_mm()
+    def set_at_end(self, *, on: bool) -> None:
+        """Move the plunger to an end of its travel, or back."""
+        self._at_end = on
 
-    def release(self) -> None:
-        """End the hold."""
-        self._held_mm = None
-
-    def jam(self, *, on: bool) -> None:
+    def set_frozen(self, *, on: bool) -> None:
         """Jam the plunger at its position, or free it; the instrument still answers."""
         self._jammed_mm = self._plunger() if on else None
 
-    def push(self, *, on: bool) -> None:
+    def set_pushed(self, *, on: bool) -> None:
         """Push the plunger farther than a ball on its plate could, or release it."""
         self._pushed_mm = -copysign(PUSH_MM, self._plunger()) if on else 0.0
 
-    def recall_preset(self) -> None:
-        """Set the display to the preset value; with a preset of 0 this is the zero key."""
-        self._offset_mm += self.preset_mm - (self._live_mm() or 0.0)
-
-    def switch_off(self) -> None:
-        """The automatic switch-off."""
-        self.powered = False
-
-    def switch_on(self) -> None:
-        """Switch on: no hold, and the zero at the present plunger position."""
-        self.powered = True
-        self.release()
-        self._offset_mm = 0.0
-        self._offset_mm = -(self._live_mm() or 0.0)
-
     def _live_mm(self) -> float | None:
         position = self._plunger() + self._pushed_mm if self._jammed_mm is None else self._jammed_mm
-        if self.at_end or abs(position) > self._travel_mm / 2:
+        if self._at_end or abs(position) > self._travel_mm / 2:
             return None
-        return (-position if self.reversed else position) + self._offset_mm
+        return -position if self.reversed else position
 
 
 class LineDevice(ABC):
@@ -99,10 +73,6 @@ class LineDevice(ABC):
     @abstractmethod
     def answer(self, command: bytes) -> bytes:
         """The answer to ``command``, which has no carriage return."""
-
-    def power_up(self) -> bytes:
-        """What it sends when it is switched on."""
-        return b""
 
 
 class SingleDevice(LineDevice):

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
-from drivers.simulated.gauges.device import Indicator, LineDevice
+from drivers.simulated.gauges.device import LineDevice
 
 NO_GAUGE = b"911\r"
 GAUGE_ERROR = b"912\r"
-BUSY = b"918\r"
 IDENTIFICATION = b"MUX-10F SIMULATED\r"
 
 
@@ -19,11 +16,7 @@ def format_value(channel: int, value: float, *, inch: bool) -> bytes:
 
 
 class Mux10Device(LineDevice):
-    """Answers a channel number with the value of its indicator; the first ``busy`` times with BUSY."""
-
-    def __init__(self, indicators: Mapping[int, Indicator]) -> None:
-        super().__init__(indicators)
-        self.busy = 0
+    """Answers a channel number with the value of its indicator."""
 
     def answer(self, command: bytes) -> bytes:
         """A data frame or an error; nothing if the command is no channel number and not ``V``."""
@@ -31,9 +24,6 @@ class Mux10Device(LineDevice):
             return IDENTIFICATION
         if not command.isdigit():
             return b""
-        if self.busy:
-            self.busy -= 1
-            return BUSY
         return self._value(int(command))
 
     def _value(self, channel: int) -> bytes:

@@ -10,14 +10,10 @@ import threading
 from collections import deque
 from collections.abc import Callable
 from concurrent.futures import Future
-from typing import Literal
 
-from drivers.simulated.closeable import Closeable
-from drivers.simulated.gauges.device import Indicator, LineDevice
-from drivers.simulated.gauges.faults import InjectedGaugeFault, WireFaults, apply_fault
+from drivers.simulated.gauges.device import LineDevice
+from drivers.simulated.served_device import Closeable
 from drivers.simulated.transports.interface import Transport
-from drivers.simulated.transports.pty import PtyTransport
-from drivers.simulated.transports.tcp import SocketTransport
 from hexacell.clock import CellClock
 
 COMMAND_END = b"\r"
@@ -42,7 +38,6 @@ class GaugeLineServer(Closeable):
         *,
         latency_s: float,
         baudrate: int | None = None,
-        seed: int = 0,
     ) -> None:
         self.device = device
         self.url = transport.url
@@ -50,7 +45,7 @@ class GaugeLineServer(Closeable):
         self._clock = clock
         self._latency_s = latency_s
         self._byte_s = device.bits_a_byte / (baudrate or device.baudrate)
-        self._faults = WireFaults(seed)
+        self._silent = False
         self._received = b""
         self._answers: deque[tuple[float, bytes]] = deque()
         self._jobs: queue.SimpleQueue[tuple[Callable[[], None], Future[None]]] = queue.SimpleQueue()
@@ -59,31 +54,13 @@ class GaugeLineServer(Closeable):
         self._thread = threading.Thread(target=self._serve, name=f"gauges on {self.url}")
         self._thread.start()
 
-    def inject(
-        self,
-        fault: InjectedGaugeFault,
-        *,
-        channel: int | None = None,
-        answers: int | None = None,
-        seconds: float = 1.0,
-    ) -> None:
-        """Inject ``fault`` now.
+    def set_unplugged(self, *, on: bool) -> None:
+        """Unplug the line, or plug it in again."""
+        self._run_on_thread(self._unplug if on else self._transport.plug_in)
 
-        Args:
-            fault: The fault.
-            channel: The channel of the instrument for its faults; the first one by default.
-            answers: How many answers a fault of the line affects; None for all until cleared.
-            seconds: Delay of late answers, in the cell's time.
-        """
-        self._run_on_thread(lambda: self._inject(fault, channel, answers, seconds))
-
-    def clear(self, fault: InjectedGaugeFault, *, channel: int | None = None) -> None:
-        """Clear a fault: plug the line in, or switch the instrument on again."""
-        self._run_on_thread(lambda: self._clear(fault, channel))
-
-    def send_unsolicited(self, data: bytes) -> None:
-        """Send ``data`` now without a request, as a data button or a foot switch does."""
-        self._run_on_thread(lambda: self._transport.send(data))
+    def set_silent(self, *, on: bool) -> None:
+        """Lose every answer, or no more."""
+        self._silent = on
 
     def close(self) -> None:
         """End the thread and close the line; closing twice is harmless."""
@@ -140,10 +117,12 @@ class GaugeLineServer(Closeable):
             self._answer(command.strip(b"\n"))
 
     def _answer(self, command: bytes) -> None:
-        answer, delay_s = self._faults.apply(self.device.answer(command))
+        answer = self.device.answer(command)
+        if self._silent:
+            answer = b""
         wire_s = (len(command) + len(COMMAND_END) + len(answer)) * self._byte_s
         free_at = max([self._clock.now(), *(due for due, _ in self._answers)])
-        self._answers.append((free_at + self._latency_s + wire_s + delay_s, answer))
+        self._answers.append((free_at + self._latency_s + wire_s, answer))
 
     def _until_next_answer_s(self) -> float | None:
         if not self._answers:
@@ -154,44 +133,7 @@ class GaugeLineServer(Closeable):
         while self._answers and self._answers[0][0] <= self._clock.now():
             self._transport.send(self._answers.popleft()[1])
 
-    def _inject(
-        self, fault: InjectedGaugeFault, channel: int | None, answers: int | None, seconds: float
-    ) -> None:
-        if fault is InjectedGaugeFault.UNPLUGGED:
-            self._unplug()
-        elif not apply_fault(self._indicator(channel), fault, on=True):
-            self._faults.inject(fault, answers=answers, seconds=seconds)
-
-    def _clear(self, fault: InjectedGaugeFault, channel: int | None) -> None:
-        if fault is InjectedGaugeFault.UNPLUGGED:
-            self._transport.plug_in()
-        elif not apply_fault(self._indicator(channel), fault, on=False):
-            self._faults.clear(fault)
-        elif fault is InjectedGaugeFault.AUTO_OFF:
-            self._transport.send(self.device.power_up())
-
     def _unplug(self) -> None:
         self._received = b""
         self._answers.clear()
         self._transport.unplug()
-
-    def _indicator(self, channel: int | None) -> Indicator:
-        return self.device.indicators[min(self.device.indicators) if channel is None else channel]
-
-
-def serve_gauges(
-    device: LineDevice,
-    transport: Literal["pty", "socket"],
-    clock: CellClock,
-    *,
-    name: str = "gauge",
-    latency_s: float = 0.02,
-    baudrate: int | None = None,
-    seed: int = 0,
-) -> GaugeLineServer:
-    """Serve ``device`` at ``url`` until it is closed.
-
-    ``name`` is the name of a pseudo-terminal in its folder.
-    """
-    line = PtyTransport(name) if transport == "pty" else SocketTransport()
-    return GaugeLineServer(device, line, clock, latency_s=latency_s, baudrate=baudrate, seed=seed)

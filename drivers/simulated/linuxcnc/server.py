@@ -13,9 +13,9 @@ import threading
 from collections.abc import Callable
 from contextlib import suppress
 
-from drivers.simulated.closeable import Closeable
 from drivers.simulated.linuxcnc.commands import GET_COMMANDS, SET_COMMANDS, ClientSession, Permission
 from drivers.simulated.linuxcnc.state import ConnectionCut, ControllerState, Machine
+from drivers.simulated.served_device import Closeable
 from hexacell.cell.devices import ControllerSettings
 
 HOST = "127.0.0.1"
@@ -44,18 +44,15 @@ class SimulatedController(Closeable):
         )
         self._thread.start()
 
-    def unplug(self) -> None:
-        """Cut every connection and accept no other; the machine continues."""
-        self._server.unplugged = True
-        self._server.cut_all()
+    def set_unplugged(self, *, on: bool) -> None:
+        """Cut every connection and accept no other, or accept them again; the machine continues."""
+        self._server.unplugged = on
+        if on:
+            self._server.cut_all()
 
-    def plug_in(self) -> None:
-        """Accept connections again."""
-        self._server.unplugged = False
-
-    def silence(self, *, silent: bool = True) -> None:
-        """Lines get no response, and are lost."""
-        self._server.silent = silent
+    def set_silent(self, *, on: bool) -> None:
+        """Lose every line without a response, or no more."""
+        self._server.silent = on
 
     def close(self) -> None:
         """Stop the machine, cut all connections and end all threads; closing twice is harmless."""

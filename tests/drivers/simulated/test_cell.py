@@ -19,7 +19,6 @@ from drivers.gauges.mux10 import Mux10Gauge
 from drivers.gauges.sylvac import SylvacGauge
 from drivers.serial.shared_port import SharedSerialPorts
 from drivers.simulated.cell import SimulatedCell
-from drivers.simulated.gauges.faults import InjectedGaugeFault
 from hexacell.cell.model import CellSettings
 from hexacell.controller_config.toml_format import NativeToml
 from hexacell.errors import FileError, HexacellError, ReachError
@@ -225,9 +224,9 @@ async def test_faults_of_devices_reach_the_drivers(bundled_cell) -> None:
     hasty = settings.encoders.model_copy(update={"timeout_s": 0.3})
     with serve(bundled_cell, settings.model_copy(update={"encoders": hasty})) as cell:
         async with drivers(cell.settings) as (gauges, encoders, _):
-            cell.gauges.inject("x", InjectedGaugeFault.INCH)
+            cell.gauges.indicators["x"].inch = True
             with pytest.raises(HexacellError, match="gauge x"):
                 await gauges[0].read()
-            cell.encoders.faults.silence(3)
+            cell.faults.inject("silent", "encoder 3")
             with pytest.raises(HexacellError, match="3"):
                 await encoders.read()

@@ -9,7 +9,6 @@ import pytest
 from drivers.encoders.cia406 import Cia406Bank
 from drivers.gauges.mux10 import Mux10Gauge
 from drivers.serial.shared_port import SharedSerialPorts
-from drivers.simulated.gauges.faults import InjectedGaugeFault
 from drivers.wire_trace import WireTrace
 from hexacell.application.device_setup import device_addresses, devices_of, open_devices
 from hexacell.errors import DeviceError, UsageError
@@ -72,11 +71,11 @@ async def test_connected_devices_answer_and_their_talk_is_kept(make_site) -> Non
 async def test_if_one_cannot_be_opened_all_are_let_go(make_site) -> None:
     """What would stay open, the harness finds; and afterwards all can be opened again."""
     site = make_site()
-    site.simulated.gauges.inject("y", InjectedGaugeFault.INCH)
+    site.simulated.gauges.indicators["y"].inch = True
     with pytest.raises(DeviceError, match="gauge y"):
         async with open_devices(site.simulated.settings):
             pytest.fail("was connected")
-    site.simulated.gauges.clear("y", InjectedGaugeFault.INCH)
+    site.simulated.gauges.indicators["y"].inch = False
     async with open_devices(site.simulated.settings):
         pass
 

@@ -7,14 +7,14 @@ from typing import Any
 
 import pytest
 
-from drivers.simulated.fault_schedule import FaultKind
 from hexacell.application.calibration_run import preflight
 from hexacell.cell.recovery import UnattendedRecovery
-from hexacell.cell.simulation import SimulatedFault
+from hexacell.cell.simulation import FaultKind, SimulatedFault
 from hexacell.errors import ExitCode, HexacellError
 from procedures.calibration.workflow import Mode
 from procedures.run import events
 from procedures.run.trips import Guard, GuardTripped
+from tests.injection_times import injection_times
 
 GIVES_UP = UnattendedRecovery(**dict.fromkeys(UnattendedRecovery.model_fields, ("abort",)))
 SLOW: dict[str, Any] = {
@@ -27,16 +27,16 @@ SLOW: dict[str, Any] = {
 
 IN_A_SET, TO_A_POINT = "P1/o02/move", "P1/o01/move"
 FAULTS = [
-    (FaultKind.STOP_LINE, "", IN_A_SET, {Guard.STOP_LINE}),
-    (FaultKind.STOP_LINE, "", TO_A_POINT, {Guard.STOP_LINE}),
-    (FaultKind.EMERGENCY_STOP, "controller", IN_A_SET, {Guard.CONTROLLER}),
-    (FaultKind.FOLLOWING_ERROR, "controller", TO_A_POINT, {Guard.FOLLOWING}),
-    (FaultKind.AT_END, "x", IN_A_SET, {Guard.GAUGE_END}),
-    (FaultKind.OFF_PLATE, "z", IN_A_SET, {Guard.PLATE, Guard.GAUGE_END}),
-    (FaultKind.UNPLUGGED, "x", IN_A_SET, {Guard.DEVICE, Guard.STALE}),
-    (FaultKind.ALARM, "encoder 3", TO_A_POINT, {Guard.ENCODERS}),
-    (FaultKind.UNPLUGGED, "encoder 5", IN_A_SET, {Guard.ENCODERS, Guard.STALE}),
-    (FaultKind.UNPLUGGED, "controller", IN_A_SET, {Guard.DEVICE, Guard.STALE}),
+    ("stop line", "", IN_A_SET, {Guard.STOP_LINE}),
+    ("stop line", "", TO_A_POINT, {Guard.STOP_LINE}),
+    ("emergency stop", "controller", IN_A_SET, {Guard.CONTROLLER}),
+    ("following error", "controller", TO_A_POINT, {Guard.FOLLOWING}),
+    ("at its end", "x", IN_A_SET, {Guard.GAUGE_END}),
+    ("off its plate", "z", IN_A_SET, {Guard.PLATE, Guard.GAUGE_END}),
+    ("unplugged", "x", IN_A_SET, {Guard.DEVICE, Guard.STALE}),
+    ("alarm", "encoder 3", TO_A_POINT, {Guard.ENCODERS}),
+    ("unplugged", "encoder 5", IN_A_SET, {Guard.ENCODERS, Guard.STALE}),
+    ("unplugged", "controller", IN_A_SET, {Guard.DEVICE, Guard.STALE}),
 ]
 
 
@@ -47,7 +47,7 @@ def striking(site: Any, key: str, kind: FaultKind, device: str) -> Callable[...,
         if isinstance(event, events.StepBegun) and event.step.key == key:
             schedule = site.simulated.schedule
             fault = {
-                "kind": kind.value,
+                "kind": kind,
                 "device": device,
                 "at_move": schedule.move_count + 1,
                 "after_s": 5.0,
@@ -61,6 +61,7 @@ def striking(site: Any, key: str, kind: FaultKind, device: str) -> Callable[...,
 async def test_what_happens_on_a_move_stops_it(make_site, kind, device, key, guards) -> None:
     site = make_site(**SLOW, guards__stale_s=0.4)
     before = site.config
+    struck_s = injection_times(site.simulated)
     with pytest.raises(GuardTripped) as tripped:
         await site.calibrate(striking(site, key, kind, device))
     assert tripped.value.trip.guard in guards
@@ -71,20 +72,20 @@ async def test_what_happens_on_a_move_stops_it(make_site, kind, device, key, gua
     assert interrupted[-1].reason == str(tripped.value)
     # The first point is where the robot stands already: it may be there before it is stopped.
     assert key in [event.step.key for event in site.happened(events.StepBegun)][-3:]
-    (struck,) = site.simulated.schedule.injected
-    if device == "controller" and kind is FaultKind.UNPLUGGED:
+    assert len(struck_s) == 1
+    if device == "controller" and kind == "unplugged":
         assert "could not be stopped" in str(tripped.value)
         assert str(tripped.value).endswith("Press the emergency stop")
     else:
-        assert site.simulated.physics.motion_end_s < struck.at_s + 20.0, "a second on the wall"
+        assert site.simulated.physics.motion_end_s < struck_s[0] + 20.0, "a second on the wall"
 
 
 @pytest.mark.slow
 async def test_a_cable_that_was_put_back_lets_it_go_on(make_site) -> None:
     site = make_site(**SLOW, guards__stale_s=0.4)
     with pytest.raises(GuardTripped):
-        await site.calibrate(striking(site, IN_A_SET, FaultKind.UNPLUGGED, "x"))
-    site.simulated.faults.clear(FaultKind.UNPLUGGED, "x")
+        await site.calibrate(striking(site, IN_A_SET, "unplugged", "x"))
+    site.simulated.faults.clear("unplugged", "x")
 
     class Enough(Exception):
         pass

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from drivers.simulated.gauges.faults import InjectedGaugeFault
 from hexacell.acceptance import AcceptanceGate, Verdict
 from hexacell.cell.simulation import SimulatedFault
 from hexacell.controller_config.change import ConfigChange
@@ -154,7 +153,8 @@ async def test_a_config_that_somebody_changes_meanwhile_is_left_alone(proposed) 
 
 async def test_a_gauge_set_to_inches_stops_it(make_site) -> None:
     site = make_site()
-    fault = at(events.RecordTaken, lambda: site.simulated.gauges.inject("z", InjectedGaugeFault.INCH))
+    indicator = site.simulated.gauges.indicators["z"]
+    fault = at(events.RecordTaken, lambda: setattr(indicator, "inch", True))
     with pytest.raises(DeviceError, match=r"gauge z: answers in inch\. Press its in/mm key") as refusal:
         await site.calibrate(fault)
     assert refusal.value.exit_code is ExitCode.HARDWARE
@@ -169,7 +169,7 @@ async def test_two_gauges_that_fail_at_once_are_both_named(make_site) -> None:
 
     def press_both_keys() -> None:
         for name in "xz":
-            site.simulated.gauges.inject(name, InjectedGaugeFault.INCH)
+            site.simulated.gauges.indicators[name].inch = True
 
     with pytest.raises(DeviceError, match=r"(?s)gauge x: .*gauge z: "):
         await site.calibrate(at(events.RecordTaken, press_both_keys))

@@ -7,7 +7,6 @@ import asyncio
 import numpy as np
 import pytest
 
-from drivers.simulated.gauges.faults import InjectedGaugeFault
 from hexacell.application.calibration_run import preflight
 from hexacell.campaign import feasibility
 from hexacell.errors import (
@@ -53,9 +52,9 @@ async def test_every_failure_is_said_at_once(make_site) -> None:
         stations__placement="by-hand",
         **HASTY,
     )
-    site.simulated.gauges.inject("x", InjectedGaugeFault.INCH)
-    site.simulated.gauges.inject("z", InjectedGaugeFault.HOLD)
-    site.simulated.encoders.faults.unplug(4)
+    site.simulated.gauges.indicators["x"].inch = True
+    site.simulated.gauges.indicators["z"].held_mm = 1.0
+    site.simulated.faults.inject("unplugged", "encoder 4")
     controller = site.simulated.settings.controller.model_copy(update={"connect_password": "WRONG"})
     site.simulated.settings = site.simulated.settings.model_copy(update={"controller": controller})
     before = site.simulated.machine.joints()
@@ -82,7 +81,7 @@ async def test_every_failure_is_said_at_once(make_site) -> None:
 async def test_a_run_begins_with_the_same_checks_and_leaves_no_folder(make_site) -> None:
     good = (100.0, -100.0, 500.0)
     site = make_site(verification__points=(FAR, good), **HASTY)
-    site.simulated.gauges.inject("y", InjectedGaugeFault.INCH)
+    site.simulated.gauges.indicators["y"].inch = True
     with pytest.raises(SeveralErrors, match=r"(?s)verification point 1.*gauge y: answers in inch"):
         await site.calibrate()
     assert not site.folder.path.exists()
@@ -108,7 +107,7 @@ async def test_a_stop_during_the_checks_of_the_plan_leaves_nothing(make_site, mo
 
 async def test_devices_that_open_but_cannot_be_read_are_said(make_site, monkeypatch) -> None:
     site = make_site(verification__points=(FAR, (100.0, -100.0, 500.0)), **HASTY)
-    site.simulated.encoders.faults.silence(2)
+    site.simulated.faults.inject("silent", "encoder 2")
     with pytest.raises(SeveralErrors) as refusal:
         await check(site)
     kinds = [type(error) for error in refusal.value.errors]

@@ -7,13 +7,13 @@ from typing import Any
 
 import pytest
 
-from drivers.simulated.fault_schedule import FaultKind
 from hexacell.cell.recovery import Action
+from hexacell.cell.simulation import FaultKind
 from hexacell.errors import DeviceError, ExitCode
 from procedures.devices.reconnection import DeviceReplaced
 from procedures.run import events
 
-UNPLUGGED = FaultKind.UNPLUGGED
+UNPLUGGED: FaultKind = "unplugged"
 
 
 def pulled_out(site: Any, kind: FaultKind, device: str, step: str) -> Any:

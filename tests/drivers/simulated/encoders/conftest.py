@@ -11,7 +11,7 @@ import can
 import pytest
 
 from drivers.encoders.cia406 import Cia406Bank
-from drivers.simulated.encoders import SimulatedEncoderBank
+from drivers.simulated.encoders.bank import SimulatedEncoderBank
 from drivers.simulated.slcan import serve_slcan
 from hexacell.cell.devices import EncoderSettings
 from hexacell.clock import CellClock

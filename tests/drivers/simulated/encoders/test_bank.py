@@ -12,10 +12,13 @@ import pytest
 from drivers.encoders.cia406 import Cia406Bank
 from drivers.errors import BusError, InvalidSampleError, RestartedNodeError, SilentNodeError
 from drivers.interfaces import EncoderSample
-from drivers.simulated.encoders import EVENTS_AND_SYNC, EVENTS_ONLY, TWO_MAGNETS
+from drivers.simulated.encoders.bank import SimulatedEncoderBank
+from drivers.simulated.encoders.object_dictionary import EVENTS_AND_SYNC
 from drivers.simulated.slcan import serve_slcan
 from hexacell.clock import CellClock
 from hexacell.errors import DeviceError
+from tests.drivers.simulated.encoders import faults
+from tests.drivers.simulated.encoders.vendors import EVENTS_ONLY, TWO_MAGNETS
 from tests.waiting import until
 
 
@@ -94,14 +97,14 @@ async def test_latency_is_in_the_cells_time(make_bank, driver):
 
 async def test_a_missing_node(make_bank, reach, driver):
     simulated = make_bank()
-    simulated.faults.unplug(4)
+    simulated.faults(4)["unplugged"](on=True)
     with pytest.raises(BusError, match=r"encoder of leg 4 \(node 4\): nobody answers"):
         await driver(reach(simulated), timeout_s=0.3).open()
 
 
 async def test_a_duplicated_node(make_bank, reach, driver):
     simulated = make_bank()
-    simulated.faults.add_duplicate(4)
+    faults.add_duplicate(simulated, 4)
     with pytest.raises(DeviceError, match=r"leg 4 \(node 4\).*two devices share"):
         await driver(reach(simulated)).open()
 
@@ -110,7 +113,7 @@ async def test_a_node_duplicated_in_the_middle_of_a_run(make_bank, driver):
     simulated = make_bank()
     bank = driver(simulated.bus_settings)
     await bank.open()
-    simulated.faults.add_duplicate(2)
+    faults.add_duplicate(simulated, 2)
     with pytest.raises(RestartedNodeError, match="leg 2"):
         await read_on(bank)
     with pytest.raises(DeviceError, match=r"leg 2.*two devices share"):
@@ -122,10 +125,10 @@ async def test_a_node_that_falls_silent(make_bank, reach, driver, hurry):
     bank = driver(reach(simulated))
     await bank.open()
     hurry(bank)
-    simulated.faults.silence(6)
+    simulated.faults(6)["silent"](on=True)
     with pytest.raises(SilentNodeError, match=r"leg 6"):
         await bank.read()
-    simulated.faults.silence(6, silent=False)
+    simulated.faults(6)["silent"](on=False)
     assert len(set((await bank.read()).counts)) == 1
 
 
@@ -133,10 +136,10 @@ async def test_an_emergency_and_its_end(make_bank, reach, driver):
     simulated = make_bank()
     bank = driver(reach(simulated))
     await bank.open()
-    simulated.faults.emergency(3)
+    simulated.faults(3)["alarm"](on=True)
     with pytest.raises(InvalidSampleError, match=r"leg 3.*no magnet"):
         await read_on(bank)
-    simulated.faults.clear_emergency(3)
+    simulated.faults(3)["alarm"](on=False)
     while True:
         with contextlib.suppress(InvalidSampleError):
             await bank.read()
@@ -146,14 +149,14 @@ async def test_an_emergency_and_its_end(make_bank, reach, driver):
 async def test_an_error_or_alarm_from_before_keeps_the_bank_shut(make_bank, driver):
     simulated = make_bank()
     bank = driver(simulated.bus_settings)
-    simulated.faults.alarm(5)
+    faults.set_alarms(simulated, 5)
     with pytest.raises(InvalidSampleError, match=r"leg 5.*6503h"):
         await bank.open()
-    simulated.faults.alarm(5, 0)
-    simulated.faults.emergency(1)
+    faults.set_alarms(simulated, 5, 0)
+    simulated.faults(1)["alarm"](on=True)
     with pytest.raises(InvalidSampleError, match=r"leg 1.*1001h"):
         await bank.open()
-    simulated.faults.clear_emergency(1)
+    simulated.faults(1)["alarm"](on=False)
     await bank.open()
 
 
@@ -161,7 +164,7 @@ async def test_a_reboot_in_the_middle_of_a_run(make_bank, reach, driver):
     simulated = make_bank()
     bank = driver(reach(simulated))
     await bank.open()
-    simulated.faults.reboot(1)
+    faults.reboot(simulated, 1)
     with pytest.raises(RestartedNodeError, match=r"leg 1.*set is void"):
         await read_on(bank)
     await bank.open()
@@ -172,7 +175,7 @@ async def test_the_loss_of_a_heartbeat(make_bank, reach, driver):
     simulated = make_bank()
     bank = driver(reach(simulated), heartbeat_ms=30)
     await bank.open()
-    simulated.faults.stop_heartbeat(2)
+    faults.stop_heartbeat(simulated, 2)
     with pytest.raises(SilentNodeError, match=r"leg 2.*heartbeat"):
         await read_on(bank)
 
@@ -182,10 +185,10 @@ async def test_a_node_unplugged_and_plugged_in_again(make_bank, driver, hurry):
     bank = driver(simulated.bus_settings)
     await bank.open()
     hurry(bank)
-    simulated.faults.unplug(2)
+    simulated.faults(2)["unplugged"](on=True)
     with pytest.raises(SilentNodeError, match="leg 2"):
         await bank.read()
-    simulated.faults.plug_in(2)
+    simulated.faults(2)["unplugged"](on=False)
     with pytest.raises(RestartedNodeError, match="leg 2"):
         await read_on(bank)
     await bank.open()
@@ -199,7 +202,7 @@ async def test_stale_answers_never_mix_instants(make_bank, driver, hurry, timeou
     bank = driver(simulated.bus_settings)
     await bank.open()
     hurry(bank, 0.08)
-    simulated.faults.delay(3, timeouts * 0.08)
+    faults.delay(simulated, 3, timeouts * 0.08)
     for _ in range(2):
         outcome = (await asyncio.gather(bank.read(), return_exceptions=True))[0]
         if isinstance(outcome, DeviceError):
@@ -214,7 +217,7 @@ async def test_a_bus_whose_nodes_all_die(make_bank, reach, driver, hurry):
     bank = driver(reach(simulated))
     await bank.open()
     hurry(bank)
-    simulated.faults.kill_bus()
+    simulated.bus.stop()
     with pytest.raises(SilentNodeError, match=r"leg 1 .*leg 6 .*CAN adapter"):
         await bank.read()
 
@@ -238,7 +241,7 @@ async def test_an_adapter_that_is_pulled_out(make_bank, driver, samples, transpo
     bank = driver(adapter.bus_settings, timeout_s=2.0)
     await bank.open()
     if reading:
-        simulated.faults.silence(1)
+        simulated.faults(1)["silent"](on=True)
         before = samples.taken
         waiting = asyncio.ensure_future(bank.read())
         await until(lambda: samples.taken > before)
@@ -262,10 +265,7 @@ async def test_closing_and_opening_over_the_same_adapter(make_bank, driver, reac
 
 async def test_no_thread_is_left(settings, samples, reach):
     before = set(threading.enumerate())
-    from drivers.simulated.encoders import SimulatedEncoderBank
-
     bank = SimulatedEncoderBank(settings, samples, CellClock())
-    bank.start()
     bank.close()
     bank.close()
     assert set(threading.enumerate()) == before

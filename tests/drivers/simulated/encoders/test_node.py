@@ -2,20 +2,27 @@
 
 from __future__ import annotations
 
+import uuid
+
+import can
 import pytest
 
-from drivers.simulated.encoders import EVENTS_AND_SYNC, EVENTS_ONLY, TWO_MAGNETS, SimulatedEncoderBank
+from drivers.simulated.encoders.bank import SimulatedEncoderBank
+from drivers.simulated.encoders.object_dictionary import EVENTS_AND_SYNC
 from hexacell.clock import CellClock
+from tests.drivers.simulated.encoders.vendors import EVENTS_ONLY, TWO_MAGNETS
 
 START, STOP, PRE_OPERATIONAL, RESET, RESET_COMMUNICATION = 1, 2, 0x80, 0x81, 0x82
 SYNC, NMT, ALL = 0x80, 0, 0
 
 
-def test_every_node_announces_itself(settings, samples):
-    import can
-
-    bank = SimulatedEncoderBank(settings, samples, CellClock())
-    with can.Bus(**bank.bus_settings) as ear, bank:
+def test_every_node_announces_itself(settings, samples, monkeypatch):
+    number = uuid.uuid4()
+    monkeypatch.setattr(uuid, "uuid4", lambda: number)
+    with (
+        can.Bus(f"hexacell-encoders-{number.hex}", interface="virtual") as ear,
+        SimulatedEncoderBank(settings, samples, CellClock()),
+    ):
         boots = {(m.arbitration_id, bytes(m.data)) for _ in range(6) if (m := ear.recv()) is not None}
     assert boots == {(0x700 + node, b"\0") for node in range(1, 7)}
 
@@ -152,18 +159,9 @@ def test_reading_the_position_by_sdo_gives_the_last_sample(make_bank, listen, sa
 def test_an_emergency_is_a_frame_and_a_register(make_bank, listen):
     simulated = make_bank()
     ear = listen(simulated)
-    simulated.faults.emergency(2, 0xFF00)
+    simulated.faults(2)["alarm"](on=True)
     assert ear.heard() == [(0x82, "00ff210000000000")]
     assert ear.sdo(2, "40011000") == "4f01100021000000"
-    simulated.faults.clear_emergency(2)
+    simulated.faults(2)["alarm"](on=False)
     assert ear.heard() == [(0x82, "0000000000000000")]
     assert ear.sdo(2, "40011000") == "4f01100000000000"
-
-
-def test_faults_before_the_start(settings, samples, listen):
-    bank = SimulatedEncoderBank(settings, samples, CellClock())
-    bank.faults.unplug(2)
-    with bank:
-        ear = listen(bank)
-        ear.send(0x602, 0x40, 0, 0x10, 0, 0, 0, 0, 0)
-        assert ear.heard() == []

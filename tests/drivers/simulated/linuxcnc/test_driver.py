@@ -182,10 +182,10 @@ async def test_a_slider_that_jumps_when_the_machine_comes_on(ready, machine):
 async def test_a_silent_controller(driver, simulated):
     controller = driver(Timeouts(answer=0.3))
     await controller.open()
-    simulated.silence()
+    simulated.set_silent(on=True)
     with pytest.raises(ResponseTimeout, match="did not answer 'get abs_act_pos'"):
         await controller.pose()
-    simulated.silence(silent=False)
+    simulated.set_silent(on=False)
     assert await controller.pose() == HOME
     await controller.close()
 
@@ -212,8 +212,8 @@ async def test_an_acknowledged_move_that_does_not_take_place(ready, machine):
 
 async def test_a_connection_dropped_in_mid_move(ready, simulated, machine):
     moving = await begin(ready, machine)
-    simulated.unplug()
-    simulated.plug_in()
+    simulated.set_unplugged(on=True)
+    simulated.set_unplugged(on=False)
     with pytest.raises(ConnectionLost, match="closed the connection"):
         await moving
     stood = await ready.pose()

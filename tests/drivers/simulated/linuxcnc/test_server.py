@@ -248,10 +248,10 @@ def test_homing_that_is_aborted_leaves_it_unhomed(client, machine):
 
 def test_silence(client, simulated):
     me = client()
-    simulated.silence()
+    simulated.set_silent(on=True)
     me.send("get estop")
     me.expect_silence()
-    simulated.silence(silent=False)
+    simulated.set_silent(on=False)
     me.say("get estop", b"ESTOP ON\r\n")
 
 
@@ -279,7 +279,7 @@ def test_an_unplugged_controller_cuts_connections_and_its_machine_continues(clie
     machine.duration_s = 30.0
     me.send("set mdi G0 X100")
     machine.wait_for("move")
-    simulated.unplug()
+    simulated.set_unplugged(on=True)
     me.expect_end()
     assert machine.events[-1] == "move"
 

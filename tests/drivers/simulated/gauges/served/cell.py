@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+import itertools
 from collections.abc import Callable
 
 from drivers.gauges.cdi import CdiGauge
@@ -11,7 +12,9 @@ from drivers.gauges.sylvac import SylvacGauge
 from drivers.serial.shared_port import SharedSerialPorts
 from drivers.simulated.gauges.bank import SimulatedGaugeBank, simulated_device
 from drivers.simulated.gauges.device import Indicator
-from drivers.simulated.gauges.server import serve_gauges
+from drivers.simulated.gauges.server import GaugeLineServer
+from drivers.simulated.transports.pty import PtyTransport
+from drivers.simulated.transports.tcp import SocketTransport
 from hexacell.cell.devices import GaugeSettings
 from hexacell.cell.simulation import SimulatedGauges
 from hexacell.clock import CellClock
@@ -63,9 +66,26 @@ async def cell(*args, **kwargs):
         made.rack.close()
 
 
-def served(protocol, plunger=lambda: 1.0, transport="pty", factor=FAST, channels=(1,), **pace):
-    indicators = {channel: Indicator(plunger) for channel in channels}
-    return serve_gauges(simulated_device(protocol, indicators), transport, CellClock(factor), **pace)
+def served(protocol, plunger=lambda: 1.0, transport="pty", factor=FAST, name="gauge", **pace):
+    device = simulated_device(protocol, {1: Indicator(plunger)})
+    line = PtyTransport(name) if transport == "pty" else SocketTransport()
+    return GaugeLineServer(device, line, CellClock(factor), **({"latency_s": 0.02} | pace))
+
+
+def send_unsolicited(line, data):
+    """Send ``data`` now without a request, as a data button or a foot switch does."""
+    line._run_on_thread(lambda: line._transport.send(data))
+
+
+def change_answers(line, change, count=None):
+    """Let ``change`` alter every answer of a line, or the next ``count``."""
+    changes = itertools.repeat(change) if count is None else iter([change] * count)
+    answer = line.device.answer
+
+    def changed(command):
+        return next(changes, bytes)(answer(command))
+
+    line.device.answer = changed
 
 
 def questions_to(line):

@@ -3,14 +3,16 @@
 import asyncio
 import contextlib
 import logging
+from functools import partial
+from random import Random
 
 import pytest
 
 from drivers.errors import GaugeSilent, GaugeUnsteady, WrongAnswer, ZeroVoid
 from drivers.serial.shared_port import SharedSerialPort, SharedSerialPorts
-from drivers.simulated.gauges.faults import InjectedGaugeFault
 from hexacell.cell.devices import GaugeSettings
 from hexacell.errors import DeviceError
+from tests.drivers.simulated.gauges.garbling import flip_bit, flip_digit
 from tests.drivers.simulated.gauges.served.cell import (
     DRIVERS,
     FAST,
@@ -19,6 +21,7 @@ from tests.drivers.simulated.gauges.served.cell import (
     TRANSPORTS,
     ask,
     cell,
+    change_answers,
     questions_to,
     served,
 )
@@ -26,27 +29,29 @@ from tests.waiting import until
 
 
 async def test_silent(sylvac):
-    sylvac.rack.inject("y", InjectedGaugeFault.SILENT)
+    sylvac.rack.line("y").set_silent(on=True)
     with pytest.raises(GaugeSilent, match="gauge y"):
         await sylvac.gauges["y"].read()
-    sylvac.rack.clear("y", InjectedGaugeFault.SILENT)
+    sylvac.rack.line("y").set_silent(on=False)
     assert await sylvac.values() == [1.0, 2.0, 3.0]
 
 
 async def test_a_late_answer_is_never_the_next_reading(sylvac):
-    late_s = (TIMEOUT_S + 0.1) * FAST
-    sylvac.rack.inject("y", InjectedGaugeFault.LATE, answers=1, seconds=late_s)
+    line = sylvac.rack.line("y")
+    usual_s, line._latency_s = line._latency_s, (TIMEOUT_S + 0.1) * FAST
     with pytest.raises(GaugeSilent):
         await sylvac.gauges["y"].read()
+    line._latency_s = usual_s
     sylvac.balls["y"] = 5.0
     assert (await sylvac.gauges["y"].read()).value_mm == 5.0
     await sylvac.gauges["y"].check()
 
 
 async def test_cancelled_readings_leave_the_line_in_step(sylvac):
-    questions = questions_to(sylvac.rack.line("y"))
+    line = sylvac.rack.line("y")
+    line._latency_s = 0.02 * FAST
+    questions = questions_to(line)
     for _ in range(5):
-        sylvac.rack.inject("y", InjectedGaugeFault.LATE, answers=1, seconds=0.02 * FAST)
         questions.clear()
         reading = asyncio.create_task(sylvac.gauges["y"].read())
         await until(lambda: bool(questions))
@@ -58,18 +63,19 @@ async def test_cancelled_readings_leave_the_line_in_step(sylvac):
 
 
 @pytest.mark.parametrize("protocol", PROTOCOLS)
-@pytest.mark.parametrize("fault", [InjectedGaugeFault.GARBLED_DIGIT, InjectedGaugeFault.GARBLED_BIT])
-async def test_one_garbled_answer_never_gets_through(protocol, fault):
+@pytest.mark.parametrize("garbled", [flip_digit, flip_bit])
+async def test_one_garbled_answer_never_gets_through(protocol, garbled):
     async with cell([protocol] * 3, timeout_s=TIMEOUT_S) as made:
         await made.open()
+        random = Random(0)
         for _ in range(5):
-            made.rack.inject("y", fault, answers=1)
+            change_answers(made.rack.line("y"), partial(garbled, random=random), count=1)
             reading = await made.gauges["y"].read()
             assert reading.value_mm == pytest.approx(2.0, abs=0.05)
 
 
 async def test_garbled_for_ever(sylvac):
-    sylvac.rack.inject("y", InjectedGaugeFault.GARBLED_DIGIT)
+    change_answers(sylvac.rack.line("y"), partial(flip_digit, random=Random(0)))
     outcomes = []
     for _ in range(5):
         try:
@@ -96,7 +102,7 @@ async def test_a_wrong_protocol_is_recognised(spoken, driver):
 async def test_unplugged_and_plugged_in_again(transport):
     async with cell(["sylvac"] * 3, transport) as made:
         await made.open()
-        made.rack.inject("y", InjectedGaugeFault.UNPLUGGED)
+        made.rack.line("y").set_unplugged(on=True)
         with pytest.raises(DeviceError, match=r"gauge y: port .* was lost"):
             await made.gauges["y"].read()
         absent = "is absent" if transport == "pty" else "cannot be opened"
@@ -104,7 +110,7 @@ async def test_unplugged_and_plugged_in_again(transport):
             with pytest.raises(DeviceError, match=f"gauge y: port .* {absent}"):
                 await made.gauges["y"].open()
         assert (await made.gauges["z"].read()).value_mm == 3.0
-        made.rack.clear("y", InjectedGaugeFault.UNPLUGGED)
+        made.rack.line("y").set_unplugged(on=False)
         with pytest.raises(DeviceError, match="gauge y: is not open"):
             await made.gauges["y"].read()
         await made.gauges["y"].open()
@@ -114,20 +120,20 @@ async def test_unplugged_and_plugged_in_again(transport):
 async def test_unplugged_during_a_question():
     async with cell(["mux10"] * 3) as made:
         await made.gauges["x"].open()
-        made.rack.inject("x", InjectedGaugeFault.SILENT)
+        made.rack.line("x").set_silent(on=True)
         questions = questions_to(made.rack.line("x"))
         reading = asyncio.create_task(made.gauges["x"].read())
         await until(lambda: bool(questions))
-        made.rack.inject("x", InjectedGaugeFault.UNPLUGGED)
+        made.rack.line("x").set_unplugged(on=True)
         with pytest.raises(DeviceError, match="was lost"):
             await reading
 
 
 async def test_opening_again_finds_the_gauge_that_was_unplugged_unnoticed(sylvac):
     for _ in range(2):
-        sylvac.rack.inject("y", InjectedGaugeFault.UNPLUGGED)
+        sylvac.rack.line("y").set_unplugged(on=True)
     for _ in range(2):
-        sylvac.rack.clear("y", InjectedGaugeFault.UNPLUGGED)
+        sylvac.rack.line("y").set_unplugged(on=False)
     await sylvac.gauges["y"].open()
     assert (await sylvac.gauges["y"].read()).value_mm == 2.0
 
@@ -135,8 +141,8 @@ async def test_opening_again_finds_the_gauge_that_was_unplugged_unnoticed(sylvac
 async def test_a_socket_ended_unnoticed_is_opened_again():
     async with cell(["mux10"] * 3, "socket") as made:
         await made.open()
-        made.rack.inject("x", InjectedGaugeFault.UNPLUGGED)
-        made.rack.clear("x", InjectedGaugeFault.UNPLUGGED)
+        made.rack.line("x").set_unplugged(on=True)
+        made.rack.line("x").set_unplugged(on=False)
         await made.gauges["x"].open()
         assert (await made.gauges["x"].read()).value_mm == 1.0
         with pytest.raises(ZeroVoid, match="gauge y: lost its port meanwhile"):

@@ -8,7 +8,6 @@ import serial
 
 from drivers.serial.shared_port import SharedSerialPort
 from drivers.simulated.gauges.bank import SimulatedGaugeBank
-from drivers.simulated.gauges.faults import InjectedGaugeFault
 from hexacell.cell.devices import GaugeSettings
 from hexacell.cell.simulation import SimulatedGauges
 from hexacell.clock import CellClock
@@ -20,6 +19,7 @@ from tests.drivers.simulated.gauges.served.cell import (
     ask,
     cell,
     questions_to,
+    send_unsolicited,
     served,
 )
 from tests.waiting import until
@@ -153,7 +153,7 @@ async def test_closing_does_not_wait_for_answers_that_are_due():
         await waiting
     await link.close()
     with pytest.raises(RuntimeError, match="is closed"):
-        line.inject(InjectedGaugeFault.INCH)
+        line.set_unplugged(on=True)
 
 
 def test_nothing_stays_in_the_file_system():
@@ -167,7 +167,7 @@ def test_nothing_stays_in_the_file_system():
 def test_answers_to_nobody_are_lost_as_on_a_cable():
     with served("sylvac") as line:
         for _ in range(1000):
-            line.send_unsolicited(b"+9.999\r" * 10)
+            send_unsolicited(line, b"+9.999\r" * 10)
         port = serial.serial_for_url(line.url, timeout=LONG_S)
         port.write(b"?\r")
         received = port.read_until(b"+1.000\r")

@@ -1,0 +1,46 @@
+"""Faults of simulated encoders that no cell file can plan; legs count from 1."""
+
+from __future__ import annotations
+
+import struct
+from functools import partial
+
+from drivers.simulated.encoders.bank import SimulatedEncoderBank
+from drivers.simulated.encoders.object_dictionary import ALARMS
+
+
+def add_duplicate(bank: SimulatedEncoderBank, leg: int) -> None:
+    """A second device with the same node id and another serial number appears."""
+    duplicate = bank._make(leg, bank._encoders[leg - 1].data.serial_number + 1000)
+    with bank.bus.lock:
+        duplicate.set_unplugged(on=False)
+
+
+def set_alarms(bank: SimulatedEncoderBank, leg: int, bits: int = 1) -> None:
+    """The node sets alarms in 6503h without a message; 0 clears them."""
+    with bank.bus.lock:
+        bank._encoders[leg - 1]._node.set_data(ALARMS, 0, struct.pack("<H", bits))
+
+
+def reboot(bank: SimulatedEncoderBank, leg: int) -> None:
+    """The node restarts and loses its configuration."""
+    with bank.bus.lock:
+        bank._encoders[leg - 1].boot()
+
+
+def stop_heartbeat(bank: SimulatedEncoderBank, leg: int) -> None:
+    """The heartbeat of the node ends; it still responds."""
+    with bank.bus.lock:
+        bank._encoders[leg - 1]._node.nmt.stop_heartbeat()
+
+
+def delay(bank: SimulatedEncoderBank, leg: int, seconds: float) -> None:
+    """The responses of the node are delayed; they keep the sample of their SYNC."""
+    encoder = bank._encoders[leg - 1]
+    send = encoder.send
+
+    def send_later(cob_id: int, data: bytes) -> None:
+        bank.bus.call_later(seconds, partial(send, cob_id, data))
+
+    with bank.bus.lock:
+        encoder.send = send_later  # type: ignore[method-assign]

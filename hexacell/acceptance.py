@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from pydantic import BaseModel, ConfigDict
 
-from hexacell.identification.diagnostics.tolerance_check import tolerance_violations
+from hexacell.identification.diagnostics.parameter_checks import tolerance_violations
 from hexacell.identification.problem.problem import Tolerances
 from hexacell.identification.solver.result import GeometryEstimate
 from hexacell.kinematics.geometry import Geometry

@@ -10,10 +10,14 @@ import numpy as np
 from hexacell.campaign.task_accuracy import Task
 from hexacell.cell.model import CellSettings
 from hexacell.experiment_design.decorrelation import DecorrelatingPose, decorrelating_poses
-from hexacell.identification.diagnostics.correlations import CorrelatedPair, strongly_correlated
+from hexacell.identification.diagnostics.parameter_checks import (
+    CorrelatedPair,
+    ToleranceViolation,
+    strongly_correlated,
+    tolerance_violations,
+)
 from hexacell.identification.diagnostics.pose_accuracy import Accuracy, predicted_accuracy
 from hexacell.identification.diagnostics.repeatability import Repeatability, repeatability
-from hexacell.identification.diagnostics.tolerance_check import ToleranceViolation, tolerance_violations
 from hexacell.identification.diagnostics.variance_components import NoiseLevels, noise_levels
 from hexacell.identification.solver.measurement_model import record_covariance
 from hexacell.identification.solver.result import Identification

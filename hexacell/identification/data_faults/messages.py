@@ -25,7 +25,6 @@ def rejected_record(
     kind: DataFaultKind,
     *,
     gauges: str = "",
-    statistic: float = np.inf,
     offset_mm: Deviation | None = None,
     leg: tuple[int, float] | None = None,
 ) -> DataFault:
@@ -49,11 +48,8 @@ def rejected_record(
         kind,
         f"Point {point}, orientation {orientation}: {fact}",
         action,
-        point=point,
-        orientation=orientation,
         gauges=gauges,
         left_out=(record,),
-        statistic=statistic,
         offset_mm=offset_mm,
     )
 
@@ -73,14 +69,14 @@ def refused_zero_shift(shift: ZeroShiftHypothesis, equations: int) -> DataFault:
 
 def gauge_fault(hypothesis: GaugeFaultHypothesis, before: ChiSquareTest, after: ChiSquareTest) -> DataFault:
     """A gauge fault, refused; the residuals before and after its correction are the evidence."""
-    fault, point = hypothesis.gauge_fault, hypothesis.point
-    where = "at every point" if point is None else f"at point {point}"
+    fault = hypothesis.gauge_fault
+    where = "at every point" if hypothesis.point is None else f"at point {hypothesis.point}"
     looks, correction, action = _looks_correction_action(fault, where)
     sentence = (
         f"{_names(fault.gauges)} {looks} {where}: the residuals are {before.ratio:.3g} times the stated "
         f"noise, and {after.ratio:.3g} times {correction}"
     )
-    return DataFault(fault.kind, sentence, action, point=point, gauges=fault.gauges)
+    return DataFault(fault.kind, sentence, action, gauges=fault.gauges)
 
 
 def _mismatched_joints(leg: tuple[int, float]) -> tuple[str, str]:
@@ -121,11 +117,8 @@ def _zero_shift(
         f"Point {shift.point}: the zero of {_names(gauges)} slipped before orientation "
         f"{shift.orientation} ({components} mm){consequence}",
         f"Check that {_names(gauges)} and the station are clamped, and measure point {shift.point} again",
-        point=shift.point,
-        orientation=shift.orientation,
         gauges=gauges,
         left_out=left_out,
-        statistic=shift.gain,
     )
 
 

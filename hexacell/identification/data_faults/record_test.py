@@ -10,7 +10,7 @@ from scipy.special import chdtri
 from hexacell.identification.data_faults import messages
 from hexacell.identification.data_faults.hypotheses import GAUGE_FAULTS, record_ids, record_mask
 from hexacell.identification.data_faults.score_tests import OutlierStatistics
-from hexacell.identification.problem.encoder_consistency import inconsistent_leg
+from hexacell.identification.problem.encoder_consistency import ACCEPTED_MM
 from hexacell.identification.problem.problem import Problem
 from hexacell.identification.solver import measurement_model
 from hexacell.identification.solver.linearized_model import LinearizedModel
@@ -22,6 +22,10 @@ SMALLEST_GAUGE_FAULT_MM = 1.0
 """A smaller gross error resembles some gauge fault by chance."""
 
 SIGNIFICANCE = 1e-3
+
+MIN_COMPARED_RECORDS = 3
+OUTLIER_SCATTERS = 10.0
+"""Median absolute deviations beyond which a joint variable is an outlier."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -65,7 +69,6 @@ def deletion_test(problem: Problem, record: RecordId, fit: Identification) -> De
         record,
         kind,
         gauges=faulty,
-        statistic=float(statistics.omnibus[row]),
         offset_mm=(float(offset[0]), float(offset[1]), float(offset[2])),
         leg=leg,
     )
@@ -77,10 +80,24 @@ def _row(problem: Problem, record: RecordId) -> int:
 
 
 def _inconsistent_leg(problem: Problem, record: RecordId) -> tuple[int, float] | None:
+    """The leg (from 1) whose joint variable in one record is an outlier, and its offset, mm; or None.
+
+    The test compares the differences between measured and commanded joint variables with their median
+    over the other records of the point. They change little between the poses of a point, whatever
+    geometry the controller had.
+    """
     row = _row(problem, record)
-    others = problem.labels[:, 0] == record[0]
-    others[row] = False
-    return inconsistent_leg(problem.commands, problem.joints, row, others)
+    misfit = problem.joints - problem.commands.joints
+    is_other = (problem.labels[:, 0] == record[0]) & (np.arange(problem.records) != row)
+    known = misfit[is_other & np.isfinite(misfit).all(axis=-1)]
+    if len(known) < MIN_COMPARED_RECORDS or not np.isfinite(misfit[row]).all():
+        return None
+    usual = np.median(known, axis=0)
+    scatter = np.median(np.abs(known - usual), axis=0)
+    off = misfit[row] - usual
+    beyond = np.abs(off) - ACCEPTED_MM - OUTLIER_SCATTERS * scatter
+    leg = int(np.argmax(beyond))
+    return (leg + 1, float(off[leg])) if beyond[leg] > 0.0 else None
 
 
 def _model_with(problem: Problem, record: RecordId, fit: Identification) -> LinearizedModel | None:

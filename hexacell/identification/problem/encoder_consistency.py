@@ -26,10 +26,6 @@ ACCEPTED_MM = 1.0
 MAX_OUTLIER_SHARE = 0.2
 """Largest share of the records that may be inconsistent."""
 
-MIN_COMPARED_RECORDS = 3
-OUTLIER_SCATTERS = 10.0
-"""Median absolute deviations beyond which a joint variable is an outlier."""
-
 
 @dataclass(frozen=True, slots=True, eq=False)
 class EncoderConsistency:
@@ -122,24 +118,3 @@ def _in_any_leg(joints: Mask) -> Mask:
 
 def _is_small_share(records: Mask) -> bool:
     return bool(np.count_nonzero(records) <= MAX_OUTLIER_SHARE * len(records))
-
-
-def inconsistent_leg(
-    commands: CommandedPoses, measured: Array, row: int, others: Mask
-) -> tuple[int, float] | None:
-    """The leg (from 1) whose joint variable in one record is an outlier, and its offset, mm; or None.
-
-    The test compares the differences between measured (n, 6) and commanded joint variables with their
-    median over ``others``. They change little between the poses of a point, whatever geometry the
-    controller had.
-    """
-    misfit = measured - commands.joints
-    known = misfit[others & np.isfinite(misfit).all(axis=-1)]
-    if len(known) < MIN_COMPARED_RECORDS or not np.isfinite(misfit[row]).all():
-        return None
-    usual = np.median(known, axis=0)
-    scatter = np.median(np.abs(known - usual), axis=0)
-    off = misfit[row] - usual
-    beyond = np.abs(off) - ACCEPTED_MM - OUTLIER_SCATTERS * scatter
-    leg = int(np.argmax(beyond))
-    return (leg + 1, float(off[leg])) if beyond[leg] > 0.0 else None

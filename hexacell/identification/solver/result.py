@@ -45,23 +45,16 @@ class DataFault:
         kind: what is wrong with them.
         sentence: what is wrong and how it shows, for people.
         action: the next thing to do.
-        point: at which point; none where it is every point.
-        orientation: the record, or the first one after a zero shift; none where it is all of the point.
         gauges: the gauges concerned, of ``xyz``; empty if no single one is at fault.
         left_out: the records left out; empty where the data are refused.
-        statistic: squared length of the standardized residual, about 3 for a good record; infinite for
-            a record that the identified geometry cannot reach.
         offset_mm: what the gauges x, y and z of a record read too much; none where that is unknown.
     """
 
     kind: DataFaultKind
     sentence: str
     action: str
-    point: int | None = None
-    orientation: int | None = None
     gauges: str = ""
     left_out: tuple[RecordId, ...] = ()
-    statistic: float = np.inf
     offset_mm: Deviation | None = None
 
     def __str__(self) -> str:

@@ -146,8 +146,6 @@ def gross_error(point, orientation):
         DataFaultKind.GROSS_ERROR,
         f"gauge y is 0.2 mm off at point {point}, orientation {orientation}",
         "Measure it again",
-        point=point,
-        orientation=orientation,
         gauges="y",
         left_out=((point, orientation),),
     )

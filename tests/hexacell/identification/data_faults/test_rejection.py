@@ -34,7 +34,6 @@ def named(found):
 def test_a_bad_record_is_named_and_does_not_change_the_result(noisy, spoil, make_problem, label, error):
     found = identify(make_problem(spoil(noisy, label, **error)))
     assert named(found) == {label}
-    assert found.data_faults[0].statistic > 100.0
     clean = identify(make_problem(without(noisy, label)))
     assert found.geometry.largest_difference(clean.geometry) < 1e-6
     assert found.records == clean.records == 54
@@ -58,7 +57,6 @@ def test_unreachable_joint_variables_are_named(noisy, spoil, make_problem):
     apart = spoil(noisy, (2, 4), joints=(-300, -300, -300, 300, 300, 300))
     found = identify(make_problem(apart))
     assert named(found) == {(2, 4)}
-    assert found.data_faults[0].statistic == np.inf
     assert found.records == 54
     clean = identify(make_problem(without(noisy, (2, 4))))
     assert found.geometry.largest_difference(clean.geometry) < 1e-6
@@ -117,8 +115,9 @@ def test_all_records_after_a_shift_of_the_zero_are_left_out(noisy, make_problem)
     shifted = changed(noisy, lambda d: np.add(d, [0.0, 0.4, 0.0]), point=2, first=5)
     found = identify(make_problem(shifted))
     (fault,) = found.data_faults
-    assert (fault.kind, fault.point, fault.orientation) == (DataFaultKind.ZERO_SHIFT, 2, 5)
+    assert fault.kind is DataFaultKind.ZERO_SHIFT
     assert fault.gauges == "y"
+    assert fault.sentence.startswith("Point 2: the zero of gauge y slipped before orientation 5 (y +0.4")
     assert fault.left_out == tuple((2, orientation) for orientation in range(5, 12))
     clean = identify(make_problem(without(noisy, *fault.left_out)))
     assert found.geometry.largest_difference(clean.geometry) < 1e-6
@@ -128,9 +127,9 @@ def test_two_shifts_of_the_zero_are_found_one_after_the_other(noisy, make_proble
     shifted = changed(noisy, lambda d: np.add(d, [0.0, 0.4, 0.0]), point=2, first=5)
     shifted = changed(shifted, lambda d: np.add(d, [1.0, 0.0, 0.0]), point=4, first=7)
     faults = identify(make_problem(shifted)).data_faults
-    assert {(fault.kind, fault.point, fault.orientation) for fault in faults} == {
-        (DataFaultKind.ZERO_SHIFT, 2, 5),
-        (DataFaultKind.ZERO_SHIFT, 4, 7),
+    assert {(fault.kind, fault.left_out[0]) for fault in faults} == {
+        (DataFaultKind.ZERO_SHIFT, (2, 5)),
+        (DataFaultKind.ZERO_SHIFT, (4, 7)),
     }
 
 
@@ -160,7 +159,8 @@ def test_a_gauge_fault_is_refused_and_named(visit, make_problem, change, point, 
     with pytest.raises(GaugeFaultError) as raised:
         identify(make_problem(changed(many, change, point=point)))
     fault = raised.value.fault
-    assert (fault.kind, fault.point, fault.gauges) == (kind, point, gauges)
+    assert (fault.kind, fault.gauges) == (kind, gauges)
+    assert ("at every point:" if point is None else f"at point {point}:") in fault.sentence
     assert fault.left_out == ()
     assert str(raised.value) == f"{fault.sentence}. {fault.action}"
 
@@ -192,4 +192,4 @@ def test_joint_variables_of_another_pose_are_recognized(noisy, make_problem):
     records[16], records[17] = replace(first, joints=second.joints), replace(second, joints=first.joints)
     faults = identify(make_problem(MeasurementSet(tuple(records)))).data_faults
     assert [fault.kind for fault in faults] == [DataFaultKind.MISMATCHED_JOINTS] * 2
-    assert [fault.orientation for fault in faults] == [first.orientation, second.orientation]
+    assert [fault.left_out for fault in faults] == [(first.id,), (second.id,)]

@@ -18,8 +18,7 @@ from hexacell.identification.problem.problem import Noise, Prior, Problem, Toler
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.commanded_motion import CommandedRobot
 from hexacell.kinematics.geometry import Geometry
-from hexacell.kinematics.inverse import inverse_kinematics
-from hexacell.kinematics.mechanism import Branch, FrameTransform, Mechanism
+from hexacell.kinematics.mechanism import Branch, FrameTransform, Mechanism, inverse_kinematics
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.sensitivity import singularity_margin
 from hexacell.measurements.records import MeasurementSet

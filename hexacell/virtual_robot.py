@@ -7,7 +7,7 @@ import numpy as np
 from hexacell.errors import LimitError, ReachError
 from hexacell.kinematics.commanded_motion import ActualPoses, change_geometry
 from hexacell.kinematics.geometry import Geometry
-from hexacell.kinematics.inverse import inverse_kinematics
+from hexacell.kinematics.mechanism import inverse_kinematics
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.rotations import Array, Mask
 from hexacell.kinematics.sensitivity import singularity_margin

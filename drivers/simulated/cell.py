@@ -21,8 +21,7 @@ from hexacell.cell.model import CellSettings
 from hexacell.cell.simulation import SimulationSettings
 from hexacell.clock import CellClock
 from hexacell.controller_config.interface import ConfigFormat
-from hexacell.kinematics.inverse import inverse_kinematics
-from hexacell.kinematics.mechanism import Mechanism
+from hexacell.kinematics.mechanism import Mechanism, inverse_kinematics
 from hexacell.kinematics.pose import Pose, PoseBatch
 
 

@@ -9,6 +9,7 @@ from typing import Literal, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from hexacell.errors import ReachError
 from hexacell.kinematics.geometry import Geometry, GeometryBatch
 from hexacell.kinematics.parameters import GeometricParameter, ParameterSet
 from hexacell.kinematics.pose import PoseBatch
@@ -127,21 +128,18 @@ class Mechanism(Protocol):
     parameters: ParameterSet
     convention: FrameConvention
 
-    def constraints(self, geometry: Geometry, poses: PoseBatch, joints: Array) -> Array:
-        """Length error of each leg (n, 6), mm; zero where the mechanism closes."""
-        ...
-
     def residual_and_jacobian(
         self, geometry: Geometry | GeometryBatch, poses: PoseBatch, joints: Array
     ) -> tuple[Array, Array]:
-        """:meth:`constraints` (n, 6) and their derivatives by the pose (n, 6, 6), for Newton's method.
+        """The constraints (n, 6), mm, and their derivatives by the pose (n, 6, 6), for Newton's method.
 
-        ``geometry`` is one for all poses, or one for each.
+        A constraint is the length error of a leg, zero where it closes. ``geometry`` is one for all
+        poses, or one for each.
         """
         ...
 
     def derivatives(self, geometry: Geometry, poses: PoseBatch, joints: Array) -> ConstraintDerivatives:
-        """All derivatives of :meth:`constraints`."""
+        """All derivatives of the constraints."""
         ...
 
     def inverse(self, geometry: Geometry, branch: Branch, poses: PoseBatch) -> Array:
@@ -163,3 +161,16 @@ class Mechanism(Protocol):
     def platform_radius(self, geometry: Geometry | GeometryBatch) -> Array:
         """Mean distance of the platform joints from the ball, mm; (n,) for a batch. It scales rotations."""
         ...
+
+
+def inverse_kinematics(mechanism: Mechanism, geometry: Geometry, branch: Branch, poses: PoseBatch) -> Array:
+    """Joint variables (n, 6), mm, of n poses.
+
+    Raises:
+        ReachError: a pose is out of a leg's reach; the message names both.
+    """
+    joints = mechanism.inverse(geometry, branch, poses)
+    if np.isnan(joints).any():
+        row, leg = np.argwhere(np.isnan(joints))[0]
+        raise ReachError(f"leg {leg + 1} cannot reach the pose {poses.pose(row)}")
+    return joints

@@ -16,7 +16,7 @@ import pytest
 from hexacell.campaign.planner import Plan
 from hexacell.kinematics.forward import continue_solution
 from hexacell.kinematics.geometry import Geometry
-from hexacell.kinematics.inverse import inverse_kinematics
+from hexacell.kinematics.mechanism import inverse_kinematics
 from hexacell.kinematics.mechanisms.hexaglide import Hexaglide, hexaglide_geometry
 from hexacell.kinematics.pose import Pose, PoseBatch
 

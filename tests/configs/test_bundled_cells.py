@@ -12,8 +12,7 @@ from hexacell.cell.loader import Cell, describe, dump, load_cell
 from hexacell.cell.mechanism_sections import GeometrySettings
 from hexacell.controller_config.toml_format import NativeToml
 from hexacell.kinematics.geometry import Geometry
-from hexacell.kinematics.inverse import inverse_kinematics
-from hexacell.kinematics.mechanism import Branch
+from hexacell.kinematics.mechanism import Branch, inverse_kinematics
 from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS, Hexaglide, hexaglide_geometry
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.sensitivity import singularity_margin

@@ -15,8 +15,7 @@ from hexacell.controller_config.interface import ControllerGeometry
 from hexacell.errors import ReachError
 from hexacell.identification.estimator import estimate_online, identify
 from hexacell.identification.problem.problem import Tolerances
-from hexacell.kinematics.inverse import inverse_kinematics
-from hexacell.kinematics.mechanism import FrameTransform
+from hexacell.kinematics.mechanism import FrameTransform, inverse_kinematics
 from hexacell.kinematics.mechanisms.hexaglide import Hexaglide, hexaglide_geometry
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.measurements.records import MeasurementSet, Record

@@ -60,10 +60,6 @@ class Hexaglide:
     parameters = HEXAGLIDE_PARAMETERS
     convention = PAPER_FRAME
 
-    def constraints(self, geometry: Geometry, poses: PoseBatch, joints: Array) -> Array:
-        """See :class:`~hexacell.kinematics.mechanism.Mechanism`."""
-        return _leg_errors(geometry, _leg_vectors(geometry, poses, joints)[1])
-
     def residual_and_jacobian(
         self, geometry: Geometry | GeometryBatch, poses: PoseBatch, joints: Array
     ) -> tuple[Array, Array]:

@@ -20,7 +20,7 @@ from hexacell.cell.simulation import SimulationSettings
 from hexacell.clock import CellClock
 from hexacell.controller_config.toml_format import NativeToml
 from hexacell.kinematics.geometry import Geometry
-from hexacell.kinematics.inverse import inverse_kinematics
+from hexacell.kinematics.mechanism import inverse_kinematics
 from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS, Hexaglide, hexaglide_geometry
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.rotations import Array

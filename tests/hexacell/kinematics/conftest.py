@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from hexacell.kinematics.inverse import inverse_kinematics
+from hexacell.kinematics.mechanism import inverse_kinematics
 
 
 @pytest.fixture

@@ -27,6 +27,6 @@ def numeric_jacobian(hexaglide, geometry, pose, joints):
         for side in (1.0, -1.0):
             turn = Rotation.from_rotvec(side * step[3:]).as_matrix()
             moved = PoseBatch(pose.positions + side * step[:3], turn @ pose.rotations)
-            ends.append(hexaglide.constraints(geometry, moved, joints)[0])
+            ends.append(hexaglide.residual_and_jacobian(geometry, moved, joints)[0][0])
         columns.append((ends[0] - ends[1]) / 2e-5)
     return np.array(columns).T

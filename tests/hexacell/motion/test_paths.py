@@ -9,7 +9,7 @@ import pytest
 
 from hexacell.experiment_design.candidates import commands_for, orientations, reachable_targets
 from hexacell.kinematics.forward import continue_solution
-from hexacell.kinematics.inverse import inverse_kinematics
+from hexacell.kinematics.mechanism import inverse_kinematics
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.motion.paths import WAYPOINT_PIECES, PathPlanner
 from hexacell.motion.trajectory import interpolate_line

@@ -11,7 +11,7 @@ import pytest
 from hexacell.campaign.stopping_rules import REFUSALS
 from hexacell.errors import IdentifiabilityError
 from hexacell.kinematics.forward import continue_solution
-from hexacell.kinematics.inverse import inverse_kinematics
+from hexacell.kinematics.mechanism import inverse_kinematics
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.motion import paths
 from hexacell.motion.trajectory import interpolate_line

@@ -53,9 +53,6 @@ class GoughStewart:
     parameters = PARAMETERS
     convention = CONVENTION
 
-    def constraints(self, geometry: Geometry, poses: PoseBatch, joints: Array) -> Array:
-        return _errors(_vectors(geometry, poses)[1], geometry["z"] + joints)
-
     def residual_and_jacobian(
         self, geometry: Geometry | GeometryBatch, poses: PoseBatch, joints: Array
     ) -> tuple[Array, Array]:

@@ -100,9 +100,8 @@ class EncoderNode:
         if self.sdo.has_surplus_response:
             raise duplicated_node("responded twice to one request", self.leg)
 
-    def _communication_error(self, entry: ObjectEntry, error: Exception) -> DeviceError:
-        if self.sdo.has_surplus_response:
-            return duplicated_node("responded twice to one request", self.leg)
+    def _communication_error(self, entry: ObjectEntry, error: Exception) -> SilentNodeError:
+        self.check_alone()
         return SilentNodeError(
             f"does not respond for {entry}: {error}",
             subject=self.leg.subject,

@@ -102,7 +102,7 @@ def _missing(missing: Sequence[EncoderNode], unexpected: Sequence[int]) -> BusEr
     found = ", ".join(str(node) for node in unexpected)
     hint = f"; node {found} is on the bus but belongs to no leg" if unexpected else ""
     return BusError(
-        f"nobody answers{hint}",
+        f"no device responds{hint}",
         subject=subject_of([node.leg for node in missing]),
         action="Check supply, cable, bit rate and node id",
     )

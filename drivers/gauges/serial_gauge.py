@@ -94,10 +94,10 @@ class SerialGauge(ABC):
         readings = [self._in_mm(await self._read_value())]
         while len(readings) < MAX_READINGS:
             readings.append(self._in_mm(await self._read_value()))
-            if abs(readings[-1].value - readings[-2].value) <= AGREEMENT_MM:
-                return GaugeReading(readings[-1].value, readings[-1].text)
+            if abs(readings[-1].value_mm - readings[-2].value_mm) <= AGREEMENT_MM:
+                return readings[-1]
         raise GaugeUnsteady(
-            f"readings do not agree: {', '.join(displayed.text for displayed in readings)}",
+            f"readings do not agree: {', '.join(reading.raw for reading in readings)}",
             subject=self.subject,
             action="Wait until it is still; if it is, check its cable",
         )
@@ -106,11 +106,10 @@ class SerialGauge(ABC):
         """The value displayed at this moment, mm, from a single query."""
         self._opened_state()
         try:
-            displayed = self._in_mm(self._parse_value(await self._ask(self.value_request)))
+            return self._in_mm(self._parse_value(await self._ask(self.value_request)))
         except FrameRejected as rejection:
             self._require_silence()
             raise unexpected_answer(self.subject, self.spec, rejection.frame) from rejection
-        return GaugeReading(displayed.value, displayed.text)
 
     async def check(self) -> None:
         """Query the settings again; a ``ZeroVoid`` if one has changed since ``open``."""
@@ -172,10 +171,10 @@ class SerialGauge(ABC):
     def _garbled(self, received: bytes) -> DeviceError:
         return unexpected_answer(self.subject, self.spec, received)
 
-    def _in_mm(self, displayed: DisplayedValue) -> DisplayedValue:
+    def _in_mm(self, displayed: DisplayedValue) -> GaugeReading:
         if displayed.apparent_unit is Unit.INCH:
             raise self._inch()
-        return displayed
+        return GaugeReading(displayed.value, displayed.text)
 
     def _require_usable(self, state: GaugeState) -> None:
         if state.unit is Unit.INCH:

@@ -1,4 +1,4 @@
-"""The stop line: pressed is pressed, and what cannot be told is pressed too."""
+"""The stop input forbids motion while it is active, and while its state is unknown."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ async def test_a_link_that_leads_nowhere_is_a_file_too(tmp_path: Path) -> None:
     assert await CombinedStopInput(tmp_path / "stop").active_reason() is not None
 
 
-async def test_a_file_that_cannot_be_looked_for_forbids(tmp_path: Path) -> None:
+async def test_a_file_that_cannot_be_checked_forbids(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
     assert "cannot be checked" in (
         await CombinedStopInput(tmp_path / "file" / "stop").active_reason() or ""
@@ -119,14 +119,14 @@ async def test_a_port_that_is_absent_is_refused(tmp_path: Path) -> None:
         await line.open()
 
 
-async def test_a_port_that_means_nothing_is_refused() -> None:
+async def test_an_invalid_port_is_refused() -> None:
     line = stop_input_of(GuardSettings(stop_port="nonsense://x"), Path())
     with pytest.raises(FileError, match="stop line"):
         await line.open()
 
 
 async def test_a_port_without_modem_lines_is_refused_or_forbids() -> None:
-    """A pseudo-terminal carries none: nobody could ever press it, so it must not pass for a contact."""
+    """A pseudo-terminal has none and could never stop the robot, so it must not be taken for a contact."""
     import os
 
     near, far = os.openpty()

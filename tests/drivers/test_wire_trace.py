@@ -20,7 +20,7 @@ def test_the_latest_bytes_are_kept_and_the_rest_is_counted():
     assert len(trace.text().splitlines()) == 3
 
 
-def test_nothing_forgotten_is_not_mentioned():
+def test_no_dropped_entries_are_not_mentioned():
     trace = WireTrace()
     trace(entry(b"?\r"))
     assert trace.text() == "1.500000 /dev/ttyUSB0 > 3f 0d  ?.\n"

@@ -40,12 +40,12 @@ async def test_a_cancelled_one_is_killed(tmp_path):
     _expect_gone(tmp_path)
 
 
-async def test_a_daemon_that_it_leaves_behind_does_not_hold_us_up(tmp_path):
+async def test_a_daemon_that_it_starts_is_not_waited_for(tmp_path):
     await reload_command.run(("sh", "-c", f"sleep 3600 & echo $! > {tmp_path}/pid"), "controller", 1800.0)
     os.kill(int((tmp_path / "pid").read_text()), signal.SIGKILL)
 
 
-async def test_only_the_last_words_of_a_talkative_one_are_shown():
+async def test_only_the_end_of_a_long_output_is_shown():
     talking = "import sys; print('x' * 10_000); sys.exit('the end')"
     with pytest.raises(DeviceError, match="xxx\nthe end") as caught:
         await reload_command.run(python(talking), "controller", 5.0)

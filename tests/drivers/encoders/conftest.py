@@ -92,7 +92,7 @@ def plain_objects(node: int) -> dict[Object, bytes]:
 
 
 MARKER = 0x7F0
-"""An identifier that nobody uses."""
+"""An identifier that no node uses."""
 
 
 class RawBus:
@@ -182,16 +182,16 @@ async def bank(settings: EncoderSettings) -> AsyncIterator[Cia406Bank]:
 
 
 @pytest.fixture
-async def impatient(settings: EncoderSettings) -> AsyncIterator[Cia406Bank]:
-    """A bank for tests in which somebody stays silent."""
+async def short_timeout_bank(settings: EncoderSettings) -> AsyncIterator[Cia406Bank]:
+    """A bank for tests in which a node is silent."""
     bank = Cia406Bank(settings.model_copy(update={"timeout_s": 0.2}))
     yield bank
     await bank.close()
 
 
 @pytest.fixture
-def hurry() -> Callable[..., None]:
-    """Shorten an open bank's wait for rounds, for tests in which somebody stays silent."""
+def shorten_timeout() -> Callable[..., None]:
+    """Shorten the time-out of an open bank's samples, for tests in which a node is silent."""
 
     def shorten(bank: Cia406Bank, timeout_s: float = 0.04) -> None:
         assert bank._session is not None

@@ -1,4 +1,4 @@
-"""What nodes report unasked, and what becomes of the samples."""
+"""Emergencies, alarms, heartbeats and boot-up messages."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ async def test_an_emergency_makes_samples_invalid_until_it_is_cleared(raw, bank)
         ("", "emergency FFFF"),
     ],
 )
-async def test_whatever_is_no_clean_reset_is_an_error(raw, bank, data, words):
+async def test_an_emergency_that_is_no_complete_reset_is_an_error(raw, bank, data, words):
     await bank.open()
     raw.send(0x81, bytes.fromhex(data))
     await raw.delivered_to(bank)
@@ -47,7 +47,7 @@ async def test_whatever_is_no_clean_reset_is_an_error(raw, bank, data, words):
         await bank.read()
 
 
-async def test_an_emergency_amid_a_round_spoils_that_round(raw, bank):
+async def test_an_emergency_during_a_sample_makes_it_invalid(raw, bank):
     await bank.open()
 
     def report_then_answer(_sync):
@@ -59,13 +59,13 @@ async def test_an_emergency_amid_a_round_spoils_that_round(raw, bank):
         await bank.read()
 
 
-async def test_after_an_emergency_the_alarms_are_looked_at(raw, bank, monkeypatch):
+async def test_the_alarms_are_read_after_an_emergency(raw, bank, monkeypatch):
     monkeypatch.setattr("drivers.encoders.node_monitor.ALARM_POLL_S", 60.0)
     for node in raw.nodes.values():
         node.objects[0x6503, 0] = bytes(2)
     await bank.open()
     raw.nodes[3].objects[0x6503, 0] = b"\x01\x00"
-    await bank.read()  # nobody has said so, and the last look is recent
+    await bank.read()  # no emergency, and the last poll is recent
     raw.send(0x83, NO_MAGNET)
     raw.send(0x83, CLEARED)
     await raw.delivered_to(bank)
@@ -75,7 +75,7 @@ async def test_after_an_emergency_the_alarms_are_looked_at(raw, bank, monkeypatc
     await bank.read()
 
 
-async def test_alarms_without_an_emergency_are_found_out(raw, bank, monkeypatch):
+async def test_alarms_without_an_emergency_are_found(raw, bank, monkeypatch):
     monkeypatch.setattr("drivers.encoders.node_monitor.ALARM_POLL_S", 0.0)
     for node in raw.nodes.values():
         node.objects[0x6503, 0] = bytes(2)
@@ -97,7 +97,7 @@ async def test_a_boot_up_voids_the_set_until_opened_again(raw, bank):
     await bank.read()
 
 
-async def test_a_boot_up_ends_a_round_that_waits(raw, settings):
+async def test_a_boot_up_ends_a_waiting_sample(raw, settings):
     bank = Cia406Bank(settings.model_copy(update={"timeout_s": 10.0}))
     await bank.open()
     raw.nodes[2].answers_sync = lambda _: raw.send(0x702, b"\x00") or []
@@ -106,7 +106,7 @@ async def test_a_boot_up_ends_a_round_that_waits(raw, settings):
     await bank.close()
 
 
-async def test_a_boot_up_while_being_configured_is_noticed(raw, bank):
+async def test_a_boot_up_during_configuration_is_detected(raw, bank):
     answer = raw.nodes[2].answer_sdo
 
     def reboot_once(request):
@@ -131,7 +131,7 @@ async def test_a_node_that_leaves_operational_has_lost_its_configuration(raw, ba
         await bank.read()
 
 
-class Hearts:
+class Heartbeats:
     """Heartbeats of the nodes in ``beating``, on a clock of the driver's that nothing else moves."""
 
     def __init__(self, raw: Any) -> None:
@@ -142,7 +142,7 @@ class Hearts:
     def monotonic(self) -> float:
         return self._now_s
 
-    async def go_on(self, bank: Any, seconds: float) -> None:
+    async def advance(self, bank: Any, seconds: float) -> None:
         for _ in range(round(seconds / PERIOD_S)):
             self._now_s += PERIOD_S
             for node in self.beating:
@@ -152,43 +152,43 @@ class Hearts:
 
 
 @pytest.fixture
-def hearts(raw, monkeypatch):
-    beating = Hearts(raw)
+def heartbeats(raw, monkeypatch):
+    beating = Heartbeats(raw)
     monkeypatch.setattr(node_monitor, "time", beating)
     return beating
 
 
 @pytest.fixture
-async def watchful(settings):
+async def heartbeat_bank(settings):
     bank = Cia406Bank(settings.model_copy(update={"heartbeat_ms": 20}))
     yield bank
     await bank.close()
 
 
-async def test_heartbeats_are_asked_for_and_their_loss_is_an_error(raw, watchful, hearts):
-    await watchful.open()
+async def test_heartbeats_are_requested_and_their_loss_is_an_error(raw, heartbeat_bank, heartbeats):
+    await heartbeat_bank.open()
     assert raw.nodes[1].objects[0x1017, 0] == b"\x14\x00"
-    await hearts.go_on(watchful, 0.4)
-    await watchful.read()
-    hearts.beating.discard(5)
-    await hearts.go_on(watchful, 0.24)
-    await watchful.read()
-    await hearts.go_on(watchful, 0.04)
+    await heartbeats.advance(heartbeat_bank, 0.4)
+    await heartbeat_bank.read()
+    heartbeats.beating.discard(5)
+    await heartbeats.advance(heartbeat_bank, 0.24)
+    await heartbeat_bank.read()
+    await heartbeats.advance(heartbeat_bank, 0.04)
     with pytest.raises(SilentNodeError, match=r"encoder of leg 5 \(node 5\): no heartbeat for 0.26 s"):
-        await watchful.read()
+        await heartbeat_bank.read()
 
 
-async def test_loss_of_all_heartbeats_points_at_the_bus(watchful, hearts):
-    await watchful.open()
-    await hearts.go_on(watchful, 0.1)
-    hearts.beating.clear()
-    await hearts.go_on(watchful, 0.3)
+async def test_loss_of_all_heartbeats_suggests_the_bus(heartbeat_bank, heartbeats):
+    await heartbeat_bank.open()
+    await heartbeats.advance(heartbeat_bank, 0.1)
+    heartbeats.beating.clear()
+    await heartbeats.advance(heartbeat_bank, 0.3)
     with pytest.raises(SilentNodeError, match=r"leg 1 .*leg 6 .*CAN adapter"):
-        await watchful.read()
+        await heartbeat_bank.read()
 
 
-async def test_without_heartbeats_silence_is_no_fault(bank, hearts):
+async def test_without_heartbeats_silence_is_no_fault(bank, heartbeats):
     await bank.open()
-    hearts.beating.clear()
-    await hearts.go_on(bank, 3600.0 * PERIOD_S)
+    heartbeats.beating.clear()
+    await heartbeats.advance(bank, 3600.0 * PERIOD_S)
     await bank.read()

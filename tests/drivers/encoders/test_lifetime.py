@@ -1,4 +1,4 @@
-"""Opening, closing, cancelling: nothing is left behind and nothing gets out of step."""
+"""Opening, closing and cancelling: no threads are left, and samples stay synchronized."""
 
 from __future__ import annotations
 
@@ -36,11 +36,11 @@ async def test_no_thread_outlives_close(raw, bank):
     assert set(threading.enumerate()) == before
 
 
-async def test_no_thread_outlives_a_failed_open(raw, impatient):
+async def test_no_thread_outlives_a_failed_open(raw, short_timeout_bank):
     before = set(threading.enumerate())
     del raw.nodes[1]
     with pytest.raises(BusError):
-        await impatient.open()
+        await short_timeout_bank.open()
     assert set(threading.enumerate()) == before
 
 
@@ -76,7 +76,7 @@ async def test_a_cancelled_read_returns_soon_and_the_next_one_is_right(raw, sett
     await bank.close()
 
 
-async def test_cancelling_at_any_moment_never_leaves_the_link_out_of_step(raw, bank):
+async def test_cancelling_at_any_moment_leaves_the_samples_synchronized(raw, bank):
     await bank.open()
     for node in raw.nodes.values():
         node.answers_sync = lambda sync: [sync.to_bytes(4, "little")]
@@ -125,7 +125,7 @@ async def test_closing_ends_reads_in_progress(raw, settings):
     assert all(isinstance(result, DeviceError) for result in results)
 
 
-async def test_reads_from_many_tasks_take_turns(raw, bank):
+async def test_concurrent_reads_run_one_after_another(raw, bank):
     await bank.open()
     for node in raw.nodes.values():
         node.answers_sync = lambda sync: [sync.to_bytes(4, "little")]
@@ -134,7 +134,7 @@ async def test_reads_from_many_tasks_take_turns(raw, bank):
     assert len({found.counts for found in rounds}) == 20
 
 
-async def test_a_slow_device_does_not_hold_up_the_event_loop(raw, settings):
+async def test_a_slow_device_does_not_block_the_event_loop(raw, settings):
     bank = Cia406Bank(settings.model_copy(update={"timeout_s": 3600.0}))
     await bank.open()
     raw.nodes[1].answers_sync = lambda _: []
@@ -148,7 +148,7 @@ async def test_a_slow_device_does_not_hold_up_the_event_loop(raw, settings):
 
 
 @pytest.mark.parametrize("where", ["recv", "send"])
-async def test_a_bus_that_dies_is_an_error_with_its_cause(raw, bank, monkeypatch, where):
+async def test_a_bus_that_fails_is_an_error_with_its_cause(raw, bank, monkeypatch, where):
     await bank.open()
 
     def fail(*_args, **_kwargs):
@@ -161,7 +161,7 @@ async def test_a_bus_that_dies_is_an_error_with_its_cause(raw, bank, monkeypatch
             await bank.read()
 
 
-async def test_a_bus_may_die_of_anything(raw, bank, monkeypatch):
+async def test_any_error_of_the_bus_is_reported(raw, bank, monkeypatch):
     await bank.open()
     monkeypatch.setattr(bank._session.bus.network.bus, "recv", lambda _timeout: 1 / 0)
     with pytest.raises(BusError, match="division by zero"):

@@ -1,4 +1,4 @@
-"""What happens before the first position: finding, comparing and configuring six nodes."""
+"""Opening: detection, identification and configuration of the nodes."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from hexacell.errors import DeviceError
 
 DIALOGUE_WITH_NODE_4 = """
     8004                enter PRE-OPERATIONAL
-    4000100000000000    device type: anybody there?
+    4000100000000000    device type: probe
     4000100000000000    device type
     4005600100000000    measuring step
     4018100100000000    vendor
@@ -57,7 +57,7 @@ async def test_all_nodes_are_configured_before_any_is_started(raw, bank):
     assert not any(data[0] >> 5 == 1 for can_id, data in raw.heard[first_start:] if can_id >> 7 == 0xC)
 
 
-async def test_it_says_who_answered(bank):
+async def test_the_identities_describe_the_nodes(bank):
     identities = await bank.open()
     assert [identity.serial_number for identity in identities] == [str(500 + leg) for leg in range(1, 7)]
     assert identities[2].name == "encoder of leg 3 (node 3)"
@@ -65,17 +65,17 @@ async def test_it_says_who_answered(bank):
     assert "absolute linear encoder, vendor 0x00000099" in identities[2].description
 
 
-async def test_missing_nodes_are_all_named(raw, impatient):
+async def test_missing_nodes_are_all_named(raw, short_timeout_bank):
     del raw.nodes[2], raw.nodes[5]
-    with pytest.raises(BusError, match=r"encoders of leg 2 \(node 2\), leg 5 \(node 5\): nobody"):
-        await impatient.open()
+    with pytest.raises(BusError, match=r"encoders of leg 2 \(node 2\), leg 5 \(node 5\): no device"):
+        await short_timeout_bank.open()
 
 
-async def test_a_node_that_no_leg_has_is_pointed_out(raw, impatient):
+async def test_a_node_that_belongs_to_no_leg_is_named(raw, short_timeout_bank):
     raw.nodes[127] = raw.nodes.pop(3)
     raw.nodes[127].node = 127
     with pytest.raises(BusError, match=r"leg 3 \(node 3\).*node 127 is on the bus but belongs to no leg"):
-        await impatient.open()
+        await short_timeout_bank.open()
 
 
 async def test_nodes_need_not_be_numbered_like_legs(raw, settings):
@@ -131,7 +131,7 @@ async def test_the_step_may_be_kept_in_6501(raw, bank, step, fits):
             await bank.open()
 
 
-async def test_a_device_that_does_not_tell_its_step_is_refused(raw, bank):
+async def test_a_device_that_does_not_report_its_step_is_refused(raw, bank):
     del raw.nodes[3].objects[0x6005, 1]
     with pytest.raises(DeviceError, match=r"leg 3.*has no object 6501h:0"):
         await bank.open()
@@ -177,7 +177,7 @@ async def test_a_write_refused_names_object_and_leg(raw, bank):
 
 
 @pytest.mark.parametrize("entry", [(0x1801, 2), (0x1801, 1)])
-async def test_a_device_that_only_pretends_to_be_configured_is_refused(raw, bank, entry):
+async def test_a_device_that_acknowledges_writes_without_effect_is_refused(raw, bank, entry):
     raw.nodes[5].objects[0x1801, 2] = b"\xfe"
     raw.nodes[5].objects[0x1801, 1] = bytes.fromhex("85020080")
     raw.nodes[5].forgets.add(entry)
@@ -201,18 +201,18 @@ async def test_a_position_between_bytes_is_refused(raw, bank):
 
 
 @pytest.mark.parametrize("register", [0x01, 0x21])
-async def test_an_error_from_before_is_not_overlooked(raw, bank, register):
+async def test_an_error_from_before_opening_is_found(raw, bank, register):
     raw.nodes[2].objects[0x1001, 0] = bytes([register])
     with pytest.raises(InvalidSampleError, match=r"leg 2.*1001h:0"):
         await bank.open()
 
 
-async def test_a_past_communication_error_does_not_matter(raw, bank):
+async def test_a_past_communication_error_is_ignored(raw, bank):
     raw.nodes[2].objects[0x1001, 0] = b"\x10"
     await bank.open()
 
 
-async def test_a_node_that_dies_while_being_configured_is_named(raw, impatient):
+async def test_a_node_that_fails_while_being_configured_is_named(raw, short_timeout_bank):
     node, answer = raw.nodes[3], raw.nodes[3].answer_sdo
 
     def answer_until_tpdo1_is_read(request):
@@ -221,10 +221,10 @@ async def test_a_node_that_dies_while_being_configured_is_named(raw, impatient):
 
     node.answer_sdo = answer_until_tpdo1_is_read
     with pytest.raises(SilentNodeError, match=r"leg 3 .*1A00h:0"):
-        await impatient.open()
+        await short_timeout_bank.open()
 
 
-async def test_nonsense_in_answer_to_a_request_is_an_error_with_a_name(raw, bank):
+async def test_an_invalid_response_is_an_error_that_names_the_leg(raw, bank):
     raw.nodes[3].answer_sdo = lambda request: b"\x43\x00\x10\x07" + bytes(4)
     with pytest.raises(SilentNodeError, match="leg 3"):
         await bank.open()
@@ -243,13 +243,13 @@ async def test_nonsense_in_answer_to_a_request_is_an_error_with_a_name(raw, bank
         (None, "not configured in the cell file.*encoders"),
     ],
 )
-async def test_a_bus_that_cannot_be_opened_says_what_to_do(bus, words):
+async def test_a_bus_that_cannot_be_opened_is_reported_with_an_action(bus, words):
     with pytest.raises(BusError, match=words) as caught:
         await Cia406Bank(EncoderSettings(bus=bus)).open()
     assert caught.value.action
 
 
-async def test_bus_settings_go_through_unchanged(raw, settings, monkeypatch):
+async def test_bus_settings_are_passed_unchanged(raw, settings, monkeypatch):
     seen = {}
     real = can.Bus
 

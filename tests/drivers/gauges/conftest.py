@@ -1,4 +1,4 @@
-"""Wire dialogues: a port that expects these questions in this order and gives these answers."""
+"""A scripted serial port that expects these requests in this order and gives these answers."""
 
 import pytest
 import serial
@@ -28,7 +28,7 @@ class Dialogue:
         self.expected += [(question, b"".join(answers)) for question, *answers in pairs]
 
     def unasked(self, data):
-        """Put bytes on the line that nobody asked for."""
+        """Put unsolicited bytes on the line."""
         self.pending += data
 
     def open(self):

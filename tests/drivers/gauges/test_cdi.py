@@ -134,25 +134,25 @@ async def test_it_opens_and_reads(dialogue, gauge):
     assert await gauge.read() == GaugeReading(2.138, "+  2.1380, MM")
 
 
-async def test_commands_that_are_echoed_are_no_answers(dialogue, gauge):
+async def test_echoed_requests_are_not_answers(dialogue, gauge):
     dialogue.expect(*((ask, ask + b"\n", answer) for ask, answer in opening()))
     dialogue.expect(*[(b"R\r", b"R\r" + VALUE)] * 2)
     await gauge.open()
     assert (await gauge.read()).value_mm == 2.138
 
 
-async def test_line_ends_of_a_carriage_return_alone_will_do(dialogue, gauge):
+async def test_a_carriage_return_alone_ends_a_line(dialogue, gauge):
     dialogue.expect(*((ask, answer.replace(b"\n", b"")) for ask, answer in opening()))
     await gauge.open()
 
 
-async def test_an_older_indicator_without_parameters_will_do(dialogue, gauge):
+async def test_an_older_indicator_without_parameters_is_accepted(dialogue, gauge):
     dialogue.expect((b"R\r", VALUE), (b"?p011\r",), (b"R\r", VALUE))
     await gauge.open()
     await gauge.check()
 
 
-async def test_an_indicator_that_has_answered_for_parameters_must_go_on_doing_so(dialogue, opened):
+async def test_an_indicator_that_has_reported_parameters_must_still_do_so(dialogue, opened):
     dialogue.expect((b"R\r", VALUE), (b"?p011\r",))
     with pytest.raises(GaugeSilent):
         await opened.check()
@@ -178,7 +178,7 @@ async def test_inch_pressed_during_a_set_is_found_in_a_reading(dialogue, opened,
         await opened.read()
 
 
-async def test_the_unit_is_asked_for_with_the_plunger_at_its_end(dialogue, gauge):
+async def test_the_unit_is_requested_with_the_plunger_at_its_end(dialogue, gauge):
     at_end = opening(b"OUT OF BOUNDS\r\n")
     dialogue.expect(at_end[0], (b"?p013\r", b"1\r\n"), *at_end[1:])
     with pytest.raises(WrongSetting):
@@ -196,7 +196,7 @@ async def test_the_unit_is_asked_for_with_the_plunger_at_its_end(dialogue, gauge
         ({"p040": b"1\r\n"}, "multiplies"),
     ],
 )
-async def test_what_falsifies_readings_is_refused(dialogue, gauge, answers, words):
+async def test_settings_that_falsify_readings_are_refused(dialogue, gauge, answers, words):
     dialogue.expect(*opening(**answers))
     with pytest.raises(WrongSetting, match=words):
         await gauge.open()
@@ -206,7 +206,7 @@ async def test_what_falsifies_readings_is_refused(dialogue, gauge, answers, word
     ("answers", "words"),
     [({"p019": b"1\r\n"}, "reversed False -> True"), ({"p011": b"2\r\n"}, "mode ABS -> INCR")],
 )
-async def test_what_changed_during_a_set_voids_its_zero(dialogue, opened, answers, words):
+async def test_a_setting_changed_during_a_set_voids_the_zero(dialogue, opened, answers, words):
     dialogue.expect(*opening(**answers))
     with pytest.raises(ZeroVoid, match=words):
         await opened.check()
@@ -218,7 +218,7 @@ async def test_a_plunger_at_its_end_is_an_error_of_its_own(dialogue, opened):
         await opened.read()
 
 
-async def test_a_question_that_was_not_understood_is_asked_again(dialogue, opened):
+async def test_a_request_that_was_not_understood_is_repeated(dialogue, opened):
     dialogue.expect((b"R\r", b"NOT FOUND\r\n"), (b"R\r", VALUE), (b"R\r", VALUE))
     assert (await opened.read()).value_mm == 2.138
 
@@ -229,7 +229,7 @@ async def test_another_protocol_is_quoted_beside_what_was_expected(dialogue, gau
         await gauge.open()
 
 
-async def test_a_glance_is_one_question(dialogue, opened):
+async def test_read_once_sends_one_request(dialogue, opened):
     dialogue.expect((b"R\r", b"+  2.1380, MM\r\n"), (b"R\r", b"OUT OF BOUNDS\r\n"))
     assert (await opened.read_once()).value_mm == 2.138
     with pytest.raises(GaugeAtEnd):

@@ -128,20 +128,20 @@ async def test_it_opens_and_reads(dialogue, gauge):
     assert (dialogue.settings["bytesize"], dialogue.settings["parity"]) == (8, "N")
 
 
-async def test_a_multiplexer_that_says_nothing_of_itself_will_do(dialogue, gauge):
+async def test_a_multiplexer_without_identification_is_accepted(dialogue, gauge):
     dialogue.expect((b"2\r", VALUE), (b"V\r",), (b"2\r", VALUE))
     assert (await gauge.open()).description == "Mitutoyo MUX-10 channel"
     await gauge.check()
 
 
-async def test_a_busy_multiplexer_is_asked_again(dialogue, opened, no_pause):
+async def test_requests_to_a_busy_multiplexer_are_repeated(dialogue, opened, no_pause):
     dialogue.expect(
         (b"2\r", b"918\r"), (b"2\r", b"918\r"), (b"2\r", VALUE), (b"2\r", b"918\r"), (b"2\r", VALUE)
     )
     assert (await opened.read()).value_mm == 0.123
 
 
-async def test_it_waits_before_it_asks_a_busy_multiplexer_again(dialogue, opened, monkeypatch):
+async def test_it_pauses_before_it_repeats_a_request_to_a_busy_multiplexer(dialogue, opened, monkeypatch):
     pauses = []
 
     async def sleep(seconds):
@@ -153,7 +153,7 @@ async def test_it_waits_before_it_asks_a_busy_multiplexer_again(dialogue, opened
     assert pauses == [0.05]
 
 
-async def test_a_multiplexer_that_stays_busy_is_told(dialogue, opened, no_pause):
+async def test_a_multiplexer_that_stays_busy_is_an_error(dialogue, opened, no_pause):
     dialogue.expect(*[(b"2\r", b"918\r")] * mux10.BUSY_TRIES)
     with pytest.raises(DeviceError, match=r"gauge y: its multiplexer stays busy \(918\)"):
         await opened.read()
@@ -171,7 +171,7 @@ async def test_any_other_error_is_a_plunger_at_its_end(dialogue, opened):
         await opened.read()
 
 
-async def test_a_plunger_at_its_end_does_not_hinder_opening(dialogue, gauge):
+async def test_a_plunger_at_its_end_does_not_prevent_opening(dialogue, gauge):
     dialogue.expect((b"2\r", b"912\r"), OPENING[1], (b"2\r", VALUE), (b"2\r", VALUE), (b"2\r", VALUE))
     await gauge.open()
     assert (await gauge.read()).value_mm == 0.123
@@ -260,19 +260,19 @@ async def test_two_speeds_on_one_line_are_refused(dialogue, opened, links, setti
 # Glancing
 
 
-async def test_a_glance_is_one_question(dialogue, opened):
+async def test_read_once_sends_one_request(dialogue, opened):
     dialogue.expect((b"2\r", VALUE))
     assert await opened.read_once() == GaugeReading(0.123, "02A+0000.123")
 
 
-async def test_a_busy_multiplexer_has_not_answered_a_glance(dialogue, opened):
+async def test_read_once_of_a_busy_multiplexer_is_a_wrong_answer(dialogue, opened):
     dialogue.expect((b"2\r", b"918\r"), (b"2\r", VALUE))
     with pytest.raises(WrongAnswer, match=r"busy \(918\)"):
         await opened.read_once()
     assert (await opened.read_once()).value_mm == 0.123
 
 
-async def test_a_glance_at_the_end_of_its_travel(dialogue, opened):
+async def test_read_once_with_the_plunger_at_its_end(dialogue, opened):
     dialogue.expect((b"2\r", b"912\r"))
     with pytest.raises(GaugeAtEnd):
         await opened.read_once()

@@ -1,4 +1,4 @@
-"""Time for fake serial ports: it passes only while somebody waits for bytes, and takes none on the wall."""
+"""Simulated time for fake serial ports: it passes only while a read waits for bytes."""
 
 from __future__ import annotations
 

@@ -7,13 +7,13 @@ plain = st.binary(max_size=20).filter(lambda data: not set(data) & set(b"\r\n"))
 ends = st.sampled_from([b"", b"\r", b"\n", b"\r\n"])
 
 
-def test_no_frame_until_it_is_whole():
+def test_no_frame_until_it_is_complete():
     assert cut_frame(b"", b"?\r", b"\r") is None
     assert cut_frame(b"+1.23", b"?\r", b"\r") is None
     assert cut_frame(b"?", b"?\r", b"\r") is None
 
 
-def test_the_echo_of_the_question_is_no_answer():
+def test_the_echo_of_the_request_is_no_answer():
     assert cut_frame(b"?\r", b"?\r", b"\r") is None
     assert cut_frame(b"?\r+1.234\r", b"?\r", b"\r") == (b"+1.234\r", b"")
     assert cut_frame(b"R\r\n+1, MM\r\n", b"R\r", b"\r\n") == (b"+1, MM\r\n", b"")
@@ -33,7 +33,7 @@ def test_a_frame_is_found_behind_line_ends_and_echo(before, echoed, between, fra
 
 
 @given(st.binary(max_size=60))
-def test_nothing_is_invented(noise):
+def test_a_frame_consists_of_received_bytes(noise):
     cut = cut_frame(noise, b"?\r", b"\r")
     if cut is not None:
         assert noise.endswith(cut[0] + cut[1])

@@ -1,4 +1,4 @@
-"""A thermometer behind a file: what the kernel writes there, and what it should not."""
+"""Thermometers that are read from a file: valid and invalid contents."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ async def test_millidegrees_are_read(path: Path, text: str, celsius: float) -> N
         assert await room.read() == TemperatureReading(celsius, text.strip())
 
 
-async def test_it_says_where_it_is(path: Path) -> None:
+async def test_its_identity_names_the_file(path: Path) -> None:
     show(path, "21375\n")
     async with thermometer(path) as room:
         assert await room.open() == DeviceIdentity("thermometer room", "sysfs", str(path))
@@ -71,7 +71,7 @@ async def test_what_is_no_temperature_is_refused(path: Path, text: str, words: s
     assert refusal.value.action == f"Check the sensor behind {path}"
 
 
-async def test_what_cannot_be_read_is_said_and_may_come_back(path: Path) -> None:
+async def test_a_file_that_cannot_be_read_is_an_error_until_it_can(path: Path) -> None:
     async with thermometer(path) as room:
         with pytest.raises(DeviceError, match="cannot be read: it does not exist"):
             await room.open()
@@ -92,8 +92,8 @@ async def test_a_pipe_is_not_waited_for(path: Path) -> None:
             await room.read()
 
 
-async def test_a_sensor_that_hangs_is_left_to_itself(path: Path, monkeypatch) -> None:
-    """One read hangs at a time, and what comes of it later is nobody's answer."""
+async def test_a_sensor_that_blocks_is_not_read_again(path: Path, monkeypatch) -> None:
+    """At most one read blocks at a time, and its late result is discarded."""
     answers = threading.Event()
     content: Callable[[Path], str] = sysfs._content
 

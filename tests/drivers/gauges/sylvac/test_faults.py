@@ -1,4 +1,4 @@
-"""What goes wrong with a Sylvac gauge, and what is said of it."""
+"""Faults of a Sylvac gauge, and their messages."""
 
 import pytest
 
@@ -43,7 +43,7 @@ async def test_even_parity_read_as_eight_bits_is_recognised(dialogue, gauge):
         await gauge.open()
 
 
-async def test_questions_with_wrong_parity_are_recognised(dialogue, opened):
+async def test_requests_with_wrong_parity_are_recognised(dialogue, opened):
     dialogue.expect(*[(b"?\r", b"ERR2\r")] * 3)
     with pytest.raises(WrongAnswer, match=r"ERR2.*Check parity settings"):
         await opened.read()
@@ -103,7 +103,7 @@ async def test_inch_pressed_during_a_set_is_found_by_the_check(dialogue, opened)
         ({"BAT": b"BAT0\r"}, "has a low battery"),
     ],
 )
-async def test_what_falsifies_readings_is_refused_at_opening_and_by_the_check(
+async def test_settings_that_falsify_readings_are_refused_at_opening_and_by_the_check(
     dialogue, gauge, answers, words
 ):
     dialogue.expect(*opening(**answers))
@@ -124,7 +124,7 @@ async def test_what_falsifies_readings_is_refused_at_opening_and_by_the_check(
         ({"MOD": b"REF1\r"}, "mode NOR -> REF1"),
     ],
 )
-async def test_what_changed_during_a_set_voids_its_zero(dialogue, opened, answers, words):
+async def test_a_setting_changed_during_a_set_voids_the_zero(dialogue, opened, answers, words):
     dialogue.expect(*opening(**answers))
     with pytest.raises(ZeroVoid, match=words):
         await opened.check()
@@ -137,32 +137,32 @@ async def test_an_unchanged_gauge_passes_the_check(dialogue, opened):
     await opened.check()
 
 
-async def test_a_power_up_banner_before_a_question_voids_the_zero(dialogue, opened):
+async def test_a_power_up_message_before_a_request_voids_the_zero(dialogue, opened):
     dialogue.unasked(b"SY276.1\r")
     dialogue.expect((b"?\r", b"+0.000\r"))
     with pytest.raises(ZeroVoid, match=r"switched on again.*SY276\.1"):
         await opened.read()
 
 
-async def test_a_power_up_banner_instead_of_an_answer_voids_the_zero(dialogue, opened):
+async def test_a_power_up_message_instead_of_an_answer_voids_the_zero(dialogue, opened):
     dialogue.expect((b"?\r", b"TE233.1.2\r"))
     with pytest.raises(ZeroVoid, match="switched on again"):
         await opened.read()
 
 
-async def test_a_power_up_banner_among_the_checks_answers_voids_the_zero(dialogue, opened):
+async def test_a_power_up_message_among_the_answers_of_the_check_voids_the_zero(dialogue, opened):
     dialogue.expect(*OPENING[:2], (b"ID?\r", b"SY276.1\rSY276\r"), (b"MOD?\r", b"NOR\r"))
     with pytest.raises(ZeroVoid, match="switched on again"):
         await opened.check()
 
 
-async def test_a_gauge_that_wakes_up_when_it_is_opened_is_asked_again(dialogue, gauge):
+async def test_requests_are_repeated_if_opening_switches_the_gauge_on(dialogue, gauge):
     dialogue.expect((b"UNI?\r", b"SY276.1\rMM\r"), *OPENING, *[(b"?\r", b"+1.000\r")] * 2)
     await gauge.open()
     assert (await gauge.read()).value_mm == 1.0
 
 
-async def test_a_banner_that_came_before_opening_is_old_news(dialogue, gauge, monkeypatch):
+async def test_a_power_up_message_before_opening_is_ignored(dialogue, gauge, monkeypatch):
     opening_port = dialogue.open
 
     def open_with_banner():
@@ -174,7 +174,7 @@ async def test_a_banner_that_came_before_opening_is_old_news(dialogue, gauge, mo
     await gauge.open()
 
 
-async def test_a_lost_port_is_told_and_voids_what_others_zeroed(dialogue, opened):
+async def test_a_lost_port_is_reported_until_the_gauge_is_opened_again(dialogue, opened):
     dialogue.broken = OSError(5, "Input/output error")
     with pytest.raises(DeviceError, match="gauge y: port wire was lost"):
         await opened.read()

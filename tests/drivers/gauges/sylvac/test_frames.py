@@ -1,4 +1,4 @@
-"""Sylvac's opto-RS duplex protocol: what is a value, a fault, a setting, and what is nothing."""
+"""Frames of Sylvac's opto-RS duplex protocol: values, errors and settings."""
 
 import re
 

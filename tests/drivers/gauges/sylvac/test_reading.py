@@ -1,4 +1,4 @@
-"""Opening a Sylvac gauge, reading it and glancing at it."""
+"""Opening and reading a Sylvac gauge."""
 
 import pytest
 
@@ -41,27 +41,27 @@ async def test_the_cell_file_overrides_the_defaults(dialogue, links, settings):
     await gauge.close()
 
 
-async def test_commands_that_are_echoed_are_no_answers(dialogue, gauge):
+async def test_echoed_requests_are_not_answers(dialogue, gauge):
     echoed = [(question, question, answer) for question, answer in OPENING]
     dialogue.expect(*echoed, (b"?\r", b"?\r+1.234\r"), (b"?\r", b"?\r\n+1.234\r\n"))
     await gauge.open()
     assert (await gauge.read()).value_mm == 1.234
 
 
-async def test_an_instrument_that_knows_only_its_unit_will_do(dialogue, gauge):
+async def test_an_instrument_that_reports_only_its_unit_is_accepted(dialogue, gauge):
     unknown = [(question, b"ERR1\r") for question, _ in OPENING[1:]]
     dialogue.expect(OPENING[0], *unknown, OPENING[0], *unknown)
     assert (await gauge.open()).description == "Sylvac opto-RS indicator"
     await gauge.check()
 
 
-async def test_an_instrument_that_does_not_tell_its_unit_is_refused(dialogue, gauge):
+async def test_an_instrument_that_does_not_report_its_unit_is_refused(dialogue, gauge):
     dialogue.expect((b"UNI?\r", b"ERR1\r"))
     with pytest.raises(DeviceError, match="gauge y: does not report its unit"):
         await gauge.open()
 
 
-async def test_a_flipped_digit_does_not_get_through(dialogue, opened):
+async def test_a_wrong_digit_is_not_accepted(dialogue, opened):
     values = (b"+1.234\r", b"+5.234\r", b"+1.234\r", b"+1.235\r")
     dialogue.expect(*((b"?\r", value) for value in values))
     assert (await opened.read()).value_mm == 1.235
@@ -73,46 +73,46 @@ async def test_readings_that_never_agree_are_an_error_of_their_own(dialogue, ope
         await opened.read()
 
 
-async def test_a_frame_that_does_not_match_is_asked_again(dialogue, opened):
+async def test_the_request_is_repeated_after_a_frame_that_does_not_match(dialogue, opened):
     answers = (b"+1.2\x134\r", b"+1.234\r", b"1.234\r", b"+1.234\r")
     dialogue.expect(*((b"?\r", answer) for answer in answers))
     assert (await opened.read()).value_mm == 1.234
 
 
-async def test_a_frame_cut_short_is_asked_again(dialogue, opened):
+async def test_the_request_is_repeated_after_an_incomplete_frame(dialogue, opened):
     dialogue.expect((b"?\r", b"+1.23"), (b"?\r", b"+1.234\r"), (b"?\r", b"+1.234\r"))
     assert (await opened.read()).value_mm == 1.234
 
 
-async def test_a_glance_is_one_question(dialogue, opened):
+async def test_read_once_sends_one_request(dialogue, opened):
     dialogue.expect((b"?\r", b"+1.234\r"))
     assert await opened.read_once() == GaugeReading(1.234, "+1.234")
 
 
-async def test_glances_need_not_agree(dialogue, opened):
+async def test_single_readings_need_not_agree(dialogue, opened):
     dialogue.expect((b"?\r", b"+1.234\r"), (b"?\r", b"+4.321\r"))
     assert [(await opened.read_once()).value_mm for _ in range(2)] == [1.234, 4.321]
 
 
-async def test_a_garbled_glance_is_not_repeated(dialogue, opened):
+async def test_read_once_does_not_repeat_a_garbled_answer(dialogue, opened):
     dialogue.expect((b"?\r", b"+1.2x4\r"), (b"?\r", b"+1.234\r"))
     with pytest.raises(WrongAnswer, match="gauge y"):
         await opened.read_once()
     assert (await opened.read_once()).value_mm == 1.234
 
 
-async def test_a_glance_at_the_end_of_its_travel(dialogue, opened):
+async def test_read_once_with_the_plunger_at_its_end(dialogue, opened):
     dialogue.expect((b"?\r", b"ERR3\r"))
     with pytest.raises(GaugeAtEnd):
         await opened.read_once()
 
 
-async def test_a_glance_that_is_not_answered(dialogue, opened):
+async def test_read_once_without_an_answer(dialogue, opened):
     dialogue.expect((b"?\r", b""))
     with pytest.raises(GaugeSilent):
         await opened.read_once()
 
 
-async def test_nobody_glances_at_a_gauge_that_is_closed(gauge):
+async def test_read_once_of_a_closed_gauge_is_an_error(gauge):
     with pytest.raises(DeviceError, match="is not open"):
         await gauge.read_once()

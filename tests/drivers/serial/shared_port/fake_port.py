@@ -1,4 +1,4 @@
-"""A serial port that delivers what it is told to, and links that lead to it."""
+"""A scripted serial port."""
 
 import math
 import threading

@@ -1,4 +1,4 @@
-"""Cancelling and closing: nothing waits for what no longer comes."""
+"""Cancelling and closing do not wait for an answer."""
 
 import asyncio
 import threading
@@ -12,7 +12,7 @@ from tests.drivers.serial.shared_port.fake_port import FOREVER_S, SOON_S, FakePo
 from tests.waiting import until
 
 
-async def test_a_cancelled_exchange_leaves_the_link_in_step(fake):
+async def test_a_cancelled_exchange_leaves_the_port_synchronized(fake):
     answering = threading.Event()
     port = fake(FakePort(lambda request: [(SOON_S, b"to " + request)] * answering.wait()))
     link = await opened()
@@ -27,7 +27,7 @@ async def test_a_cancelled_exchange_leaves_the_link_in_step(fake):
     await link.close()
 
 
-async def test_an_exchange_that_is_cancelled_before_its_turn_is_never_asked(fake):
+async def test_an_exchange_cancelled_before_its_turn_sends_nothing(fake):
     answering = threading.Event()
     port = fake(FakePort(lambda request: [(SOON_S, b"to " + request)] * answering.wait()))
     link = await opened()
@@ -43,7 +43,7 @@ async def test_an_exchange_that_is_cancelled_before_its_turn_is_never_asked(fake
     await link.close()
 
 
-async def test_exchanges_at_once_take_their_turns(fake):
+async def test_concurrent_exchanges_run_one_after_another(fake):
     fake(FakePort(lambda request: [(0.01, b"to " + request)]))
     link = await opened()
     requests = [b"%d\r" % number for number in range(10)]
@@ -87,7 +87,7 @@ async def test_a_cancelled_close_closes_all_the_same(fake):
     await until(lambda: not port.is_open)
 
 
-async def test_closing_twice_is_harmless_and_using_it_afterwards_is_not(fake):
+async def test_closing_twice_is_harmless_and_use_after_closing_is_an_error(fake):
     fake(FakePort())
     link = await opened()
     await link.close()
@@ -99,7 +99,7 @@ async def test_closing_twice_is_harmless_and_using_it_afterwards_is_not(fake):
         await link.open()
 
 
-async def test_a_link_that_was_never_opened_closes_and_does_not_ask(fake):
+async def test_a_port_that_was_never_opened_closes_and_sends_nothing(fake):
     port = fake(FakePort())
     link = SharedSerialPort("fake", {})
     with pytest.raises(DeviceError, match="it is not open"):

@@ -1,4 +1,4 @@
-"""Questions and answers stay in step, whatever comes late, unasked or not at all."""
+"""Requests and answers stay synchronized with late, unsolicited and missing answers."""
 
 import pytest
 import serial
@@ -10,7 +10,7 @@ from hexacell.errors import DeviceError
 from tests.drivers.serial.shared_port.fake_port import LONG_S, SOON_S, WORST_LATENCY_S, FakePort, opened
 
 
-async def test_an_answer_comes_back_whole_and_from_one_thread(fake):
+async def test_an_answer_is_complete_and_read_by_one_thread(fake):
     port = fake(FakePort(lambda _: [(0.0, b"+1."), (0.01, b"234"), (0.02, b"\r")]))
     link = await opened()
     assert await link.exchange(b"?\r", b"\r", LONG_S) == b"+1.234\r"
@@ -20,7 +20,7 @@ async def test_an_answer_comes_back_whole_and_from_one_thread(fake):
     assert not port.is_open
 
 
-async def test_what_came_is_told_when_no_answer_does(fake):
+async def test_received_bytes_are_reported_if_there_is_no_answer(fake):
     fake(FakePort(lambda _: [(0.0, b"+1.2")]))
     link = await opened()
     with pytest.raises(NoAnswer, match=r"no answer within 0\.05 s") as caught:
@@ -51,7 +51,7 @@ async def test_a_write_that_took_too_long_is_judged_by_its_answer(fake, sent):
     await link.close()
 
 
-async def test_a_late_answer_is_never_the_answer_to_the_next_question(fake):
+async def test_a_late_answer_is_never_taken_for_that_to_the_next_request(fake):
     answers = iter([[(3 * SOON_S, b"late\r")], [(0.0, b"second\r")], [(0.0, b"third\r")]])
     fake(FakePort(lambda _: next(answers)))
     link = await opened()
@@ -63,7 +63,7 @@ async def test_a_late_answer_is_never_the_answer_to_the_next_question(fake):
     await link.close()
 
 
-async def test_nothing_is_asked_until_a_late_answer_has_had_its_time(fake):
+async def test_nothing_is_sent_until_no_late_answer_can_come(fake):
     port = fake(FakePort(lambda request: [] if request == b"1\r" else [(0.0, b"b\r")]))
     link = await opened()
     with pytest.raises(NoAnswer):
@@ -74,7 +74,7 @@ async def test_nothing_is_asked_until_a_late_answer_has_had_its_time(fake):
     await link.close()
 
 
-async def test_what_nobody_asked_for_is_put_aside(fake):
+async def test_unsolicited_bytes_are_kept_apart(fake):
     port = fake(FakePort(lambda _: [(0.0, b"answer\r")]))
     link = await opened()
     port.due = [(0.0, b"SY276.1\r"), (port.time.now_s + SOON_S, b"more\r")]
@@ -84,7 +84,7 @@ async def test_what_nobody_asked_for_is_put_aside(fake):
     await link.close()
 
 
-async def test_a_second_frame_behind_the_answer_does_not_answer_the_next_question(fake):
+async def test_a_second_frame_after_the_answer_does_not_answer_the_next_request(fake):
     answers = iter([b"one\rkey\r", b"two\r"])
     fake(FakePort(lambda _: [(0.0, next(answers))]))
     link = await opened()
@@ -94,7 +94,7 @@ async def test_a_second_frame_behind_the_answer_does_not_answer_the_next_questio
     await link.close()
 
 
-async def test_a_distrusted_frame_is_followed_by_silence(fake):
+async def test_silence_is_awaited_after_a_garbled_frame(fake):
     answers = iter([[(0.0, b"gar\r"), (0.02, b"bage\r")], [(0.0, b"two\r")]])
     fake(FakePort(lambda _: next(answers)))
     link = await opened()
@@ -104,7 +104,7 @@ async def test_a_distrusted_frame_is_followed_by_silence(fake):
     await link.close()
 
 
-async def test_a_flood_without_an_end_is_cut_off(fake):
+async def test_bytes_without_a_terminator_are_limited(fake):
     fake(FakePort(lambda _: [(0.0, b"x" * (FRAME_LIMIT + 1))]))
     link = await opened()
     with pytest.raises(NoAnswer) as caught:
@@ -123,7 +123,7 @@ async def test_a_device_that_never_falls_silent_is_refused(fake):
     await link.close()
 
 
-async def test_only_our_own_question_back_is_no_answer():
+async def test_the_echo_alone_is_no_answer():
     link = await opened("loop://")
     with pytest.raises(NoAnswer) as caught:
         await link.exchange(b"?\r", b"\r", SOON_S)

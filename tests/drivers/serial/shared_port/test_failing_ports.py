@@ -1,4 +1,4 @@
-"""Every failure of a port in plain words, and a port that comes back."""
+"""Failures of a port, and reconnection."""
 
 import errno
 import os
@@ -14,7 +14,7 @@ from hexacell.errors import DeviceError, ExitCode
 from tests.drivers.serial.shared_port.fake_port import LONG_S, FakePort, opened
 
 
-async def test_an_absent_port_is_told_with_the_gauge_and_what_to_do(links):
+async def test_an_absent_port_is_reported_with_the_gauge_and_an_action(links):
     link = links.acquire("/dev/absent-port", "x", {})
     with pytest.raises(DeviceError) as caught:
         await link.open()
@@ -23,7 +23,7 @@ async def test_an_absent_port_is_told_with_the_gauge_and_what_to_do(links):
     assert caught.value.exit_code is ExitCode.HARDWARE
 
 
-async def test_a_refused_connection_is_told():
+async def test_a_refused_connection_is_reported():
     link = SharedSerialPort("socket://127.0.0.1:1", {})
     with pytest.raises(DeviceError, match="cannot be opened"):
         await link.open()
@@ -40,13 +40,13 @@ async def test_a_refused_connection_is_told():
         (errno.EIO, "cannot be opened"),
     ],
 )
-def test_the_cause_is_told_in_words(number, words):
+def test_the_cause_is_reported_in_words(number, words):
     with pytest.raises(PortLost, match=words) as caught, opening_errors("gauge x", "/dev/ttyUSB0"):
         raise serial.SerialException(number, "reason")
     assert caught.value.action
 
 
-async def test_a_port_in_use_is_told():
+async def test_a_port_in_use_is_reported():
     near, far = os.openpty()
     url = os.ttyname(far)
     one, two = await opened(url, exclusive=True), SharedSerialPort(url, {"exclusive": True})
@@ -58,11 +58,11 @@ async def test_a_port_in_use_is_told():
     os.close(far)
 
 
-async def test_a_pseudo_terminal_that_refuses_parity_is_told():
+async def test_a_pseudo_terminal_that_refuses_parity_is_reported():
     near, far = os.openpty()
     for again in range(2):
         link = SharedSerialPort(os.ttyname(far), {"bytesize": 7, "parity": "E", "stopbits": 2})
-        if again:  # the open that pyserial 196 is about, and nobody resets the speed here
+        if again:  # the open that pyserial 196 is about, and no server resets the speed here
             with pytest.raises(DeviceError, match="cannot be opened"):
                 await link.open()
         else:
@@ -107,7 +107,7 @@ async def test_opening_an_open_port_is_no_new_session(fake):
     await link.close()
 
 
-async def test_opening_finds_out_that_an_open_port_has_died_unnoticed(fake):
+async def test_opening_detects_that_an_open_port_has_been_lost(fake):
     port = fake(FakePort())
     link = await opened()
     port.broken = OSError(errno.EIO, "Input/output error")

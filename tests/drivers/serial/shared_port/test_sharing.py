@@ -34,7 +34,7 @@ async def test_settings_that_pyserial_refuses_are_errors_of_the_cell_file(links,
     assert caught.value.exit_code is ExitCode.USAGE
 
 
-async def test_gauges_on_one_port_share_a_link_until_the_last_lets_go(links, fake):
+async def test_gauges_on_one_port_share_it_until_the_last_releases_it(links, fake):
     port = fake(FakePort())
     x = links.acquire("fake", "x", {"baudrate": 9600}, channel=1)
     y = links.acquire("fake", "y", {"baudrate": 9600}, channel=2)
@@ -67,13 +67,13 @@ async def test_what_cannot_be_shared_is_refused(links, settings, channel, words)
     assert first._port.subject == "gauge x"
 
 
-async def test_a_port_of_ones_own_is_not_shared(links):
+async def test_a_port_used_alone_is_not_shared(links):
     links.acquire("loop://", "x", {})
     with pytest.raises(FileError, match="already belongs to gauge x"):
         links.acquire("loop://", "y", {}, channel=1)
 
 
-async def test_closing_all_closes_what_is_still_held(links, fake):
+async def test_closing_all_closes_ports_still_in_use(links, fake):
     port = fake(FakePort())
     await links.acquire("fake", "x", {}).open()
     await links.close()

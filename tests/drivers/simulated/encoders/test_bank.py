@@ -98,7 +98,7 @@ async def test_latency_is_in_the_cells_time(make_bank, driver):
 async def test_a_missing_node(make_bank, reach, driver):
     simulated = make_bank()
     simulated.faults(4)["unplugged"](on=True)
-    with pytest.raises(BusError, match=r"encoder of leg 4 \(node 4\): nobody answers"):
+    with pytest.raises(BusError, match=r"encoder of leg 4 \(node 4\): no device responds"):
         await driver(reach(simulated), timeout_s=0.3).open()
 
 

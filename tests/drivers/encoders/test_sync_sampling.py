@@ -1,4 +1,4 @@
-"""Positions: one SYNC, six answers, all of one instant or none."""
+"""Sampling: six positions of one SYNC, or an error."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ def counts(value: int) -> bytes:
     return value.to_bytes(4, "little", signed=True)
 
 
-async def test_a_round_is_one_sync_and_no_sdo_request(raw, bank):
+async def test_a_sample_is_one_sync_and_no_sdo_request(raw, bank):
     await bank.open()
     raw.heard.clear()
     assert (await bank.read()).counts == (1000, 2000, 3000, 4000, 5000, 6000)
     assert raw.heard == [(0x80, b"")]
 
 
-async def test_positions_are_never_asked_for_by_sdo(raw, bank):
+async def test_positions_are_never_requested_over_sdo(raw, bank):
     await bank.open()
     for _ in range(20):
         await bank.read()
@@ -64,9 +64,9 @@ async def test_unsigned_positions_do_not_turn_negative(raw, settings):
     await bank.close()
 
 
-async def test_an_incomplete_round_is_discarded_and_tried_again(raw, bank, hurry):
+async def test_an_incomplete_sample_is_discarded_and_repeated(raw, bank, shorten_timeout):
     await bank.open()
-    hurry(bank)
+    shorten_timeout(bank)
     for node in raw.nodes.values():
         node.answers_sync = lambda sync, node=node: (
             [] if (sync, node.node) == (2, 3) else [counts(100 * sync + node.node)]
@@ -75,9 +75,9 @@ async def test_an_incomplete_round_is_discarded_and_tried_again(raw, bank, hurry
     assert (await bank.read()).counts == (401, 402, 403, 404, 405, 406)
 
 
-async def test_a_silent_leg_is_named_after_bounded_tries(raw, bank, hurry):
+async def test_a_silent_leg_is_named_after_bounded_tries(raw, bank, shorten_timeout):
     await bank.open()
-    hurry(bank)
+    shorten_timeout(bank)
     raw.nodes[5].answers_sync = lambda _: []
     before = raw.syncs
     with pytest.raises(
@@ -87,18 +87,18 @@ async def test_a_silent_leg_is_named_after_bounded_tries(raw, bank, hurry):
     assert raw.syncs - before == MAX_SYNCS
 
 
-async def test_silence_of_all_points_at_the_bus(raw, bank, hurry):
+async def test_silence_of_all_suggests_the_bus(raw, bank, shorten_timeout):
     await bank.open()
-    hurry(bank)
+    shorten_timeout(bank)
     for node in raw.nodes.values():
         node.answers_sync = lambda _: []
     with pytest.raises(SilentNodeError, match=r"leg 1 .*leg 6 .*CAN adapter, supply and termination"):
         await bank.read()
 
 
-async def test_after_silence_the_bank_reads_on(raw, bank, hurry):
+async def test_the_bank_can_be_read_after_silence(raw, bank, shorten_timeout):
     await bank.open()
-    hurry(bank)
+    shorten_timeout(bank)
     raw.nodes[5].answers_sync = lambda _: []
     with pytest.raises(SilentNodeError):
         await bank.read()
@@ -106,7 +106,7 @@ async def test_after_silence_the_bank_reads_on(raw, bank, hurry):
     assert (await bank.read()).counts[4] == 5000
 
 
-async def test_an_answer_just_late_is_waited_for_before_the_next_sync(raw, bank, monkeypatch):
+async def test_a_late_response_is_awaited_before_the_next_sync(raw, bank, monkeypatch):
     await bank.open()
     assert bank._session is not None
     bus, timed_out = bank._session.bus, threading.Event()
@@ -137,7 +137,7 @@ async def test_one_position_too_many_is_another_device(raw, bank):
         await bank.read()
 
 
-async def test_somebody_elses_sync_is_an_error(raw, bank):
+async def test_sync_of_another_master_is_an_error(raw, bank):
     await bank.open()
     raw.send(0x80)
     await raw.delivered_to(bank)
@@ -163,7 +163,7 @@ async def test_position_is_taken_from_where_it_is_mapped(raw, bank):
     assert (await bank.read()).counts[0] == -5
 
 
-async def test_frames_that_are_no_canopen_do_not_matter(raw, bank):
+async def test_frames_that_are_not_canopen_are_ignored(raw, bank):
     await bank.open()
     cob_id = raw.nodes[1].tpdo
     raw.send(cob_id, counts(9), is_extended_id=True)
@@ -175,7 +175,7 @@ async def test_frames_that_are_no_canopen_do_not_matter(raw, bank):
     assert (await bank.read()).counts[0] == 1000
 
 
-async def test_our_own_echo_is_not_somebody_elses_sync(raw, settings):
+async def test_the_echo_of_its_own_sync_is_not_that_of_another_master(raw, settings):
     echoing = {**settings.bus, "receive_own_messages": True}
     bank = Cia406Bank(settings.model_copy(update={"bus": echoing}))
     await bank.open()

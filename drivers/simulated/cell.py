@@ -14,8 +14,9 @@ from drivers.simulated.gauges.bank import SimulatedGaugeBank
 from drivers.simulated.linuxcnc.server import SimulatedController
 from drivers.simulated.physics import RobotPhysics
 from drivers.simulated.robot import SimulatedMachine
+from drivers.simulated.serial_line import PtyLine
 from drivers.simulated.served_device import Closeable
-from drivers.simulated.slcan import serve_slcan
+from drivers.simulated.slcan import SlcanServer
 from hexacell.cell.devices import GaugeSettings
 from hexacell.cell.model import CellSettings
 from hexacell.cell.simulation import SimulationSettings
@@ -56,7 +57,7 @@ class SimulatedCell(Closeable):
             self.encoders = served.enter_context(_encoder_bank(settings, simulation, self.physics, clock))
             bus: dict[str, Any] = self.encoders.bus_settings
             if other_processes:
-                adapter = served.enter_context(serve_slcan(self.encoders.channel, "pty"))
+                adapter = served.enter_context(SlcanServer(self.encoders.channel, PtyLine("slcan")))
                 bus = adapter.bus_settings
             self.controller = served.enter_context(SimulatedController(self.machine, settings.controller))
             self.faults = CellFaults(self.gauges, self.encoders, self.controller, stop_file)

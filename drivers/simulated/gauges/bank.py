@@ -10,9 +10,8 @@ from drivers.simulated.gauges.device import Indicator, LineDevice, PlungerPositi
 from drivers.simulated.gauges.mux10 import Mux10Device
 from drivers.simulated.gauges.server import GaugeLineServer
 from drivers.simulated.gauges.sylvac import SylvacDevice
+from drivers.simulated.serial_line import PtyLine, SocketLine
 from drivers.simulated.served_device import Closeable, Switch
-from drivers.simulated.transports.pty import PtyTransport
-from drivers.simulated.transports.tcp import SocketTransport
 from hexacell.cell.devices import GaugeSettings
 from hexacell.cell.simulation import FaultKind, SimulatedGauges
 from hexacell.clock import CellClock
@@ -92,7 +91,7 @@ class SimulatedGaugeBank(Closeable):
         name = "-".join(gauge.name for gauge in group)
         return GaugeLineServer(
             device,
-            PtyTransport(name) if self._settings.transport == "pty" else SocketTransport(),
+            PtyLine(name) if self._settings.transport == "pty" else SocketLine(),
             self._clock,
             latency_s=self._settings.latency_s,
             baudrate=self._settings.baudrate,

@@ -12,8 +12,8 @@ from collections.abc import Callable
 from concurrent.futures import Future
 
 from drivers.simulated.gauges.device import LineDevice
+from drivers.simulated.serial_line import SerialLine
 from drivers.simulated.served_device import Closeable
-from drivers.simulated.transports.interface import Transport
 from hexacell.clock import CellClock
 
 COMMAND_END = b"\r"
@@ -24,7 +24,7 @@ _log = logging.getLogger(__name__)
 
 
 class GaugeLineServer(Closeable):
-    """Serves a device on a transport, from a thread of its own, until it is closed.
+    """Serves a device on a serial line, from a thread of its own, until it is closed.
 
     An answer is sent after ``latency_s`` plus the transmission time of request and answer, in seconds
     of the cell's clock. Answers are sent one after another, as on a cable.
@@ -33,15 +33,15 @@ class GaugeLineServer(Closeable):
     def __init__(
         self,
         device: LineDevice,
-        transport: Transport,
+        line: SerialLine,
         clock: CellClock,
         *,
         latency_s: float,
         baudrate: int | None = None,
     ) -> None:
         self.device = device
-        self.url = transport.url
-        self._transport = transport
+        self.url = line.url
+        self._line = line
         self._clock = clock
         self._latency_s = latency_s
         self._byte_s = device.bits_a_byte / (baudrate or device.baudrate)
@@ -56,7 +56,7 @@ class GaugeLineServer(Closeable):
 
     def set_unplugged(self, *, on: bool) -> None:
         """Unplug the line, or plug it in again."""
-        self._run_on_thread(self._unplug if on else self._transport.plug_in)
+        self._run_on_thread(self._unplug if on else self._line.plug_in)
 
     def set_silent(self, *, on: bool) -> None:
         """Lose every answer, or no more."""
@@ -69,7 +69,7 @@ class GaugeLineServer(Closeable):
         self._stopping = True
         os.write(self._wake_write, b"x")
         self._thread.join()
-        self._transport.close()
+        self._line.close()
         os.close(self._wake_read)
         os.close(self._wake_write)
 
@@ -91,13 +91,13 @@ class GaugeLineServer(Closeable):
 
     def _serve_until_stopped(self) -> None:
         while not self._stopping:
-            watched = [self._wake_read, *self._transport.descriptors()]
+            watched = [self._wake_read, *self._line.descriptors()]
             ready, _, _ = select.select(watched, [], [], self._until_next_answer_s())
             if self._wake_read in ready:
                 os.read(self._wake_read, COMMAND_LIMIT)
                 self._do_jobs()
             else:
-                self._receive(self._transport.receive(ready))
+                self._receive(self._line.receive(ready))
             self._send_due()
 
     def _do_jobs(self) -> None:
@@ -131,9 +131,9 @@ class GaugeLineServer(Closeable):
 
     def _send_due(self) -> None:
         while self._answers and self._answers[0][0] <= self._clock.now():
-            self._transport.send(self._answers.popleft()[1])
+            self._line.send(self._answers.popleft()[1])
 
     def _unplug(self) -> None:
         self._received = b""
         self._answers.clear()
-        self._transport.unplug()
+        self._line.unplug()

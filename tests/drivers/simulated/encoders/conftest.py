@@ -12,7 +12,8 @@ import pytest
 
 from drivers.encoders.cia406 import Cia406Bank
 from drivers.simulated.encoders.bank import SimulatedEncoderBank
-from drivers.simulated.slcan import serve_slcan
+from drivers.simulated.serial_line import PtyLine, SerialLine, SocketLine
+from drivers.simulated.slcan import SlcanServer
 from hexacell.cell.devices import EncoderSettings
 from hexacell.clock import CellClock
 
@@ -34,6 +35,9 @@ class Samples:
         self.taken += 1
         return [self.taken * 0.001] * 6
 
+
+LINES: dict[str, Callable[[], SerialLine]] = {"pty": lambda: PtyLine("slcan"), "socket": SocketLine}
+"""Serial lines on which an slcan adapter may be."""
 
 MakeBank = Callable[..., SimulatedEncoderBank]
 
@@ -73,7 +77,8 @@ def reach(request: pytest.FixtureRequest) -> Iterator[Callable[[SimulatedEncoder
         def reach(bank: SimulatedEncoderBank) -> dict[str, Any]:
             if request.param == "virtual":
                 return bank.bus_settings
-            return stack.enter_context(serve_slcan(bank.channel, request.param)).bus_settings
+            line = LINES[request.param]()
+            return stack.enter_context(SlcanServer(bank.channel, line)).bus_settings
 
         yield reach
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import threading
+from functools import partial
 from typing import NoReturn
 
 import pytest
@@ -14,7 +15,8 @@ from drivers.errors import BusError, InvalidSampleError, RestartedNodeError, Sil
 from drivers.interfaces import EncoderSample
 from drivers.simulated.encoders.bank import SimulatedEncoderBank
 from drivers.simulated.encoders.object_dictionary import EVENTS_AND_SYNC
-from drivers.simulated.slcan import serve_slcan
+from drivers.simulated.serial_line import PtyLine, SocketLine
+from drivers.simulated.slcan import SlcanServer
 from hexacell.clock import CellClock
 from hexacell.errors import DeviceError
 from tests.drivers.simulated.encoders import faults
@@ -233,11 +235,11 @@ async def test_positions_that_fail_are_as_loud_as_a_broken_cable(make_bank, driv
     assert "the simulated encoders have failed" in caplog.text
 
 
-@pytest.mark.parametrize("transport", ["pty", "socket"])
+@pytest.mark.parametrize("line", [partial(PtyLine, "slcan"), SocketLine], ids=["pty", "socket"])
 @pytest.mark.parametrize("reading", [True, False])
-async def test_an_adapter_that_is_pulled_out(make_bank, driver, samples, transport, reading):
+async def test_an_adapter_that_is_pulled_out(make_bank, driver, samples, line, reading):
     simulated = make_bank()
-    adapter = serve_slcan(simulated.channel, transport)
+    adapter = SlcanServer(simulated.channel, line())
     bank = driver(adapter.bus_settings, timeout_s=2.0)
     await bank.open()
     if reading:

@@ -13,8 +13,7 @@ from drivers.serial.shared_port import SharedSerialPorts
 from drivers.simulated.gauges.bank import SimulatedGaugeBank, simulated_device
 from drivers.simulated.gauges.device import Indicator
 from drivers.simulated.gauges.server import GaugeLineServer
-from drivers.simulated.transports.pty import PtyTransport
-from drivers.simulated.transports.tcp import SocketTransport
+from drivers.simulated.serial_line import PtyLine, SocketLine
 from hexacell.cell.devices import GaugeSettings
 from hexacell.cell.simulation import SimulatedGauges
 from hexacell.clock import CellClock
@@ -68,13 +67,13 @@ async def cell(*args, **kwargs):
 
 def served(protocol, plunger=lambda: 1.0, transport="pty", factor=FAST, name="gauge", **pace):
     device = simulated_device(protocol, {1: Indicator(plunger)})
-    line = PtyTransport(name) if transport == "pty" else SocketTransport()
+    line = PtyLine(name) if transport == "pty" else SocketLine()
     return GaugeLineServer(device, line, CellClock(factor), **({"latency_s": 0.02} | pace))
 
 
 def send_unsolicited(line, data):
     """Send ``data`` now without a request, as a data button or a foot switch does."""
-    line._run_on_thread(lambda: line._transport.send(data))
+    line._run_on_thread(lambda: line._line.send(data))
 
 
 def change_answers(line, change, count=None):

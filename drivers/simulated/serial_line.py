@@ -1,0 +1,223 @@
+"""The device's end of a simulated serial line: a pseudo-terminal, or a TCP port of this machine."""
+
+from __future__ import annotations
+
+import fcntl
+import os
+import re
+import select
+import socket
+import struct
+import termios
+import tty
+from collections.abc import Sequence
+from contextlib import suppress
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Protocol
+
+CHUNK = 1024
+LOOPBACK = "127.0.0.1"
+NOT_IN_FILE_NAMES = re.compile(r"[^\w.-]+")
+
+
+class SerialLine(Protocol):
+    """Carries bytes to and from one client. Plugged in from the start.
+
+    One thread receives; ``send`` may be called from another one.
+    """
+
+    @property
+    def url(self) -> str:
+        """What ``serial.serial_for_url`` opens; the same after unplugging and plugging in again."""
+        ...
+
+    def descriptors(self) -> list[int]:
+        """The file descriptors to wait on for input."""
+        ...
+
+    def receive(self, ready: Sequence[int]) -> bytes:
+        """The bytes that came on the descriptors that are ``ready``, possibly none."""
+        ...
+
+    def send(self, data: bytes, wait_s: float = 0.0) -> None:
+        """Send ``data``; what a full buffer does not take within ``wait_s`` is lost, as on a cable."""
+        ...
+
+    def unplug(self) -> None:
+        """Break the line: a client that has it open gets an error, and opening it fails."""
+        ...
+
+    def plug_in(self) -> None:
+        """Restore the line."""
+        ...
+
+    def close(self) -> None:
+        """Release everything."""
+        ...
+
+
+class PtyLine:
+    """A pseudo-terminal behind a symbolic link of constant name, like those in ``/dev/serial/by-id``."""
+
+    def __init__(self, name: str) -> None:
+        self._folder = TemporaryDirectory(prefix="hexacell-")
+        self._link = Path(self._folder.name) / NOT_IN_FILE_NAMES.sub("-", name)
+        self._master = self._slave = -1
+        self.plug_in()
+
+    @property
+    def url(self) -> str:
+        """The path of the link."""
+        return str(self._link)
+
+    def plug_in(self) -> None:
+        """Create a pseudo-terminal in raw mode and link to it."""
+        if self._master >= 0:
+            return
+        self._master, self._slave = os.openpty()
+        tty.setraw(self._slave)
+        self._reset_speed()
+        os.set_blocking(self._master, False)
+        # packet mode: a read also reports that a client has configured the terminal
+        fcntl.ioctl(self._master, termios.TIOCPKT, struct.pack("i", 1))
+        self._link.symlink_to(os.ttyname(self._slave))
+
+    def unplug(self) -> None:
+        """Remove the link and close both ends."""
+        if self._master < 0:
+            return
+        self._link.unlink()
+        os.close(self._master)
+        os.close(self._slave)
+        self._master = self._slave = -1
+
+    def descriptors(self) -> list[int]:
+        """The master end."""
+        return [] if self._master < 0 else [self._master]
+
+    def receive(self, ready: Sequence[int]) -> bytes:
+        """One packet: data, or the notice of a change at the client's end."""
+        if self._master not in ready:
+            return b""
+        packet = os.read(self._master, CHUNK)
+        if packet[:1] != b"\0":
+            self._reset_speed()
+        return packet[1:] if packet[:1] == b"\0" else b""
+
+    def send(self, data: bytes, wait_s: float = 0.0) -> None:
+        """Write to the master end."""
+        if self._master >= 0:
+            _write_or_drop(self._master, data, wait_s)
+
+    def close(self) -> None:
+        """Close both ends and remove the link."""
+        self.unplug()
+        self._folder.cleanup()
+
+    def _reset_speed(self) -> None:
+        """Set a default speed, so that the next client has a setting to change.
+
+        A pseudo-terminal ignores parity, and ``tcsetattr`` fails if nothing at all changed; so a port
+        with parity could be opened only once (pyserial issue 196).
+        """
+        attributes = termios.tcgetattr(self._slave)
+        attributes[4] = attributes[5] = termios.B38400
+        termios.tcsetattr(self._slave, termios.TCSANOW, attributes)
+
+
+class SocketLine:
+    """A TCP port that serves one client at a time."""
+
+    def __init__(self) -> None:
+        self._port = 0
+        self._listener = self._bound()
+        self._port = self._listener.getsockname()[1]
+        self._client: socket.socket | None = None
+        self._plugged = False
+        self.plug_in()
+
+    @property
+    def url(self) -> str:
+        """``socket://`` address and port."""
+        return f"socket://{LOOPBACK}:{self._port}"
+
+    def plug_in(self) -> None:
+        """Accept clients."""
+        self._listener.listen(1)
+        self._plugged = True
+
+    def unplug(self) -> None:
+        """Drop the client; keep the port without accepting clients."""
+        self.close()
+        self._plugged = False
+        self._listener = self._bound()
+
+    def descriptors(self) -> list[int]:
+        """The listener while plugged in, and the client."""
+        listening = [self._listener] if self._plugged else []
+        connected = [self._client] if self._client else []
+        return [each.fileno() for each in (*listening, *connected)]
+
+    def receive(self, ready: Sequence[int]) -> bytes:
+        """Bytes from the client; accepts one if there is none."""
+        data = b""
+        if self._client is not None and self._client.fileno() in ready:
+            data = self._read(self._client)
+        if self._listener.fileno() in ready:
+            # A client that closes and connects again is gone only once all it sent has been read.
+            while self._client is not None and (rest := self._read(self._client)):
+                data += rest
+            self._accept()
+        return data
+
+    def send(self, data: bytes, wait_s: float = 0.0) -> None:
+        """Send to the client, if there is one."""
+        client = self._client
+        if client is not None:
+            with suppress(OSError, ValueError):  # the client may be dropped meanwhile
+                _write_or_drop(client.fileno(), data, wait_s)
+
+    def close(self) -> None:
+        """Drop the client and close the port."""
+        self._drop()
+        self._listener.close()
+
+    def _bound(self) -> socket.socket:
+        listener = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+        listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        listener.bind((LOOPBACK, self._port))
+        return listener
+
+    def _accept(self) -> None:
+        client, _ = self._listener.accept()
+        if self._client is not None:  # a serial port refuses a second client too
+            client.close()
+            return
+        client.setblocking(False)
+        client.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        self._client = client
+
+    def _read(self, client: socket.socket) -> bytes:
+        try:
+            data = client.recv(CHUNK)
+        except BlockingIOError:
+            return b""
+        except OSError:
+            data = b""
+        if not data:
+            self._drop()
+        return data
+
+    def _drop(self) -> None:
+        if self._client is not None:
+            self._client.close()
+            self._client = None
+
+
+def _write_or_drop(descriptor: int, data: bytes, wait_s: float) -> None:
+    """Write to a non-blocking descriptor; what finds no room within ``wait_s`` is dropped."""
+    while data:
+        if not select.select([], [descriptor], [], wait_s)[1]:
+            return
+        data = data[os.write(descriptor, data) :]

@@ -1,1 +1,0 @@
-"""Transports of simulated devices: pseudo-terminals, TCP, CAN over a serial line."""

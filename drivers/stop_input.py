@@ -16,7 +16,7 @@ import serial
 
 from drivers.interfaces import DeviceIdentity
 from drivers.serial.errors import opening_errors
-from hexacell.cell.limits import GuardSettings
+from hexacell.cell.measuring import GuardSettings
 from hexacell.errors import HexacellError
 
 SUBJECT = "stop line"

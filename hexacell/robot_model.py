@@ -9,7 +9,6 @@ from functools import cached_property
 import numpy as np
 
 from hexacell.cell.loader import Cell
-from hexacell.cell.mechanism_sections import mechanism_named
 from hexacell.cell.model import CellSettings
 from hexacell.controller_config.interface import ConfigFormat, ControllerGeometry
 from hexacell.errors import ReachError
@@ -125,7 +124,7 @@ class Robot:
 
 def config_format(settings: CellSettings) -> ConfigFormat:
     """The reader and writer of a cell's controller config."""
-    parameters = mechanism_named(settings.robot.mechanism).parameters
+    parameters = settings.mechanism.parameters
     made: ConfigFormat = load(Group.CONFIG_FORMATS, settings.controller.config_format)(parameters)
     return made
 
@@ -141,15 +140,15 @@ def robot_of(cell: Cell) -> Robot:
 
 def make_robot(settings: CellSettings, controller: ControllerGeometry) -> Robot:
     """The robot of a cell's settings and a controller geometry."""
-    mechanism, limits = mechanism_named(settings.robot.mechanism), settings.limits
-    nominal = Geometry.of(mechanism.parameters, settings.robot.nominal.document())
+    mechanism, limits = settings.mechanism, settings.limits
+    nominal = Geometry.of(mechanism.parameters, settings.robot.nominal.model_dump())
     drawing, _ = mechanism.normalize_frames(nominal)
     return Robot(
         mechanism=mechanism,
         drawing=drawing,
         controller=controller.geometry,
         branch=controller.branch,
-        tolerances=Tolerances.of_settings(mechanism.parameters, settings.tolerances.document()),
+        tolerances=Tolerances.of_settings(mechanism.parameters, settings.tolerances.model_dump()),
         noise=Noise(
             settings.noise.encoder_mm,
             settings.noise.gauge_mm,

@@ -94,7 +94,7 @@ class RobotPhysics:
         start_geometry: Geometry,
         start_joints: Array,
     ) -> None:
-        self._truth = Geometry.of(mechanism.parameters, settings.geometry.document())
+        self._truth = Geometry.of(mechanism.parameters, settings.geometry.model_dump())
         self._mechanism = mechanism
         self.on_motion_start: Callable[[], None] = lambda: None
         self._settings = settings

@@ -12,7 +12,6 @@ from hexacell import __version__
 from hexacell.application.device_setup import Connected, device_addresses, open_devices
 from hexacell.campaign.pose_list import pose_list_of
 from hexacell.cell.loader import Cell
-from hexacell.cell.mechanism_sections import mechanism_named
 from hexacell.controller_config.change import fingerprint
 from hexacell.controller_config.interface import ControllerGeometry
 from hexacell.errors import FileError, HexacellError, UsageError, flatten_errors
@@ -222,6 +221,6 @@ def _resumed_start(request: RunRequest) -> events.RunStarted:
 
 def robot_of_run(cell: Cell, started: events.RunStarted) -> Robot:
     """The robot with the geometry that the controller had when the run began."""
-    parameters = mechanism_named(cell.settings.robot.mechanism).parameters
+    parameters = cell.settings.mechanism.parameters
     geometry = Geometry.of(parameters, started.controller)
     return make_robot(cell.settings, ControllerGeometry(geometry, started.branch))

@@ -10,10 +10,9 @@ from tempfile import TemporaryDirectory
 from hexacell import __version__
 from hexacell.application.calibration_run import robot_of_run
 from hexacell.campaign.pose_list import pose_list_of
-from hexacell.cell.calibration import IdentificationSettings
 from hexacell.cell.loader import Cell, dump, load_cell
-from hexacell.cell.mechanism_sections import geometry_settings, mechanism_named
-from hexacell.cell.model import CellSettings
+from hexacell.cell.measuring import IdentificationSettings
+from hexacell.cell.model import CellSettings, geometry_settings
 from hexacell.controller_config.change import ConfigChange
 from hexacell.controller_config.write_back import BEFORE
 from hexacell.errors import FileError, HexacellError
@@ -158,6 +157,6 @@ def _config_text(folder: RunFolder, started: RunStarted) -> bytes | None:
 
 def _native_config(settings: CellSettings, started: RunStarted) -> bytes:
     """A config in the native format with the geometry that commanded the run."""
-    parameters = mechanism_named(settings.robot.mechanism).parameters
+    parameters = settings.mechanism.parameters
     geometry = dump(geometry_settings(parameters).model_validate(started.controller))
     return f"[geometry]\n{geometry}branch = {list(started.branch)}\n".encode()

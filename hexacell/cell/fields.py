@@ -20,6 +20,10 @@ class Section(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True)
 
 
+class GeometrySettings(Section):
+    """One value a parameter of the mechanism, under the symbols of the kinds that the mechanism has."""
+
+
 def broken_rule(problem: str, action: str) -> PydanticCustomError:
     """The error that a validator raises: the problem and the next action."""
     return PydanticCustomError("broken_rule", "{problem}", {"problem": problem, "action": action})

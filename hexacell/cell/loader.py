@@ -16,8 +16,7 @@ from pydantic import ValidationError
 
 from hexacell.cell.diagnostics import Diagnosis, ModelLookup
 from hexacell.cell.fields import Section
-from hexacell.cell.mechanism_sections import DEFAULT_MECHANISM
-from hexacell.cell.model import CellSettings, cell_model
+from hexacell.cell.model import DEFAULT_MECHANISM, CellSettings, cell_model
 from hexacell.errors import FileError, SeveralErrors
 from hexacell.plugins import Group, names
 from hexacell.storage.atomic_files import read_text

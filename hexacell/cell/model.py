@@ -1,38 +1,39 @@
-"""The cell file as a whole, and the rules that span its sections."""
+"""The cell file as a whole, the rules that span its sections, and the keys that the mechanism decides."""
 
 from __future__ import annotations
 
 from functools import cache
-from typing import Literal, Self
+from typing import Any, Literal, Self, TypeVar
 
 from pydantic import Field, ValidationError, create_model, field_validator, model_validator
 from pydantic_core import InitErrorDetails
 
-from hexacell.cell.calibration import (
-    AcceptanceSettings,
-    IdentificationSettings,
-    StationSettings,
-    TaskSettings,
-    VerificationSettings,
-)
 from hexacell.cell.devices import ControllerSettings, EncoderSettings, GaugeSettings, ThermometerSettings
-from hexacell.cell.fields import Section, broken_rule
-from hexacell.cell.limits import (
+from hexacell.cell.fields import Finite, GeometrySettings, NotNegative, Positive, Section, broken_rule
+from hexacell.cell.measuring import (
+    AcceptanceSettings,
     GuardSettings,
+    IdentificationSettings,
     LimitSettings,
     NoiseSettings,
+    StationSettings,
+    TaskSettings,
     TimingSettings,
-)
-from hexacell.cell.mechanism_sections import (
-    DEFAULT_MECHANISM,
-    GeometrySettings,
-    ToleranceSettings,
-    geometry_settings,
-    mechanism_named,
-    tolerance_settings,
+    VerificationSettings,
 )
 from hexacell.cell.recovery import RecoverySettings
 from hexacell.cell.simulation import SimulationSettings
+from hexacell.kinematics.mechanism import Mechanism
+from hexacell.kinematics.parameters import ParameterKind, ParameterSet
+from hexacell.plugins import Group, load
+
+DEFAULT_MECHANISM = "hexaglide"
+
+SectionType = TypeVar("SectionType", bound=Section)
+
+
+class ToleranceSettings(Section):
+    """Largest deviations of the built robot from its drawing; has a key a kind, and ``ball_mm``."""
 
 
 class RobotSettings(Section):
@@ -43,7 +44,7 @@ class RobotSettings(Section):
 
 
 class CellSettings(Section):
-    """A whole cell file, for any mechanism; :func:`cell_model` is the model of one."""
+    """A whole cell file."""
 
     version: Literal[1] = Field(1, description="of this file's format")
     name: str = Field(min_length=1, description="of the cell, on screens and in reports")
@@ -64,6 +65,11 @@ class CellSettings(Section):
     recovery: RecoverySettings = RecoverySettings()
     task: TaskSettings = TaskSettings()
     simulation: SimulationSettings | None = None
+
+    @property
+    def mechanism(self) -> Mechanism:
+        """The mechanism that the file names; raises ``UsageError`` if it is not installed."""
+        return mechanism_named(self.robot.mechanism)
 
     @field_validator("gauges")
     @classmethod
@@ -102,37 +108,67 @@ class CellSettings(Section):
         return self
 
 
+def _unreachable(place: tuple[str | int, ...], problem: str) -> InitErrorDetails:
+    rule = broken_rule(f"{problem}; only a cell with a [simulation] needs none", "Add it")
+    return InitErrorDetails(type=rule, loc=place, input=None)
+
+
+@cache
+def mechanism_named(name: str) -> Mechanism:
+    """The mechanism that is announced under a name; raises ``UsageError`` if there is none."""
+    found: Mechanism = load(Group.MECHANISMS, name)()
+    return found
+
+
 @cache
 def cell_model(mechanism: str) -> type[CellSettings]:
-    """The model of the cell files of one mechanism, whose parameters decide some of the keys.
-
-    Raises:
-        UsageError: no such mechanism is installed.
-    """
+    """The model of the cell files of one mechanism; raises ``UsageError`` if it is not installed."""
     parameters = mechanism_named(mechanism).parameters
     geometry, tolerances = geometry_settings(parameters), tolerance_settings(parameters)
     has_defaults = not any(field.is_required() for field in tolerances.model_fields.values())
-    nominal = (geometry, RobotSettings.model_fields["nominal"])
-    truth = (geometry, SimulationSettings.model_fields["geometry"])
-    robot = create_model(
-        "RobotSettings", __base__=RobotSettings, __doc__=RobotSettings.__doc__, nominal=nominal
-    )
-    simulation = create_model(
-        "SimulationSettings",
-        __base__=SimulationSettings,
-        __doc__=SimulationSettings.__doc__,
-        geometry=truth,
-    )
-    return create_model(
-        "CellSettings",
-        __base__=CellSettings,
-        __doc__="A whole cell file.",
+    robot = _derived(RobotSettings, nominal=(geometry, RobotSettings.model_fields["nominal"]))
+    truth = SimulationSettings.model_fields["geometry"]
+    simulation = _derived(SimulationSettings, geometry=(geometry, truth))
+    return _derived(
+        CellSettings,
         robot=(robot, ...),
         tolerances=(tolerances, tolerances() if has_defaults else ...),
         simulation=(simulation | None, None),
     )
 
 
-def _unreachable(place: tuple[str | int, ...], problem: str) -> InitErrorDetails:
-    rule = broken_rule(f"{problem}; only a cell with a [simulation] needs none", "Add it")
-    return InitErrorDetails(type=rule, loc=place, input=None)
+def geometry_settings(parameters: ParameterSet) -> type[GeometrySettings]:
+    """The section for a geometry of these parameters."""
+    fields: dict[str, Any] = {
+        kind.symbol: (_array_type(kind.shape), Field(description=kind.meaning)) for kind in parameters.kinds
+    }
+    return _derived(GeometrySettings, **fields)
+
+
+def tolerance_settings(parameters: ParameterSet) -> type[ToleranceSettings]:
+    """The section for the tolerances of these parameters."""
+    fields: dict[str, Any] = {
+        kind.tolerance_key: (Positive, _tolerance_field(kind)) for kind in parameters.kinds
+    }
+    kinds = " and ".join(kind.symbol for kind in parameters.kinds if kind.has_ball_offset)
+    description = f"mounting of the ball: an offset common to all {kinds}"
+    fields["ball_mm"] = (NotNegative, Field(0.0, description=description))
+    return _derived(ToleranceSettings, **fields)
+
+
+def _tolerance_field(kind: ParameterKind) -> Any:  # noqa: ANN401 - what pydantic's Field returns
+    default = ... if kind.default_tolerance is None else kind.default_tolerance
+    return Field(default, description=kind.tolerance_meaning)
+
+
+def _array_type(shape: tuple[int, ...]) -> Any:  # noqa: ANN401 - a type made here
+    made: Any = Finite
+    for length in reversed(shape):
+        made = tuple.__class_getitem__((made,) * length)
+    return made
+
+
+def _derived(base: type[SectionType], **fields: Any) -> type[SectionType]:  # noqa: ANN401
+    """A section with the fields that the mechanism decides; each is a type and a default or description."""
+    made: type[SectionType] = create_model(base.__name__, __base__=base, __doc__=base.__doc__, **fields)
+    return made

@@ -6,8 +6,7 @@ from typing import Literal
 
 from pydantic import Field
 
-from hexacell.cell.fields import NotNegative, Positive, Section
-from hexacell.cell.mechanism_sections import GeometrySettings
+from hexacell.cell.fields import GeometrySettings, NotNegative, Positive, Section
 
 FaultKind = Literal[
     "emergency stop",

@@ -9,7 +9,7 @@ import numpy as np
 
 from drivers.errors import GaugeAtEnd, GaugeUnsteady
 from drivers.interfaces import EncoderSample, GaugeReading
-from hexacell.cell.limits import TimingSettings
+from hexacell.cell.measuring import TimingSettings
 from hexacell.clock import CellClock
 from hexacell.errors import DeviceError, HexacellError, consists_only_of, flatten_errors
 from hexacell.kinematics.rotations import Array

@@ -32,7 +32,7 @@ class TableOne:
 def table_one() -> TableOne:
     cell = load_cell(Path(bundled_config("simulated-hexaglide")))
     assert cell.settings.simulation is not None
-    values = cell.settings.simulation.geometry
+    values = cell.settings.simulation.geometry.model_dump()
     return TableOne(
         robot_of(cell),
         hexaglide_geometry(values["S"], values["B"], values["l"]),

@@ -22,8 +22,8 @@ from drivers.simulated.cell import SimulatedCell
 from drivers.wire_trace import WireTrace
 from hexacell.application.device_setup import devices_of
 from hexacell.cell.bundled import bundled_config
-from hexacell.cell.limits import GuardSettings
 from hexacell.cell.loader import Cell, load_cell
+from hexacell.cell.measuring import GuardSettings
 from hexacell.cell.simulation import FaultKind, SimulatedFault
 from hexacell.clock import CellClock
 from hexacell.controller_config.toml_format import NativeToml

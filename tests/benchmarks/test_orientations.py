@@ -80,7 +80,7 @@ def truth_of(cell: Cell, robot: Robot, number: int) -> Geometry:
     """Table 1's robot is number 0."""
     if number == 0:
         assert cell.settings.simulation is not None
-        actual = cell.settings.simulation.geometry
+        actual = cell.settings.simulation.geometry.model_dump()
         return robot.mechanism.normalize_frames(hexaglide_geometry(actual["S"], actual["B"], actual["l"]))[
             0
         ]

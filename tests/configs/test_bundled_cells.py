@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from hexacell.cell.fields import GeometrySettings
 from hexacell.cell.loader import Cell, describe, dump, load_cell
-from hexacell.cell.mechanism_sections import GeometrySettings
 from hexacell.controller_config.toml_format import NativeToml
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import Branch, inverse_kinematics
-from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS, Hexaglide, hexaglide_geometry
+from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS, Hexaglide
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.sensitivity import singularity_margin
 
@@ -32,7 +32,7 @@ def cell(request: pytest.FixtureRequest) -> Cell:
 
 
 def geometry(values: GeometrySettings) -> Geometry:
-    return hexaglide_geometry(values["S"], values["B"], values["l"])
+    return Geometry.of(HEXAGLIDE_PARAMETERS, values.model_dump())
 
 
 def test_controller_starts_from_the_drawing(cell):
@@ -44,8 +44,8 @@ def test_controller_starts_from_the_drawing(cell):
 def test_truth_is_within_the_tolerances(cell):
     settings = cell.settings
     assert settings.simulation is not None
-    nominal, actual = settings.robot.nominal, settings.simulation.geometry
-    tolerances = settings.tolerances.document()
+    nominal, actual = settings.robot.nominal.model_dump(), settings.simulation.geometry.model_dump()
+    tolerances = settings.tolerances.model_dump()
     assert np.abs(np.subtract(actual["S"], nominal["S"])).max() <= tolerances["S_mm"]
     assert (
         np.abs(np.subtract(actual["B"], nominal["B"])).max() <= tolerances["B_mm"] + tolerances["ball_mm"]
@@ -56,7 +56,8 @@ def test_truth_is_within_the_tolerances(cell):
 def test_geometries_obey_the_paper_frame(cell):
     """S2 = 0, S3z = 0, B2z = B3z = B5z, B2y = B5y: the drawing and the truth can be compared."""
     assert cell.settings.simulation is not None
-    for values in (cell.settings.robot.nominal, cell.settings.simulation.geometry):
+    for section in (cell.settings.robot.nominal, cell.settings.simulation.geometry):
+        values = section.model_dump()
         assert values["S"][1] == (0, 0, 0)
         assert values["S"][2][2] == 0
         assert values["B"][1][2] == values["B"][2][2] == values["B"][4][2]
@@ -96,9 +97,10 @@ def test_owners_configs_hold_more_than_the_geometry():
 def test_simulated_hexaglide_is_table_1():
     settings = load_cell(CONFIGS / "simulated-hexaglide.toml").settings
     assert settings.simulation is not None
-    assert settings.robot.nominal["l"] == (590, 580, 615, 615, 580, 590)
-    assert settings.robot.nominal["B"][5] == (90, -67, -125)
-    actual = settings.simulation.geometry
+    drawing = settings.robot.nominal.model_dump()
+    assert drawing["l"] == (590, 580, 615, 615, 580, 590)
+    assert drawing["B"][5] == (90, -67, -125)
+    actual = settings.simulation.geometry.model_dump()
     assert actual["S"][0] == (0.861, -160.815, 1.501)
     assert actual["B"][5] == (86.346, -67.912, -130.613)
     assert actual["l"] == (583.941, 578.279, 610.563, 614.068, 585.272, 593.461)
@@ -106,7 +108,7 @@ def test_simulated_hexaglide_is_table_1():
     assert settings.identification.orientations == 11
     assert settings.verification.points == (P6, (100, 100, 550))
     assert settings.limits.gauge_travel_mm == 5
-    assert settings.tolerances.document() == {"S_mm": 7, "B_mm": 7, "l_mm": 7, "ball_mm": 0}
+    assert settings.tolerances.model_dump() == {"S_mm": 7, "B_mm": 7, "l_mm": 7, "ball_mm": 0}
     assert {settings.noise.encoder_mm, settings.noise.gauge_mm} == {0.01}
     assert [(gauge.axis, gauge.protocol) for gauge in settings.gauges] == [
         ("x", "sylvac"),
@@ -120,10 +122,11 @@ def test_simulated_hexaglide_is_table_1():
 def test_paper_experiment_is_tables_3_and_4():
     settings = load_cell(CONFIGS / "paper-experiment.toml").settings
     assert settings.simulation is not None
-    assert settings.simulation.geometry["S"][3] == (1.08, 155.85, -0.26)
-    assert settings.simulation.geometry["B"][0] == (-90.04, -67.09, -151.27)
-    assert settings.simulation.geometry["l"] == (590.58, 579.58, 615.75, 619.33, 578.71, 592.50)
+    actual = settings.simulation.geometry.model_dump()
+    assert actual["S"][3] == (1.08, 155.85, -0.26)
+    assert actual["B"][0] == (-90.04, -67.09, -151.27)
+    assert actual["l"] == (590.58, 579.58, 615.75, 619.33, 578.71, 592.50)
     assert settings.identification.points == (P1, P2, P3)
     assert settings.verification.points == (P4, P5, P6)
     assert (settings.identification.orientations, settings.verification.orientations) == (20, 20)
-    assert settings.tolerances.document()["ball_mm"] == 40
+    assert settings.tolerances.model_dump()["ball_mm"] == 40

@@ -9,7 +9,7 @@ import pytest
 import serial
 
 from drivers.stop_input import CombinedStopInput, StopContact, stop_input_of
-from hexacell.cell.limits import GuardSettings
+from hexacell.cell.measuring import GuardSettings
 from hexacell.errors import DeviceError, FileError
 
 

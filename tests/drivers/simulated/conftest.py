@@ -133,7 +133,7 @@ def make_twin(bundled_cell: Cell) -> MakeTwin:
         machine = SimulatedMachine(
             Hexaglide(), NativeToml(HEXAGLIDE_PARAMETERS), config, physics, clock, home
         )
-        values = simulation.geometry
+        values = simulation.geometry.model_dump()
         truth = hexaglide_geometry(values["S"], values["B"], values["l"])
         return Twin(clock, physics, machine, config, truth, read.geometry)
 

@@ -148,7 +148,10 @@ async def test_reloading_reads_the_config_and_moves_nothing(bundled_cell) -> Non
         async with drivers(cell.settings) as (_, _, controller):
             await controller.prepare()
             sliders, believed = cell.machine.joints(), await controller.pose()
-            config, values = bundled_cell.config_path, bundled_cell.settings.simulation.geometry
+            config, values = (
+                bundled_cell.config_path,
+                bundled_cell.settings.simulation.geometry.model_dump(),
+            )
             config.write_text(
                 NativeToml(HEXAGLIDE_PARAMETERS).rewrite(config.read_text(), _geometry(values))
             )

@@ -247,7 +247,7 @@ def test_a_triad_may_stand_askew(make_twin) -> None:
 
 
 def test_a_world_that_cannot_stand_there_is_refused(make_twin, bundled_cell) -> None:
-    truth = bundled_cell.settings.simulation.geometry
+    truth = bundled_cell.settings.simulation.geometry.model_dump()
     short = [length / 3.0 for length in truth["l"]]
     with pytest.raises(ReachError, match=r"cannot reach X0\.000"):
         make_twin(geometry__l=short)

@@ -69,7 +69,7 @@ def test_the_beginning_says_with_what_it_began(finished) -> None:
     assert started.cell == "simulated-hexaglide"
     assert started.cell_text == finished.cell.text
     assert started.config_sha256 != fingerprint(finished.cell.config_path)
-    assert started.controller == finished.cell.settings.robot.nominal.document()
+    assert started.controller == finished.cell.settings.robot.nominal.model_dump()
     assert started.branch == (-1, -1, -1, 1, 1, 1)
     protocols = [device.protocol for device in started.devices]
     assert protocols == ["sylvac", "mux10", "cdi", *["cia406"] * 6, "linuxcncrsh"]

@@ -100,7 +100,7 @@ async def test_worse_than_before_is_rolled_back_bit_for_bit(proposed, finished) 
 
 
 def _drawing(site: Any) -> Geometry:
-    nominal = site.cell.settings.robot.nominal
+    nominal = site.cell.settings.robot.nominal.model_dump()
     return hexaglide_geometry(nominal["S"], nominal["B"], nominal["l"])
 
 

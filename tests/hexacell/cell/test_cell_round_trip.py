@@ -7,10 +7,8 @@ from typing import Any, get_args
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hexacell.cell import calibration, devices, limits, model, simulation
+from hexacell.cell import devices, measuring, model, simulation
 from hexacell.cell.loader import describe, dump, schema
-from hexacell.cell.mechanism_sections import geometry_settings
-from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS
 
 finite = st.floats(allow_nan=False, allow_infinity=False)
 positive = st.floats(min_value=0, exclude_min=True, allow_infinity=False)
@@ -27,7 +25,7 @@ MODEL = model.cell_model("hexaglide")
 ROBOT: Any = MODEL.model_fields["robot"].annotation
 SIMULATION: Any = get_args(MODEL.model_fields["simulation"].annotation)[0]
 geometries = st.builds(
-    geometry_settings(HEXAGLIDE_PARAMETERS),
+    ROBOT.model_fields["nominal"].annotation,
     S=st.tuples(*[points] * 6),
     B=st.tuples(*[points] * 6),
     l=six,
@@ -73,16 +71,16 @@ cells = st.builds(
         offset_mm=six,
         serial_numbers=st.none() | st.tuples(*[st.integers(0, 2**32 - 1)] * 6),
     ),
-    limits=st.builds(limits.LimitSettings, tilt_deg=st.floats(1e-300, 80)),
+    limits=st.builds(measuring.LimitSettings, tilt_deg=st.floats(1e-300, 80)),
     identification=st.builds(
-        calibration.IdentificationSettings,
+        measuring.IdentificationSettings,
         points=st.lists(points, min_size=2, max_size=4).map(tuple),
         orientations=st.integers(2, 10**30),
     ),
     verification=st.builds(
-        calibration.VerificationSettings, points=st.lists(points, min_size=1, max_size=2).map(tuple)
+        measuring.VerificationSettings, points=st.lists(points, min_size=1, max_size=2).map(tuple)
     ),
-    task=st.builds(calibration.TaskSettings, poses=st.lists(six, max_size=2).map(tuple)),
+    task=st.builds(measuring.TaskSettings, poses=st.lists(six, max_size=2).map(tuple)),
     simulation=st.builds(
         SIMULATION,
         geometry=geometries,

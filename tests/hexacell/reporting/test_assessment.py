@@ -10,8 +10,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from hexacell.cell.bundled import bundled_config
-from hexacell.cell.calibration import TaskSettings
 from hexacell.cell.loader import load_cell
+from hexacell.cell.measuring import TaskSettings
 from hexacell.controller_config.interface import ControllerGeometry
 from hexacell.identification.estimator import identify
 from hexacell.identification.solver.levenberg_marquardt import Termination

@@ -9,7 +9,7 @@ from dataclasses import replace
 import pytest
 
 from drivers.interfaces import ControllerStatus
-from hexacell.cell.limits import TimingSettings
+from hexacell.cell.measuring import TimingSettings
 from hexacell.errors import DeviceError
 from procedures.devices.device_set import Devices
 from procedures.devices.live_values import LiveValues

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from drivers.errors import GaugeAtEnd, GaugeSilent, GaugeUnsteady
-from hexacell.cell.limits import TimingSettings
+from hexacell.cell.measuring import TimingSettings
 from hexacell.errors import DeviceError, ExitCode, SeveralErrors
 from procedures.devices.settling import LEAST_WINDOWS, read_all, settle
 

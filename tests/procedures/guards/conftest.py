@@ -18,7 +18,7 @@ import pytest
 from drivers.controllers.errors import MotionInterrupted
 from drivers.errors import GaugeSilent, WrongSetting
 from drivers.interfaces import ControllerStatus, EncoderSample, GaugeReading
-from hexacell.cell.limits import GuardSettings
+from hexacell.cell.measuring import GuardSettings
 from hexacell.errors import DeviceError
 from procedures.run import events
 from procedures.run.questions import Question

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hexacell.cell.mechanism_sections import geometry_settings, tolerance_settings
+from hexacell.cell.model import geometry_settings, tolerance_settings
 from hexacell.controller_config.toml_format import NativeToml
 from hexacell.errors import FileError
 from hexacell.identification.estimator import identify
@@ -149,8 +149,8 @@ def test_what_its_config_lacks_is_named_by_its_own_kinds(tmp_path: Path) -> None
 def test_the_cell_file_has_its_keys(drawing: Geometry) -> None:
     section = geometry_settings(PARAMETERS)
     assert list(section.model_fields) == ["z", "A", "B"]
-    assert section.model_validate(drawing.document())["z"] == tuple(drawing["z"])
-    assert list(tolerance_settings(PARAMETERS)().document()) == ["z_mm", "A_mm", "B_mm", "ball_mm"]
+    assert section.model_validate(drawing.document()).model_dump()["z"] == tuple(drawing["z"])
+    assert list(tolerance_settings(PARAMETERS)().model_dump()) == ["z_mm", "A_mm", "B_mm", "ball_mm"]
 
 
 def test_its_parameters_have_names_for_people() -> None:

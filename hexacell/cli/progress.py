@@ -33,7 +33,7 @@ class RunProgress:
     def __call__(self, event: events.Event, state: RunState) -> None:
         """Show one event."""
         if not self.has_started:
-            # Reset, not updated: records of an earlier attempt say nothing about the present speed.
+            # Reset, not updated: records of an earlier attempt do not count for the present speed.
             self._bar.reset(self._task, completed=completed(state))
             self.has_started = True
         if _may_ask(event):

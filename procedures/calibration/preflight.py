@@ -38,14 +38,12 @@ def _plan_failures(calibration: Calibration, *, unattended: bool) -> Iterator[li
         if not unreachable and not too_few:
             yield from feasibility.optimisation_failures(calibration.plan)
     if unattended and calibration.settings.stations.placement == "by-hand":
-        yield [_nobody_to_place_gauges()]
-
-
-def _nobody_to_place_gauges() -> AnswerNeeded:
-    return AnswerNeeded(
-        "unattended running is not possible: the gauges are put at each point by hand",
-        action='Give every point fixed gauges and say placement = "fixed" in [stations]',
-    )
+        yield [
+            AnswerNeeded(
+                "unattended running is not possible: the gauges are put at each point by hand",
+                action='Give every point fixed gauges and set placement = "fixed" in [stations]',
+            )
+        ]
 
 
 def _held_out_failures(calibration: Calibration) -> Iterator[HexacellError]:

@@ -40,7 +40,7 @@ class MountedGauge:
 
 @dataclass(frozen=True, slots=True)
 class Devices:
-    """Three gauges, the encoders, the controller, and the line by which anybody may stop it.
+    """Three gauges, the encoders, the controller, and the stop input.
 
     What a run reads of them is also kept in ``live``.
     """
@@ -134,7 +134,7 @@ class Thermometers:
         return tuple(identity for identity in found if identity is not None)
 
     async def read(self) -> tuple[Temperature, ...]:
-        """What all of them say now."""
+        """The temperatures now."""
         return tuple(await asyncio.gather(*(self._temperature(one) for one in self._thermometers)))
 
     async def close(self) -> None:

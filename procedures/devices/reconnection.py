@@ -29,7 +29,7 @@ class DeviceReplaced(DeviceError):
 
 
 async def reconnect(devices: Devices, error: HexacellError, known: Sequence[DeviceIdentity]) -> bool:
-    """Reopen the devices that an error says are lost; True if a gauge is among them: its zero is void.
+    """Reopen the devices that are lost by an error; True if a gauge is among them: its zero is void.
 
     Raises:
         DeviceReplaced: another device answers.

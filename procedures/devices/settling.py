@@ -97,7 +97,7 @@ def _is_full(window: deque[DeviceSnapshot], timing: TimingSettings) -> bool:
 
 
 def _still_swings(error: HexacellError) -> bool:
-    """Whether it says no more than that the ball moves; that may touch an end of the travel too."""
+    """Whether it only means that the ball moves, which may reach an end of the travel too."""
     unsteady = any(isinstance(one, GaugeUnsteady) for one in flatten_errors(error))
     return unsteady and consists_only_of(error, GaugeUnsteady, GaugeAtEnd)
 

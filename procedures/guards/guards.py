@@ -41,7 +41,11 @@ STUCK_GAUGE_SIGMAS = 5.0
 
 
 class Guards:
-    """The guards of one cell."""
+    """The guards of one cell.
+
+    An action under guards raises ``GuardTripped`` if one of them trips: before it, during it, or at the
+    end of a move.
+    """
 
     def __init__(self, settings: CellSettings, devices: Devices, clock: CellClock, folder: Path) -> None:
         self._settings = settings
@@ -49,22 +53,14 @@ class Guards:
         self.supervisor = MotionSupervisor(devices.controller, clock, folder, settings.guards.free_disk_mb)
 
     async def prepare(self) -> None:
-        """Make the controller ready to move; releases the latch.
-
-        Raises:
-            GuardTripped: motion is forbidden, an encoder has a fault, or the disk is full.
-        """
+        """Make the controller ready to move; releases the latch."""
         self.supervisor.clear()
         await self.supervisor.supervise(
             self._devices.controller.prepare, self._pollers(), self._limits(), STOP_GRACE_S
         )
 
     async def move(self, step: Move, state: RunState, commanded: Callable[[], Array]) -> None:
-        """Move to the target of a step; ``commanded`` gives the slider positions (6,), mm, at its pose.
-
-        Raises:
-            GuardTripped: a guard tripped before, during or at the end of the move.
-        """
+        """Move to the target of a step; ``commanded`` gives the slider positions (6,), mm, at its pose."""
         gauges = self._watched_gauges(step, state)
         pollers = self._pollers(controller=True, gauges=gauges)
         reached = await self.supervisor.supervise(
@@ -78,29 +74,17 @@ class Guards:
             raise await self.supervisor.stop(trip)
 
     async def at_standstill(self, action: Supervised[Result]) -> Result:
-        """Run an action during which the robot must stay at standstill.
-
-        Raises:
-            GuardTripped: it moved, or motion is forbidden.
-        """
+        """Run an action during which the robot must stay at standstill."""
         limits = self._limits(rest_mm=self._settings.guards.following_mm)
         return await self.supervisor.supervise(action, self._pollers(controller=True), limits)
 
     async def during_readings(self, action: Supervised[Result]) -> Result:
-        """Run an action that reads gauges and encoders, which are therefore not polled.
-
-        Raises:
-            GuardTripped: motion is forbidden, or the controller was disabled.
-        """
+        """Run an action that reads gauges and encoders, which are therefore not polled."""
         pollers = self._pollers(controller=True, encoders=False)
         return await self.supervisor.supervise(action, pollers, self._limits())
 
     async def reload(self) -> None:
-        """Make the controller reload its config.
-
-        Raises:
-            GuardTripped: motion is forbidden, or an encoder has a fault.
-        """
+        """Make the controller reload its config."""
         await self.supervisor.supervise(
             self._devices.controller.reload, self._pollers(), self._limits(), STOP_GRACE_S
         )

@@ -63,14 +63,14 @@ def controller_not_ready(devices: PolledDevices, _limits: GuardLimits) -> Trip |
     if report is None or report.value is None or report.value.may_move:
         return None
     status = report.value
-    said = "; ".join(status.error_messages)
-    if any("following error" in complaint.lower() for complaint in status.error_messages):
+    messages = "; ".join(status.error_messages)
+    if "following error" in messages.lower():
         action = "Look for what blocks that leg, then switch on and resume"
-        return Trip(Guard.FOLLOWING, report.device, f"switched itself off: {said}", action)
+        return Trip(Guard.FOLLOWING, report.device, f"switched itself off: {messages}", action)
     problem = "is in emergency stop" if status.estop else "was switched off"
     release = "release the emergency stop" if status.estop else "see to it"
     action = f"Find out why, {release}, then resume"
-    return Trip(Guard.CONTROLLER, report.device, f"{problem}: {said}" if said else problem, action)
+    return Trip(Guard.CONTROLLER, report.device, f"{problem}: {messages}" if messages else problem, action)
 
 
 def encoder_fault(devices: PolledDevices, _limits: GuardLimits) -> Trip | None:
@@ -217,7 +217,7 @@ def _is_fault(report: DevicePoller[object]) -> bool:
 
 
 def _fault_trip(guard: Guard, report: DevicePoller[object]) -> Trip:
-    assert report.error is not None  # noqa: S101 - callers see to it
+    assert report.error is not None  # noqa: S101 - callers have checked it
     error = report.error
     action = error.action or "Check it, then resume"
     return Trip(guard, error.subject or report.device, error.problem, action, (error,))

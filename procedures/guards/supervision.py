@@ -202,7 +202,7 @@ class GuardMonitor:
             raise self._failure
 
     def _on_task_end(self, task: asyncio.Task[None]) -> None:
-        """Release everybody who waits if a task has failed."""
+        """Release what waits if a task has failed."""
         if not task.cancelled() and (error := task.exception()) is not None:
             self._failure = self._failure or error
             self._ended.set()

@@ -112,7 +112,7 @@ class RecordedOperator:
     recorded: Recorded
 
     async def ask(self, question: Question) -> str | None:
-        """Who approved a change, if anybody did; a question about a failure is never asked here."""
+        """Who approved a change, if a person did; a question about a failure is never asked here."""
         if isinstance(self.recorded.outcome, events.Committed):
             return self.recorded.outcome.approved_by
         return question.default

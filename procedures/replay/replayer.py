@@ -139,16 +139,13 @@ class Replayer:
         if not self._scope.derives(step):
             return
         self.report.results += 1
-        derived = await self._outcome_of(step, event)
+        self._executor.recorded.outcome = event
+        derived = await _result_or_error(self._executor.perform(step, self._state))
         self._compare_with(Aspect.RESULT, step.key, event, derived)
         if isinstance(event, events.RecordTaken):
             encoders = self._executor.cell.settings.encoders
             if change := counts_mismatch(event.reading, encoders):
                 self._add_difference(Aspect.RESULT, step.key, change)
-
-    async def _outcome_of(self, step: Step, outcome: events.Event) -> events.Event | Exception:
-        self._executor.recorded.outcome = outcome
-        return await _result_or_error(self._executor.perform(step, self._state))
 
     async def _interruption(self, event: events.Interrupted) -> None:
         """A failure without a device or the disk is computed again; any other is taken from the journal."""
@@ -157,9 +154,7 @@ class Replayer:
         elif self._current_step is None:
             await self._undecided(event)
         elif self._current_step.kind in COMPUTED_STEPS and self._scope.derives(self._current_step):
-            self.report.results += 1
-            derived = await self._outcome_of(self._current_step, event)
-            self._compare_with(Aspect.RESULT, self._current_step.key, event, derived)
+            await self._outcome(self._current_step, event)
         else:
             self.report.taken += 1
 

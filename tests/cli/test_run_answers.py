@@ -180,7 +180,7 @@ class TestAPersonAtTheTerminal:
         question = terminal.read_until("Write this into the controller's config? Type yes: ")
         return process, question, fast_cell
 
-    def test_sees_the_change_and_says_yes(self, waiting, terminal, demo):
+    def test_sees_the_change_and_approves_it(self, waiting, terminal, demo):
         process, question, cell = waiting
         lines = question.replace("\r\n", "\n").splitlines()
         assert {"--- config-before", "+++ config-after"} <= set(lines)

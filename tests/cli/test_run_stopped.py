@@ -64,7 +64,7 @@ def to_go_on(words: str) -> list[str]:
     return arguments
 
 
-def test_a_check_is_stopped_at_once_and_resumed_as_it_says(start, typed_here, good_cell):
+def test_a_check_is_stopped_at_once_and_resumed_by_the_printed_command(start, typed_here, good_cell):
     config = good_cell.controller.read_bytes()
     process = start("run", good_cell.cell, "--unattended")
     under_way(process, good_cell, 1)
@@ -117,7 +117,7 @@ def test_a_stop_before_anything_was_measured_leaves_nothing_to_resume(start, goo
     assert ("To go on" in outcome.out) == bool(good_cell.runs())
 
 
-def test_a_closed_terminal_stops_it_too_and_json_says_so(start, good_cell):
+def test_a_closed_terminal_stops_it_too_with_a_json_document(start, good_cell):
     process = start("run", good_cell.cell, "--unattended", "--json")
     under_way(process, good_cell, 1)
     outcome = stopped_at_once(process, good_cell, signal.SIGHUP)

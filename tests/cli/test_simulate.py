@@ -39,7 +39,7 @@ def shared(tmp_path_factory, processes):
         yield folder, process, process.out
 
 
-def test_it_prints_a_complete_cell_file_before_it_says_that_it_serves(shared, typed_here, tmp_path):
+def test_it_prints_a_complete_cell_file_before_it_serves(shared, typed_here, tmp_path):
     folder, _, text = shared
     settings = tomllib.loads(text)
     assert "simulation" not in settings
@@ -99,7 +99,7 @@ def test_it_starts_no_other_processes(shared):
     assert Path(f"/proc/{pid}/task/{pid}/children").read_text() == ""
 
 
-def test_it_ends_while_a_run_talks_to_it(served, start):
+def test_it_ends_while_a_run_is_connected(served, start):
     """The run then reports which device is lost, and that it can be resumed."""
     simulation, printed = served
     run = start("run", printed, "--mode", "check")

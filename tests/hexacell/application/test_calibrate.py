@@ -32,7 +32,7 @@ def test_it_passes(finished) -> None:
     assert judged.verdict is Verdict.PASS
 
 
-def test_listeners_heard_what_the_journal_says(finished) -> None:
+def test_listeners_get_the_events_of_the_journal(finished) -> None:
     assert finished.told == finished.history
 
 
@@ -52,7 +52,7 @@ def test_the_way_back_is_kept(finished) -> None:
     assert receipt.sha256_after == fingerprint(finished.cell.config_path)
 
 
-def test_the_run_folder_says_everything(finished) -> None:
+def test_the_run_folder_has_everything(finished) -> None:
     folder, state = finished.folder, fold(finished.history)
     assert (folder.path / "cell.toml").read_text() == finished.cell.text
     assert read_measurements(folder.measurements) == state.measurements()
@@ -64,7 +64,7 @@ def test_the_run_folder_says_everything(finished) -> None:
     assert folder.wire.stat().st_size > 1000
 
 
-def test_the_beginning_says_with_what_it_began(finished) -> None:
+def test_the_first_event_has_the_inputs_of_the_run(finished) -> None:
     started = finished.history[0]
     assert started.cell == "simulated-hexaglide"
     assert started.cell_text == finished.cell.text
@@ -181,7 +181,7 @@ async def test_a_run_that_somebody_else_writes_is_not_resumed(make_site, finishe
     assert site.config == finished.config_before
 
 
-async def test_cancelled_it_stops_in_place_and_goes_on_later(make_site, finished) -> None:
+async def test_a_cancelled_run_stops_in_place_and_can_be_resumed(make_site, finished) -> None:
     site = make_site()
     site.write(finished.until(events.SetClosed), finished)
     heard = 0

@@ -51,14 +51,14 @@ def test_axes_and_signs_are_the_files(make_site) -> None:
 
 
 @pytest.mark.parametrize("section", ["encoders", "controller"])
-def test_a_protocol_that_nobody_speaks_is_refused(make_site, section: str) -> None:
+def test_a_protocol_without_a_driver_is_refused(make_site, section: str) -> None:
     settings = make_site().simulated.settings
     strange = getattr(settings, section).model_copy(update={"protocol": "telepathy"})
     with pytest.raises(UsageError, match="telepathy"):
         devices_of(settings.model_copy(update={section: strange}), SharedSerialPorts(), WireTrace())
 
 
-async def test_connected_devices_answer_and_their_talk_is_kept(make_site) -> None:
+async def test_connected_devices_answer_and_their_traffic_is_kept(make_site) -> None:
     site = make_site()
     async with open_devices(site.simulated.settings) as cell_now:
         look = await read_all(cell_now.devices, cell_now.clock)
@@ -68,7 +68,7 @@ async def test_connected_devices_answer_and_their_talk_is_kept(make_site) -> Non
     assert cell_now.clock.factor == 500.0
 
 
-async def test_if_one_cannot_be_opened_all_are_let_go(make_site) -> None:
+async def test_if_one_cannot_be_opened_all_are_closed(make_site) -> None:
     """What would stay open, the harness finds; and afterwards all can be opened again."""
     site = make_site()
     site.simulated.gauges.indicators["y"].inch = True
@@ -80,7 +80,7 @@ async def test_if_one_cannot_be_opened_all_are_let_go(make_site) -> None:
         pass
 
 
-async def test_all_are_let_go_after_an_error_inside(make_site) -> None:
+async def test_all_are_closed_after_an_error_inside(make_site) -> None:
     site = make_site()
     with pytest.raises(ZeroDivisionError):
         async with open_devices(site.simulated.settings):
@@ -89,7 +89,7 @@ async def test_all_are_let_go_after_an_error_inside(make_site) -> None:
         pass
 
 
-def test_a_real_cell_is_served_by_nobody(make_site) -> None:
+def test_a_real_cell_is_not_simulated(make_site) -> None:
     site = make_site()
     cell = replace(site.cell, settings=site.simulated.settings)
     with device_addresses(cell) as settings:

@@ -48,7 +48,7 @@ def proposed(finished, make_site) -> Callable[..., Any]:
     return make
 
 
-async def test_it_goes_on_from_the_proposal(proposed, finished) -> None:
+async def test_it_is_resumed_from_the_proposal(proposed, finished) -> None:
     site = proposed()
     assert (await site.calibrate(resume=True)).exit_code == ExitCode.DONE
     assert site.config == finished.cell.config_path.read_bytes()
@@ -62,7 +62,7 @@ async def test_a_gate_that_forbids(proposed, finished) -> None:
     assert site.config == finished.config_before
 
 
-async def test_a_gate_that_needs_a_person_and_nobody_there(proposed, finished) -> None:
+async def test_a_gate_that_needs_a_person_ends_an_unattended_run(proposed, finished) -> None:
     site = proposed([DOUBTFUL])
     with pytest.raises(AnswerNeeded, match="It is 20 mm") as refusal:
         await site.calibrate(resume=True)
@@ -125,7 +125,7 @@ async def test_a_controller_that_does_not_take_the_reload(proposed, finished, tm
     assert not site.happened(events.Committed)
 
 
-async def test_a_controller_that_never_reloads_must_be_started_anew(proposed, finished) -> None:
+async def test_a_controller_that_never_reloads_must_be_restarted(proposed, finished) -> None:
     site = proposed(controller__reload_command=("false",))
     with pytest.raises(WriteBackUndone, match="Restart the controller before it moves"):
         await site.calibrate(resume=True)

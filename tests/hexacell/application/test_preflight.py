@@ -29,7 +29,7 @@ async def check(site, *, unattended: bool = True):
     return await preflight(site.order().cell, Mode.OPTIMISE, unattended=unattended)
 
 
-async def test_a_cell_that_is_ready_says_who_answered_and_nothing_moves(make_site) -> None:
+async def test_a_ready_cell_gives_its_devices_and_nothing_moves(make_site) -> None:
     site = make_site()
     before = site.simulated.machine.joints()
     identities = await check(site)
@@ -44,7 +44,7 @@ async def test_a_cell_that_serves_itself_is_checked_too(make_cell) -> None:
     assert len(await preflight(make_cell(), Mode.CHECK, unattended=True)) == 10
 
 
-async def test_every_failure_is_said_at_once(make_site) -> None:
+async def test_every_failure_is_reported_at_once(make_site) -> None:
     good = (100.0, -100.0, 500.0)
     site = make_site(
         identification__points=(good, FAR),
@@ -105,7 +105,7 @@ async def test_a_stop_during_the_checks_of_the_plan_leaves_nothing(make_site, mo
         pass
 
 
-async def test_devices_that_open_but_cannot_be_read_are_said(make_site, monkeypatch) -> None:
+async def test_devices_that_open_but_cannot_be_read_are_reported(make_site, monkeypatch) -> None:
     site = make_site(verification__points=(FAR, (100.0, -100.0, 500.0)), **HASTY)
     site.simulated.faults.inject("silent", "encoder 2")
     with pytest.raises(SeveralErrors) as refusal:
@@ -122,13 +122,13 @@ async def test_gauges_away_from_the_ball_do_not_stand_in_the_way(make_site) -> N
     assert len(await check(site)) == 10
 
 
-async def test_an_unreachable_point_of_a_self_served_cell_is_said(make_cell) -> None:
+async def test_an_unreachable_point_of_a_simulated_cell_is_reported(make_cell) -> None:
     cell = make_cell(identification__points=(FAR, FAR))
     with pytest.raises(SeveralErrors, match=r"(?s)identification point 1.*identification point 2"):
         await preflight(cell, Mode.OPTIMISE, unattended=True)
 
 
-async def test_one_failure_is_said_as_it_is(make_site) -> None:
+async def test_a_single_failure_is_raised_as_it_is(make_site) -> None:
     site = make_site(stations__placement="by-hand")
     with pytest.raises(AnswerNeeded):
         await check(site)

@@ -54,7 +54,7 @@ async def test_a_run_on_the_wire_is_the_same_again(finished, tmp_path, monkeypat
     assert list(tmp_path.iterdir()) == [], "nothing is left behind"
 
 
-async def test_the_journal_alone_will_do(finished, tmp_path) -> None:
+async def test_a_journal_alone_is_replayed(finished, tmp_path) -> None:
     journal = shutil.copy(finished.folder.journal, tmp_path / "sent-by-mail")
     replayed = await replay(Path(journal), Scope.RESULTS)
     assert replayed.is_same

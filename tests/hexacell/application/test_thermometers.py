@@ -47,7 +47,7 @@ async def test_preflight_names_those_that_answer(make_site, tmp_path) -> None:
     assert found[-1].name == "thermometer room"
 
 
-def test_a_protocol_that_nobody_speaks_is_refused(make_cell, tmp_path) -> None:
+def test_a_protocol_without_a_driver_is_refused(make_cell, tmp_path) -> None:
     strange = in_the_room(tmp_path).model_copy(update={"protocol": "sysfz"})
     with pytest.raises(UsageError, match=r"no thermometer protocol 'sysfz'. Did you mean 'sysfs'\?"):
         require_drivers(make_cell(thermometers=(strange,)).settings)

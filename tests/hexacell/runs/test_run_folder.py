@@ -76,7 +76,7 @@ def test_a_folder_that_holds_a_run_takes_no_other(cell: Cell, folder: RunFolder)
     assert (folder.path / "cell.toml").read_text() == "as it was"
 
 
-def test_a_folder_that_cannot_be_made_is_said(cell: Cell, tmp_path: Path) -> None:
+def test_a_folder_that_cannot_be_made_is_reported(cell: Cell, tmp_path: Path) -> None:
     (tmp_path / "file").touch()
     with pytest.raises(FileError):
         RunFolder(tmp_path / "file" / "run").create(cell)

@@ -121,7 +121,7 @@ async def test_an_abort_where_the_robot_stands_level_takes_it_back(rig) -> None:
 
 
 @pytest.mark.parametrize("count", [2, 5])
-async def test_an_abort_in_the_middle_of_a_set_leaves_it_until_the_run_goes_on(rig, count) -> None:
+async def test_an_abort_in_the_middle_of_a_set_leaves_it_until_the_run_is_resumed(rig, count) -> None:
     before = rig.config
     with pytest.raises(Interruption):
         await rig.run(at(events.RecordTaken, lambda: rig.engine.command(Abort()), count))
@@ -171,7 +171,7 @@ async def test_a_controller_that_does_not_take_it_leaves_the_config_as_it_was(ri
 
 
 @pytest.mark.parametrize("comes_back", [True, False])
-async def test_what_was_lent_and_cannot_be_noted_is_taken_back_or_said(
+async def test_a_provisional_geometry_that_cannot_be_journalled_is_reverted_or_reported(
     rig, monkeypatch, comes_back: bool
 ) -> None:
     before, append = rig.config, Journal.append

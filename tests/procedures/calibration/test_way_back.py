@@ -77,7 +77,7 @@ def test_a_way_back_over_stops_is_gone_stop_by_stop(make_rig, story, monkeypatch
     assert step.key == "P1/o01/move"
 
 
-def test_at_a_stop_it_is_not_decided_anew(make_rig, story, monkeypatch) -> None:
+def test_at_a_waypoint_of_the_way_back_nothing_is_decided_again(make_rig, story, monkeypatch) -> None:
     """From the stop alone nothing leads on, and back to where it came from would go on for ever."""
     stop = Pose(100.0, -100.0, 500.0, 4.0, 1.0, 0.0)
     stands_in = ClearLines(monkeypatch, 1, stops=(stop,))

@@ -20,7 +20,7 @@ from procedures.devices.device_set import gather_errors
 from tests.waiting import until
 
 
-async def test_all_are_opened_and_say_who_they_are(bench) -> None:
+async def test_all_are_opened_and_identified(bench) -> None:
     identities = await bench.devices.open()
     names = [identity.name for identity in identities]
     assert names == ["x", "y", "z", *(f"encoder {leg}" for leg in range(1, 7)), "controller"]
@@ -37,7 +37,7 @@ async def test_all_that_cannot_be_opened_are_named_at_once(bench) -> None:
     assert all(subject in str(refusal.value) for subject in ("gauge y", "encoders", "controller"))
 
 
-async def test_one_that_cannot_be_opened_is_said_as_it_is(bench) -> None:
+async def test_a_single_failure_is_raised_as_it_is(bench) -> None:
     bench.gauges[2].dead = GaugeSilent("does not answer", subject="gauge z")
     with pytest.raises(GaugeSilent):
         await bench.devices.open()
@@ -52,7 +52,7 @@ async def test_several_in_one_device_are_not_lost_among_others(bench) -> None:
     assert flatten_errors(refusal.value)[1:] == both
 
 
-async def test_closing_goes_on_after_a_failure(bench, monkeypatch) -> None:
+async def test_the_others_are_closed_after_a_failure(bench, monkeypatch) -> None:
     async def broken() -> None:
         raise DeviceError("cannot be closed")
 

@@ -70,7 +70,7 @@ async def test_one_that_fails_is_missing_and_warned_of_once(caplog, failure: Exc
     assert "Records are taken without this temperature" in caplog.records[0].getMessage()
 
 
-async def test_all_are_let_go() -> None:
+async def test_all_are_closed() -> None:
     both = [FakeThermometer("room", 20.5), FakeThermometer("rails", GONE)]
     await Thermometers(both).close()
     assert [one.closed for one in both] == [1, 1]

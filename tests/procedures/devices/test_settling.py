@@ -146,14 +146,14 @@ async def test_a_gauge_that_stays_unsteady_is_named(bench) -> None:
     assert bench.clock.now() < 21.0
 
 
-async def test_an_end_of_the_travel_is_said_at_once(bench) -> None:
+async def test_an_end_of_the_travel_is_reported_at_once(bench) -> None:
     bench.gauges[0].shown = lambda: 9.0
     with pytest.raises(GaugeAtEnd):
         await settle(bench.devices, TIMING, bench.clock)
     assert bench.clock.now() == 0.0
 
 
-async def test_two_ends_of_the_travel_are_both_said(bench) -> None:
+async def test_two_ends_of_the_travel_are_both_reported(bench) -> None:
     bench.gauges[0].shown = bench.gauges[2].shown = lambda: -9.0
     with pytest.raises(SeveralErrors) as refusal:
         await settle(bench.devices, TIMING, bench.clock)
@@ -200,7 +200,7 @@ async def test_slow_readings_that_never_agree_end_too(bench) -> None:
     assert bench.gauges[0].reads == LEAST_WINDOWS * TIMING.readings
 
 
-async def test_a_window_longer_than_the_patience_is_said(bench) -> None:
+async def test_a_window_longer_than_the_time_allowed_is_reported(bench) -> None:
     timing = TIMING.model_copy(update={"window_s": 30.0})
     with pytest.raises(DeviceError, match="window of readings is longer"):
         await settle(bench.devices, timing, bench.clock)

@@ -45,8 +45,8 @@ def sliders(now: tuple[float, ...], first: tuple[float, ...] = (0.0,) * 6) -> An
     return polled("encoders", value=taken(now), first=taken(first))
 
 
-def status(*complaints: str, estop: bool = False, enabled: bool = True) -> Any:
-    return polled("controller", value=ControllerStatus(estop, enabled, complaints))
+def status(*messages: str, estop: bool = False, enabled: bool = True) -> Any:
+    return polled("controller", value=ControllerStatus(estop, enabled, messages))
 
 
 WELL = PolledDevices(
@@ -70,18 +70,18 @@ def test_where_all_is_well_nothing_trips() -> None:
     assert rules.first_trip(PolledDevices(), LIMITS) is None
 
 
-def test_what_was_not_heard_yet_trips_nothing_but_time() -> None:
-    unheard = PolledDevices(
+def test_a_device_without_an_answer_trips_only_by_its_silence() -> None:
+    unanswered = PolledDevices(
         (polled("gauge x"),),
         polled("encoders"),
         polled("controller"),
         polled("stop line"),
     )
-    assert rules.first_trip(unheard, LIMITS) is None
+    assert rules.first_trip(unanswered, LIMITS) is None
     assert tripped(encoders=polled("encoders", silent_s=0.13)).guard is Guard.STALE
 
 
-def test_the_stop_line_says_how_it_is_pressed() -> None:
+def test_the_stop_line_gives_its_reason() -> None:
     trip = tripped(stop_input=polled("stop line", value="/cell/stop exists"))
     assert trip.guard is Guard.STOP_LINE
     assert "/cell/stop exists" in trip.problem
@@ -104,12 +104,12 @@ def test_a_controller_that_may_not_move(heard: Any, guard: Guard, words: str) ->
     assert words in trip.problem
 
 
-def test_complaints_of_a_machine_that_is_on_trip_nothing() -> None:
-    talkative = PolledDevices(controller=status("joint 3 following error"))
-    assert rules.first_trip(talkative, LIMITS) is None
+def test_error_messages_of_an_enabled_controller_trip_nothing() -> None:
+    enabled = PolledDevices(controller=status("joint 3 following error"))
+    assert rules.first_trip(enabled, LIMITS) is None
 
 
-def test_an_encoder_is_named_with_what_it_says() -> None:
+def test_an_encoder_is_named_with_its_error() -> None:
     error = DeviceError("reports no magnet", subject="leg 3", action="Look at it")
     trip = tripped(encoders=polled("encoders", error=error))
     assert (trip.guard, trip.device, trip.action) == (Guard.ENCODERS, "leg 3", "Look at it")
@@ -180,7 +180,7 @@ def test_any_device_may_be_silent_for_so_long_and_no_longer(device: str) -> None
     assert (trip.guard, trip.device) == (Guard.STALE, "it")
 
 
-def test_the_plainest_cause_comes_first() -> None:
+def test_a_cause_comes_before_its_effects() -> None:
     everything: dict[str, Any] = {
         "gauges": (gauge(9.0, error=AT_END, silent_s=1.0),),
         "encoders": polled("encoders", error=DeviceError("has an alarm"), silent_s=1.0),
@@ -227,7 +227,7 @@ def test_a_gauge_that_does_not_follow_its_ball(
         )
 
 
-def test_drift_leaves_with_its_own_code() -> None:
+def test_drift_has_its_own_exit_code() -> None:
     assert rules.reference_drift("P2", (0.1, -0.1, 0.0), 0.1) is None
     trip = rules.reference_drift("P2", (0.0, -0.101, 0.0), 0.1)
     assert trip is not None

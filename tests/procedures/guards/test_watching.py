@@ -100,7 +100,7 @@ async def test_what_is_latched_lasts_until_it_is_cleared(scene) -> None:
     await stage.do(move(2))
 
 
-async def test_preparing_anew_clears_what_is_latched_but_looks_again(scene) -> None:
+async def test_prepare_clears_the_latch_and_evaluates_the_guards_again(scene) -> None:
     stage = await reference(scene())
     stage.forbidden = "the button is pressed"
     for action in (lambda: stage.do(move(2)), stage.rig.performer.prepare):
@@ -111,7 +111,7 @@ async def test_preparing_anew_clears_what_is_latched_but_looks_again(scene) -> N
     await stage.do(move(2))
 
 
-async def test_a_robot_that_cannot_be_stopped_is_said(scene) -> None:
+async def test_a_robot_that_cannot_be_stopped_is_reported(scene) -> None:
     stage = await reference(scene())
 
     async def deaf() -> None:
@@ -140,7 +140,7 @@ async def test_a_move_that_fails_by_itself_is_explained_by_the_guard_that_knows_
     assert isinstance(tripped.value.__cause__, DeviceError)
 
 
-async def test_a_move_that_fails_for_reasons_of_its_own_says_so(scene) -> None:
+async def test_a_move_that_fails_without_a_trip_raises_its_own_error(scene) -> None:
     stage = await reference(scene())
     stage.controller.failures["move"] = DeviceError("cannot go there", subject="controller")
     with pytest.raises(DeviceError, match="cannot go there") as failed:
@@ -272,7 +272,7 @@ async def test_a_drifted_reference_is_not_latched(scene) -> None:
     assert stage.rig.performer.guards.supervisor.latched is None
 
 
-async def test_lanes_of_one_line_are_silent_together(scene) -> None:
+async def test_pollers_on_one_line_share_its_silence(scene) -> None:
     stage = scene()
     clock, shared = stage.rig.clock, LineActivity()
     turn = asyncio.Lock()
@@ -282,13 +282,13 @@ async def test_lanes_of_one_line_are_silent_together(scene) -> None:
             await clock.sleep(0.05)
         return "here"
 
-    lanes = tuple(DevicePoller("it", queued, shared) for _ in range(5))
-    async with GuardMonitor(PolledDevices(gauges=lanes), GuardLimits(0.12, 5.5), clock) as patrol:  # type: ignore[arg-type]
+    pollers = tuple(DevicePoller("it", queued, shared) for _ in range(5))
+    async with GuardMonitor(PolledDevices(gauges=pollers), GuardLimits(0.12, 5.5), clock) as monitor:  # type: ignore[arg-type]
         await clock.sleep(2.0)
-        assert patrol.trip is None, "one answer in 0.25 s each, but one in 0.05 s altogether"
+        assert monitor.trip is None, "one answer in 0.25 s each, but one in 0.05 s altogether"
 
 
-async def test_a_process_without_turns_is_deaf_not_its_devices_silent(scene) -> None:
+async def test_a_delay_of_the_process_is_no_silence_of_its_devices(scene) -> None:
     stage = scene()
     clock = stage.rig.clock
 
@@ -296,15 +296,15 @@ async def test_a_process_without_turns_is_deaf_not_its_devices_silent(scene) -> 
         await clock.sleep(0.05)
         return ""
 
-    lanes = PolledDevices(stop_input=DevicePoller("stop line", slow))
-    async with GuardMonitor(lanes, GuardLimits(0.12, 5.5), clock) as patrol:
+    pollers = PolledDevices(stop_input=DevicePoller("stop line", slow))
+    async with GuardMonitor(pollers, GuardLimits(0.12, 5.5), clock) as monitor:
         await clock.sleep(0.2)
         clock.time_s += 5.0
         await clock.sleep(0.2)
-        assert patrol.trip is None
+        assert monitor.trip is None
 
 
-async def test_errors_of_a_lane_do_not_hide_what_it_said() -> None:
+async def test_an_error_keeps_the_latest_value() -> None:
     answers: list[Any] = [1.0, GaugeAtEnd("end", subject="g"), HexacellError("off", subject="g"), 2.0]
 
     async def ask() -> float:
@@ -313,10 +313,10 @@ async def test_errors_of_a_lane_do_not_hide_what_it_said() -> None:
             raise answer
         return float(answer)
 
-    lane = DevicePoller("g", ask)
+    poller = DevicePoller("g", ask)
     seen = []
     for _ in range(4):
-        await lane.poll()
-        seen.append((lane.value, lane.first, str(lane.error or "")))
+        await poller.poll()
+        seen.append((poller.value, poller.first, str(poller.error or "")))
     assert seen == [(1.0, 1.0, ""), (1.0, 1.0, "g: end"), (1.0, 1.0, "g: off"), (2.0, 1.0, "")]
-    assert np.isclose(lane.line.silent_s, 0.0)
+    assert np.isclose(poller.line.silent_s, 0.0)

@@ -96,7 +96,7 @@ def test_prose_is_told_from_the_rest() -> None:
     assert not is_wording(Change("reading.line_up", 1, 2))
 
 
-def test_a_difference_in_words_is_short_and_says_where() -> None:
+def test_the_text_of_a_difference_is_short_and_names_the_place() -> None:
     change = Change("held_out[0][0][0]", "x" * 500, 2.0)
     words = str(Difference(7, "identify", Aspect.RESULT, change))
     assert words.startswith("line 7, identify: held_out[0][0][0]: recorded xxx")

@@ -60,21 +60,21 @@ def replay(make_rig, recording, tmp_path: Path) -> Replay:
     return run
 
 
-def test_a_run_comes_out_as_it_was_recorded(recording, replay) -> None:
-    tally = replay(recording.history)
+def test_a_run_is_reproduced(recording, replay) -> None:
+    report = replay(recording.history)
     begun = [event for event in recording.history if isinstance(event, events.StepBegun)]
-    assert tally.differences == []
-    assert tally.decisions == len(begun)
-    assert tally.results == len(begun) + 1, "every step has its result, and so has the run"
-    assert tally.taken == 1, "only the beginning is taken as it stands"
+    assert report.differences == []
+    assert report.decisions == len(begun)
+    assert report.results == len(begun) + 1, "every step has its result, and so has the run"
+    assert report.taken == 1, "only the beginning is taken as it stands"
 
 
-def test_a_check_comes_out_as_it_was_recorded(make_rig, replay) -> None:
+def test_a_check_is_reproduced(make_rig, replay) -> None:
     rig = make_rig(Mode.CHECK)
     asyncio.run(rig.run())
-    tally = replay(read_journal(rig.folder.journal), rig)
-    assert tally.differences == []
-    assert tally.results > 10
+    report = replay(read_journal(rig.folder.journal), rig)
+    assert report.differences == []
+    assert report.results > 10
 
 
 def after(happened: Callable[[events.Event], bool], action: Callable[[], object], count: int = 1) -> Any:
@@ -98,7 +98,7 @@ def refusal(event: events.Event) -> bool:
     return isinstance(event, events.RecordRejected)
 
 
-def test_refused_records_come_out_as_they_were(make_rig, replay) -> None:
+def test_rejected_records_are_reproduced(make_rig, replay) -> None:
     """One whose plungers were at their ends, and one farther away than the travel allows."""
     rig = make_rig()
     shown = rig.gauges[1].shown
@@ -116,8 +116,8 @@ def test_refused_records_come_out_as_they_were(make_rig, replay) -> None:
     history = read_journal(rig.folder.journal)
     readings = [event.reading for event in history if isinstance(event, events.RecordRejected)]
     assert [reading is None for reading in readings] == [True, False]
-    tally = replay(history, rig)
-    assert tally.differences == []
+    report = replay(history, rig)
+    assert report.differences == []
 
 
 async def stopped(
@@ -138,7 +138,7 @@ def anything(_: events.Event) -> bool:
     return True
 
 
-def test_a_run_that_was_stopped_over_and_over_comes_out_as_it_was(recording, replayed, replay) -> None:
+def test_a_run_that_was_stopped_several_times_is_reproduced(recording, replayed, replay) -> None:
     rig = replayed(recording.until(events.SetClosed, count=1))
 
     async def history() -> None:
@@ -158,7 +158,7 @@ NUMBERS = range(1, 40)
 @pytest.mark.parametrize(
     "number", [pytest.param(n, marks=[] if n % 8 == 5 else pytest.mark.slow) for n in NUMBERS]
 )
-def test_a_check_stopped_after_any_event_comes_out_as_it_was(make_rig, replay, number: int) -> None:
+def test_a_check_stopped_after_any_event_is_reproduced(make_rig, replay, number: int) -> None:
     rig = make_rig(Mode.CHECK)
 
     async def history() -> None:
@@ -166,29 +166,29 @@ def test_a_check_stopped_after_any_event_comes_out_as_it_was(make_rig, replay, n
         await rig.run()
 
     asyncio.run(history())
-    tally = replay(read_journal(rig.folder.journal), rig)
-    assert tally.differences == []
+    report = replay(read_journal(rig.folder.journal), rig)
+    assert report.differences == []
 
 
-def test_killed_without_a_word_it_comes_out_as_it_was(recording, replay) -> None:
+def test_a_killed_run_is_reproduced(recording, replay) -> None:
     for kind in (events.StepBegun, events.RecordTaken, events.Committed):
-        tally = replay(recording.until(kind, count=1))
-        assert tally.differences == []
+        report = replay(recording.until(kind, count=1))
+        assert report.differences == []
 
 
-def test_what_could_not_be_identified_fails_again_in_the_same_words(make_rig, replay) -> None:
+def test_a_failed_identification_fails_again_with_the_same_message(make_rig, replay) -> None:
     rig = make_rig(identification__orientations=3)
     with pytest.raises(HexacellError, match="12 equations for 35 parameters"):
         asyncio.run(rig.run())
     history = read_journal(rig.folder.journal)
-    tally = replay(history, rig, Scope.RESULTS)
-    assert tally.differences == []
-    tally = replay(changed(history, events.Interrupted, {"reason": "something else"}), rig, Scope.RESULTS)
-    [difference] = tally.differences
+    report = replay(history, rig, Scope.RESULTS)
+    assert report.differences == []
+    report = replay(changed(history, events.Interrupted, {"reason": "something else"}), rig, Scope.RESULTS)
+    [difference] = report.differences
     assert difference.aspect is Aspect.WORDS
 
 
-def test_what_a_person_answered_is_answered_again(recording, replayed, replay) -> None:
+def test_answers_of_a_person_are_repeated(recording, replayed, replay) -> None:
     rig = replayed(recording.until(events.Proposed), acceptance__approval="ask")
     rig.operator.name = None
     with pytest.raises(LimitError, match="declined"):
@@ -199,8 +199,8 @@ def test_what_a_person_answered_is_answered_again(recording, replayed, replay) -
     assert "somebody else" in {
         event.approved_by for event in history if isinstance(event, events.Committed)
     }
-    tally = replay(history, rig, Scope.RESULTS)
-    assert tally.differences == []
+    report = replay(history, rig, Scope.RESULTS)
+    assert report.differences == []
 
 
 def changed(history: Sequence[events.Event], kind: type[Any], changes: dict[str, Any], nth: int = 1) -> Any:
@@ -266,8 +266,8 @@ def test_what_was_changed_afterwards_is_found_in_its_line(recording, replay, wha
     line = next(
         n for n, pair in enumerate(zip(history, recording.history, strict=True), 1) if pair[0] != pair[1]
     )
-    tally = replay(history[:line], scope=scope)
-    first = tally.differences[0]
+    report = replay(history[:line], scope=scope)
+    first = report.differences[0]
     assert (first.line, first.change.field) == (line, field)
     assert first.aspect is (Aspect.DECISION if scope is Scope.DECISIONS else Aspect.RESULT)
     assert f"line {line}, " in str(first)
@@ -281,17 +281,17 @@ def test_a_reading_that_had_not_settled_is_found(recording, replay, changes: dic
     assert "had not settled" in str(first)
 
 
-def test_one_difference_makes_no_other(recording, replay) -> None:
+def test_one_difference_causes_no_other(recording, replay) -> None:
     history = changed(recording.history, events.Arrived, {"pose": (100.0, -100.0, 500.0, 1.0, 0.0, 0.0)}, 2)
     [line] = (n for n, event in enumerate(history, 1) if event != recording.history[n - 1])
     assert {difference.line for difference in replay(history, scope=Scope.RESULTS).differences} == {line}
 
 
-def test_other_words_are_told_apart(recording, replay) -> None:
-    tally = replay(
+def test_other_wording_is_an_aspect_of_its_own(recording, replay) -> None:
+    report = replay(
         changed(recording.history, events.ResultValidated, {"line": "all is well"}), scope=Scope.RESULTS
     )
-    [difference] = tally.differences
+    [difference] = report.differences
     assert difference.aspect is Aspect.WORDS
     assert difference.change.field == "line"
 
@@ -303,13 +303,13 @@ def test_a_run_that_ended_too_early_is_found(recording, replay) -> None:
     assert (difference.change.recorded, difference.change.replayed) == ("ended", "P2/o01/move")
 
 
-def test_what_nobody_knows_is_taken_as_it_stands(recording, replay) -> None:
+def test_an_event_with_an_external_cause_is_taken_from_the_journal(recording, replay) -> None:
     """Events that come from outside are no outcomes, whenever they come."""
     told = list(recording.until(events.RecordTaken, count=2))
     told.insert(-1, events.SetInvalidated(at=SetKey(phase=Phase.AFTER, point=9), reason="a visitor"))
-    tally = replay(told)
-    assert tally.differences == []
-    assert tally.taken == 2
+    report = replay(told)
+    assert report.differences == []
+    assert report.taken == 2
 
 
 def test_nothing_is_decided_by_the_time_or_by_chance(recording, replay, monkeypatch) -> None:

@@ -2,7 +2,8 @@
 
 Every device has the same life cycle: ``open`` connects and identifies it, then it is read or operated,
 ``close`` releases it; it can be opened again. Every call is a coroutine, so a slow device never blocks
-the others or a stop. Every failure is a :class:`hexacell.errors.DeviceError` that names the device.
+the others or a stop. Every failure is a :class:`hexacell.errors.DeviceError` that names the device;
+those that a run reacts to in a way of their own are in :mod:`drivers.errors`.
 """
 
 from __future__ import annotations

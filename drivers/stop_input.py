@@ -9,13 +9,13 @@ programs, and for cells without such a contact: while it exists, nothing moves.
 from __future__ import annotations
 
 import termios
-from contextlib import suppress
 from pathlib import Path
 
 import serial
 
 from drivers.interfaces import DeviceIdentity
 from drivers.serial.errors import opening_errors
+from drivers.serial.port import close_port
 from hexacell.cell.measuring import GuardSettings
 from hexacell.errors import HexacellError
 
@@ -61,8 +61,7 @@ class StopContact:
         """Close the port; closing twice is harmless."""
         port, self._port = self._port, None
         if port is not None:
-            with suppress(OSError, termios.error):
-                port.close()
+            close_port(port)
 
 
 class CombinedStopInput:

@@ -125,6 +125,16 @@ def duplicated_node(what: str, leg: Leg) -> DeviceError:
     )
 
 
+def silent_nodes(what: str, legs: Sequence[Leg], *, all_legs: bool) -> SilentNodeError:
+    """The error for legs whose encoders are silent, or those of all legs."""
+    where = "the CAN adapter, supply and termination" if all_legs else "its supply and cable"
+    return SilentNodeError(
+        what,
+        subject=subject_of(legs),
+        action=f"Check {where}, then open the encoders again; the set that was being measured is void",
+    )
+
+
 SDO_REQUEST = 0x600
 SDO_RESPONSE = 0x580
 _UPLOAD_DEVICE_TYPE = bytes((0x40, 0x00, 0x10, 0, 0, 0, 0, 0))

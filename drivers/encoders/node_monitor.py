@@ -12,9 +12,9 @@ from collections.abc import Sequence
 from canopen.emcy import EmcyError
 
 from drivers.encoders.can_bus import EncoderBus
-from drivers.encoders.canopen_node import EncoderNode, Leg, subject_of
+from drivers.encoders.canopen_node import EncoderNode, Leg, silent_nodes, subject_of
 from drivers.encoders.object_dictionary import ALARMS, ERROR_REGISTER
-from drivers.errors import InvalidSampleError, RestartedNodeError, SilentNodeError
+from drivers.errors import InvalidSampleError, RestartedNodeError
 
 HEARTBEAT = 0x700
 EMERGENCY = 0x080
@@ -92,7 +92,8 @@ def check_nodes(monitors: Sequence[NodeMonitor]) -> None:
         raise _restarted(restarted)
     silent = [monitor for monitor in monitors if monitor.is_silent]
     if silent:
-        raise _silent(silent, all_legs=len(silent) == len(monitors))
+        what = f"no heartbeat for {silent[0].timeout_s:.2g} s"
+        raise silent_nodes(what, [monitor.leg for monitor in silent], all_legs=len(silent) == len(monitors))
     for monitor in monitors:
         if monitor.emergency is not None:
             raise invalid_sample(f"reports {monitor.emergency}", monitor.leg)
@@ -107,25 +108,11 @@ def invalid_sample(what: str, leg: Leg) -> InvalidSampleError:
     )
 
 
-def silence_action(*, all_legs: bool) -> str:
-    """The next action when some legs are silent, or all."""
-    where = "the CAN adapter, supply and termination" if all_legs else "its supply and cable"
-    return f"Check {where}, then open the encoders again; the set that was being measured is void"
-
-
 def _restarted(legs: Sequence[Leg]) -> RestartedNodeError:
     return RestartedNodeError(
         "restarted, or was stopped, during the run and lost its configuration: the set is void",
         subject=subject_of(legs),
         action="Check its supply, open the encoders again and repeat the set",
-    )
-
-
-def _silent(monitors: Sequence[NodeMonitor], *, all_legs: bool) -> SilentNodeError:
-    return SilentNodeError(
-        f"no heartbeat for {monitors[0].timeout_s:.2g} s",
-        subject=subject_of([monitor.leg for monitor in monitors]),
-        action=silence_action(all_legs=all_legs),
     )
 
 

@@ -8,9 +8,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from drivers.encoders.can_bus import EncoderBus
-from drivers.encoders.canopen_node import Leg, duplicated_node, subject_of
+from drivers.encoders.canopen_node import Leg, duplicated_node, silent_nodes
 from drivers.encoders.node_identity import SECOND_RESPONSE_S
-from drivers.encoders.node_monitor import silence_action
 from drivers.encoders.pdo_configuration import PositionChannel
 from drivers.errors import BusError, SilentNodeError
 from hexacell.errors import DeviceError
@@ -108,11 +107,8 @@ class SyncSampler:
         silent = [
             leg for leg, outstanding in zip(self._legs, self._outstanding, strict=True) if outstanding > 0
         ]
-        return SilentNodeError(
-            f"no response to SYNC within {self._timeout_s:g} s, {MAX_SYNCS} times",
-            subject=subject_of(silent),
-            action=silence_action(all_legs=len(silent) == len(self._legs)),
-        )
+        what = f"no response to SYNC within {self._timeout_s:g} s, {MAX_SYNCS} times"
+        return silent_nodes(what, silent, all_legs=len(silent) == len(self._legs))
 
     def _on_position(self, can_id: int, data: bytearray, _timestamp: float) -> None:
         index = self._index[can_id]

@@ -112,7 +112,7 @@ class SerialPort:
     def close(self) -> None:
         """Close the port; closing twice is harmless."""
         if self._port is not None:
-            _close(self._port)
+            close_port(self._port)
             self._port = None
 
     def _is_alive(self, port: serial.Serial) -> bool:
@@ -245,7 +245,8 @@ def _refuses_parity(error: termios.error) -> bool:
     return bool(error.args[:1] == (errno.EINVAL,))
 
 
-def _close(port: serial.Serial) -> None:
+def close_port(port: serial.Serial) -> None:
+    """Close a port, even if it was lost."""
     # pyserial's socket:// forgets its socket unclosed if the far side has reset the connection
     connection = getattr(port, "_socket", None)
     with suppress(OSError, termios.error):

@@ -10,8 +10,8 @@ from enum import StrEnum
 
 import numpy as np
 from numpy.typing import ArrayLike
-from pydantic import BaseModel, ConfigDict
 
+from hexacell.cell.fields import Frozen
 from hexacell.identification.diagnostics.parameter_checks import tolerance_violations
 from hexacell.identification.problem.problem import Tolerances
 from hexacell.identification.solver.result import GeometryEstimate
@@ -19,13 +19,11 @@ from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.rotations import Array
 
 
-class AcceptanceGate(BaseModel):
+class AcceptanceGate(Frozen):
     """One condition for writing back, whether it is met, and that as a sentence for people.
 
     ``needs_person``: where it is not met, a person may accept the geometry nevertheless.
     """
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
 
     name: str
     passed: bool

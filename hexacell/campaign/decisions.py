@@ -5,8 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Literal
 
-from pydantic import BaseModel, ConfigDict
-
+from hexacell.cell.fields import Frozen
 from hexacell.kinematics.pose import Pose
 from hexacell.measurements.records import Deviation, Joints, MeasurementSet
 
@@ -40,7 +39,7 @@ class CampaignState:
         return len(begun if self.point is None else begun | {self.point})
 
 
-class Forecast(BaseModel):
+class Forecast(Frozen):
     """The predicted error at the worst task pose, 1 sigma, mm: now, after this record, at the end.
 
     Attributes:
@@ -49,8 +48,6 @@ class Forecast(BaseModel):
         end_mm: once everything that is still planned is measured.
         records: that are still planned, the proposed one included, and the ``minutes`` they will take.
     """
-
-    model_config = ConfigDict(frozen=True, extra="forbid", ser_json_inf_nan="constants")
 
     now_mm: float
     next_mm: float

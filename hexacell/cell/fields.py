@@ -1,4 +1,4 @@
-"""Types that the sections of the cell file share."""
+"""Types that the sections of the cell file share, with each other and with the records of a run."""
 
 from __future__ import annotations
 
@@ -14,10 +14,14 @@ Point = tuple[Finite, Finite, Finite]
 SixNumbers = tuple[Finite, Finite, Finite, Finite, Finite, Finite]
 
 
-class Section(BaseModel):
-    """A section of the cell file: frozen, without unknown keys."""
+class Frozen(BaseModel):
+    """A record that is kept in a file; no key is unknown, and NaN and infinity are numbers in JSON too."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(extra="forbid", frozen=True, ser_json_inf_nan="constants")
+
+
+class Section(Frozen):
+    """A section of the cell file."""
 
 
 class GeometrySettings(Section):

@@ -7,19 +7,17 @@ import io
 from pathlib import Path
 from typing import ClassVar, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
+from pydantic import ValidationError, model_validator
 
-from hexacell.cell.fields import GeometryDocument
+from hexacell.cell.fields import Frozen, GeometryDocument
 from hexacell.controller_config.interface import ConfigFormat
 from hexacell.errors import FileError
 from hexacell.kinematics.geometry import Geometry
 from hexacell.storage import atomic_files
 
 
-class JsonRecord(BaseModel):
-    """A frozen record: written atomically, validated when read."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True)
+class JsonRecord(Frozen):
+    """A record in a file of its own: written atomically, validated when read."""
 
     noun: ClassVar[str]
     """What error messages call it."""

@@ -9,7 +9,7 @@ from hexacell.identification.diagnostics.repeatability import Repeatability
 from hexacell.identification.diagnostics.variance_components import NoiseLevel, NoiseLevels
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.geometry import Geometry
-from hexacell.presentation.layout import blocks, wrapped
+from hexacell.presentation.layout import wrapped
 from hexacell.reporting.assessment import Assessment
 from hexacell.reporting.findings import findings, noise_sentence, pair_sentences, residual_sentence
 
@@ -19,18 +19,17 @@ PARAMETER_HEADER = f"{'mm':4}{'drawing':>10}{'identified':>12}{'change':>9}{'sig
 def identification_report(assessed: Assessment) -> str:
     """The whole report that ``hexacell fit`` prints."""
     found = assessed.found
-    return blocks(
-        [
-            "\n".join(wrapped(sentence) for sentence in findings(assessed)),
-            accuracy_table(assessed),
-            _data_and_termination(found),
-            parameter_table(found, assessed.drawing),
-            residual_line(found),
-            noise_table(assessed.noise),
-            repeatability_lines(assessed.repeatability),
-            correlation_lines(pair_sentences(assessed), len(assessed.correlated)),
-        ]
+    parts = (
+        "\n".join(wrapped(sentence) for sentence in findings(assessed)),
+        accuracy_table(assessed),
+        _data_and_termination(found),
+        parameter_table(found, assessed.drawing),
+        residual_line(found),
+        noise_table(assessed.noise),
+        repeatability_lines(assessed.repeatability),
+        correlation_lines(pair_sentences(assessed), len(assessed.correlated)),
     )
+    return "\n\n".join(part for part in parts if part)
 
 
 def accuracy_table(assessed: Assessment) -> str:

@@ -1,9 +1,8 @@
-"""Paragraphs and blocks of text for a terminal of 80 columns."""
+"""Paragraphs of text for a terminal of 80 columns."""
 
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Iterable
 
 COLUMNS = 80
 
@@ -13,8 +12,3 @@ def wrapped(text: str, *, indent: int = 0) -> str:
     return textwrap.fill(
         text, COLUMNS, subsequent_indent=" " * indent, break_long_words=False, break_on_hyphens=False
     )
-
-
-def blocks(parts: Iterable[str]) -> str:
-    """The parts that are not empty, with a blank line between them."""
-    return "\n\n".join(part for part in parts if part)

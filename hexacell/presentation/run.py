@@ -1,4 +1,4 @@
-"""Text for a run as a whole: how it begins, what it asks, how to resume it, how it ended."""
+"""Text for a run as a whole: how it begins, what it asks, how to resume it, its end, and its replay."""
 
 from __future__ import annotations
 
@@ -6,7 +6,10 @@ import shlex
 from pathlib import Path
 
 from hexacell.application.calibration_run import RunRequest
+from hexacell.application.replay_run import Replay
+from hexacell.presentation.layout import wrapped
 from procedures.calibration.workflow import Mode
+from procedures.replay.comparison import Aspect, Difference
 from procedures.run import events
 from procedures.run.questions import GaugePlacement, PendingChange, Question, StepFailure
 
@@ -14,6 +17,9 @@ UNVERIFIED = (
     "The controller's config holds the new geometry, which is not verified yet: resuming "
     "verifies it, or restores the old one."
 )
+
+LISTED_DIFFERENCES = 10
+"""How many differences of a replay are printed."""
 
 
 def demo_opening(config: Path) -> str:
@@ -73,3 +79,32 @@ def matching_choice(typed: str, question: Question) -> str | None:
     answer = typed.strip().lower().replace(" ", "-")
     found = [choice for choice in question.choices if answer and choice.startswith(answer)]
     return found[0] if len(found) == 1 else None
+
+
+def replay_report(replayed: Replay) -> str:
+    """The differences, those that count first, and the verdict."""
+    found = sorted(replayed.tally.differences, key=lambda one: not replayed.counts(one))
+    lines = [
+        wrapped(_difference_line(replayed, difference), indent=4)
+        for difference in found[:LISTED_DIFFERENCES]
+    ]
+    if len(found) > LISTED_DIFFERENCES:
+        lines.append(f"and {len(found) - LISTED_DIFFERENCES} more (--json lists them)")
+    if any(one.aspect is Aspect.DECISION for one in found) and not replayed.is_same_software:
+        lines.append(
+            wrapped(f"{replayed.recorded_by} recorded it: {replayed.replayed_by} may decide otherwise.")
+        )
+    return "\n".join([*lines, _replay_verdict(replayed)])
+
+
+def _difference_line(replayed: Replay, difference: Difference) -> str:
+    return f"{'NO' if replayed.counts(difference) else '--'}  {difference}"
+
+
+def _replay_verdict(replayed: Replay) -> str:
+    tally = replayed.tally
+    what = f"{tally.decisions} decisions and {tally.results} results of {replayed.events} events"
+    if replayed.is_same:
+        return f"{what}: the same as recorded"
+    first = next(one for one in tally.differences if replayed.counts(one))
+    return f"{what}: different, first in line {first.line} ({first.place})"

@@ -7,9 +7,7 @@ from __future__ import annotations
 
 from typing import Any, Self
 
-from pydantic import BaseModel, ConfigDict
-
-from hexacell.cell.fields import GeometryDocument
+from hexacell.cell.fields import Frozen, GeometryDocument
 from hexacell.identification.solver.levenberg_marquardt import Termination
 from hexacell.identification.solver.result import (
     DataFault,
@@ -22,11 +20,7 @@ from hexacell.kinematics.parameters import ParameterSet
 from hexacell.measurements.records import Deviation, RecordId
 
 
-class _Frozen(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid", ser_json_inf_nan="constants")
-
-
-class OutlierRecord(_Frozen):
+class OutlierRecord(Frozen):
     """A record that was left out.
 
     ``gauges`` are those that alone are wrong, and ``off_mm`` what the gauges x, y and z show too much.
@@ -48,7 +42,7 @@ class OutlierRecord(_Frozen):
         )
 
 
-class IdentificationResult(_Frozen):
+class IdentificationResult(Frozen):
     """The identified geometry and its uncertainty: the first part of ``result.json``."""
 
     converged: bool

@@ -12,11 +12,11 @@ from pydantic import Field
 
 from drivers.interfaces import DeviceIdentity
 from hexacell.acceptance import AcceptanceGate, Verdict
-from hexacell.cell.fields import GeometryDocument
+from hexacell.cell.fields import Frozen, GeometryDocument
 from hexacell.cell.recovery import Action, FailureKind
 from hexacell.kinematics.mechanism import Branch
 from hexacell.reporting.result import IdentificationResult
-from procedures.run.steps import Frozen, SetKey, SixNumbers, Step, StepOfSet, ThreeNumbers
+from procedures.run.steps import SetKey, SixNumbers, Step, StepOfSet, ThreeNumbers
 from procedures.run.trips import Guard, Trip
 
 

@@ -5,19 +5,14 @@ from __future__ import annotations
 from enum import StrEnum
 from typing import Annotated, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from hexacell.campaign.decisions import Forecast
+from hexacell.cell.fields import Frozen
 from hexacell.kinematics.pose import Pose
 
 SixNumbers = tuple[float, float, float, float, float, float]
 ThreeNumbers = tuple[float, float, float]
-
-
-class Frozen(BaseModel):
-    """A record of the journal."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", ser_json_inf_nan="constants")
 
 
 class Phase(StrEnum):

@@ -9,7 +9,7 @@ from hexacell.application.replay_run import replay
 from hexacell.cli.console import Console
 from hexacell.errors import ExitCode, UsageError
 from hexacell.presentation.documents import replay_document
-from hexacell.presentation.replay import replay_report
+from hexacell.presentation.run import replay_report
 from procedures.replay.comparison import TOLERANCE
 from procedures.replay.replayer import Scope
 

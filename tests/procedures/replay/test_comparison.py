@@ -10,10 +10,11 @@ from typing import Any
 import pytest
 
 from hexacell.acceptance import AcceptanceGate
+from hexacell.cell.fields import Frozen
 from procedures.journal.line_format import decode
 from procedures.replay.comparison import Aspect, Change, Difference, changes, is_wording
 from procedures.run import events
-from procedures.run.steps import Frozen, Phase, SetKey
+from procedures.run.steps import Phase, SetKey
 
 KEY = SetKey(phase=Phase.BEFORE, point=2)
 

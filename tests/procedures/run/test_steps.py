@@ -12,11 +12,12 @@ from pydantic import TypeAdapter, ValidationError
 
 from drivers.interfaces import DeviceIdentity
 from hexacell.acceptance import AcceptanceGate, Verdict
+from hexacell.cell.fields import Frozen
 from hexacell.cell.recovery import Action, FailureKind
 from hexacell.identification.solver.result import DataFaultKind
 from hexacell.reporting.result import OutlierRecord
 from procedures.journal.journal import Journal, read_journal
-from procedures.run import events, steps
+from procedures.run import events
 from procedures.run.steps import (
     CloseSet,
     Compute,
@@ -191,7 +192,7 @@ def test_every_kind_of_event_is_in_the_union_and_under_test() -> None:
     kinds = {
         kind
         for _, kind in inspect.getmembers(events, inspect.isclass)
-        if issubclass(kind, steps.Frozen)
+        if issubclass(kind, Frozen)
         and "kind" in kind.model_fields
         and kind.__module__ == "procedures.run.events"
     }

@@ -9,7 +9,7 @@ from hexacell.identification.problem.data_requirements import (
 )
 from hexacell.identification.problem.problem import Problem
 from hexacell.identification.solver.levenberg_marquardt import COARSE, SolverOptions
-from hexacell.identification.solver.regularized_fit import fit
+from hexacell.identification.solver.regularized_fit import fit_regularized
 from hexacell.identification.solver.result import Identification
 from hexacell.identification.solver.singular_records import solve_around_singularities
 from hexacell.kinematics.pose import PoseBatch
@@ -27,7 +27,7 @@ def identify(problem: Problem, *, find_outliers: bool = True) -> Identification:
     """
     require_enough_records(problem)
     require_rotation_diversity(problem)
-    found = screen(problem) if find_outliers else fit(problem)
+    found = screen(problem) if find_outliers else fit_regularized(problem)
     require_enough_records(found.problem)
     return found
 

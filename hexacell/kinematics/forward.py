@@ -13,8 +13,8 @@ geometry and the joint variables change linearly to (G, q) in a few stages, and 
 the solution of the one before. The sign of det J changes only at a singularity. A solution on which
 the sign differs from that at x0 is on another assembly mode and counts as not found.
 
-Sources: Merlet, Parallel Robots, 2nd ed. 2006, ch. 4 (Newton's method and assembly modes);
-Allgower and Georg, Numerical Continuation Methods, 1990, ch. 1 and 2.
+Sources: Merlet, Parallel Robots, 2nd ed. 2006 (Newton's method and assembly modes);
+Allgower and Georg, Numerical Continuation Methods, 1990.
 """
 
 from __future__ import annotations

@@ -16,7 +16,7 @@ With the Gramian ``M = A A^T``, ``||A||_2 = ||M^2||_2^(1/4)``, which gives the c
     ||M^2||_F^(1/4) / 6^(1/8) <= ||A||_2 <= ||M^2||_F^(1/4).
 
 Only poses between these bounds need the decomposition. Source: Golub and Van Loan, Matrix Computations,
-4th ed. 2013, sections 2.3.2 (norms) and 2.4 (singular values).
+4th ed. 2013 (norms, singular values).
 """
 
 from __future__ import annotations

@@ -6,9 +6,8 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass, field, replace
 
 from hexacell.identification.problem.problem import Problem
-from hexacell.identification.solver import regularized_fit
 from hexacell.identification.solver.chi_square import ChiSquareVerdict
-from hexacell.identification.solver.regularized_fit import QUICK
+from hexacell.identification.solver.regularized_fit import QUICK, fit_regularized
 from hexacell.identification.solver.result import Identification
 
 PENALTY_PER_UNKNOWN = 10.0
@@ -67,19 +66,19 @@ class CorrectedFit:
     @classmethod
     def uncorrected(cls, problem: Problem) -> CorrectedFit:
         """The fit of all records as measured."""
-        return cls(problem, problem, regularized_fit.fit(problem, options=QUICK))
+        return cls(problem, problem, fit_regularized(problem, QUICK))
 
     def corrected_for(self, hypothesis: FaultHypothesis) -> CorrectedFit:
         """The fit after correction for one more fault."""
         problem = hypothesis.corrected(self.problem)
-        fit = regularized_fit.fit(problem, options=QUICK)
+        fit = fit_regularized(problem, QUICK)
         return replace(self, problem=problem, fit=fit, faults=(*self.faults, hypothesis))
 
     def converged(self) -> CorrectedFit:
         """The same with the solver's full number of iterations where the quick fit was cut short."""
         if self.fit.converged:
             return self
-        return replace(self, fit=regularized_fit.fit(self.problem))
+        return replace(self, fit=fit_regularized(self.problem))
 
     @property
     def lost(self) -> int:

@@ -7,8 +7,8 @@ around the solution with the records that the solver left out. Two candidates re
 at once: greedy deletion with a refit after each, and deletion around the drawing. The first corrected fit
 that agrees with the noise is taken, else the best one if it is better by far.
 
-Source: Atkinson and Riani, Robust Diagnostic Regression Analysis, 2000, chapter 1, on masking: several
-outliers hide each other around a fit to all of them, and show around one that they did not influence.
+Source: Atkinson and Riani, Robust Diagnostic Regression Analysis, 2000, on masking: several outliers
+hide each other around a fit to all of them, and show around one that they did not influence.
 """
 
 from __future__ import annotations

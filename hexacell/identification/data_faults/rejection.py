@@ -46,8 +46,9 @@ from hexacell.identification.data_faults.hypothesis_search import (
 from hexacell.identification.data_faults.record_test import DeletionTest, deletion_test
 from hexacell.identification.problem.data_requirements import equations, is_determined
 from hexacell.identification.problem.problem import Problem
+from hexacell.identification.solver.levenberg_marquardt import FINE
 from hexacell.identification.solver.multistart import start_points
-from hexacell.identification.solver.regularized_fit import refit
+from hexacell.identification.solver.regularized_fit import fit_regularized
 from hexacell.identification.solver.result import DataFault, GaugeFaultError, Identification
 from hexacell.measurements.records import RecordId
 
@@ -138,7 +139,13 @@ def _readmit(selected: CorrectedFit) -> CorrectedFit | None:
     solved = problem.solve_poses(selected.fit.free)
     if not solved.found.all():
         return None
-    again = refit(replace(problem, has_start_pose=solved.found), selected.fit.free, solved.poses)
+    at_solution = replace(
+        problem,
+        initial_parameters=selected.fit.free,
+        start=solved.poses,
+        has_start_pose=solved.found,
+    )
+    again = fit_regularized(at_solution, FINE)
     readmitted = CorrectedFit(original, problem, again, _without(agreeing, selected.faults))
     return readmitted if readmitted.is_reliable else None
 

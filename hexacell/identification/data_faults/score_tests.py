@@ -17,7 +17,7 @@ only the blocks of the records concerned. Three choices of Z:
 
 Sources: Rao, Large sample tests of statistical hypotheses, Proc. Cambridge Phil. Soc. 44, 1948 (score
 test); Baarda, A testing procedure for use in geodetic networks, 1968 (data snooping); Cook and
-Weisberg, Residuals and Influence in Regression, 1982, chapter 2.
+Weisberg, Residuals and Influence in Regression, 1982.
 """
 
 from __future__ import annotations

@@ -23,7 +23,6 @@ from hexacell.identification.solver.levenberg_marquardt import (
 )
 from hexacell.identification.solver.result import Identification
 from hexacell.identification.solver.singular_records import solve_around_singularities
-from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array
 
 RELEASE_RATIO = 9.0
@@ -38,19 +37,14 @@ QUICK = SolverOptions(INITIAL_DAMPING, 1e-3, iterations=60, searches=12)
 """Twice the iterations that consistent records need."""
 
 
-def fit(problem: Problem, *, options: SolverOptions = COARSE) -> Identification:
+def fit_regularized(problem: Problem, options: SolverOptions = COARSE) -> Identification:
     """Fit the records, from the initial parameters of the problem."""
-    return _released(problem, problem.initial_parameters, problem.start, options)
-
-
-def refit(problem: Problem, free: Array, poses: PoseBatch) -> Identification:
-    """Fit the records from free parameters (p,), mm, near the solution, and poses that close them."""
-    return _released(problem, free, poses, FINE)
-
-
-def _released(problem: Problem, free: Array, poses: PoseBatch, options: SolverOptions) -> Identification:
     kept, regularized = solve_around_singularities(
-        problem, problem.prior.precision, free=free, poses=poses, options=options
+        problem,
+        problem.prior.precision,
+        free=problem.initial_parameters,
+        poses=problem.start,
+        options=options,
     )
     information = _noise_correction(kept, regularized) * regularized.information
     active_prior = _unreleased_precision(information, problem.prior.covariance)

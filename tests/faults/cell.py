@@ -17,6 +17,7 @@ from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import Cell, dump, load_cell
 from hexacell.runs.run_folder import RunFolder
 from hexacell.storage.cell_lock import lock_path
+from tests.small_cell import changed
 
 POINTS = ((100.0, -100.0, 500.0), (-100.0, 100.0, 500.0))
 ORIENTATIONS = 9
@@ -50,15 +51,6 @@ NEVER_GOOD_ENOUGH: dict[str, Any] = {
 """No result passes this, so that what was written is rolled back."""
 PROVISIONAL: dict[str, Any] = {"identification.provisional": True}
 """The controller is lent a geometry after the first point, which is taken back after the last."""
-
-
-def changed(section: Any, changes: dict[str, Any]) -> Any:
-    """A section of the cell file with other values at some dotted keys."""
-    for key, value in changes.items():
-        head, _, rest = key.partition(".")
-        inner = changed(getattr(section, head), {rest: value}) if rest else value
-        section = section.model_copy(update={head: inner})
-    return section
 
 
 @dataclass(frozen=True)

@@ -19,14 +19,15 @@ from hexacell.controller_config.write_back import commit
 from procedures.run import events
 from procedures.run.steps import Phase, SetKey
 from tests.procedures.fakes import Bench
-from tests.procedures.rig import MakeRig, Recording, Rig, hurry, new_rig
+from tests.procedures.rig import MakeRig, Recording, Rig, new_rig
 from tests.procedures.story import Story
+from tests.small_cell import choose_among_few
 
 
 @pytest.fixture
 def few_candidates(monkeypatch: pytest.MonkeyPatch) -> None:
     """Choose among few poses, go there in few pieces: what is chosen is not under test here."""
-    hurry(monkeypatch)
+    choose_among_few(monkeypatch)
 
 
 @pytest.fixture
@@ -37,7 +38,7 @@ def make_rig(few_candidates: None, tmp_path: Path) -> MakeRig:
 @pytest.fixture(scope="session")
 def recording(tmp_path_factory: pytest.TempPathFactory) -> Recording:
     with pytest.MonkeyPatch.context() as patch:
-        hurry(patch)
+        choose_among_few(patch)
         rig = new_rig(tmp_path_factory.mktemp("recording"))
         before = rig.config
         told: list[events.Event] = []

@@ -11,7 +11,6 @@ from typing import Any
 
 import pytest
 
-from drivers.simulated import robot as machine_module
 from drivers.simulated.cell import _physics
 from drivers.simulated.physics import RobotPhysics
 from drivers.simulated.robot import SimulatedMachine
@@ -19,11 +18,11 @@ from hexacell.application.calibration_run import run_started
 from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import Cell, dump, load_cell
 from hexacell.controller_config.toml_format import NativeToml
+from hexacell.errors import DeviceError, FileError, HexacellError
 from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS, Hexaglide
 from hexacell.kinematics.pose import Pose
 from hexacell.robot_model import robot_of
 from hexacell.runs.run_folder import RunFolder
-from procedures.calibration import workflow as calibration_module
 from procedures.calibration.workflow import Calibration, Mode
 from procedures.engine.engine import Engine, Listener
 from procedures.engine.recovery import GIVE_UP, RecoveryPolicy
@@ -32,6 +31,7 @@ from procedures.journal.journal import Journal
 from procedures.run import events
 from procedures.run.questions import QuestionBroker
 from tests.procedures.fakes import Approver, Bench
+from tests.small_cell import SMALL, changed, history_until
 
 
 @dataclass
@@ -93,41 +93,15 @@ class Rig:
 
 
 MakeRig = Callable[..., Rig]
-SMALL: dict[str, Any] = {
-    "identification.points": ((100.0, -100.0, 500.0), (-100.0, 100.0, 500.0)),
-    "identification.orientations": 9,
-    "verification.orientations": 3,
-    "noise.encoder_mm": 0.001,
-    "noise.gauge_mm": 0.001,
-    "acceptance.mean_deviation_mm": 0.2,
-    "acceptance.max_deviation_mm": 0.4,
-    "timing.interval_s": 0.15,
-    "simulation.gauges.noise_mm": 0.001,
-    "simulation.gauges.flicker_mm": 0.0002,
-    "simulation.encoders.noise_mm": 0.001,
-    "simulation.encoders.flicker_mm": 0.0002,
-}
-"""A cell that is measured quickly and precisely: as few poses as identify it."""
-
-
-def changed(section: Any, changes: dict[str, Any]) -> Any:
-    """A section of the cell file with other values at some dotted keys."""
-    for key, value in changes.items():
-        head, _, rest = key.partition(".")
-        inner = changed(getattr(section, head), {rest: value}) if rest else value
-        section = section.model_copy(update={head: inner})
-    return section
-
-
-def hurry(patch: pytest.MonkeyPatch) -> None:
-    patch.setattr(calibration_module, "CANDIDATES", 64)
-    patch.setattr(calibration_module, "HELD_OUT_CANDIDATES", 128)
-    patch.setattr(machine_module, "LINE_STEPS", 8)
 
 
 def new_rig(folder: Path, mode: Mode = Mode.OPTIMISE, operator: Any = None, **changes: Any) -> Rig:
     source = load_cell(bundled_config("simulated-hexaglide"))
-    changes = SMALL | {key.replace("__", "."): value for key, value in changes.items()}
+    changes = (
+        SMALL
+        | {"timing.interval_s": 0.15}
+        | {key.replace("__", "."): value for key, value in changes.items()}
+    )
     path = folder / "cell.toml"
     path.write_text(dump(changed(source.settings, changes)))
     shutil.copy(source.config_path, folder)
@@ -146,5 +120,24 @@ class Recording:
 
     def until(self, *kinds: type[Any], count: int = 1) -> tuple[events.Event, ...]:
         """The history up to and with the ``count``-th event of these kinds."""
-        places = [place for place, event in enumerate(self.history) if isinstance(event, kinds)]
-        return self.history[: places[count - 1] + 1]
+        return history_until(self.history, *kinds, count=count)
+
+
+async def failure_without_record(
+    rig: Rig, patch: pytest.MonkeyPatch, kind: type[Any], *, reload_works: bool
+) -> str:
+    """The error of a run that cannot journal an event of this kind."""
+    append = Journal.append
+
+    def full(self: Journal, event: events.Event) -> None:
+        if isinstance(event, kind):
+            if not reload_works:
+                rig.controller.failures["reload"] = DeviceError("does not answer", subject="controller")
+            raise FileError("the disk is full", subject=self.path)
+        append(self, event)
+
+    with patch.context() as patched:
+        patched.setattr(Journal, "append", full)
+        with pytest.raises(HexacellError, match="the disk is full") as failure:
+            await rig.run()
+    return str(failure.value)

@@ -12,7 +12,6 @@ from typing import Any
 
 import pytest
 
-from drivers.simulated import robot as machine_module
 from drivers.simulated.cell import SimulatedCell
 from hexacell.application.calibration_run import RunRequest, calibrate
 from hexacell.campaign import feasibility
@@ -22,40 +21,20 @@ from hexacell.cell.model import CellSettings
 from hexacell.controller_config.toml_format import NativeToml
 from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS, Hexaglide
 from hexacell.runs.run_folder import RunFolder
-from procedures.calibration import workflow as calibration_module
 from procedures.calibration.workflow import Mode
 from procedures.engine.engine import Listener
 from procedures.journal.journal import Journal, read_journal
 from procedures.run import events
 from procedures.run.questions import Question, UnattendedOperator
+from tests.small_cell import SMALL, changed, choose_among_few, history_until
 
-SMALL: dict[str, Any] = {
-    "identification.points": ((100.0, -100.0, 500.0), (-100.0, 100.0, 500.0)),
-    "identification.orientations": 9,
-    "verification.orientations": 3,
-    "noise.encoder_mm": 0.001,
-    "noise.gauge_mm": 0.001,
-    "acceptance.mean_deviation_mm": 0.2,
-    "acceptance.max_deviation_mm": 0.4,
+SERVED: dict[str, Any] = {
     "timing.clock_factor": 500.0,
     "encoders.timeout_s": 10.0,
     "encoders.heartbeat_ms": 10_000,
-    "simulation.gauges.noise_mm": 0.001,
-    "simulation.gauges.flicker_mm": 0.0002,
-    "simulation.encoders.noise_mm": 0.001,
-    "simulation.encoders.flicker_mm": 0.0002,
     "simulation.motion.ringing_mm": 0.05,
 }
-"""Quick and precise: as few poses as identify it."""
-
-
-def changed(section: Any, changes: dict[str, Any]) -> Any:
-    """A section of the cell file with other values at some dotted keys."""
-    for key, value in changes.items():
-        head, _, rest = key.partition(".")
-        inner = changed(getattr(section, head), {rest: value}) if rest else value
-        section = section.model_copy(update={head: inner})
-    return section
+"""Real drivers are patient with simulated devices on a fast clock."""
 
 
 MakeCell = Callable[..., Cell]
@@ -65,7 +44,7 @@ def maker(folder: Path) -> MakeCell:
     def make(**changes: Any) -> Cell:
         source = bundled_config("simulated-hexaglide")
         cell = load_cell(source)
-        changes = SMALL | {key.replace("__", "."): value for key, value in changes.items()}
+        changes = SMALL | SERVED | {key.replace("__", "."): value for key, value in changes.items()}
         patient = tuple(gauge.model_copy(update={"timeout_s": 10.0}) for gauge in cell.settings.gauges)
         settings: CellSettings = changed(cell.settings, {"gauges": patient} | changes)
         path = folder / "cell.toml"
@@ -86,11 +65,9 @@ def make_cell(tmp_path: Path) -> MakeCell:
 def few_candidates() -> Iterator[None]:
     """Choose among few poses: what is chosen is not under test here."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(calibration_module, "CANDIDATES", 64)
-        patch.setattr(calibration_module, "HELD_OUT_CANDIDATES", 128)
+        choose_among_few(patch)
         patch.setattr(feasibility, "CANDIDATES", 8)
         patch.setattr(feasibility, "ROBOTS", 4)
-        patch.setattr(machine_module, "LINE_STEPS", 8)
         yield
 
 
@@ -119,8 +96,7 @@ class Finished:
 
     def until(self, *kinds: type[Any], count: int = 1) -> tuple[events.Event, ...]:
         """The history up to and with the ``count``-th event of these kinds."""
-        places = [place for place, event in enumerate(self.history) if isinstance(event, kinds)]
-        return self.history[: places[count - 1] + 1]
+        return history_until(self.history, *kinds, count=count)
 
 
 @pytest.fixture(scope="session")

@@ -8,14 +8,15 @@ import numpy as np
 import pytest
 
 from hexacell.controller_config.toml_format import NativeToml
-from hexacell.errors import DeviceError, ExitCode, FileError, HexacellError, Interruption
+from hexacell.errors import DeviceError, ExitCode, HexacellError, Interruption
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS
-from procedures.journal.journal import Journal, read_journal
+from procedures.journal.journal import read_journal
 from procedures.run import events
 from procedures.run.commands import Abort
 from procedures.run.state import fold
 from procedures.run.steps import Compute
+from tests.procedures.rig import failure_without_record
 
 
 class PowerCut(BaseException):
@@ -170,25 +171,16 @@ async def test_a_controller_that_does_not_take_it_leaves_the_config_as_it_was(ri
     assert rig.config == before
 
 
-@pytest.mark.parametrize("comes_back", [True, False])
+@pytest.mark.parametrize("reload_works", [True, False])
 async def test_a_provisional_geometry_that_cannot_be_journalled_is_reverted_or_reported(
-    rig, monkeypatch, comes_back: bool
+    rig, monkeypatch, reload_works: bool
 ) -> None:
-    before, append = rig.config, Journal.append
-
-    def full(self: Journal, event: events.Event) -> None:
-        if isinstance(event, events.ProvisionalApplied):
-            if not comes_back:
-                rig.controller.failures["reload"] = DeviceError("is deaf", subject="controller")
-            raise FileError("the disk is full", subject=self.path)
-        append(self, event)
-
-    with monkeypatch.context() as patch:
-        patch.setattr(Journal, "append", full)
-        with pytest.raises(HexacellError, match="the disk is full") as failure:
-            await rig.run()
-    said = "the controller has a provisional geometry, which could be neither noted nor taken back"
-    assert (said in str(failure.value)) is not comes_back
+    before = rig.config
+    report = await failure_without_record(
+        rig, monkeypatch, events.ProvisionalApplied, reload_works=reload_works
+    )
+    unreverted = "the controller has a provisional geometry, which could be neither noted nor taken back"
+    assert (unreverted in report) is not reload_works
     assert rig.config == before
     rig.controller.failures.clear()
     await require_finished(rig)

@@ -31,12 +31,15 @@ SILENCE_ATTEMPTS = 5  # a line may take this many times the required silence to 
 OPEN_TRIES = 5
 
 
-class NoAnswer(DeviceError):
-    """No complete frame in time; ``received`` is what came, the echo of the request included."""
+class NoAnswer(Exception):
+    """No complete frame in time; ``received`` is what came, the echo of the request included.
 
-    def __init__(self, problem: str, *, subject: str, received: bytes) -> None:
+    Never shown to users.
+    """
+
+    def __init__(self, received: bytes) -> None:
         self.received = received
-        super().__init__(problem, subject=subject, action="Switch the device on and check its cable")
+        super().__init__(received)
 
 
 class SerialPort:
@@ -179,9 +182,7 @@ class SerialPort:
                 frame, self._surplus = cut
                 return frame
         self._silence_s = self._worst_latency_s
-        raise NoAnswer(
-            f"no answer within {timeout_s:g} s on {self.url}", subject=self.subject, received=received
-        )
+        raise NoAnswer(received)
 
     def _read(self, port: serial.Serial) -> bytes:
         """The bytes that come within one slice, possibly none."""

@@ -23,7 +23,7 @@ async def test_an_answer_is_complete_and_read_by_one_thread(fake):
 async def test_received_bytes_are_reported_if_there_is_no_answer(fake):
     fake(FakePort(lambda _: [(0.0, b"+1.2")]))
     link = await opened()
-    with pytest.raises(NoAnswer, match=r"no answer within 0\.05 s") as caught:
+    with pytest.raises(NoAnswer) as caught:
         await link.exchange(b"?\r", b"\r", SOON_S)
     assert caught.value.received == b"+1.2"
     await link.close()

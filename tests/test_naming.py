@@ -11,7 +11,6 @@ PACKAGES = ("hexacell", "drivers", "procedures")
 ONE_IDEA_IN_SEVERAL_MODULES = {
     "main": "a command of the command line",
     "parse_value": "a reading in the syntax of one gauge protocol",
-    "format_value": "the reverse, in the simulation",
 }
 
 

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 
-from drivers.simulated.gauges.cdi import CdiDevice
-from drivers.simulated.gauges.device import Indicator, LineDevice, PlungerPosition
-from drivers.simulated.gauges.mux10 import Mux10Device
+from drivers.simulated.gauges.indicator import Indicator, PlungerPosition
+from drivers.simulated.gauges.instruments import INSTRUMENTS, Instrument
 from drivers.simulated.gauges.server import GaugeLineServer
-from drivers.simulated.gauges.sylvac import SylvacDevice
 from drivers.simulated.serial_line import PtyLine, SocketLine
 from drivers.simulated.served_device import Closeable, Switch
 from hexacell.cell.devices import GaugeSettings
@@ -17,26 +15,21 @@ from hexacell.cell.simulation import FaultKind, SimulatedGauges
 from hexacell.clock import CellClock
 from hexacell.errors import FileError
 
-DEVICES: dict[str, Callable[[Mapping[int, Indicator]], LineDevice]] = {
-    "sylvac": SylvacDevice,
-    "mux10": Mux10Device,
-    "cdi": CdiDevice,
-}
 MULTIPLEXED = frozenset({"mux10"})
 
 
-def simulated_device(protocol: str, indicators: Mapping[int, Indicator]) -> LineDevice:
-    """A device that speaks ``protocol``, with ``indicators`` by channel.
+def simulated_instrument(protocol: str, indicators: Mapping[int, Indicator]) -> Instrument:
+    """An instrument with ``protocol``, with ``indicators`` by channel.
 
     Raises:
-        FileError: There is no such simulated device.
+        FileError: There is no such simulated instrument.
     """
-    if protocol not in DEVICES:
+    if protocol not in INSTRUMENTS:
         raise FileError(
             f"no simulated gauge speaks protocol {protocol}",
-            action=f"Choose one of {', '.join(sorted(DEVICES))}",
+            action=f"Choose one of {', '.join(sorted(INSTRUMENTS))}",
         )
-    return DEVICES[protocol](indicators)
+    return INSTRUMENTS[protocol](indicators)
 
 
 class SimulatedGaugeBank(Closeable):
@@ -87,10 +80,10 @@ class SimulatedGaugeBank(Closeable):
 
     def _serve(self, group: Sequence[GaugeSettings]) -> GaugeLineServer:
         indicators = {_channel(gauge): self.indicators[gauge.name] for gauge in group}
-        device = simulated_device(group[0].protocol, indicators)
+        instrument = simulated_instrument(group[0].protocol, indicators)
         name = "-".join(gauge.name for gauge in group)
         return GaugeLineServer(
-            device,
+            instrument,
             PtyLine(name) if self._settings.transport == "pty" else SocketLine(),
             self._clock,
             latency_s=self._settings.latency_s,

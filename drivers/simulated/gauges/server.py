@@ -11,7 +11,7 @@ from collections import deque
 from collections.abc import Callable
 from concurrent.futures import Future
 
-from drivers.simulated.gauges.device import LineDevice
+from drivers.simulated.gauges.instruments import Instrument
 from drivers.simulated.serial_line import SerialLine
 from drivers.simulated.served_device import Closeable
 from hexacell.clock import CellClock
@@ -24,7 +24,7 @@ _log = logging.getLogger(__name__)
 
 
 class GaugeLineServer(Closeable):
-    """Serves a device on a serial line, from a thread of its own, until it is closed.
+    """Serves an instrument on a serial line, from a thread of its own, until it is closed.
 
     An answer is sent after ``latency_s`` plus the transmission time of request and answer, in seconds
     of the cell's clock. Answers are sent one after another, as on a cable.
@@ -32,19 +32,19 @@ class GaugeLineServer(Closeable):
 
     def __init__(
         self,
-        device: LineDevice,
+        instrument: Instrument,
         line: SerialLine,
         clock: CellClock,
         *,
         latency_s: float,
         baudrate: int | None = None,
     ) -> None:
-        self.device = device
+        self.instrument = instrument
         self.url = line.url
         self._line = line
         self._clock = clock
         self._latency_s = latency_s
-        self._byte_s = device.bits_a_byte / (baudrate or device.baudrate)
+        self._byte_s = instrument.bits_a_byte / (baudrate or instrument.baudrate)
         self._silent = False
         self._received = b""
         self._answers: deque[tuple[float, bytes]] = deque()
@@ -117,7 +117,7 @@ class GaugeLineServer(Closeable):
             self._answer(command.strip(b"\n"))
 
     def _answer(self, command: bytes) -> None:
-        answer = self.device.answer(command)
+        answer = self.instrument.answer(command)
         if self._silent:
             answer = b""
         wire_s = (len(command) + len(COMMAND_END) + len(answer)) * self._byte_s

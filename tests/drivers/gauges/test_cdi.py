@@ -10,7 +10,7 @@ from drivers.errors import GaugeAtEnd, GaugeSilent, WrongAnswer, WrongSetting, Z
 from drivers.gauges.cdi import CdiError, CdiGauge, Parameter, parse_parameter, parse_value
 from drivers.gauges.protocol import DisplayedValue, FrameRejected
 from drivers.interfaces import DeviceIdentity, GaugeReading
-from drivers.simulated.gauges.cdi import format_value
+from drivers.simulated.gauges.instruments import Cdi
 
 VALUE = b"+  2.1380, MM\r\n"
 PARAMETERS = {b"?p011\r": b"0\r\n", b"?p019\r": b"0\r\n", b"?p021\r": b"0\r\n", b"?p040\r": b"0\r\n"}
@@ -85,7 +85,7 @@ def test_anything_else_is_rejected(frame):
 
 @given(st.floats(-99, 99), st.booleans())
 def test_what_the_simulated_device_writes_is_read(value, inch):
-    shown = parse_value(format_value(value, inch=inch).removesuffix(b"\n"))
+    shown = parse_value(Cdi.format_value(1, value, inch=inch).removesuffix(b"\n"))
     assert isinstance(shown, DisplayedValue)
     assert shown.value == pytest.approx(value, abs=0.51e-5 if inch else 0.51e-4)
     assert shown.unit == ("inch" if inch else "mm")

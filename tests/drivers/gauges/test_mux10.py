@@ -12,7 +12,7 @@ from drivers.gauges import mux10
 from drivers.gauges.mux10 import MultiplexerError, Mux10Gauge, parse_identification, parse_value
 from drivers.gauges.protocol import DisplayedValue, FrameRejected
 from drivers.interfaces import DeviceIdentity, GaugeReading
-from drivers.simulated.gauges.mux10 import format_value
+from drivers.simulated.gauges.instruments import Mux10
 from hexacell.errors import DeviceError, FileError
 
 VALUE = b"02A+0000.123\r"
@@ -84,7 +84,7 @@ def test_anything_else_is_rejected(frame):
 
 @given(st.integers(1, 99), st.floats(-99, 99), st.booleans())
 def test_what_the_simulated_device_writes_is_read(channel, value, inch):
-    shown = parse_value(format_value(channel, value, inch=inch), channel)
+    shown = parse_value(Mux10.format_value(channel, value, inch=inch), channel)
     assert isinstance(shown, DisplayedValue)
     assert shown.value == pytest.approx(value, abs=0.51e-5 if inch else 0.51e-3)
     assert (shown.apparent_unit == "inch") is inch
@@ -104,7 +104,7 @@ def test_noise_is_a_value_only_if_it_is_one_to_the_last_byte(noise):
 
 @given(st.floats(-99, 99), st.integers(0, 9), st.integers(0, 9))
 def test_no_part_of_a_value_is_a_value(value, front, back):
-    frame = format_value(2, value, inch=False)
+    frame = Mux10.format_value(2, value, inch=False)
     part = frame[front : len(frame) - back]
     if part != frame and not re.fullmatch(rb"9[12]\d\r", part):  # the last digits may be an error frame
         with pytest.raises(FrameRejected):

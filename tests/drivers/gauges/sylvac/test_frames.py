@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from drivers.gauges.protocol import DisplayedValue, FrameRejected
 from drivers.gauges.sylvac import BATTERY, IDENTIFICATION, PRESET, SylvacError, parse_value
-from drivers.simulated.gauges.sylvac import format_value
+from drivers.simulated.gauges.instruments import Sylvac
 
 
 @pytest.mark.parametrize(
@@ -62,7 +62,7 @@ def test_anything_else_is_rejected(frame):
 
 @given(st.floats(-999, 999), st.booleans())
 def test_what_the_simulated_device_writes_is_read(value, inch):
-    shown = parse_value(format_value(value, inch=inch))
+    shown = parse_value(Sylvac.format_value(1, value, inch=inch))
     assert isinstance(shown, DisplayedValue)
     assert shown.value == pytest.approx(value, abs=0.51e-5 if inch else 0.51e-3)
     assert (shown.apparent_unit == "inch") is inch
@@ -82,7 +82,7 @@ def test_noise_is_a_value_only_if_it_is_one_to_the_last_byte(noise):
 
 @given(st.floats(-99, 99), st.integers(0, 6), st.integers(0, 6))
 def test_no_part_of_a_value_is_a_value(value, front, back):
-    frame = format_value(value, inch=False)
+    frame = Sylvac.format_value(1, value, inch=False)
     part = frame[front : len(frame) - back]
     if part != frame:
         with pytest.raises(FrameRejected):

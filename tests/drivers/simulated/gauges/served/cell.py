@@ -10,8 +10,8 @@ from drivers.gauges.mux10 import Mux10Gauge
 from drivers.gauges.serial_gauge import SerialGauge
 from drivers.gauges.sylvac import SylvacGauge
 from drivers.serial.shared_port import SharedSerialPorts
-from drivers.simulated.gauges.bank import SimulatedGaugeBank, simulated_device
-from drivers.simulated.gauges.device import Indicator
+from drivers.simulated.gauges.bank import SimulatedGaugeBank, simulated_instrument
+from drivers.simulated.gauges.indicator import Indicator
 from drivers.simulated.gauges.server import GaugeLineServer
 from drivers.simulated.serial_line import PtyLine, SocketLine
 from hexacell.cell.devices import GaugeSettings
@@ -66,9 +66,9 @@ async def cell(*args, **kwargs):
 
 
 def served(protocol, plunger=lambda: 1.0, transport="pty", factor=FAST, name="gauge", **pace):
-    device = simulated_device(protocol, {1: Indicator(plunger)})
+    instrument = simulated_instrument(protocol, {1: Indicator(plunger)})
     line = PtyLine(name) if transport == "pty" else SocketLine()
-    return GaugeLineServer(device, line, CellClock(factor), **({"latency_s": 0.02} | pace))
+    return GaugeLineServer(instrument, line, CellClock(factor), **({"latency_s": 0.02} | pace))
 
 
 def send_unsolicited(line, data):
@@ -79,23 +79,23 @@ def send_unsolicited(line, data):
 def change_answers(line, change, count=None):
     """Let ``change`` alter every answer of a line, or the next ``count``."""
     changes = itertools.repeat(change) if count is None else iter([change] * count)
-    answer = line.device.answer
+    answer = line.instrument.answer
 
     def changed(command):
         return next(changes, bytes)(answer(command))
 
-    line.device.answer = changed
+    line.instrument.answer = changed
 
 
 def questions_to(line):
     """A list that gets every question when it arrives at ``line``."""
-    questions, answer = [], line.device.answer
+    questions, answer = [], line.instrument.answer
 
     def noted(command):
         questions.append(command)
         return answer(command)
 
-    line.device.answer = noted
+    line.instrument.answer = noted
     return questions
 
 

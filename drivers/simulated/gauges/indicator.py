@@ -1,11 +1,9 @@
-"""The device on a simulated line, and its dial indicators, whose settings depend on no protocol."""
+"""A simulated dial indicator, whose settings depend on no protocol."""
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from math import copysign
-from typing import ClassVar
 
 MM_PER_INCH = 25.4
 PUSH_MM = 6.0
@@ -56,37 +54,3 @@ class Indicator:
         if self._at_end or abs(position) > self._travel_mm / 2:
             return None
         return -position if self.reversed else position
-
-
-class LineDevice(ABC):
-    """An instrument, or a multiplexer with several, that answers commands.
-
-    ``indicators`` are by channel, counted from 1; all but a multiplexer have channel 1 only.
-    """
-
-    baudrate: ClassVar[int] = 9600
-    bits_a_byte: ClassVar[int] = 10  # with start, parity and stop bits
-
-    def __init__(self, indicators: Mapping[int, Indicator]) -> None:
-        self.indicators = dict(indicators)
-
-    @abstractmethod
-    def answer(self, command: bytes) -> bytes:
-        """The answer to ``command``, which has no carriage return."""
-
-
-class SingleDevice(LineDevice):
-    """A device with one indicator."""
-
-    @property
-    def indicator(self) -> Indicator:
-        """Its indicator."""
-        return self.indicators[1]
-
-    def answer(self, command: bytes) -> bytes:
-        """The answer to ``command``; nothing while it is off."""
-        return self.reply(command) if self.indicator.powered else b""
-
-    @abstractmethod
-    def reply(self, command: bytes) -> bytes:
-        """The answer while it is on."""

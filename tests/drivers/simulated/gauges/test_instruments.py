@@ -2,10 +2,8 @@
 
 import pytest
 
-from drivers.simulated.gauges.cdi import CdiDevice
-from drivers.simulated.gauges.device import Indicator
-from drivers.simulated.gauges.mux10 import Mux10Device
-from drivers.simulated.gauges.sylvac import SylvacDevice
+from drivers.simulated.gauges.indicator import Indicator
+from drivers.simulated.gauges.instruments import Cdi, Mux10, Sylvac
 
 
 class Ball:
@@ -30,17 +28,17 @@ def indicator(ball):
 
 @pytest.fixture
 def sylvac(indicator):
-    return SylvacDevice({1: indicator})
+    return Sylvac({1: indicator})
 
 
 @pytest.fixture
 def mux10(indicator):
-    return Mux10Device({2: indicator})
+    return Mux10({2: indicator})
 
 
 @pytest.fixture
 def cdi(indicator):
-    return CdiDevice({1: indicator})
+    return Cdi({1: indicator})
 
 
 # The instrument

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from hexacell import __version__
 from hexacell.application.calibration_run import robot_of_run
 from hexacell.campaign.pose_list import pose_list_of
 from hexacell.cell.loader import Cell, dump, load_cell
@@ -21,52 +20,16 @@ from hexacell.storage import atomic_files
 from procedures.calibration.workflow import Calibration, Mode
 from procedures.journal.journal import read_entries
 from procedures.journal.line_format import Entry
-from procedures.replay.comparison import TOLERANCE, Aspect, Difference
+from procedures.replay.comparison import TOLERANCE, ReplayReport
 from procedures.replay.recorded_executor import RecordedStepExecutor
-from procedures.replay.replayer import Replayer, ReplayReport, Scope
+from procedures.replay.replayer import Replayer, Scope
 from procedures.run.events import RunStarted
 
 CONFIG = "controller-config"
 POSES = "poses.csv"
 
 
-@dataclass(frozen=True)
-class Replay:
-    """A run that was replayed.
-
-    Attributes:
-        recorded_by: the software that recorded it.
-        replayed_by: this software.
-    """
-
-    journal: Path
-    recorded_by: str
-    replayed_by: str
-    events: int
-    tally: ReplayReport
-
-    @property
-    def is_same_software(self) -> bool:
-        """Whether decisions must be the same; another version may decide better."""
-        return self.recorded_by == self.replayed_by
-
-    @property
-    def is_same(self) -> bool:
-        """Whether no difference counts."""
-        return not any(self.counts(difference) for difference in self.tally.differences)
-
-    def counts(self, difference: Difference) -> bool:
-        """Whether a difference means that the replay failed; see ``docs/interface.md``."""
-        match difference.aspect:
-            case Aspect.WORDS:
-                return False
-            case Aspect.DECISION:
-                return self.is_same_software
-            case Aspect.RESULT:
-                return True
-
-
-async def replay(run: Path, scope: Scope = Scope.ALL, tolerance: float = TOLERANCE) -> Replay:
+async def replay(run: Path, scope: Scope = Scope.ALL, tolerance: float = TOLERANCE) -> ReplayReport:
     """Put a recorded run through the procedure again and compare.
 
     Args:
@@ -80,10 +43,12 @@ async def replay(run: Path, scope: Scope = Scope.ALL, tolerance: float = TOLERAN
     folder, journal = _found(run)
     entries = read_entries(journal)
     started = _started(journal, entries)
+    report = ReplayReport(journal, started.software, len(entries))
     with TemporaryDirectory(prefix="hexacell-replay-") as name:
-        replayer, started = _set_up(Path(name), folder, started, scope, tolerance)
-        tally = await replayer.replay([replace(entries[0], event=started), *entries[1:]])
-    return Replay(journal, started.software, f"hexacell {__version__}", len(entries), tally)
+        executor, started = _set_up(Path(name), folder, started)
+        replayer = Replayer(executor, report, scope, tolerance)
+        await replayer.replay([replace(entries[0], event=started), *entries[1:]])
+    return report
 
 
 def _found(run: Path) -> tuple[RunFolder, Path]:
@@ -100,8 +65,8 @@ def _started(journal: Path, entries: Sequence[Entry]) -> RunStarted:
 
 
 def _set_up(
-    scratch: Path, folder: RunFolder, started: RunStarted, scope: Scope, tolerance: float
-) -> tuple[Replayer, RunStarted]:
+    scratch: Path, folder: RunFolder, started: RunStarted
+) -> tuple[RecordedStepExecutor, RunStarted]:
     """The procedure with recorded devices, and the run's start with the config of the temporary folder."""
     cell = _cell(scratch, started, folder.journal)
     text = _config_text(folder, started)
@@ -121,8 +86,7 @@ def _set_up(
     run.path.mkdir()
     calibration = Calibration(settings, robot_of_run(cell, started), Mode(started.mode), pose_list_of(cell))
     executor = RecordedStepExecutor.of(cell, calibration, run)
-    replayer = Replayer(executor, run.journal, scope, tolerance)
-    return replayer, started.model_copy(update={"config_sha256": atomic_files.sha256(text)})
+    return executor, started.model_copy(update={"config_sha256": atomic_files.sha256(text)})
 
 
 def _cell(scratch: Path, started: RunStarted, journal: Path) -> Cell:

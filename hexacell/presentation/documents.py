@@ -9,8 +9,8 @@ from typing import Any
 from drivers.interfaces import DeviceIdentity
 from hexacell.application.calibration_run import RunRequest
 from hexacell.application.offline import NextPose, PlanTrial
-from hexacell.application.replay_run import Replay
 from hexacell.campaign.decisions import Finished, Forecast, MeasurePose, StartPoint
+from procedures.replay.comparison import ReplayReport
 from procedures.run import events
 
 
@@ -86,16 +86,15 @@ def run_document(request: RunRequest, ended: events.Ended) -> dict[str, Any]:
     }
 
 
-def replay_document(replayed: Replay) -> dict[str, Any]:
+def replay_document(replayed: ReplayReport) -> dict[str, Any]:
     """What ``replay --json`` prints."""
-    tally = replayed.tally
     return {
         "same": replayed.is_same,
         "journal": str(replayed.journal),
         "events": replayed.events,
-        "decisions": tally.decisions,
-        "results": tally.results,
-        "taken": tally.taken,
+        "decisions": replayed.decisions,
+        "results": replayed.results,
+        "taken": replayed.taken,
         "recorded_by": replayed.recorded_by,
         "replayed_by": replayed.replayed_by,
         "differences": [
@@ -106,6 +105,6 @@ def replay_document(replayed: Replay) -> dict[str, Any]:
                 "counts": replayed.counts(difference),
                 **asdict(difference.change),
             }
-            for difference in tally.differences
+            for difference in replayed.differences
         ],
     }

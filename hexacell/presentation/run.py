@@ -6,10 +6,9 @@ import shlex
 from pathlib import Path
 
 from hexacell.application.calibration_run import RunRequest
-from hexacell.application.replay_run import Replay
 from hexacell.presentation.layout import wrapped
 from procedures.calibration.workflow import Mode
-from procedures.replay.comparison import Aspect, Difference
+from procedures.replay.comparison import Aspect, Difference, ReplayReport
 from procedures.run import events
 from procedures.run.questions import GaugePlacement, PendingChange, Question, StepFailure
 
@@ -81,9 +80,9 @@ def matching_choice(typed: str, question: Question) -> str | None:
     return found[0] if len(found) == 1 else None
 
 
-def replay_report(replayed: Replay) -> str:
+def replay_report(replayed: ReplayReport) -> str:
     """The differences, those that count first, and the verdict."""
-    found = sorted(replayed.tally.differences, key=lambda one: not replayed.counts(one))
+    found = sorted(replayed.differences, key=lambda one: not replayed.counts(one))
     lines = [
         wrapped(_difference_line(replayed, difference), indent=4)
         for difference in found[:LISTED_DIFFERENCES]
@@ -97,14 +96,13 @@ def replay_report(replayed: Replay) -> str:
     return "\n".join([*lines, _replay_verdict(replayed)])
 
 
-def _difference_line(replayed: Replay, difference: Difference) -> str:
+def _difference_line(replayed: ReplayReport, difference: Difference) -> str:
     return f"{'NO' if replayed.counts(difference) else '--'}  {difference}"
 
 
-def _replay_verdict(replayed: Replay) -> str:
-    tally = replayed.tally
-    what = f"{tally.decisions} decisions and {tally.results} results of {replayed.events} events"
+def _replay_verdict(replayed: ReplayReport) -> str:
+    what = f"{replayed.decisions} decisions and {replayed.results} results of {replayed.events} events"
     if replayed.is_same:
         return f"{what}: the same as recorded"
-    first = next(one for one in tally.differences if replayed.counts(one))
+    first = next(one for one in replayed.differences if replayed.counts(one))
     return f"{what}: different, first in line {first.line} ({first.place})"

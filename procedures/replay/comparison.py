@@ -1,16 +1,18 @@
-"""Comparison of a recorded and a replayed event, field by field."""
+"""Comparison of recorded and replayed events, field by field, and what a replay found by it."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import StrEnum
+from pathlib import Path
 
 import numpy as np
 from pydantic import BaseModel
 
 from drivers.encoders.cia406 import positions_mm
+from hexacell import __version__
 from hexacell.cell.devices import EncoderSettings
 from procedures.run.events import Reading
 
@@ -53,6 +55,48 @@ class Difference:
             f"line {self.line}, {self.place}: {field}recorded {_short(self.change.recorded)}, "
             f"replayed {_short(self.change.replayed)}"
         )
+
+
+@dataclass
+class ReplayReport:
+    """A run that is replayed, and the findings so far.
+
+    Attributes:
+        recorded_by: the software that recorded it.
+        events: how many events its journal has.
+        decisions: how many decisions were computed again.
+        results: how many outcomes were computed again.
+        taken: how many other events were taken from the journal.
+    """
+
+    journal: Path
+    recorded_by: str
+    events: int
+    replayed_by: str = f"hexacell {__version__}"
+    decisions: int = 0
+    results: int = 0
+    taken: int = 0
+    differences: list[Difference] = field(default_factory=list)
+
+    @property
+    def is_same_software(self) -> bool:
+        """Whether decisions must be the same; another version may decide better."""
+        return self.recorded_by == self.replayed_by
+
+    @property
+    def is_same(self) -> bool:
+        """Whether no difference counts."""
+        return not any(self.counts(difference) for difference in self.differences)
+
+    def counts(self, difference: Difference) -> bool:
+        """Whether a difference means that the replay failed; see ``docs/interface.md``."""
+        match difference.aspect:
+            case Aspect.WORDS:
+                return False
+            case Aspect.DECISION:
+                return self.is_same_software
+            case Aspect.RESULT:
+                return True
 
 
 def changes(recorded: BaseModel, replayed: BaseModel, tolerance: float) -> list[Change]:

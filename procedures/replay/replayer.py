@@ -9,9 +9,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Awaitable, Sequence
-from dataclasses import dataclass, field
 from enum import StrEnum
-from pathlib import Path
 from typing import TypeVar
 
 from pydantic import BaseModel
@@ -25,6 +23,7 @@ from procedures.replay.comparison import (
     Aspect,
     Change,
     Difference,
+    ReplayReport,
     changes,
     counts_mismatch,
     is_wording,
@@ -58,53 +57,35 @@ class Scope(StrEnum):
         )
 
 
-@dataclass
-class ReplayReport:
-    """The findings so far.
-
-    Attributes:
-        decisions: how many decisions were computed again.
-        results: how many outcomes were computed again.
-        taken: how many other events were taken from the journal.
-    """
-
-    decisions: int = 0
-    results: int = 0
-    taken: int = 0
-    differences: list[Difference] = field(default_factory=list)
-
-
 class Replayer:
     """Replays one recorded run.
 
     Args:
         executor: executes steps in a temporary folder.
-        scratch: path of a temporary journal, for the end of the run.
+        report: gets the findings.
     """
 
     def __init__(
         self,
         executor: RecordedStepExecutor,
-        scratch: Path,
+        report: ReplayReport,
         scope: Scope = Scope.ALL,
         tolerance: float = TOLERANCE,
     ) -> None:
         self._executor = executor
-        self._scratch = scratch
         self._scope = scope
         self._tolerance = tolerance
         self._state = RunState()
         self._current_step: Step | None = None
         self._line = 0
-        self.report = ReplayReport()
+        self.report = report
 
-    async def replay(self, entries: Sequence[Entry]) -> ReplayReport:
+    async def replay(self, entries: Sequence[Entry]) -> None:
         """Replay all entries."""
         for place, entry in enumerate(entries):
             self._line = entry.number
             await self._compare(entry.event, entries[:place])
             self._state = apply(self._state, entry.event)
-        return self.report
 
     async def _compare(self, event: events.Event, before: Sequence[Entry]) -> None:
         match event:
@@ -177,8 +158,9 @@ class Replayer:
         if left is not None:
             self._compare_with(Aspect.DECISION, "end", event, left)
             return
-        self._scratch.write_bytes(b"".join(encode(entry) for entry in before))
-        with Journal(self._scratch) as journal:
+        path = self._executor.folder.journal
+        path.write_bytes(b"".join(encode(entry) for entry in before))
+        with Journal(path) as journal:
             ended = await _result_or_error(Engine(self._executor, journal).run())
         self._compare_with(Aspect.RESULT, "end", event, ended)
 

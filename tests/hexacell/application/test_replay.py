@@ -47,9 +47,9 @@ async def test_a_run_on_the_wire_is_the_same_again(finished, tmp_path, monkeypat
     before = everything_in(finished.cell.path.parent)
     replayed = await replay(finished.folder.path)
     assert replayed.is_same
-    assert replayed.tally.differences == []
+    assert replayed.differences == []
     assert replayed.events == len(finished.history)
-    assert replayed.tally.decisions == sum(isinstance(e, events.StepBegun) for e in finished.history)
+    assert replayed.decisions == sum(isinstance(e, events.StepBegun) for e in finished.history)
     assert everything_in(finished.cell.path.parent) == before
     assert list(tmp_path.iterdir()) == [], "nothing is left behind"
 
@@ -59,7 +59,7 @@ async def test_a_journal_alone_is_replayed(finished, tmp_path) -> None:
     replayed = await replay(Path(journal), Scope.RESULTS)
     assert replayed.is_same
     assert {event.kind for event in finished.history} >= {"proposed", "committed"}
-    assert replayed.tally.results > 60
+    assert replayed.results > 60
 
 
 async def test_a_run_that_followed_a_list_is_the_same_without_the_list(make_cell, tmp_path) -> None:
@@ -80,8 +80,8 @@ async def test_a_run_that_followed_a_list_is_the_same_without_the_list(make_cell
         await calibrate(order_of(cell, run))
     listed.unlink()
     replayed = await replay(run.path)
-    assert replayed.tally.differences == []
-    assert replayed.tally.decisions > 2 * 2 * 10
+    assert replayed.differences == []
+    assert replayed.decisions > 2 * 2 * 10
     started = read_journal(run.journal)[0]
     assert isinstance(started, events.RunStarted)
     assert started.pose_list == "\n".join(rows) + "\n"
@@ -103,7 +103,7 @@ async def test_a_manipulated_journal_is_another_run(finished, tmp_path) -> None:
     path = write(tmp_path / "journal.jsonl", entries)
     replayed = await replay(path, Scope.IDENTIFICATION)
     assert not replayed.is_same
-    [difference] = replayed.tally.differences
+    [difference] = replayed.differences
     assert (difference.line, difference.change.field) == (place + 1, "result.chi2")
     assert (await replay(path, Scope.IDENTIFICATION, tolerance=1e-5)).is_same
 
@@ -118,7 +118,7 @@ async def test_another_version_may_decide_otherwise(finished, tmp_path) -> None:
     assert not (await replay(path, Scope.DECISIONS)).is_same
     other = with_beginning(entries, software="hexacell 0.0.9")
     replayed = await replay(write(path, other), Scope.DECISIONS)
-    [difference] = replayed.tally.differences
+    [difference] = replayed.differences
     assert difference.aspect is Aspect.DECISION
     assert replayed.is_same, "a difference that is reported and does not count"
 

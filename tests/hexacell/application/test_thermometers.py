@@ -38,7 +38,7 @@ async def test_temperatures_stand_in_the_journal_and_its_replay(make_site, tmp_p
         assert (rails.name, rails.celsius) == ("rails", None)
         assert rails.problem.startswith("thermometer rails: cannot be read")
     replayed = await replay(site.folder.path, Scope.RESULTS)
-    assert replayed.tally.differences == []
+    assert replayed.differences == []
 
 
 async def test_preflight_names_those_that_answer(make_site, tmp_path) -> None:

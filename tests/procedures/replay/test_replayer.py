@@ -21,9 +21,9 @@ from hexacell.robot_model import robot_of
 from procedures.calibration.workflow import Calibration, Mode
 from procedures.journal.journal import read_journal
 from procedures.journal.line_format import Entry
-from procedures.replay.comparison import Aspect
+from procedures.replay.comparison import Aspect, ReplayReport
 from procedures.replay.recorded_executor import RecordedStepExecutor
-from procedures.replay.replayer import Replayer, ReplayReport, Scope
+from procedures.replay.replayer import Replayer, Scope
 from procedures.run import events
 from procedures.run.state import RunState
 from procedures.run.steps import Phase, SetKey
@@ -43,8 +43,9 @@ def through(
     folder.mkdir()
     calibration = Calibration(rig.cell.settings, robot_of(rig.cell), rig.mode)
     executor = RecordedStepExecutor.of(rig.cell, calibration, type(rig.folder)(folder))
-    replayer = Replayer(executor, folder / "journal.jsonl", scope)
-    return asyncio.run(replayer.replay(numbered(history)))
+    report = ReplayReport(rig.folder.journal, "hexacell", len(history))
+    asyncio.run(Replayer(executor, report, scope).replay(numbered(history)))
+    return report
 
 
 @pytest.fixture

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,7 +14,7 @@ from hexacell.cell.model import CellSettings
 from hexacell.errors import LimitError
 from hexacell.experiment_design import candidates
 from hexacell.experiment_design.candidates import Amplitudes
-from hexacell.experiment_design.criteria import D_OPTIMAL, Criterion, CriterionName
+from hexacell.experiment_design.criteria import D_OPTIMAL, Criterion
 from hexacell.experiment_design.pose_selection import SelectedPose, select_from_list, select_pose
 from hexacell.experiment_design.predicted_records import GaugeZero
 from hexacell.experiment_design.travel_monte_carlo import orientation_sigma
@@ -28,14 +29,6 @@ informative."""
 
 SMALL_TILT_SHARE = 0.1
 """Of the largest tilt, for candidates where none of full size is safe."""
-
-
-@dataclass(frozen=True, slots=True)
-class _Attempt:
-    """From which of the point's records a path is to start, and the share of the largest tilt."""
-
-    start: int
-    tilt_share: float = 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,23 +81,19 @@ class PoseChooser:
     ) -> tuple[SelectedPose, int]:
         """The selected pose, and the row of the point's record that its path starts from."""
         last = max(0, len(_visited(state)) - 1)
-        # Small tilts are for when so little is known that nearly all candidates are too large.
-        attempts = dict.fromkeys([_Attempt(last), _Attempt(0), _Attempt(0, SMALL_TILT_SHARE)])
-        failure: LimitError | None = None
-        for attempt in attempts:
-            try:
-                return self._select(belief, zero, state, attempt), attempt.start
-            except LimitError as error:
-                failure = error
-        assert failure is not None  # noqa: S101 - there is always an attempt
-        raise failure
+        for row in dict.fromkeys([last, 0]):
+            with suppress(LimitError):
+                return self._select(belief, zero, state, row), row
+        # So little may be known that nearly all candidates of full size are too large.
+        return self._select(belief, zero, state, 0, SMALL_TILT_SHARE), 0
 
     def _select(
-        self, belief: RobotBelief, zero: GaugeZero, state: CampaignState, attempt: _Attempt
+        self, belief: RobotBelief, zero: GaugeZero, state: CampaignState, row: int, tilt_share: float = 1.0
     ) -> SelectedPose:
+        """The best pose with a path from a row of the point's records."""
         visited = self.robot.from_commands(_visited(state))
-        start = visited[attempt.start : attempt.start + 1] if len(visited) else None
-        reference_command = visited[:1] if attempt.start else None
+        start = visited[row : row + 1] if len(visited) else None
+        reference_command = visited[:1] if row else None
         if self.pose_list is not None:
             waiting = without_visited(self.pose_list.at(state.point or 0)[1:], _visited(state))
             return select_from_list(
@@ -115,7 +104,7 @@ class PoseChooser:
                 reference_command=reference_command,
                 skipped=state.rejections,
             )
-        tilt = attempt.tilt_share * belief.limits.tilt
+        tilt = tilt_share * belief.limits.tilt
         well_known = orientation_sigma(belief, zero.target) <= WELL_KNOWN_SIGMA
         amplitudes = Amplitudes.MOSTLY_LARGE if well_known else Amplitudes.ALL_SCALES
         orientations = candidates.orientations(self.candidates, tilt, self._seed(state), amplitudes)
@@ -127,10 +116,10 @@ class PoseChooser:
         return visited[0] if visited and is_same_pose(visited[0], waypoint) else waypoint
 
     def _criterion(self, belief: RobotBelief) -> Criterion:
-        name = CriterionName(self.settings.identification.criterion)
-        if name is CriterionName.PARAMETERS:
+        name = self.settings.identification.criterion
+        if name == "parameters":
             return Criterion(belief.basis.T @ belief.basis)
-        error = self.task.error(belief) if name is CriterionName.TASK else None
+        error = self.task.error(belief) if name == "task" else None
         return D_OPTIMAL if error is None else Criterion(error.weight())
 
     def _seed(self, state: CampaignState) -> int:

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hexacell.errors import LimitError
-from hexacell.experiment_design.predicted_records import GaugeZero, estimate_gauge_zero
+from hexacell.experiment_design.predicted_records import GaugeZero, gauge_zero_at
 from hexacell.identification.belief import RobotBelief
 from hexacell.identification.estimator import estimate_online
 from hexacell.identification.problem.data_requirements import is_determined
@@ -48,11 +48,7 @@ class OnlineEstimate:
         found = self.identification
         if found is None or point not in found.problem.labels[:, 0]:
             raise LimitError("the records of this point do not determine the ball's position")
-        problem = found.problem
-        rows = np.flatnonzero(problem.labels[:, 0] == point)
-        return estimate_gauge_zero(
-            self.belief, found.poses[rows], problem.joints[rows], problem.deviations[rows]
-        )
+        return gauge_zero_at(self.belief, found, point)
 
 
 class OnlineEstimator:

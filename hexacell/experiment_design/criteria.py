@@ -14,19 +14,10 @@ those taken (Fedorov, Theory of Optimal Experiments, 1972; Atkinson & Donev, Opt
 from __future__ import annotations
 
 from dataclasses import dataclass
-from enum import StrEnum
 
 import numpy as np
 
 from hexacell.kinematics.rotations import Array
-
-
-class CriterionName(StrEnum):
-    """What poses are chosen for: D, A or I, as the cell file names them."""
-
-    INFORMATION = "information"
-    PARAMETERS = "parameters"
-    TASK = "task"
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -16,8 +16,7 @@ from hexacell.experiment_design.criteria import update_factors
 from hexacell.experiment_design.predicted_records import (
     SAFETY_SIGMAS,
     TRAVEL_SHARE,
-    PredictedRecords,
-    estimate_gauge_zero,
+    gauge_zero_at,
     predict_records,
 )
 from hexacell.identification.belief import RobotBelief
@@ -61,47 +60,35 @@ def decorrelating_poses(
     """
     names = found.problem.mechanism.convention.free_names()
     trials = list(_trials(belief, found)) if pairs else []
-    return tuple(_best(trials, (names.index(pair.first), names.index(pair.second)), pair) for pair in pairs)
+    return tuple(
+        _best(trials, belief.covariance, (names.index(pair.first), names.index(pair.second)), pair)
+        for pair in pairs
+    )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Trials:
-    """Records (n) at a point, their commands, and their :func:`update_factors` (n, 3, p)."""
+class _Trial:
+    """A record at a point: the platform (3, 3), the command (1), and :func:`update_factors` (3, p)."""
 
     point: int
-    orientations: Array
-    commands: PoseBatch
+    orientation: Array
+    command: PoseBatch
     factors: Array
-    covariance: Array
-
-    def correlations(self, rows: tuple[int, int]) -> Array:
-        """The correlation (n,) of two parameters after each record."""
-        factors = self.factors[..., rows]
-        block = self.covariance[np.ix_(rows, rows)] - np.swapaxes(factors, -1, -2) @ factors
-        correlations: Array = block[:, 0, 1] / np.sqrt(block[:, 0, 0] * block[:, 1, 1])
-        return correlations
-
-    def pose(self, row: int, correlation: float) -> DecorrelatingPose:
-        angles = np.degrees(rotations.to_vector(self.orientations[row]))
-        axis = int(np.argmax(np.abs(angles)))
-        command = self.commands.pose(row)
-        return DecorrelatingPose(self.point, "xyz"[axis], float(angles[axis]), command, correlation)
 
 
-def _trials(belief: RobotBelief, found: Identification) -> Iterator[_Trials]:
+def _trials(belief: RobotBelief, found: Identification) -> Iterator[_Trial]:
     """What could be measured at each point, or at some of very many."""
-    problem = found.problem
-    ends = np.append(problem.first_rows[1:], problem.records)
-    step = -(-problem.points // MOST_POINTS)
-    for first, end in list(zip(problem.first_rows, ends, strict=True))[::step]:
-        rows = slice(int(first), int(end))
-        zero = estimate_gauge_zero(
-            belief, found.poses[rows], problem.joints[rows], problem.deviations[rows]
-        )
+    points = found.problem.labels[found.problem.first_rows, 0]
+    for point in points[:: -(-len(points) // MOST_POINTS)].tolist():
+        zero = gauge_zero_at(belief, found, point)
         targets, commands = reachable(belief, PoseBatch.at(zero.reference, _rotations()))
-        if len(targets):
-            records = predict_records(belief, zero, targets)
-            yield _trials_at(belief, int(problem.labels[first, 0]), records, commands)
+        if not len(targets):
+            continue
+        records = predict_records(belief, zero, targets)
+        inside = SAFETY_SIGMAS * records.sigma.max(axis=-1) <= TRAVEL_SHARE * belief.limits.gauge_travel_mm
+        factors = update_factors(belief.covariance, records.jacobian, records.covariance)
+        for row in np.flatnonzero(inside).tolist():
+            yield _Trial(point, targets.poses.rotations[row], commands[[row]], factors[row])
 
 
 def _rotations() -> Array:
@@ -110,24 +97,24 @@ def _rotations() -> Array:
     return rotations.from_vector((angles[:, None, None] * np.eye(3)).reshape(-1, 3))
 
 
-def _trials_at(belief: RobotBelief, point: int, records: PredictedRecords, commands: PoseBatch) -> _Trials:
-    inside = SAFETY_SIGMAS * records.sigma.max(axis=-1) <= TRAVEL_SHARE * belief.limits.gauge_travel_mm
-    factors = update_factors(belief.covariance, records.jacobian, records.covariance)
-    orientations = records.targets.poses.rotations
-    return _Trials(point, orientations[inside], commands[inside], factors[inside], belief.covariance)
-
-
 def _best(
-    trials: Sequence[_Trials], rows: tuple[int, int], pair: CorrelatedPair
+    trials: Sequence[_Trial], covariance: Array, rows: tuple[int, int], pair: CorrelatedPair
 ) -> DecorrelatingPose | None:
-    best: DecorrelatingPose | None = None
-    smallest = 1.0 - LEAST_IMPROVEMENT * (1.0 - abs(pair.correlation))
-    for trial in trials:
-        correlations = trial.correlations(rows)
-        if not len(correlations):
-            continue
-        row = int(np.argmin(np.abs(correlations)))
-        if abs(correlations[row]) < smallest:
-            smallest = float(abs(correlations[row]))
-            best = trial.pose(row, float(correlations[row]))
-    return best
+    """The record with the smallest correlation of two parameters, if it is worth measuring."""
+    if not trials:
+        return None
+    factors = np.array([trial.factors[:, rows] for trial in trials])
+    after = covariance[np.ix_(rows, rows)] - np.swapaxes(factors, -1, -2) @ factors
+    correlations = after[:, 0, 1] / np.sqrt(after[:, 0, 0] * after[:, 1, 1])
+    best = int(np.argmin(np.abs(correlations)))
+    if abs(correlations[best]) >= 1.0 - LEAST_IMPROVEMENT * (1.0 - abs(pair.correlation)):
+        return None
+    angles = np.degrees(rotations.to_vector(trials[best].orientation))
+    axis = int(np.argmax(np.abs(angles)))
+    return DecorrelatingPose(
+        point=trials[best].point,
+        axis="xyz"[axis],
+        degrees=float(angles[axis]),
+        command=trials[best].command.pose(0),
+        correlation=float(correlations[best]),
+    )

@@ -15,6 +15,7 @@ from hexacell.experiment_design.candidates import ReachableTargets, commands_for
 from hexacell.experiment_design.criteria import innovation_covariance
 from hexacell.identification.belief import RobotBelief
 from hexacell.identification.solver.measurement_model import record_covariance, record_weights
+from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.forward import assembly_mode
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array, Mask
@@ -82,6 +83,13 @@ def estimate_gauge_zero(
     reference = covariance @ np.einsum("nij,nj->i", weights, poses.positions - deviations)
     mean_jacobian = covariance @ np.einsum("nij,njp->ip", weights, jacobian)
     return GaugeZero(reference, poses.rotations[0], joints[0], mean_jacobian, covariance)
+
+
+def gauge_zero_at(belief: RobotBelief, found: Identification, point: int) -> GaugeZero:
+    """The zero of a point's gauges by the records of an identification."""
+    problem = found.problem
+    rows = np.flatnonzero(problem.labels[:, 0] == point)
+    return estimate_gauge_zero(belief, found.poses[rows], problem.joints[rows], problem.deviations[rows])
 
 
 def position_derivatives(belief: RobotBelief, targets: ReachableTargets) -> tuple[Array, Array]:

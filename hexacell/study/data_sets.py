@@ -6,9 +6,8 @@ deviations are differences of positions.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 
@@ -19,8 +18,8 @@ from hexacell.kinematics.forward import CONTINUATION_STAGES
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import Mechanism
 from hexacell.kinematics.pose import PoseBatch
-from hexacell.kinematics.rotations import Array
-from hexacell.kinematics.sensitivity import singularity_margin
+from hexacell.kinematics.rotations import Array, Mask
+from hexacell.kinematics.sensitivity import has_singularity_margin
 from hexacell.measurements.records import MeasurementSet, Record
 from hexacell.robot_model import Robot
 
@@ -47,9 +46,8 @@ class DataSet:
     joints: Array
     positions: Array
 
-    def measured(self, noise_mm: float, random: np.random.Generator | None = None) -> MeasurementSet:
+    def measured(self, noise_mm: float, random: np.random.Generator) -> MeasurementSet:
         """The records, with noise of ``noise_mm``, one standard deviation, on every number."""
-        random = random or np.random.default_rng()
         first = np.searchsorted(self.labels[:, 0], self.labels[:, 0])
         joints = self.joints + noise_mm * random.standard_normal(self.joints.shape)
         deviations = self.positions - self.positions[first]
@@ -85,9 +83,8 @@ def unlimited_travel(
     margin = robot.limits.singularity_margin if margin is None else margin
     sets = []
     for point in points:
-        poses = _PointPoses(robot, truth, point, margin)
-        poses.fill(orientations, partial(_random_poses, point, random, amplitude))
-        sets.append(poses)
+        drawn = (PoseBatch.at(point, turns) for turns in _random_orientations(random, amplitude))
+        sets.append(_first_reached(robot, truth, point, drawn, orientations, margin))
     return _data_set(sets, orientations)
 
 
@@ -107,97 +104,90 @@ def within_travel(
     Raises:
         LimitError: a point, or enough poses at it, cannot be reached without crossing a singularity.
     """
-    travel = TRAVEL_SHARE * robot.limits.gauge_travel_mm
+    margin = robot.limits.singularity_margin
     sets = []
     for point in points:
-        poses = _PointPoses(robot, truth, point, robot.limits.singularity_margin)
-        poses.add(PoseBatch.at(point, np.eye(3)[None]), 1)
-        if poses.count < 1:
-            raise poses.too_few()
-        reference = poses.actual[0]
-
-        def commands(reference: PoseBatch = reference) -> PoseBatch:
-            rotated = _random_orientations(random, amplitude) @ reference.rotations[0]
-            offsets = random.uniform(-travel, travel, (BATCH, 3))
-            return _commands(robot, truth, PoseBatch(reference.positions + offsets, rotated))
-
-        poses.fill(orientations, commands)
-        sets.append(poses)
+        level = [PoseBatch.at(point, np.eye(3)[None])]
+        reference = _first_reached(robot, truth, point, level, 1, margin)
+        drawn = _aimed(robot, truth, reference.actual, amplitude, random)
+        others = _first_reached(robot, truth, point, drawn, orientations - 1, margin)
+        sets.append(_Reached.concatenate([reference, others]))
     return _data_set(sets, orientations)
 
 
-def _random_poses(point: Array, random: np.random.Generator, amplitude: float) -> PoseBatch:
-    return PoseBatch.at(point, _random_orientations(random, amplitude))
+def _random_orientations(random: np.random.Generator, amplitude: float) -> Iterator[Array]:
+    for _ in range(BATCHES):
+        yield rotations.from_angles(random.uniform(-amplitude, amplitude, (BATCH, 3)))
 
 
-def _random_orientations(random: np.random.Generator, amplitude: float) -> Array:
-    return rotations.from_angles(random.uniform(-amplitude, amplitude, (BATCH, 3)))
+def _aimed(
+    robot: Robot, truth: Geometry, reference: PoseBatch, amplitude: float, random: np.random.Generator
+) -> Iterator[PoseBatch]:
+    """Commands that bring the true robot to rotations from the reference, inside the travel."""
+    travel = TRAVEL_SHARE * robot.limits.gauge_travel_mm
+    for turns in _random_orientations(random, amplitude):
+        positions = reference.positions + random.uniform(-travel, travel, (BATCH, 3))
+        targets = PoseBatch(positions, turns @ reference.rotations[0])
+        joints = robot.mechanism.inverse(truth, robot.branch, targets)
+        rows = np.flatnonzero(np.isfinite(joints).all(axis=-1))
+        commanded = robot.commanded(truth)
+        commands = commanded.commands_for(targets[rows], joints[rows], stages=CONTINUATION_STAGES)
+        yield commands.poses[commands.found]
 
 
-class _PointPoses:
-    """Poses at one point that the robot can be brought to without crossing a singularity."""
+@dataclass(frozen=True, slots=True, eq=False)
+class _Reached:
+    """Commands (n), the joint variables (n, 6), mm, and the actual poses that they bring the robot to."""
 
-    def __init__(self, robot: Robot, truth: Geometry, point: Array, margin: float) -> None:
-        self._robot = robot
-        self._truth = truth
-        self._point = point
-        self._margin = margin
-        self.commands: list[PoseBatch] = []
-        self.joints: list[Array] = []
-        self.actual: list[PoseBatch] = []
+    commands: PoseBatch
+    joints: Array
+    actual: PoseBatch
 
-    @property
-    def count(self) -> int:
-        return sum(len(poses) for poses in self.commands)
+    @classmethod
+    def concatenate(cls, parts: Sequence[_Reached]) -> _Reached:
+        return cls(
+            PoseBatch.concatenate(part.commands for part in parts),
+            np.concatenate([part.joints for part in parts]),
+            PoseBatch.concatenate(part.actual for part in parts),
+        )
 
-    def fill(self, wanted: int, draw: Callable[[], PoseBatch]) -> None:
-        """Add drawn commands until there are as many poses as wanted.
-
-        Raises:
-            LimitError: too few of them can be reached.
-        """
-        for _ in range(BATCHES):
-            self.add(draw(), wanted)
-            if self.count >= wanted:
-                return
-        raise self.too_few()
-
-    def add(self, commands: PoseBatch, wanted: int) -> None:
-        """Add those of some commands that can be reached, up to the number wanted."""
-        robot = self._robot
-        actual = robot.commanded(self._truth).actual_poses(commands)
-        rows = np.flatnonzero(actual.found & within_limits(robot.limits, commands, actual.joints))
-        commands, joints, poses = commands[rows], actual.joints[rows], actual.poses[rows]
-        margins = [
-            singularity_margin(robot.mechanism, geometry, some, joints)
-            for geometry, some in ((robot.commanding, commands), (self._truth, poses))
-        ]
-        clear = np.min(margins, axis=0, initial=np.inf) >= self._margin
-        kept = np.flatnonzero(clear)[: wanted - self.count]
-        self.commands.append(commands[kept])
-        self.joints.append(joints[kept])
-        self.actual.append(poses[kept])
-
-    def too_few(self) -> LimitError:
-        return LimitError(f"too few poses can be reached at {self._point} without crossing a singularity")
+    def __getitem__(self, rows: slice | Mask) -> _Reached:
+        return _Reached(self.commands[rows], self.joints[rows], self.actual[rows])
 
 
-def _commands(robot: Robot, truth: Geometry, targets: PoseBatch) -> PoseBatch:
-    """The commands that bring the true robot to those of the targets that it can be brought to."""
-    joints = robot.mechanism.inverse(truth, robot.branch, targets)
-    rows = np.flatnonzero(np.isfinite(joints).all(axis=-1))
-    commands = robot.commanded(truth).commands_for(targets[rows], joints[rows], stages=CONTINUATION_STAGES)
-    return commands.poses[np.flatnonzero(commands.found)]
+def _first_reached(
+    robot: Robot, truth: Geometry, point: Array, drawn: Iterable[PoseBatch], wanted: int, margin: float
+) -> _Reached:
+    """The first of some commands that the robot can be brought to without crossing a singularity.
+
+    Raises:
+        LimitError: there are fewer than wanted.
+    """
+    parts: list[_Reached] = []
+    for commands in drawn:
+        parts.append(_reached(robot, truth, commands, margin))
+        if sum(len(part.commands) for part in parts) >= wanted:
+            return _Reached.concatenate(parts)[:wanted]
+    raise LimitError(f"too few poses can be reached at {point} without crossing a singularity")
 
 
-def _data_set(sets: list[_PointPoses], orientations: int) -> DataSet:
+def _reached(robot: Robot, truth: Geometry, commands: PoseBatch, margin: float) -> _Reached:
+    """Those of some commands that keep the limits and, by both geometries, a singularity margin."""
+    actual = robot.commanded(truth).actual_poses(commands)
+    rows = actual.found & within_limits(robot.limits, commands, actual.joints)
+    found = _Reached(commands, actual.joints, actual.poses)[rows]
+    sides = ((robot.commanding, found.commands), (truth, found.actual))
+    clear = [
+        has_singularity_margin(robot.mechanism, geometry, poses, found.joints, margin)
+        for geometry, poses in sides
+    ]
+    return found[np.logical_and(*clear)]
+
+
+def _data_set(sets: list[_Reached], orientations: int) -> DataSet:
     labels = [(point, turn) for point in range(1, len(sets) + 1) for turn in range(1, orientations + 1)]
-    return DataSet(
-        np.array(labels),
-        PoseBatch.concatenate(poses for one in sets for poses in one.commands),
-        np.concatenate([joints for one in sets for joints in one.joints]),
-        np.concatenate([poses.positions for one in sets for poses in one.actual]),
-    )
+    found = _Reached.concatenate(sets)
+    return DataSet(np.array(labels), found.commands, found.joints, found.actual.positions)
 
 
 def random_robot(

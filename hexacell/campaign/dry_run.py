@@ -13,6 +13,7 @@ from hexacell.campaign.decisions import (
     Decision,
     Finished,
     FinishPoint,
+    Forecast,
     MeasurePose,
     StartPoint,
 )
@@ -98,21 +99,16 @@ class VirtualCampaign:
         """A point was finished."""
 
     def _measure(self, decision: StartPoint | MeasurePose) -> None:
-        state, point = self.state, decision.point
-        record = self.virtual_robot.measure(point, decision.orientation)
+        state = self.state
+        record = self.virtual_robot.measure(decision.point, decision.orientation)
         deviation = float(np.abs(record.deviation).max())
         self.largest_mm = max(self.largest_mm, deviation)
         if deviation > self.plan.robot.limits.gauge_travel_mm:
             self.outside += 1
             self.state = replace(state, present=decision.pose, rejections=state.rejections + 1)
             return
-        self.state = CampaignState(
-            MeasurementSet((*state.measurements.records, record)),
-            point,
-            state.done,
-            decision.pose,
-            state.rejections if state.point == point else 0,
-        )
+        measurements = MeasurementSet((*state.measurements.records, record))
+        self.state = replace(state, measurements=measurements, point=decision.point, present=decision.pose)
 
     def _finish(self, point: int, reference: Pose) -> None:
         """Return to the point's reference; it is finished if nothing can be measured from there either."""
@@ -146,14 +142,13 @@ class DryRunResult:
     minutes: float
 
 
-def dry_run(plan: Plan, robots: int | None = None) -> DryRunResult:
-    """Carry the plan out on a few robots, ``ROBOTS`` by default. Takes a second or two for each."""
-    wanted = ROBOTS if robots is None else robots
+def dry_run(plan: Plan, robots: int = ROBOTS) -> DryRunResult:
+    """Carry the plan out on a few robots. Takes a second or two for each."""
     quick = replace(plan, candidates=min(plan.candidates, CANDIDATES))
-    identified: list[_Outcome] = []
+    identified: list[tuple[VirtualCampaign, Forecast | None]] = []
     tried = 0
     for truth in robots_within_tolerances(plan.robot, MOST_TRIED, plan.settings.identification.seed):
-        if len(identified) == wanted:
+        if len(identified) == robots:
             break
         outcome = _carry_out(quick, truth, tried)
         identified += [] if outcome is None else [outcome]
@@ -161,17 +156,8 @@ def dry_run(plan: Plan, robots: int | None = None) -> DryRunResult:
     return _summary(plan, tried, identified)
 
 
-@dataclass(frozen=True, slots=True)
-class _Outcome:
-    """What came of a campaign that identified its robot."""
-
-    points: int
-    records: int
-    outside: int
-    worst_sigma_mm: float | None
-
-
-def _carry_out(plan: Plan, truth: Geometry, number: int) -> _Outcome | None:
+def _carry_out(plan: Plan, truth: Geometry, number: int) -> tuple[VirtualCampaign, Forecast | None] | None:
+    """The campaign on one robot, and the error that remains; none if it is not identified."""
     random = np.random.default_rng([plan.settings.identification.seed, number])
     campaign = VirtualCampaign(plan, VirtualRobot(plan.robot, truth, random))
     try:
@@ -180,18 +166,17 @@ def _carry_out(plan: Plan, truth: Geometry, number: int) -> _Outcome | None:
     except HexacellError:
         return None
     found = estimate.identification
-    if found is None or not is_determined(found.problem):
-        return None
-    worst = None if forecast is None else forecast.now_mm
-    return _Outcome(campaign.state.begun_points, len(campaign.measurements), campaign.outside, worst)
+    return None if found is None or not is_determined(found.problem) else (campaign, forecast)
 
 
-def _summary(plan: Plan, tried: int, identified: list[_Outcome]) -> DryRunResult:
+def _summary(
+    plan: Plan, tried: int, identified: list[tuple[VirtualCampaign, Forecast | None]]
+) -> DryRunResult:
     if not identified:
         return DryRunResult(tried, 0, 0, 0, 0, None, 0.0)
-    points = round(median(one.points for one in identified))
-    records = round(median(one.records for one in identified))
-    errors = [one.worst_sigma_mm for one in identified if one.worst_sigma_mm is not None]
+    points = round(median(campaign.state.begun_points for campaign, _ in identified))
+    records = round(median(len(campaign.measurements) for campaign, _ in identified))
+    errors = [forecast.now_mm for _, forecast in identified if forecast is not None]
     held_out = plan.settings.verification
     straight = TimeModel.of(plan.settings, moves=1.0)
     validation = straight.minutes(len(held_out.points) * held_out.orientations, len(held_out.points))
@@ -200,7 +185,7 @@ def _summary(plan: Plan, tried: int, identified: list[_Outcome]) -> DryRunResult
         robots=len(identified),
         points=points,
         records=records,
-        outside=sum(one.outside for one in identified),
+        outside=sum(campaign.outside for campaign, _ in identified),
         worst_sigma_mm=median(errors) if errors else None,
         minutes=plan.budget.time_model.minutes(records, points) + 2.0 * validation,
     )

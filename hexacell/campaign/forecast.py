@@ -77,8 +77,9 @@ class Forecaster:
             return None
         now = after = error.worst(belief.covariance)
         if selected is not None:
+            record = selected.record
             after = error.worst(
-                covariance_update(belief.covariance, selected.jacobian, selected.covariance)
+                covariance_update(belief.covariance, record.jacobian[0], record.covariance[0])
             )
         planned = self.planned(state)
         end = error.worst(self.predicted_belief(belief, state).covariance)

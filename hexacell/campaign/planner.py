@@ -191,14 +191,14 @@ class Plan:
         estimate = self.estimate(state)
         belief = estimate.belief
         selected, via = self.chooser.choose(belief, estimate.gauge_zero(point), state)
-        base = self.robot.frames.base.T
-        covariance = base @ np.diag(selected.sigma**2) @ base.T
+        base, record = self.robot.frames.base.T, selected.record
+        covariance = base @ np.diag(record.sigma[0] ** 2) @ base.T
         return MeasurePose(
             point=point,
             orientation=state.records_at(point) + 1,
             pose=self.robot.to_command(selected.command),
-            joints=joints_of(selected.joints),
-            deviation=deviation_of(base @ selected.deviation),
+            joints=joints_of(record.targets.joints[0]),
+            deviation=deviation_of(base @ record.deviation[0]),
             sigma=deviation_of(np.sqrt(np.diag(covariance))),
             gain=selected.gain,
             forecast=self.forecaster.forecast(state, belief, selected) if self.with_forecast else None,

@@ -20,7 +20,7 @@ from hexacell.experiment_design.predicted_records import GaugeZero
 from hexacell.experiment_design.travel_monte_carlo import orientation_sigma
 from hexacell.identification.belief import RobotBelief
 from hexacell.kinematics.pose import Pose, PoseBatch
-from hexacell.motion.paths import find_route
+from hexacell.motion.paths import PathPlanner, find_route
 from hexacell.robot_model import Robot
 
 WELL_KNOWN_SIGMA = np.radians(0.5)
@@ -92,23 +92,16 @@ class PoseChooser:
     ) -> SelectedPose:
         """The best pose with a path from a row of the point's records."""
         visited = self.robot.from_commands(_visited(state))
-        start = visited[row : row + 1] if len(visited) else None
-        reference_command = visited[:1] if row else None
+        start = visited[row : row + 1] if len(visited) else zero.command(belief)
+        planner = PathPlanner(belief, start, visited[:1] if row else None, zero.reference)
         if self.pose_list is not None:
             waiting = without_visited(self.pose_list.at(state.point or 0)[1:], _visited(state))
-            return select_from_list(
-                belief,
-                zero,
-                self.robot.from_commands(waiting),
-                start,
-                reference_command=reference_command,
-                skipped=state.rejections,
-            )
+            return select_from_list(planner, zero, self.robot.from_commands(waiting), state.rejections)
         tilt = tilt_share * belief.limits.tilt
         well_known = orientation_sigma(belief, zero.target) <= WELL_KNOWN_SIGMA
         amplitudes = Amplitudes.MOSTLY_LARGE if well_known else Amplitudes.ALL_SCALES
         orientations = candidates.orientations(self.candidates, tilt, self._seed(state), amplitudes)
-        return select_pose(belief, zero, orientations, start, self._criterion(belief), reference_command)
+        return select_pose(planner, zero, orientations, self._criterion(belief))
 
     @staticmethod
     def _as_visited(visited: list[Pose], waypoint: Pose) -> Pose:

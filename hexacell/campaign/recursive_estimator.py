@@ -112,12 +112,10 @@ def _from_other_starts(problem: Problem) -> Iterator[Identification]:
 
 def _start_poses(problem: Problem, before: Identification) -> PoseBatch | None:
     """Poses that close the former estimate, to start the search; none if one is not found."""
-    former_rows = {tuple(label): row for row, label in enumerate(before.problem.labels.tolist())}
-    former = [former_rows.get(tuple(label)) for label in problem.labels.tolist()]
-    new = np.array([row for row, place in enumerate(former) if place is None], dtype=np.intp)
+    rows = {tuple(label): row for row, label in enumerate(problem.labels.tolist())}
+    old = np.array([rows[tuple(label)] for label in before.problem.labels.tolist()], dtype=np.intp)
+    new = np.setdiff1d(np.arange(problem.records), old)
     solved = problem.commands[new].solve_poses(before.geometry, problem.joints[new])
     if not solved.found[problem.has_start_pose[new]].all():
         return None
-    old = np.array([row for row, place in enumerate(former) if place is not None], dtype=np.intp)
-    places = np.array([place for place in former if place is not None], dtype=np.intp)
-    return problem.commands.poses.with_rows(new, solved.poses).with_rows(old, before.poses[places])
+    return problem.commands.poses.with_rows(new, solved.poses).with_rows(old, before.poses)

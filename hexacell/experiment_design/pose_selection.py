@@ -51,55 +51,35 @@ class SelectedPose:
 
     Attributes:
         command: what to send to the controller as it is configured now.
-        joints: joint variables (6,), mm, it will go to.
-        deviation: what the gauges are expected to show (3,), mm.
-        sigma: standard deviation (3,), mm, of ``deviation``.
+        record: the record (1) that it will give.
         gain: information gained on the parameters, nat.
-        jacobian: of the deviation (3, p) by the free parameters.
-        covariance: of the deviation (3, 3), mm^2, the parameters being known.
         waypoints: commands to pass on the path; none on a straight line.
     """
 
     command: Pose
-    joints: Array
-    deviation: Array
-    sigma: Array
+    record: PredictedRecords
     gain: float
-    jacobian: Array
-    covariance: Array
-    waypoints: tuple[Pose, ...] = ()
+    waypoints: tuple[Pose, ...]
 
 
 def select_pose(
-    belief: RobotBelief,
-    zero: GaugeZero,
-    orientations: Array,
-    start: PoseBatch | None = None,
-    criterion: Criterion = D_OPTIMAL,
-    reference_command: PoseBatch | None = None,
+    planner: PathPlanner, zero: GaugeZero, orientations: Array, criterion: Criterion = D_OPTIMAL
 ) -> SelectedPose:
-    """The best of some orientations (n, 3, 3), relative to the platform's at the zeroed reference.
+    """The best by a criterion of some orientations (n, 3, 3), relative to the platform's at the reference.
 
     They are not relative to the level platform: with millimetres of error in the joints the platform may
     be 20 degrees from where the controller believes it to be.
 
-    Args:
-        belief: the estimate of the robot and its covariance.
-        zero: of the point's gauges.
-        orientations: the candidates.
-        start: the command (1) that the path starts from; by default that of the reference.
-        criterion: what is gained.
-        reference_command: the command (1) of the reference, if paths may pass through it.
-
     Raises:
         LimitError: none is reachable within the limits and almost surely inside the travel.
     """
+    belief = planner.belief
     poses = PoseBatch.at(zero.reference, orientations @ zero.orientation)
     records = predict_records(belief, zero, reachable_targets(belief, poses, zero.mode(belief)))
     if not len(records):
         raise LimitError("no orientation is within reach, joint range, tilt limit and singularity margin")
     gains = criterion.gain(belief.covariance, records.jacobian, records.covariance)
-    search = _PathSearch.at(belief, zero, start, reference_command)
+    search = _PathSearch(TravelConstraint(belief, zero), planner)
     for ranked in _batches(_ranking(belief, records, gains), COMMAND_BATCH):
         commands, found = commands_for(belief, records.targets[ranked])
         for few in _batches(np.flatnonzero(found), PATH_BATCH):
@@ -110,13 +90,7 @@ def select_pose(
 
 
 def select_from_list(
-    belief: RobotBelief,
-    zero: GaugeZero,
-    commands: PoseBatch,
-    start: PoseBatch | None = None,
-    *,
-    reference_command: PoseBatch | None = None,
-    skipped: int = 0,
+    planner: PathPlanner, zero: GaugeZero, commands: PoseBatch, skipped: int
 ) -> SelectedPose:
     """The first of some commands (n) that almost surely stays inside the travel.
 
@@ -126,10 +100,11 @@ def select_from_list(
     Raises:
         LimitError: none of them does.
     """
+    belief = planner.belief
     targets, rows = outcomes_of(belief, commands)
     records = predict_records(belief, zero, targets)
     inside = np.flatnonzero(records.within(TRAVEL_SHARE * belief.limits.gauge_travel_mm))[skipped:]
-    search = _PathSearch.at(belief, zero, start, reference_command)
+    search = _PathSearch(TravelConstraint(belief, zero), planner)
     no_preference = np.full(len(inside), np.inf)
     selected = search.first_safe(records[inside], commands[rows[inside]], no_preference)
     if selected is None:
@@ -149,22 +124,8 @@ def _ranking(belief: RobotBelief, records: PredictedRecords, gains: Array) -> Ro
 class _PathSearch:
     """Search for candidates that can be reached safely, all from one command."""
 
-    belief: RobotBelief
     travel: TravelConstraint
     planner: PathPlanner
-
-    @classmethod
-    def at(
-        cls,
-        belief: RobotBelief,
-        zero: GaugeZero,
-        start: PoseBatch | None,
-        reference_command: PoseBatch | None,
-    ) -> _PathSearch:
-        """The search at a point whose gauges were zeroed at ``zero``."""
-        start = zero.command(belief) if start is None else start
-        planner = PathPlanner(belief, start, reference_command, zero.reference)
-        return cls(belief, TravelConstraint(belief, zero), planner)
 
     def first_safe(
         self, records: PredictedRecords, commands: PoseBatch, gains: Array
@@ -186,7 +147,9 @@ class _PathSearch:
         if found is None:
             return None
         row, path = found
-        return self._selected(records[np.array([row])], commands.pose(row), path.waypoints)
+        record = records[np.array([row])]
+        gain = D_OPTIMAL.gain(self.planner.belief.covariance, record.jacobian, record.covariance)
+        return SelectedPose(commands.pose(row), record, float(gain[0]), path.waypoints)
 
     def _first(self, paths_to: Callable[[Rows], list[Path | None]], rows: Rows) -> tuple[int, Path] | None:
         """The first row with a path along which the ball stays inside, and the path."""
@@ -194,21 +157,6 @@ class _PathSearch:
             if path is not None and self.travel.holds_along(path):
                 return row, path
         return None
-
-    def _selected(
-        self, record: PredictedRecords, command: Pose, waypoints: tuple[Pose, ...]
-    ) -> SelectedPose:
-        gain = D_OPTIMAL.gain(self.belief.covariance, record.jacobian, record.covariance)
-        return SelectedPose(
-            command=command,
-            joints=record.targets.joints[0],
-            deviation=record.deviation[0],
-            sigma=record.sigma[0],
-            gain=float(gain[0]),
-            jacobian=record.jacobian[0],
-            covariance=record.covariance[0],
-            waypoints=waypoints,
-        )
 
 
 def _batches(rows: Rows, size: int) -> Iterator[Rows]:

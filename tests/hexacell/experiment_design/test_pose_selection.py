@@ -13,12 +13,18 @@ from hexacell.errors import ExitCode, LimitError
 from hexacell.experiment_design import pose_selection
 from hexacell.experiment_design.candidates import orientations
 from hexacell.experiment_design.pose_selection import WAYPOINT_GAIN_RATIO, select_pose
-from hexacell.experiment_design.predicted_records import SAFETY_SIGMAS, TRAVEL_SHARE, estimate_gauge_zero
+from hexacell.experiment_design.predicted_records import (
+    SAFETY_SIGMAS,
+    TRAVEL_SHARE,
+    estimate_gauge_zero,
+    gauge_zero_at,
+)
 from hexacell.identification.estimator import estimate_online
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.measurements.records import MeasurementSet, Record
+from hexacell.motion.paths import PathPlanner
 
 TRAVEL_MM = 5.0
 TILT = float(np.radians(45.0))
@@ -26,11 +32,13 @@ TURNS = orientations(256, TILT, seed=11)
 
 
 def station_of(know, estimate, point):
-    rows = np.flatnonzero(estimate.problem.labels[:, 0] == point)
-    problem = estimate.problem
-    return estimate_gauge_zero(
-        know(estimate), estimate.poses[rows], problem.joints[rows], problem.deviations[rows]
-    )
+    return gauge_zero_at(know(estimate), estimate, point)
+
+
+def selected(belief, zero, turns, start=None):
+    """The pose selected with paths from the reference, or from another command."""
+    start = zero.command(belief) if start is None else start
+    return select_pose(PathPlanner(belief, start, None, zero.reference), zero, turns)
 
 
 @pytest.fixture(scope="module", params=["little", "much"])
@@ -38,7 +46,7 @@ def stage(request, know):
     """An estimate, the station at the first point, and what is chosen there."""
     estimate = request.getfixturevalue(request.param)
     at = station_of(know, estimate, 1)
-    return estimate, at, select_pose(know(estimate), at, TURNS)
+    return estimate, at, selected(know(estimate), at, TURNS)
 
 
 def stands(legs, geometry, joints, near):
@@ -50,7 +58,7 @@ def stands(legs, geometry, joints, near):
 
 def aimed_at(legs, estimate, choice, at):
     start = np.concatenate([at.reference, Rotation.from_matrix(choice.command.rotation).as_rotvec()])
-    return stands(legs, estimate.geometry, choice.joints, start)
+    return stands(legs, estimate.geometry, choice.record.targets.joints[0], start)
 
 
 # --- what is chosen ---
@@ -58,8 +66,9 @@ def aimed_at(legs, estimate, choice, at):
 
 def test_the_prediction_keeps_the_travel_with_three_sigma(stage):
     _, _, choice = stage
-    assert (np.abs(choice.deviation) + SAFETY_SIGMAS * choice.sigma <= TRAVEL_SHARE * TRAVEL_MM).all()
-    assert (choice.sigma > 0.0).all()
+    deviation, sigma = choice.record.deviation[0], choice.record.sigma[0]
+    assert (np.abs(deviation) + SAFETY_SIGMAS * sigma <= TRAVEL_SHARE * TRAVEL_MM).all()
+    assert (sigma > 0.0).all()
     assert TRAVEL_SHARE < 1.0
     assert SAFETY_SIGMAS >= 3.0
 
@@ -67,7 +76,7 @@ def test_the_prediction_keeps_the_travel_with_three_sigma(stage):
 def test_the_command_leads_the_controllers_own_inverse_to_the_joints(stage, paper, legs, vector_of):
     _, _, choice = stage
     np.testing.assert_allclose(
-        legs(paper.nominal).joints(vector_of(choice.command)), choice.joints, atol=1e-6
+        legs(paper.nominal).joints(vector_of(choice.command)), choice.record.targets.joints[0], atol=1e-6
     )
 
 
@@ -75,17 +84,18 @@ def test_the_estimated_robot_then_has_its_ball_where_the_gauges_were_zeroed(stag
     """Not at the nominal point: the real one is millimetres away."""
     estimate, at, choice = stage
     pose = aimed_at(legs, estimate, choice, at)
-    np.testing.assert_allclose(pose[:3], at.reference + choice.deviation, atol=1e-6)
+    np.testing.assert_allclose(pose[:3], at.reference + choice.record.deviation[0], atol=1e-6)
     assert np.linalg.norm(at.reference - [0.0, 0.0, 550.0]) > 0.5
 
 
 def test_reach_tilt_and_margin_are_kept(stage, paper, legs, vector_of):
     estimate, at, choice = stage
-    assert np.abs(choice.joints).max() <= 800.0
+    assert np.abs(choice.record.targets.joints[0]).max() <= 800.0
     pose = aimed_at(legs, estimate, choice, at)
     assert np.arccos(Rotation.from_rotvec(pose[3:]).as_matrix()[2, 2]) <= TILT + 1e-9
-    assert legs(estimate.geometry).margin(choice.joints, pose) > 0.05 - 1e-4
-    assert legs(paper.nominal).margin(choice.joints, vector_of(choice.command)) > 0.05 - 1e-4
+    joints = choice.record.targets.joints[0]
+    assert legs(estimate.geometry).margin(joints, pose) > 0.05 - 1e-4
+    assert legs(paper.nominal).margin(joints, vector_of(choice.command)) > 0.05 - 1e-4
 
 
 def test_whatever_the_robot_turns_out_to_be_the_ball_stays_inside_the_travel(stage, legs, hexaglide):
@@ -107,11 +117,11 @@ def test_whatever_the_robot_turns_out_to_be_the_ball_stays_inside_the_travel(sta
     for free in robots:
         robot = Geometry(HEXAGLIDE_PARAMETERS, hexaglide.convention.basis() @ free)
         reference = stands(legs, robot, problem.joints[reference_row], from_where)
-        deviations.append(stands(legs, robot, choice.joints, goes_to)[:3] - reference[:3])
+        deviations.append(stands(legs, robot, choice.record.targets.joints[0], goes_to)[:3] - reference[:3])
     spread = np.std(deviations, axis=0)
     assert (np.abs(deviations) < TRAVEL_MM).all()
     # The prediction also knows the noise, and of the reference what all its records say.
-    assert (spread < 1.5 * choice.sigma + 0.02).all()
+    assert (spread < 1.5 * choice.record.sigma[0] + 0.02).all()
 
 
 def test_what_is_gained_is_what_the_record_then_takes_from_the_uncertainty(
@@ -137,15 +147,15 @@ def test_what_is_gained_is_what_the_record_then_takes_from_the_uncertainty(
 
 def test_no_other_orientation_that_fits_gains_more(know, much):
     at = station_of(know, much, 1)
-    best = select_pose(know(much), at, TURNS)
+    best = selected(know(much), at, TURNS)
     for rows in (slice(0, 64), slice(64, 128), slice(128, 256)):
-        assert select_pose(know(much), at, TURNS[rows]).gain <= WAYPOINT_GAIN_RATIO * best.gain
+        assert selected(know(much), at, TURNS[rows]).gain <= WAYPOINT_GAIN_RATIO * best.gain
 
 
 def test_amplitudes_grow_with_what_is_known(know, little, much):
     def turned(estimate):
         at = station_of(know, estimate, 1)
-        choice = select_pose(know(estimate), at, TURNS)
+        choice = selected(know(estimate), at, TURNS)
         turn = Rotation.from_matrix(choice.command.rotation @ estimate.poses.rotations[0].T)
         return np.degrees(turn.magnitude())
 
@@ -154,7 +164,7 @@ def test_amplitudes_grow_with_what_is_known(know, little, much):
 
 
 def test_the_choice_is_the_same_every_time(know, much):
-    first, again = (select_pose(know(much), station_of(know, much, 2), TURNS) for _ in range(2))
+    first, again = (selected(know(much), station_of(know, much, 2), TURNS) for _ in range(2))
     assert first.command == again.command
 
 
@@ -168,7 +178,7 @@ def test_the_path_from_the_present_pose_is_clear_and_inside_the_travel(
     """From a pose of the first point, over the stops, looked at more closely than the choice does."""
     at = station_of(know, much, 1)
     start = much.problem.commands.poses[[present]]
-    choice = select_pose(know(much), at, TURNS, start)
+    choice = selected(know(much), at, TURNS, start)
     line = [np.array(pose.as_tuple()) for pose in (start.pose(0), *choice.waypoints, choice.command)]
     real = much.poses[[present]]
     near = np.concatenate([real.positions[0], Rotation.from_matrix(real.rotations[0]).as_rotvec()])
@@ -188,7 +198,7 @@ def test_an_orientation_without_a_clear_path_is_not_selected(know, much):
     at = station_of(know, much, 1)
     beyond = PoseBatch.of([Pose(0, 0, 550, 0, 0, 100)])
     with pytest.raises(LimitError, match="inside the gauges' travel"):
-        select_pose(know(much), at, TURNS, beyond)
+        selected(know(much), at, TURNS, beyond)
 
 
 def test_stops_must_be_worth_the_moves_that_they_take(know, much, monkeypatch):
@@ -197,7 +207,7 @@ def test_stops_must_be_worth_the_moves_that_they_take(know, much, monkeypatch):
 
     def chosen(least):
         monkeypatch.setattr(pose_selection, "WAYPOINT_GAIN_RATIO", least)
-        return select_pose(know(much), at, TURNS, start)
+        return selected(know(much), at, TURNS, start)
 
     free, dear, usual = chosen(1.0), chosen(100.0), chosen(WAYPOINT_GAIN_RATIO)
     assert free.waypoints
@@ -215,14 +225,14 @@ def test_what_a_record_will_depend_on_is_how_it_moves_with_the_parameters(stage,
         return stands(
             legs,
             Geometry(HEXAGLIDE_PARAMETERS, hexaglide.convention.basis() @ free),
-            choice.joints,
+            choice.record.targets.joints[0],
             goes_to,
         )[:3]
 
     steps = 1e-3 * np.eye(len(estimate.free))
     moved = [(ball(estimate.free + step) - ball(estimate.free - step)) / 2e-3 for step in steps]
-    np.testing.assert_allclose(choice.jacobian, np.transpose(moved) - at.jacobian, atol=1e-4)
-    by_encoders = choice.covariance - at.covariance - 0.01**2 * np.eye(3)
+    np.testing.assert_allclose(choice.record.jacobian[0], np.transpose(moved) - at.jacobian, atol=1e-4)
+    by_encoders = choice.record.covariance[0] - at.covariance - 0.01**2 * np.eye(3)
     assert (np.linalg.eigvalsh(by_encoders) > 0.0).all()
 
 
@@ -242,7 +252,7 @@ def test_nothing_left_to_choose_says_why(know, much, limits, change, message):
     at = station_of(know, much, 1)
     belief = replace(know(much), limits=replace(limits, **change))
     with pytest.raises(LimitError, match=message) as caught:
-        select_pose(belief, at, TURNS)
+        selected(belief, at, TURNS)
     assert caught.value.exit_code is ExitCode.OUT_OF_LIMITS
 
 

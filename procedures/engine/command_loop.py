@@ -9,21 +9,26 @@ import asyncio
 from collections.abc import Callable, Coroutine
 from dataclasses import dataclass, replace
 from enum import StrEnum
+from functools import reduce
 from typing import Any, TypeVar
 
+from hexacell.errors import UsageError
 from procedures.run.cancellation import cancel_and_wait
 from procedures.run.commands import (
     Abort,
     Answer,
     Command,
     CommandQueue,
+    Invalidation,
     MeasureAgain,
     Pause,
     Resume,
     Stop,
     Undo,
+    invalidation_event,
 )
 from procedures.run.questions import QuestionBroker
+from procedures.run.state import RunState, apply
 
 Result = TypeVar("Result")
 
@@ -46,7 +51,7 @@ class EngineFlags:
     """Facts about the engine; several may hold at once.
 
     Attributes:
-        fault: what failed, until somebody decides how to continue.
+        fault: what failed, until it is decided how to continue.
         asking: a question waits for a person.
         pausing: a pause is wanted, ``at_once`` in mid-step; ``paused``: it has begun.
         stopping: why the run is to end; nothing where it is not.
@@ -86,7 +91,7 @@ class CommandLoop:
     Args:
         queue: where commands are put.
         broker: where questions are open, for answers.
-        invalidate: called with a command that undoes records; gives the reason if it is refused.
+        state: gives the present state of the run.
         reject: called with every command that is refused, and the reason.
     """
 
@@ -95,15 +100,16 @@ class CommandLoop:
         queue: CommandQueue,
         broker: QuestionBroker,
         *,
-        invalidate: Callable[[Undo | MeasureAgain], str | None],
+        state: Callable[[], RunState],
         reject: Callable[[Command, str], None],
     ) -> None:
         self.flags = EngineFlags()
         self.watchers: list[Callable[[Status], None]] = []
         self._queue = queue
         self._broker = broker
-        self._invalidate = invalidate
+        self._state = state
         self._reject = reject
+        self._invalidations: list[Invalidation] = []
         broker.on_change = lambda: self.set_flags(asking=broker.open is not None)
 
     def set_flags(self, **flags: Any) -> None:  # noqa: ANN401 - the fields of EngineFlags
@@ -144,6 +150,14 @@ class CommandLoop:
         for command in self._queue.take():
             self._take(command)
 
+    def take_invalidations(self) -> list[Invalidation]:
+        """What undo commands made invalid, oldest first; only once.
+
+        Each refers to the records that were there when it was requested, not to those taken meanwhile.
+        """
+        taken, self._invalidations = self._invalidations, []
+        return taken
+
     async def _until_cancelled(self) -> None:
         while not self._take(await self._queue.next()):
             pass
@@ -166,12 +180,20 @@ class CommandLoop:
             case Answer() if self._broker.answer(command.value):
                 pass
             case Undo() | MeasureAgain():
-                if reason := self._invalidate(command):
-                    self._reject(command, reason)
-                return flags.asking and flags.fault is None and not reason
+                return self._invalidate(command) and flags.asking and flags.fault is None
             case _:
                 self._reject(command, _refusal(command, flags))
         return False
+
+    def _invalidate(self, command: Undo | MeasureAgain) -> bool:
+        """Request what the command asks for; whether it is possible."""
+        expected = reduce(apply, self._invalidations, self._state())
+        try:
+            self._invalidations.append(invalidation_event(command, expected))
+        except UsageError as refusal:
+            self._reject(command, str(refusal))
+            return False
+        return True
 
 
 def _refusal(command: Command, flags: EngineFlags) -> str:

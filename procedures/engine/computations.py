@@ -47,11 +47,7 @@ class Computations:
         return events.Identified(result=result, held_out=self.calibration.held_out_poses(identified))
 
     def propose(self, state: RunState) -> events.Proposed:
-        """Save the change of the config, and hold the geometry against the gates.
-
-        Raises:
-            FileError: the config is not the one that the run began with.
-        """
+        """Save the change of the config and evaluate the gates; raises ``FileError``."""
         robot = self.calibration.robot
         identified = _identified(state).estimate(robot.mechanism.parameters)
         commanding, _ = robot.mechanism.normalize_frames(robot.controller)

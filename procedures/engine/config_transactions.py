@@ -9,7 +9,7 @@ applies a change, another reverts it::
 
 A transaction is begun in the journal by its step, written with a receipt that can undo it, read by the
 controller, and confirmed in the journal by its event. If the controller does not read a new geometry,
-the file is restored before the error goes on. A crash or a cancellation in between leaves a whole file,
+the file is restored before the error is raised. A crash or a cancellation in between leaves a whole file,
 old or new, and the receipt; applying and reverting may both be repeated from there.
 
 Two cases need a revert that no decision of the procedure asks for. :func:`revert_unrecorded` is for a

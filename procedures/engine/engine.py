@@ -15,7 +15,7 @@ from procedures.engine.step_executor import StepExecutor
 from procedures.journal.journal import Journal
 from procedures.run import events
 from procedures.run.cancellation import shielded
-from procedures.run.commands import Command, CommandQueue, MeasureAgain, PendingInvalidations, Undo
+from procedures.run.commands import Command, CommandQueue
 from procedures.run.questions import Question, QuestionBroker, UnattendedOperator
 from procedures.run.state import RunState, apply, fold
 from procedures.run.steps import Phase, Step
@@ -31,9 +31,9 @@ _BEFORE_SAMPLING = (events.Located, events.Arrived, events.GaugesPlaced)
 class Engine:
     """One run, from the end of its journal to the end of the run.
 
-    A face receives events through listeners, called after each event is on the disk, and of the status
-    through ``watch``. It controls the run through ``command``. The executor's operator should be
-    ``broker``, so that any face may answer the question that is open.
+    A user interface receives events through listeners, called after each event is on the disk, and the
+    status through ``watch``. It controls the run through ``command``. The executor's operator should be
+    ``broker``, so that any user interface may answer the question that is open.
     """
 
     def __init__(
@@ -52,12 +52,11 @@ class Engine:
         self._queue = queue or CommandQueue()
         self._broker = broker or QuestionBroker(UnattendedOperator())
         self._commands = CommandLoop(
-            self._queue, self._broker, invalidate=self._invalidate, reject=self._reject
+            self._queue, self._broker, state=lambda: self.state, reject=self._reject
         )
         self._recovery = Recovery(
             executor, self._commands, self._broker, policy, halt=self._halt, record=self.record
         )
-        self._invalidations = PendingInvalidations()
         self._is_prepared = False
         self._last: events.Event | None = None
         self.state = fold(journal.events)
@@ -119,11 +118,7 @@ class Engine:
                 self.record(events.SetInvalidated(at=key, reason="the run was interrupted in this set"))
 
     def record(self, event: events.Event) -> RunState:
-        """Journal an event, then call the listeners; gives the state after it.
-
-        Raises:
-            FileError: it cannot be journalled.
-        """
+        """Journal an event, then call the listeners; gives the state after it. Raises ``FileError``."""
         self._journal.append(event)
         self.state = apply(self.state, event)
         self._last = event
@@ -231,11 +226,8 @@ class Engine:
         if reason := self._commands.flags.stopping:
             raise Interruption(reason)
 
-    def _invalidate(self, command: Undo | MeasureAgain) -> str | None:
-        return self._invalidations.request(command, self.state)
-
     def _record_invalidations(self) -> None:
-        for event in self._invalidations.take():
+        for event in self._commands.take_invalidations():
             if self.state.set(event.at).samples:
                 self.record(event)
 

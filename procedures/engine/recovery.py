@@ -145,10 +145,9 @@ class Recovery:
     record: Callable[[events.Event], RunState]
 
     async def recover(self, error: HexacellError, step: Step | None, state: RunState) -> None:
-        """Return when the next step may be decided; a failure meanwhile is a failure of its own.
+        """Return when the next step may be decided; raises the error that ends the run otherwise.
 
-        Raises:
-            HexacellError: the failure that ends the run.
+        A failure meanwhile is a failure of its own.
         """
         while True:
             failure = failed(self.policy, error, step, state)
@@ -193,11 +192,7 @@ class Recovery:
     async def _prepare(
         self, error: HexacellError, failure: events.Failed, state: RunState
     ) -> list[events.SetInvalidated]:
-        """Wait, reconnect lost devices, and give the sets that are invalid by that or by the action.
-
-        Raises:
-            HexacellError: a device does not come back, or another one answers.
-        """
+        """Wait, reconnect lost devices, and give the sets that are invalid by that or by the action."""
         if not failure.asked:
             await self.executor.clock.sleep(self.policy.wait_s)
         is_zero_lost = False

@@ -65,11 +65,7 @@ class StepExecutor:
         await self.guards.prepare()
 
     async def perform(self, step: Step, state: RunState) -> events.Event:  # noqa: PLR0911 - a case a step
-        """Do one step.
-
-        Raises:
-            HexacellError: it could not be done; the message says what to do.
-        """
+        """Do one step; raises ``HexacellError``."""
         match step:
             case Locate():
                 return events.Located(pose=(await self.devices.controller.pose()).as_tuple())

@@ -1,4 +1,4 @@
-"""The run on disk: one JSON line an event, appended, checksummed, forced out before going on.
+"""The run on disk: one JSON line an event, appended, with a checksum, synced before the next.
 
 Every line is on the disk before the next is begun, so a power cut can tear the last one only: it may
 be cut off, or have zeros where its bytes should be. Such a tail is dropped: its write was never
@@ -78,11 +78,7 @@ class Journal:
         return tuple(self._events)
 
     def append(self, event: Event) -> None:
-        """Add one event; when this returns, it is on the disk.
-
-        Raises:
-            FileError: it could not be written; the journal is as before.
-        """
+        """Add one event and sync it to the disk; after a ``FileError`` the journal is as before."""
         line = self._line(event)
         try:
             if self._is_torn:
@@ -101,7 +97,7 @@ class Journal:
         self._whole += len(line)
 
     def close(self) -> None:
-        """Let the file and its lock go."""
+        """Close the file, which releases its lock."""
         os.close(self._descriptor)
 
     def __enter__(self) -> Self:

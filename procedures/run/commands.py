@@ -7,11 +7,10 @@ from collections import deque
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
-from functools import reduce
 
 from hexacell.errors import UsageError
 from procedures.run import events
-from procedures.run.state import RunState, apply
+from procedures.run.state import RunState
 from procedures.run.steps import Phase, SetKey
 
 REASON = "a person asked for it"
@@ -111,35 +110,8 @@ class CommandQueue:
             self._loop, self.is_over = None, True
 
 
-class PendingInvalidations:
-    """Invalidations that wait for the end of a step.
-
-    Each refers to the records that were there when it was requested, not to those taken meanwhile.
-    """
-
-    def __init__(self) -> None:
-        self._pending: list[Invalidation] = []
-
-    def request(self, command: Undo | MeasureAgain, state: RunState) -> str | None:
-        """Add the invalidation that a command asks for; or why it is refused."""
-        try:
-            self._pending.append(invalidation_event(command, reduce(apply, self._pending, state)))
-        except UsageError as refusal:
-            return str(refusal)
-        return None
-
-    def take(self) -> list[Invalidation]:
-        """All that are pending, oldest first; none is pending afterwards."""
-        taken, self._pending = self._pending, []
-        return taken
-
-
 def invalidation_event(command: Undo | MeasureAgain, state: RunState) -> Invalidation:
-    """The event that does what the command asks for.
-
-    Raises:
-        UsageError: there is no such record, or a result depends on it already.
-    """
+    """The event of a command; raises ``UsageError`` where no such record is, or a result depends on it."""
     key, orientation = (
         _last_record(state) if isinstance(command, Undo) else (command.at, command.orientation)
     )

@@ -54,9 +54,7 @@ class Question:
     """One question to a person. An answer is a text, or None.
 
     Attributes:
-        kind: what is asked.
-        text: the question in plain words, for a face that has none of its own.
-        subject: what the question is about.
+        text: the question in plain words, for a user interface that has none of its own.
         choices: the answers that are accepted. If empty, any text is (the name of who approves) and
             None declines.
         default: the choice that an empty answer selects; None if a choice must be made.
@@ -103,18 +101,12 @@ class Operator(Protocol):
     """Answers questions."""
 
     async def ask(self, question: Question) -> str | None:
-        """The answer; see :class:`Question`.
-
-        Raises:
-            AnswerNeeded: there is no answer.
-        """
+        """The answer; raises ``AnswerNeeded`` if there is none."""
         ...
 
 
 class QuestionBroker:
-    """An :class:`Operator` that passes questions on, and takes an answer from any face meanwhile.
-
-    The first answer counts: the operator's, or the one given to :meth:`answer`.
+    """Passes questions on to an operator; the first answer counts, its own or one given to :meth:`answer`.
 
     Attributes:
         open: the question that waits for an answer, if one does.
@@ -159,11 +151,7 @@ class UnattendedOperator:
     """No person is present: every question ends the run."""
 
     async def ask(self, question: Question) -> str | None:
-        """Refuse.
-
-        Raises:
-            AnswerNeeded: names what is needed, and how to run without it where that is possible.
-        """
+        """Raise ``AnswerNeeded``: what is needed, and how to run without it where that is possible."""
         match question.subject:
             case GaugePlacement(point=point, pose=pose):
                 raise AnswerNeeded(
@@ -177,4 +165,4 @@ class UnattendedOperator:
                     f"the new geometry waits for approval: {reasons or 'the cell file says to ask'}"
                 )
             case StepFailure(problem=problem):
-                raise AnswerNeeded(f"{problem} Somebody must choose: {', '.join(question.choices)}")
+                raise AnswerNeeded(f"{problem} A person must choose: {', '.join(question.choices)}")

@@ -46,7 +46,7 @@ async def test_unattended_approval_is_refused_where_the_cell_file_requires_it() 
 
 async def test_unattended_no_recovery_is_chosen() -> None:
     question = ask_recovery("It broke.", (Action.RETRY, Action.ABORT))
-    with pytest.raises(AnswerNeeded, match=r"^It broke\. Somebody must choose: retry, abort"):
+    with pytest.raises(AnswerNeeded, match=r"^It broke\. A person must choose: retry, abort"):
         await UnattendedOperator().ask(question)
 
 

@@ -22,8 +22,8 @@ from hexacell.cell.model import CellSettings
 from hexacell.cell.simulation import SimulationSettings
 from hexacell.clock import CellClock
 from hexacell.controller_config.interface import ConfigFormat
-from hexacell.kinematics.mechanism import Mechanism, inverse_kinematics
-from hexacell.kinematics.pose import Pose, PoseBatch
+from hexacell.kinematics.mechanism import Mechanism
+from hexacell.kinematics.pose import Pose
 
 
 class SimulatedCell(Closeable):
@@ -49,7 +49,7 @@ class SimulatedCell(Closeable):
     ) -> None:
         clock = CellClock(settings.timing.clock_factor)
         home = Pose(*settings.identification.points[0])
-        self.physics = _physics(mechanism, simulation, clock, config_format, config, home)
+        self.physics = RobotPhysics(mechanism, simulation, clock, config_format.read(config), home)
         self.machine = SimulatedMachine(mechanism, config_format, config, self.physics, clock, home)
         with ExitStack() as served:
             stop_file = _stop_file(settings, served)
@@ -86,27 +86,6 @@ def _stop_file(settings: CellSettings, served: ExitStack) -> Path:
     if settings.guards.stop_file is not None:
         return Path(settings.guards.stop_file)
     return Path(served.enter_context(TemporaryDirectory(prefix="hexacell-"))) / "stop"
-
-
-def _physics(
-    mechanism: Mechanism,
-    simulation: SimulationSettings,
-    clock: CellClock,
-    config_format: ConfigFormat,
-    config: Path,
-    home: Pose,
-) -> RobotPhysics:
-    commanding = config_format.read(config)
-    start = PoseBatch.of([home])
-    joints = inverse_kinematics(mechanism, commanding.geometry, commanding.branch, start)[0]
-    return RobotPhysics(
-        mechanism,
-        simulation,
-        clock,
-        start=start,
-        start_geometry=commanding.geometry,
-        start_joints=joints,
-    )
 
 
 def _gauge_bank(

@@ -15,13 +15,14 @@ import numpy as np
 
 from hexacell.cell.simulation import SimulationSettings
 from hexacell.clock import CellClock
+from hexacell.controller_config.interface import ControllerGeometry
 from hexacell.errors import ReachError
 from hexacell.kinematics import rotations
 from hexacell.kinematics.commanded_motion import change_geometry
 from hexacell.kinematics.forward import forward_kinematics
 from hexacell.kinematics.geometry import Geometry
-from hexacell.kinematics.mechanism import Mechanism
-from hexacell.kinematics.pose import PoseBatch
+from hexacell.kinematics.mechanism import Mechanism, inverse_kinematics
+from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.rotations import Array
 
 
@@ -80,8 +81,10 @@ class RobotPhysics:
     Attributes:
         on_motion_start: called when a motion has started; must return quickly.
 
+    It starts where a controller with the geometry ``commanding`` puts the sliders for ``home``.
+
     Raises:
-        ReachError: the true geometry cannot reach the start.
+        ReachError: ``home`` is out of reach of that geometry or of the true one.
     """
 
     def __init__(
@@ -89,10 +92,8 @@ class RobotPhysics:
         mechanism: Mechanism,
         settings: SimulationSettings,
         clock: CellClock,
-        *,
-        start: PoseBatch,
-        start_geometry: Geometry,
-        start_joints: Array,
+        commanding: ControllerGeometry,
+        home: Pose,
     ) -> None:
         self._truth = Geometry.of(mechanism.parameters, settings.geometry.model_dump())
         self._mechanism = mechanism
@@ -101,13 +102,15 @@ class RobotPhysics:
         self._clock = clock
         self._random = np.random.default_rng(settings.seed)
         self._lock = threading.RLock()
-        self._motion = Motion.stationary(start_joints)
-        self._joints = start_joints
+        start = PoseBatch.of([home])
+        joints = inverse_kinematics(mechanism, commanding.geometry, commanding.branch, start)
+        self._motion = Motion.stationary(joints[0])
+        self._joints = joints[0]
         self._rows_passed = 0
-        first = change_geometry(mechanism, start_geometry, self._truth, start, start_joints[None])
+        first = change_geometry(mechanism, commanding.geometry, self._truth, start, joints)
         if not first.found[0]:
             raise ReachError(
-                f"the simulated machine cannot reach {start.pose(0)}",
+                f"the simulated machine cannot reach {home}",
                 action="Correct [simulation.geometry], or start at another point",
             )
         self._pose = first.poses

@@ -11,7 +11,6 @@ from typing import Any
 
 import pytest
 
-from drivers.simulated.cell import _physics
 from drivers.simulated.physics import RobotPhysics
 from drivers.simulated.robot import SimulatedMachine
 from hexacell.application.calibration_run import run_started
@@ -50,12 +49,11 @@ class Rig:
         bench = self.bench = Bench()
         self.clock, self.gauges, self.controller = bench.clock, bench.gauges, bench.controller
         home, config = Pose(*self.cell.settings.identification.points[0]), self.cell.config_path
-        self.physics: RobotPhysics = _physics(
-            Hexaglide(), simulation, self.clock, NativeToml(HEXAGLIDE_PARAMETERS), config, home
+        config_format = NativeToml(HEXAGLIDE_PARAMETERS)
+        self.physics: RobotPhysics = RobotPhysics(
+            Hexaglide(), simulation, self.clock, config_format.read(config), home
         )
-        self.machine = SimulatedMachine(
-            Hexaglide(), NativeToml(HEXAGLIDE_PARAMETERS), config, self.physics, self.clock, home
-        )
+        self.machine = SimulatedMachine(Hexaglide(), config_format, config, self.physics, self.clock, home)
         for gauge in bench.gauges:
             gauge.shown = partial(self.physics.gauge_displacement, gauge.name)
         bench.encoders.shown = lambda: list(self.physics.encoder_positions())

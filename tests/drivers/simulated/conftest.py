@@ -119,17 +119,8 @@ def make_twin(bundled_cell: Cell) -> MakeTwin:
         simulation = changed(simulation, changes)
         config = bundled_cell.config_path
         read = NativeToml(HEXAGLIDE_PARAMETERS).read(config)
-        start = PoseBatch.of([home])
-        joints = inverse_kinematics(Hexaglide(), read.geometry, read.branch, start)[0]
         clock = StillClock()
-        physics = RobotPhysics(
-            Hexaglide(),
-            simulation,
-            clock,
-            start=start,
-            start_geometry=read.geometry,
-            start_joints=joints,
-        )
+        physics = RobotPhysics(Hexaglide(), simulation, clock, read, home)
         machine = SimulatedMachine(
             Hexaglide(), NativeToml(HEXAGLIDE_PARAMETERS), config, physics, clock, home
         )

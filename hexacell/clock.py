@@ -30,9 +30,6 @@ class CellClock:
         """Wait for ``seconds`` of the cell."""
         await asyncio.sleep(self.real_seconds(seconds))
 
-    def wait(self, seconds: float, until: threading.Event | None = None) -> bool:
-        """The same for a thread; returns early, with True, when ``until`` is set."""
-        if until is not None:
-            return until.wait(self.real_seconds(seconds))
-        time.sleep(self.real_seconds(seconds))
-        return False
+    def wait(self, seconds: float, until: threading.Event) -> None:
+        """The same for a thread; returns early when ``until`` is set."""
+        until.wait(self.real_seconds(seconds))

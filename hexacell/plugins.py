@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from enum import StrEnum
+from enum import Enum
 from importlib.metadata import EntryPoint, entry_points
 from typing import Any
 
@@ -12,35 +12,24 @@ from hexacell.errors import UsageError, did_you_mean
 Factory = Callable[..., Any]
 
 
-class Group(StrEnum):
-    """A kind of plug-in: the name of its entry point group."""
+class Group(Enum):
+    """A kind of plug-in: the name of its entry point group, and the word for one plug-in in a message."""
 
-    GAUGES = "hexacell.gauges"
-    ENCODERS = "hexacell.encoders"
-    CONTROLLERS = "hexacell.controllers"
-    THERMOMETERS = "hexacell.thermometers"
-    CONFIG_FORMATS = "hexacell.config_formats"
-    MECHANISMS = "hexacell.mechanisms"
+    GAUGES = ("hexacell.gauges", "gauge protocol")
+    ENCODERS = ("hexacell.encoders", "encoder protocol")
+    CONTROLLERS = ("hexacell.controllers", "controller protocol")
+    THERMOMETERS = ("hexacell.thermometers", "thermometer protocol")
+    CONFIG_FORMATS = ("hexacell.config_formats", "config format")
+    MECHANISMS = ("hexacell.mechanisms", "mechanism")
 
-    @property
-    def noun(self) -> str:
-        """The word for one plug-in of the group in a message."""
-        return _NOUNS[self]
-
-
-_NOUNS = {
-    Group.GAUGES: "gauge protocol",
-    Group.ENCODERS: "encoder protocol",
-    Group.CONTROLLERS: "controller protocol",
-    Group.THERMOMETERS: "thermometer protocol",
-    Group.CONFIG_FORMATS: "config format",
-    Group.MECHANISMS: "mechanism",
-}
+    def __init__(self, entry_points: str, noun: str) -> None:
+        self.entry_points = entry_points
+        self.noun = noun
 
 
 def names(group: Group) -> tuple[str, ...]:
     """The names announced in ``group``, sorted. Nothing is imported."""
-    return tuple(sorted(entry_points(group=group).names))
+    return tuple(sorted(entry_points(group=group.entry_points).names))
 
 
 def load(group: Group, name: str) -> Factory:
@@ -54,7 +43,7 @@ def load(group: Group, name: str) -> Factory:
 
 
 def _only(group: Group, name: str) -> EntryPoint:
-    by_target = {point.value: point for point in entry_points(group=group, name=name)}
+    by_target = {point.value: point for point in entry_points(group=group.entry_points, name=name)}
     if not by_target:
         raise _unknown(group, name)
     found = list(by_target.values())

@@ -13,23 +13,17 @@ _IN_THE_WHEEL = Path(__file__).parents[1] / "_configs"
 _IN_A_CHECKOUT = Path(__file__).parents[2] / "configs"
 
 
-def bundled_configs() -> tuple[Path, ...]:
-    """Everything in ``configs``, sorted: a TOML file or a folder each.
-
-    Treat them as read-only: a calibration writes beside its cell file, so copy them first.
-    """
-    return tuple(sorted(path for path in _folder().iterdir() if not path.name.startswith(".")))
-
-
 def bundled_config(name: str) -> Path:
     """The cell called ``name``, with or without its suffix: ``simulated-hexaglide``.
 
-    It is a cell file, or a folder with a cell file and the files that it names.
+    It is a cell file, or a folder with a cell file and the files that it names. Treat it as read-only: a
+    calibration writes beside its cell file, so copy it first.
 
     Raises:
         UsageError: no such config comes with the package; the message names the nearest.
     """
-    known = {path.stem: path for path in bundled_configs() if not path.name.endswith(CONTROLLER)}
+    configs = sorted(path for path in _folder().iterdir() if not path.name.startswith("."))
+    known = {path.stem: path for path in configs if not path.name.endswith(CONTROLLER)}
     found = known.get(name) or known.get(name.removesuffix(".toml"))
     if found is None:
         action = did_you_mean(name, known) or f"There are: {', '.join(known)}"

@@ -36,10 +36,6 @@ class GaugeAxis:
         """What the instrument shows at a coordinate; the inverse of :meth:`coordinate`."""
         return self.sign * coordinate_mm
 
-    def deviation(self, reading_mm: float, zero_mm: float) -> float:
-        """How far a reading is from a zero that is given as a coordinate, along the base axis."""
-        return self.coordinate(reading_mm) - zero_mm
-
 
 class GaugeSettings(Section):
     """One dial indicator."""

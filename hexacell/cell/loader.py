@@ -21,7 +21,7 @@ from hexacell.errors import FileError, SeveralErrors
 from hexacell.plugins import Group, names
 from hexacell.storage.atomic_files import read_text
 from hexacell.storage.toml_document import TomlDocument, table_header
-from hexacell.storage.toml_locations import BYTE_ORDER_MARK, KeyPath
+from hexacell.storage.toml_locations import KeyPath
 
 Remark = Callable[[KeyPath], str | None]
 """The comment behind the value at a path, if any."""
@@ -53,7 +53,7 @@ def load_cell(path: Path) -> Cell:
         FileError: The file cannot be read, is no TOML, or has one mistake.
         SeveralErrors: It has more than one; each of ``errors`` is a FileError with its line.
     """
-    document = TomlDocument.parse(read_text(path).removeprefix(BYTE_ORDER_MARK), path)
+    document = TomlDocument.parse(read_text(path), path)
     return Cell(path, _checked(document, path), document)
 
 

@@ -12,7 +12,6 @@ import io
 import math
 from collections import Counter
 from collections.abc import Iterator
-from operator import itemgetter
 from pathlib import Path
 
 from hexacell.errors import FileError
@@ -37,10 +36,10 @@ def read_measurements(path: Path, *, allow_partial: bool = False) -> Measurement
         FileError: the file cannot be read, a column is missing, a cell is no number, a record occurs
             twice, or there are too few; with the line.
     """
-    text = read_text(path).removeprefix("\N{BYTE ORDER MARK}")
+    text = read_text(path)
     if allow_partial and not text.strip():
         return MeasurementSet(())
-    records = _by_id(path, _Table(path, text, HEADER))
+    records = _records(path, text, HEADER)
     if not allow_partial:
         _require_two_rows_a_point(path, {record: line for record, (line, _) in records.items()})
     return MeasurementSet(tuple(record for _, record in records.values()))
@@ -52,8 +51,7 @@ def read_poses(path: Path) -> list[tuple[int, int, Pose]]:
     Raises:
         FileError: as for a measurement file, but only the columns of the poses are required.
     """
-    table = _Table(path, read_text(path).removeprefix("\N{BYTE ORDER MARK}"), POSE_HEADER)
-    records = _by_id(path, table).values()
+    records = _records(path, read_text(path), POSE_HEADER).values()
     return [(line, record.point, record.pose) for line, record in records]
 
 
@@ -76,46 +74,24 @@ def _row(record: Record) -> list[str]:
     return [str(record.point), str(record.orientation), *(repr(float(number)) for number in numbers)]
 
 
-def _by_id(path: Path, table: _Table) -> dict[RecordId, tuple[int, Record]]:
-    """The records of a table, each with its line, in the order of the file."""
+def _records(path: Path, text: str, wanted: tuple[str, ...]) -> dict[RecordId, tuple[int, Record]]:
+    """The records, each with its line, in the order of the file; ``wanted`` are the first of ``HEADER``."""
+    rows = _filled_rows(path, text)
+    line, header = next(rows, (1, []))
+    columns = _columns(path, line, header, wanted)
+    absent = ("0",) * (len(HEADER) - len(wanted))
     found: dict[RecordId, tuple[int, Record]] = {}
-    for line, record in table.records():
+    for line, row in rows:
+        if len(row) != len(header):
+            raise _wrong_width(path, line, row, header)
+        cells = (*(row[column] for column in columns), *absent)
+        record = _record(cells)
+        if record is None:
+            raise _bad_cell(path, line, cells)
         if record.id in found:
             raise _duplicate(path, record.id, found[record.id][0], line)
         found[record.id] = (line, record)
     return found
-
-
-class _Table:
-    """The rows of one file, and the positions of the wanted columns: the first ones of ``HEADER``."""
-
-    def __init__(self, path: Path, text: str, wanted: tuple[str, ...]) -> None:
-        self._path = path
-        self._rows = _filled_rows(path, text)
-        line, self._header = next(self._rows, (1, []))
-        columns = _columns(path, line, self._header, wanted)
-        self._cells = itemgetter(*columns)
-        self._absent = ("0",) * (len(HEADER) - len(wanted))
-
-    def records(self) -> Iterator[tuple[int, Record]]:
-        """Each record with its line."""
-        for line, row in self._rows:
-            if len(row) != len(self._header):
-                raise self._wrong_width(line, row)
-            cells = (*self._cells(row), *self._absent)
-            record = _record(cells)
-            if record is None:
-                raise _bad_cell(self._path, line, cells)
-            yield line, record
-
-    def _wrong_width(self, line: int, row: list[str]) -> FileError:
-        hint = "; is the decimal sign a comma?" if len(row) > len(self._header) else ""
-        return FileError(
-            f"the row has {len(row)} cells, the header {len(self._header)}{hint}",
-            subject=self._path,
-            line=line,
-            action="Correct this row",
-        )
 
 
 def _filled_rows(path: Path, text: str) -> Iterator[tuple[int, list[str]]]:
@@ -129,6 +105,12 @@ def _filled_rows(path: Path, text: str) -> Iterator[tuple[int, list[str]]]:
         raise FileError(
             f"is not valid CSV: {error}", subject=path, line=reader.line_num, action="Correct this line"
         ) from None
+
+
+def _wrong_width(path: Path, line: int, row: list[str], header: list[str]) -> FileError:
+    hint = "; is the decimal sign a comma?" if len(row) > len(header) else ""
+    problem = f"the row has {len(row)} cells, the header {len(header)}{hint}"
+    return FileError(problem, subject=path, line=line, action="Correct this row")
 
 
 def _columns(path: Path, line: int, header: list[str], wanted: tuple[str, ...]) -> list[int]:

@@ -20,6 +20,8 @@ from pathlib import Path
 
 from hexacell.errors import FileError
 
+BYTE_ORDER_MARK = "\ufeff"
+
 _REASONS: dict[int, tuple[str, str]] = {
     errno.ENOENT: ("it does not exist", "Check the path"),
     errno.ENOTDIR: ("a part of the path is not a folder", "Check the path"),
@@ -68,12 +70,12 @@ def read_if_present(path: Path) -> bytes | None:
 
 
 def read_text(path: Path) -> str:
-    """The content of a UTF-8 file, with its line ends and byte order mark.
+    """The content of a UTF-8 file, with its line ends but no byte order mark.
 
     Raises:
         FileError: as for :func:`read_bytes`, or not UTF-8; then with the line.
     """
-    return decode_utf8(read_bytes(path), path)
+    return decode_utf8(read_bytes(path), path).removeprefix(BYTE_ORDER_MARK)
 
 
 def decode_utf8(data: bytes, path: Path) -> str:

@@ -12,7 +12,8 @@ from pathlib import Path
 from typing import Any, Self
 
 from hexacell.errors import FileError
-from hexacell.storage.toml_locations import BYTE_ORDER_MARK, KeyPath, locate
+from hexacell.storage.atomic_files import BYTE_ORDER_MARK
+from hexacell.storage.toml_locations import KeyPath, locate
 
 _LONGEST_QUOTE = 40
 _POSITION = re.compile(r" \(at (?:line (?P<line>\d+), column \d+|end of document)\)$")

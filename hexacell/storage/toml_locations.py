@@ -11,7 +11,7 @@ from __future__ import annotations
 import re
 import tomllib
 
-BYTE_ORDER_MARK = "\ufeff"
+from hexacell.storage.atomic_files import BYTE_ORDER_MARK
 
 KeyPath = tuple[str | int, ...]
 """Keys of tables and, counted from 0, positions in arrays, from the document's root."""

@@ -152,7 +152,7 @@ class WatchedGauge:
         """The present deviation from the reference of the set."""
         reading = await self._devices.read_gauge_once(self._mounted.gauge)
         self.displayed.append(reading.raw)
-        deviation_mm = self._mounted.axis.deviation(reading.value_mm, self._reference_mm)
+        deviation_mm = self._mounted.axis.coordinate(reading.value_mm) - self._reference_mm
         return GaugeDeviation(self.axis, deviation_mm)
 
 

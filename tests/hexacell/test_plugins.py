@@ -25,7 +25,7 @@ def install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Install:
         info = tmp_path / f"{package}-1.0.dist-info"
         info.mkdir()
         (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {package}\nVersion: 1.0\n")
-        (info / "entry_points.txt").write_text(f"[{Group.GAUGES}]\n{gauges}\n")
+        (info / "entry_points.txt").write_text(f"[{Group.GAUGES.entry_points}]\n{gauges}\n")
         monkeypatch.delitem(sys.modules, package, raising=False)
 
     return put

@@ -36,11 +36,9 @@ class ManualClock(CellClock):
         self.time_s += seconds
         await asyncio.sleep(0)
 
-    def wait(self, seconds: float, until: threading.Event | None = None) -> bool:
-        if until is not None and until.is_set():
-            return True
-        self.time_s += seconds
-        return False
+    def wait(self, seconds: float, until: threading.Event) -> None:
+        if not until.is_set():
+            self.time_s += seconds
 
 
 class Fake:

@@ -49,12 +49,10 @@ class StillClock(CellClock):
     def now(self) -> float:
         return self.time_s
 
-    def wait(self, seconds: float, until: threading.Event | None = None) -> bool:
+    def wait(self, seconds: float, until: threading.Event) -> None:
         self.on_wait()
-        if until is not None and until.is_set():
-            return True
-        self.time_s += seconds
-        return False
+        if not until.is_set():
+            self.time_s += seconds
 
 
 @dataclass

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from enum import IntEnum
 from pathlib import Path
 
@@ -126,6 +126,13 @@ class SeveralErrors(HexacellError):
 
     def __str__(self) -> str:
         return "\n".join([f"{self.problem}:", *(f"  - {error}" for error in self.errors)])
+
+
+def joined(problem: str, errors: Sequence[HexacellError]) -> HexacellError:
+    """The error to raise for one or more: a single one as it is, several in one report."""
+    if len(errors) == 1:
+        return errors[0]
+    return SeveralErrors(problem, [single for error in errors for single in flatten_errors(error)])
 
 
 def consists_only_of(error: HexacellError, *kinds: type[HexacellError]) -> bool:

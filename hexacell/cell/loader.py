@@ -17,7 +17,7 @@ from pydantic import ValidationError
 from hexacell.cell.diagnostics import Diagnosis, ModelLookup
 from hexacell.cell.fields import Section
 from hexacell.cell.model import DEFAULT_MECHANISM, CellSettings, cell_model
-from hexacell.errors import FileError, SeveralErrors
+from hexacell.errors import joined
 from hexacell.plugins import Group, names
 from hexacell.storage.atomic_files import read_text
 from hexacell.storage.toml_document import TomlDocument, table_header
@@ -83,7 +83,8 @@ def _checked(document: TomlDocument, path: Path) -> CellSettings:
     except ValidationError as refusal:
         errors |= diagnosis.explain_refusal(refusal)
     if errors:
-        raise _joined(path, list(errors.values()))
+        in_order = sorted(errors.values(), key=lambda error: error.line or 0)
+        raise joined(f"{path} has {len(errors)} mistakes", in_order)
     return settings
 
 
@@ -92,13 +93,6 @@ def _mechanism(document: TomlDocument) -> str:
     robot = document.data.get("robot")
     name = robot.get("mechanism") if isinstance(robot, dict) else None
     return name if isinstance(name, str) and name in names(Group.MECHANISMS) else DEFAULT_MECHANISM
-
-
-def _joined(path: Path, errors: list[FileError]) -> FileError | SeveralErrors:
-    if len(errors) == 1:
-        return errors[0]
-    in_order = sorted(errors, key=lambda error: error.line or 0)
-    return SeveralErrors(f"{path} has {len(errors)} mistakes", [*in_order])
 
 
 def dump(settings: Section, remark: Remark = lambda _: None) -> str:

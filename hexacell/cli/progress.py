@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import sys
-from types import TracebackType
-from typing import Self
 
 from rich.console import Console as RichConsole
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
@@ -17,7 +15,7 @@ from procedures.run.steps import Compute, Place
 
 
 class RunProgress:
-    """A listener of the engine that prints events and moves the bar.
+    """A listener of the engine that prints events and moves ``bar``, a context manager.
 
     Attributes:
         has_started: whether the run exists on the disk, and so can be resumed.
@@ -27,35 +25,26 @@ class RunProgress:
         self.has_started = False
         self._console = console
         self._formatter = EventFormatter()
-        self._bar = _bar()
-        self._task = self._bar.add_task("connecting", total=expected_records)
+        self.bar = _bar()
+        self._task = self.bar.add_task("connecting", total=expected_records)
 
     def __call__(self, event: events.Event, state: RunState) -> None:
         """Show one event."""
         if not self.has_started:
             # Reset, not updated: records of an earlier attempt do not count for the present speed.
-            self._bar.reset(self._task, completed=completed(state))
+            self.bar.reset(self._task, completed=completed(state))
             self.has_started = True
         if _may_ask(event):
-            self._bar.stop()
+            self.bar.stop()
         else:
-            self._bar.start()
-        self._bar.update(self._task, completed=completed(state), description=activity(event))
+            self.bar.start()
+        self.bar.update(self._task, completed=completed(state), description=activity(event))
         for line in self._formatter.lines(event, state):
             self._console.print(line)
 
     def hide(self) -> None:
         """Remove the bar until the next event, so that a question can be shown."""
-        self._bar.stop()
-
-    def __enter__(self) -> Self:
-        self._bar.start()
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self._bar.stop()
+        self.bar.stop()
 
 
 def _may_ask(event: events.Event) -> bool:

@@ -8,7 +8,7 @@ from pathlib import Path
 from drivers.errors import GaugeAtEnd
 from drivers.interfaces import EncoderSample, GaugeReading
 from hexacell.campaign import feasibility
-from hexacell.errors import AnswerNeeded, HexacellError, SeveralErrors, flatten_errors
+from hexacell.errors import AnswerNeeded, HexacellError, flatten_errors, joined
 from hexacell.kinematics.pose import Pose
 from procedures.calibration.workflow import Calibration, Mode
 from procedures.devices.device_set import Devices, gather_errors
@@ -76,7 +76,5 @@ async def start_failures(devices: Devices, folder: Path, free_disk_mb: float) ->
 
 def raise_all(failures: list[HexacellError]) -> None:
     """Raise one failure as it is, several in one report, none not at all."""
-    if len(failures) == 1:
-        raise failures[0]
     if failures:
-        raise SeveralErrors(f"{len(failures)} problems prevent the run", failures)
+        raise joined(f"{len(failures)} problems prevent the run", failures)

@@ -108,11 +108,7 @@ class Calibration:
         return self._at_start.points.estimate(state)
 
     def held_out_poses(self, identified: Identification | None) -> tuple[tuple[SixNumbers, ...], ...]:
-        """Poses at each held-out point, in the controller's frames.
-
-        Raises:
-            LimitError: a point has too few that keep the ball inside the travel.
-        """
+        """See :meth:`HeldOutSteps.choose_poses`."""
         return self._at_start.held_out.choose_poses(identified)
 
     def _write_back(self, state: RunState) -> Step | None:

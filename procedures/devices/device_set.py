@@ -21,7 +21,7 @@ from drivers.interfaces import (
 )
 from drivers.stop_input import CombinedStopInput
 from hexacell.cell.devices import GaugeAxis
-from hexacell.errors import HexacellError, SeveralErrors, flatten_errors
+from hexacell.errors import HexacellError, joined
 from procedures.devices.live_values import LiveValues
 from procedures.run.events import Temperature
 
@@ -114,10 +114,8 @@ async def gather_errors(problem: str, calls: Sequence[Awaitable[Result]]) -> lis
     others = [result for result in results if isinstance(result, BaseException)]
     if others and len(others) > len(errors):
         raise next(error for error in others if not isinstance(error, HexacellError))
-    if len(errors) == 1:
-        raise errors[0]
     if errors:
-        raise SeveralErrors(problem, [one for error in errors for one in flatten_errors(error)])
+        raise joined(problem, errors)
     return [result for result in results if not isinstance(result, BaseException)]
 
 

@@ -77,7 +77,7 @@ def execute_run(request: RunRequest, console: Console) -> events.Ended:
     progress = RunProgress(console, expected_records(request.cell.settings, request.mode, listed))
     signals = SignalCommands(console)
     try:
-        with progress:
+        with progress.bar:
             return signals.run(_calibrate(request, console, progress, signals.queue))
     except HexacellError:
         if progress.has_started:

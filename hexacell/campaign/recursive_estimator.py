@@ -19,7 +19,7 @@ from hexacell.identification.estimator import estimate_online
 from hexacell.identification.problem.data_requirements import is_determined
 from hexacell.identification.problem.problem import Problem
 from hexacell.identification.solver.levenberg_marquardt import COARSE, INCREMENTAL
-from hexacell.identification.solver.multistart import start_points
+from hexacell.identification.solver.multistart import restarts
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.measurements.records import MeasurementSet, Record
@@ -82,7 +82,7 @@ def update_estimate(problem: Problem, before: Identification | None) -> Identifi
         return estimate_online(problem)
     # While the records leave much open, undamped steps may diverge.
     options = INCREMENTAL if is_determined(problem) else COARSE
-    found = estimate_online(problem, free=before.free, poses=poses, options=options)
+    found = estimate_online(problem.starting_at(before.free, poses), options)
     others = _from_other_starts(problem)
     while not _is_plausible(problem, found) and (other := next(others, None)):
         is_better = (other.records, -cost(other)) > (found.records, -cost(found))
@@ -106,8 +106,7 @@ def _from_other_starts(problem: Problem) -> Iterator[Identification]:
     With few records, one of them may be beyond a singularity for all robots near the drawing.
     """
     yield estimate_online(problem)
-    for free, poses in start_points(problem):
-        yield estimate_online(problem, free=free, poses=poses)
+    yield from map(estimate_online, restarts(problem))
 
 
 def _start_poses(problem: Problem, before: Identification) -> PoseBatch | None:

@@ -12,8 +12,6 @@ from hexacell.identification.solver.levenberg_marquardt import COARSE, SolverOpt
 from hexacell.identification.solver.regularized_fit import fit_regularized
 from hexacell.identification.solver.result import Identification
 from hexacell.identification.solver.singular_records import solve_around_singularities
-from hexacell.kinematics.pose import PoseBatch
-from hexacell.kinematics.rotations import Array
 
 
 def identify(problem: Problem, *, find_outliers: bool = True) -> Identification:
@@ -32,20 +30,8 @@ def identify(problem: Problem, *, find_outliers: bool = True) -> Identification:
     return found
 
 
-def estimate_online(
-    problem: Problem,
-    *,
-    free: Array | None = None,
-    poses: PoseBatch | None = None,
-    options: SolverOptions = COARSE,
-) -> Identification:
-    """Estimate the geometry from the records so far, with the full prior and without any check.
-
-    The solver starts at ``free`` (p,), mm, with ``poses`` that close it at the problem's records, or
-    at the problem's initial parameters.
-    """
-    if free is None or poses is None:
-        free, poses = problem.initial_parameters, problem.start
+def estimate_online(problem: Problem, options: SolverOptions = COARSE) -> Identification:
+    """Estimate the geometry from the records so far, with the full prior and without any check."""
     precision = problem.prior.precision
-    kept, solution = solve_around_singularities(problem, precision, free=free, poses=poses, options=options)
+    kept, solution = solve_around_singularities(problem, precision, options)
     return Identification(kept, solution, precision)

@@ -74,27 +74,6 @@ def apply_twist(poses: PoseBatch, step: Array) -> PoseBatch:
     )
 
 
-def newton(
-    mechanism: Mechanism,
-    geometry: Geometry | GeometryBatch,
-    joints: Array,
-    start: PoseBatch,
-    mode: Array,
-    tolerance_mm: float,
-    max_steps: int = MAX_STEPS,
-) -> ForwardResult:
-    """Damped Newton's method on each of n poses; a pose that has converged is not changed further."""
-    iteration = _NewtonIteration(mechanism, geometry, joints, start, mode)
-    for _ in range(max_steps):
-        # Written so that a pose with the error NaN, which no step can improve, is finished as well.
-        iteration.finish(~(iteration.errors() >= tolerance_mm), tolerance_mm)
-        if not len(iteration.rows):
-            break
-        iteration.step()
-    iteration.finish(np.ones(len(iteration.rows), dtype=bool), tolerance_mm)
-    return ForwardResult(PoseBatch(iteration.positions, iteration.rotations), iteration.found)
-
-
 class _NewtonIteration:
     """The iterates of n poses: ``rows`` are still active, the other poses have their final values."""
 
@@ -104,14 +83,15 @@ class _NewtonIteration:
         geometry: Geometry | GeometryBatch,
         joints: Array,
         start: PoseBatch,
-        mode: Array,
+        mode: Array | None,
     ) -> None:
         self.positions, self.rotations = np.array(start.positions), np.array(start.rotations)
         self.found = np.zeros(len(joints), dtype=bool)
         self.rows = np.arange(len(joints))
-        self._mechanism, self._geometry, self._mode = mechanism, geometry, mode
+        self._mechanism, self._geometry = mechanism, geometry
         self._joints, self._poses = joints, start
         self._error, self._jacobian = mechanism.residual_and_jacobian(geometry, start, joints)
+        self._mode = assembly_mode(self._jacobian) if mode is None else mode
 
     def errors(self) -> Array:
         """Largest absolute constraint of each active pose, mm."""
@@ -163,8 +143,11 @@ def forward_kinematics(
     *,
     mode: Array | None = None,
     tolerance_mm: float = TOLERANCE_MM,
+    max_steps: int = MAX_STEPS,
 ) -> ForwardResult:
     """Poses of n joint vectors (n, 6), mm, by damped Newton's method from nearby poses.
+
+    A pose that has converged is not changed further.
 
     Args:
         mechanism: gives the constraints and their derivatives.
@@ -173,10 +156,17 @@ def forward_kinematics(
         start: n poses near the solutions.
         mode: (n,) the required assembly mode; by default that of ``start``.
         tolerance_mm: largest constraint of a solution.
+        max_steps: largest number of Newton steps.
     """
-    if mode is None:
-        mode = assembly_mode(mechanism.residual_and_jacobian(geometry, start, joints)[1])
-    return newton(mechanism, geometry, joints, start, mode, tolerance_mm)
+    iteration = _NewtonIteration(mechanism, geometry, joints, start, mode)
+    for _ in range(max_steps):
+        # Written so that a pose with the error NaN, which no step can improve, is finished as well.
+        iteration.finish(~(iteration.errors() >= tolerance_mm), tolerance_mm)
+        if not len(iteration.rows):
+            break
+        iteration.step()
+    iteration.finish(np.ones(len(iteration.rows), dtype=bool), tolerance_mm)
+    return ForwardResult(PoseBatch(iteration.positions, iteration.rotations), iteration.found)
 
 
 def continue_solution(
@@ -231,8 +221,14 @@ def _continue_in_stages(
         geometry = geometries[0].interpolate(geometries[1], fraction)
         stage_joints = (1.0 - fraction) * joints[0][rows] + fraction * joints[1][rows]
         tolerance_mm = TOLERANCE_MM if stage == stages else STAGE_TOLERANCE_MM
-        result = newton(
-            mechanism, geometry, stage_joints, poses[rows], mode[rows], tolerance_mm, MAX_STAGE_STEPS
+        result = forward_kinematics(
+            mechanism,
+            geometry,
+            stage_joints,
+            poses[rows],
+            mode=mode[rows],
+            tolerance_mm=tolerance_mm,
+            max_steps=MAX_STAGE_STEPS,
         )
         poses = poses.with_rows(rows, result.poses)
         # A failed pose takes the most steps, and the next stages could not find it either.

@@ -33,7 +33,6 @@ from hexacell.identification.problem.problem import Problem
 from hexacell.identification.solver import measurement_model
 from hexacell.identification.solver.chi_square import ChiSquareTest
 from hexacell.identification.solver.linearized_model import LinearizedModel
-from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array, Mask
 
 LARGEST_REJECTED_SHARE = 0.1
@@ -112,49 +111,42 @@ def _greedy_deletion(start: CorrectedFit) -> CorrectedFit:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _ExpansionPoint:
-    """A geometry to linearize the model around.
+    """A geometry to linearize the model around: the one at which a problem starts.
 
-    Attributes:
-        free: its free parameters (p,), mm.
-        active_prior: precision (p, p), 1/mm^2, of the prior there.
-        poses: that close it, as far as they were ``found``.
+    ``active_prior`` is the precision (p, p), 1/mm^2, of the prior there.
     """
 
     problem: Problem
-    free: Array
     active_prior: Array
-    poses: PoseBatch
-    found: Mask
 
     @classmethod
     def start(cls, problem: Problem) -> _ExpansionPoint:
         """Where a fit starts, as a rule the drawing, with the full prior."""
-        precision = problem.prior.precision
-        return cls(problem, problem.initial_parameters, precision, problem.start, problem.has_start_pose)
+        return cls(problem, problem.prior.precision)
 
     @classmethod
     def solution(cls, current: CorrectedFit) -> _ExpansionPoint:
         """The solution, with the records that the solver left out."""
-        free = current.fit.free
-        solved = current.problem.solve_poses(free)
-        return cls(current.problem, free, current.fit.active_prior, solved.poses, solved.found)
+        problem, free = current.problem, current.fit.free
+        solved = problem.solve_poses(free)
+        return cls(problem.starting_at(free, solved.poses, solved.found), current.fit.active_prior)
 
     def hypotheses(self) -> list[FaultHypothesis]:
         """The significant hypotheses, the most likely first."""
-        model = self._model(self.found)
+        model = self._model(self.problem.has_start_pose)
         if model is None:
             return []
         return rank_hypotheses(model, ChiSquareTest(model.chi2, model.problem.coordinates))
 
     def gauge_faults(self) -> list[GaugeFaultHypothesis]:
         """All gauge faults, the one with the largest gain first."""
-        model = self._model(self.found)
+        model = self._model(self.problem.has_start_pose)
         hypotheses = [] if model is None else score_gauge_faults(model)
         return sorted(hypotheses, key=lambda hypothesis: hypothesis.cost)
 
     def gross_errors(self) -> OutlierHypothesis | None:
         """All outliers by deletion of the worst record, one after another, at the same geometry."""
-        kept = self.found.copy()
+        kept = self.problem.has_start_pose.copy()
         while np.count_nonzero(~kept) <= LARGEST_TRIMMED_SHARE * self.problem.records:
             worst = self._worst(kept)
             if worst is None:
@@ -175,13 +167,11 @@ class _ExpansionPoint:
 
     def _model(self, kept: Mask) -> LinearizedModel | None:
         """The linear model of those of some records (n,) that are not next to a singularity."""
-        rows = np.flatnonzero(kept)
-        prediction = measurement_model.predict(self.problem.subset(kept), self.free, self.poses[rows])
-        rows = rows[~prediction.singular]
-        if not len(rows):
+        some = self.problem.subset(kept)
+        prediction = measurement_model.predict(some, some.initial_parameters, some.start)
+        if prediction.singular.all():
             return None
-        clear = np.zeros_like(kept)
-        clear[rows] = True
-        some = self.problem.subset(clear)
-        prediction = measurement_model.predict(some, self.free, self.poses[rows])
+        if prediction.singular.any():
+            some = some.subset(~prediction.singular)
+            prediction = measurement_model.predict(some, some.initial_parameters, some.start)
         return LinearizedModel.around(some, prediction, self.active_prior)

@@ -47,7 +47,7 @@ from hexacell.identification.data_faults.record_test import DeletionTest, deleti
 from hexacell.identification.problem.data_requirements import equations, is_determined
 from hexacell.identification.problem.problem import Problem
 from hexacell.identification.solver.levenberg_marquardt import FINE
-from hexacell.identification.solver.multistart import start_points
+from hexacell.identification.solver.multistart import restarts
 from hexacell.identification.solver.regularized_fit import fit_regularized
 from hexacell.identification.solver.result import DataFault, GaugeFaultError, Identification
 from hexacell.measurements.records import RecordId
@@ -139,13 +139,7 @@ def _readmit(selected: CorrectedFit) -> CorrectedFit | None:
     solved = problem.solve_poses(selected.fit.free)
     if not solved.found.all():
         return None
-    at_solution = replace(
-        problem,
-        initial_parameters=selected.fit.free,
-        start=solved.poses,
-        has_start_pose=solved.found,
-    )
-    again = fit_regularized(at_solution, FINE)
+    again = fit_regularized(problem.starting_at(selected.fit.free, solved.poses, solved.found), FINE)
     readmitted = CorrectedFit(original, problem, again, _without(agreeing, selected.faults))
     return readmitted if readmitted.is_reliable else None
 
@@ -207,10 +201,9 @@ def _other_minimum(problem: Problem) -> Identification | None:
     if problem.records > FEW_RECORDS:
         return None
     everywhere = np.ones(problem.records, dtype=bool)
-    for free, poses in islice(start_points(problem), OTHER_STARTS):
-        restarted = replace(problem, initial_parameters=free, start=poses, has_start_pose=everywhere)
-        found = CorrectedFit.uncorrected(restarted)
-        largest = LARGEST_MEAN_SQUARE * len(free)
+    largest = LARGEST_MEAN_SQUARE * len(problem.prior.free)
+    for restarted in islice(restarts(problem), OTHER_STARTS):
+        found = CorrectedFit.uncorrected(replace(restarted, has_start_pose=everywhere))
         if found.is_consistent and problem.prior.squared_distance(found.fit.free) <= largest:
             return found.fit
     return None

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -177,6 +177,11 @@ class Problem:
         """A value of each point (m, ...), repeated for each of its records (n, ...)."""
         lengths = np.diff(np.append(self.first_rows, self.records))
         return np.repeat(values, lengths, axis=0)
+
+    def starting_at(self, free: Array, poses: PoseBatch, has_start_pose: Mask | None = None) -> Problem:
+        """The problem with another start: free parameters (p,), mm, and poses that close them."""
+        known = self.has_start_pose if has_start_pose is None else has_start_pose
+        return replace(self, initial_parameters=free, start=poses, has_start_pose=known)
 
     def subset(self, rows: Mask) -> Problem:
         """The problem of some of the records (n,)."""

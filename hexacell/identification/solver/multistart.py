@@ -16,22 +16,21 @@ import numpy as np
 from hexacell.identification.problem.problem import Problem
 from hexacell.identification.solver.measurement_model import predict
 from hexacell.identification.solver.nuisance_parameters import NuisanceElimination
-from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array
 
 DRAWS = 240
 START_POINTS = 12
 
 
-def start_points(problem: Problem) -> Iterator[tuple[Array, PoseBatch]]:
-    """Free parameters (p,), mm, that of lowest cost first, and the poses that close them."""
+def restarts(problem: Problem) -> Iterator[Problem]:
+    """The problem with other start points, that of lowest cost first."""
     root = np.linalg.cholesky(problem.prior.covariance)
     draws = np.random.default_rng(0).standard_normal((DRAWS, len(root)))
     costs = np.array([_cost(problem, problem.initial_parameters + root @ draw) for draw in draws])
     order = np.argsort(costs, kind="stable")[:START_POINTS]
     for row in order[np.isfinite(costs[order])]:
         free = problem.initial_parameters + root @ draws[row]
-        yield free, problem.solve_poses(free).poses
+        yield problem.starting_at(free, problem.solve_poses(free).poses)
 
 
 def _cost(problem: Problem, free: Array) -> float:

@@ -39,13 +39,7 @@ QUICK = SolverOptions(INITIAL_DAMPING, 1e-3, iterations=60, searches=12)
 
 def fit_regularized(problem: Problem, options: SolverOptions = COARSE) -> Identification:
     """Fit the records, from the initial parameters of the problem."""
-    kept, regularized = solve_around_singularities(
-        problem,
-        problem.prior.precision,
-        free=problem.initial_parameters,
-        poses=problem.start,
-        options=options,
-    )
+    kept, regularized = solve_around_singularities(problem, problem.prior.precision, options)
     information = _noise_correction(kept, regularized) * regularized.information
     active_prior = _unreleased_precision(information, problem.prior.covariance)
     solution = solve(

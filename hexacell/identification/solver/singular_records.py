@@ -26,14 +26,11 @@ from hexacell.kinematics.sensitivity import pose_sensitivity
 
 
 def solve_around_singularities(
-    problem: Problem, precision: Array, *, free: Array, poses: PoseBatch, options: SolverOptions
+    problem: Problem, precision: Array, options: SolverOptions
 ) -> tuple[Problem, Solution]:
-    """As :func:`levenberg_marquardt.solve`; returns the problem of the records used as well.
-
-    ``poses`` of the n records are valid where ``problem.has_start_pose``.
-    """
+    """As :func:`levenberg_marquardt.solve`, from the problem's start; returns the records used as well."""
     used = problem.has_start_pose.copy()
-    poses = poses[used]
+    free, poses = problem.initial_parameters, problem.start[used]
     restored = np.zeros(problem.records, dtype=bool)
     for search in itertools.count(1):
         kept = problem.subset(used)

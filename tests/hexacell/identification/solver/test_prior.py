@@ -97,7 +97,7 @@ def test_the_online_estimate_starts_without_records(paper, visit, make_problem):
 def test_the_online_estimate_continues_from_the_previous_one(visit, make_problem):
     problem = make_problem(visit(seed=2).measured(0.01, seed=1))
     cold = estimate_online(problem)
-    warm = estimate_online(problem, free=cold.free, poses=cold.poses)
+    warm = estimate_online(problem.starting_at(cold.free, cold.poses))
     assert warm.geometry.largest_difference(cold.geometry) < 1e-6
     assert warm.solution.iterations <= 2
     assert warm.solution.iterations < cold.solution.iterations

@@ -103,7 +103,7 @@ def _demo(commands: Any) -> None:  # noqa: ANN401
 
 
 def _run(commands: Any) -> None:  # noqa: ANN401
-    parser = _command(commands, "run", "measure, identify, propose, write back and verify", "run.run")
+    parser = _command(commands, "run", "measure, identify, propose, write back and verify")
     _add_cell(parser)
     parser.add_argument("--resume", metavar="RUN", help="resume an interrupted run: its folder or name")
     parser.add_argument("--unattended", action="store_true", help="no person can place gauges or approve")

@@ -23,7 +23,7 @@ from procedures.run.commands import CommandQueue
 from procedures.run.questions import UnattendedOperator
 
 
-def run(options: argparse.Namespace) -> ExitCode:
+def main(options: argparse.Namespace) -> ExitCode:
     """Calibrate a cell, or check it."""
     console = Console(options.json)
     cell = load_cell(options.cell)

@@ -99,9 +99,6 @@ class SimulatedMachine:
             self._geometry = new
             self._line = found.poses[[0, 0]]
 
-    def switch_off(self) -> None:
-        """Brakes hold the sliders."""
-
     def home(self) -> None:
         """The encoders are absolute: nothing to do."""
 

@@ -93,24 +93,31 @@ class SimulatedCanBus(canopen.Network):
         return None if self.bus is None else self.bus.recv(timeout_s)
 
 
-class PeriodicFrame:
+class PeriodicAction:
+    """An action that the thread of the bus repeats until it is stopped."""
+
+    def __init__(self, bus: SimulatedCanBus, period_s: float, action: Callable[[], None]) -> None:
+        self._bus = bus
+        self._period_s = period_s
+        self._action = action
+        self._timer = bus.call_later(period_s, self._run)
+
+    def stop(self) -> None:
+        """Stop it; once only."""
+        self._bus.cancel(self._timer)
+
+    def _run(self) -> None:
+        self._timer = self._bus.call_later(self._period_s, self._run)
+        self._action()
+
+
+class PeriodicFrame(PeriodicAction):
     """A periodic frame, with the interface that canopen expects for its heartbeat."""
 
     def __init__(self, bus: SimulatedCanBus, can_id: int, data: bytes, period_s: float) -> None:
-        self._bus = bus
-        self._can_id = can_id
+        super().__init__(bus, period_s, lambda: bus.send_message(can_id, self._data))
         self._data = data
-        self._period_s = period_s
-        self._timer = bus.call_later(period_s, self._send)
 
     def update(self, data: bytes) -> None:
         """Send other data from now on."""
         self._data = data
-
-    def stop(self) -> None:
-        """Send no more."""
-        self._bus.cancel(self._timer)
-
-    def _send(self) -> None:
-        self._timer = self._bus.call_later(self._period_s, self._send)
-        self._bus.send_message(self._can_id, self._data)

@@ -6,16 +6,16 @@ CiA 301 for changing PDOs.
 
 from __future__ import annotations
 
-import sched
 import struct
 from collections.abc import Callable, Iterator
+from functools import partial
 
 import canopen
 from canopen.objectdictionary import ODVariable
 from canopen.sdo.exceptions import SdoAbortedError
 
 from drivers.simulated.encoders import object_dictionary
-from drivers.simulated.encoders.can_bus import SimulatedCanBus
+from drivers.simulated.encoders.can_bus import PeriodicAction, SimulatedCanBus
 from drivers.simulated.encoders.object_dictionary import DeviceData, Vendor
 
 _NMT = 0x000
@@ -42,7 +42,7 @@ class SimulatedEncoder:
         self._bus = bus
         self._vendor = vendor
         self._real_seconds = real_seconds
-        self._event_timers: list[sched.Event] = []
+        self._event_timers: list[PeriodicAction] = []
         self._syncs = 0
         self._node = canopen.LocalNode(data.node, object_dictionary.build(vendor, data))
         self._node.add_read_callback(self._read_position)  # type: ignore[no-untyped-call]
@@ -126,21 +126,17 @@ class SimulatedEncoder:
             is_on = not self._value(0x1800 + number - 1, 1) & object_dictionary.TPDO_OFF
             period_ms = self._value(0x1800 + number - 1, 5)
             if is_on and period_ms and self._value(0x1800 + number - 1, 2) not in _SYNCHRONOUS:
-                self._repeat(number, self._real_seconds(period_ms / 1000))
+                period_s = self._real_seconds(period_ms / 1000)
+                send = partial(self._send_tpdo, number)
+                self._event_timers.append(PeriodicAction(self._bus, period_s, send))
 
-    def _repeat(self, number: int, period_s: float) -> None:
-        def send() -> None:
-            self._event_timers.remove(timer)
-            for cob_id, data in self._frames(number):
-                self.send(cob_id, data)
-            self._repeat(number, period_s)
-
-        timer = self._bus.call_later(period_s, send)
-        self._event_timers.append(timer)
+    def _send_tpdo(self, number: int) -> None:
+        for cob_id, data in self._frames(number):
+            self.send(cob_id, data)
 
     def _stop_event_timers(self) -> None:
         for timer in self._event_timers:
-            self._bus.cancel(timer)
+            timer.stop()
         self._event_timers.clear()
 
     def _read_position(self, index: int, subindex: int, **_: object) -> int | None:

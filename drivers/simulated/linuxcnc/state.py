@@ -79,10 +79,6 @@ class Machine(Protocol):
         """
         ...
 
-    def switch_off(self) -> None:
-        """Disable the drives; the joints stay where they are."""
-        ...
-
     def home(self) -> None:
         """Home the joints; returns when that has ended or was stopped."""
         ...
@@ -228,9 +224,7 @@ class ControllerState:
 
     def _switch_off(self) -> None:
         self.abort()
-        if self.enabled:
-            self.enabled = False
-            self.machine.switch_off()
+        self.enabled = False
 
 
 def _outcome(job: Future[bool]) -> bool:

@@ -183,10 +183,9 @@ def test_with_the_true_geometry_it_goes_where_it_is_sent(make_twin) -> None:
         assert twin.seen() == pytest.approx(before, abs=1e-6)
 
 
-def test_switching_off_moves_nothing(twin) -> None:
+def test_homing_moves_nothing(twin) -> None:
     twin.machine.move(TILTED)
     before = twin.physics.encoder_positions()
-    twin.machine.switch_off()
     twin.machine.home()
     assert np.array_equal(twin.physics.encoder_positions(), before)
 

@@ -82,9 +82,6 @@ class FakeMachine:
         self._geometry = self.config
         self._joints = (self._joints[0] + self.jump_mm, *self._joints[1:])
 
-    def switch_off(self) -> None:
-        self.events.append("off")
-
     def home(self) -> None:
         self._stop.clear()
         self.events.append("home")

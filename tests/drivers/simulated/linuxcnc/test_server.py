@@ -218,7 +218,7 @@ def test_switching_on_reads_the_config_again(client, machine):
     me.say("set machine on", b"SET MACHINE ACK\n\r")
     assert machine.pose().x == 8.0
     assert machine.joints()[0] == 10.0
-    assert machine.events == ["on", "home", "move", "off", "on"]
+    assert machine.events == ["on", "home", "move", "on"]
 
 
 def test_a_config_that_cannot_be_used_keeps_the_machine_off(client, machine):

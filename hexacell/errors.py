@@ -88,7 +88,7 @@ class DeviceError(HexacellError):
 
 
 class AnswerNeeded(HexacellError):
-    """A person must answer or approve, and nobody is there."""
+    """A person must answer or approve, and the run is unattended."""
 
     exit_code = ExitCode.ANSWER_NEEDED
 

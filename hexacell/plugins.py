@@ -39,7 +39,14 @@ def load(group: Group, name: str) -> Factory:
         UsageError: nothing has that name, two packages define it, its import fails, or it is not
             callable.
     """
-    return _import(group, _only(group, name))
+    point = _only(group, name)
+    try:
+        factory: object = point.load()
+    except Exception as error:  # third-party code may raise anything
+        raise _broken(group, point, repr(error)) from error
+    if not callable(factory):
+        raise _broken(group, point, f"{factory!r} is not callable")
+    return factory
 
 
 def _only(group: Group, name: str) -> EntryPoint:
@@ -59,16 +66,6 @@ def _unknown(group: Group, name: str) -> UsageError:
     known = names(group)
     action = did_you_mean(name, known) or f"Known are: {', '.join(known) or 'none'}"
     return UsageError(f"there is no {group.noun} '{name}'", action=action)
-
-
-def _import(group: Group, point: EntryPoint) -> Factory:
-    try:
-        factory: object = point.load()
-    except Exception as error:  # third-party code may raise anything
-        raise _broken(group, point, repr(error)) from error
-    if not callable(factory):
-        raise _broken(group, point, f"{factory!r} is not callable")
-    return factory
 
 
 def _broken(group: Group, point: EntryPoint, reason: str) -> UsageError:

@@ -1,7 +1,7 @@
 """What is wrong with a cell file, in the words of its reader and with the line.
 
 The model refuses a file with pydantic's errors, which name types and validators. Here each becomes one
-sentence: what the file says, what it must say, and what to do.
+sentence: what is in the file, what must be there, and what to do.
 """
 
 from __future__ import annotations
@@ -107,7 +107,7 @@ Errors = dict[KeyPath, FileError]
 
 @dataclass(frozen=True, slots=True)
 class Diagnosis:
-    """What is wrong with a document, by what the model of the cell file says."""
+    """What is wrong with a document by the model of the cell file."""
 
     document: TomlDocument
     model: ModelLookup

@@ -1,7 +1,7 @@
 """The cell file: read, checked, described and written.
 
-:mod:`hexacell.cell.model` says what a cell file may hold. Here its text becomes settings, with the line of
-every value and errors that a technician can act on.
+The content that :mod:`hexacell.cell.model` describes becomes settings here, with the line of every value
+and errors that a technician can act on.
 """
 
 from __future__ import annotations
@@ -50,8 +50,8 @@ def load_cell(path: Path) -> Cell:
     """Read and check a cell file.
 
     Raises:
-        FileError: The file cannot be read, is no TOML, or has one mistake.
-        SeveralErrors: It has more than one; each of ``errors`` is a FileError with its line.
+        FileError: it cannot be read, is no TOML, or has one mistake.
+        SeveralErrors: it has more than one; each of ``errors`` is a FileError with its line.
     """
     document = TomlDocument.parse(read_text(path), path)
     return Cell(path, _checked(document, path), document)

@@ -88,13 +88,9 @@ def propose(
 ) -> ConfigChange:
     """The change that gives the controller the geometry ``after``, mm; nothing is written.
 
-    Args:
-        path: the controller's config.
-        config_format: how to read and rewrite it.
-        format_name: the name of that format in the cell file.
-        after: the identified geometry.
-        fingerprint_at_start: :func:`fingerprint` of the config when the run began. The measurements were
-            commanded with that geometry and are meaningless with another one.
+    ``format_name`` is the name of ``config_format`` in the cell file, ``fingerprint_at_start`` the
+    :func:`fingerprint` of the config when the run began: the measurements were commanded with that
+    geometry and are meaningless with another one.
 
     Raises:
         FileError: the config changed since, or is invalid.

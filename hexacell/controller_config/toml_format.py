@@ -44,12 +44,9 @@ class NativeToml:
     def rewrite(self, text: str, geometry: Geometry) -> str:
         """``text`` with ``geometry`` in it, with as many decimals as the unit has (1 nm), no exponent.
 
-        A value that differs by no more than half of the last decimal keeps its token. The new text is
-        read again before it is returned.
-
-        Raises:
-            FileError: ``text`` is no such config, or ``geometry`` has a value that is not finite or
-                a length that is not above zero.
+        A value that differs by no more than half of the last decimal keeps its token. A geometry with a
+        value that is not finite, or a length that is not above zero, is refused; the new text is read
+        again before it is returned.
         """
         _require_physical(geometry)
         document = TomlDocument.parse(text)
@@ -65,7 +62,7 @@ class NativeToml:
         return changed
 
 
-def number_token(value: float, unit: ParameterUnit = ParameterUnit.MM) -> str:
+def number_token(value: float, unit: ParameterUnit) -> str:
     """``value`` as a TOML float: at most the decimals of its unit, at least one, never ``-0.0``."""
     whole, _, decimals = f"{value:.{unit.decimals}f}".partition(".")
     number = f"{whole}.{decimals.rstrip('0') or '0'}"
@@ -91,7 +88,7 @@ def _changed_tokens(before: Geometry, after: Geometry) -> Iterator[tuple[KeyPath
 
 @dataclass(frozen=True, slots=True)
 class _Content:
-    """What a config says; every method raises ``FileError`` with the line where it is not that."""
+    """The content of a config; every method raises ``FileError`` with the line of what is wrong."""
 
     document: TomlDocument
     parameters: ParameterSet

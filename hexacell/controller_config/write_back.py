@@ -172,7 +172,7 @@ def _reason(error: BaseException) -> str:
 
 
 def _keep_foreign_version(receipt: Receipt, found: bytes | None) -> None:
-    """Keep a version that no commit wrote beside the backup, if possible: nobody's work is lost."""
+    """Keep a version that no commit wrote beside the backup, if possible, so that it is not lost."""
     if found is None or atomic_files.sha256(found) in {receipt.sha256_before, receipt.sha256_after}:
         return
     with suppress(FileError):

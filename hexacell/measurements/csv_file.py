@@ -46,21 +46,13 @@ def read_measurements(path: Path, *, allow_partial: bool = False) -> Measurement
 
 
 def read_poses(path: Path) -> list[tuple[int, int, Pose]]:
-    """Read only the poses of a measurement file: line, point and pose of each row.
-
-    Raises:
-        FileError: as for a measurement file, but only the columns of the poses are required.
-    """
+    """Read line, point and pose of each row; only the columns of the poses are required."""
     records = _records(path, read_text(path), POSE_HEADER).values()
     return [(line, record.point, record.pose) for line, record in records]
 
 
 def write_measurements(path: Path, measurements: MeasurementSet) -> None:
-    """Write a measurement file; every number reads back exactly.
-
-    Raises:
-        FileError: the file cannot be written; an older one is then unchanged.
-    """
+    """Write a measurement file, in one step; every number reads back exactly."""
     text = io.StringIO()
     rows = csv.writer(text, lineterminator="\n")
     rows.writerow(HEADER)

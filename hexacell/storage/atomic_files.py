@@ -4,6 +4,8 @@ A replacement is written to a temporary file in the same folder, synced to the d
 the old file; then the folder is synced too. POSIX ``rename`` is atomic: a reader gets the old content or
 the new one, never a mixture. A process that dies in between leaves its temporary file,
 ``.hexacell-*.tmp``; the next process that holds the cell removes it.
+
+What cannot be read or written is a ``FileError`` with the reason and what to do.
 """
 
 from __future__ import annotations
@@ -46,11 +48,7 @@ def sha256(data: bytes) -> str:
 
 
 def read_bytes(path: Path) -> bytes:
-    """The content of a regular file; a pipe or a device is refused, as reading it could block.
-
-    Raises:
-        FileError: absent, unreadable, or not a regular file.
-    """
+    """The content of a regular file; a pipe or a device is refused, as reading it could block."""
     try:
         _require_regular(path, path.stat())
         return path.read_bytes()
@@ -59,7 +57,7 @@ def read_bytes(path: Path) -> bytes:
 
 
 def read_if_present(path: Path) -> bytes | None:
-    """The content of a regular file, None if there is no such file; raises ``FileError``."""
+    """The content of a regular file, None if there is no such file."""
     try:
         path.lstat()
     except FileNotFoundError:
@@ -70,16 +68,12 @@ def read_if_present(path: Path) -> bytes | None:
 
 
 def read_text(path: Path) -> str:
-    """The content of a UTF-8 file, with its line ends but no byte order mark.
-
-    Raises:
-        FileError: as for :func:`read_bytes`, or not UTF-8; then with the line.
-    """
+    """The content of a UTF-8 file, with its line ends but no byte order mark."""
     return decode_utf8(read_bytes(path), path).removeprefix(BYTE_ORDER_MARK)
 
 
 def decode_utf8(data: bytes, path: Path) -> str:
-    """``data`` as UTF-8 text; ``path`` and the line appear in the ``FileError`` if it is not."""
+    """``data``, the content of ``path``, as UTF-8 text; the error has the line that is not."""
     try:
         return data.decode()
     except UnicodeDecodeError as error:
@@ -127,7 +121,7 @@ def sync_folder(folder: Path) -> None:
 
 
 def create_folder_durably(folder: Path) -> None:
-    """Create ``folder`` and its missing parents, synced to the disk; raises ``FileError``."""
+    """Create ``folder`` and its missing parents, synced to the disk."""
     try:
         absent = [parent for parent in (folder, *folder.parents) if not parent.exists()]
         folder.mkdir(parents=True, exist_ok=True)
@@ -161,7 +155,7 @@ def remove_stale_temporaries(path: Path) -> None:
     target = _resolved(path)
     folder, own = (target, "*") if target.is_dir() else (target.parent, f"{_mark(target)}-*")
     for temporary in folder.glob(f".hexacell-{own}.tmp"):
-        with suppress(OSError):  # it does no harm, as nobody reads it
+        with suppress(OSError):  # it does no harm, as no program reads it
             temporary.unlink()
 
 

@@ -93,33 +93,25 @@ class _Scanner:
     def _value(self, path: KeyPath) -> None:
         first = self._next()
         start = self._offset
-        if first == "[":
-            self._array(path)
-        elif first == "{":
-            self._inline_table(path)
+        if first in {"[", "{"}:
+            self._items(path, first)
         else:
             self._match(_STRING if first in {'"', "'"} else _BARE_VALUE)
         self._spans[path] = slice(start, self._offset)
 
-    def _array(self, path: KeyPath) -> None:
-        self._offset += len("[")
+    def _items(self, path: KeyPath, bracket: str) -> None:
+        """The elements of an array, or the keys and values of an inline table."""
+        self._offset += len(bracket)
         index = 0
-        while self._next() != "]":
-            self._value((*path, index))
+        while self._next() not in {"]", "}"}:
+            if bracket == "[":
+                self._value((*path, index))
+            else:
+                self._key_and_value(path)
             index += 1
-            self._skip_comma()
-        self._offset += len("]")
-
-    def _inline_table(self, path: KeyPath) -> None:
-        self._offset += len("{")
-        while self._next() != "}":
-            self._key_and_value(path)
-            self._skip_comma()
-        self._offset += len("}")
-
-    def _skip_comma(self) -> None:
-        if self._next() == ",":
-            self._offset += len(",")
+            if self._next() == ",":
+                self._offset += len(",")
+        self._offset += len(bracket)
 
 
 def _split_keys(dotted: str) -> list[str]:

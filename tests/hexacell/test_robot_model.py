@@ -138,7 +138,7 @@ def test_a_pose_within_reach_is_no_error(robot):
         (Pose(0, 0, 550, 46.0), r"^task 1: the singularity margin is 0\.00\d, below 0\.03$"),
     ],
 )
-def test_a_pose_out_of_reach_says_why(robot, pose, message):
+def test_a_pose_out_of_reach_is_refused_with_the_reason(robot, pose, message):
     with pytest.raises(ReachError, match=message):
         robot.require_reach("task 1", pose)
 

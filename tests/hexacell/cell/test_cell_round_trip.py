@@ -129,7 +129,7 @@ def test_dump_of_a_real_cell_needs_no_simulation(load_text, cell_text):
     assert load_text(text).settings == real
 
 
-def test_description_says_where_every_value_comes_from(load_text, cell_text, line_with):
+def test_description_has_the_origin_of_every_value(load_text, cell_text, line_with):
     text = describe(load_text(cell_text))
     assert f"tilt_deg = 45.0  # line {line_with('tilt_deg')}\n" in text
     assert "window_s = 0.6  # default\n" in text

@@ -14,7 +14,7 @@ def test_a_cell_needs_none(load_text, cell_text) -> None:
     assert load_text(cell_text).settings.thermometers == ()
 
 
-def test_what_one_says(load_text, cell_text) -> None:
+def test_settings_of_a_thermometer(load_text, cell_text) -> None:
     rails = ROOM.replace("room", "rails") + 'protocol = "laser"\ntimeout_s = 0.5\n'
     cell = load_text(cell_text + ROOM + rails)
     room, other = cell.settings.thermometers

@@ -23,7 +23,7 @@ def proposal(config: Path, geometry: Geometry) -> ConfigChange:
     )
 
 
-def test_a_proposal_says_what_would_change_and_writes_nothing(
+def test_a_proposal_describes_the_change_and_writes_nothing(
     config: Path, geometry: Geometry, proposal: ConfigChange
 ) -> None:
     text = config.read_bytes()

@@ -14,6 +14,7 @@ from hexacell.controller_config.toml_format import NativeToml, number_token
 from hexacell.errors import FileError
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS
+from hexacell.kinematics.parameters import ParameterUnit
 from hexacell.storage.toml_document import TomlDocument
 
 FORMAT: ConfigFormat = NativeToml(HEXAGLIDE_PARAMETERS)
@@ -154,7 +155,7 @@ def test_what_was_written_is_read_and_then_written_no_more(
 
 @given(st.floats(-1e15, 1e15))
 def test_number_tokens_are_floats_with_six_decimals(value: float) -> None:
-    token = number_token(value)
+    token = number_token(value, ParameterUnit.MM)
     _, decimals = token.split(".")
     assert 1 <= len(decimals) <= 6
     assert not decimals[1:].endswith("0")
@@ -167,7 +168,7 @@ def test_number_tokens_are_floats_with_six_decimals(value: float) -> None:
     [(1000.0, "1000.0"), (-0.0, "0.0"), (-1e-9, "0.0"), (0.1 + 0.2, "0.3"), (1e22, "1" + "0" * 22 + ".0")],
 )
 def test_number_tokens(value: float, token: str) -> None:
-    assert number_token(value) == token
+    assert number_token(value, ParameterUnit.MM) == token
 
 
 def test_read_gives_geometry_and_branch(config: Path, geometry: Geometry) -> None:

@@ -39,7 +39,7 @@ def closed(at: SetKey) -> list[Any]:
     return [taken(at, 1, ZERO), taken(at, 2, (0.5, -1.25, 0.0)), end]
 
 
-def test_a_move_says_where_and_what_is_predicted():
+def test_a_move_has_its_place_and_the_predicted_error():
     assert activity(move(POINT, 7, FORECAST)) == "point 2, orientation 7: 0.310 -> 0.060 mm"
     assert activity(move(HELD_OUT, 1)) == "held-out point 1, before, orientation 1"
     assert activity(events.Paused()) is None

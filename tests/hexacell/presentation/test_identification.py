@@ -51,7 +51,7 @@ def test_the_verdict_comes_first_and_the_table_after(fit, clean):
     assert places == sorted(places)
 
 
-def test_every_free_parameter_has_its_line_and_says_how_far_it_moved(fit, clean):
+def test_every_free_parameter_has_a_line_with_its_change(fit, clean):
     lines = fit(clean).out.splitlines()
     named = [line.split()[0] for line in lines if line.endswith("sigma") and "moved" in line]
     fixed = {"S2x", "S2y", "S2z", "S3z"}

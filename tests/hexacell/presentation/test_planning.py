@@ -62,7 +62,7 @@ def test_durations_are_rounded_to_what_is_known(minutes, text):
     assert duration(minutes) == text
 
 
-def test_a_run_says_what_the_remaining_records_gain():
+def test_a_run_states_what_the_remaining_records_gain():
     line = run_forecast_line(RUN_FORECAST)
     assert line == "  predicted error at the task 0.290 mm; continuing gains 0.230 mm in 12 minutes"
     last = RUN_FORECAST.model_copy(update={"records": 1})

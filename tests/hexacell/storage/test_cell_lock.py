@@ -135,7 +135,7 @@ def test_a_write_back_does_not_open_the_lock(config: Path) -> None:
         assert is_busy(config)
 
 
-def test_the_lock_file_stays_and_says_nothing_when_nobody_holds_it(config: Path) -> None:
+def test_the_lock_file_stays_and_is_empty_when_the_cell_is_free(config: Path) -> None:
     path = lock_path(config)
     with cell_lock(config):
         assert str(os.getpid()) in path.read_text()
@@ -162,9 +162,7 @@ def test_an_unreadable_note_still_means_busy(config: Path, note: str) -> None:
             pass
 
 
-def test_a_full_disk_does_not_keep_anybody_from_the_robot(
-    config: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_full_disk_does_not_prevent_locking(config: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def full(*_: object) -> int:
         raise OSError(28, "No space left on device")
 

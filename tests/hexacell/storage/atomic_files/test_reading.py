@@ -17,7 +17,7 @@ def test_read_if_present(path: Path, tmp_path: Path) -> None:
         atomic_files.read_if_present(path / "below")
 
 
-def test_text_keeps_its_line_ends_and_tells_the_line_that_is_not_utf8(tmp_path: Path) -> None:
+def test_text_keeps_its_line_ends_and_the_error_has_the_line_that_is_not_utf8(tmp_path: Path) -> None:
     path = tmp_path / "text"
     path.write_bytes(b"\xef\xbb\xbfa\r\nb\n")
     assert atomic_files.read_text(path) == "a\r\nb\n"
@@ -37,7 +37,7 @@ def test_folders_are_made_with_those_above(tmp_path: Path) -> None:
             atomic_files.create_folder_durably(tmp_path / name)
 
 
-def test_every_folder_that_is_made_is_a_name_for_good_in_the_one_above(
+def test_the_name_of_every_new_folder_is_synced_in_its_parent(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     synced: list[Path] = []

@@ -159,7 +159,7 @@ def test_the_order_is_data_then_name_then_folder(path: Path, monkeypatch: pytest
     assert order == ["data 5", "name", "folder"]
 
 
-def test_nobody_else_can_read_a_private_file_while_it_is_written(
+def test_no_other_user_can_read_a_private_file_while_it_is_written(
     path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     seen, fchmod = [], os.fchmod

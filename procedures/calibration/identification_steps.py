@@ -105,9 +105,8 @@ class IdentificationSteps:
 
 def open_set(state: RunState) -> SetKey | None:
     """The set of the identification that is being measured."""
-    begun = [key for key, measured in state.sets.items() if not measured.closed]
     visited = [] if state.at_pose is None else [state.at_pose[0]]
-    for key in [*begun, *visited]:
+    for key in [*state.open_sets, *visited]:
         if key.phase is Phase.IDENTIFY and not state.set(key).closed:
             return key
     return None

@@ -112,9 +112,9 @@ class Engine:
         """
         if self.state.target is not None and not self.state.position_unknown:
             self.record(events.Interrupted(reason="the program ended unexpectedly", exit_code=_KILLED))
-        for key, measured in list(self.state.sets.items()):
-            is_useless = not measured.samples or (measured.rejections and key.phase is Phase.BEFORE)
-            if is_useless and not measured.closed:
+        for key in self.state.open_sets:
+            measured = self.state.set(key)
+            if not measured.samples or (measured.rejections and key.phase is Phase.BEFORE):
                 self.record(events.SetInvalidated(at=key, reason="the run was interrupted in this set"))
 
     def record(self, event: events.Event) -> RunState:

@@ -6,7 +6,7 @@ the cell file). Each attempt is an event, so the state of a run knows which acti
 
 from __future__ import annotations
 
-from collections.abc import Awaitable, Callable, Iterable, Mapping, Sequence
+from collections.abc import Awaitable, Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 from drivers import errors as device
@@ -23,7 +23,7 @@ from procedures.run import events
 from procedures.run.questions import QuestionBroker, ask_recovery
 from procedures.run.state import RunState
 from procedures.run.steps import Compute, SetKey, Step, StepOfSet
-from procedures.run.trips import Guard, GuardTripped, Trip, causes_of
+from procedures.run.trips import Guard, GuardTripped, causes_of
 
 KINDS: Mapping[type[HexacellError], FailureKind] = {
     device.GaugeSilent: FailureKind.GAUGE_SILENT,
@@ -64,15 +64,12 @@ SEVERITY = (Action.RETRY, Action.MEASURE_AGAIN, Action.REDO_SET, Action.ASK, Act
 
 def kind_of(error: HexacellError) -> FailureKind:
     """The kind of one failure."""
-    if isinstance(error, GuardTripped):
-        return _kind_of_trip(error.trip)
-    return next((KINDS[base] for base in type(error).__mro__ if base in KINDS), FailureKind.FINAL)
-
-
-def _kind_of_trip(trip: Trip) -> FailureKind:
-    if trip.guard is Guard.STALE:
-        return FailureKind.GAUGE_SILENT if trip.device.startswith("gauge") else FailureKind.LINK_LOST
-    return OF_GUARDS.get(trip.guard, FailureKind.GUARD)
+    if not isinstance(error, GuardTripped):
+        return next((KINDS[base] for base in type(error).__mro__ if base in KINDS), FailureKind.FINAL)
+    if error.trip.guard is Guard.STALE:
+        is_gauge = error.trip.device.startswith("gauge")
+        return FailureKind.GAUGE_SILENT if is_gauge else FailureKind.LINK_LOST
+    return OF_GUARDS.get(error.trip.guard, FailureKind.GUARD)
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,9 +102,14 @@ def failed(
     policy: RecoveryPolicy, error: HexacellError, step: Step | None, state: RunState
 ) -> events.Failed:
     """The event of a failure; of several at once, the one with the most severe action decides."""
-    verdicts = (_verdict(policy, kind, step, state) for kind in _kinds(error))
-    kind, attempt, action = max(verdicts, key=lambda verdict: SEVERITY.index(verdict[2]))
-    return events.Failed(step=step, failure=kind, attempt=attempt, reason=str(error), action=action)
+    failures: list[events.Failed] = []
+    for kind in dict.fromkeys(kind_of(one) for one in causes_of(error)):
+        attempt = state.attempts(kind, step) + 1
+        action = policy.action(kind, attempt)
+        failures.append(
+            events.Failed(step=step, failure=kind, attempt=attempt, reason=str(error), action=action)
+        )
+    return max(failures, key=lambda failure: SEVERITY.index(failure.action))
 
 
 def choices(failure: events.Failed) -> tuple[Action, ...]:
@@ -115,17 +117,6 @@ def choices(failure: events.Failed) -> tuple[Action, ...]:
     if isinstance(failure.step, Compute):
         return Action.RETRY, Action.ABORT
     return Action.RETRY, Action.MEASURE_AGAIN, Action.REDO_SET, Action.ABORT
-
-
-def _kinds(error: HexacellError) -> Iterable[FailureKind]:
-    return dict.fromkeys(kind_of(one) for one in causes_of(error))
-
-
-def _verdict(
-    policy: RecoveryPolicy, kind: FailureKind, step: Step | None, state: RunState
-) -> tuple[FailureKind, int, Action]:
-    attempt = state.failures.get((kind.value, events.place_of(step)), 0) + 1
-    return kind, attempt, policy.action(kind, attempt)
 
 
 @dataclass(frozen=True, eq=False)
@@ -200,7 +191,7 @@ class Recovery:
             known = state.started.devices if state.started else ()
             is_zero_lost = await reconnect(self.executor.devices, error, known)
         if is_zero_lost:
-            return _invalidated(_open_sets(state), "a gauge was opened again, its zero is void")
+            return _invalidated(state.open_sets, "a gauge was opened again, its zero is void")
         if failure.action is Action.REDO_SET:
             return _invalidated(_failed_sets(failure, state), failure.reason)
         return []
@@ -212,9 +203,5 @@ def _invalidated(keys: Sequence[SetKey], reason: str) -> list[events.SetInvalida
 
 def _failed_sets(failure: events.Failed, state: RunState) -> list[SetKey]:
     """The set of the failed step; all open sets if it has none."""
-    opened, step = _open_sets(state), failure.step
-    return [key for key in opened if key == step.at] if isinstance(step, StepOfSet) else opened
-
-
-def _open_sets(state: RunState) -> list[SetKey]:
-    return [key for key, measured in state.sets.items() if not measured.closed]
+    step = failure.step
+    return [key for key in state.open_sets if not isinstance(step, StepOfSet) or key == step.at]

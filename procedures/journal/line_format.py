@@ -15,7 +15,6 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from pydantic import TypeAdapter, ValidationError
-from pydantic_core import PydanticSerializationError
 
 from hexacell.errors import FileError
 from procedures.run.events import Event
@@ -57,20 +56,12 @@ def now() -> tuple[datetime, float]:
 
 
 def encode(entry: Entry) -> bytes:
-    """The line of an entry.
-
-    Raises:
-        ValueError: its text has no bytes in UTF-8 (a file name that is no text).
-    """
+    """The line of an entry; raises ``ValueError`` if its text has no bytes in UTF-8, as some file names."""
     at = entry.at.isoformat(timespec="milliseconds").replace("+00:00", "Z")
     version = f'"version":{VERSION},' if entry.number == 1 else ""
-    try:
-        event = entry.event.model_dump_json().encode()
-    except PydanticSerializationError as error:
-        raise ValueError(str(error)) from error
     monotonic = "" if entry.monotonic_s is None else f'"s":{entry.monotonic_s},'
     head = f'{{"n":{entry.number},{version}"at":"{at}",{monotonic}"event":'
-    body = head.encode() + event
+    body = (head + entry.event.model_dump_json()).encode()
     return b'%b,"crc":"%08x"}\n' % (body, _checksum(body))
 
 

@@ -126,7 +126,7 @@ def invalidation_event(command: Undo | MeasureAgain, state: RunState) -> Invalid
 
 
 def _last_record(state: RunState) -> tuple[SetKey, int]:
-    measured = [key for key, value in state.sets.items() if value.samples and not value.closed]
+    measured = [key for key in state.open_sets if state.set(key).samples]
     if not measured:
         raise UsageError("there is no record to undo in the set that is being measured")
     key = state.at_pose[0] if state.at_pose and state.at_pose[0] in measured else measured[-1]

@@ -16,15 +16,8 @@ from hexacell.cell.fields import Frozen, GeometryDocument
 from hexacell.cell.recovery import Action, FailureKind
 from hexacell.kinematics.mechanism import Branch
 from hexacell.reporting.result import IdentificationResult
-from procedures.run.steps import SetKey, SixNumbers, Step, StepOfSet, ThreeNumbers
+from procedures.run.steps import SetKey, SixNumbers, Step, ThreeNumbers
 from procedures.run.trips import Guard, Trip
-
-
-def place_of(step: Step | None) -> str:
-    """Where failures are counted: the set of a step, or the key of a step that belongs to none."""
-    if step is None:
-        return "deciding"
-    return str(step.at) if isinstance(step, StepOfSet) else step.key
 
 
 class RunStarted(Frozen):

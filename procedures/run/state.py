@@ -10,7 +10,7 @@ from hexacell.cell.recovery import Action, FailureKind
 from hexacell.kinematics.pose import Pose
 from hexacell.measurements.records import MeasurementSet, Record
 from procedures.run import events
-from procedures.run.steps import Compute, Move, Phase, SetKey, SixNumbers
+from procedures.run.steps import Compute, Move, Phase, SetKey, SixNumbers, Step, StepOfSet
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,13 +104,22 @@ class RunState:
     provisional: events.ProvisionalApplied | None = None
     provisional_active: bool = False
     config_write_pending: bool = False
-    failures: dict[tuple[str, str], int] = field(default_factory=dict)
+    failures: dict[tuple[FailureKind, str], int] = field(default_factory=dict)
     ended: events.Ended | None = None
 
     @property
     def is_unverified(self) -> bool:
         """Whether the controller has a new geometry on which no verdict was given."""
         return self.committed is not None and self.judged is None
+
+    @property
+    def open_sets(self) -> list[SetKey]:
+        """The sets that are not closed, in the order in which they were begun."""
+        return [key for key, measured in self.sets.items() if not measured.closed]
+
+    def attempts(self, kind: FailureKind, step: Step | None) -> int:
+        """How often a step, or another one of its set, failed in this way."""
+        return self.failures.get((kind, _place_of(step)), 0)
 
     def set(self, key: SetKey) -> SetState:
         """One set; an empty one where nothing was measured yet."""
@@ -230,7 +239,7 @@ def _unverified(state: RunState, but: SetKey | None = None) -> RunState:
 
 
 def _failed(state: RunState, event: events.Failed) -> RunState:
-    where = (event.failure.value, events.place_of(event.step))
+    where = (event.failure, _place_of(event.step))
     counted = replace(state, failures={**state.failures, where: event.attempt})
     is_off_plate = event.failure is FailureKind.GAUGE_AT_END and event.action is not Action.REDO_SET
     match event.step:
@@ -246,6 +255,13 @@ def _rolled_back(state: RunState) -> RunState:
         return replace(state, rolled_back=True)
     kept = {key: value for key, value in state.sets.items() if key.phase is not Phase.AFTER}
     return replace(state, committed=None, sets=kept)
+
+
+def _place_of(step: Step | None) -> str:
+    """Where failures are counted: the set of a step, or the key of a step that belongs to none."""
+    if step is None:
+        return "deciding"
+    return str(step.at) if isinstance(step, StepOfSet) else step.key
 
 
 def _with_set(state: RunState, key: SetKey, value: SetState) -> RunState:

@@ -63,7 +63,7 @@ def require_drivers(settings: CellSettings) -> None:
         (Group.CONTROLLERS, settings.controller.protocol),
     }
     failures: list[HexacellError] = []
-    for group, protocol in sorted(protocols):
+    for group, protocol in sorted(protocols, key=lambda one: (one[0].value, one[1])):
         try:
             load(group, protocol)
         except HexacellError as error:

@@ -1,4 +1,4 @@
-"""The simulated Hexaglide on a clock that stands until it is moved."""
+"""The simulated Hexaglide on a clock that tests advance."""
 
 from __future__ import annotations
 
@@ -35,11 +35,11 @@ STILL: dict[str, Any] = {
     "motion.repeatability_mm": 0.0,
     "station_reach_mm": 30.0,
 }
-"""A simulation without any scatter: what is seen is what is."""
+"""A simulation without any scatter: readings are exact."""
 
 
 class StillClock(CellClock):
-    """Time passes when told to, and for whoever waits on it."""
+    """Advances on request, and by the time of every wait."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -57,7 +57,7 @@ class StillClock(CellClock):
 
 @dataclass
 class Twin:
-    """A physics and the machine in it, beside what an onlooker may compute for himself."""
+    """The physics and the machine in it, and the expected values by independent computation."""
 
     clock: StillClock
     physics: RobotPhysics
@@ -67,13 +67,13 @@ class Twin:
     commanding: Geometry
 
     def joints_for(self, pose: Pose) -> Array:
-        """Where the controller's geometry puts the sliders for a pose."""
+        """The slider positions of a pose by the controller's geometry."""
         branch = NativeToml(HEXAGLIDE_PARAMETERS).read(self.config).branch
         joints: Array = inverse_kinematics(Hexaglide(), self.commanding, branch, PoseBatch.of([pose]))[0]
         return joints
 
     def ball_at(self, pose: Pose) -> Array:
-        """Where the ball then really is: found by least squares, not by the simulation's own way."""
+        """The actual position of the ball, by least squares instead of the simulation's own method."""
         from scipy.optimize import least_squares
 
         joints = self.joints_for(pose)
@@ -93,7 +93,7 @@ class Twin:
         return ball
 
     def seen(self) -> Array:
-        """What the three gauges see, mm."""
+        """The displacements at the three gauges, mm."""
         return np.array([self.physics.gauge_displacement(axis) for axis in "xyz"])
 
 

@@ -43,7 +43,7 @@ def serve(bundled_cell: Any, settings: CellSettings | None = None, *, other_proc
 
 
 def quick(settings: CellSettings) -> CellSettings:
-    """A cell that lives fast, and whose drivers wait long for a machine under load."""
+    """A cell with a fast clock, and long time-outs for a machine under load."""
     timing = settings.timing.model_copy(update={"clock_factor": 200.0})
     gauges = tuple(gauge.model_copy(update={"timeout_s": 10.0}) for gauge in settings.gauges)
     encoders = settings.encoders.model_copy(update={"timeout_s": 10.0, "heartbeat_ms": 10_000})
@@ -51,7 +51,7 @@ def quick(settings: CellSettings) -> CellSettings:
 
 
 def slow(settings: CellSettings) -> CellSettings:
-    """Moves that last 20 s on the wall: time enough to stop one."""
+    """Moves that last 20 s of real time: long enough to stop one."""
     assert settings.simulation is not None
     motion = settings.simulation.motion.model_copy(update={"minimum_s": 4000.0})
     simulation = settings.simulation.model_copy(update={"motion": motion})
@@ -91,7 +91,7 @@ async def test_every_device_answers_and_the_robot_moves(bundled_cell) -> None:
         assert readings == pytest.approx(seen, abs=0.05)
 
 
-async def test_out_of_reach_is_said_by_the_driver(bundled_cell) -> None:
+async def test_a_target_out_of_reach_is_refused(bundled_cell) -> None:
     with serve(bundled_cell) as cell:
         async with drivers(cell.settings) as (_, encoders, controller):
             await controller.prepare()
@@ -101,7 +101,7 @@ async def test_out_of_reach_is_said_by_the_driver(bundled_cell) -> None:
             assert (await encoders.read()).positions_mm == pytest.approx(before, abs=0.01)
 
 
-async def test_a_move_that_is_cancelled_stops_the_robot_in_place(bundled_cell) -> None:
+async def test_a_cancelled_move_stops_the_robot_in_place(bundled_cell) -> None:
     with serve(bundled_cell, slow(bundled_cell.settings)) as cell:
         async with drivers(cell.settings) as (_, _, controller):
             await controller.prepare()
@@ -117,7 +117,7 @@ async def test_a_move_that_is_cancelled_stops_the_robot_in_place(bundled_cell) -
         assert cell.physics.encoder_positions() == pytest.approx(sliders, abs=0.01)
 
 
-async def test_a_stop_while_it_moves_is_said(bundled_cell) -> None:
+async def test_a_stop_during_a_move_is_reported(bundled_cell) -> None:
     with serve(bundled_cell, slow(bundled_cell.settings)) as cell:
         async with drivers(cell.settings) as (_, _, controller):
             await controller.prepare()
@@ -129,7 +129,9 @@ async def test_a_stop_while_it_moves_is_said(bundled_cell) -> None:
 
 
 @pytest.mark.parametrize("signs", [(1, 1, 1), (-1, 1, -1)])
-async def test_gauges_count_the_way_they_are_mounted(bundled_cell, signs: tuple[int, ...]) -> None:
+async def test_gauges_count_in_the_direction_of_their_mounting(
+    bundled_cell, signs: tuple[int, ...]
+) -> None:
     settings = quick(bundled_cell.settings)
     gauges = tuple(
         gauge.model_copy(update={"sign": sign}) for gauge, sign in zip(settings.gauges, signs, strict=True)
@@ -165,7 +167,7 @@ def _geometry(values: Any) -> Any:
     return hexaglide_geometry(values["S"], values["B"], values["l"])
 
 
-async def test_the_cells_own_passwords_are_asked_for(bundled_cell) -> None:
+async def test_the_passwords_of_the_cell_file_are_required(bundled_cell) -> None:
     settings = quick(bundled_cell.settings)
     own = settings.controller.model_copy(update={"connect_password": "sesame", "enable_password": "open"})
     with serve(bundled_cell, settings.model_copy(update={"controller": own})) as cell:
@@ -178,7 +180,7 @@ async def test_the_cells_own_passwords_are_asked_for(bundled_cell) -> None:
         await stranger.close()
 
 
-def test_its_settings_name_every_device_and_no_simulation(bundled_cell) -> None:
+def test_settings_have_an_address_for_every_device_and_no_simulation(bundled_cell) -> None:
     with serve(bundled_cell) as cell:
         assert cell.settings.simulation is None
         assert len({gauge.port for gauge in cell.settings.gauges}) == 3
@@ -194,7 +196,7 @@ def test_other_processes_reach_the_encoders_too(bundled_cell) -> None:
         assert bus["interface"] == "slcan"
 
 
-def test_closing_ends_everything_and_twice_is_harmless(bundled_cell) -> None:
+def test_closing_ends_all_threads_and_may_be_repeated(bundled_cell) -> None:
     before = set(threading.enumerate())
     cell = serve(bundled_cell)
     assert set(threading.enumerate()) > before

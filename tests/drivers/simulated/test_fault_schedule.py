@@ -1,4 +1,4 @@
-"""What goes wrong with a simulated cell, at once and at a planned moment."""
+"""Faults of a simulated cell, injected at once and on schedule."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ async def gauge(cell):
     await links.close()
 
 
-async def test_a_plunger_at_its_end_comes_back(cell, gauge) -> None:
+async def test_a_plunger_moves_to_its_end_and_back(cell, gauge) -> None:
     cell.faults.inject("at its end", "x")
     with pytest.raises(GaugeAtEnd):
         await gauge.read_once()
@@ -54,14 +54,14 @@ async def test_a_plunger_at_its_end_comes_back(cell, gauge) -> None:
     assert abs((await gauge.read_once()).value_mm) < 3.0
 
 
-async def test_a_frozen_gauge_answers_the_same_again_and_again(cell, gauge) -> None:
+async def test_a_frozen_gauge_repeats_its_answer(cell, gauge) -> None:
     cell.faults.inject("frozen", "x")
     assert len({(await gauge.read_once()).raw for _ in range(20)}) == 1
     cell.faults.clear("frozen", "x")
     assert len({(await gauge.read_once()).raw for _ in range(50)}) > 1
 
 
-async def test_a_ball_off_its_plate_and_back(cell, gauge) -> None:
+async def test_a_ball_moves_off_its_plate_and_back(cell, gauge) -> None:
     before = (await gauge.read_once()).value_mm
     cell.faults.inject("off its plate", "x")
     assert abs((await gauge.read_once()).value_mm - before) == pytest.approx(6.0, abs=0.1)
@@ -69,7 +69,7 @@ async def test_a_ball_off_its_plate_and_back(cell, gauge) -> None:
     assert (await gauge.read_once()).value_mm == pytest.approx(before, abs=0.1)
 
 
-async def test_a_cable_that_is_pulled_and_put_back(cell, gauge) -> None:
+async def test_a_cable_unplugged_and_plugged_in(cell, gauge) -> None:
     cell.faults.inject("unplugged", "x")
     with pytest.raises(DeviceError, match="lost"):
         await gauge.read_once()
@@ -118,20 +118,20 @@ def test_an_emergency_stop_and_a_following_error_switch_the_machine_off(cell) ->
         ("emergency stop", "encoder 2"),
     ],
 )
-def test_what_cannot_go_wrong_is_refused(cell, kind: FaultKind, device: str) -> None:
+def test_impossible_faults_are_refused(cell, kind: FaultKind, device: str) -> None:
     with pytest.raises(UsageError, match=f"no fault '{kind}' can be simulated of '{device}'"):
         cell.faults.inject(kind, device)
 
 
 class Log:
-    """Stands in for a cell's faults and writes down what is asked of it."""
+    """A test double of a cell's faults that records its calls."""
 
     def __init__(self, clock: CellClock) -> None:
         self.clock = clock
         self.told: list[tuple[str, str, float]] = []
 
     def check(self, kind: FaultKind, device: str) -> None:
-        if device == "nobody":
+        if device == "absent":
             raise UsageError("there is no such device")
 
     def inject(self, kind: FaultKind, device: str = "") -> None:
@@ -173,14 +173,14 @@ def test_a_fault_waits_for_its_move() -> None:
         assert log.wait_for(2) == [("inject", "x"), ("inject", "y")]
 
 
-def test_what_is_planned_is_checked_at_once() -> None:
+def test_planned_faults_are_checked_at_the_start() -> None:
     clock = CellClock()
     log: Any = Log(clock)
     with pytest.raises(UsageError):
-        FaultSchedule(log, clock, [fault("nobody")])
+        FaultSchedule(log, clock, [fault("absent")])
 
 
-def test_closing_forgets_what_has_not_struck() -> None:
+def test_closing_drops_faults_that_are_not_due() -> None:
     clock = CellClock()
     log: Any = Log(clock)
     schedule = FaultSchedule(log, clock, [fault("x", after_s=1000.0)])
@@ -189,7 +189,7 @@ def test_closing_forgets_what_has_not_struck() -> None:
     assert log.told == []
 
 
-def test_a_cell_file_that_plans_what_cannot_be_is_refused(bundled_cell) -> None:
+def test_a_cell_file_with_an_impossible_fault_is_refused(bundled_cell) -> None:
     settings = bundled_cell.settings
     simulation = settings.simulation.model_copy(update={"faults": (fault("w"),)})
     with pytest.raises(UsageError, match="simulated of 'w'"):

@@ -1,4 +1,4 @@
-"""How simulated sliders travel: from rest to rest, on their path, and stoppable anywhere."""
+"""Motions of the simulated sliders along a path, from standstill to standstill."""
 
 from __future__ import annotations
 
@@ -22,26 +22,26 @@ def motion() -> Motion:
 @pytest.mark.parametrize(
     ("now_s", "fraction"), [(0.0, 0.0), (10.0, 0.0), (12.0, 0.5), (14.0, 1.0), (99.0, 1.0), (11.0, 0.15625)]
 )
-def test_how_far_it_is(motion: Motion, now_s: float, fraction: float) -> None:
+def test_fraction_of_the_path(motion: Motion, now_s: float, fraction: float) -> None:
     assert motion.fraction(now_s) == fraction
     assert motion.path_position(now_s) == 2.0 * fraction
 
 
-def test_it_begins_and_ends_where_the_path_does(motion: Motion) -> None:
+def test_it_starts_and_ends_with_the_path(motion: Motion) -> None:
     assert np.array_equal(motion.joints(10.0), PATH[0])
     assert np.array_equal(motion.joints(12.0), PATH[1])
     assert np.array_equal(motion.joints(14.0), PATH[2])
     assert motion.end_s == 14.0
 
 
-def test_between_rows_it_goes_straight(motion: Motion) -> None:
+def test_it_is_linear_between_rows(motion: Motion) -> None:
     place = motion.path_position(13.0)
     assert 1.0 < place < 2.0
     expected = PATH[1] + (place - 1.0) * (PATH[2] - PATH[1])
     assert motion.joints(13.0) == pytest.approx(expected)
 
 
-def test_it_begins_and_ends_at_rest(motion: Motion) -> None:
+def test_it_starts_and_ends_at_standstill(motion: Motion) -> None:
     short = 1e-4
     middle = motion.fraction(12.0 + short) - motion.fraction(12.0 - short)
     for edge in (10.0, 14.0):
@@ -52,27 +52,27 @@ times = st.floats(-100.0, 100.0)
 
 
 @given(earlier=times, later=times)
-def test_it_never_goes_back(earlier: float, later: float) -> None:
+def test_it_is_monotonic(earlier: float, later: float) -> None:
     earlier, later = sorted((earlier, later))
     motion = Motion(PATH, start_s=0.0, duration_s=3.0)
     assert 0.0 <= motion.fraction(earlier) <= motion.fraction(later) <= 1.0
 
 
 @given(stopped=st.floats(10.0, 14.0), later=st.floats(0.0, 100.0))
-def test_stopped_it_stays_where_it_was(stopped: float, later: float) -> None:
+def test_a_stopped_motion_stays_at_its_position(stopped: float, later: float) -> None:
     motion = Motion(PATH, start_s=10.0, duration_s=4.0)
     halted = replace(motion, stopped_s=stopped)
     assert halted.end_s == stopped
     assert np.array_equal(halted.joints(stopped + later), motion.joints(stopped))
 
 
-def test_rest_is_no_motion() -> None:
+def test_standstill() -> None:
     rest = Motion.stationary(PATH[1])
     assert rest.end_s < 0.0
     assert rest.fraction(0.0) == 1.0
     assert np.array_equal(rest.joints(0.0), PATH[1])
 
 
-def test_a_way_of_no_duration_is_done_at_once() -> None:
+def test_a_motion_without_duration_is_complete_at_once() -> None:
     motion = Motion(PATH, start_s=1.0, duration_s=0.0)
     assert np.array_equal(motion.joints(1.0), PATH[-1])

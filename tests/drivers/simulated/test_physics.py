@@ -1,4 +1,4 @@
-"""The hidden truth: the ball follows the true geometry, and who looks sees it through noise."""
+"""The true state of the simulated robot: positions by the true geometry, and sensors with noise."""
 
 from __future__ import annotations
 
@@ -40,21 +40,21 @@ def test_the_ball_is_where_the_true_geometry_puts_it(make_twin) -> None:
         assert twin.seen() - seen == pytest.approx(twin.ball_at(pose) - reference, abs=1e-6)
 
 
-def test_it_is_not_where_the_controller_believes(make_twin) -> None:
-    """Without errors of geometry there would be nothing to calibrate, and nothing to test with."""
+def test_the_ball_is_not_at_the_commanded_pose_with_another_true_geometry(make_twin) -> None:
+    """The true geometry differs from that of the controller."""
     twin = make_twin(station_reach_mm=1e6)
     before = twin.seen()
     go(twin, POSES[1])
     assert np.linalg.norm(twin.seen() - before) > 1.0
 
 
-def test_the_sliders_go_where_the_controllers_geometry_puts_them(twin) -> None:
+def test_sliders_follow_the_controllers_geometry(twin) -> None:
     for pose in POSES:
         go(twin, pose)
         assert twin.physics.encoder_positions() == pytest.approx(twin.joints_for(pose), abs=1e-9)
 
 
-def test_the_way_there_does_not_matter(make_twin) -> None:
+def test_the_pose_does_not_depend_on_the_path(make_twin) -> None:
     one, other = make_twin(station_reach_mm=1e6), make_twin(station_reach_mm=1e6)
     go(one, POSES[2])
     for pose in (POSES[1], POSES[0], POSES[2]):
@@ -62,7 +62,7 @@ def test_the_way_there_does_not_matter(make_twin) -> None:
     assert one.seen() == pytest.approx(other.seen(), abs=1e-6)
 
 
-def test_how_often_it_is_looked_at_does_not_matter(make_twin) -> None:
+def test_the_pose_does_not_depend_on_the_number_of_readings(make_twin) -> None:
     one, other = make_twin(station_reach_mm=1e6), make_twin(station_reach_mm=1e6)
     for twin, looks in ((one, 1), (other, 200)):
         motion = twin.physics.start_motion(
@@ -85,7 +85,7 @@ def test_a_move_takes_the_time_of_its_longest_slider(make_twin) -> None:
     assert twin.physics.start_motion(np.stack([here, here + 0.001])).duration_s == 0.2
 
 
-def test_on_the_way_sliders_and_ball_are_in_between(make_twin) -> None:
+def test_sliders_and_ball_are_between_start_and_end_during_a_move(make_twin) -> None:
     twin = make_twin(station_reach_mm=1e6)
     start, seen = twin.physics.encoder_positions(), twin.seen()
     end = start + 20.0  # all of them alike: the platform goes along the rails
@@ -96,7 +96,7 @@ def test_on_the_way_sliders_and_ball_are_in_between(make_twin) -> None:
     assert twin.seen() - seen == pytest.approx([10.0, 0.0, 0.0], abs=1e-6)
 
 
-def test_stopped_it_stays_in_place(make_twin) -> None:
+def test_a_stopped_robot_stays_in_place(make_twin) -> None:
     twin = make_twin(station_reach_mm=1e6)
     start, seen = twin.physics.encoder_positions(), twin.seen()
     motion = twin.physics.start_motion(np.stack([start, start + 20.0]))
@@ -110,7 +110,7 @@ def test_stopped_it_stays_in_place(make_twin) -> None:
         twin.physics.stop()
 
 
-def test_stopping_what_stands_changes_nothing(twin) -> None:
+def test_a_stop_at_standstill_changes_nothing(twin) -> None:
     go(twin, POSES[0])
     before = twin.physics.encoder_positions()
     twin.physics.stop()
@@ -118,7 +118,7 @@ def test_stopping_what_stands_changes_nothing(twin) -> None:
     assert np.array_equal(twin.physics.encoder_positions(), before)
 
 
-def test_after_a_stop_the_next_way_begins_in_place(twin) -> None:
+def test_after_a_stop_the_next_move_starts_in_place(twin) -> None:
     start = twin.physics.encoder_positions()
     motion = twin.physics.start_motion(np.stack([start, start + 20.0]))
     twin.clock.time_s += motion.duration_s / 2.0
@@ -154,7 +154,7 @@ def test_flicker_is_drawn_at_every_reading(make_twin) -> None:
         assert np.std(readings - readings.mean(axis=0)) == pytest.approx(0.002, rel=0.25)
 
 
-def test_the_same_seed_gives_the_same_world(make_twin) -> None:
+def test_the_same_seed_gives_the_same_noise(make_twin) -> None:
     noisy = {"gauges__noise_mm": 0.01, "gauges__flicker_mm": 0.001, "motion__ringing_mm": 0.2}
     one, same, other = (make_twin(seed=seed, **noisy) for seed in (5, 5, 6))
     for twin in (one, same, other):
@@ -163,7 +163,7 @@ def test_the_same_seed_gives_the_same_world(make_twin) -> None:
     assert not np.array_equal(one.seen(), other.seen())
 
 
-def test_on_arrival_the_ball_swings_and_the_swing_decays(make_twin) -> None:
+def test_the_ball_oscillates_on_arrival_and_the_oscillation_decays(make_twin) -> None:
     twin = make_twin(motion__ringing_mm=0.2, motion__ringing_s=0.15)
     quiet = make_twin()
     for each in (twin, quiet):
@@ -185,13 +185,13 @@ def _placing(one: Any, other: Any) -> Any:
     return other.physics._station - one.physics._station
 
 
-def test_sliders_do_not_swing(make_twin) -> None:
+def test_sliders_do_not_oscillate(make_twin) -> None:
     twin = make_twin(motion__ringing_mm=0.5)
     twin.machine.move(POSES[0])
     assert twin.physics.encoder_positions() == pytest.approx(twin.joints_for(POSES[0]), abs=1e-9)
 
 
-def test_a_machine_may_not_repeat(make_twin) -> None:
+def test_slider_stops_scatter_by_the_repeatability(make_twin) -> None:
     twin = make_twin(motion__repeatability_mm=0.5, station_reach_mm=1e6)
     start = twin.physics.encoder_positions()
     stops = []
@@ -201,7 +201,7 @@ def test_a_machine_may_not_repeat(make_twin) -> None:
     assert np.std(stops) == pytest.approx(0.5, rel=0.25)
 
 
-def test_gauges_are_put_near_the_ball(make_twin) -> None:
+def test_gauges_are_placed_near_the_ball(make_twin) -> None:
     placings = np.array([make_twin(seed=seed).seen() for seed in range(40)])
     assert np.abs(placings).max() < 2.0
     assert np.std(placings) == pytest.approx(0.4, rel=0.3)
@@ -216,13 +216,13 @@ def test_gauges_stay_while_the_ball_is_within_reach(make_twin) -> None:
     assert twin.seen() == pytest.approx(before, abs=1e-6)
 
 
-def test_beyond_reach_they_are_carried_to_the_ball(make_twin) -> None:
+def test_gauges_move_to_a_ball_beyond_their_reach(make_twin) -> None:
     twin = make_twin(station_reach_mm=30.0)
     go(twin, Pose(60.0, 0.0, 550.0))
     assert np.abs(twin.seen()).max() < 2.0
 
 
-def test_they_are_not_carried_while_the_robot_moves(make_twin) -> None:
+def test_gauges_do_not_move_while_the_robot_moves(make_twin) -> None:
     twin = make_twin(station_reach_mm=30.0)
     before = twin.seen()
     start = twin.physics.encoder_positions()
@@ -233,7 +233,7 @@ def test_they_are_not_carried_while_the_robot_moves(make_twin) -> None:
     assert twin.seen() == pytest.approx(before, abs=1e-6)
 
 
-def test_a_triad_may_stand_askew(make_twin) -> None:
+def test_the_triad_of_gauges_may_be_misaligned(make_twin) -> None:
     straight, askew = (
         make_twin(gauges__misalignment_deg=angle, station_reach_mm=1e6) for angle in (0.0, 2.0)
     )
@@ -246,15 +246,15 @@ def test_a_triad_may_stand_askew(make_twin) -> None:
     assert 0.05 < np.linalg.norm(moved[1] - moved[0]) < 3.0
 
 
-def test_a_world_that_cannot_stand_there_is_refused(make_twin, bundled_cell) -> None:
+def test_a_start_out_of_reach_of_the_true_geometry_is_refused(make_twin, bundled_cell) -> None:
     truth = bundled_cell.settings.simulation.geometry.model_dump()
     short = [length / 3.0 for length in truth["l"]]
     with pytest.raises(ReachError, match=r"cannot reach X0\.000"):
         make_twin(geometry__l=short)
 
 
-def test_driven_where_nobody_knows_it_comes_back(make_twin) -> None:
-    """Sliders that tear the platform apart: afterwards everything is as before."""
+def test_the_pose_is_found_again_after_slider_positions_without_a_pose(make_twin) -> None:
+    """At positions that no pose closes the platform waits; back in reach everything is as before."""
     twin = make_twin(station_reach_mm=1e6)
     start, seen = twin.physics.encoder_positions(), twin.seen()
     apart = start + np.repeat([-400.0, 400.0], 3)
@@ -266,7 +266,7 @@ def test_driven_where_nobody_knows_it_comes_back(make_twin) -> None:
     assert twin.seen() == pytest.approx(seen, abs=1e-6)
 
 
-def test_many_may_look_at_once(make_twin) -> None:
+def test_readings_from_several_threads(make_twin) -> None:
     twin = make_twin(station_reach_mm=1e6)
     motion = twin.physics.start_motion(
         np.linspace(twin.physics.encoder_positions(), twin.joints_for(POSES[2]), 25)

@@ -1,4 +1,4 @@
-"""The simulated robot under its controller: it goes where its config says, not where it truly is."""
+"""The simulated robot as its controller moves it, with the geometry of the config."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ def test_a_move_lasts_until_the_sliders_stand(make_twin) -> None:
     assert twin.physics.progress() == 1.0
 
 
-def test_its_pose_on_the_way_is_on_the_way(twin) -> None:
+def test_the_pose_during_a_move_is_between_start_and_end(twin) -> None:
     seen: list[Pose] = []
 
     def look() -> None:
@@ -51,7 +51,7 @@ def test_its_pose_on_the_way_is_on_the_way(twin) -> None:
     assert seen[0].as_tuple() == pytest.approx((2.0, 0.0, 550.0, 0.0, 0.0, 1.0), abs=1e-6)
 
 
-def test_it_goes_straight(twin) -> None:
+def test_moves_are_straight(twin) -> None:
     """At every piece of the line the sliders are where the geometry puts them for that pose."""
     paths: list[Any] = []
     real = twin.physics.start_motion
@@ -97,7 +97,7 @@ def stop_half_way(twin: Any) -> None:
     twin.clock.on_wait = stop
 
 
-def test_it_stops_in_place(twin) -> None:
+def test_the_machine_stops_in_place(twin) -> None:
     stop_half_way(twin)
     twin.machine.move(Pose(4.0, 0.0, 550.0))
     there = Pose(2.0, 0.0, 550.0)
@@ -106,7 +106,7 @@ def test_it_stops_in_place(twin) -> None:
     assert twin.physics.encoder_positions() == pytest.approx(twin.joints_for(there), abs=1e-3)
 
 
-def test_after_a_stop_it_goes_on_from_there(twin) -> None:
+def test_after_a_stop_the_next_move_starts_there(twin) -> None:
     stop_half_way(twin)
     twin.machine.move(Pose(4.0, 0.0, 550.0))
     twin.clock.on_wait = lambda: None
@@ -114,7 +114,7 @@ def test_after_a_stop_it_goes_on_from_there(twin) -> None:
     assert twin.physics.encoder_positions() == pytest.approx(twin.joints_for(TILTED), abs=1e-9)
 
 
-def test_a_stop_while_the_way_is_being_computed_is_not_lost(twin, monkeypatch) -> None:
+def test_a_stop_while_the_line_is_computed_is_not_lost(twin, monkeypatch) -> None:
     real = twin.machine._joints
 
     def interrupted(poses: Any) -> Any:
@@ -130,7 +130,7 @@ def test_a_stop_while_the_way_is_being_computed_is_not_lost(twin, monkeypatch) -
     assert twin.machine.pose().as_tuple() == pytest.approx((0.0, 0.0, 550.0, 0.0, 0.0, 0.0), abs=1e-9)
 
 
-def test_stopping_what_stands_does_not_stop_the_next_move(twin) -> None:
+def test_a_stop_at_standstill_does_not_stop_the_next_move(twin) -> None:
     twin.machine.stop()
     twin.machine.stop()
     twin.machine.move(TILTED)
@@ -159,7 +159,7 @@ def test_a_stop_from_another_thread_ends_the_wait(make_twin) -> None:
     assert not mover.is_alive()
 
 
-def test_switched_on_it_reads_its_geometry_and_the_sliders_stay(twin) -> None:
+def test_switching_on_reads_the_geometry_and_moves_no_slider(twin) -> None:
     twin.machine.move(TILTED)
     sliders, seen = twin.physics.encoder_positions(), twin.seen()
     rewrite(twin, twin.truth)
@@ -172,7 +172,7 @@ def test_switched_on_it_reads_its_geometry_and_the_sliders_stay(twin) -> None:
     assert twin.machine.joints() == pytest.approx(sliders, abs=1e-8)
 
 
-def test_with_the_true_geometry_it_goes_where_it_is_sent(make_twin) -> None:
+def test_with_the_true_geometry_the_ball_reaches_its_target(make_twin) -> None:
     twin = make_twin(station_reach_mm=1e6)
     rewrite(twin, twin.truth)
     twin.machine.switch_on()

@@ -98,7 +98,7 @@ async def driver(settings):
 
 
 ASKED, REACHED = 0x7F0, 0x7F1
-"""Identifiers that nobody uses."""
+"""Unused identifiers."""
 
 
 class Listener:
@@ -148,7 +148,7 @@ def listen() -> Iterator[Callable[[SimulatedEncoderBank], Listener]]:
 
 @pytest.fixture
 def hurry() -> Callable[..., None]:
-    """Shorten an open bank's wait for rounds, for tests in which somebody stays silent."""
+    """Shorten an open bank's wait for rounds, for tests with silent nodes."""
 
     def shorten(bank: Cia406Bank, timeout_s: float = 0.04) -> None:
         assert bank._session is not None

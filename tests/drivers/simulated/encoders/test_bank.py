@@ -47,9 +47,9 @@ async def test_thousands_of_rounds(make_bank, driver, samples):
         assert (await bank.read()).counts == (samples.taken,) * 6
 
 
-@pytest.mark.parametrize("maker", [EVENTS_AND_SYNC, EVENTS_ONLY, TWO_MAGNETS])
-async def test_every_make_is_brought_to_one_sample_per_sync(make_bank, driver, listen, maker):
-    simulated = make_bank(vendors=(maker,) * 6)
+@pytest.mark.parametrize("vendor", [EVENTS_AND_SYNC, EVENTS_ONLY, TWO_MAGNETS])
+async def test_every_vendor_is_configured_to_one_sample_per_sync(make_bank, driver, listen, vendor):
+    simulated = make_bank(vendors=(vendor,) * 6)
     bank = driver(simulated.bus_settings)
     identities = await bank.open()
     assert [identity.serial_number for identity in identities] == [str(1001 + leg) for leg in range(6)]
@@ -80,7 +80,7 @@ async def test_positions_come_back_within_half_a_step(make_bank, driver, setting
     assert found == pytest.approx(positions, abs=changed.measuring_step_nm * 0.5e-6 + 1e-9)
 
 
-async def test_two_cells_in_one_process_do_not_hear_each_other(make_bank, driver):
+async def test_two_cells_in_one_process_have_separate_buses(make_bank, driver):
     banks = [driver(make_bank(positions=lambda mm=mm: [mm] * 6).bus_settings) for mm in (1.0, 2.0)]
     await asyncio.gather(*(bank.open() for bank in banks))
     rounds = await asyncio.gather(*(bank.read() for bank in banks for _ in range(10)))
@@ -111,7 +111,7 @@ async def test_a_duplicated_node(make_bank, reach, driver):
         await driver(reach(simulated)).open()
 
 
-async def test_a_node_duplicated_in_the_middle_of_a_run(make_bank, driver):
+async def test_a_node_duplicated_during_a_run(make_bank, driver):
     simulated = make_bank()
     bank = driver(simulated.bus_settings)
     await bank.open()
@@ -148,7 +148,7 @@ async def test_an_emergency_and_its_end(make_bank, reach, driver):
             break
 
 
-async def test_an_error_or_alarm_from_before_keeps_the_bank_shut(make_bank, driver):
+async def test_an_earlier_error_or_alarm_prevents_opening(make_bank, driver):
     simulated = make_bank()
     bank = driver(simulated.bus_settings)
     faults.set_alarms(simulated, 5)
@@ -162,7 +162,7 @@ async def test_an_error_or_alarm_from_before_keeps_the_bank_shut(make_bank, driv
     await bank.open()
 
 
-async def test_a_reboot_in_the_middle_of_a_run(make_bank, reach, driver):
+async def test_a_reboot_during_a_run(make_bank, reach, driver):
     simulated = make_bank()
     bank = driver(reach(simulated))
     await bank.open()
@@ -198,7 +198,7 @@ async def test_a_node_unplugged_and_plugged_in_again(make_bank, driver, hurry):
 
 
 @pytest.mark.parametrize("timeouts", [0.5, 1.4, 2.5, 4.5])
-async def test_stale_answers_never_mix_instants(make_bank, driver, hurry, timeouts):
+async def test_late_answers_are_never_mixed_with_later_samples(make_bank, driver, hurry, timeouts):
     """Leg 3 answers every SYNC that much later, with what it saw at that SYNC."""
     simulated = make_bank()
     bank = driver(simulated.bus_settings)
@@ -214,7 +214,7 @@ async def test_stale_answers_never_mix_instants(make_bank, driver, hurry, timeou
             assert len(set(outcome.counts)) == 1
 
 
-async def test_a_bus_whose_nodes_all_die(make_bank, reach, driver, hurry):
+async def test_a_bus_whose_nodes_are_all_silent(make_bank, reach, driver, hurry):
     simulated = make_bank()
     bank = driver(reach(simulated))
     await bank.open()
@@ -224,7 +224,7 @@ async def test_a_bus_whose_nodes_all_die(make_bank, reach, driver, hurry):
         await bank.read()
 
 
-async def test_positions_that_fail_are_as_loud_as_a_broken_cable(make_bank, driver, hurry, caplog):
+async def test_an_error_of_the_simulation_silences_the_bus(make_bank, driver, hurry, caplog):
     positions = [0.0] * 6
     bank = driver(make_bank(positions=lambda: positions).bus_settings)
     await bank.open()
@@ -237,7 +237,7 @@ async def test_positions_that_fail_are_as_loud_as_a_broken_cable(make_bank, driv
 
 @pytest.mark.parametrize("line", [partial(PtyLine, "slcan"), SocketLine], ids=["pty", "socket"])
 @pytest.mark.parametrize("reading", [True, False])
-async def test_an_adapter_that_is_pulled_out(make_bank, driver, samples, line, reading):
+async def test_an_adapter_that_is_closed(make_bank, driver, samples, line, reading):
     simulated = make_bank()
     adapter = SlcanServer(simulated.channel, line())
     bank = driver(adapter.bus_settings, timeout_s=2.0)

@@ -16,7 +16,7 @@ START, STOP, PRE_OPERATIONAL, RESET, RESET_COMMUNICATION = 1, 2, 0x80, 0x81, 0x8
 SYNC, NMT, ALL = 0x80, 0, 0
 
 
-def test_every_node_announces_itself(settings, samples, monkeypatch):
+def test_every_node_sends_a_boot_up_message(settings, samples, monkeypatch):
     number = uuid.uuid4()
     monkeypatch.setattr(uuid, "uuid4", lambda: number)
     with (
@@ -27,7 +27,7 @@ def test_every_node_announces_itself(settings, samples, monkeypatch):
     assert boots == {(0x700 + node, b"\0") for node in range(1, 7)}
 
 
-def test_nothing_is_sent_unasked_before_start(make_bank, listen):
+def test_nothing_is_sent_before_start(make_bank, listen):
     ear = listen(make_bank(vendors=(EVENTS_ONLY,) * 6))
     assert ear.silence()
     ear.send(SYNC)
@@ -67,7 +67,7 @@ def test_event_timers_run_in_the_cells_time(make_bank, listen):
     assert clock.now() - begun_s >= 2 * 0.01
 
 
-def test_a_reset_brings_back_the_makers_defaults(make_bank, listen):
+def test_a_reset_restores_the_vendors_defaults(make_bank, listen):
     clock = CellClock()
     ear = listen(make_bank(clock=clock))
     begun_s = clock.now()
@@ -81,7 +81,7 @@ def test_a_reset_brings_back_the_makers_defaults(make_bank, listen):
     assert ear.sdo(1, "40171000") == "4b17100000000000"
 
 
-def test_a_heartbeat_tells_the_state(make_bank, listen):
+def test_a_heartbeat_contains_the_state(make_bank, listen):
     ear = listen(make_bank())
     ear.sdo(1, "2b1710000a")
     ear.send(NMT, START, 1)
@@ -90,7 +90,7 @@ def test_a_heartbeat_tells_the_state(make_bank, listen):
 
 
 @pytest.mark.parametrize(
-    ("maker", "object_", "value"),
+    ("vendor", "object_", "value"),
     [
         (EVENTS_AND_SYNC, "40001000", "4300100096010800"),
         (TWO_MAGNETS, "40001000", "4300100096010a00"),
@@ -104,8 +104,8 @@ def test_a_heartbeat_tells_the_state(make_bank, listen):
         (TWO_MAGNETS, "40011a02", "43011a0220012060"),
     ],
 )
-def test_the_dictionary_answers(make_bank, listen, maker, object_, value):
-    assert listen(make_bank(vendors=(maker,) * 6)).sdo(1, object_) == value
+def test_the_dictionary_answers(make_bank, listen, vendor, object_, value):
+    assert listen(make_bank(vendors=(vendor,) * 6)).sdo(1, object_) == value
 
 
 @pytest.mark.parametrize(
@@ -117,7 +117,7 @@ def test_the_dictionary_answers(make_bank, listen, maker, object_, value):
         ([], "2300100000000000", 0x06010002),  # the device type
     ],
 )
-def test_pdos_are_changed_by_the_rules_or_not_at_all(make_bank, listen, before, request_, code):
+def test_changes_of_pdos_against_the_rules_are_refused(make_bank, listen, before, request_, code):
     ear = listen(make_bank())
     for each in before:
         assert ear.sdo(1, each).startswith("60")

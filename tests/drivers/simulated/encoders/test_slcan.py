@@ -40,12 +40,12 @@ def test_decode_undoes_encode(message):
         (can.Message(arbitration_id=0x181, data=b"\x0a\xff", is_extended_id=False), b"t18120AFF\r"),
     ],
 )
-def test_frames_are_written_as_the_protocol_says(message, text):
+def test_format_of_frames(message, text):
     assert encode_frame(message) == text
 
 
 @given(st.text(alphabet="tTrR0123456789abcdefABCDEFxyz \n", max_size=30))
-def test_whatever_is_no_frame_is_refused(text):
+def test_other_text_is_refused(text):
     found = decode_frame(text)
     assert found is None or encode_frame(found).decode()[:-1].upper() == text.upper()
 
@@ -139,7 +139,7 @@ def test_no_frame_is_lost_in_a_burst(pair):
                 assert int.from_bytes(found.data, "big") == expected
 
 
-def test_a_client_that_does_not_read_holds_up_nobody(pair):
+def test_a_client_that_does_not_read_blocks_nothing(pair):
     near, far = pair
     for number in range(3000):  # far more than a line buffers
         near.send(can.Message(arbitration_id=0x181, data=number.to_bytes(8, "big"), is_extended_id=False))
@@ -149,7 +149,7 @@ def test_a_client_that_does_not_read_holds_up_nobody(pair):
     assert found.arbitration_id == 0x080
 
 
-def test_garbage_on_the_line_is_survived():
+def test_the_server_continues_after_garbage():
     channel = f"slcan-{uuid.uuid4().hex}"
     with can.Bus(channel, interface="virtual") as near, SlcanServer(channel, PtyLine("slcan")) as server:
         line = os.open(server.bus_settings["channel"], os.O_RDWR | os.O_NOCTTY)

@@ -7,7 +7,7 @@ from tests.drivers.simulated.gauges.garbling import flip_bit, flip_digit
 
 
 @given(st.binary(min_size=1), st.integers())
-def test_one_bit_and_never_the_parity_bit_is_flipped(data, seed):
+def test_one_bit_but_not_the_parity_bit_is_flipped(data, seed):
     flipped = flip_bit(data, random.Random(seed))
     different = [old ^ new for old, new in zip(data, flipped, strict=True) if old != new]
     assert len(different) == 1

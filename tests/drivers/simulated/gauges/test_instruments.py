@@ -7,7 +7,7 @@ from drivers.simulated.gauges.instruments import Cdi, Mux10, Sylvac
 
 
 class Ball:
-    """Something that pushes a plunger."""
+    """A plunger position that tests change."""
 
     def __init__(self, position):
         self.position = position

@@ -29,7 +29,7 @@ class FakeMachine:
         self.duration_s = 0.01
         self.config: float | None = 0.0
         self.jump_mm = 0.0
-        self.deaf_to = 0
+        self.ignored_stops = 0
         self.refusal = ""
         self.ignored_moves = 0
         self.events: list[str] = []
@@ -57,8 +57,8 @@ class FakeMachine:
                 self._joints = tuple(a + share * (b - a) for a, b in zip(start, target, strict=True))
 
     def stop(self) -> None:
-        if self.deaf_to > 0:
-            self.deaf_to -= 1
+        if self.ignored_stops > 0:
+            self.ignored_stops -= 1
         else:
             self._stop.set()
 
@@ -89,32 +89,32 @@ class FakeMachine:
 
 
 class RawClient:
-    """Says one line at a time and reads what comes until nothing has come for a moment."""
+    """A TCP client that sends single lines and compares the received bytes."""
 
     def __init__(self, port: int) -> None:
         self._socket = socket.create_connection((HOST, port))
         self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
 
-    def say(self, line: str, answer: bytes) -> None:
+    def expect(self, line: str, answer: bytes) -> None:
         """Expect ``answer`` and not a byte more or less."""
         self.send(line)
-        assert self.hear(len(answer)) == answer
+        assert self.receive(len(answer)) == answer
 
     def send(self, line: str) -> None:
         self._socket.sendall(line.encode() + b"\r\n")
 
-    def hear(self, count: int) -> bytes:
-        heard = b""
-        while len(heard) < count and (data := self._socket.recv(count - len(heard))):
-            heard += data
-        return heard
+    def receive(self, count: int) -> bytes:
+        received = b""
+        while len(received) < count and (data := self._socket.recv(count - len(received))):
+            received += data
+        return received
 
-    def ask(self, line: str) -> bytes:
+    def query(self, line: str) -> bytes:
         """The line that answers."""
         self.send(line)
         answer = b""
         while not answer.endswith(b"\n"):
-            answer += self.hear(1)
+            answer += self.receive(1)
         return answer
 
     def expect_silence(self) -> None:
@@ -127,19 +127,19 @@ class RawClient:
         assert self._socket.recv(1) == b""
 
     def greet(self) -> None:
-        self.say("hello EMC test 1.0", b"HELLO ACK EMCNETSVR 1.1\r\n")
-        self.say("set echo off", b"set echo off\r\n")
-        self.say("set verbose on", b"SET VERBOSE ACK\n\r")
-        self.say("set enable EMCTOO", b"SET ENABLE ACK\n\r")
+        self.expect("hello EMC test 1.0", b"HELLO ACK EMCNETSVR 1.1\r\n")
+        self.expect("set echo off", b"set echo off\r\n")
+        self.expect("set verbose on", b"SET VERBOSE ACK\n\r")
+        self.expect("set enable EMCTOO", b"SET ENABLE ACK\n\r")
 
     def make_ready(self) -> None:
         self.greet()
-        self.say("set set_wait done", b"SET SET_WAIT ACK\n\r")
-        self.say("set estop off", b"SET ESTOP ACK\n\r")
-        self.say("set machine on", b"SET MACHINE ACK\n\r")
-        self.say("set home -1", b"SET HOME ACK\n\r")
-        wait_until(lambda: b"NO" not in self.ask("get joint_homed"))
-        self.say("set mode mdi", b"SET MODE ACK\n\r")
+        self.expect("set set_wait done", b"SET SET_WAIT ACK\n\r")
+        self.expect("set estop off", b"SET ESTOP ACK\n\r")
+        self.expect("set machine on", b"SET MACHINE ACK\n\r")
+        self.expect("set home -1", b"SET HOME ACK\n\r")
+        wait_until(lambda: b"NO" not in self.query("get joint_homed"))
+        self.expect("set mode mdi", b"SET MODE ACK\n\r")
 
     def close(self) -> None:
         self._socket.close()
@@ -176,8 +176,8 @@ def client(simulated: SimulatedController) -> Iterator[Callable[[], RawClient]]:
 def driver(simulated: SimulatedController) -> Callable[..., LinuxcncrshController]:
     """Makes drivers for ``simulated``; keywords are controller settings."""
 
-    def make(patience: Timeouts = QUICK, **settings: object) -> LinuxcncrshController:
+    def make(timeouts: Timeouts = QUICK, **settings: object) -> LinuxcncrshController:
         values = {"config": "machine.ini", "port": simulated.port, **settings}
-        return LinuxcncrshController(ControllerSettings.model_validate(values), timeouts=patience)
+        return LinuxcncrshController(ControllerSettings.model_validate(values), timeouts=timeouts)
 
     return make

@@ -28,7 +28,7 @@ async def ready(driver):
 
 
 async def begin(ready, machine):
-    """A move that would last for ever, under way."""
+    """A long move that has started."""
     machine.duration_s = LONG_S
     machine.events.clear()
     moving = asyncio.create_task(ready.move(TARGET))
@@ -52,7 +52,7 @@ async def test_from_emergency_stop_to_a_pose(driver, machine):
         await controller.close()
 
 
-async def test_an_unprepared_machine_says_why_it_does_not_move(driver):
+async def test_a_move_of_an_unprepared_machine_is_refused_with_the_reason(driver):
     controller = driver()
     await controller.open()
     with pytest.raises(MoveRefused, match="it is in emergency stop"):
@@ -60,14 +60,14 @@ async def test_an_unprepared_machine_says_why_it_does_not_move(driver):
     await controller.close()
 
 
-async def test_out_of_reach_and_on(ready):
+async def test_a_move_after_a_target_out_of_reach(ready):
     with pytest.raises(MoveRefused, match="Linear move on line 0 fails kinematicsInverse"):
         await ready.move(Pose(0.0, 0.0, 5000.0))
     await ready.move(TARGET)
     assert await ready.pose() == TARGET
 
 
-async def test_stopping_in_mid_move_ends_it_in_place(ready, machine):
+async def test_a_stop_during_a_move_ends_it_in_place(ready, machine):
     moving = await begin(ready, machine)
     await ready.stop()
     with pytest.raises(MotionInterrupted, match="it was stopped on request"):
@@ -79,7 +79,7 @@ async def test_stopping_in_mid_move_ends_it_in_place(ready, machine):
     assert await ready.pose() == TARGET
 
 
-async def test_stopping_at_once(ready, machine):
+async def test_a_stop_that_overtakes_its_move(ready, machine):
     """The abort may overtake the move that it is meant for."""
     machine.duration_s = LONG_S
     moving = asyncio.create_task(ready.move(TARGET))
@@ -89,16 +89,16 @@ async def test_stopping_at_once(ready, machine):
         await moving
 
 
-async def test_stopping_a_machine_that_does_not_hear_at_first(ready, machine):
+async def test_a_stop_is_repeated_until_it_has_an_effect(ready, machine):
     moving = await begin(ready, machine)
-    machine.deaf_to = 2
+    machine.ignored_stops = 2
     await ready.stop()
     with pytest.raises(MotionInterrupted):
         await moving
-    assert machine.deaf_to == 0
+    assert machine.ignored_stops == 0
 
 
-async def test_a_cancelled_move_stands_still_and_the_next_one_is_its_own(ready, machine):
+async def test_a_cancelled_move_stops_the_machine_and_the_next_one_is_executed(ready, machine):
     moving = await begin(ready, machine)
     moving.cancel()
     with pytest.raises(asyncio.CancelledError):
@@ -173,7 +173,7 @@ async def test_a_config_that_cannot_be_used(ready, machine):
         await ready.reload()
 
 
-async def test_a_slider_that_jumps_when_the_machine_comes_on(ready, machine):
+async def test_a_slider_that_jumps_when_the_machine_is_switched_on(ready, machine):
     machine.jump_mm = 6.8
     with pytest.raises(DeviceError, match=r"moved joint 1 by 6\.800 mm"):
         await ready.reload()
@@ -210,7 +210,7 @@ async def test_an_acknowledged_move_that_does_not_take_place(ready, machine):
     await ready.move(TARGET)
 
 
-async def test_a_connection_dropped_in_mid_move(ready, simulated, machine):
+async def test_a_connection_cut_during_a_move(ready, simulated, machine):
     moving = await begin(ready, machine)
     simulated.set_unplugged(on=True)
     simulated.set_unplugged(on=False)
@@ -221,7 +221,7 @@ async def test_a_connection_dropped_in_mid_move(ready, simulated, machine):
     assert stood.x < 90.0
 
 
-async def test_an_emergency_stop_in_mid_move(ready, simulated, machine):
+async def test_an_emergency_stop_during_a_move(ready, simulated, machine):
     moving = await begin(ready, machine)
     simulated.state.set_estop(on=True)
     with pytest.raises(MotionInterrupted, match="it is in emergency stop"):
@@ -231,7 +231,7 @@ async def test_an_emergency_stop_in_mid_move(ready, simulated, machine):
     await ready.move(TARGET)
 
 
-async def test_a_controller_that_goes_away(ready, simulated):
+async def test_a_controller_that_is_closed(ready, simulated):
     await asyncio.to_thread(simulated.close)
     with pytest.raises(ConnectionLost, match="cannot be reached: Connection refused"):
         await ready.pose()

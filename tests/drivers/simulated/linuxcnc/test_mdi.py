@@ -14,7 +14,7 @@ HERE = Pose(1.0, 2.0, 3.0, 4.0, 5.0, 6.0)
 
 
 @given(st.builds(Pose, *[st.floats(-1e4, 1e4)] * 6))
-def test_what_the_driver_says_is_understood(pose):
+def test_moves_of_the_driver_are_parsed(pose):
     target = parse_block(rapid_move(pose), HERE)
     assert target.as_tuple() == pytest.approx(pose.as_tuple(), abs=1e-8)
 
@@ -39,13 +39,13 @@ def test_missing_words_keep_their_values(block, target):
         ("G20", "Unknown g code used"),
     ],
 )
-def test_what_is_not_understood(block, words):
+def test_other_blocks_are_refused(block, words):
     with pytest.raises(BlockError, match=words):
         parse_block(block, HERE)
 
 
 @given(st.text())
-def test_nothing_else_is_raised(block):
+def test_no_other_error_is_raised(block):
     try:
         parse_block(block, HERE)
     except BlockError:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-NOBODY = [
+NEW_CLIENT = [
     ("get estop", b"ESTOP ON\r\n"),
     ("set estop off", b"SET NAK\r\n"),
     ("hello wrong me 1.0", b"HELLO NAK\r\n"),
@@ -85,22 +85,22 @@ READY = [
 
 def test_before_and_during_the_greeting(client):
     me = client()
-    for line, answer in NOBODY:
-        me.say(line, answer)
+    for line, answer in NEW_CLIENT:
+        me.expect(line, answer)
 
 
 def test_in_emergency_stop_and_before_homing(client):
     me = client()
     me.greet()
     for line, answer in GREETED:
-        me.say(line, answer)
+        me.expect(line, answer)
 
 
 def test_ready_to_move(client):
     me = client()
     me.make_ready()
     for line, answer in READY:
-        me.say(line, answer)
+        me.expect(line, answer)
 
 
 def test_an_unknown_first_word_gets_no_answer(client):
@@ -109,16 +109,16 @@ def test_an_unknown_first_word_gets_no_answer(client):
     me.send("foo bar")
     me.send("")
     me.expect_silence()
-    me.say("get mode", b"MODE MANUAL\r\n")
+    me.expect("get mode", b"MODE MANUAL\r\n")
 
 
 def test_success_is_silent_until_verbose_is_on(client):
     me = client()
-    me.say("hello EMC test 1.0", b"HELLO ACK EMCNETSVR 1.1\r\n")
-    me.say("set echo off", b"set echo off\r\n")
+    me.expect("hello EMC test 1.0", b"HELLO ACK EMCNETSVR 1.1\r\n")
+    me.expect("set echo off", b"set echo off\r\n")
     me.send("set enable EMCTOO")
     me.expect_silence()
-    me.say("get enable", b"ENABLE ON\r\n")
+    me.expect("get enable", b"ENABLE ON\r\n")
 
 
 def test_quitting_ends_the_connection(client):
@@ -131,7 +131,7 @@ def test_a_line_longer_than_the_buffer_is_fatal(client):
     me = client()
     me.send("x" * 255)
     me.send("get estop")
-    assert me.hear(10) == b"ESTOP ON\r\n"
+    assert me.receive(10) == b"ESTOP ON\r\n"
     me.send("x" * 256)
     me.expect_end()
 
@@ -140,10 +140,10 @@ def test_one_client_commands_at_a_time(client):
     first, second = client(), client()
     first.make_ready()
     second.greet()
-    first.say("get enable", b"ENABLE OFF\r\n")
-    first.say("set mode manual", b"SET MODE NAK\n\r")
-    first.say("set enable EMCTOO", b"SET ENABLE ACK\n\r")
-    second.say("set abort", b"SET ABORT NAK\n\r")
+    first.expect("get enable", b"ENABLE OFF\r\n")
+    first.expect("set mode manual", b"SET MODE NAK\n\r")
+    first.expect("set enable EMCTOO", b"SET ENABLE ACK\n\r")
+    second.expect("set abort", b"SET ABORT NAK\n\r")
 
 
 @pytest.mark.parametrize(
@@ -154,48 +154,46 @@ def test_one_client_commands_at_a_time(client):
         ("set estop on", b"SET ESTOP ACK\n\r", b"MACHINE OFF\r\n"),
     ],
 )
-def test_a_move_that_another_client_ends_is_acknowledged_all_the_same(
-    client, machine, order, answer, machine_is
-):
+def test_a_move_that_another_client_ends_is_acknowledged(client, machine, order, answer, machine_is):
     first, second = client(), client()
     first.make_ready()
     machine.duration_s = 30.0
     first.send("set mdi G0 X100")
     machine.wait_for("move")
     second.greet()
-    second.say(order, answer)
-    assert first.hear(13) == b"SET MDI ACK\n\r"
+    second.expect(order, answer)
+    assert first.receive(13) == b"SET MDI ACK\n\r"
     assert machine.pose().x < 99.0
-    first.say("get machine", machine_is)
-    first.say("get joint_homed", b"JOINT_HOMED YES YES YES YES YES YES\r\n")
+    first.expect("get machine", machine_is)
+    first.expect("get joint_homed", b"JOINT_HOMED YES YES YES YES YES YES\r\n")
 
 
-def test_a_move_is_acknowledged_on_receipt_unless_told_otherwise(client, machine):
+def test_a_move_is_acknowledged_on_receipt_by_default(client, machine):
     me = client()
     me.make_ready()
-    me.say("set set_wait received", b"SET SET_WAIT ACK\n\r")
+    me.expect("set set_wait received", b"SET SET_WAIT ACK\n\r")
     machine.duration_s = 30.0
-    me.say("set mdi G0 X100", b"SET MDI ACK\n\r")
+    me.expect("set mdi G0 X100", b"SET MDI ACK\n\r")
     assert machine.pose().x < 99.0
 
 
-def test_an_abort_drops_the_moves_that_wait(client, machine):
+def test_an_abort_drops_waiting_moves(client, machine):
     me = client()
     me.make_ready()
-    me.say("set set_wait received", b"SET SET_WAIT ACK\n\r")
+    me.expect("set set_wait received", b"SET SET_WAIT ACK\n\r")
     machine.duration_s = 30.0
-    me.say("set mdi G0 X100", b"SET MDI ACK\n\r")
-    me.say("set mdi G0 X200", b"SET MDI ACK\n\r")
+    me.expect("set mdi G0 X100", b"SET MDI ACK\n\r")
+    me.expect("set mdi G0 X200", b"SET MDI ACK\n\r")
     machine.wait_for("move")
-    me.say("set abort", b"SET ABORT ACK\n\r")
+    me.expect("set abort", b"SET ABORT ACK\n\r")
     machine.duration_s = 0.01
-    me.say("set set_wait done", b"SET SET_WAIT ACK\n\r")
-    me.say("set mdi G0 X300", b"SET MDI ACK\n\r")
+    me.expect("set set_wait done", b"SET SET_WAIT ACK\n\r")
+    me.expect("set mdi G0 X300", b"SET MDI ACK\n\r")
     assert machine.events.count("move") == 2
     assert machine.pose().x == 300.0
 
 
-def test_a_machine_goes_on_when_the_client_goes(client, machine):
+def test_a_move_continues_when_its_client_disconnects(client, machine):
     first, second = client(), client()
     first.make_ready()
     machine.duration_s = 0.1
@@ -204,18 +202,18 @@ def test_a_machine_goes_on_when_the_client_goes(client, machine):
     first.close()
     second.greet()
     machine.wait_until(lambda machine: machine.pose().x == 100.0)
-    second.say("get joint_pos", b"JOINT_POS 100.000000 0.000000 0.000000 0.000000 0.000000 0.000000\r\n")
+    second.expect("get joint_pos", b"JOINT_POS 100.000000 0.000000 0.000000 0.000000 0.000000 0.000000\r\n")
 
 
 def test_switching_on_reads_the_config_again(client, machine):
     me = client()
     me.make_ready()
-    me.say("set mdi G0 X10", b"SET MDI ACK\n\r")
+    me.expect("set mdi G0 X10", b"SET MDI ACK\n\r")
     machine.config = 2.0
-    me.say("set machine on", b"SET MACHINE ACK\n\r")
+    me.expect("set machine on", b"SET MACHINE ACK\n\r")
     assert machine.pose().x == 10.0
-    me.say("set machine off", b"SET MACHINE ACK\n\r")
-    me.say("set machine on", b"SET MACHINE ACK\n\r")
+    me.expect("set machine off", b"SET MACHINE ACK\n\r")
+    me.expect("set machine on", b"SET MACHINE ACK\n\r")
     assert machine.pose().x == 8.0
     assert machine.joints()[0] == 10.0
     assert machine.events == ["on", "home", "move", "on"]
@@ -225,31 +223,31 @@ def test_a_config_that_cannot_be_used_keeps_the_machine_off(client, machine):
     me = client()
     me.greet()
     machine.config = None
-    me.say("set estop off", b"SET ESTOP ACK\n\r")
-    me.say("set machine on", b"SET MACHINE ACK\n\r")
-    me.say("get machine", b"MACHINE OFF\r\n")
-    me.say("get error", b"ERROR machine.ini: has no geometry\r\n")
+    me.expect("set estop off", b"SET ESTOP ACK\n\r")
+    me.expect("set machine on", b"SET MACHINE ACK\n\r")
+    me.expect("get machine", b"MACHINE OFF\r\n")
+    me.expect("get error", b"ERROR machine.ini: has no geometry\r\n")
 
 
-def test_homing_that_is_aborted_leaves_it_unhomed(client, machine):
+def test_aborted_homing_leaves_the_machine_unhomed(client, machine):
     me = client()
     me.greet()
     machine.duration_s = 30.0
-    me.say("set estop off", b"SET ESTOP ACK\n\r")
-    me.say("set machine on", b"SET MACHINE ACK\n\r")
-    me.say("set home -1", b"SET HOME ACK\n\r")
+    me.expect("set estop off", b"SET ESTOP ACK\n\r")
+    me.expect("set machine on", b"SET MACHINE ACK\n\r")
+    me.expect("set home -1", b"SET HOME ACK\n\r")
     machine.wait_for("home")
-    me.say("set abort", b"SET ABORT ACK\n\r")
-    me.say("get joint_homed", b"JOINT_HOMED NO NO NO NO NO NO\r\n")
+    me.expect("set abort", b"SET ABORT ACK\n\r")
+    me.expect("get joint_homed", b"JOINT_HOMED NO NO NO NO NO NO\r\n")
 
 
-def test_silence(client, simulated):
+def test_a_silent_server_loses_lines(client, simulated):
     me = client()
     simulated.set_silent(on=True)
     me.send("get estop")
     me.expect_silence()
     simulated.set_silent(on=False)
-    me.say("get estop", b"ESTOP ON\r\n")
+    me.expect("get estop", b"ESTOP ON\r\n")
 
 
 @pytest.mark.parametrize("fault", ["estop", "following error"])
@@ -263,10 +261,10 @@ def test_faults_during_a_move_stop_it(client, simulated, machine, fault):
         simulated.state.set_estop(on=True)
     else:
         simulated.state.exceed_following_error()
-    assert me.hear(13) == b"SET MDI ACK\n\r"
-    me.say("get machine", b"MACHINE OFF\r\n")
-    me.say("get estop", b"ESTOP ON\r\n" if fault == "estop" else b"ESTOP OFF\r\n")
-    me.say("get error", b"ERROR OK\r\n" if fault == "estop" else b"ERROR joint 3 following error\r\n")
+    assert me.receive(13) == b"SET MDI ACK\n\r"
+    me.expect("get machine", b"MACHINE OFF\r\n")
+    me.expect("get estop", b"ESTOP ON\r\n" if fault == "estop" else b"ESTOP OFF\r\n")
+    me.expect("get error", b"ERROR OK\r\n" if fault == "estop" else b"ERROR joint 3 following error\r\n")
     assert machine.pose().x < 99.0
 
 
@@ -287,7 +285,7 @@ def test_closing_ends_a_move_and_may_be_repeated(client, simulated, machine):
     machine.duration_s = 30.0
     me.send("set mdi G0 X100")
     machine.wait_for("move")
-    machine.deaf_to = 2
+    machine.ignored_stops = 2
     simulated.close()
     simulated.close()
     assert machine.pose().x < 99.0

@@ -80,7 +80,7 @@ async def test_a_plunger_at_its_end(protocol):
         assert (await made.gauges["y"].read()).value_mm == 6.2
 
 
-async def test_a_data_button_is_not_mistaken_for_an_answer():
+async def test_the_frame_of_a_data_button_is_no_answer():
     async with cell(["mux10"] * 3) as made:
         await made.open()
         send_unsolicited(made.rack.line("x"), b"01A+0009.999\r")

@@ -47,7 +47,7 @@ async def test_a_late_answer_is_never_the_next_reading(sylvac):
     await sylvac.gauges["y"].check()
 
 
-async def test_cancelled_readings_leave_the_line_in_step(sylvac):
+async def test_after_cancelled_readings_answers_belong_to_their_requests(sylvac):
     line = sylvac.rack.line("y")
     line._latency_s = 0.02 * FAST
     questions = questions_to(line)
@@ -64,7 +64,7 @@ async def test_cancelled_readings_leave_the_line_in_step(sylvac):
 
 @pytest.mark.parametrize("protocol", PROTOCOLS)
 @pytest.mark.parametrize("garbled", [flip_digit, flip_bit])
-async def test_one_garbled_answer_never_gets_through(protocol, garbled):
+async def test_one_garbled_answer_is_never_accepted(protocol, garbled):
     async with cell([protocol] * 3, timeout_s=TIMEOUT_S) as made:
         await made.open()
         random = Random(0)
@@ -74,7 +74,7 @@ async def test_one_garbled_answer_never_gets_through(protocol, garbled):
             assert reading.value_mm == pytest.approx(2.0, abs=0.05)
 
 
-async def test_garbled_for_ever(sylvac):
+async def test_every_answer_garbled(sylvac):
     change_answers(sylvac.rack.line("y"), partial(flip_digit, random=Random(0)))
     outcomes = []
     for _ in range(5):
@@ -129,7 +129,7 @@ async def test_unplugged_during_a_question():
             await reading
 
 
-async def test_opening_again_finds_the_gauge_that_was_unplugged_unnoticed(sylvac):
+async def test_opening_finds_a_gauge_that_was_unplugged_and_plugged_in_again(sylvac):
     for _ in range(2):
         sylvac.rack.line("y").set_unplugged(on=True)
     for _ in range(2):
@@ -138,7 +138,7 @@ async def test_opening_again_finds_the_gauge_that_was_unplugged_unnoticed(sylvac
     assert (await sylvac.gauges["y"].read()).value_mm == 2.0
 
 
-async def test_a_socket_ended_unnoticed_is_opened_again():
+async def test_a_socket_that_was_cut_is_opened_again():
     async with cell(["mux10"] * 3, "socket") as made:
         await made.open()
         made.rack.line("x").set_unplugged(on=True)
@@ -149,7 +149,7 @@ async def test_a_socket_ended_unnoticed_is_opened_again():
             await made.gauges["y"].read()
 
 
-async def test_a_truth_that_fails_is_as_loud_as_a_broken_cable(caplog):
+async def test_an_error_of_the_simulation_breaks_the_line(caplog):
     def broken():
         raise ArithmeticError("the truth has no such pose")
 

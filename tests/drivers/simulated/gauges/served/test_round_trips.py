@@ -65,7 +65,7 @@ def test_an_unknown_protocol_is_refused_and_nothing_is_left_open():
 
 
 @pytest.mark.parametrize("asked", [False, True])
-async def test_a_pseudo_terminal_opens_with_parity_again_and_again(asked):
+async def test_a_pseudo_terminal_opens_with_parity_repeatedly(asked):
     settings = {"baudrate": 4800, "bytesize": 7, "parity": "E", "stopbits": 2, "exclusive": True}
     with served("sylvac") as line:
         for _ in range(5):
@@ -76,7 +76,7 @@ async def test_a_pseudo_terminal_opens_with_parity_again_and_again(asked):
             await link.close()
 
 
-def test_a_foreign_client_may_open_it_with_parity_again():
+def test_pyserial_opens_it_with_parity_repeatedly():
     with served("sylvac") as line:
         for _ in range(5):
             port = serial.Serial(line.url, 4800, bytesize=7, parity="E", stopbits=2, timeout=LONG_S)
@@ -95,7 +95,7 @@ async def test_questions_in_pieces_and_in_a_row_are_answered_in_order(transport)
         port.close()
 
 
-async def test_a_second_client_of_a_socket_is_turned_away():
+async def test_a_second_client_of_a_socket_is_refused():
     with served("sylvac", transport="socket") as line:
         one, two = SharedSerialPort(line.url, {}), SharedSerialPort(line.url, {})
         await one.open()
@@ -132,7 +132,7 @@ async def test_an_answer_takes_its_latency_and_its_time_on_the_wire(protocol, qu
         await link.close()
 
 
-async def test_a_faster_clock_shortens_the_pace():
+async def test_a_faster_clock_shortens_the_latency():
     with served("sylvac", factor=1000.0, latency_s=60.0) as line:
         link = SharedSerialPort(line.url, {})
         await link.open()
@@ -156,7 +156,7 @@ async def test_closing_does_not_wait_for_answers_that_are_due():
         line.set_unplugged(on=True)
 
 
-def test_nothing_stays_in_the_file_system():
+def test_the_link_and_its_folder_are_removed():
     with served("sylvac", name="gauge / of the x axis") as line:
         path = Path(line.url)
         assert path.name == "gauge-of-the-x-axis"
@@ -164,7 +164,7 @@ def test_nothing_stays_in_the_file_system():
     assert not path.parent.exists()
 
 
-def test_answers_to_nobody_are_lost_as_on_a_cable():
+def test_answers_without_a_client_are_lost():
     with served("sylvac") as line:
         for _ in range(1000):
             send_unsolicited(line, b"+9.999\r" * 10)

@@ -63,7 +63,7 @@ class GaugeZero:
 def estimate_gauge_zero(
     belief: RobotBelief, poses: PoseBatch, joints: Array, deviations: Array
 ) -> GaugeZero:
-    """The weighted mean of what each of a point's records (n) says of the zero.
+    """The weighted mean of the zeros by each of a point's records (n).
 
     Args:
         belief: what is known of the robot.

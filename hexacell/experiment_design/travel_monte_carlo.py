@@ -41,7 +41,7 @@ uncertain: the ball stays inside even if the prediction is wrong by a factor of 
 
 UNCERTAIN_SIGMA = float(np.radians(3.0))
 """Standard deviation, rad, beyond which the orientation is uncertain. Under the drawing's tolerances one
-robot in a hundred then deviates twenty times as far as linear propagation says."""
+robot in a hundred then deviates twenty times as far as linear propagation gives."""
 
 HALF_TRAVEL_SIGMA = float(np.radians(6.0))
 """Standard deviation of the orientation, rad, at which half of the travel may be used."""

@@ -9,6 +9,7 @@ import numpy as np
 
 from hexacell.errors import LimitError
 from hexacell.kinematics.rotations import Array
+from hexacell.measurements.records import deviation_of
 from hexacell.robot_model import Robot
 from procedures.calibration.path_planning import RunPathPlanner
 from procedures.run import events
@@ -22,7 +23,6 @@ from procedures.run.steps import (
     SetKey,
     SixNumbers,
     Step,
-    ThreeNumbers,
 )
 
 
@@ -96,15 +96,9 @@ def check_reference(
         leg = int(np.abs(sliders).argmax())
         reason = f"back at its reference q{leg + 1} shows {sliders[leg]:+.3f}, more than {limit_mm:g} mm"
         return events.SetInvalidated(at=at, reason=reason, reading=now)
-    return events.ReferenceConfirmed(at=at, change_mm=three_numbers(gauges), reading=now)
+    return events.ReferenceConfirmed(at=at, change_mm=deviation_of(gauges), reading=now)
 
 
 def in_words(deviation: Array) -> str:
     """Three numbers along x, y and z, mm."""
     return ", ".join(f"{axis} {value:+.3f}" for axis, value in zip("xyz", deviation, strict=True))
-
-
-def three_numbers(values: Array) -> ThreeNumbers:
-    """An array (3,) as the journal keeps it."""
-    x, y, z = (float(value) for value in values)
-    return x, y, z

@@ -14,9 +14,10 @@ from hexacell.controller_config.interface import ControllerGeometry
 from hexacell.errors import HexacellError, consists_only_of
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.rotations import Array
+from hexacell.measurements.records import deviation_of, joints_of
 from hexacell.robot_model import config_format
 from hexacell.runs.run_folder import RunFolder
-from procedures.calibration.set_steps import check_reference, in_words, three_numbers
+from procedures.calibration.set_steps import check_reference, in_words
 from procedures.calibration.workflow import Calibration
 from procedures.devices.device_set import Devices, Thermometers, gather_errors
 from procedures.devices.settling import Settled, settle
@@ -132,7 +133,7 @@ class StepExecutor:
             orientation=step.orientation,
             pose=step.pose,
             reading=reading,
-            deviation_mm=three_numbers(deviation),
+            deviation_mm=deviation_of(deviation),
         )
 
     async def _revisit(self, step: Revisit, state: RunState) -> events.Event:
@@ -155,9 +156,9 @@ class StepExecutor:
         zero = state.set(step.at).samples[0].reading
         drift = np.subtract(reading.gauges_mm, zero.gauges_mm)
         await self._check_gauges()
-        if drifted := self.guards.drift(str(step.at), three_numbers(drift)):
+        if drifted := self.guards.drift(str(step.at), deviation_of(drift)):
             raise drifted
-        return events.SetClosed(at=step.at, drift_mm=three_numbers(drift), reading=reading)
+        return events.SetClosed(at=step.at, drift_mm=deviation_of(drift), reading=reading)
 
     async def read(self) -> events.Reading:
         """One settled reading of all devices; raises ``HexacellError``."""
@@ -185,11 +186,10 @@ def _reading(
     for row, mounted in enumerate(devices.gauges):
         on_axes[mounted.axis.index] = mounted.axis.coordinate(means[row])
         spread[mounted.axis.index] = spreads[row]
-    q1, q2, q3, q4, q5, q6 = (float(value) for value in settled.joints.mean(axis=0))
     return events.Reading(
-        gauges_mm=three_numbers(on_axes),
-        spread_mm=three_numbers(spread),
-        joints_mm=(q1, q2, q3, q4, q5, q6),
+        gauges_mm=deviation_of(on_axes),
+        spread_mm=deviation_of(spread),
+        joints_mm=joints_of(settled.joints.mean(axis=0)),
         answers=tuple(tuple(reading.raw for reading in one.gauges) for one in settled.window),
         counts=tuple(one.encoders.counts for one in settled.window),
         temperatures=temperatures,

@@ -46,7 +46,7 @@ class Taken:
 
 @dataclass(eq=False)
 class Campaign:
-    """Whatever the plan decides, carried out; noise of 0.01 mm on all that is read."""
+    """Carries out all decisions of a plan, with noise of 0.01 mm on all readings."""
 
     plan: Plan
     truth: Geometry

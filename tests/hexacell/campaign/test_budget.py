@@ -9,12 +9,12 @@ import pytest
 from hexacell.campaign.budget import Budget, TimeModel
 
 
-def test_minutes_count_stations_records_and_closings():
+def test_minutes_are_of_points_records_and_references_read_again():
     pace = TimeModel(point_minutes=5.0, record_seconds=30.0)
     assert pace.minutes(10, 2) == pytest.approx(2 * 5.0 + 12 * 0.5)
 
 
-def test_without_a_limit_all_can_be_paid():
+def test_without_a_limit_all_records_are_left():
     assert Budget(None, None, TimeModel(5.0, 30.0)).records_left(1000, 100) == math.inf
 
 
@@ -24,7 +24,7 @@ def test_records_are_counted(records, stations, left):
 
 
 @pytest.mark.parametrize(("records", "stations", "left"), [(0, 1, 29), (29, 1, 0), (0, 2, 18), (0, 5, 0)])
-def test_minutes_are_what_is_left_after_stations_and_closings(records, stations, left):
+def test_minutes_left_are_those_after_points_and_references_read_again(records, stations, left):
     assert Budget(None, 20.0, TimeModel(5.0, 30.0)).records_left(records, stations) == left
 
 
@@ -34,7 +34,7 @@ def test_the_tighter_limit_holds():
     assert Budget(100, 20.0, TimeModel(5.0, 30.0)).description == "100 records or 20 minutes"
 
 
-def test_a_cells_pace(make_plan):
+def test_durations_of_a_cell(make_plan):
     by_hand = {"stations__placement": "by-hand", "identification__minutes_per_station": 7.0}
     assert TimeModel.of(make_plan(**by_hand).settings).point_minutes == 7.0
     assert TimeModel.of(make_plan().settings).point_minutes == 0.0, "fixed gauges are not carried"

@@ -1,4 +1,4 @@
-"""What a plan will give: the plan itself on simulated robots, each time the same."""
+"""The dry run of a plan on virtual robots; repeatable."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def result(make_plan):
     return dry_run(make_plan(**SMALL), robots=1)
 
 
-def test_it_is_what_a_campaign_then_gives(result, campaign, two_points):
+def test_the_result_is_that_of_a_campaign(result, campaign, two_points):
     outlook = two_points.forecast(campaign[-1].state)
     assert result.robots == 1
     assert result.points == 2

@@ -37,8 +37,8 @@ def measured(plan, truth, poses):
     return MeasurementSet(tuple(records))
 
 
-def test_no_robot_within_the_tolerances_leaves_the_travel_on_its_first_step(plan):
-    """Where straight propagation is trusted, as it is later, one in forty does."""
+def test_no_robot_within_the_tolerances_leaves_the_travel_at_its_second_record(plan):
+    """With linear propagation, as it is used later, one in forty would."""
     reference = plan.reference_pose(1)
     opened = CampaignState(measured(plan, robot_number(plan, 1), [reference]), 1, present=reference)
     first = plan.decide(opened)
@@ -64,7 +64,7 @@ def test_no_robot_within_the_tolerances_leaves_the_travel_on_its_first_step(plan
     ],
 )
 def test_a_search_that_ends_next_to_a_singularity_is_started_elsewhere(plan, number, small_turn):
-    """Robots of a thousand, by their number: between them and the drawing both records pass one."""
+    """Robots, by number, for which a singularity is between the drawing and both records."""
     measurements = measured(plan, robot_number(plan, number), [plan.reference_pose(1), small_turn])
     assert np.abs(measurements.records[1].deviation).max() > 2.0
     assert not estimate_online(plan.robot.problem(measurements)).converged

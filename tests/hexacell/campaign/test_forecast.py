@@ -1,4 +1,4 @@
-"""What sets of records would tell, and the error at the task poses, against the estimator itself."""
+"""Information of planned sets and error at the task poses, compared with the estimator."""
 
 from __future__ import annotations
 
@@ -27,8 +27,8 @@ def plan(make_plan):
     )
 
 
-def test_a_set_tells_what_the_estimator_then_knows(plan):
-    """The robot as drawn visits the sets; its records give the predicted covariance."""
+def test_the_information_of_sets_is_that_of_the_estimator(plan):
+    """The records of a robot as drawn at the sets give the predicted covariance."""
     belief = plan.robot.belief()
     virtual_robot = VirtualRobot(plan.robot, belief.estimate, np.random.default_rng(0))
     records = []
@@ -45,7 +45,7 @@ def test_a_set_tells_what_the_estimator_then_knows(plan):
     )
 
 
-def test_more_records_tell_more_and_one_nothing(plan):
+def test_information_grows_with_the_records_from_the_second_on(plan):
     seen = PlannedInformation.of(plan.planned_sets, plan.robot.belief())
     traces = [np.trace(seen.information(1, count)) for count in range(9)]
     assert traces[0] == traces[1] == 0.0
@@ -54,7 +54,7 @@ def test_more_records_tell_more_and_one_nothing(plan):
     assert np.linalg.eigvalsh(seen.information(2, 8)).min() > -1e-6 * traces[-1]
 
 
-def test_sets_begin_at_the_point_untilted_and_keep_to_the_limits(plan):
+def test_sets_begin_at_the_level_point_and_keep_the_limits(plan):
     for point, poses in zip(TWO_POINTS, plan.planned_sets, strict=True):
         assert len(poses) == 8
         np.testing.assert_allclose(poses.rotations[0], np.eye(3), atol=1e-12)
@@ -101,7 +101,7 @@ def test_without_task_poses_the_workspace_is_the_task(make_plan):
     assert outlook.now_mm > 1.0
 
 
-def test_task_poses_out_of_reach_leave_nothing_to_predict(make_plan, campaign):
+def test_without_reachable_task_poses_there_is_no_forecast(make_plan, campaign):
     plan = make_plan(task__poses=((0.0, 0.0, 3000.0, 0.0, 0.0, 0.0),), identification__points=TWO_POINTS)
     assert plan.forecast(CampaignState()) is None
     visit = plan.decide(campaign[3].state)

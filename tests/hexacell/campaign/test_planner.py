@@ -59,7 +59,7 @@ def test_a_reference_is_the_cells_point_untilted(campaign):
     assert np.isfinite(opening.joints).all()
 
 
-def test_visits_keep_the_ball_inside_and_are_as_expected(campaign):
+def test_records_are_inside_the_travel_and_as_expected(campaign):
     wrong = []
     for one, following in pairwise(campaign):
         if isinstance(one.decision, MeasurePose):
@@ -71,7 +71,7 @@ def test_visits_keep_the_ball_inside_and_are_as_expected(campaign):
     assert np.median(wrong) < 1.5
 
 
-def test_nothing_but_the_situation_decides(campaign, make_plan):
+def test_decisions_depend_on_the_state_alone(campaign, make_plan):
     """Another plan, without memory of what it decided before, decides the same to the last bit."""
     for one in (campaign[3], campaign[12], campaign[6]):
         fresh = make_plan(identification__points=TWO_POINTS, identification__orientations=8)
@@ -91,7 +91,7 @@ def test_the_error_after_each_record_is_as_forecast(campaign):
 
 
 def test_poses_and_expectations_are_in_the_controllers_frames(campaign, two_points, paper):
-    """A config whose base is turned upside down about the rails gets the same robot, turned."""
+    """A config with its base rotated by half a turn about the rails gives the same robot, rotated."""
     turned = np.diag([1.0, -1.0, -1.0])
     geometry = hexaglide_geometry(paper.nominal["S"] @ turned, paper.nominal["B"], paper.nominal["l"])
     robot = make_robot(two_points.settings, ControllerGeometry(geometry, paper.branch))
@@ -105,7 +105,7 @@ def test_poses_and_expectations_are_in_the_controllers_frames(campaign, two_poin
 
 
 @pytest.mark.parametrize("rejections", [0, REFUSALS, REFUSALS + 1])
-def test_refusals_bring_another_pose_until_the_point_is_given_up(campaign, two_points, rejections):
+def test_rejections_lead_to_another_pose_until_the_point_is_given_up(campaign, two_points, rejections):
     one = campaign[3]
     decision = two_points.decide(replace(one.state, rejections=rejections))
     if rejections > REFUSALS:
@@ -115,7 +115,7 @@ def test_refusals_bring_another_pose_until_the_point_is_given_up(campaign, two_p
         assert (decision.pose == one.decision.pose) == (rejections == 0)
 
 
-def test_a_point_that_offers_nothing_is_closed_with_the_reason(campaign, make_plan):
+def test_a_point_without_a_safe_pose_is_finished_with_the_reason(campaign, make_plan):
     plan = make_plan(identification__points=TWO_POINTS, limits__gauge_travel_mm=0.02)
     decision = plan.decide(campaign[2].state)
     assert isinstance(decision, FinishPoint)
@@ -132,7 +132,7 @@ def test_records_of_another_robot_are_refused(campaign, two_points):
         two_points.decide(replace(state, measurements=MeasurementSet(strange)))
 
 
-def test_a_budget_of_records_ends_it(make_plan, carry_out):
+def test_a_budget_of_records_ends_the_campaign(make_plan, carry_out):
     plan = make_plan(
         identification__points=TWO_POINTS,
         identification__orientations=8,
@@ -145,7 +145,7 @@ def test_a_budget_of_records_ends_it(make_plan, carry_out):
     assert [forecast.records for forecast in forecasts_of(taken)] == [*range(10, 3, -1), 2, 1]
 
 
-def test_a_record_alone_at_a_point_is_not_begun(make_plan, campaign):
+def test_a_point_is_not_begun_for_a_single_record(make_plan, campaign):
     plan = make_plan(
         identification__points=TWO_POINTS,
         identification__orientations=8,
@@ -206,13 +206,13 @@ def test_it_stops_where_nothing_is_worth_measuring(make_plan, carry_out, campaig
     assert any("would gain" in decision.reason for decision in closed)
 
 
-def test_nothing_is_begun_that_is_not_worth_it(make_plan):
+def test_a_point_without_enough_gain_is_not_begun(make_plan):
     plan = make_plan(identification__least_gain_mm=1000.0)
     assert plan.decide(CampaignState()) == Finished("no record would gain 1000 mm at the task poses")
 
 
-def test_points_are_chosen_by_what_they_tell_for_their_time(make_plan, carry_out):
-    """Beside a good point one that repeats it tells little, though it comes next in the file."""
+def test_points_are_chosen_by_their_gain_per_minute(make_plan, carry_out):
+    """A point close to one measured already gains little, though it is next in the file."""
 
     def plan(choose_points):
         return make_plan(
@@ -235,7 +235,7 @@ def test_points_are_chosen_by_what_they_tell_for_their_time(make_plan, carry_out
     assert worst[0] < worst[1]
 
 
-def test_dear_stations_are_left_later(make_plan, carry_out):
+def test_points_that_take_long_to_set_up_are_left_later(make_plan, carry_out):
     def plan(minutes):
         return make_plan(
             identification__choose_points=True,
@@ -250,7 +250,7 @@ def test_dear_stations_are_left_later(make_plan, carry_out):
 
 
 def test_no_provisional_geometry_before_the_robot_is_known_well_enough(campaign, make_plan):
-    """Two records leave the orientation open by degrees: such a geometry would command wrong poses."""
+    """After two records the orientation is uncertain by degrees, too much to command with."""
     plan = make_plan(identification__points=TWO_POINTS, identification__orientations=8)
     by_records = {len(one.state.measurements): one.state for one in campaign}
     assert not plan.allows_provisional(CampaignState())

@@ -1,4 +1,4 @@
-"""A fixed list of poses: read, visited in its order where that is safe, the others left waiting."""
+"""A fixed list of poses: read, and visited in its order where that is safe."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def test_a_list_that_is_safe_is_visited_in_its_order(plan_of, visited, carry_out
     assert isinstance(taken[-1].decision, Finished)
 
 
-def test_what_is_not_safe_yet_waits(plan_of, visited, carry_out):
+def test_a_pose_that_is_not_safe_yet_is_postponed(plan_of, visited, carry_out):
     """The widest pose listed first comes later, when enough is known."""
     reference, *others = visited[0]
     backwards = ((reference, *reversed(others)), visited[1])
@@ -64,7 +64,7 @@ def test_what_is_not_safe_yet_waits(plan_of, visited, carry_out):
     assert not _near(there[1], others[-1])
 
 
-def test_a_refused_pose_is_passed_over(plan_of, campaign, visited):
+def test_a_rejected_pose_is_skipped(plan_of, campaign, visited):
     plan = plan_of(visited)
     state = campaign[6].state
     first = plan.decide(state)
@@ -124,7 +124,7 @@ def test_a_list_is_read_beside_its_cell_file(cell):
     assert [pose.a for pose in listed.at(2)] == [0.0, -2.0]
 
 
-def test_no_list_no_poses(cell):
+def test_without_a_list_poses_are_selected(cell):
     plan = cell.settings.identification.model_copy(update={"poses": None})
     assert (
         pose_list_of(replace(cell, settings=cell.settings.model_copy(update={"identification": plan})))
@@ -132,12 +132,12 @@ def test_no_list_no_poses(cell):
     )
 
 
-def test_a_list_that_is_not_there(cell):
+def test_an_absent_list_is_an_error(cell):
     with pytest.raises(FileError, match=r"list\.csv: cannot be read"):
         pose_list_of(cell)
 
 
-def test_columns_of_poses_are_enough_and_needed(cell):
+def test_a_list_needs_the_columns_of_poses_only(cell):
     (cell.path.parent / "list.csv").write_text("point,orientation,x,y,z,a,b\n1,1,0,0,550,0,0\n")
     with pytest.raises(FileError, match=r"list\.csv:1: columns are missing: c\. .*x,y,z,a,b,c$"):
         pose_list_of(cell)

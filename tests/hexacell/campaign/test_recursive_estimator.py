@@ -1,4 +1,4 @@
-"""The chain of estimates: quick where it continues, the same where it is computed again."""
+"""The chain of estimates: continued from the last one, or computed again with the same result."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def estimates(robot, *sets):
     return [tracker.estimate(MeasurementSet(tuple(records))).identification for records in sets]
 
 
-def test_before_the_first_record_the_drawing_is_all(two_points):
+def test_before_the_first_record_the_estimate_is_the_drawing(two_points):
     known = OnlineEstimator(two_points.robot).estimate(MeasurementSet(()))
     assert known.identification is None
     np.testing.assert_array_equal(known.belief.covariance, two_points.robot.prior.covariance)
@@ -32,7 +32,7 @@ def test_before_the_first_record_the_drawing_is_all(two_points):
         known.gauge_zero(1)
 
 
-def test_what_was_asked_before_changes_nothing(two_points, records):
+def test_the_estimate_does_not_depend_on_earlier_calls(two_points, records):
     """Record by record, at once, after others, after too many: the same to the last bit."""
     robot = two_points.robot
     one_by_one = estimates(robot, *[records[:count] for count in range(1, 11)])[-1]
@@ -66,8 +66,8 @@ def test_the_same_records_are_not_fitted_twice(two_points, records, monkeypatch)
     assert fitted == [1, 2, 3, 4, 5]
 
 
-def test_an_implausible_estimate_is_started_again(two_points, records):
-    """Continued from far away it would end far away, and its cost shows that."""
+def test_an_implausible_estimate_is_repeated_from_other_starts(two_points, records):
+    """Continued from a distant estimate it would end in a local minimum, which its cost shows."""
     problem = two_points.robot.problem(MeasurementSet(records))
     good = estimate_online(problem)
     before = estimate_online(two_points.robot.problem(MeasurementSet(records[:-1])))
@@ -78,7 +78,7 @@ def test_an_implausible_estimate_is_started_again(two_points, records):
     assert recursive_estimator.cost(found) <= recursive_estimator.cost(good) * (1.0 + 1e-6)
 
 
-def test_the_station_is_where_the_gauges_were_zeroed(two_points, records, paper):
+def test_the_zero_is_where_the_gauges_were_zeroed(two_points, records, paper):
     known = OnlineEstimator(two_points.robot).estimate(MeasurementSet(records))
     found = known.identification
     assert found is not None

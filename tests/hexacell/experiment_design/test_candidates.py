@@ -1,4 +1,4 @@
-"""Orientations to choose from, and commands that really lead the controller to the joints meant."""
+"""Candidate orientations, and the commands that bring the controller to the intended joint variables."""
 
 from __future__ import annotations
 
@@ -18,14 +18,14 @@ def as_vectors(poses: PoseBatch) -> np.ndarray:
     return np.hstack([poses.positions, Rotation.from_matrix(poses.rotations).as_rotvec()])
 
 
-def test_orientations_are_the_same_for_the_same_seed_and_others_for_another():
+def test_orientations_depend_on_the_seed_alone():
     first, again, other = (orientations(64, TILT, seed) for seed in (7, 7, 8))
     np.testing.assert_array_equal(first, again)
     assert np.abs(first - other).max() > 0.1
 
 
 @pytest.mark.parametrize("tilt", [0.05, 0.3, TILT])
-def test_orientations_are_rotations_that_fill_the_tilts_allowed(tilt):
+def test_orientations_are_rotations_over_the_whole_range_of_tilts(tilt):
     turns = orientations(256, tilt, seed=1)
     np.testing.assert_allclose(
         turns @ np.swapaxes(turns, -1, -2), np.eye(3)[None].repeat(256, 0), atol=1e-12
@@ -54,7 +54,7 @@ def test_candidates_are_poses_of_the_estimated_robot(found, much, legs):
         assert np.abs(estimated.errors(target, joints)).max() < 1e-9
 
 
-def test_commands_lead_the_controllers_own_inverse_to_the_joints(found, paper, legs, vector_of):
+def test_inverse_kinematics_of_the_commands_gives_the_joints(found, paper, legs, vector_of):
     targets, commands = found
     controller = legs(paper.nominal)
     for row, joints in enumerate(targets.joints):
@@ -62,21 +62,21 @@ def test_commands_lead_the_controllers_own_inverse_to_the_joints(found, paper, l
         np.testing.assert_allclose(controller.joints(command), joints, atol=1e-6)
 
 
-def test_candidates_are_clear_of_singularities_on_both_sides(found, much, paper, legs):
+def test_candidates_keep_the_singularity_margin_of_both_geometries(found, much, paper, legs):
     targets, commands = found
     for poses, geometry in ((targets.poses, much.geometry), (commands, paper.nominal)):
         for vector, joints in zip(as_vectors(poses), targets.joints, strict=True):
             assert legs(geometry).margin(joints, vector) > 0.05 - 1e-4
 
 
-def test_candidates_keep_to_tilt_and_joint_limits(found):
+def test_candidates_keep_tilt_and_joint_limits(found):
     targets, _ = found
     assert targets.poses.tilts().max() <= TILT
     assert np.abs(targets.joints).max() <= 800.0
 
 
 def test_some_poses_of_the_estimated_robot_have_no_command(know, much):
-    """The unmodified controller cannot lead everywhere; what it cannot is left out."""
+    """Poses that the uncalibrated controller cannot command are left out."""
     poses = PoseBatch.at([0.0, 0.0, 550.0], orientations(256, TILT, seed=3))
     _, through_nominal = reachable(know(much), poses)
     targets, through_itself = reachable(know(much, controller=much.geometry), poses)
@@ -93,13 +93,13 @@ def test_some_poses_of_the_estimated_robot_have_no_command(know, much):
         {"singularity_margin": 0.12},
     ],
 )
-def test_every_limit_counts(know, much, limits, found, change):
+def test_every_limit_reduces_the_candidates(know, much, limits, found, change):
     tighter = know(much, limits=replace(limits, **change))
     fewer, _ = reachable(tighter, PoseBatch.at([0.0, 0.0, 550.0], orientations(256, TILT, seed=3)))
     assert 0 < len(fewer) < len(found[0])
 
 
-def test_nowhere_to_go_is_no_error(know, much):
+def test_no_candidate_is_no_error(know, much):
     targets, _ = reachable(know(much), PoseBatch.at([0.0, 0.0, 900.0], orientations(16, TILT, seed=3)))
     assert len(targets) == 0
 

@@ -29,10 +29,10 @@ def test_level_and_tilted_at_every_point(belief, paper):
     assert np.allclose(poses.positions, paper.points[0])
 
 
-def test_tilts_keep_to_a_smaller_limit(belief, paper):
+def test_tilts_keep_a_smaller_limit(belief, paper):
     narrow = replace(belief, limits=replace(LIMITS, tilt=np.radians(8.0)))
     assert np.degrees(workspace_poses(narrow, paper.points[:2]).tilts()).max() == pytest.approx(8.0)
 
 
-def test_what_is_out_of_reach_is_left_out(belief):
+def test_poses_out_of_reach_are_left_out(belief):
     assert len(workspace_poses(belief, np.array([[0.0, 2000.0, 500.0]]))) == 0

@@ -1,4 +1,4 @@
-"""The measurement that parts two parameters, against what it does once it is made."""
+"""The record that separates two correlated parameters, compared with its effect once it is measured."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ DEGREES = 30.0
 
 @pytest.fixture(scope="module")
 def measured(visit):
-    """Without noise, so that the estimate stays where it is when a record is added."""
+    """Without noise, so that one more record does not change the estimate."""
     return visit(seed=SEED, degrees=DEGREES).measured()
 
 
@@ -72,7 +72,7 @@ def test_the_record_changes_the_correlation_as_predicted(
         assert 1.0 - abs(correlation_of(more, pair)) > 1.05 * (1.0 - abs(pair.correlation))
 
 
-def test_the_ball_stays_where_the_gauges_are(found, belief, visit, reach, paper):
+def test_the_ball_stays_within_the_travel(found, belief, visit, reach, paper):
     exact = visit(seed=SEED, degrees=DEGREES)
     pairs = strongly_correlated(found)[:6]
     for part in filter(None, decorrelating_poses(belief, found, pairs)):
@@ -88,17 +88,17 @@ def test_limits_are_kept(found, belief):
     assert all(abs(part.degrees) < 15.0 for part in parts if part.axis != "z")
 
 
-def test_gauges_with_next_to_no_travel_leave_nothing_to_measure(found, belief):
+def test_with_almost_no_travel_there_is_no_record(found, belief):
     blind = replace(belief, limits=replace(LIMITS, gauge_travel_mm=1e-6))
     pairs = strongly_correlated(found)[:3]
     assert decorrelating_poses(blind, found, pairs) == (None, None, None)
 
 
-def test_where_nothing_is_in_reach_there_is_none(found, belief):
+def test_where_no_pose_is_in_reach_there_is_no_record(found, belief):
     stuck = replace(belief, limits=replace(LIMITS, joint_min_mm=0.0, joint_max_mm=1.0))
     pairs = strongly_correlated(found)[:1]
     assert decorrelating_poses(stuck, found, pairs) == (None,)
 
 
-def test_without_pairs_nothing_is_tried(found, belief):
+def test_without_pairs_there_are_no_records(found, belief):
     assert decorrelating_poses(belief, found, ()) == ()

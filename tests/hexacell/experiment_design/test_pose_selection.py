@@ -1,4 +1,4 @@
-"""The pose measured next: informative, and inside the travel whatever the robot turns out to be."""
+"""The pose measured next: informative, and inside the travel for any robot that the estimate allows."""
 
 from __future__ import annotations
 
@@ -43,14 +43,14 @@ def selected(belief, zero, turns, start=None):
 
 @pytest.fixture(scope="module", params=["little", "much"])
 def stage(request, know):
-    """An estimate, the station at the first point, and what is chosen there."""
+    """An estimate, the gauges' zero at the first point, and the pose selected there."""
     estimate = request.getfixturevalue(request.param)
     at = station_of(know, estimate, 1)
     return estimate, at, selected(know(estimate), at, TURNS)
 
 
 def stands(legs, geometry, joints, near):
-    """Where a machine (position and rotation vector) stands at joints, by the test's root finder."""
+    """The pose (position and rotation vector) at some joint variables, by the test's root finder."""
     pose = legs(geometry).closed(joints, near)
     assert pose is not None
     return pose
@@ -73,15 +73,15 @@ def test_the_prediction_keeps_the_travel_with_three_sigma(stage):
     assert SAFETY_SIGMAS >= 3.0
 
 
-def test_the_command_leads_the_controllers_own_inverse_to_the_joints(stage, paper, legs, vector_of):
+def test_inverse_kinematics_of_the_command_gives_the_joints(stage, paper, legs, vector_of):
     _, _, choice = stage
     np.testing.assert_allclose(
         legs(paper.nominal).joints(vector_of(choice.command)), choice.record.targets.joints[0], atol=1e-6
     )
 
 
-def test_the_estimated_robot_then_has_its_ball_where_the_gauges_were_zeroed(stage, legs):
-    """Not at the nominal point: the real one is millimetres away."""
+def test_the_estimated_robot_brings_the_ball_to_the_expected_deviation(stage, legs):
+    """From the estimated reference, which is millimetres from the nominal point."""
     estimate, at, choice = stage
     pose = aimed_at(legs, estimate, choice, at)
     np.testing.assert_allclose(pose[:3], at.reference + choice.record.deviation[0], atol=1e-6)
@@ -98,8 +98,8 @@ def test_reach_tilt_and_margin_are_kept(stage, paper, legs, vector_of):
     assert legs(paper.nominal).margin(joints, vector_of(choice.command)) > 0.05 - 1e-4
 
 
-def test_whatever_the_robot_turns_out_to_be_the_ball_stays_inside_the_travel(stage, legs, hexaglide):
-    """Many robots as likely as the estimate says, each moved from its own reference to the pose."""
+def test_the_ball_of_every_likely_robot_stays_inside_the_travel(stage, legs, hexaglide):
+    """Robots sampled from the estimate, each moved from its own reference to the pose."""
     estimate, at, choice = stage
     random = np.random.default_rng(0)
     robots = random.multivariate_normal(estimate.free, estimate.free_covariance, size=120)
@@ -124,10 +124,10 @@ def test_whatever_the_robot_turns_out_to_be_the_ball_stays_inside_the_travel(sta
     assert (spread < 1.5 * choice.record.sigma[0] + 0.02).all()
 
 
-def test_what_is_gained_is_what_the_record_then_takes_from_the_uncertainty(
+def test_the_gain_is_the_reduction_of_entropy_by_the_record(
     stage, know, paper, reach, make_problem, noisy, visit
 ):
-    """Measured, and the estimate made again: the entropy falls by about the predicted gain."""
+    """The entropy of the estimate with the record is lower by about the predicted gain."""
     estimate, _, choice = stage
     joints, pose = reach(paper.actual, paper.nominal, choice.command)
     few = visit(points=1, orientations=4, degrees=2.0, seed=5)
@@ -145,14 +145,14 @@ def test_what_is_gained_is_what_the_record_then_takes_from_the_uncertainty(
     assert fallen == pytest.approx(choice.gain, rel=0.3, abs=0.2)
 
 
-def test_no_other_orientation_that_fits_gains_more(know, much):
+def test_no_other_safe_orientation_gains_more(know, much):
     at = station_of(know, much, 1)
     best = selected(know(much), at, TURNS)
     for rows in (slice(0, 64), slice(64, 128), slice(128, 256)):
         assert selected(know(much), at, TURNS[rows]).gain <= WAYPOINT_GAIN_RATIO * best.gain
 
 
-def test_amplitudes_grow_with_what_is_known(know, little, much):
+def test_rotations_are_larger_when_more_is_known(know, little, much):
     def turned(estimate):
         at = station_of(know, estimate, 1)
         choice = selected(know(estimate), at, TURNS)
@@ -175,7 +175,7 @@ def test_the_choice_is_the_same_every_time(know, much):
 def test_the_path_from_the_present_pose_is_clear_and_inside_the_travel(
     know, much, paper, legs, vector_of, present
 ):
-    """From a pose of the first point, over the stops, looked at more closely than the choice does."""
+    """From a pose of the first point, over the waypoints, sampled more finely than in the selection."""
     at = station_of(know, much, 1)
     start = much.problem.commands.poses[[present]]
     choice = selected(know(much), at, TURNS, start)
@@ -201,7 +201,7 @@ def test_an_orientation_without_a_clear_path_is_not_selected(know, much):
         selected(know(much), at, TURNS, beyond)
 
 
-def test_stops_must_be_worth_the_moves_that_they_take(know, much, monkeypatch):
+def test_waypoints_are_taken_only_for_enough_gain(know, much, monkeypatch):
     """From a tilted pose: the selected orientation depends on what waypoints cost."""
     at, start = station_of(know, much, 1), much.problem.commands.poses[[2]]
 
@@ -216,7 +216,7 @@ def test_stops_must_be_worth_the_moves_that_they_take(know, much, monkeypatch):
     assert usual.gain >= (WAYPOINT_GAIN_RATIO if usual.waypoints else 1.0) * dear.gain
 
 
-def test_what_a_record_will_depend_on_is_how_it_moves_with_the_parameters(stage, legs, hexaglide):
+def test_the_jacobian_of_the_record_is_that_of_the_forward_kinematics(stage, legs, hexaglide):
     """By central differences of the test's own forward kinematics."""
     estimate, at, choice = stage
     goes_to = aimed_at(legs, estimate, choice, at)
@@ -248,7 +248,7 @@ def test_what_a_record_will_depend_on_is_how_it_moves_with_the_parameters(stage,
         ({"gauge_travel_mm": 1e-3}, "no orientation surely keeps the ball inside"),
     ],
 )
-def test_nothing_left_to_choose_says_why(know, much, limits, change, message):
+def test_without_a_safe_pose_the_error_gives_the_reason(know, much, limits, change, message):
     at = station_of(know, much, 1)
     belief = replace(know(much), limits=replace(limits, **change))
     with pytest.raises(LimitError, match=message) as caught:
@@ -259,8 +259,8 @@ def test_nothing_left_to_choose_says_why(know, much, limits, change, message):
 # --- the station ---
 
 
-def test_a_stations_reference_is_where_the_ball_was_when_zeroed(know, paper, visit):
-    """By exact records and the true geometry, all of them say the same place."""
+def test_the_estimated_zero_is_the_position_of_the_ball_when_zeroed(know, paper, visit):
+    """With exact records and the true geometry every record gives the same position."""
     exact = visit(seed=2)
     rows = slice(11, 22)
     measured = exact.measured()
@@ -274,7 +274,7 @@ def test_a_stations_reference_is_where_the_ball_was_when_zeroed(know, paper, vis
     np.testing.assert_allclose(at.orientation, exact.rotations[11])
 
 
-def test_a_reference_is_the_better_known_the_more_records_say_where_it_was(know, paper, visit):
+def test_more_records_reduce_the_covariance_of_the_zero(know, paper, visit):
     exact = visit(seed=2)
     measured = exact.measured()
     traces = []
@@ -290,7 +290,7 @@ def test_a_reference_is_the_better_known_the_more_records_say_where_it_was(know,
     assert traces[0] > traces[1] > traces[2] > 0.0
 
 
-def test_a_references_derivative_is_how_it_moves_with_the_parameters(know, paper, legs, visit, hexaglide):
+def test_the_jacobian_of_the_zero_is_that_of_the_forward_kinematics(know, paper, legs, visit, hexaglide):
     exact, rows = visit(seed=2), slice(0, 4)
     deviations = exact.measured().deviations[rows]
 

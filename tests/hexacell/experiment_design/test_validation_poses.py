@@ -39,7 +39,7 @@ def test_the_first_is_untilted_and_all_are_at_the_point(chosen, point):
 
 
 def test_the_uncorrected_robot_keeps_the_ball_inside_the_travel(chosen, paper, reach):
-    """The true one, through its unmodified controller: what the gauges will really see."""
+    """The true robot under its uncalibrated controller: what the gauges will show."""
     balls = []
     for row in range(COUNT):
         end = reach(paper.actual, paper.nominal, chosen.pose(row))
@@ -51,7 +51,7 @@ def test_the_uncorrected_robot_keeps_the_ball_inside_the_travel(chosen, paper, r
 
 
 def test_they_are_apart_from_each_other(chosen):
-    """As commanded, which is about as they really stand."""
+    """As commanded, which is about the actual orientation."""
     turns = Rotation.from_matrix(chosen.rotations)
     apart = [(turns[i] * turns[j].inv()).magnitude() for i in range(COUNT) for j in range(i)]
     assert np.degrees(min(apart)) > 2.0
@@ -59,7 +59,7 @@ def test_they_are_apart_from_each_other(chosen):
 
 
 def test_they_are_away_from_the_orientations_used(chosen, know, much, point, paper, reach):
-    """Where the platform really stood when the geometry was identified: the truth's orientations."""
+    """The actual orientations at which the geometry was identified."""
     used = much.poses.rotations
     away = select_validation_poses(know(much), point, COUNT, TURNS, used)
     np.testing.assert_array_equal(away.rotations[0], np.eye(3))
@@ -73,7 +73,7 @@ def test_they_are_away_from_the_orientations_used(chosen, know, much, point, pap
     assert nearest(away) > 1.2 * nearest(chosen)
 
 
-def test_an_orientation_used_already_is_the_last_to_be_taken(know, paper, limits):
+def test_an_orientation_used_already_is_selected_last(know, paper, limits):
     exactly = know(paper.nominal, limits=replace(limits, singularity_margin=0.02))
     centre = np.array([0.0, 0.0, 550.0])
     turns = PoseBatch.of([Pose(0, 0, 0, tilt) for tilt in (8.0, 16.0, -12.0)]).rotations
@@ -98,7 +98,7 @@ def test_lines_from_one_to_the_next_and_back_to_the_first_are_clear(chosen, know
         assert is_clear(know(much), chosen[[start]], chosen[[end]])
 
 
-def test_what_lies_beyond_a_singularity_is_not_taken_though_it_would_be_farthest(know, paper, limits):
+def test_a_pose_beyond_a_singularity_is_not_selected_though_it_is_farthest(know, paper, limits):
     """Tilted by 51 deg the platform has margin again, in another assembly mode."""
     exactly = know(paper.nominal, limits=replace(limits, singularity_margin=0.02, tilt=1.4))
     centre = np.array([0.0, 0.0, 550.0])
@@ -118,7 +118,7 @@ def test_the_choice_is_the_same_every_time(know, much, point, chosen):
     np.testing.assert_array_equal(again.rotations, chosen.rotations)
 
 
-def test_the_less_is_known_the_less_is_tilted(know, little, much, point):
+def test_tilts_are_smaller_when_less_is_known(know, little, much, point):
     def largest(estimate):
         poses = select_validation_poses(know(estimate), point, 3, TURNS)
         return Rotation.from_matrix(poses.rotations).magnitude().max()

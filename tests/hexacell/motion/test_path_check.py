@@ -18,7 +18,7 @@ def at(*numbers: float) -> PoseBatch:
 
 @pytest.fixture(scope="module")
 def exactly(know, paper, limits):
-    """A robot that is as drawn and known to be."""
+    """A robot as drawn, and known exactly."""
 
     def known(**change):
         return know(paper.nominal, limits=replace(limits, **change))
@@ -26,7 +26,7 @@ def exactly(know, paper, limits):
     return known
 
 
-def test_all_six_numbers_move_evenly_as_a_controllers_do():
+def test_all_six_numbers_are_interpolated_linearly():
     way = interpolate_line(at(0, 0, 500, -10, 0, 40), at(12, -24, 560, 14, 6, -8), pieces=4)
     numbers = [way.pose(row).as_tuple() for row in range(5)]
     np.testing.assert_allclose(numbers[0], (0, 0, 500, -10, 0, 40), atol=1e-9)
@@ -43,7 +43,7 @@ def test_an_open_line_is_clear(exactly):
     assert is_clear(exactly(), at(0, 0, 550), at(50, -60, 540, 20, -15, 25))
 
 
-def test_a_line_is_as_clear_in_both_directions(exactly):
+def test_a_line_is_clear_in_both_directions_or_in_none(exactly):
     ends = [at(0, 0, 550, 10), at(30, 20, 560, -20, 5, 10), at(0, 0, 550, 44), at(20, 0, 899)]
     for start in ends:
         for end in ends:
@@ -64,7 +64,7 @@ def test_a_line_through_a_singularity_is_refused_though_both_ends_are_clear(
 
 
 @pytest.mark.parametrize("start", np.arange(11.5, 17.5, 0.5))
-def test_a_singularity_between_two_of_the_poses_looked_at_is_seen(exactly, start):
+def test_a_singularity_between_two_samples_is_detected(exactly, start):
     """With a small limit and long pieces the margin alone may step over it."""
     assert 3.0 * PIECES == 36.0
     assert not is_clear(
@@ -72,7 +72,7 @@ def test_a_singularity_between_two_of_the_poses_looked_at_is_seen(exactly, start
     )
 
 
-def test_the_joint_range_holds_all_along(exactly):
+def test_the_joint_range_is_checked_along_the_line(exactly):
     """Both ends are inside; in the middle, where the platform is highest, no slider is."""
     tight = exactly(joint_min_mm=-480.0, joint_max_mm=480.0)
     low, high = at(0, -50, 600), at(0, 60, 600)
@@ -93,7 +93,7 @@ def test_the_line_is_clear_for_the_estimated_robot_too(know, paper):
     assert not is_clear(know(paper.actual), start, end)
 
 
-def test_the_ball_must_stay_inside_the_travel_all_along(know, paper, exactly):
+def test_the_travel_is_checked_along_the_line(know, paper, exactly):
     """A robot with errors: a tilt of 10 deg takes the ball millimetres away from the reference."""
     real = know(paper.actual)
     start, end = at(0, 0, 550), at(0, 0, 550, 0, 0, 20)

@@ -39,7 +39,7 @@ def home(well):
 
 
 def farthest(well, line):
-    """How far the ball gets from its place on lines over some commands, finely sampled."""
+    """The largest deviation of the ball on lines over some commands, finely sampled."""
     away = 0.0
     for start, end in pairwise(line):
         way = interpolate_line(start, end, 60)
@@ -97,7 +97,7 @@ def test_from_the_reference_itself_there_is_no_path_over_it(well, commands, home
     assert list(paths.via_reference(np.array([0, 1]))) == [None, None]
 
 
-def test_there_is_no_path_from_where_the_robot_cannot_be(well, commands):
+def test_there_is_no_path_from_a_command_out_of_reach(well, commands):
     beyond = PoseBatch.at([0.0, 0.0, 5000.0], np.eye(3)[None])
     planner = PathPlanner(well, beyond, beyond, BALL)
     assert not any(planner.plan(commands))

@@ -1,4 +1,4 @@
-"""The next move back to the reference: planned once, kept to, and else along the trail."""
+"""The next move back to the reference: on the path planned once, or else along the trail."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def test_without_any_clear_line_back_along_the_trail(plan: Any) -> None:
     assert move(TRAIL, 3) == 2
 
 
-def test_beside_the_planned_path_the_trail_leads_back(plan: Any) -> None:
+def test_off_the_planned_path_the_robot_returns_along_the_trail(plan: Any) -> None:
     plan(WAYPOINT, clear_to=(0,))
     assert move([*TRAIL, Pose(0, 0, 500, 20)], 3) == 0
     plan(WAYPOINT)

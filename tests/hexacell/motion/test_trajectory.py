@@ -1,4 +1,4 @@
-"""Where the real robot goes while its controller follows straight lines."""
+"""The actual path of a robot while its controller follows straight lines."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def here(hexaglide, paper, commanded):
 
 
 def stepwise(hexaglide, geometry, ways, joints, here, row, fineness=8):
-    """One line in much smaller steps, one after the other; nothing once the mode is lost."""
+    """One line in much smaller steps, one after the other; none where the assembly mode is left."""
     mode = assembly_mode(pose_jacobian(hexaglide, geometry, here, joints[0, [row]]))
     pose, found = here, []
     for piece in range(len(joints) - 1):
@@ -54,7 +54,7 @@ def stepwise(hexaglide, geometry, ways, joints, here, row, fineness=8):
     return np.array(found)
 
 
-def test_all_at_once_is_as_one_after_the_other(hexaglide, paper, commanded, here):
+def test_lines_corrected_at_once_are_those_tracked_step_by_step(hexaglide, paper, commanded, here):
     ways, joints = commanded
     actual, found = trace_path(hexaglide, paper.actual, ways, joints, here)
     agreeing = 0
@@ -84,7 +84,7 @@ def test_unconfirmed_lines_are_tracked_point_by_point_or_left_out(
 
 
 def test_a_jump_to_another_solution_is_not_a_path(hexaglide, paper, commanded, here, monkeypatch):
-    """Poses of another assembly mode amid a line, as a search that left its branch would find them."""
+    """Poses of another assembly mode within a line, as a search that left its branch would give."""
     ways, joints = commanded
     sure, is_sure = trace_path(hexaglide, paper.actual, ways, joints, here)
     honest = module._Robot.correct
@@ -106,7 +106,7 @@ def test_a_jump_to_another_solution_is_not_a_path(hexaglide, paper, commanded, h
     np.testing.assert_allclose(repaired.positions[:, is_sure], sure.positions[:, is_sure], atol=1e-3)
 
 
-def test_from_waypoint_to_waypoint():
+def test_lines_go_from_waypoint_to_waypoint():
     stop, end = PoseBatch.of([Pose(0, 0, 560, 10)]), PoseBatch.of([Pose(10, 0, 550, 0, 10, 0)])
     way = interpolate_lines((START, stop, end), refinement=2)
     pieces = len(way) - 1

@@ -1,4 +1,4 @@
-"""The paper's way, eq. 5 to 13: all pairs, ordinary least squares."""
+"""The paper's method, eq. 5 to 13: all pairs, ordinary least squares."""
 
 from __future__ import annotations
 
@@ -50,12 +50,12 @@ def test_the_pairwise_minimum_is_the_unweighted_centred_one(noisy, make_problem,
     np.testing.assert_allclose(centred.free, pairwise, rtol=0, atol=1e-6)
 
 
-def test_gauss_newton_says_where_it_got_lost(visit, make_problem):
+def test_gauss_newton_reports_that_it_left_the_assembly_mode(visit, make_problem):
     """From errors of millimetres it may step over a singularity; the paper asks for a good start."""
     with pytest.raises(ConvergenceError, match="assembly mode"):
         reference_solvers.gauss_newton(make_problem(visit(seed=0).measured()))
 
 
-def test_gauss_newton_says_when_its_steps_are_used_up(problem):
+def test_gauss_newton_reports_that_it_did_not_converge(problem):
     with pytest.raises(ConvergenceError, match="in 2 steps"):
         reference_solvers.gauss_newton(problem, steps=2)

@@ -1,4 +1,4 @@
-"""A campaign on a virtual robot that moves as a real one does."""
+"""A campaign on a virtual robot with all its moves."""
 
 from __future__ import annotations
 

@@ -11,7 +11,7 @@ from hexacell.cell.fields import NotNegative, Positive, Section, broken_rule
 
 
 class Action(StrEnum):
-    """How a failure is handled.
+    """How a failure is handled, the least severe action first.
 
     ``retry``: do the same again. ``measure-again``: reconnect the device if it was lost, return to the
     set's reference and, if the gauges kept their zero, take the record again. ``redo-set``: discard the

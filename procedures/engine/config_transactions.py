@@ -46,7 +46,12 @@ ROLL_BACK = Compute(kind="roll back")
 
 @dataclass(frozen=True, eq=False)
 class ConfigTransactions:
-    """Applies and reverts the changes of one run."""
+    """Applies and reverts the changes of one run; each method gives the event that confirms it.
+
+    Raises:
+        WriteBackUndone: the controller did not read the new geometry; its config is as before.
+        HexacellError: there is no geometry, or the config cannot be written or read.
+    """
 
     cell: Cell
     calibration: Calibration
@@ -55,29 +60,8 @@ class ConfigTransactions:
     folder: RunFolder
     operator: Operator
 
-    async def perform(self, step: Compute, state: RunState) -> events.Event:
-        """Do one of the four steps; gives the event that confirms it.
-
-        Raises:
-            WriteBackUndone: the controller did not read the new geometry; its config is as before.
-            HexacellError: there is no geometry, or the config cannot be written or read.
-        """
-        match step.kind:
-            case "lend":
-                return await self._apply_provisional(state)
-            case "take back":
-                return await self._revert_provisional(state)
-            case "commit":
-                return await self._apply_result(state)
-            case _:
-                return await self._revert_result()
-
     def change_to(self, geometry: Geometry, state: RunState) -> ConfigChange:
-        """The change of the config to a geometry in the frame convention; nothing is written.
-
-        Raises:
-            FileError: the config is not the one that the run began with.
-        """
+        """The change of the config to a geometry in the frame convention; nothing is written."""
         settings = self.cell.settings
         return propose(
             self.cell.config_path,
@@ -87,7 +71,8 @@ class ConfigTransactions:
             fingerprint_at_start=state.started.config_sha256 if state.started else "",
         )
 
-    async def _apply_provisional(self, state: RunState) -> events.Event:
+    async def apply_provisional(self, state: RunState) -> events.ProvisionalApplied:
+        """Give the controller a geometry to measure the remaining points with."""
         geometry = await in_thread(self.calibration.provisional_geometry, state)
         await self._apply(
             await in_thread(self.change_to, geometry, state),
@@ -97,7 +82,8 @@ class ConfigTransactions:
         )
         return events.ProvisionalApplied(geometry=geometry.document(), folder=PROVISIONAL_FOLDER)
 
-    async def _apply_result(self, state: RunState) -> events.Event:
+    async def apply_result(self, state: RunState) -> events.Committed:
+        """Give the controller the proposed geometry, once it is approved."""
         conditions = state.proposed.gates if state.proposed else ()
         refused = [gate.sentence for gate in conditions if not gate.passed and not gate.needs_person]
         if refused:
@@ -138,7 +124,8 @@ class ConfigTransactions:
             return False
         return True
 
-    async def _revert_provisional(self, state: RunState) -> events.Event:
+    async def revert_provisional(self, state: RunState) -> events.ProvisionalReverted:
+        """Give the controller the geometry of before the provisional one."""
         written = holds_provisional(self.folder, self.cell.config_path)
         if written:
             await in_thread(rollback, Receipt.of(self._provisional_backup))
@@ -155,7 +142,8 @@ class ConfigTransactions:
             raise
         return events.ProvisionalReverted()
 
-    async def _revert_result(self) -> events.Event:
+    async def revert_result(self) -> events.RolledBack:
+        """Give the controller the geometry of before the run."""
         await in_thread(rollback, Receipt.of(self.folder.path))
         await self.guards.reload()
         return events.RolledBack()

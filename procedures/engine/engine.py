@@ -204,8 +204,7 @@ class Engine:
     async def _obey_commands(self) -> None:
         """Between two steps: obey the commands that waited for the end of a step."""
         self._commands.catch_up()
-        self._record_invalidations()
-        self._leave_if_stopping()
+        self._obey_requests()
         flags = self._commands.flags
         if flags.pausing and (flags.at_once or not isinstance(self._last, _BEFORE_SAMPLING)):
             await self._pause(at_once=flags.at_once)
@@ -218,18 +217,16 @@ class Engine:
         self._commands.set_flags(pausing=False, at_once=False, paused=True)
         while self._commands.flags.paused:
             await self._commands.take_one()
-            self._record_invalidations()
-            self._leave_if_stopping()
+            self._obey_requests()
         self.record(events.Resumed())
 
-    def _leave_if_stopping(self) -> None:
-        if reason := self._commands.flags.stopping:
-            raise Interruption(reason)
-
-    def _record_invalidations(self) -> None:
+    def _obey_requests(self) -> None:
+        """Record what was made invalid; raises ``Interruption`` if the run is to end."""
         for event in self._commands.take_invalidations():
             if self.state.set(event.at).samples:
                 self.record(event)
+        if reason := self._commands.flags.stopping:
+            raise Interruption(reason)
 
     def _reject(self, command: Command, reason: str) -> None:
         self.record(events.CommandRejected(command=type(command).__name__, reason=reason))

@@ -59,8 +59,6 @@ OF_GUARDS: Mapping[Guard, FailureKind] = {
 }
 """Guards that tripped on nothing that a device said; any other is a kind of its own."""
 
-SEVERITY = (Action.RETRY, Action.MEASURE_AGAIN, Action.REDO_SET, Action.ASK, Action.ABORT)
-
 
 def kind_of(error: HexacellError) -> FailureKind:
     """The kind of one failure."""
@@ -109,7 +107,7 @@ def failed(
         failures.append(
             events.Failed(step=step, failure=kind, attempt=attempt, reason=str(error), action=action)
         )
-    return max(failures, key=lambda failure: SEVERITY.index(failure.action))
+    return max(failures, key=lambda failure: list(Action).index(failure.action))
 
 
 def choices(failure: events.Failed) -> tuple[Action, ...]:

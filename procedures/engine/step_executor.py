@@ -166,7 +166,7 @@ class StepExecutor:
         settled = await self.guards.during_readings(lambda: settle(self.devices, timing, self.clock))
         return _reading(self.devices, settled, await self.thermometers.read())
 
-    async def _compute(self, step: Compute, state: RunState) -> events.Event:
+    async def _compute(self, step: Compute, state: RunState) -> events.Event:  # noqa: PLR0911
         match step.kind:
             case "identify":
                 return await in_thread(self.computations.identify, state)
@@ -174,8 +174,14 @@ class StepExecutor:
                 return await in_thread(self.computations.propose, state)
             case "judge":
                 return await in_thread(self.computations.judge, state)
-            case _:
-                return await self.config.perform(step, state)
+            case "lend":
+                return await self.config.apply_provisional(state)
+            case "take back":
+                return await self.config.revert_provisional(state)
+            case "commit":
+                return await self.config.apply_result(state)
+            case "roll back":
+                return await self.config.revert_result()
 
 
 def _reading(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from enum import IntEnum
 from pathlib import Path
@@ -60,9 +60,6 @@ GET_COMMANDS: dict[str, Callable[[ClientSession], str]] = {
 }
 
 
-SettingT = TypeVar("SettingT", TaskMode, WaitMode)
-
-
 class Permission(IntEnum):
     """Which client may send a command."""
 
@@ -80,16 +77,37 @@ class SetCommand:
     execute: Callable[[ClientSession, str], bool]
 
 
-def _echo(session: ClientSession, argument: str) -> bool:
-    if (on := _on_or_off(argument)) is not None:
-        session.echo = on
-    return on is not None
+SettingT = TypeVar("SettingT")
 
 
-def _verbose(session: ClientSession, argument: str) -> bool:
-    if (on := _on_or_off(argument)) is not None:
-        session.verbose = on
-    return on is not None
+def _one_of(
+    settings: Mapping[str, SettingT], change: Callable[[ClientSession, SettingT], None]
+) -> Callable[[ClientSession, str], bool]:
+    """The effect of a command whose argument is one of some words."""
+
+    def execute(session: ClientSession, argument: str) -> bool:
+        word = argument.upper()
+        if word in settings:
+            change(session, settings[word])
+        return word in settings
+
+    return execute
+
+
+def _set_echo(session: ClientSession, on: bool) -> None:
+    session.echo = on
+
+
+def _set_verbose(session: ClientSession, on: bool) -> None:
+    session.verbose = on
+
+
+def _set_wait_mode(session: ClientSession, mode: WaitMode) -> None:
+    session.state.wait_mode = mode
+
+
+def _set_teleop(session: ClientSession, on: bool) -> None:
+    session.state.teleop = on
 
 
 def _enable(session: ClientSession, argument: str) -> bool:
@@ -102,64 +120,36 @@ def _enable(session: ClientSession, argument: str) -> bool:
     return False
 
 
-def _set_wait(session: ClientSession, argument: str) -> bool:
-    if (choice := _one_of(WaitMode, argument)) is None:
-        return False
-    session.state.wait_mode = choice
-    return True
-
-
-def _estop(session: ClientSession, argument: str) -> bool:
-    on = _on_or_off(argument)
-    return on is not None and session.state.set_estop(on=on)
-
-
-def _machine(session: ClientSession, argument: str) -> bool:
-    on = _on_or_off(argument)
-    return on is not None and session.state.set_machine(on=on)
-
-
-def _mode(session: ClientSession, argument: str) -> bool:
-    mode = _one_of(TaskMode, argument)
-    return mode is not None and session.state.set_mode(mode)
-
-
-def _teleop_enable(session: ClientSession, argument: str) -> bool:
-    if (on := _on_or_off(argument)) is not None:
-        session.state.teleop = on
-    return on is not None
-
-
-def _home(session: ClientSession, argument: str) -> bool:
-    return argument == "-1" and session.state.home()
-
-
 def _mdi(session: ClientSession, argument: str) -> bool:
     return session.state.mdi(argument)
 
 
 def _abort(session: ClientSession, _argument: str) -> bool:
-    return session.state.abort()
+    session.state.abort()
+    return True
 
 
-def _on_or_off(argument: str) -> bool | None:
-    return {"ON": True, "OFF": False}.get(argument.upper())
-
-
-def _one_of(choices: type[SettingT], argument: str) -> SettingT | None:
-    return next((choice for choice in choices if choice.value == argument.upper()), None)
-
+_SWITCH = {"ON": True, "OFF": False}
+_ALL_JOINTS = {"-1": -1}
+_TASK_MODES = {mode.value: mode for mode in TaskMode}
+_WAIT_MODES = {mode.value: mode for mode in WaitMode}
 
 SET_COMMANDS: dict[str, SetCommand] = {
-    "ECHO": SetCommand(Permission.ANYBODY, _echo),
-    "VERBOSE": SetCommand(Permission.ANYBODY, _verbose),
+    "ECHO": SetCommand(Permission.ANYBODY, _one_of(_SWITCH, _set_echo)),
+    "VERBOSE": SetCommand(Permission.ANYBODY, _one_of(_SWITCH, _set_verbose)),
     "ENABLE": SetCommand(Permission.ANYBODY, _enable),
-    "SET_WAIT": SetCommand(Permission.COMMANDER, _set_wait),
-    "ESTOP": SetCommand(Permission.COMMANDER, _estop),
-    "MACHINE": SetCommand(Permission.COMMANDER, _machine),
-    "MODE": SetCommand(Permission.ON, _mode),
-    "TELEOP_ENABLE": SetCommand(Permission.ON, _teleop_enable),
-    "HOME": SetCommand(Permission.ON, _home),
+    "SET_WAIT": SetCommand(Permission.COMMANDER, _one_of(_WAIT_MODES, _set_wait_mode)),
+    "ESTOP": SetCommand(
+        Permission.COMMANDER, _one_of(_SWITCH, lambda session, on: session.state.set_estop(on=on))
+    ),
+    "MACHINE": SetCommand(
+        Permission.COMMANDER, _one_of(_SWITCH, lambda session, on: session.state.set_machine(on=on))
+    ),
+    "MODE": SetCommand(
+        Permission.ON, _one_of(_TASK_MODES, lambda session, mode: session.state.set_mode(mode))
+    ),
+    "TELEOP_ENABLE": SetCommand(Permission.ON, _one_of(_SWITCH, _set_teleop)),
+    "HOME": SetCommand(Permission.ON, _one_of(_ALL_JOINTS, lambda session, _joints: session.state.home())),
     "MDI": SetCommand(Permission.ON, _mdi),
     "ABORT": SetCommand(Permission.ON, _abort),
 }

@@ -1,7 +1,7 @@
 """The state of the simulated controller, shared by all clients, and the effects of commands on it.
 
 Names and messages are LinuxCNC's: task state, mode, teleoperation, and a queue of operator errors.
-Commands return whether they succeeded, which becomes ACK or NAK.
+All commands but MDI blocks are acknowledged even without effect.
 """
 
 from __future__ import annotations
@@ -116,13 +116,12 @@ class ControllerState:
         """Remove and return the oldest operator error; OK if there is none."""
         return self._errors.popleft() if self._errors else "OK"
 
-    def set_estop(self, *, on: bool) -> bool:
+    def set_estop(self, *, on: bool) -> None:
         """Enter or leave emergency stop; entering switches the machine off."""
         with self._lock:
             if on:
                 self._switch_off()
             self.estop = on
-        return True
 
     def exceed_following_error(self) -> None:
         """A joint exceeds its following error: the machine is switched off, with an error message."""
@@ -130,25 +129,23 @@ class ControllerState:
             self._errors.append(f"joint {FAULTY_JOINT} following error")
             self._switch_off()
 
-    def set_machine(self, *, on: bool) -> bool:
+    def set_machine(self, *, on: bool) -> None:
         """Switch on or off; in emergency stop this is acknowledged without effect."""
         with self._lock:
             if not on:
                 self._switch_off()
             elif not self.estop and not self.enabled:
                 self._switch_on()
-        return True
 
-    def set_mode(self, mode: TaskMode) -> bool:
+    def set_mode(self, mode: TaskMode) -> None:
         """Change mode; MDI before homing is acknowledged without effect."""
         if mode is not TaskMode.MANUAL and not self.homed:
             self._errors.append("all joints must be homed before going into coordinated mode")
-            return True
+            return
         self.mode = mode
         self.teleop = mode is TaskMode.MANUAL and self.homed
-        return True
 
-    def home(self) -> bool:
+    def home(self) -> None:
         """Start homing; acknowledged at once, without effect outside joint mode."""
         if self.mode is not TaskMode.MANUAL:
             self._errors.append("can't do that (EMC_JOINT_HOME:123) in MDI mode")
@@ -156,16 +153,14 @@ class ControllerState:
             self._errors.append("must be in joint mode to home")
         else:
             self._start(self._home)
-        return True
 
-    def abort(self) -> bool:
+    def abort(self) -> None:
         """Stop the motion in place; waiting blocks are dropped."""
         with self._lock:
             self._abort_count += 1
             for job in self._jobs:
                 job.cancel()
             self.machine.stop()
-        return True
 
     def mdi(self, block: str) -> bool:
         """Carry out one block; with ``WaitMode.DONE`` returns when it has ended.

@@ -102,15 +102,18 @@ class CellSettings(Section):
             (("encoders",), "the encoders have no bus", self.encoders.bus),
             (("controller",), "the controller has no port", self.controller.port),
         ]
-        refusals = [_unreachable(place, problem) for place, problem, given in connections if given is None]
+        refusals = [
+            InitErrorDetails(
+                type=broken_rule(f"{problem}; only a cell with a [simulation] needs none", "Add it"),
+                loc=place,
+                input=None,
+            )
+            for place, problem, given in connections
+            if given is None
+        ]
         if refusals:
             raise ValidationError.from_exception_data(self.name, refusals)
         return self
-
-
-def _unreachable(place: tuple[str | int, ...], problem: str) -> InitErrorDetails:
-    rule = broken_rule(f"{problem}; only a cell with a [simulation] needs none", "Add it")
-    return InitErrorDetails(type=rule, loc=place, input=None)
 
 
 @cache

@@ -19,7 +19,7 @@ class ControllerGeometry:
 
 
 class ConfigFormat(Protocol):
-    """A kind of controller config; a plug-in's class takes no arguments."""
+    """A kind of controller config; a plug-in's class takes the parameters of the mechanism."""
 
     def read(self, path: Path) -> ControllerGeometry:
         """The geometry in the file.

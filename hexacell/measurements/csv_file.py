@@ -77,9 +77,7 @@ def _records(path: Path, text: str, wanted: tuple[str, ...]) -> dict[RecordId, t
         if len(row) != len(header):
             raise _wrong_width(path, line, row, header)
         cells = (*(row[column] for column in columns), *absent)
-        record = _record(cells)
-        if record is None:
-            raise _bad_cell(path, line, cells)
+        record = _record(path, line, cells)
         if record.id in found:
             raise _duplicate(path, record.id, found[record.id][0], line)
         found[record.id] = (line, record)
@@ -123,34 +121,28 @@ def _columns(path: Path, line: int, header: list[str], wanted: tuple[str, ...]) 
     raise FileError(problem, subject=path, line=line, action=f"The header must be {','.join(wanted)}")
 
 
-def _record(cells: tuple[str, ...]) -> Record | None:
-    """The record in the cells of ``HEADER``, or none if one of them is invalid."""
-    # Python accepts underscores in numbers; a CSV file must not have them.
-    if "_" in "".join(cells):
-        return None
+def _record(path: Path, line: int, cells: tuple[str, ...]) -> Record:
+    """The record in the cells of ``HEADER``."""
+    numbers = [_number(path, line, name, cell) for name, cell in zip(HEADER, cells, strict=True)]
+    point, orientation = int(numbers[0]), int(numbers[1])
+    q1, q2, q3, q4, q5, q6, dx, dy, dz = numbers[8:]
+    return Record(point, orientation, Pose(*numbers[2:8]), (q1, q2, q3, q4, q5, q6), (dx, dy, dz))
+
+
+def _number(path: Path, line: int, name: str, cell: str) -> float:
+    """The number in one cell of the column ``name``."""
+    is_count = name in COUNTS
     try:
-        point, orientation = int(cells[0]), int(cells[1])
-        numbers = tuple(map(float, cells[2:]))
+        number = int(cell) if is_count else float(cell)
     except ValueError:
-        return None
-    counts = 1 <= point <= LARGEST_COUNT and 1 <= orientation <= LARGEST_COUNT
-    if not counts or not all(map(math.isfinite, numbers)):
-        return None
-    q1, q2, q3, q4, q5, q6, dx, dy, dz = numbers[6:]
-    return Record(point, orientation, Pose(*numbers[:6]), (q1, q2, q3, q4, q5, q6), (dx, dy, dz))
-
-
-def _bad_cell(path: Path, line: int, cells: tuple[str, ...]) -> FileError:
-    """The error for the cell that :func:`_record` does not accept."""
-    good = ("1", "1", *("0" for _ in NUMBERS))
-    alone = ((*good[:place], cell, *good[place + 1 :]) for place, cell in enumerate(cells))
-    place = [_record(candidate) is None for candidate in alone].index(True)
-    name, cell = HEADER[place], cells[place]
-    expected = "a whole number from 1" if name in COUNTS else "a finite number"
+        number = math.nan
+    # Python accepts underscores in numbers; a CSV file must not have them.
+    if "_" not in cell and (1 <= number <= LARGEST_COUNT if is_count else math.isfinite(number)):
+        return number
+    expected = "a whole number from 1" if is_count else "a finite number"
     found = f'"{cell}"' if cell.strip() else "empty"
-    return FileError(
-        f"{name} is {found}, but must be {expected}", subject=path, line=line, action="Correct this cell"
-    )
+    problem = f"{name} is {found}, but must be {expected}"
+    raise FileError(problem, subject=path, line=line, action="Correct this cell")
 
 
 def _duplicate(path: Path, record: RecordId, first: int, line: int) -> FileError:

@@ -26,7 +26,6 @@ import os
 import socket
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -36,25 +35,6 @@ from hexacell.storage import atomic_files
 _LONGEST_NOTE = 4096
 # O_NOFOLLOW: in a shared folder a link must not turn the holder's note into a write to another file.
 _FLAGS = os.O_RDWR | os.O_NOFOLLOW
-
-
-@dataclass(frozen=True, slots=True)
-class LockOwner:
-    """The process that holds a cell; ``since`` is local time with its offset, ISO 8601."""
-
-    pid: int
-    user: str
-    host: str
-    since: str
-
-    @classmethod
-    def this_process(cls) -> LockOwner:
-        """This process as a holder, from now on."""
-        since = datetime.now(UTC).astimezone().isoformat(timespec="seconds")
-        return cls(os.getpid(), _user(), socket.gethostname(), since)
-
-    def __str__(self) -> str:
-        return f"process {self.pid} of {self.user} on {self.host} since {self.since}"
 
 
 @contextmanager
@@ -69,7 +49,7 @@ def cell_lock(config: Path) -> Iterator[None]:
     descriptor = _open(path)
     try:
         _acquire(descriptor, config)
-        _note(descriptor, json.dumps(asdict(LockOwner.this_process())) + "\n")
+        _note(descriptor, _this_process())
         try:
             yield
         finally:
@@ -114,9 +94,8 @@ def _acquire(descriptor: int, config: Path) -> None:
     try:
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except BlockingIOError as error:
-        holder = _holder(descriptor)
         raise CellBusy(
-            f"the cell is in use by {holder or 'another process'}",
+            f"the cell is in use by {_holder(descriptor)}",
             subject=config,
             action="Wait until that has ended, or stop it",
         ) from error
@@ -132,12 +111,20 @@ def _note(descriptor: int, text: str) -> None:
         os.ftruncate(descriptor, len(data))
 
 
-def _holder(descriptor: int) -> LockOwner | None:
+def _this_process() -> str:
+    """The note of this process as the holder from now on; ``since`` is local time, ISO 8601."""
+    since = datetime.now(UTC).astimezone().isoformat(timespec="seconds")
+    holder = {"pid": os.getpid(), "user": _user(), "host": socket.gethostname(), "since": since}
+    return json.dumps(holder) + "\n"
+
+
+def _holder(descriptor: int) -> str:
+    """The holder in a few words, by its note."""
     try:
         line = os.pread(descriptor, _LONGEST_NOTE, 0).splitlines()[0]
-        return LockOwner(**json.loads(line))
-    except (OSError, IndexError, TypeError, ValueError):
-        return None
+        return "process {pid} of {user} on {host} since {since}".format(**json.loads(line))
+    except (OSError, LookupError, TypeError, ValueError):
+        return "another process"
 
 
 def _user() -> str:

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from hexacell.errors import LimitError, ReachError
-from hexacell.kinematics.commanded_motion import ActualPoses, change_geometry
+from hexacell.kinematics.commanded_motion import ActualPoses
+from hexacell.kinematics.forward import continue_solution
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import inverse_kinematics
 from hexacell.kinematics.pose import Pose, PoseBatch
@@ -101,8 +102,12 @@ class VirtualRobot:
             LimitError: no pose of that geometry belongs to the joint variables.
         """
         joints = self._joints(self._commanded)
-        found = change_geometry(
-            model.mechanism, self.model.commanding, model.commanding, self._commanded, joints
+        found = continue_solution(
+            model.mechanism,
+            model.commanding,
+            joints,
+            start=self._commanded,
+            start_geometry=self.model.commanding,
         )
         if not found.found[0]:
             raise LimitError("no pose of this geometry belongs to the joint variables")

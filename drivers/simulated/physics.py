@@ -18,8 +18,7 @@ from hexacell.clock import CellClock
 from hexacell.controller_config.interface import ControllerGeometry
 from hexacell.errors import ReachError
 from hexacell.kinematics import rotations
-from hexacell.kinematics.commanded_motion import change_geometry
-from hexacell.kinematics.forward import forward_kinematics
+from hexacell.kinematics.forward import continue_solution, forward_kinematics
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import Mechanism, inverse_kinematics
 from hexacell.kinematics.pose import Pose, PoseBatch
@@ -107,7 +106,9 @@ class RobotPhysics:
         self._motion = Motion.stationary(joints[0])
         self._joints = joints[0]
         self._rows_passed = 0
-        first = change_geometry(mechanism, commanding.geometry, self._truth, start, joints)
+        first = continue_solution(
+            mechanism, self._truth, joints, start=start, start_geometry=commanding.geometry
+        )
         if not first.found[0]:
             raise ReachError(
                 f"the simulated machine cannot reach {home}",

@@ -13,7 +13,7 @@ from hexacell.clock import CellClock
 from hexacell.controller_config.interface import ConfigFormat, ControllerGeometry
 from hexacell.errors import FileError
 from hexacell.kinematics import rotations
-from hexacell.kinematics.commanded_motion import change_geometry
+from hexacell.kinematics.forward import continue_solution
 from hexacell.kinematics.mechanism import Mechanism
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.rotations import Array
@@ -91,7 +91,9 @@ class SimulatedMachine:
             here = self._pose_now()
             joints = self._joints(here)
             new = self._format.read(self._config)
-            found = change_geometry(self._mechanism, self._geometry.geometry, new.geometry, here, joints)
+            found = continue_solution(
+                self._mechanism, new.geometry, joints, start=here, start_geometry=self._geometry.geometry
+            )
             if not found.found[0]:
                 raise FileError(
                     "this geometry has no pose at the present slider positions", subject=self._config

@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hexacell.kinematics.forward import CONTINUATION_STAGES, ForwardResult, continue_solution
+from hexacell.kinematics.forward import ForwardResult, continue_solution
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import Branch, Mechanism
 from hexacell.kinematics.pose import PoseBatch
@@ -29,30 +29,6 @@ COMMAND_STAGES = (3,)
 
 JOINT_TOLERANCE_MM = 1e-6
 """Largest difference between the joint variables of a command and the required ones."""
-
-
-def change_geometry(
-    mechanism: Mechanism,
-    before: Geometry,
-    after: Geometry,
-    poses: PoseBatch,
-    joints: Array,
-    *,
-    stages: Sequence[int] = CONTINUATION_STAGES,
-) -> ForwardResult:
-    """Poses of another geometry at the same joint variables (n, 6), mm.
-
-    ``poses`` (n) close the geometry ``before`` at these joint variables; the result closes ``after``.
-    """
-    return continue_solution(
-        mechanism,
-        after,
-        joints,
-        start=poses,
-        start_geometry=before,
-        start_joints=joints,
-        stage_counts=stages,
-    )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -106,10 +82,19 @@ class CommandedRobot:
         A command is not found if the controller's geometry has no pose at these joint variables, or has
         one only on another assembly mode or branch.
         """
-        result = change_geometry(self.mechanism, self.actual, self.commanding, poses, joints, stages=stages)
+        result = continue_solution(
+            self.mechanism,
+            self.commanding,
+            joints,
+            start=poses,
+            start_geometry=self.actual,
+            stage_counts=stages,
+        )
         error = np.abs(np.nan_to_num(self.joints(result.poses), nan=np.inf) - joints)
         agrees = error.max(axis=-1, initial=0.0) < JOINT_TOLERANCE_MM
         return ForwardResult(result.poses, result.found & agrees)
 
     def _actual(self, commands: PoseBatch, joints: Array) -> ForwardResult:
-        return change_geometry(self.mechanism, self.commanding, self.actual, commands, joints)
+        return continue_solution(
+            self.mechanism, self.actual, joints, start=commands, start_geometry=self.commanding
+        )

@@ -145,18 +145,10 @@ def forward_kinematics(
     tolerance_mm: float = TOLERANCE_MM,
     max_steps: int = MAX_STEPS,
 ) -> ForwardResult:
-    """Poses of n joint vectors (n, 6), mm, by damped Newton's method from nearby poses.
+    """Poses of n joint vectors (n, 6), mm, by damped Newton's method from nearby poses ``start``.
 
-    A pose that has converged is not changed further.
-
-    Args:
-        mechanism: gives the constraints and their derivatives.
-        geometry: one for all poses, or one for each.
-        joints: (n, 6), mm.
-        start: n poses near the solutions.
-        mode: (n,) the required assembly mode; by default that of ``start``.
-        tolerance_mm: largest constraint of a solution.
-        max_steps: largest number of Newton steps.
+    A pose that has converged is not changed further. ``mode`` (n,) is the required assembly mode, by
+    default that of ``start``; ``tolerance_mm`` is the largest constraint of a solution.
     """
     iteration = _NewtonIteration(mechanism, geometry, joints, start, mode)
     for _ in range(max_steps):
@@ -176,20 +168,16 @@ def continue_solution(
     *,
     start: PoseBatch,
     start_geometry: Geometry,
-    start_joints: Array,
+    start_joints: Array | None = None,
     stage_counts: Sequence[int] = CONTINUATION_STAGES,
 ) -> ForwardResult:
     """Poses of n joint vectors (n, 6), mm, by continuation from n known poses.
 
-    Args:
-        mechanism: gives the constraints and their derivatives.
-        geometry: of the wanted poses.
-        joints: (n, 6), mm, of the wanted poses.
-        start: n poses that close ``start_geometry`` at ``start_joints``.
-        start_geometry: of the known poses.
-        start_joints: (n, 6), mm, of the known poses.
-        stage_counts: numbers of stages; the next one is tried for the poses where one fails.
+    ``start`` closes ``start_geometry`` at ``start_joints`` (n, 6), mm; by default these are ``joints``, and
+    only the geometry changes. Of ``stage_counts`` the next one is tried for the poses where one fails.
     """
+    if start_joints is None:
+        start_joints = joints
     poses = start
     found = np.zeros(len(joints), dtype=bool)
     for stages in stage_counts:

@@ -17,11 +17,8 @@ from hexacell.kinematics.rotations import Array
 class Geometry:
     """The parameters of one robot, in their own units.
 
-    ``geometry["S"]`` is the array of one kind, ``(6, 3)`` or ``(6,)``.
-
-    Attributes:
-        parameters: description of the numbers.
-        vector: (P,), in the order of ``parameters``; a read-only copy.
+    ``vector`` (P,) is a read-only copy, in the order of ``parameters``; ``geometry["S"]`` is the array
+    of one kind, ``(6, 3)`` or ``(6,)``.
 
     Raises:
         ValueError: the vector does not have one number for each parameter.
@@ -70,12 +67,7 @@ class Geometry:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class GeometryBatch:
-    """One geometry for each of n poses, for batched computations.
-
-    Attributes:
-        parameters: description of the numbers.
-        vectors: (n, P).
-    """
+    """One geometry for each of n poses, for batched computations; ``vectors`` are (n, P)."""
 
     parameters: ParameterSet
     vectors: Array

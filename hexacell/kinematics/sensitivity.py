@@ -41,14 +41,10 @@ def pose_jacobian(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Sensitivity:
-    """Derivatives of a pose by the joint variables and the parameters.
+    """Derivatives of a pose by the joint variables (n, 6, 6) and the parameters (n, 6, P).
 
-    Rows are the ball's position, mm, then the rotation vector in the base frame, rad.
-
-    Attributes:
-        joints: (n, 6, 6).
-        parameters: (n, 6, P).
-        mode: (n,), see :func:`assembly_mode`.
+    Rows are the ball's position, mm, then the rotation vector in the base frame, rad. ``mode`` (n,) is the
+    assembly mode.
     """
 
     joints: Array

@@ -51,11 +51,8 @@ class FaultHypothesis(ABC):
 class CorrectedFit:
     """A fit of records that are corrected for data faults.
 
-    Attributes:
-        original: all records as measured.
-        problem: the records after correction.
-        fit: their fit; the solver may have left out records next to a singularity.
-        faults: the hypotheses that were corrected for, in the order of selection.
+    ``original`` has all records as measured, ``problem`` those after correction. The solver may have left
+    out some of these, next to a singularity. ``faults`` are in the order of selection.
     """
 
     original: Problem

@@ -41,13 +41,9 @@ MIN_CORRELATION = -0.9
 
 @dataclass(frozen=True, slots=True)
 class NoiseLevel:
-    """One kind of noise, standard deviations in mm.
+    """One kind of noise: standard deviations, mm, stated in the cell file and estimated from the residuals.
 
-    Attributes:
-        stated: standard deviation in the cell file.
-        estimated: standard deviation from the residuals.
-        standard_error: of ``estimated``.
-        at_most: upper limit, two standard errors of the variance above the estimate.
+    ``at_most`` is an upper limit, two standard errors of the variance above the estimate.
     """
 
     stated: float
@@ -79,12 +75,10 @@ def noise_levels(found: Identification) -> NoiseLevels | None:
     """The noise levels from the residuals; None without redundancy."""
     noise = found.problem.noise
     stated = np.array([noise.encoder_mm, noise.gauge_mm]) ** 2
-    estimation = _Estimation.of(found)
-    if estimation.equations(stated).redundancy < 1.0:
+    if _Equations.at(found, stated).redundancy < 1.0:
         return None
-    variances = estimation.solve(stated)
-    information = estimation.equations(variances).information
-    covariance = np.linalg.inv(information)
+    variances = _solve(found, stated)
+    covariance = np.linalg.inv(_Equations.at(found, variances).information)
     errors = np.sqrt(np.diag(covariance))
     encoder, gauge = (
         NoiseLevel(
@@ -98,14 +92,42 @@ def noise_levels(found: Identification) -> NoiseLevels | None:
     return NoiseLevels(encoder, gauge, float(covariance[0, 1] / (errors[0] * errors[1])))
 
 
+def _solve(found: Identification, stated: Array) -> Array:
+    """The variances (2,), mm^2, that solve the estimating equation."""
+    variances = stated
+    for _ in range(MAX_STEPS):
+        before = variances
+        step = _Equations.at(found, variances).step()
+        variances = np.maximum(variances * np.exp(step), MIN_RATIO**2 * stated)
+        if np.abs(np.log(variances / before)).max() < TOLERANCE:
+            break
+    return variances
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class _Equations:
     """Both sides of the estimating equation (2,), and the information matrix of the variances (2, 2)."""
 
     variances: Array
-    found: Array
+    observed: Array
     expected: Array
     information: Array
+
+    @classmethod
+    def at(cls, found: Identification, variances: Array) -> _Equations:
+        """At some variances (2,), mm^2, with the parameters refitted under them."""
+        model = _refitted(found, variances)
+        by_joints = found.prediction.by_joints
+        encoder = by_joints @ np.swapaxes(by_joints, -1, -2)
+        cofactors = (encoder, np.broadcast_to(np.eye(3), encoder.shape))
+        scores = model.scores
+        observed = [np.einsum("ni,nij,nj->", scores, cofactor, scores) for cofactor in cofactors]
+        projected = model.weights - model.weights @ model.explained @ model.weights
+        products = [projected @ cofactor for cofactor in cofactors]
+        information = np.array([[np.einsum("nij,nji->", a, b) for b in products] for a in products])
+        expected = np.array([np.einsum("nii->", product) for product in products])
+        scale = 0.5 * (variances @ expected) / (variances @ information @ variances)
+        return cls(variances, np.array(observed), expected, scale * information)
 
     @property
     def redundancy(self) -> float:
@@ -114,60 +136,15 @@ class _Equations:
 
     def step(self) -> Array:
         """The Fisher scoring step of the logarithms of the variances."""
-        gradient = 0.5 * self.variances * (self.found - self.expected)
+        gradient = 0.5 * self.variances * (self.observed - self.expected)
         information = np.outer(self.variances, self.variances) * self.information
         step: Array = np.linalg.solve(information, gradient)
         return np.clip(step, -MAX_LOG_STEP, MAX_LOG_STEP)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Estimation:
-    """Restricted maximum likelihood estimation; ``cofactors`` are Q1 and Q2 (n, 3, 3)."""
-
-    identified: Identification
-    cofactors: tuple[Array, Array]
-
-    @classmethod
-    def of(cls, identified: Identification) -> _Estimation:
-        by_joints = identified.prediction.by_joints
-        encoder = by_joints @ np.swapaxes(by_joints, -1, -2)
-        return cls(identified, (encoder, np.broadcast_to(np.eye(3), encoder.shape)))
-
-    def solve(self, stated: Array) -> Array:
-        """The variances (2,), mm^2, that solve the estimating equation."""
-        variances = stated
-        for _ in range(MAX_STEPS):
-            before = variances
-            step = self.equations(variances).step()
-            variances = np.maximum(variances * np.exp(step), MIN_RATIO**2 * stated)
-            if np.abs(np.log(variances / before)).max() < TOLERANCE:
-                break
-        return variances
-
-    def equations(self, variances: Array) -> _Equations:
-        """The estimating equation at some variances (2,), with the parameters refitted under them."""
-        model = self._refitted(variances)
-        weighted = model.scores
-        projected = model.weights - model.weights @ model.explained @ model.weights
-        products = [projected @ cofactor for cofactor in self.cofactors]
-        information = np.array([[np.einsum("nij,nji->", a, b) for b in products] for a in products])
-        expected = np.array([np.einsum("nii->", product) for product in products])
-        redundancy = variances @ expected
-        return _Equations(
-            variances,
-            np.array(
-                [np.einsum("ni,nij,nj->", weighted, cofactor, weighted) for cofactor in self.cofactors]
-            ),
-            expected,
-            0.5 * information * redundancy / (variances @ information @ variances),
-        )
-
-    def _refitted(self, variances: Array) -> LinearizedModel:
-        """The linear model with the parameters that are best under some variances (2,), mm^2."""
-        problem, prediction = self.identified.problem, self.identified.prediction
-        encoder, gauge = np.sqrt(variances).tolist()
-        weights = record_weights(
-            prediction.by_joints, replace(problem.noise, encoder_mm=encoder, gauge_mm=gauge)
-        )
-        reweighted = replace(prediction, weights=weights)
-        return LinearizedModel.around(problem, reweighted, self.identified.active_prior)
+def _refitted(found: Identification, variances: Array) -> LinearizedModel:
+    """The linear model with the parameters that are best under some variances (2,), mm^2."""
+    encoder, gauge = np.sqrt(variances).tolist()
+    noise = replace(found.problem.noise, encoder_mm=encoder, gauge_mm=gauge)
+    reweighted = replace(found.prediction, weights=record_weights(found.prediction.by_joints, noise))
+    return LinearizedModel.around(found.problem, reweighted, found.active_prior)

@@ -8,7 +8,7 @@ nearest to its encoders. Its pose under any other geometry is found by continuat
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -64,13 +64,7 @@ class CommandedPoses:
         return self.candidate_geometries[int(np.argmax(counts))]
 
     def __getitem__(self, rows: Mask | NDArray[np.intp]) -> CommandedPoses:
-        return CommandedPoses(
-            self.mechanism,
-            self.poses[rows],
-            self.candidate_geometries,
-            self.choice[rows],
-            self.joints[rows],
-        )
+        return replace(self, poses=self.poses[rows], choice=self.choice[rows], joints=self.joints[rows])
 
     def solve_poses(self, geometry: Geometry, joints: Array) -> ForwardResult:
         """Poses that close ``geometry`` at joint variables (n, 6), mm, near the commanded ones."""

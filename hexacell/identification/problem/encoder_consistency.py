@@ -31,11 +31,8 @@ MAX_OUTLIER_SHARE = 0.2
 class EncoderConsistency:
     """The measured joint variables and the commanded poses of n records.
 
-    Attributes:
-        measured: (n, 6), mm.
-        labels: (n, 2) point and orientation.
-        drawing: every geometry of the controller is within ``widths`` of it.
-        widths: (c,), the tolerances of the numbers of one leg, in the order of the kinds.
+    The controller's geometries are within ``widths`` (c,) of the drawing: the tolerances of the numbers of
+    one leg, in the order of the kinds. ``measured`` is (n, 6), mm; ``labels`` are point and orientation.
     """
 
     commands: CommandedPoses

@@ -26,8 +26,6 @@ class Noise:
     """Standard deviations of the readings of a record and of the gauges' alignment and scale.
 
     Attributes:
-        encoder_mm: of a joint variable.
-        gauge_mm: of a gauge reading.
         alignment: of each component of a station's small rotation against the base, rad; zero if exact.
         gauge_scale: of each gauge's relative scale error; zero if exact.
     """
@@ -186,19 +184,15 @@ class Problem:
     def subset(self, rows: Mask) -> Problem:
         """The problem of some of the records (n,)."""
         kept = np.flatnonzero(rows)
-        return Problem(
-            self.mechanism,
-            self.prior,
-            self.noise,
-            self.joints[kept],
-            self.deviations[kept],
-            _first_rows(self.labels[kept, 0]),
-            self.commands[kept],
-            self.initial_parameters,
-            self.start[kept],
-            self.has_start_pose[kept],
-            self.labels[kept],
-            self.gauges,
+        return replace(
+            self,
+            joints=self.joints[kept],
+            deviations=self.deviations[kept],
+            first_rows=_first_rows(self.labels[kept, 0]),
+            commands=self.commands[kept],
+            start=self.start[kept],
+            has_start_pose=self.has_start_pose[kept],
+            labels=self.labels[kept],
         )
 
 
@@ -214,16 +208,9 @@ def build_problem(
 ) -> Problem:
     """The problem of a measurement set.
 
-    Args:
-        mechanism: kind of robot.
-        measurements: the records.
-        controller: geometry under which the poses were commanded, in any frames. Records from before
-            the last calibration may have been commanded under the drawing instead.
-        branch: of the inverse kinematics.
-        prior: of the geometry.
-        noise: of the readings.
-        provisional: further geometries under which records may have been commanded, in the frame
-            convention, the last one used last.
+    The poses were commanded under the ``controller``'s geometry, in any frames, or under ``provisional``
+    ones, in the frame convention, the last one used last. Records from before the last calibration may
+    have been commanded under the drawing.
 
     Raises:
         IdentifiabilityError: joint variables do not belong to the commanded poses, or for most records

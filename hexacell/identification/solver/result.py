@@ -71,13 +71,9 @@ class GaugeFaultError(IdentifiabilityError):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class GeometryEstimate:
-    """An identified geometry with its uncertainty, what the acceptance depends on.
+    """An identified geometry with the standard deviations (P,), mm, of its parameters.
 
-    Attributes:
-        geometry: in the mechanism's frame convention, mm.
-        sigma: standard deviations (P,), mm, of its parameters.
-        termination: why the solver ended.
-        undetermined: parameters about which the data have almost no information.
+    About the ``undetermined`` parameters the data have almost no information.
     """
 
     geometry: Geometry

@@ -48,9 +48,9 @@ def solve_around_singularities(
         restorable, their_poses = _restorable(problem, free, aside)
         if not restorable.any():
             break
-        poses = _merged(problem.records, used, poses, restorable, their_poses)
+        every = problem.start.with_rows(used, poses).with_rows(restorable, their_poses)
         used, restored = used | restorable, restored | restorable
-        poses = poses[used]
+        poses = every[used]
     return kept, solution
 
 
@@ -63,11 +63,3 @@ def _restorable(problem: Problem, free: Array, aside: Mask) -> tuple[Mask, PoseB
     restorable = np.zeros(problem.records, dtype=bool)
     restorable[aside] = clear
     return restorable, solved.poses[clear]
-
-
-def _merged(records: int, used: Mask, poses: PoseBatch, others: Mask, other_poses: PoseBatch) -> PoseBatch:
-    """The poses of all records (n,), those of neither mask zero."""
-    positions, rotations = np.zeros((records, 3)), np.zeros((records, 3, 3))
-    positions[used], rotations[used] = poses.positions, poses.rotations
-    positions[others], rotations[others] = other_poses.positions, other_poses.rotations
-    return PoseBatch(positions, rotations)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hexacell.campaign.decisions import CampaignState
-from hexacell.campaign.pose_list import PoseList, is_same_pose, without_visited
+from hexacell.campaign.pose_list import PoseList, without_visited
 from hexacell.campaign.task_accuracy import Task
 from hexacell.cell.model import CellSettings
 from hexacell.errors import LimitError
@@ -64,7 +64,7 @@ class PoseChooser:
         if state.present is None:
             return selected, ()
         visited = _visited(state)
-        waypoints = [self._as_visited(visited, self.robot.to_command(pose)) for pose in selected.waypoints]
+        waypoints = [_as_visited(visited[:1], self.robot.to_command(pose)) for pose in selected.waypoints]
         path = [*visited[start : start + 1], *waypoints]
         if state.present in path:  # the usual case; the path was checked when the pose was selected
             return selected, tuple(path[path.index(state.present) + 1 :])
@@ -103,11 +103,6 @@ class PoseChooser:
         orientations = candidates.orientations(self.candidates, tilt, self._seed(state), amplitudes)
         return select_pose(planner, zero, orientations, self._criterion(belief))
 
-    @staticmethod
-    def _as_visited(visited: list[Pose], waypoint: Pose) -> Pose:
-        """The reference exactly as visited, if the waypoint is the reference."""
-        return visited[0] if visited and is_same_pose(visited[0], waypoint) else waypoint
-
     def _criterion(self, belief: RobotBelief) -> Criterion:
         name = self.settings.identification.criterion
         if name == "parameters":
@@ -120,6 +115,12 @@ class PoseChooser:
         point = state.point or 0
         attempt = state.records_at(point) + 100 * state.rejections
         return self.settings.identification.seed + 1000 * point + attempt
+
+
+def _as_visited(visited: list[Pose], waypoint: Pose) -> Pose:
+    """A waypoint exactly as visited, if it was."""
+    same = PoseBatch.of(visited).is_same(PoseBatch.of([waypoint]))
+    return visited[int(np.argmax(same))] if same.any() else waypoint
 
 
 def _visited(state: CampaignState) -> list[Pose]:

@@ -11,15 +11,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-
 from hexacell.cell.loader import Cell
 from hexacell.errors import FileError
-from hexacell.kinematics.pose import Pose
+from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.measurements.csv_file import read_poses
-
-SAME_MM_DEG = 1e-6
-"""Numbers of a pose that differ by less are the same, written and read again."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,9 +65,5 @@ def pose_list_of(cell: Cell) -> PoseList | None:
 
 def without_visited(poses: tuple[Pose, ...], visited: list[Pose]) -> tuple[Pose, ...]:
     """The poses that were not visited yet."""
-    return tuple(pose for pose in poses if not any(is_same_pose(pose, other) for other in visited))
-
-
-def is_same_pose(one: Pose, other: Pose) -> bool:
-    """Whether two poses are the same up to rounding."""
-    return bool(np.abs(np.subtract(one.as_tuple(), other.as_tuple())).max() < SAME_MM_DEG)
+    done = PoseBatch.of(visited)
+    return tuple(pose for pose in poses if not done.is_same(PoseBatch.of([pose])).any())

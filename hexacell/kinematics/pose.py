@@ -14,6 +14,10 @@ from hexacell.kinematics.rotations import Array, Mask
 Index = slice | NDArray[np.intp] | Mask | list[int]
 """Which poses of a batch. With two axes a pair: which poses of a line, and which lines."""
 
+SAME_MM = 1e-6
+SAME_ANGLE = float(np.radians(1e-6))
+"""Poses that differ by less are the same, converted between frames, or written and read again."""
+
 
 @dataclass(frozen=True, slots=True)
 class Pose:
@@ -106,6 +110,13 @@ class PoseBatch:
     def pose(self, row: int) -> Pose:
         """The pose in a row, in mm and deg."""
         return Pose.of(self.positions[row], self.rotations[row])
+
+    def is_same(self, other: PoseBatch) -> Mask:
+        """Which of n poses are another one (1), up to rounding."""
+        distance = np.abs(self.positions - other.positions).max(axis=-1)
+        angle = np.abs(self.rotations - other.rotations).max(axis=(-2, -1))
+        same: Mask = (distance < SAME_MM) & (angle < SAME_ANGLE)
+        return same
 
     def tilts(self) -> Array:
         """Angles (n,), rad, between the platform's z axis and the base's."""

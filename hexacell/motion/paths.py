@@ -29,7 +29,7 @@ from numpy.typing import NDArray
 
 from hexacell.identification.belief import RobotBelief
 from hexacell.kinematics.pose import Pose, PoseBatch
-from hexacell.kinematics.rotations import Array, Mask
+from hexacell.kinematics.rotations import Array
 from hexacell.motion.path_check import CheckedLines, LinesFrom, is_clear
 from hexacell.motion.trajectory import PIECES
 
@@ -38,10 +38,6 @@ Rows = NDArray[np.intp]
 WAYPOINT_PIECES = (1, PIECES // 3, 2 * PIECES // 3, PIECES - 1)
 """Pieces of the straight line after which the waypoints are: closer together near the ends, where
 rotations are large and the ball moves fastest."""
-
-SAME_MM = 1e-6
-SAME_ANGLE = float(np.radians(1e-6))
-"""Commands that differ by less are the same, converted between frames."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -205,16 +201,9 @@ def next_return_move(belief: RobotBelief, reference: Array, trail: PoseBatch, de
     here, home = trail[[-1]], trail[[0]]
     (path,) = PathPlanner(belief, trail[[departure]], None, reference).plan(home)
     waypoints = () if path is None else path.waypoints
-    line = PoseBatch.of([trail.pose(departure), *waypoints])
-    if path is not None and _is_same(line, here).any():
-        passed = int(np.argmax(_is_same(line, here)))
+    at_waypoint = PoseBatch.of([trail.pose(departure), *waypoints]).is_same(here)
+    if path is not None and at_waypoint.any():
+        passed = int(np.argmax(at_waypoint))
         return waypoints[passed] if passed < len(waypoints) else 0
     shortcuts = (row for row in range(len(trail) - 2) if is_clear(belief, here, trail[[row]], reference))
     return next(shortcuts, len(trail) - 2)
-
-
-def _is_same(poses: PoseBatch, other: PoseBatch) -> Mask:
-    distance = np.abs(poses.positions - other.positions).max(axis=-1)
-    angle = np.abs(poses.rotations - other.rotations).max(axis=(-2, -1))
-    same: Mask = (distance < SAME_MM) & (angle < SAME_ANGLE)
-    return same

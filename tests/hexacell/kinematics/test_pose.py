@@ -72,3 +72,10 @@ def test_tilt_is_the_angle_between_the_z_axes_and_knows_no_turn_about_them():
     np.testing.assert_allclose(
         np.degrees(tilts.tilts()), [0.0, 30.0, 40.0, np.degrees(np.arccos(0.25))], atol=1e-6
     )
+
+
+def test_poses_that_differ_by_rounding_alone_are_the_same():
+    poses = PoseBatch.of(
+        [Pose(1, 2, 3, 4, 5, 180), Pose(1, 2, 3 + 1e-9, 4, 5, -180), Pose(1, 2, 3, 4, 5, 179.99)]
+    )
+    assert poses.is_same(poses[:1]).tolist() == [True, True, False]

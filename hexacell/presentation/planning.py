@@ -5,13 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from drivers.interfaces import DeviceIdentity
-from hexacell.application.offline import NextPose, PlanTrial
+from hexacell.application.offline import PlanTrial
 from hexacell.campaign.decisions import Finished, Forecast, MeasurePose, StartPoint
-
-
-def next_pose_text(proposed: NextPose) -> tuple[str, str]:
-    """What to do now, and what the remaining records gain."""
-    return decision_text(proposed.decision), forecast_text(proposed.forecast)
 
 
 def decision_text(decision: StartPoint | MeasurePose | Finished) -> str:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import chain, repeat
 
 import numpy as np
 
@@ -42,9 +42,8 @@ class Assessment:
         repeatability: none where no pose was visited twice.
         record_noise_mm: scatter of a deviation by the stated noise (root mean square distance), to
             compare the repeatability with.
-        correlated: strongly correlated pairs of parameters, the strongest first.
-        decorrelating_poses: for the first of these pairs, the record that would separate them; the
-            command is in the controller's frames.
+        correlated: strongly correlated pairs of parameters, the strongest first; with the first
+            ``SEPARATED_PAIRS`` the record that would separate them, commanded in the controller's frames.
         task: poses at which the accuracy is predicted, in the controller's frames.
         task_named: whether the cell file names them; else they span the workspace.
         accuracy: at these poses; none where the robot can reach none of them. Where the residuals
@@ -56,8 +55,7 @@ class Assessment:
     noise: NoiseLevels | None
     repeatability: Repeatability | None
     record_noise_mm: float
-    correlated: tuple[CorrelatedPair, ...]
-    decorrelating_poses: tuple[DecorrelatingPose | None, ...]
+    correlated: tuple[tuple[CorrelatedPair, DecorrelatingPose | None], ...]
     task: tuple[Pose, ...]
     task_named: bool
     accuracy: Accuracy | None
@@ -86,7 +84,6 @@ def assess(
     settings: CellSettings, robot: Robot, measurements: MeasurementSet, found: Identification
 ) -> Assessment:
     """Check an identification of some measurements, and predict the accuracy with it."""
-    pairs = strongly_correlated(found)
     left_out = {record for record, _ in found.left_out}
     task, accuracy = _accuracy(settings, robot, found)
     return Assessment(
@@ -95,8 +92,7 @@ def assess(
         noise=noise_levels(found),
         repeatability=repeatability(measurements, left_out),
         record_noise_mm=_record_noise_mm(found),
-        correlated=pairs,
-        decorrelating_poses=_decorrelating_poses(robot, found, pairs[:SEPARATED_PAIRS]),
+        correlated=_correlated(robot, found),
         task=tuple(robot.to_command(task.pose(row)) for row in range(len(task))),
         task_named=bool(settings.task.poses),
         accuracy=accuracy and replace(accuracy, after=accuracy.after.times(found.goodness.noise_factor)),
@@ -109,13 +105,13 @@ def _record_noise_mm(found: Identification) -> float:
     return float(np.sqrt(np.mean(np.trace(covariance, axis1=-2, axis2=-1))))
 
 
-def _decorrelating_poses(
-    robot: Robot, found: Identification, pairs: Sequence[CorrelatedPair]
-) -> tuple[DecorrelatingPose | None, ...]:
-    return tuple(
-        pose and replace(pose, command=robot.to_command(pose.command))
-        for pose in decorrelating_poses(robot.belief(found), found, pairs)
-    )
+def _correlated(
+    robot: Robot, found: Identification
+) -> tuple[tuple[CorrelatedPair, DecorrelatingPose | None], ...]:
+    pairs = strongly_correlated(found)
+    poses = decorrelating_poses(robot.belief(found), found, pairs[:SEPARATED_PAIRS])
+    in_commands = [pose and replace(pose, command=robot.to_command(pose.command)) for pose in poses]
+    return tuple(zip(pairs, chain(in_commands, repeat(None)), strict=False))
 
 
 def _accuracy(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import asdict
-from itertools import zip_longest
 from typing import Any
 
 import numpy as np
@@ -72,8 +71,7 @@ def _correlated(assessed: Assessment) -> list[dict[str, Any]]:
             "correlation": pair.correlation,
             "measure": pose and _decorrelating_pose(pose),
         }
-        for pair, pose in zip_longest(assessed.correlated, assessed.decorrelating_poses)
-        if pair
+        for pair, pose in assessed.correlated
     ]
 
 

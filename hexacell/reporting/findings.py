@@ -9,7 +9,7 @@ from hexacell.identification.diagnostics.variance_components import NoiseLevel, 
 from hexacell.identification.solver.chi_square import ChiSquareTest, ChiSquareVerdict
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.mechanism import FrameConvention
-from hexacell.reporting.assessment import Assessment
+from hexacell.reporting.assessment import SEPARATED_PAIRS, Assessment
 
 POOR_REPEATABILITY = 2.0
 """Scatter of repeated poses over that of the stated noise from which it is a finding."""
@@ -38,7 +38,7 @@ def pair_sentences(assessed: Assessment) -> tuple[str, ...]:
     """For the strongest correlations: the pair, and the measurement that would separate it."""
     convention = assessed.found.problem.mechanism.convention
     sentences = []
-    for pair, pose in zip(assessed.correlated, assessed.decorrelating_poses, strict=False):
+    for pair, pose in assessed.correlated[:SEPARATED_PAIRS]:
         first, second = (convention.display_name(name) for name in (pair.first, pair.second))
         fact = f"{first} and {second} cannot be separated from these poses"
         remedy = (

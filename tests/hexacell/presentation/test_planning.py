@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from hexacell.application.offline import NextPose, PlanTrial
+from hexacell.application.offline import PlanTrial
 from hexacell.campaign.decisions import Finished, Forecast, MeasurePose, StartPoint
 from hexacell.campaign.dry_run import DryRunResult
 from hexacell.kinematics.pose import Pose
@@ -12,7 +12,6 @@ from hexacell.presentation.planning import (
     decision_text,
     duration,
     forecast_text,
-    next_pose_text,
     plan_trial_lines,
     run_forecast_line,
 )
@@ -47,11 +46,6 @@ def test_what_the_remaining_records_gain():
         "0.060 mm (one sigma)."
     )
     assert "none of the task poses" in forecast_text(None)
-
-
-def test_a_proposed_pose_is_the_decision_and_the_forecast():
-    proposed = NextPose(MEASURE, FORECAST)
-    assert next_pose_text(proposed) == (decision_text(MEASURE), forecast_text(FORECAST))
 
 
 @pytest.mark.parametrize(

@@ -228,9 +228,9 @@ def test_the_frames_of_the_controller_s_config_do_not_matter(good, visit, assess
     for pose, (x, y, z, *_) in zip(assessed.task, elsewhere.task.poses, strict=True):
         np.testing.assert_allclose(pose.position, [x, y, z])
     parts = [
-        pair
-        for pair in zip(assessed.decorrelating_poses, before.decorrelating_poses, strict=True)
-        if pair[1]
+        (here, there)
+        for (_, here), (_, there) in zip(assessed.correlated, before.correlated, strict=True)
+        if there
     ]
     assert parts
     for here, there in parts:
@@ -241,12 +241,12 @@ def test_the_frames_of_the_controller_s_config_do_not_matter(good, visit, assess
 
 
 def test_pairs_are_named_with_the_measurement_that_separates_them(good):
-    assert good.correlated[0].first == "l2"
+    assert good.correlated[0][0].first == "l2"
     sentences = pair_sentences(good)
     assert sentences
     assert all("cannot be separated from these poses" in sentence for sentence in sentences)
     assert sentences[0].startswith("leg 2 length and leg 3 length cannot be separated")
-    named = [part for part in good.decorrelating_poses if part]
+    named = [part for _, part in good.correlated if part]
     for part in named:
         way = "turn" if part.axis == "z" else "tilt"
         words = f"{way} {part.degrees:+.0f} deg about {part.axis} at point {part.point}"

@@ -1,6 +1,6 @@
 """The search for data faults where the fit itself is wrong: each candidate is tried by a refit.
 
-Around a wrong solution first-order tests say little. The drawing is a better expansion point: it is
+First-order tests around a wrong solution are unreliable. The drawing is a better expansion point: it is
 within millimetres of the truth, whatever the gauges read. The most likely hypotheses of three lists
 are tried in turn: gauge faults around the drawing, all kinds around the solution, and all kinds
 around the solution with the records that the solver left out. Two candidates reject several records

@@ -1,4 +1,4 @@
-"""The 42 numbers: their order, their names, and that nobody changes them by accident."""
+"""The 42 numbers: their order, their names, and that they are read-only."""
 
 from __future__ import annotations
 

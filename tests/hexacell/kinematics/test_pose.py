@@ -65,7 +65,7 @@ def test_one_position_in_several_orientations():
     np.testing.assert_array_equal(there.rotations, turned)
 
 
-def test_tilt_is_the_angle_between_the_z_axes_and_knows_no_turn_about_them():
+def test_tilt_is_the_angle_between_the_z_axes_whatever_the_turn_about_them():
     tilts = PoseBatch.of(
         [Pose(0, 0, 0), Pose(0, 0, 0, 30, 0, 70), Pose(0, 0, 0, 0, -40), Pose(0, 0, 0, 60, 60)]
     )

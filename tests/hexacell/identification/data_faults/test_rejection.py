@@ -78,7 +78,7 @@ def test_a_scatter_of_twice_the_noise_is_no_outlier(noisy, spoil, make_problem):
 
 
 def test_no_more_than_a_tenth_is_ever_left_out(noisy, spoil, make_problem):
-    """Where so many disagree nobody can say which are right: chi-square says it instead."""
+    """Where so many disagree, it is unknown which are right; the chi-square is too large."""
     measured = noisy
     random = np.random.default_rng(0)
     for point in range(1, 6):

@@ -98,7 +98,7 @@ def test_the_order_of_records_does_not_matter(visit, make_problem):
 
 
 def test_where_the_gauges_were_zeroed_does_not_matter(visit, make_problem):
-    """A constant at each point is nobody's to know."""
+    """The constant of each point is an unknown."""
     measured = visit(seed=2).measured(0.01, seed=3)
     offsets = np.random.default_rng(0).uniform(-4.0, 4.0, (5, 3))
     from dataclasses import replace

@@ -65,7 +65,7 @@ def test_parameters_undetermined_by_small_tilts_are_named(small_tilts):
 
 
 def test_parameters_undetermined_by_small_tilts_stay_near_the_drawing(small_tilts, paper, hexaglide):
-    """And what is told of it holds: errors within a few of its sigmas, sigmas within the prior's."""
+    """Errors are within a few of their sigmas, and sigmas within the prior's."""
     free = hexaglide.convention.free_parameters
     error = small_tilts.free - free(paper.actual)
     plausible = error @ np.linalg.solve(small_tilts.free_covariance, error)

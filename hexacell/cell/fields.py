@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from pydantic_core import PydanticCustomError
 
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
@@ -31,6 +31,13 @@ class GeometrySettings(Section):
 def broken_rule(problem: str, action: str) -> PydanticCustomError:
     """The error that a validator raises: the problem and the next action."""
     return PydanticCustomError("broken_rule", "{problem}", {"problem": problem, "action": action})
+
+
+def first_mistake(refusal: ValidationError, whole: str) -> str:
+    """Where the first mistake of a record is, and what it is; ``whole`` names the record itself."""
+    first = refusal.errors(include_url=False, include_context=False)[0]
+    where = ".".join(str(key) for key in first["loc"]) or whole
+    return f"{where}: {first['msg']}"
 
 
 GeometryDocument = dict[str, tuple[Finite | tuple[Finite, ...], ...]]

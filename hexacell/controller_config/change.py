@@ -9,7 +9,7 @@ from typing import ClassVar, Literal, Self
 
 from pydantic import ValidationError, model_validator
 
-from hexacell.cell.fields import Frozen, GeometryDocument
+from hexacell.cell.fields import Frozen, GeometryDocument, first_mistake
 from hexacell.controller_config.interface import ConfigFormat
 from hexacell.errors import FileError
 from hexacell.kinematics.geometry import Geometry
@@ -38,9 +38,7 @@ class JsonRecord(Frozen):
         try:
             return cls.model_validate_json(atomic_files.read_bytes(path))
         except ValidationError as error:
-            first = error.errors(include_url=False)[0]
-            where = ".".join(str(key) for key in first["loc"]) or "the file"
-            problem = f"this is not a {cls.noun}: {where}: {first['msg']}"
+            problem = f"this is not a {cls.noun}: {first_mistake(error, 'the file')}"
             raise FileError(problem, subject=path, action="Restore the file") from error
 
 

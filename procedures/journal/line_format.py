@@ -16,6 +16,7 @@ from pathlib import Path
 
 from pydantic import TypeAdapter, ValidationError
 
+from hexacell.cell.fields import first_mistake
 from hexacell.errors import FileError
 from procedures.run.events import Event
 
@@ -87,7 +88,8 @@ def decode(line: bytes, path: Path, due: int) -> Entry | None:
         found = _EVENTS.validate_json(event)
         when = datetime.fromisoformat(at.decode())
     except ValueError as error:
-        raise _foreign(_first_words(error), path, due) from error
+        reason = first_mistake(error, "the event") if isinstance(error, ValidationError) else str(error)
+        raise _foreign(reason, path, due) from error
     return Entry(due, when, float(monotonic) if monotonic else None, found)
 
 
@@ -125,10 +127,3 @@ def _require_known_version(line: bytes, path: Path) -> None:
 def _foreign(reason: str, path: Path, due: int) -> FileError:
     problem = f"this line of the journal is not understood ({reason})"
     return FileError(problem, subject=path, line=due, action="Use the version of hexacell that wrote it")
-
-
-def _first_words(error: ValueError) -> str:
-    if isinstance(error, ValidationError):
-        first = error.errors(include_url=False, include_context=False)[0]
-        return ".".join(map(str, first["loc"])) + ": " + first["msg"]
-    return str(error)

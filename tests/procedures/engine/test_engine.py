@@ -103,7 +103,7 @@ async def test_the_controller_is_prepared_before_the_first_step(script, journal,
     assert bench.controller.log == ["prepare"]
 
 
-async def test_listeners_hear_of_what_is_on_the_disk_already(script, journal, path) -> None:
+async def test_listeners_receive_events_that_are_on_the_disk(script, journal, path) -> None:
     heard: list[events.Event] = []
 
     def listener(event: events.Event, state: RunState) -> None:
@@ -128,7 +128,7 @@ async def test_the_state_is_the_fold_of_the_journal(script, journal) -> None:
     [
         (DeviceError("does not answer", subject="gauge x"), ExitCode.HARDWARE),
         (LimitError("drifted"), ExitCode.OUT_OF_LIMITS),
-        (AnswerNeeded("nobody is there"), ExitCode.ANSWER_NEEDED),
+        (AnswerNeeded("the run is unattended"), ExitCode.ANSWER_NEEDED),
         (WriteBackUndone("undone"), ExitCode.WRITE_BACK_UNDONE),
         (FileError("changed"), ExitCode.USAGE),
         (SeveralErrors("two", [LimitError("drifted"), DeviceError("dead")]), ExitCode.HARDWARE),
@@ -293,7 +293,7 @@ async def test_a_run_that_is_over_is_not_ended_twice(script, journal) -> None:
     assert [event.kind for event in journal.events] == ["ended"]
 
 
-def test_open_sets_that_cannot_go_on_are_voided_and_the_others_doubted(script, journal, story) -> None:
+def test_open_sets_are_invalidated_or_unverified(script, journal, story) -> None:
     done, begun, zeroed, held = story(point=1), story(point=2), story(point=3), story(Phase.BEFORE, 1)
     interrupted = events.Interrupted(reason="a power cut", exit_code=130)
     in_vain = [*held.whole(2)[:-1], held.refused()]
@@ -311,13 +311,13 @@ def test_open_sets_that_cannot_go_on_are_voided_and_the_others_doubted(script, j
     assert engine.state.invalidated == 2
 
 
-def test_nothing_is_voided_in_a_new_run(script, journal) -> None:
+def test_nothing_is_invalidated_in_a_new_run(script, journal) -> None:
     Engine(script, journal).reopen_sets()
     assert journal.events == ()
 
 
-def test_after_a_kill_nobody_knows_where_the_robot_stands(script, journal, story) -> None:
-    """A killed run leaves no word; the pose it had arrived at is not believed any more."""
+def test_after_a_kill_the_position_is_unknown(script, journal, story) -> None:
+    """A killed run writes no last event; the pose it had arrived at is not relied on."""
     journal.append(story().arrived())
     engine = Engine(script, journal)
     assert engine.state.at_pose is not None

@@ -87,7 +87,7 @@ class TrippedGuard(DeviceError):
         (UsageError("unknown"), FailureKind.FINAL),
     ],
 )
-def test_the_class_of_an_error_says_its_kind(error: HexacellError, kind: FailureKind) -> None:
+def test_the_class_of_an_error_decides_its_kind(error: HexacellError, kind: FailureKind) -> None:
     assert kind_of(error) is kind
 
 
@@ -98,7 +98,7 @@ def test_every_escalation_ends(policy: RecoveryPolicy, kind: FailureKind) -> Non
     assert policy.action(FailureKind.FINAL, 1) is Action.ABORT
 
 
-def test_nobody_is_asked_where_nobody_is_and_a_technician_always() -> None:
+def test_only_an_attended_run_asks_and_it_always_does() -> None:
     kinds = [kind for kind in FailureKind if kind is not FailureKind.FINAL]
     assert all(ATTENDED.action(kind, 1) is Action.ASK for kind in kinds)
     assert all(UNATTENDED.action(kind, n) is not Action.ASK for kind in kinds for n in range(1, 9))
@@ -280,7 +280,7 @@ class TestATechnicianIsThere:
     @pytest.mark.parametrize(
         ("choice", "voided"), [(Action.RETRY, 0), (Action.MEASURE_AGAIN, 1), (Action.REDO_SET, 1)]
     )
-    async def test_who_says_how_to_go_on(self, at_second_point, choice, voided) -> None:
+    async def test_who_chooses_the_recovery(self, at_second_point, choice, voided) -> None:
         rig = at_second_point
         rig.operator.decisions = [choice]
         silent = failing(KEY, lambda: rig.gauges[1].failures.append(SILENT))
@@ -323,7 +323,7 @@ class TestATechnicianIsThere:
         assert await running
         assert [event.command for event in happened(rig, events.CommandRejected)] == ["Resume", "Pause"]
 
-    async def test_a_fault_keeps_nobody_from_leaving(self, at_second_point) -> None:
+    async def test_a_run_with_a_fault_can_be_ended(self, at_second_point) -> None:
         rig = at_second_point
 
         async def leave(*_: Any) -> Action:
@@ -368,7 +368,7 @@ class TestANewGeometryThatCannotBeVerified:
         assert rig.config == recording.config_after
         assert len(happened(rig, events.Committed)) == 2
 
-    async def test_is_left_to_be_verified_by_who_only_interrupts(self, rig, recording) -> None:
+    async def test_stays_after_an_interruption_and_is_verified_later(self, rig, recording) -> None:
         abort = failing("after-V2/close", lambda: rig.engine.command(Abort()))
         with pytest.raises(Interruption):
             await rig.run(abort)

@@ -38,7 +38,7 @@ KILLED = {"in the first set", "at a held-out point afterwards"}
 
 
 @pytest.mark.parametrize("place", PLACES)
-async def test_it_goes_on_from_anywhere(recording, replayed, place: str) -> None:
+async def test_it_resumes_from_anywhere(recording, replayed, place: str) -> None:
     kind, count = PLACES[place]
     done = recording.until(kind, count=count)
     rig = replayed(done if place in KILLED else [*done, INTERRUPTED])
@@ -103,7 +103,7 @@ async def cancelled_at(rig: Any, number: int) -> None:
 
 
 @pytest.mark.parametrize("number", [1, 6, 22, 25, 28])
-async def test_cancelled_after_any_event_it_goes_on(recording, replayed, number: int) -> None:
+async def test_cancelled_after_any_event_it_resumes(recording, replayed, number: int) -> None:
     rig = replayed(recording.until(events.SetClosed, count=3))
     begun = len(read_journal(rig.folder.journal))
     await cancelled_at(rig, number)
@@ -170,7 +170,7 @@ async def test_killed_between_writing_and_noting_it_is_not_written_twice(recordi
     assert backup.read_bytes() == recording.config_before
 
 
-async def test_the_robot_is_not_believed_to_stand_where_it_was(recording, replayed) -> None:
+async def test_the_position_is_unknown_after_an_interruption(recording, replayed) -> None:
     placed = recording.until(events.GaugesPlaced)
     rig = replayed(placed)
     await cancelled_at(rig, 10)

@@ -54,7 +54,7 @@ async def zeroed(station: Station) -> RunState:
     return fold([await station.do(SAMPLE)])
 
 
-async def test_a_move_goes_there_and_says_so(station: Station) -> None:
+async def test_a_move_reports_its_arrival(station: Station) -> None:
     event = await station.do(Move(at=P1, orientation=3, pose=(100.0, -99.0, 500.0, 1.0, 0.0, 0.0)))
     assert event == events.Arrived(at=P1, orientation=3, pose=(100.0, -99.0, 500.0, 1.0, 0.0, 0.0))
     assert station.rig.controller.log == [f"move {Pose(100.0, -99.0, 500.0, 1.0)}"]
@@ -194,12 +194,12 @@ async def test_a_gauge_that_was_set_differently_voids_the_set(station: Station, 
         await station.do(CloseSet(at=P1), zeroed)
 
 
-async def test_fixed_gauges_need_nobody(station: Station) -> None:
+async def test_fixed_gauges_need_no_operator(station: Station) -> None:
     assert await station.do(Place(at=P1, pose=POSE)) == events.GaugesPlaced(at=P1)
     assert station.rig.operator.placed == []
 
 
-async def test_gauges_are_put_by_hand_where_the_file_says_so(make_rig) -> None:
+async def test_gauges_are_placed_by_hand_where_the_cell_file_states_it(make_rig) -> None:
     rig = make_rig(stations__placement="by-hand")
     await Station(rig).do(Place(at=SetKey(phase=Phase.AFTER, point=2), pose=POSE))
     assert rig.operator.placed == [2]

@@ -64,7 +64,7 @@ def test_lines_that_are_no_records_are_damage(path: Path, written: bytes, line: 
         read_journal(path)
 
 
-def test_the_first_line_says_the_version(written: bytes) -> None:
+def test_the_first_line_states_the_version(written: bytes) -> None:
     first, *others = (json.loads(line) for line in written.splitlines())
     assert first["version"] == VERSION
     assert not any("version" in record for record in others)

@@ -53,7 +53,7 @@ def test_a_full_disk_leaves_it_as_before(path: Path, monkeypatch, room: int) -> 
 
 
 @pytest.mark.parametrize("name", ["ftruncate", "fsync"])
-def test_a_journal_that_cannot_be_opened_for_good_is_told(path: Path, monkeypatch, name: str) -> None:
+def test_a_journal_that_can_never_be_opened_is_reported(path: Path, monkeypatch, name: str) -> None:
     def broken(*_: object) -> None:
         raise OSError(errno.EROFS, os.strerror(errno.EROFS))
 

@@ -41,7 +41,7 @@ def test_what_was_appended_is_read(path: Path, written: bytes) -> None:
     assert path.read_bytes() == written
 
 
-def test_it_goes_on_where_it_ended(path: Path, written: bytes) -> None:
+def test_it_continues_where_it_ended(path: Path, written: bytes) -> None:
     with Journal(path) as journal:
         journal.append(events.RolledBack())
         assert journal.events == (*TOLD, events.RolledBack())
@@ -159,7 +159,7 @@ def test_what_is_no_file_is_not_waited_for(path: Path) -> None:
         Journal(path)
 
 
-def test_a_file_system_without_locks_is_said(path: Path, monkeypatch) -> None:
+def test_a_file_system_without_locks_is_reported(path: Path, monkeypatch) -> None:
     def refuse(*_: object) -> None:
         raise OSError(errno.ENOLCK, os.strerror(errno.ENOLCK))
 

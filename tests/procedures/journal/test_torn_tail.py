@@ -24,7 +24,7 @@ def test_a_tail_torn_at_any_byte_is_dropped(path: Path, written: bytes) -> None:
         assert path.read_bytes() == written[:begin]
 
 
-def test_after_a_torn_tail_it_goes_on(path: Path, written: bytes) -> None:
+def test_it_continues_after_a_torn_tail(path: Path, written: bytes) -> None:
     path.write_bytes(written[:-10])
     with Journal(path) as journal:
         journal.append(TOLD[-1])
@@ -97,7 +97,7 @@ def test_a_lost_line_end_before_the_last_line_loses_no_record(path: Path, writte
 
 @settings(max_examples=300, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.data())
-def test_cut_anywhere_it_is_a_part_of_what_was_told(path: Path, data) -> None:
+def test_cut_anywhere_it_is_a_part_of_what_was_written(path: Path, data) -> None:
     written = path.read_bytes() if path.exists() else write_told(path)
     cut = path.with_name("cut")
     cut.write_bytes(written[: data.draw(st.integers(0, len(written)))])

@@ -19,7 +19,7 @@ def test_nothing_happened() -> None:
     assert fold([]) == RunState()
 
 
-def test_a_fold_goes_one_event_at_a_time(recording) -> None:
+def test_a_fold_applies_one_event_at_a_time(recording) -> None:
     state = RunState()
     for place, event in enumerate(recording.history, 1):
         state = apply(state, event)
@@ -39,7 +39,7 @@ def test_a_step_that_began_has_not_happened() -> None:
     assert fold([events.StepBegun(step=CloseSet(at=P1))]) == RunState()
 
 
-def test_arriving_says_where_the_robot_stands(story) -> None:
+def test_an_arrival_gives_the_position(story) -> None:
     state = fold([story().arrived(3)])
     assert state.at_pose == (P1, 3)
     assert state.target == story().arrived(3).pose
@@ -73,7 +73,7 @@ def test_closing_records_the_drift(story) -> None:
     assert state.set(P1).closed
 
 
-def test_a_voided_set_is_gone_and_counted(story) -> None:
+def test_an_invalidated_set_is_removed_and_counted(story) -> None:
     kept = story(point=2)
     state = fold([*kept.whole(2), *story().whole(2)[:-2], story().voided()])
     assert list(state.sets) == [kept.key]
@@ -137,7 +137,7 @@ def test_the_beginning_is_kept(recording) -> None:
         events.Interrupted(reason="power cut", exit_code=130),
     ],
 )
-def test_after_these_nobody_knows_what_pose_the_robot_holds(event: Any, story) -> None:
+def test_after_these_events_the_position_is_unknown(event: Any, story) -> None:
     assert fold([story().arrived(2), event]).at_pose is None
 
 
@@ -177,7 +177,7 @@ def test_a_trail_has_no_loops(story) -> None:
     assert trail_of(*there, s.arrived(2), s.arrived(4)) == [1, 0, 2, 4]
 
 
-def test_who_was_found_elsewhere_did_not_come_by_the_trail(story) -> None:
+def test_a_located_robot_has_no_path_from_the_reference(story) -> None:
     s = story()
     lost = events.Interrupted(reason="a power cut", exit_code=130)
     there = [s.arrived(1), s.arrived(2), s.arrived(3), lost]

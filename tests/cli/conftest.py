@@ -12,11 +12,13 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import asdict, dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import pytest
 
+from hexacell.campaign.dry_run import dry_run
 from hexacell.cli.app import main
 from procedures.journal.journal import Journal, read_journal
 from procedures.run import events
@@ -217,7 +219,7 @@ def typed_here(
 @pytest.fixture
 def one_robot(monkeypatch: pytest.MonkeyPatch) -> None:
     """Predict on a single robot and from few poses: the output is under test, not its quality."""
-    monkeypatch.setattr("hexacell.campaign.dry_run.ROBOTS", 1)
+    monkeypatch.setattr("hexacell.application.offline.dry_run", partial(dry_run, robots=1))
     monkeypatch.setattr("hexacell.campaign.dry_run.CANDIDATES", 32)
 
 

@@ -174,6 +174,8 @@ class ControllerState:
         except BlockError as error:
             self._errors.append(str(error))
             return self.wait_mode is WaitMode.RECEIVED
+        if target is None:
+            return True
         job = self._start(lambda: self._travel(target))
         return self.wait_mode is WaitMode.RECEIVED or _outcome(job)
 

@@ -57,7 +57,7 @@ class TomlDocument:
         return None
 
     def replaced(self, tokens: Mapping[KeyPath, str]) -> str:
-        """The text with other tokens at the given places; every other character is kept."""
+        """The text with other tokens at the given places (see :mod:`.toml_edit`)."""
         text = self.text
         for path in sorted(tokens, key=lambda path: self.spans[path].start, reverse=True):
             span = self.spans[path]

@@ -44,7 +44,10 @@ def _numbers(values: Iterable[float]) -> str:
 
 
 GET_COMMANDS: dict[str, Callable[[ClientSession], str]] = {
+    "ECHO": lambda session: _on_off(on=session.echo),
+    "VERBOSE": lambda session: _on_off(on=session.verbose),
     "ENABLE": lambda session: _on_off(on=session.has_control),
+    "SET_WAIT": lambda session: session.state.wait_mode.value,
     "ESTOP": lambda session: _on_off(on=session.state.estop),
     "MACHINE": lambda session: _on_off(on=session.state.enabled),
     "MODE": lambda session: session.state.mode.value,
@@ -55,8 +58,10 @@ GET_COMMANDS: dict[str, Callable[[ClientSession], str]] = {
     "ABS_ACT_POS": lambda session: _numbers(session.state.machine.pose().as_tuple()),
     "POS_OFFSET": lambda _session: _numbers([0.0] * 6),
     "PROGRAM_CODES": lambda _session: _MODAL_CODES,
+    "PROGRAM_UNITS": lambda _session: "MM",
     "USER_LINEAR_UNITS": lambda _session: "MM",
     "INIFILE": lambda session: Path(session.settings.config).name,
+    "PLAT": lambda _session: "Linux",
 }
 
 

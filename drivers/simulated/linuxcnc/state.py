@@ -27,6 +27,7 @@ class TaskMode(Enum):
     """The task mode."""
 
     MANUAL = "MANUAL"
+    AUTO = "AUTO"
     MDI = "MDI"
 
 

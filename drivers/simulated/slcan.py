@@ -1,8 +1,8 @@
 """A CAN adapter that speaks slcan, the ASCII protocol of LAWICEL and CANable class devices.
 
 It makes a ``virtual`` CAN bus of this process available to other processes. Commands end with CR and are
-answered with CR, or BEL for an error. CANopen needs data frames with 11-bit ids only: ``t``, id in
-hexadecimal, number of bytes, bytes.
+answered with CR, or BEL for an error; frames are ``t`` (11-bit id), ``T`` (29-bit), and ``r`` and
+``R`` for remote requests: id in hexadecimal, number of bytes, bytes.
 """
 
 from __future__ import annotations
@@ -27,22 +27,42 @@ SEND_TIMEOUT_S = 0.2
 
 _OK = b"\r"
 _ERROR = b"\a"
-_FRAME = re.compile(r"t([0-7][0-9A-Fa-f]{2})([0-8])((?:[0-9A-Fa-f]{2})*)")
-_BIT_RATE = re.compile(r"S[0-9]")
+_FRAME = re.compile(r"(?:(?P<standard>[tr])([0-9A-Fa-f]{3})|(?P<extended>[TR])([0-9A-Fa-f]{8}))([0-8])(.*)")
+_SET_UP = re.compile(r"S[0-9]|s[0-9A-Fa-f]{4}|Y[0-9]?|Z[01]|")
+_INFORMATION = {"V": "V1013", "v": "v1013", "N": "NHX01", "F": "F00"}
 
 
 def encode_frame(message: can.Message) -> bytes:
     """A frame in slcan format, with its CR."""
-    data = bytes(message.data).hex().upper()
-    return f"t{message.arbitration_id:03X}{message.dlc:d}{data}\r".encode()
+    kind = "r" if message.is_remote_frame else "t"
+    if message.is_extended_id:
+        head = f"{kind.upper()}{message.arbitration_id:08X}"
+    else:
+        head = f"{kind}{message.arbitration_id:03X}"
+    data = "" if message.is_remote_frame else bytes(message.data).hex().upper()
+    return f"{head}{message.dlc:d}{data}\r".encode()
 
 
 def decode_frame(command: str) -> can.Message | None:
     """The frame in a command (without CR); none if the command is no valid frame."""
     match = _FRAME.fullmatch(command)
-    if match is None or len(match[3]) != 2 * int(match[2]):
+    if match is None:
         return None
-    return can.Message(arbitration_id=int(match[1], 16), data=bytes.fromhex(match[3]), is_extended_id=False)
+    kind = match["standard"] or match["extended"]
+    identifier = int(match[2] or match[4], 16)
+    length, rest = int(match[5]), match[6]
+    is_remote = kind in "rR"
+    if identifier >= (1 << (29 if match["extended"] else 11)):
+        return None
+    if not re.fullmatch(f"[0-9A-Fa-f]{{{0 if is_remote else 2 * length}}}", rest):
+        return None
+    return can.Message(
+        arbitration_id=identifier,
+        is_extended_id=match["extended"] is not None,
+        is_remote_frame=is_remote,
+        dlc=length,
+        data=None if is_remote else bytes.fromhex(rest),
+    )
 
 
 class SlcanAdapter:
@@ -50,20 +70,33 @@ class SlcanAdapter:
 
     def __init__(self, transmit: Callable[[can.Message], None]) -> None:
         self.is_open = False
+        self._may_transmit = False
         self._transmit = transmit
 
     def answer(self, command: str) -> bytes:
         """Execute one command (without CR) and return the answer."""
-        if command in ("O", "C"):
-            self.is_open = command == "O"
+        if command in ("O", "L"):
+            return self._open(may_transmit=command == "O")
+        if command == "C":
+            self.is_open = False
             return _OK
-        if _BIT_RATE.fullmatch(command):
-            return _ERROR if self.is_open else _OK
+        if command in _INFORMATION:
+            return _INFORMATION[command].encode() + _OK
+        if _SET_UP.fullmatch(command):
+            return _ERROR if self.is_open and command else _OK
+        return self._send(command)
+
+    def _open(self, *, may_transmit: bool) -> bytes:
+        self.is_open = True
+        self._may_transmit = may_transmit
+        return _OK
+
+    def _send(self, command: str) -> bytes:
         message = decode_frame(command)
-        if message is None or not self.is_open:
+        if message is None or not (self.is_open and self._may_transmit):
             return _ERROR
         self._transmit(message)
-        return b"z" + _OK
+        return (b"Z" if message.is_extended_id else b"z") + _OK
 
 
 class SlcanServer(Closeable):

@@ -8,6 +8,7 @@ from functools import partial
 
 import can
 import pytest
+from can.interfaces.slcan import slcanBus
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -17,10 +18,14 @@ from drivers.simulated.slcan import SlcanAdapter, SlcanServer, decode_frame, enc
 
 @st.composite
 def messages(draw) -> can.Message:
+    extended, remote = draw(st.booleans()), draw(st.booleans())
+    size = draw(st.integers(0, 8))
     return can.Message(
-        arbitration_id=draw(st.integers(0, 0x7FF)),
-        is_extended_id=False,
-        data=draw(st.binary(max_size=8)),
+        arbitration_id=draw(st.integers(0, (1 << (29 if extended else 11)) - 1)),
+        is_extended_id=extended,
+        is_remote_frame=remote,
+        dlc=size,
+        data=None if remote else draw(st.binary(min_size=size, max_size=size)),
     )
 
 
@@ -38,6 +43,9 @@ def test_decode_undoes_encode(message):
     [
         (can.Message(arbitration_id=0x80, is_extended_id=False), b"t0800\r"),
         (can.Message(arbitration_id=0x181, data=b"\x0a\xff", is_extended_id=False), b"t18120AFF\r"),
+        (can.Message(arbitration_id=0x1ABCDEF0, data=b"\x01"), b"T1ABCDEF0101\r"),
+        (can.Message(arbitration_id=0x701, dlc=1, is_remote_frame=True, is_extended_id=False), b"r7011\r"),
+        (can.Message(arbitration_id=0x701, dlc=8, is_remote_frame=True), b"R000007018\r"),
     ],
 )
 def test_format_of_frames(message, text):
@@ -50,7 +58,9 @@ def test_other_text_is_refused(text):
     assert found is None or encode_frame(found).decode()[:-1].upper() == text.upper()
 
 
-@pytest.mark.parametrize("text", ["t800", "t8000", "t1819", "t18120A", "t18120AFF0", "T000000800", "r1812"])
+@pytest.mark.parametrize(
+    "text", ["t800", "t8000", "t1819", "t18120A", "t18120AFF0", "T200000000", "r18120AFF"]
+)
 def test_faulty_frames_are_refused(text):
     assert decode_frame(text) is None
 
@@ -67,16 +77,30 @@ def test_frames_pass_only_while_the_channel_is_open(adapter):
     assert device.answer("t0800") == b"\a"
     assert device.answer("O") == b"\r"
     assert device.answer("t0800") == b"z\r"
-    assert device.answer("t1810") == b"z\r"
+    assert device.answer("T000000800") == b"Z\r"
     assert device.answer("C") == b"\r"
     assert device.answer("t0800") == b"\a"
-    assert [message.arbitration_id for message in sent] == [0x80, 0x181]
+    assert [message.arbitration_id for message in sent] == [0x80, 0x80]
+
+
+def test_listening_only_sends_nothing(adapter):
+    device, sent = adapter
+    assert device.answer("L") == b"\r"
+    assert device.is_open
+    assert device.answer("t0800") == b"\a"
+    assert sent == []
 
 
 @pytest.mark.parametrize(
     ("command", "answer"),
     [
         ("S6", b"\r"),
+        ("s031C", b"\r"),
+        ("", b"\r"),
+        ("Z0", b"\r"),
+        ("V", b"V1013\r"),
+        ("N", b"NHX01\r"),
+        ("F", b"F00\r"),
         ("S", b"\a"),
         ("S66", b"\a"),
         ("nonsense", b"\a"),
@@ -117,7 +141,9 @@ def test_frames_pass_both_ways(pair):
     frames = [
         can.Message(arbitration_id=0x80, is_extended_id=False),
         can.Message(arbitration_id=0x7FF, data=bytes(range(8)), is_extended_id=False),
-        can.Message(arbitration_id=0x123, data=b"\xff" * 8, is_extended_id=False),
+        can.Message(arbitration_id=0x1FFFFFFF, data=b"\xff" * 8),
+        can.Message(arbitration_id=0x123, dlc=4, is_remote_frame=True, is_extended_id=False),
+        can.Message(arbitration_id=0x123, dlc=0, is_remote_frame=True),
     ]
     for source, sink in ((near, far), (far, near)):
         for frame in frames:
@@ -126,6 +152,13 @@ def test_frames_pass_both_ways(pair):
             found = sink.recv(1.0)
             assert found is not None
             assert found.equals(frame, timestamp_delta=None, check_channel=False, check_direction=False)
+
+
+def test_the_adapter_reports_its_version(pair):
+    _, far = pair
+    assert isinstance(far, slcanBus)
+    assert far.get_version(1.0) == (10, 13)
+    assert far.get_serial_number(1.0) == "HX01"
 
 
 def test_no_frame_is_lost_in_a_burst(pair):

@@ -32,6 +32,11 @@ class SerialLine(Protocol):
         """What ``serial.serial_for_url`` opens; the same after unplugging and plugging in again."""
         ...
 
+    @property
+    def connections(self) -> int:
+        """How many clients have connected; 0 where a connection cannot be noticed."""
+        ...
+
     def descriptors(self) -> list[int]:
         """The file descriptors to wait on for input."""
         ...
@@ -59,6 +64,8 @@ class SerialLine(Protocol):
 
 class PtyLine:
     """A pseudo-terminal behind a symbolic link of constant name, like those in ``/dev/serial/by-id``."""
+
+    connections = 0
 
     def __init__(self, name: str) -> None:
         self._folder = TemporaryDirectory(prefix="hexacell-")
@@ -135,6 +142,7 @@ class SocketLine:
         self._port = self._listener.getsockname()[1]
         self._client: socket.socket | None = None
         self._plugged = False
+        self.connections = 0
         self.plug_in()
 
     @property
@@ -197,6 +205,7 @@ class SocketLine:
         client.setblocking(False)
         client.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         self._client = client
+        self.connections += 1
 
     def _read(self, client: socket.socket) -> bytes:
         try:

@@ -138,10 +138,12 @@ class SlcanServer(Closeable):
         self._bus.shutdown()
 
     def _receive_commands(self) -> None:
-        pending = b""
+        client, pending = 0, b""
         while not self._closing.is_set():
             ready, _, _ = select.select(self._line.descriptors(), [], [], SLICE_S)
             data = self._line.receive(ready)
+            if self._line.connections != client:  # a new client finds the channel closed
+                client, self._adapter.is_open, pending = self._line.connections, False, b""
             *commands, pending = (pending + data).split(b"\r")
             pending = pending[-MAX_COMMAND_BYTES:]
             for command in commands:

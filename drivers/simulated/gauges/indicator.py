@@ -22,10 +22,12 @@ class Indicator:
         self.inch = False
         self.reversed = False
         self.battery_low = False
+        self.preset_mm = 0.0
         self.powered = True
         self.held_mm: float | None = None
         self._plunger = plunger
         self._travel_mm = travel_mm
+        self._offset_mm = 0.0
         self._at_end = False
         self._jammed_mm: float | None = None
         self._pushed_mm = 0.0
@@ -36,6 +38,21 @@ class Indicator:
         if value is None:
             return None
         return value / MM_PER_INCH if self.inch else value
+
+    def set_hold(self, *, on: bool) -> None:
+        """Hold the display, without effect at an end of the travel; or end the hold."""
+        self.held_mm = self._live_mm() if on else None
+
+    def recall_preset(self) -> None:
+        """Set the display to the preset value; with a preset of 0 this is the zero key."""
+        self._offset_mm += self.preset_mm - (self._live_mm() or 0.0)
+
+    def switch_on(self) -> None:
+        """Switch on: no hold, and the zero at the present plunger position."""
+        self.powered = True
+        self.set_hold(on=False)
+        self._offset_mm = 0.0
+        self._offset_mm = -(self._live_mm() or 0.0)
 
     def set_at_end(self, *, on: bool) -> None:
         """Move the plunger to an end of its travel, or back."""
@@ -53,4 +70,4 @@ class Indicator:
         position = self._plunger() + self._pushed_mm if self._jammed_mm is None else self._jammed_mm
         if self._at_end or abs(position) > self._travel_mm / 2:
             return None
-        return -position if self.reversed else position
+        return (-position if self.reversed else position) + self._offset_mm

@@ -1,7 +1,8 @@
-"""Simulated instruments: indicators behind the protocols of the drivers, which ask and never command."""
+"""Simulated instruments: indicators behind their protocols, of which the drivers send questions only."""
 
 from __future__ import annotations
 
+import re
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from typing import ClassVar
@@ -19,6 +20,8 @@ class Instrument(ABC):
     bits_a_byte: ClassVar[int] = 10  # with start, parity and stop bits
     at_end: ClassVar[bytes]
     """The answer with the plunger at an end of its travel."""
+    introduction: ClassVar[bytes] = b""
+    """What it sends when it is switched on."""
 
     def __init__(self, indicators: Mapping[int, Indicator]) -> None:
         self.indicators = dict(indicators)
@@ -39,9 +42,16 @@ class Instrument(ABC):
 
 
 class Mux10(Instrument):
-    """A multiplexer with MUX-10 frames: answers a channel number with the value of its indicator."""
+    """A multiplexer with MUX-10 frames: answers a channel number with the value of its indicator.
+
+    It answers the next ``busy`` requests with an error.
+    """
 
     at_end: ClassVar[bytes] = b"912\r"
+
+    def __init__(self, indicators: Mapping[int, Indicator]) -> None:
+        super().__init__(indicators)
+        self.busy = 0
 
     def answer(self, command: bytes) -> bytes:
         """A data frame or an error; nothing if the command is no channel number and not ``V``."""
@@ -49,6 +59,9 @@ class Mux10(Instrument):
             return b"MUX-10F SIMULATED\r"
         if not command.isdigit():
             return b""
+        if self.busy:
+            self.busy -= 1
+            return b"918\r"
         indicator = self.indicators.get(int(command))
         return self._value(int(command)) if indicator and indicator.powered else b"911\r"
 
@@ -62,50 +75,88 @@ class Mux10(Instrument):
 class SingleIndicator(Instrument):
     """One indicator; silent while it is off."""
 
-    value_request: ClassVar[bytes]
+    @property
+    def indicator(self) -> Indicator:
+        """Its indicator."""
+        return self.indicators[1]
 
     def answer(self, command: bytes) -> bytes:
-        """The value, or a setting."""
-        indicator = self.indicators[1]
-        if not indicator.powered:
-            return b""
-        return self._value(1) if command == self.value_request else self._setting(command, indicator)
+        """The value, a setting, or what the protocol answers to a command."""
+        return self._reply(command.decode("ascii", "replace")) if self.indicator.powered else b""
 
     @abstractmethod
-    def _setting(self, question: bytes, indicator: Indicator) -> bytes: ...
+    def _reply(self, command: str) -> bytes:
+        """The answer while it is on."""
 
 
 class Sylvac(SingleIndicator):
-    """Sylvac's opto-RS duplex protocol."""
+    """Sylvac's opto-RS duplex protocol: a command that is obeyed has no answer."""
 
     baudrate: ClassVar[int] = 4800
     bits_a_byte: ClassVar[int] = 11
-    value_request: ClassVar[bytes] = b"?"
     at_end: ClassVar[bytes] = b"ERR3\r"
+    introduction: ClassVar[bytes] = b"SY276.1\r"
 
     @staticmethod
     def format_value(_channel: int, value: float, *, inch: bool) -> bytes:
         """A micrometre or 10 microinches are the last digit."""
         return b"%+.*f\r" % (5 if inch else 3, value)
 
-    def _setting(self, question: bytes, indicator: Indicator) -> bytes:
-        answers = {
-            b"UNI?": b"IN\r" if indicator.inch else b"MM\r",
-            b"ID?": b"SY276\r",
-            b"MOD?": b"NOR\r",
-            b"STO?": b"STO0\r" if indicator.held_mm is None else b"STO1\r",
-            b"CHA?": b"CHA-\r" if indicator.reversed else b"CHA+\r",
-            b"PRE?": b"PRE +0.000\r",
-            b"BAT?": b"BAT0\r" if indicator.battery_low else b"BAT1\r",
+    def _reply(self, command: str) -> bytes:
+        """Commands may be in lower case and with blanks."""
+        word = command.replace(" ", "").upper()
+        if word in {"?", "PRI"}:
+            return self._value(1)
+        if word.endswith("?"):
+            return self._settings().get(word, "ERR1").encode("ascii") + b"\r"
+        return b"" if self._obeys(word) else b"ERR1\r"
+
+    def _settings(self) -> dict[str, str]:
+        indicator = self.indicator
+        return {
+            "UNI?": "IN" if indicator.inch else "MM",
+            "ID?": "SY276",
+            "MOD?": "NOR",
+            "STO?": "STO0" if indicator.held_mm is None else "STO1",
+            "CHA?": "CHA-" if indicator.reversed else "CHA+",
+            "PRE?": f"PRE {indicator.preset_mm:+.3f}",
+            "BAT?": "BAT0" if indicator.battery_low else "BAT1",
         }
-        return answers.get(question, b"ERR1\r")
+
+    def _obeys(self, word: str) -> bool:
+        """Carry out a command; whether it is one."""
+        indicator = self.indicator
+        match word:
+            case "MM" | "IN":
+                indicator.inch = word == "IN"
+            case "CHA+" | "CHA-":
+                indicator.reversed = word == "CHA-"
+            case "STO0" | "STO1":
+                indicator.set_hold(on=word == "STO1")
+            case "PRE":
+                indicator.recall_preset()
+            case "OFF":
+                indicator.powered = False
+            case _:
+                return word.startswith("PRE") and self._set_preset(word[3:])
+        return True
+
+    def _set_preset(self, number: str) -> bool:
+        try:
+            self.indicator.preset_mm = float(number)
+        except ValueError:
+            return False
+        return True
 
 
 class Cdi(SingleIndicator):
-    """The serial ASCII protocol of CDI and Starrett: the value, and parameters that can falsify it."""
+    """The serial ASCII protocol of CDI and Starrett, with the parameters that can falsify a value."""
 
-    value_request: ClassVar[bytes] = b"R"
     at_end: ClassVar[bytes] = b"OUT OF BOUNDS\r\n"
+
+    def __init__(self, indicators: Mapping[int, Indicator]) -> None:
+        super().__init__(indicators)
+        self._without_effect = {"011": 0, "040": 0}  # mode and ratio are only stored
 
     @staticmethod
     def format_value(_channel: int, value: float, *, inch: bool) -> bytes:
@@ -114,15 +165,51 @@ class Cdi(SingleIndicator):
         number = b"%8.*f" % (5 if inch else 4, abs(value))
         return sign + number + (b", IN\r\n" if inch else b", MM\r\n")
 
-    def _setting(self, question: bytes, indicator: Indicator) -> bytes:
-        parameters = {
-            b"?p011": 0,
-            b"?p013": 1 if indicator.inch else 2,
-            b"?p019": int(indicator.reversed),
-            b"?p021": int(indicator.held_mm is not None),
-            b"?p040": 0,
+    def _reply(self, command: str) -> bytes:
+        """Parameters are asked for as ``?p013`` and set as ``p013=2``."""
+        match command:
+            case "R":
+                return self._value(1)
+            case "C":
+                self.indicator.recall_preset()
+                return b"SUCCESS\r\n"
+            case "H":
+                self.indicator.set_hold(on=self.indicator.held_mm is None)
+                return b"SUCCESS\r\n"
+        return self._parameter(command)
+
+    def _parameter(self, command: str) -> bytes:
+        match = re.fullmatch(r"(\?)?[pP](\d{3})(?:=(.*))?", command)
+        parameters = self._parameters()
+        if match is None or match[2] not in parameters:
+            return b"NOT FOUND\r\n"
+        asked, number, setting = match.groups()
+        return b"%d\r\n" % parameters[number] if asked else self._set(number, setting or "")
+
+    def _parameters(self) -> dict[str, int]:
+        indicator = self.indicator
+        return self._without_effect | {
+            "013": 1 if indicator.inch else 2,
+            "019": int(indicator.reversed),
+            "021": int(indicator.held_mm is not None),
         }
-        return b"%d\r\n" % parameters[question] if question in parameters else b"NOT FOUND\r\n"
+
+    def _set(self, number: str, setting: str) -> bytes:
+        if not setting.isdigit():
+            return b"NON NUMERIC\r\n"
+        value = int(setting)
+        if value not in {"011": range(3), "013": range(1, 3)}.get(number, range(2)):
+            return b"OUT OF BOUNDS\r\n"
+        match number:
+            case "013":
+                self.indicator.inch = value == 1
+            case "019":
+                self.indicator.reversed = value == 1
+            case "021":
+                self.indicator.set_hold(on=value == 1)
+            case _:
+                self._without_effect[number] = value
+        return b"SUCCESS\r\n"
 
 
 INSTRUMENTS: dict[str, type[Instrument]] = {"sylvac": Sylvac, "mux10": Mux10, "cdi": Cdi}

@@ -62,6 +62,10 @@ class GaugeLineServer(Closeable):
         """Lose every answer, or no more."""
         self._silent = on
 
+    def switch_on(self, channel: int = 1) -> None:
+        """Switch an indicator on again; the instrument sends its introduction."""
+        self._run_on_thread(lambda: self._switch_on(channel))
+
     def close(self) -> None:
         """End the thread and close the line; closing twice is harmless."""
         if self._stopping:
@@ -132,6 +136,10 @@ class GaugeLineServer(Closeable):
     def _send_due(self) -> None:
         while self._answers and self._answers[0][0] <= self._clock.now():
             self._line.send(self._answers.popleft()[1])
+
+    def _switch_on(self, channel: int) -> None:
+        self.instrument.indicators[channel].switch_on()
+        self._line.send(self.instrument.introduction)
 
     def _unplug(self) -> None:
         self._received = b""

@@ -8,6 +8,7 @@ from functools import partial
 
 import can
 import pytest
+import serial
 from can.interfaces.slcan import slcanBus
 from hypothesis import given
 from hypothesis import strategies as st
@@ -192,6 +193,21 @@ def test_the_server_continues_after_garbage():
         os.close(line)
     assert found is not None
     assert found.arbitration_id == 0x80
+
+
+def exchanged(server: SlcanServer, command: bytes) -> bytes:
+    """The answer to a command of a client that connects for it alone."""
+    with serial.serial_for_url(server.bus_settings["channel"], timeout=1.0) as client:
+        client.write(command)
+        return client.read()
+
+
+def test_a_client_that_connects_finds_the_channel_closed():
+    with SlcanServer(f"slcan-{uuid.uuid4().hex}", SocketLine()) as server:
+        assert exchanged(server, b"O\r") == b"\r"
+        assert exchanged(server, b"t0800\r") == b"\a"
+        assert exchanged(server, b"O\rt08") == b"\r"
+        assert exchanged(server, b"S6\r") == b"\r"
 
 
 def test_closing_twice_is_harmless():

@@ -57,18 +57,32 @@ def test_outside_its_travel_it_does_not(indicator, ball, position):
 
 
 def test_a_held_value_is_shown_even_outside_the_travel(indicator, ball):
-    indicator.held_mm = 2.138
+    indicator.set_hold(on=True)
     ball.position = 99.0
     assert indicator.shown() == 2.138
-    indicator.held_mm = None
+    indicator.set_hold(on=False)
     assert indicator.shown() is None
 
 
-def test_inch_and_reversal_combine(indicator, ball):
-    ball.position = 2.54
+def test_inch_reversal_and_preset_combine(indicator, ball):
     indicator.reversed = True
+    assert indicator.shown() == -2.138
+    indicator.preset_mm = 25.4
+    indicator.recall_preset()
     indicator.inch = True
-    assert indicator.shown() == pytest.approx(-0.1)
+    assert indicator.shown() == pytest.approx(1.0)
+    ball.position += 2.54
+    assert indicator.shown() == pytest.approx(0.9)
+
+
+def test_switching_on_again_loses_zero_and_hold(indicator, ball):
+    indicator.set_hold(on=True)
+    indicator.powered = False
+    indicator.switch_on()
+    assert indicator.powered
+    assert indicator.shown() == 0.0
+    ball.position += 1.0
+    assert indicator.shown() == pytest.approx(1.0)
 
 
 # Sylvac
@@ -85,7 +99,9 @@ def test_sylvac_answers_with_its_value(sylvac, ball, position, answer):
 @pytest.mark.parametrize(
     ("question", "answer"),
     [
+        (b"PRI", b"+2.138\r"),
         (b"UNI?", b"MM\r"),
+        (b"uni ?", b"MM\r"),
         (b"ID?", b"SY276\r"),
         (b"MOD?", b"NOR\r"),
         (b"STO?", b"STO0\r"),
@@ -94,6 +110,9 @@ def test_sylvac_answers_with_its_value(sylvac, ball, position, answer):
         (b"BAT?", b"BAT1\r"),
         (b"XYZ?", b"ERR1\r"),
         (b"XYZ", b"ERR1\r"),
+        (b"", b"ERR1\r"),
+        (b"1.5", b"ERR1\r"),
+        (b"PRE x", b"ERR1\r"),
         (b"\xff", b"ERR1\r"),
     ],
 )
@@ -102,20 +121,48 @@ def test_sylvac_answers_questions(sylvac, question, answer):
 
 
 @pytest.mark.parametrize(
-    ("setting", "value", "question", "answer"),
+    ("command", "question", "answer"),
     [
-        ("inch", True, b"?", b"+0.08417\r"),
-        ("inch", True, b"UNI?", b"IN\r"),
-        ("reversed", True, b"?", b"-2.138\r"),
-        ("reversed", True, b"CHA?", b"CHA-\r"),
-        ("held_mm", 1.0, b"STO?", b"STO1\r"),
-        ("battery_low", True, b"BAT?", b"BAT0\r"),
-        ("powered", False, b"?", b""),
+        (b"IN", b"?", b"+0.08417\r"),
+        (b"IN", b"UNI?", b"IN\r"),
+        (b"CHA-", b"?", b"-2.138\r"),
+        (b"CHA-", b"CHA?", b"CHA-\r"),
+        (b"cha -", b"CHA?", b"CHA-\r"),
+        (b"STO1", b"STO?", b"STO1\r"),
+        (b"PRE +1.5", b"PRE?", b"PRE +1.500\r"),
+        (b"PRE", b"?", b"+0.000\r"),
+        (b"OFF", b"?", b""),
     ],
 )
-def test_sylvac_answers_by_its_settings(sylvac, indicator, setting, value, question, answer):
-    setattr(indicator, setting, value)
+def test_sylvac_obeys_commands(sylvac, command, question, answer):
+    assert sylvac.answer(command) == b""
     assert sylvac.answer(question) == answer
+
+
+@pytest.mark.parametrize(
+    ("commands", "question", "answer"),
+    [
+        ([b"IN", b"MM"], b"UNI?", b"MM\r"),
+        ([b"CHA-", b"CHA+"], b"CHA?", b"CHA+\r"),
+        ([b"STO1", b"STO0"], b"STO?", b"STO0\r"),
+        ([b"PRE +1.5", b"PRE", b"CHA-"], b"?", b"-2.776\r"),
+        ([b"PRE 25.4", b"PRE", b"IN"], b"?", b"+1.00000\r"),
+        ([b"STO1", b"PRE"], b"?", b"+2.138\r"),
+        ([b"STO1", b"PRE", b"STO0"], b"?", b"+0.000\r"),
+    ],
+)
+def test_sylvac_obeys_one_command_after_another(sylvac, commands, question, answer):
+    assert [sylvac.answer(command) for command in commands] == [b""] * len(commands)
+    assert sylvac.answer(question) == answer
+
+
+def test_sylvac_reports_a_low_battery(sylvac, indicator):
+    indicator.battery_low = True
+    assert sylvac.answer(b"BAT?") == b"BAT0\r"
+
+
+def test_sylvac_introduces_itself_when_it_is_switched_on(sylvac):
+    assert sylvac.introduction == b"SY276.1\r"
 
 
 # MUX-10
@@ -144,6 +191,11 @@ def test_mux10_reports_errors_units_and_absent_gauges(mux10, ball, indicator):
     assert mux10.answer(b"2") == b"911\r"
 
 
+def test_mux10_is_busy_for_the_number_of_requests_that_is_set(mux10):
+    mux10.busy = 2
+    assert [mux10.answer(b"2") for _ in range(3)] == [b"918\r", b"918\r", b"02A+0002.138\r"]
+
+
 # CDI
 
 
@@ -161,9 +213,14 @@ def test_cdi_answers_with_value_and_unit(cdi, ball, indicator):
     ("command", "answer"),
     [
         (b"?p011", b"0\r\n"),
-        (b"?p013", b"2\r\n"),
+        (b"?P013", b"2\r\n"),
         (b"?p999", b"NOT FOUND\r\n"),
+        (b"p999=1", b"NOT FOUND\r\n"),
         (b"X", b"NOT FOUND\r\n"),
+        (b"r", b"NOT FOUND\r\n"),
+        (b"p013=3", b"OUT OF BOUNDS\r\n"),
+        (b"p013=x", b"NON NUMERIC\r\n"),
+        (b"p013", b"NON NUMERIC\r\n"),
     ],
 )
 def test_cdi_answers_for_parameters(cdi, command, answer):
@@ -171,15 +228,20 @@ def test_cdi_answers_for_parameters(cdi, command, answer):
 
 
 @pytest.mark.parametrize(
-    ("setting", "value", "question", "answer"),
+    ("command", "question", "answer"),
     [
-        ("inch", True, b"R", b"+ 0.08417, IN\r\n"),
-        ("inch", True, b"?p013", b"1\r\n"),
-        ("reversed", True, b"R", b"-  2.1380, MM\r\n"),
-        ("reversed", True, b"?p019", b"1\r\n"),
-        ("held_mm", 1.0, b"?p021", b"1\r\n"),
+        (b"p013=1", b"R", b"+ 0.08417, IN\r\n"),
+        (b"P013=1", b"?p013", b"1\r\n"),
+        (b"p019=1", b"R", b"-  2.1380, MM\r\n"),
+        (b"p019=1", b"?p019", b"1\r\n"),
+        (b"p011=2", b"?p011", b"2\r\n"),
+        (b"p021=1", b"?p021", b"1\r\n"),
+        (b"p021=0", b"?p021", b"0\r\n"),
+        (b"p040=1", b"?p040", b"1\r\n"),
+        (b"H", b"?p021", b"1\r\n"),
+        (b"C", b"R", b"+  0.0000, MM\r\n"),
     ],
 )
-def test_cdi_answers_by_its_settings(cdi, indicator, setting, value, question, answer):
-    setattr(indicator, setting, value)
+def test_cdi_obeys_commands(cdi, command, question, answer):
+    assert cdi.answer(command) == b"SUCCESS\r\n"
     assert cdi.answer(question) == answer

@@ -24,12 +24,12 @@ async def test_inch(protocol):
 async def test_hold(protocol):
     async with cell([protocol] * 3) as made:
         await made.open()
-        made.rack.indicators["x"].held_mm = 1.0
+        made.rack.indicators["x"].set_hold(on=True)
         made.balls["x"] = 1.5
         assert (await made.gauges["x"].read()).value_mm == 1.0
         with pytest.raises(WrongSetting, match="gauge x: is on hold"):
             await made.gauges["x"].check()
-        made.rack.indicators["x"].held_mm = None
+        made.rack.indicators["x"].set_hold(on=False)
         await made.gauges["x"].check()
         assert (await made.gauges["x"].read()).value_mm == 1.5
 
@@ -59,13 +59,12 @@ async def test_auto_off_and_on_again_voids_the_zero(sylvac):
     sylvac.rack.indicators["x"].powered = False
     with pytest.raises(GaugeSilent):
         await sylvac.gauges["x"].read()
-    sylvac.rack.indicators["x"].powered = True
-    send_unsolicited(sylvac.rack.line("x"), b"SY276.1\r")
+    sylvac.rack.line("x").switch_on()
     for call in (sylvac.gauges["x"].read, sylvac.gauges["x"].check):
         with pytest.raises(ZeroVoid, match=r"gauge x: was switched on again \(b'SY276\.1"):
             await call()
     await sylvac.gauges["x"].open()
-    await sylvac.gauges["x"].read()
+    assert (await sylvac.gauges["x"].read()).value_mm == 0.0
 
 
 @pytest.mark.parametrize("protocol", PROTOCOLS)

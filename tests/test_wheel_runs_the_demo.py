@@ -82,7 +82,7 @@ from hexacell.cell.bundled import bundled_config
 from hexacell.plugins import Group, names
 files = [module.__file__ for module in (drivers, hexacell, procedures)]
 files.append(str(bundled_config("simulated-hexaglide")))
-plugins = {group.value: names(group) for group in Group}
+plugins = {group.entry_points: names(group) for group in Group}
 print(json.dumps({"path": sys.path, "files": files, "plugins": plugins}))
 """
     found = json.loads(run(elsewhere / "bin" / "python", "-c", script, folder=tmp_path))

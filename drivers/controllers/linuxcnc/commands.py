@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Awaitable, Callable
+from contextlib import suppress
 from typing import TypeVar
 
 from drivers.controllers.errors import CommandRefused, ConnectionLost
@@ -33,13 +34,22 @@ class ErrorMessages:
     async def read(self, next_message: Callable[[], Awaitable[str]]) -> None:
         """Empty the controller's queue; a message that another connection is reading is waited for."""
         async with self._reading:
-            for _ in range(_MAX_ERRORS):
-                if (text := await next_message()).upper() == "OK":
-                    break
-                for unused in (self.for_orders, self.for_status):
-                    if text not in unused:
-                        unused.append(text)
-                    del unused[:-_MAX_ERRORS]
+            reading = asyncio.ensure_future(self._read_all(next_message))
+            try:
+                await asyncio.shield(reading)
+            finally:
+                while not reading.done():  # a cancelled caller waits too: the message would be lost
+                    with suppress(asyncio.CancelledError):
+                        await asyncio.wait([reading])
+
+    async def _read_all(self, next_message: Callable[[], Awaitable[str]]) -> None:
+        for _ in range(_MAX_ERRORS):
+            if (text := await next_message()).upper() == "OK":
+                break
+            for unused in (self.for_orders, self.for_status):
+                if text not in unused:
+                    unused.append(text)
+                del unused[:-_MAX_ERRORS]
 
 
 class ControllerCommands:

@@ -87,6 +87,21 @@ async def test_an_order_has_the_messages_that_the_status_read(play) -> None:
         await moving
 
 
+async def test_a_message_whose_reading_is_cancelled_is_kept(play) -> None:
+    reading = play.Pause()
+    off = asked(machine="OFF")
+    message = ("get error", reading, b"ERROR joint 3 following error\r\n")
+    driver = await play.opened([], [*GREETING, *asked(), *off, message, ERROR_OK, *off, ERROR_OK])
+    await driver.status()
+    cancelled = asyncio.create_task(driver.status())
+    await reading.reached.wait()
+    cancelled.cancel()
+    reading.set()
+    with pytest.raises(asyncio.CancelledError):
+        await cancelled
+    assert (await driver.status()).error_messages == ("joint 3 following error",)
+
+
 async def test_a_machine_that_goes_off_before_the_first_status_was_enabled_by_its_preparation(play) -> None:
     preparation = [
         ("set enable EMCTOO", b"SET ENABLE ACK\n\r"),

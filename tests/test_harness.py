@@ -1,4 +1,4 @@
-"""The suite's own safety net: a test that leaves something behind fails, one that cleans up does not."""
+"""The leak check of the test suite: a test that leaks resources fails, one that cleans up passes."""
 
 from __future__ import annotations
 
@@ -145,7 +145,7 @@ def run(suite: pytest.Pytester, *sources: str, options: str = "") -> pytest.RunR
     return suite.runpytest_subprocess("tests", *options.split())
 
 
-def test_whatever_is_left_behind_fails_its_test_and_no_other(suite: pytest.Pytester) -> None:
+def test_a_leak_fails_its_test_and_no_other(suite: pytest.Pytester) -> None:
     innocent = [f"def test_innocent_{number}(): pass" for number in range(len(LEAKS))]
     sources = [source for pair in zip(LEAKS.values(), innocent, strict=True) for source in pair]
     with (suite.path / "tests" / "conftest.py").open("a") as conftest:
@@ -157,12 +157,12 @@ def test_whatever_is_left_behind_fails_its_test_and_no_other(suite: pytest.Pytes
     result.assert_outcomes(passed=len(LEAKS) + errors + 1, errors=errors, failed=failed)
 
 
-def test_what_cleans_up_passes(suite: pytest.Pytester) -> None:
+def test_tests_that_clean_up_pass(suite: pytest.Pytester) -> None:
     run(suite, CLEAN).assert_outcomes(passed=CLEAN.count("def test_"))
 
 
 @pytest.mark.parametrize(("environment", "repeatable"), [({"CI": "true"}, True), ({}, False)])
-def test_hypothesis_repeats_itself_in_ci(
+def test_hypothesis_is_repeatable_in_ci(
     suite: pytest.Pytester, monkeypatch: pytest.MonkeyPatch, environment: dict[str, str], repeatable: bool
 ) -> None:
     monkeypatch.delenv("CI", raising=False)
@@ -182,7 +182,7 @@ def test_a_test_that_hangs_is_ended(suite: pytest.Pytester, pytestconfig: pytest
     result.stdout.fnmatch_lines(["FAILED *::test_hangs - *Timeout*"])
 
 
-def test_the_folder_of_benchmarks_marks_them(suite: pytest.Pytester) -> None:
+def test_tests_in_the_benchmark_folder_are_marked_as_benchmarks(suite: pytest.Pytester) -> None:
     suite.mkdir("tests/benchmarks")
     (suite.path / "tests/benchmarks/test_speed.py").write_text("def test_speed(): pass")
     result = run(suite, "def test_sense(): pass", options="-m benchmark -v")

@@ -1,4 +1,4 @@
-"""One word for one thing: no public function or class of the product has the name of another."""
+"""No two public functions or classes of the product have the same name."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def public_names(source: str) -> list[str]:
     return [node.name for node in nodes if not node.name.startswith("_")]
 
 
-def test_no_public_name_means_two_things() -> None:
+def test_no_public_name_is_defined_twice() -> None:
     files = [path for package in PACKAGES for path in (CHECKOUT / package).rglob("*.py")]
     counts = Counter(name for path in files for name in set(public_names(path.read_text(encoding="utf-8"))))
     assert counts["write_atomically"] == 1

@@ -1,4 +1,4 @@
-"""Setting up with make, against a Python that only notes what it is asked to do."""
+"""Setting up with make, against a fake Python that records its calls."""
 
 from __future__ import annotations
 
@@ -91,7 +91,7 @@ def settled(newcomer: Newcomer) -> Newcomer:
     return newcomer
 
 
-def test_benchmarks_add_what_they_compare_with_once(settled: Newcomer) -> None:
+def test_the_bench_target_installs_its_requirements_once(settled: Newcomer) -> None:
     settled.make("bench")
     peers = "-m pip install --quiet --constraint constraints.txt --no-build-isolation --editable .[bench]"
     assert settled.installations() == [peers]
@@ -106,18 +106,18 @@ def test_every_target_installs_first(newcomer: Newcomer, target: str) -> None:
     assert newcomer.printed[0] == "hexacell: setting up .venv, once; this takes a minute"
 
 
-def test_once_installed_only_the_work_is_done(settled: Newcomer) -> None:
+def test_a_target_with_an_installed_venv_runs_its_command_only(settled: Newcomer) -> None:
     assert settled.make("test") == 0
     assert settled.calls() == ["-c ", "-m pytest -n 3 --dist loadfile -m not slow and not benchmark"]
     assert settled.printed == []
 
 
-def test_once_installed_the_python_that_did_it_may_go(settled: Newcomer) -> None:
+def test_an_installed_venv_does_not_need_the_outer_python(settled: Newcomer) -> None:
     settled.python.unlink()
     assert settled.make("test") == 0
 
 
-def test_demo_is_the_installed_program(settled: Newcomer) -> None:
+def test_the_demo_target_runs_the_installed_program(settled: Newcomer) -> None:
     program = settled.checkout / ".venv/bin/hexacell"
     program.write_text('#!/bin/sh\necho "$@" >&2\n')
     program.chmod(0o755)
@@ -135,7 +135,7 @@ def test_other_pins_are_installed_in_place(settled: Newcomer, name: str) -> None
     assert settled.installations() == []
 
 
-def test_touching_the_pins_is_no_change(settled: Newcomer) -> None:
+def test_an_unchanged_requirement_file_is_not_installed_again(settled: Newcomer) -> None:
     (settled.checkout / "pyproject.toml").touch()
     settled.make("venv")
     assert settled.installations() == []
@@ -153,7 +153,7 @@ def test_an_interrupted_installation_starts_anew(newcomer: Newcomer) -> None:
     assert not (newcomer.checkout / ".venv/half-written").exists()
 
 
-def test_a_stranger_venv_is_made_anew(newcomer: Newcomer) -> None:
+def test_an_unknown_venv_is_made_anew(newcomer: Newcomer) -> None:
     (newcomer.checkout / ".venv/lib").mkdir(parents=True)
     assert newcomer.make("venv") == 0
     assert newcomer.installations() == FROM_SCRATCH
@@ -188,7 +188,7 @@ def test_without_ensurepip_the_outer_pip_installs(newcomer: Newcomer) -> None:
         ("ensurepip pip", "'{}' can neither make a venv with pip nor has pip itself: install python3-"),
     ],
 )
-def test_what_cannot_be_helped_gets_one_line(newcomer: Newcomer, lacking: str, line: str) -> None:
+def test_an_unusable_python_is_reported_in_one_line(newcomer: Newcomer, lacking: str, line: str) -> None:
     newcomer.lacking = lacking
     assert newcomer.make("test") == 2
     [said] = [said for said in newcomer.printed if "setting up" not in said]
@@ -196,7 +196,7 @@ def test_what_cannot_be_helped_gets_one_line(newcomer: Newcomer, lacking: str, l
     assert not any(" install " in call for call in newcomer.calls())
 
 
-def test_no_python_at_all_gets_one_line(newcomer: Newcomer) -> None:
+def test_an_absent_python_is_reported_in_one_line(newcomer: Newcomer) -> None:
     newcomer.python.unlink()
     assert newcomer.make("test") == 2
     [said] = newcomer.printed
@@ -204,7 +204,7 @@ def test_no_python_at_all_gets_one_line(newcomer: Newcomer) -> None:
 
 
 @pytest.mark.parametrize(("name", "value"), [("PYTHONPATH", "/opt/ros"), ("PYTHONDONTWRITEBYTECODE", "1")])
-def test_what_changes_pythons_ways_does_not_reach_it(settled: Newcomer, name: str, value: str) -> None:
+def test_python_environment_variables_are_not_passed_on(settled: Newcomer, name: str, value: str) -> None:
     python = settled.checkout / ".venv/bin/python"
     python.write_text(f'#!/bin/sh\necho "[${name}]" >&2\n')
     settled.environment[name] = value

@@ -1,4 +1,4 @@
-"""Processes that tests start have a terminal's signals, whatever the test run itself ignores or blocks."""
+"""Child processes of tests have a terminal's signals, whatever the test run ignores or blocks."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def test_a_child_has_the_signals_of_a_terminal() -> None:
 
 
 @pytest.mark.usefixtures("background_job")
-def test_the_test_run_keeps_what_it_was_started_with() -> None:
+def test_the_signals_of_the_test_run_are_restored() -> None:
     with terminal_signals():
         assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
     assert [signal.getsignal(number) for number in IGNORED] == [signal.SIG_IGN] * len(IGNORED)

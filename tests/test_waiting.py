@@ -1,4 +1,4 @@
-"""No test waits for a time: a count of seconds stands in for an event, and a busy machine is slower."""
+"""No test waits for a fixed time, because a busy machine may take longer."""
 
 from __future__ import annotations
 
@@ -78,12 +78,12 @@ def test_no_test_waits_for_a_time() -> None:
         "thread.join(5)",
     ],
 )
-def test_a_time_is_found(line: str) -> None:
+def test_a_wait_for_a_time_is_found(line: str) -> None:
     assert len(list(clocks_in(f"async def test():\n    {line}"))) == 1
 
 
 @pytest.mark.parametrize(
     "line", ["await asyncio.sleep(0)", "event.wait()", "await clock.sleep(0.3)", "','.join(words)"]
 )
-def test_an_event_is_none(line: str) -> None:
+def test_a_wait_for_an_event_is_accepted(line: str) -> None:
     assert list(clocks_in(f"async def test():\n    {line}")) == []

@@ -1,4 +1,4 @@
-"""The wheel alone, installed elsewhere, does the whole job: nothing of the checkout is needed."""
+"""The wheel, installed outside the checkout, runs the demo without the checkout."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ def site_packages(venv: Path) -> Path:
     return folder
 
 
-def test_the_checkout_is_out_of_sight(elsewhere: Path, tmp_path: Path) -> None:
+def test_the_installed_wheel_does_not_use_the_checkout(elsewhere: Path, tmp_path: Path) -> None:
     script = """
 import json, sys
 import drivers, hexacell, procedures
@@ -104,7 +104,7 @@ def check_demo(venv: Path, folder: Path, records: int) -> None:
     assert json.loads(result.read_text())["converged"] is True
 
 
-def test_it_does_the_whole_job_quickly(elsewhere: Path, tmp_path: Path) -> None:
+def test_the_installed_demo_passes_with_a_small_cell(elsewhere: Path, tmp_path: Path) -> None:
     cell = site_packages(elsewhere) / "hexacell" / "_configs" / CELL
     as_it_comes = text = cell.read_text()
     for old, new in QUICK:
@@ -118,5 +118,5 @@ def test_it_does_the_whole_job_quickly(elsewhere: Path, tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_it_does_the_whole_job_as_it_comes(elsewhere: Path, tmp_path: Path) -> None:
+def test_the_installed_demo_passes_unchanged(elsewhere: Path, tmp_path: Path) -> None:
     check_demo(elsewhere, tmp_path, records=55)

@@ -1,6 +1,6 @@
-"""How soon the robot stands after something went wrong: on the wire, at the speed of the wall.
+"""How soon the robot stops after a fault, through real drivers and in real time.
 
-The event strikes in the middle of a move within a set. What counts is the simulated robot's own clock:
+The fault is injected in the middle of a move within a set. What counts is the simulated robot's own clock:
 from the event to the moment in which its sliders came to rest.
 """
 
@@ -191,7 +191,9 @@ async def stopping_s(folder: Path, protocol: str, kind: FaultKind, device: str) 
 
 
 @pytest.mark.parametrize("protocol", ["sylvac", "mux10", "cdi"])
-async def test_the_robot_stands_soon_after(tmp_path: Path, say: Any, protocol: str) -> None:
+async def test_the_robot_stops_within_the_limit_after_each_fault(
+    tmp_path: Path, say: Any, protocol: str
+) -> None:
     late = {}
     for kind, device, guards in EVENTS:
         if protocol == "mux10" and kind == "unplugged" and device == "x":
@@ -205,8 +207,8 @@ async def test_the_robot_stands_soon_after(tmp_path: Path, say: Any, protocol: s
     assert max(late.values()) <= MUST_S
 
 
-async def test_the_watch_does_not_slow_the_readings(tmp_path: Path, say: Any) -> None:
-    """Readings after a watched move take what they take without it."""
+async def test_readings_after_a_watched_move_are_not_slower(tmp_path: Path, say: Any) -> None:
+    """Readings after a watched move take as long as without it."""
     async with watched(tmp_path, "mux10") as cell:
         for gauge in cell.devices.gauges:
             await gauge.gauge.read()

@@ -1,4 +1,4 @@
-"""What orientations that choose themselves give, on many robots and through the whole plan.
+"""Accuracy with automatically selected orientations, on many robots and through the whole plan.
 
 ``ROBOTS`` in the environment says how many random robots are tried besides Table 1's; the targets are
 for 1,000. All cores are used.

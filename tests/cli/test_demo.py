@@ -58,7 +58,7 @@ def distances(demo, phase: str) -> list[float]:
     return found
 
 
-def test_it_passes_with_one_document_and_text_on_stderr(demo):
+def test_the_demo_passes_with_one_document_on_stdout_and_text_on_stderr(demo):
     outcome = demo.outcome
     assert outcome.code == 0, outcome.err
     document = outcome.document
@@ -69,7 +69,7 @@ def test_it_passes_with_one_document_and_text_on_stderr(demo):
         assert (demo.folder.parent / document[name]).exists()
 
 
-def test_it_prints_the_deviation_before_and_after(demo):
+def test_the_demo_prints_the_deviation_before_and_after(demo):
     line = demo.outcome.document["line"]
     match = re.fullmatch(
         r"35 parameters, 5[0-5] records at 5 points; mean deviation at held-out points "
@@ -88,11 +88,11 @@ def test_the_mean_deviation_falls_by_more_than_99_percent(demo):
     assert np.mean(after) < 0.01 * np.mean(before)
 
 
-def test_it_prints_how_fast_its_clock_is(demo):
+def test_the_demo_prints_the_speed_of_its_clock(demo):
     assert "The simulated cell's clock runs 50 times as fast as real time." in demo.outcome.err
 
 
-def test_its_output_fits_a_terminal(demo):
+def test_the_output_of_the_demo_fits_a_terminal(demo):
     *words, _result = demo.outcome.err.splitlines()
     assert max(map(len, words)) <= 80
     sets = [line for line in words if " records, " in line]
@@ -156,7 +156,7 @@ def test_the_identified_geometry_is_the_true_one(demo):
         assert np.abs(np.subtract(nominal[name], truth[name])).max() > 5.0
 
 
-def test_its_run_folder_has_all_that_is_promised(demo):
+def test_the_run_folder_of_the_demo_has_all_documented_files(demo):
     promised = {
         "journal.jsonl",
         "cell.toml",
@@ -213,7 +213,7 @@ def test_the_bundled_cells_can_be_loaded(typed_here):
     )
 
 
-def test_a_folder_that_is_no_demo_is_left_alone(typed_here, tmp_path):
+def test_a_folder_that_is_no_demo_is_not_changed(typed_here, tmp_path):
     theirs = tmp_path / "theirs"
     theirs.mkdir()
     (theirs / "thesis.txt").write_text("years")
@@ -228,7 +228,7 @@ def test_a_folder_that_is_no_demo_is_left_alone(typed_here, tmp_path):
     ("folder", "words"),
     [("file", "something else has that name"), ("file/inside", "a part of the path is not a folder")],
 )
-def test_a_file_where_the_folder_should_be(typed_here, tmp_path, folder, words):
+def test_a_file_in_place_of_the_demo_folder_is_refused(typed_here, tmp_path, folder, words):
     (tmp_path / "file").write_text("mine")
     outcome = typed_here("demo", "--folder", folder)
     assert outcome.code == 2

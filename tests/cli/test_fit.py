@@ -147,7 +147,7 @@ def test_a_mistake_in_the_file_is_named_with_its_line(typed_here, cell_folder, t
     assert cell_folder.snapshot() == before
 
 
-def test_a_file_that_is_no_text(typed_here, cell_folder, tmp_path):
+def test_a_file_that_is_not_utf8_is_refused_with_its_line(typed_here, cell_folder, tmp_path):
     (tmp_path / "m.csv").write_bytes(b"point,orientation\n1,\xff\n")
     outcome = fit(typed_here, cell_folder)
     assert outcome.code == 2

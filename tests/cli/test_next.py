@@ -110,7 +110,7 @@ def few(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("hexacell.application.offline.Plan", partial(Plan, candidates=128))
 
 
-def test_record_by_record_to_the_end(typed_here, short_cell, stranger):
+def test_a_campaign_by_next_ends_with_all_points_measured(typed_here, short_cell, stranger):
     before = short_cell.snapshot()
     said = stranger.continue_solution(asking(typed_here, short_cell, stranger.file))
     assert short_cell.snapshot() == before
@@ -139,7 +139,7 @@ def test_record_by_record_to_the_end(typed_here, short_cell, stranger):
 
 @pytest.mark.slow
 @pytest.mark.timeout(600)
-def test_it_reaches_the_accuracy_of_a_run(typed, cell_folder, stranger, demo):
+def test_a_campaign_by_next_reaches_the_accuracy_of_a_run(typed, cell_folder, stranger, demo):
     """Every call is a process of its own; the demo ran the same cell on its own devices."""
     said = stranger.continue_solution(asking(typed, cell_folder, stranger.file))
     assert len(said) == 56
@@ -172,7 +172,7 @@ def test_an_empty_file_starts_a_campaign(typed_here, cell_folder, tmp_path, text
     assert said["pose"] == {"x": 0.0, "y": 0.0, "z": 550.0, "a": 0.0, "b": 0.0, "c": 0.0}
 
 
-def test_text_for_users(typed_here, cell_folder, stranger):
+def test_the_text_states_the_decision_and_the_forecast(typed_here, cell_folder, stranger):
     outcome = typed_here("next", cell_folder.cell, "--measurements", stranger.file)
     assert (outcome.code, outcome.err) == (0, "")
     assert "Begin point 1: go to X0.000 Y0.000 Z550.000" in outcome.out
@@ -219,7 +219,7 @@ def test_a_file_that_cannot_be_used(typed_here, cell_folder, stranger, mistake):
     assert words in outcome.err
 
 
-def test_a_file_that_is_not_there(typed_here, cell_folder):
+def test_an_absent_measurement_file_is_refused(typed_here, cell_folder):
     outcome = typed_here("next", cell_folder.cell, "--measurements", "absent.csv", "--json")
     assert outcome.code == 2
     assert "absent.csv: cannot be read: it does not exist" in outcome.err

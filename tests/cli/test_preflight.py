@@ -184,7 +184,7 @@ def test_a_controller_that_is_not_there(typed_here, served, closed_port):
 
 
 @pytest.mark.parametrize("command", COMMANDS)
-def test_everything_at_once(typed_here, served, closed_port, command):
+def test_several_failures_are_reported_at_once(typed_here, served, closed_port, command):
     served.edit(
         (port_of(served, "x"), "/dev/nowhere"),
         ("nodes = [1, 2, 3, 4, 5, 6]", "nodes = [9, 2, 3, 4, 5, 6]"),

@@ -1,4 +1,4 @@
-"""Preflight of the plan: a plan that cannot work is refused with the reason, others are predicted."""
+"""Preflight of the plan: an infeasible plan is refused with the reason, others get a prediction."""
 
 from __future__ import annotations
 
@@ -168,7 +168,7 @@ def test_a_list_of_poses_that_can_be_measured(typed_here: Any, cell_folder: Any)
     assert outcome.document["expected"]["outside"] == 0
 
 
-def test_a_list_leaves_no_points_to_choose(typed_here: Any, cell_folder: Any) -> None:
+def test_a_list_of_poses_with_choose_points_is_refused(typed_here: Any, cell_folder: Any) -> None:
     listed(cell_folder, lambda rows: rows)
     cell_folder.edit(("orientations = 11", "orientations = 11\nchoose_points = true"))
     outcome = typed_here("preflight", cell_folder.cell)

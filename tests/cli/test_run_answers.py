@@ -1,4 +1,4 @@
-"""Who approves a new geometry: limits, a person, or nobody."""
+"""Approval of a new geometry: by limits, by a person, or not at all."""
 
 from __future__ import annotations
 
@@ -82,11 +82,13 @@ def ended(process, terminal):
 
 
 @pytest.mark.usefixtures("few_candidates")
-class TestNobodyIsThere:
+class TestUnattendedRun:
     @pytest.mark.parametrize(
         "unattended", [[], ["--unattended", "--mode", "optimise"]], ids=["", "unattended"]
     )
-    def test_approval_waits_with_the_proposal_left(self, typed_here, fast_cell, demo, unattended):
+    def test_a_run_that_needs_approval_ends_and_keeps_its_proposal(
+        self, typed_here, fast_cell, demo, unattended
+    ):
         fast_cell.edit(ASK)
         run = fast_cell.rewound(demo.run, before="propose")
         config = fast_cell.controller.read_bytes()
@@ -98,7 +100,7 @@ class TestNobodyIsThere:
         assert fast_cell.controller.read_bytes() == config
         assert not (run / "config-after").exists()
 
-    def test_a_change_beyond_its_limit_waits_too(self, typed_here, fast_cell, demo):
+    def test_a_change_beyond_its_limit_needs_approval(self, typed_here, fast_cell, demo):
         fast_cell.edit(("largest_change_mm = 15.0", "largest_change_mm = 1.0"))
         run = fast_cell.rewound(demo.run, before="propose")
         config = fast_cell.controller.read_bytes()
@@ -121,7 +123,7 @@ class TestNobodyIsThere:
         assert fast_cell.controller.read_bytes() == config
         assert (run / "config-after").read_bytes() != config
 
-    def test_a_config_that_somebody_changed_meanwhile_is_left_alone(self, typed_here, fast_cell, demo):
+    def test_a_config_edited_during_the_run_is_not_overwritten(self, typed_here, fast_cell, demo):
         run = fast_cell.rewound(demo.run, before="propose")
         theirs = fast_cell.controller.read_bytes() + b"# tuned by hand\n"
         fast_cell.controller.write_bytes(theirs)
@@ -130,7 +132,7 @@ class TestNobodyIsThere:
         assert f"{fast_cell.controller}: the config changed since the run began" in outcome.err
         assert fast_cell.controller.read_bytes() == theirs
 
-    def test_a_controller_that_refuses_it_gets_the_old_one_back(self, start, typed_here, fast_cell, demo):
+    def test_a_failed_reload_restores_the_config(self, start, typed_here, fast_cell, demo):
         simulation = start("simulate", fast_cell.cell)
         simulation.wait_for("serving", lambda: simulation.err)
         fast_cell.cell.write_text(
@@ -191,14 +193,14 @@ class TestAPersonAtTheTerminal:
         assert "approved by a person at the terminal" in process.out
         assert process.out.splitlines()[-1].endswith(": pass")
 
-    def test_anything_but_yes_is_no(self, waiting, terminal, demo):
+    def test_an_answer_other_than_yes_declines(self, waiting, terminal, demo):
         process, _, cell = waiting
         terminal.type("y\n")
         assert ended(process, terminal) == 1
         assert "declined; nothing was applied" in terminal.shown
         assert cell.controller.read_bytes() == (demo.run / "config-before").read_bytes()
 
-    def test_no_answer_is_none(self, waiting, terminal, demo):
+    def test_the_end_of_input_leaves_the_question_unanswered(self, waiting, terminal, demo):
         process, _, cell = waiting
         terminal.type("\x04")
         assert ended(process, terminal) == 4

@@ -117,7 +117,7 @@ def test_a_stop_before_anything_was_measured_leaves_nothing_to_resume(start, goo
     assert ("To go on" in outcome.out) == bool(good_cell.runs())
 
 
-def test_a_closed_terminal_stops_it_too_with_a_json_document(start, good_cell):
+def test_a_closed_terminal_stops_the_run_with_a_json_document(start, good_cell):
     process = start("run", good_cell.cell, "--unattended", "--json")
     under_way(process, good_cell, 1)
     outcome = stopped_at_once(process, good_cell, signal.SIGHUP)
@@ -137,7 +137,7 @@ def test_repeated_ctrl_c_changes_nothing(start, good_cell):
     assert isinstance(history(good_cell.runs()[0])[-1], events.Interrupted)
 
 
-def test_sigterm_stops_what_ignores_ctrl_c(start, good_cell):
+def test_sigterm_stops_a_run_that_ignores_ctrl_c(start, good_cell):
     """As in the background job of a shell script."""
     process = start("run", good_cell.cell, "--unattended", through="trap '' INT; exec \"$@\"")
     under_way(process, good_cell, 1)
@@ -147,7 +147,7 @@ def test_sigterm_stops_what_ignores_ctrl_c(start, good_cell):
     assert isinstance(history(good_cell.runs()[0])[-1], events.Interrupted)
 
 
-def test_a_kill_leaves_what_can_be_resumed(start, typed_here, good_cell):
+def test_a_killed_run_can_be_resumed(start, typed_here, good_cell):
     process = start("run", good_cell.cell, "--unattended")
     under_way(process, good_cell, 2)
     process.popen.kill()
@@ -157,7 +157,7 @@ def test_a_kill_leaves_what_can_be_resumed(start, typed_here, good_cell):
     assert resumed.code == 0, resumed.err
 
 
-def test_a_closed_output_does_not_stop_it(start, good_cell):
+def test_a_closed_output_does_not_stop_the_run(start, good_cell):
     """``hexacell run ... | head -1``: the job is done, and the exit code is the job's."""
     reader, writer = os.pipe()
     os.close(reader)
@@ -168,7 +168,7 @@ def test_a_closed_output_does_not_stop_it(start, good_cell):
 
 
 @pytest.mark.parametrize("arguments", [["cell", "schema"], ["--help"]], ids=" ".join)
-def test_a_reader_that_leaves_early_gets_no_traceback(arguments, tmp_path):
+def test_a_closed_pipe_causes_no_traceback(arguments, tmp_path):
     script = ["bash", "-c", 'set -o pipefail; "$@" | true', "bash"]
     with terminal_signals():
         shell = subprocess.run(
@@ -181,7 +181,7 @@ def test_a_reader_that_leaves_early_gets_no_traceback(arguments, tmp_path):
     assert (shell.returncode, shell.stderr) == (0, "")
 
 
-class TestWhatCannotBeResumed:
+class TestRunsThatCannotBeResumed:
     @pytest.fixture
     def rewound(self, demo, cell_folder):
         return cell_folder.rewound(demo.run, before="propose")

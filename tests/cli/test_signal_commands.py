@@ -117,7 +117,7 @@ def test_when_the_engine_has_ended_a_signal_changes_nothing(signals) -> None:
     assert signals.run(over()) == "done"
 
 
-def test_what_is_ignored_stays_ignored(signals) -> None:
+def test_an_ignored_signal_stays_ignored(signals) -> None:
     former = signal.signal(INT, signal.SIG_IGN)
 
     async def background_job() -> bool:

@@ -39,7 +39,7 @@ def shared(tmp_path_factory, processes):
         yield folder, process, process.out
 
 
-def test_it_prints_a_complete_cell_file_before_it_serves(shared, typed_here, tmp_path):
+def test_simulate_prints_a_complete_cell_file_before_it_serves(shared, typed_here, tmp_path):
     folder, _, text = shared
     settings = tomllib.loads(text)
     assert "simulation" not in settings
@@ -59,7 +59,7 @@ def test_the_true_geometry_is_not_printed(shared):
         assert str(length) not in text
 
 
-def test_run_does_the_whole_job_over_the_wires(served, typed_here, quick_cell, few_candidates):
+def test_a_run_calibrates_the_simulated_cell_over_its_ports(served, typed_here, quick_cell, few_candidates):
     _, printed = served
     before = tomllib.loads(quick_cell.controller.read_text())
     outcome = typed_here("run", printed, "--json")
@@ -79,7 +79,7 @@ def test_run_does_the_whole_job_over_the_wires(served, typed_here, quick_cell, f
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
-def test_it_ends_cleanly(start, cell_folder, number):
+def test_a_signal_ends_simulate_without_leftovers(start, cell_folder, number):
     process, text = serving(start, cell_folder)
     before = cell_folder.snapshot()
     assert list(process.temporary.iterdir())
@@ -93,13 +93,13 @@ def test_it_ends_cleanly(start, cell_folder, number):
         assert port.startswith("/dev/pts/") or not Path(port).exists()
 
 
-def test_it_starts_no_other_processes(shared):
+def test_simulate_starts_no_other_processes(shared):
     _, process, _ = shared
     pid = process.popen.pid
     assert Path(f"/proc/{pid}/task/{pid}/children").read_text() == ""
 
 
-def test_it_ends_while_a_run_is_connected(served, start):
+def test_simulate_ends_while_a_run_is_connected(served, start):
     """The run then reports which device is lost, and that it can be resumed."""
     simulation, printed = served
     run = start("run", printed, "--mode", "check")

@@ -1,4 +1,4 @@
-"""The cells in ``configs`` load, and say what the paper's tables say."""
+"""The cells in ``configs`` load, and agree with the paper's tables."""
 
 from __future__ import annotations
 
@@ -80,13 +80,13 @@ def test_points_and_task_poses_can_be_reached(cell):
         assert margins.min() > settings.limits.singularity_margin
 
 
-def test_they_survive_being_written_again(cell, tmp_path):
+def test_bundled_cells_written_and_read_again_are_unchanged(cell, tmp_path):
     for text in (dump(cell.settings), describe(cell)):
         (tmp_path / "cell.toml").write_text(text)
         assert load_cell(tmp_path / "cell.toml").settings == cell.settings
 
 
-def test_owners_configs_hold_more_than_the_geometry():
+def test_controller_configs_contain_more_than_the_geometry():
     for name in NAMES:
         text = (CONFIGS / f"{name}.controller.toml").read_text()
         assert set(tomllib.loads(text)) > {"geometry", "machine", "axes"}

@@ -51,14 +51,14 @@ def port(monkeypatch: pytest.MonkeyPatch) -> Port:
     return made
 
 
-async def test_without_one_nothing_is_forbidden() -> None:
+async def test_without_a_stop_input_motion_is_allowed() -> None:
     line = stop_input_of(GuardSettings(), Path())
     assert await line.open() is None
     assert await line.active_reason() is None
     await line.close()
 
 
-async def test_a_file_forbids_while_it_exists(tmp_path: Path) -> None:
+async def test_a_stop_file_forbids_motion_while_it_exists(tmp_path: Path) -> None:
     line = stop_input_of(GuardSettings(stop_file="stop"), tmp_path)
     assert await line.open() is None, "a file is no device"
     assert await line.active_reason() is None
@@ -68,12 +68,12 @@ async def test_a_file_forbids_while_it_exists(tmp_path: Path) -> None:
     assert await line.active_reason() is None
 
 
-async def test_a_link_that_leads_nowhere_is_a_file_too(tmp_path: Path) -> None:
+async def test_a_dangling_link_as_stop_file_forbids_motion(tmp_path: Path) -> None:
     (tmp_path / "stop").symlink_to("nowhere")
     assert await CombinedStopInput(tmp_path / "stop").active_reason() is not None
 
 
-async def test_a_file_that_cannot_be_checked_forbids(tmp_path: Path) -> None:
+async def test_a_stop_file_that_cannot_be_checked_forbids_motion(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
     assert "cannot be checked" in (
         await CombinedStopInput(tmp_path / "file" / "stop").active_reason() or ""
@@ -81,7 +81,7 @@ async def test_a_file_that_cannot_be_checked_forbids(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("contact", ["dsr", "cts"])
-async def test_a_contact_forbids_while_it_is_open(port: Port, contact: Any) -> None:
+async def test_an_open_contact_forbids_motion(port: Port, contact: Any) -> None:
     settings = GuardSettings(stop_port="/dev/ttyS9", stop_contact=contact)
     line = stop_input_of(settings, Path())
     identity = await line.open()
@@ -96,7 +96,7 @@ async def test_a_contact_forbids_while_it_is_open(port: Port, contact: Any) -> N
     assert not port.is_open
 
 
-async def test_an_adapter_that_was_pulled_out_forbids(port: Port) -> None:
+async def test_an_unplugged_adapter_forbids_motion(port: Port) -> None:
     line = stop_input_of(GuardSettings(stop_port="/dev/ttyS9"), Path())
     await line.open()
     port.broken = OSError(5, "Input/output error")
@@ -105,7 +105,7 @@ async def test_an_adapter_that_was_pulled_out_forbids(port: Port) -> None:
     await line.close()
 
 
-async def test_before_it_is_open_and_after_it_is_closed_it_forbids(port: Port) -> None:
+async def test_a_contact_that_is_not_opened_forbids_motion(port: Port) -> None:
     contact = StopContact("/dev/ttyS9", "dsr")
     assert "is not open" in (contact.active_reason() or "")
     contact.open()
@@ -143,7 +143,7 @@ async def test_a_port_without_modem_lines_is_refused_or_forbids() -> None:
         os.close(far)
 
 
-async def test_each_of_several_forbids(port: Port, tmp_path: Path) -> None:
+async def test_all_active_stop_inputs_are_named(port: Port, tmp_path: Path) -> None:
     line = stop_input_of(GuardSettings(stop_file="stop", stop_port="/dev/ttyS9"), tmp_path)
     await line.open()
     port.contact_closed = False

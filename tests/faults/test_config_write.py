@@ -1,4 +1,4 @@
-"""The process dies before each call that writes the config or takes it back: SIGKILL, no cleaning.
+"""SIGKILL before each call that writes the config or reverts it, without any cleaning up.
 
 The same for every call in this process, and failures instead of deaths, are in
 ``tests/hexacell/controller_config``; a power cut, which also loses what was written, in
@@ -56,7 +56,9 @@ class Cutter:
         return f"{found}, leftover" if left else found
 
 
-def test_it_dies_before_the_replacement(program: Any, new_site: Any, undisturbed: Any, case: Any) -> None:
+def test_a_kill_before_the_replacement_leaves_the_old_config(
+    program: Any, new_site: Any, undisturbed: Any, case: Any
+) -> None:
     calls = undisturbed.ended.calls
     replaced = next(number for number, call in enumerate(calls) if call.other.endswith(CONFIG))
     cutter = Cutter(program, new_site, undisturbed, case)
@@ -65,7 +67,9 @@ def test_it_dies_before_the_replacement(program: Any, new_site: Any, undisturbed
 
 @pytest.mark.slow
 @pytest.mark.timeout(3600)
-def test_it_dies_at_every_call(program: Any, new_site: Any, rolled_back: Any, case: Any) -> None:
+def test_a_kill_at_any_call_of_a_write_back_or_rollback_leaves_a_valid_config(
+    program: Any, new_site: Any, rolled_back: Any, case: Any
+) -> None:
     cutter = Cutter(program, new_site, rolled_back, case)
     committing, rolling_back = writes_of_the_config(rolled_back.ended.calls)
     require_cut_everywhere(cutter, committing, "committing", rolling_back, "rolling back")
@@ -73,7 +77,9 @@ def test_it_dies_at_every_call(program: Any, new_site: Any, rolled_back: Any, ca
 
 @pytest.mark.slow
 @pytest.mark.timeout(3600)
-def test_it_dies_at_every_call_of_a_lending(program: Any, new_site: Any, lent: Any, case: Any) -> None:
+def test_a_kill_at_any_call_of_a_provisional_write_or_its_reversal_leaves_a_valid_config(
+    program: Any, new_site: Any, lent: Any, case: Any
+) -> None:
     cutter = Cutter(program, new_site, lent, case)
     lending, taking_back, _ = writes_of_the_config(lent.ended.calls)
     require_cut_everywhere(cutter, lending, "lending", taking_back, "taking back")

@@ -1,8 +1,8 @@
 """A disk that is full, read-only, forbidden or broken at every write of a run.
 
 A first run counts the calls that change files. Then the program is run again and again, each time
-with another of them failing: what it says, what is in the controller's config, and whether the run
-goes on once the disk is well again.
+with another of them failing: the message, the content of the controller's config, and whether the
+run resumes once the disk works again are checked.
 """
 
 from __future__ import annotations
@@ -125,19 +125,21 @@ def the(writes: Sequence[Write], name: str, file: str, step: str = "") -> Write:
     return next(w for w in writes if (w.name, w.file) == (name, file) and step in {"", w.step})
 
 
-def test_a_disk_that_is_full_while_measuring(disk: Disk, writes: Sequence[Write]) -> None:
+def test_a_disk_full_while_measuring_is_reported_as_the_journal(
+    disk: Disk, writes: Sequence[Write]
+) -> None:
     words = disk.fail(the(writes, "write", "journal.jsonl", "sampling"), errno.ENOSPC)
     assert "journal.jsonl: the journal cannot be written" in words, "not what failed afterwards"
 
 
 @pytest.mark.slow
-def test_a_config_that_may_not_be_written(disk: Disk, writes: Sequence[Write]) -> None:
+def test_a_config_without_write_permission_is_unchanged(disk: Disk, writes: Sequence[Write]) -> None:
     words = disk.fail(the(writes, "open", "simulated-hexaglide.controller.toml"), errno.EACCES)
     assert "simulated-hexaglide.controller.toml: cannot be written and is unchanged" in words
 
 
 @pytest.mark.slow
-def test_a_config_that_is_written_but_perhaps_not_for_good(disk: Disk, writes: Sequence[Write]) -> None:
+def test_a_failed_sync_after_replacing_the_config_is_reported(disk: Disk, writes: Sequence[Write]) -> None:
     replaced = the(writes, "replace", "simulated-hexaglide.controller.toml").number
     synced = next(w for w in writes[replaced:] if w.name == "fsync")
     disk.fail(synced, errno.EIO, width=1)
@@ -146,8 +148,10 @@ def test_a_config_that_is_written_but_perhaps_not_for_good(disk: Disk, writes: S
 @pytest.mark.slow
 @pytest.mark.timeout(7200)
 @pytest.mark.parametrize("code", ERRORS, ids=[words for words, _ in ERRORS.values()])
-def test_every_single_write_fails(code: int, disk: Disk, writes: Sequence[Write]) -> None:
-    """From then on; where it is the first of its kind, the run is also finished on a disk that is well."""
+def test_a_failure_of_any_write_leaves_a_valid_config(
+    code: int, disk: Disk, writes: Sequence[Write]
+) -> None:
+    """All later writes fail too; for the first write of a kind the run is also finished on a good disk."""
     kinds = of_each_kind(writes)
     for write in writes:
         disk.fail(write, code, and_resume=write in kinds)
@@ -156,7 +160,7 @@ def test_every_single_write_fails(code: int, disk: Disk, writes: Sequence[Write]
 @pytest.mark.slow
 @pytest.mark.timeout(3600)
 @pytest.mark.parametrize("step", ["lending", "taking back", "rolling back"])
-def test_every_write_fails_where_a_run_does_not_simply_pass(
+def test_a_full_disk_at_any_write_of_a_config_reversal_leaves_a_valid_config(
     step: str, program: Any, new_site: Any, whole_with: Any, case: Any
 ) -> None:
     whole = whole_with(step)
@@ -168,6 +172,8 @@ def test_every_write_fails_where_a_run_does_not_simply_pass(
 
 @pytest.mark.slow
 @pytest.mark.timeout(3600)
-def test_every_kind_of_write_fails_once(disk: Disk, writes: Sequence[Write]) -> None:
+def test_a_single_disk_error_in_any_kind_of_write_leaves_a_valid_config(
+    disk: Disk, writes: Sequence[Write]
+) -> None:
     for write in of_each_kind(writes):
         disk.fail(write, errno.EIO, width=1)

@@ -33,42 +33,48 @@ def kill(program: Any, new_site: Any, undisturbed: Any, case: Any) -> Break:
     return broken
 
 
-class TestASample:
-    def test_between_a_step_and_its_record(self, undisturbed: Any, kill: Break) -> None:
+class TestSelectedKills:
+    def test_a_run_killed_between_a_step_and_its_record_is_resumed(
+        self, undisturbed: Any, kill: Break
+    ) -> None:
         kill("killed after a record", after(places(undisturbed.history)["sampling"]))
 
-    def test_with_the_config_written_but_not_verified(self, undisturbed: Any, kill: Break) -> None:
+    def test_a_run_killed_with_an_unverified_config_is_resumed(self, undisturbed: Any, kill: Break) -> None:
         kill("killed after a record", after(places(undisturbed.history)["after"]))
 
-    def test_in_the_middle_of_a_record_and_again(self, undisturbed: Any, kill: Break) -> None:
+    def test_a_run_killed_within_a_record_and_again_after_resuming_is_resumed(
+        self, undisturbed: Any, kill: Break
+    ) -> None:
         kill("killed twice", within(places(undisturbed.history)["committing"]), after(1))
 
 
 @pytest.mark.slow
 @pytest.mark.timeout(3600)
-class TestEverywhere:
-    def test_after_every_record(self, undisturbed: Any, kill: Break) -> None:
+class TestAllKills:
+    def test_a_run_killed_after_any_record_is_resumed(self, undisturbed: Any, kill: Break) -> None:
         for records in range(1, len(undisturbed.history) + 1):
             kill("killed after a record", after(records))
 
-    def test_in_the_middle_of_a_record_of_each_kind_of_step(self, undisturbed: Any, kill: Break) -> None:
+    def test_a_run_killed_within_a_record_of_any_kind_of_step_is_resumed(
+        self, undisturbed: Any, kill: Break
+    ) -> None:
         for record in places(undisturbed.history).values():
             kill("killed within a record", within(record))
             kill("killed within a record", within(record + 1))
 
-    def test_again_while_it_is_resumed(self, undisturbed: Any, kill: Break) -> None:
+    def test_a_run_killed_again_while_it_resumes_is_resumed(self, undisturbed: Any, kill: Break) -> None:
         for records in places(undisturbed.history).values():
             for more in (1, 2, 3, 5, 8):
                 kill("killed twice", after(records), after(more))
 
-    def test_over_and_over(self, undisturbed: Any, kill: Break) -> None:
+    def test_a_run_killed_six_times_is_resumed(self, undisturbed: Any, kill: Break) -> None:
         for records in (5, 40, 90, 120):
             kill("killed six times", *[after(records), within(2), after(7), after(1), within(4), after(9)])
 
 
 @pytest.mark.slow
 @pytest.mark.timeout(3600)
-def test_a_run_that_is_taken_back_is_taken_back_after_every_kill(
+def test_a_result_to_be_rolled_back_is_rolled_back_after_a_kill_at_any_record(
     program: Any, new_site: Any, rolled_back: Any, case: Any
 ) -> None:
     history = rolled_back.history
@@ -84,7 +90,7 @@ def test_a_run_that_is_taken_back_is_taken_back_after_every_kill(
 
 @pytest.mark.slow
 @pytest.mark.timeout(3600)
-def test_what_was_lent_is_taken_back_after_every_kill(
+def test_a_provisional_geometry_is_reverted_after_a_kill_at_any_record(
     program: Any, new_site: Any, lent: Any, case: Any
 ) -> None:
     begun = places(lent.history)

@@ -1,4 +1,4 @@
-"""SIGKILL at random instants, wherever the program is: in a computation, a write, a question."""
+"""SIGKILL at random instants: in a computation, a write or a question."""
 
 from __future__ import annotations
 
@@ -21,7 +21,9 @@ SOONER = 0.95
 @pytest.mark.parametrize(
     "number", [SAMPLE, pytest.param(INSTANTS, marks=[pytest.mark.slow, pytest.mark.timeout(3600)])]
 )
-def test_at_any_instant(number: int, program: Any, new_site: Any, undisturbed: Any, case: Any) -> None:
+def test_a_run_killed_at_a_random_instant_is_resumed(
+    number: int, program: Any, new_site: Any, undisturbed: Any, case: Any
+) -> None:
     duration_s = undisturbed.seconds
     for share in instants(number):
         site, duration_s = killed(program, new_site, share, duration_s)

@@ -1,4 +1,4 @@
-"""SIGKILL of a program whose cell lives in another process: the robot stays where it was left."""
+"""SIGKILL of a program whose cell runs in another process: the robot stays at its position."""
 
 from __future__ import annotations
 
@@ -52,7 +52,9 @@ def run_over_killed(records: int, program: Any, site: Site, whole: Any, case: An
         case("killed beside a living cell", step, outcome)
 
 
-def test_in_a_set(program: Any, new_site: Any, undisturbed: Any, case: Any) -> None:
+def test_a_run_killed_within_a_set_is_resumed(
+    program: Any, new_site: Any, undisturbed: Any, case: Any
+) -> None:
     records = places(undisturbed.history)["sampling"] + 20
     run_over_killed(records, program, new_site(), undisturbed, case)
 
@@ -60,7 +62,9 @@ def test_in_a_set(program: Any, new_site: Any, undisturbed: Any, case: Any) -> N
 @pytest.mark.slow
 @pytest.mark.timeout(600)
 @pytest.mark.parametrize("step", STEPS_OF_A_RUN)
-def test_at_each_kind_of_step(step: str, program: Any, new_site: Any, whole_with: Any, case: Any) -> None:
+def test_a_run_killed_at_any_kind_of_step_is_resumed(
+    step: str, program: Any, new_site: Any, whole_with: Any, case: Any
+) -> None:
     whole = whole_with(step)
     records = places(whole.history)[step]
     run_over_killed(records, program, new_site(*whole.changes), whole, case)

@@ -1,4 +1,4 @@
-"""The matrix knows every step there is, and counts only what was tried."""
+"""The fault matrix has every kind of step, and counts only the cases that were tried."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from tests.faults.test_killed_at_random import killed
 
 
 @pytest.mark.parametrize("kind", get_args(Compute.model_fields["kind"].annotation))
-def test_every_computation_has_a_column(kind: str) -> None:
+def test_every_computation_is_a_step_of_the_matrix(kind: str) -> None:
     assert step_of([events.StepBegun(step=Compute(kind=kind))]) in STEPS
 
 
@@ -24,7 +24,7 @@ def test_all_cases_are_counted() -> None:
     assert table([*tried, tried[0]]).splitlines()[-1] == "3 cases"
 
 
-def test_a_run_that_was_over_was_not_killed() -> None:
+def test_a_run_that_ended_before_the_kill_is_tried_again_earlier() -> None:
     codes, instants = [0, 0, KILLED], []
 
     def program(_: object, die_after_s: float) -> SimpleNamespace:

@@ -1,4 +1,4 @@
-"""The power goes at every call of a run that changes a file: what is found then, in every case allowed."""
+"""A power cut at every call of a run that changes a file, with every disk content that it may leave."""
 
 from __future__ import annotations
 
@@ -96,7 +96,7 @@ def cut_everywhere(story: Story, case: Any) -> None:
         pytest.param(NEVER_GOOD_ENOUGH, 1, id="a bad result", marks=pytest.mark.slow),
     ],
 )
-def test_the_power_goes_at_any_moment(
+def test_a_run_survives_a_power_cut_at_any_file_operation(
     changes: dict[str, Any], code: int, program: Any, ground: Path, case: Any
 ) -> None:
     cut_everywhere(Story(program, make_site(ground / "cell", changes), code), case)

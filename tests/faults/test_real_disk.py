@@ -1,6 +1,6 @@
-"""Disks that really are full, files that may not grow, folders that may not be written.
+"""Full disks, files at their size limit and read-only folders of a real file system.
 
-What is injected elsewhere is real here: a file system in memory of a few hundred kilobytes, in a
+Faults that other tests inject are real here: a file system in memory of a few hundred kilobytes, in a
 mount namespace of its own, the kernel's limit on the size of files, and permissions.
 """
 
@@ -84,13 +84,15 @@ def fill_up(left: int, small_disk: Any, undisturbed: Any, case: Any) -> None:
 
 
 @pytest.mark.slow
-def test_a_disk_that_really_is_full(small_disk: Any, undisturbed: Any, case: Any) -> None:
+def test_a_run_on_a_full_disk_can_be_resumed(small_disk: Any, undisturbed: Any, case: Any) -> None:
     fill_up(80_000, small_disk, undisturbed, case)
 
 
 @pytest.mark.slow
 @pytest.mark.timeout(600)
-def test_a_disk_that_is_full_sooner_or_later(small_disk: Any, undisturbed: Any, case: Any) -> None:
+def test_a_run_on_a_disk_that_fills_up_at_any_size_can_be_resumed(
+    small_disk: Any, undisturbed: Any, case: Any
+) -> None:
     used = sum(path.stat().st_size for path in undisturbed.folder.path.iterdir())
     for left in range(0, used - undisturbed.folder.wire.stat().st_size, 12_288):
         fill_up(left, small_disk, undisturbed, case)
@@ -99,7 +101,7 @@ def test_a_disk_that_is_full_sooner_or_later(small_disk: Any, undisturbed: Any, 
 @pytest.mark.slow
 @pytest.mark.timeout(600)
 @pytest.mark.parametrize("share", [0.2, 0.5, 0.9])
-def test_a_file_that_may_not_grow(
+def test_a_run_ended_by_the_file_size_limit_can_be_resumed(
     share: float, program: Any, new_site: Any, undisturbed: Any, case: Any
 ) -> None:
     """The kernel writes what still fits: half a record."""
@@ -137,12 +139,12 @@ class TestPermissions:
 
         return run
 
-    def test_a_folder_that_may_not_be_written(self, new_site: Any, refused: Any) -> None:
+    def test_a_read_only_cell_folder_is_refused(self, new_site: Any, refused: Any) -> None:
         site = new_site()
         site.folder.chmod(0o555)
         refused(site, "Have the owner of the folder create it once, empty, with mode 666")
 
-    def test_runs_that_may_not_be_kept(self, new_site: Any, refused: Any) -> None:
+    def test_a_read_only_runs_folder_is_refused(self, new_site: Any, refused: Any) -> None:
         site = new_site()
         site.folder.chmod(0o777)
         runs = site.folder / "runs"

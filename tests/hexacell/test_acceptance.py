@@ -106,7 +106,7 @@ def test_an_allowed_offset_of_the_ball_is_no_violation(judged, identified, paper
     assert not judged(moved, tolerances=too_little, largest_change_mm=50.0)["within tolerance"].passed
 
 
-def test_one_joint_is_not_excused_by_the_ball(judged, shifted):
+def test_the_ball_tolerance_does_not_apply_to_a_single_joint(judged, shifted):
     found = shifted(B4z=25.0)
     assert not judged(found, tolerances=replace(TOLERANCES, ball_mm=40.0))["within tolerance"].passed
 
@@ -120,7 +120,7 @@ def test_the_change_is_from_the_controllers_geometry(judged, identified, paper):
     assert judged(largest_change_mm=1.0, before=identified.geometry)["small change"].passed
 
 
-def test_nan_passes_no_gate(judged, identified):
+def test_nan_in_the_geometry_fails_the_gates(judged, identified):
     vector = identified.geometry.vector.copy()
     vector[3 * 7] = np.nan
     broken = judged(replace(identified.estimate, geometry=Geometry(HEXAGLIDE_PARAMETERS, vector)))
@@ -165,7 +165,7 @@ def test_no_deviations_give_no_statistics(nothing):
         (None, None, Verdict.NOT_EVALUATED),
     ],
 )
-def test_verdicts(before, after, verdict):
+def test_the_verdict_of_each_pair_of_deviations(before, after, verdict):
     assert validate(before, after, **LIMITS) is verdict
 
 

@@ -1,4 +1,4 @@
-"""Plug-ins: packages on the path announce them, and not all of those packages are well."""
+"""Plug-ins announced by installed packages, some of which are broken."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def test_every_kind_that_hexacell_itself_announces() -> None:
 
 
 @pytest.mark.parametrize("group", Group)
-def test_what_hexacell_announces_can_be_loaded(group: Group) -> None:
+def test_every_plugin_of_hexacell_can_be_loaded(group: Group) -> None:
     assert all(callable(plugins.load(group, name)) for name in plugins.names(group))
 
 
@@ -59,13 +59,13 @@ def test_a_plugin_is_loaded(install: Install) -> None:
     assert vars(plugins.load(Group.GAUGES, "laser"))["beam"] == "red"
 
 
-def test_an_unknown_name_gets_the_nearest() -> None:
+def test_an_unknown_name_is_refused_with_the_nearest() -> None:
     with pytest.raises(UsageError, match=r"no gauge protocol 'sylvak'. Did you mean 'sylvac'\?") as caught:
         plugins.load(Group.GAUGES, "sylvak")
     assert caught.value.exit_code is ExitCode.USAGE
 
 
-def test_a_name_like_no_other_gets_them_all() -> None:
+def test_a_name_without_a_near_match_is_refused_with_all_names() -> None:
     with pytest.raises(UsageError, match=r"no gauge protocol '12'. Known are: cdi, mux10, sylvac"):
         plugins.load(Group.GAUGES, "12")
 

@@ -111,14 +111,14 @@ def test_records_in_the_configs_frames_are_identified(on_floor, paper, visit):
     assert written.largest_difference(Hexaglide().change_frames(found.geometry, TO_FLOOR)) < 1e-9
 
 
-def test_before_measuring_the_drawing_is_known_and_its_tolerances(robot, on_floor, paper):
+def test_the_belief_before_measuring_is_the_drawing_with_its_tolerances(robot, on_floor, paper):
     for known in (robot.belief(), on_floor.belief()):
         np.testing.assert_allclose(known.estimate.vector, paper.nominal.vector, atol=1e-9)
         np.testing.assert_allclose(known.controller.vector, paper.nominal.vector, atol=1e-9)
         np.testing.assert_allclose(np.diag(known.covariance), 49.0 / 3.0)
 
 
-def test_after_measuring_what_was_identified_is_known(robot, noisy):
+def test_the_belief_after_measuring_is_the_estimate_with_its_covariance(robot, noisy):
     estimate = estimate_online(robot.problem(noisy))
     known = robot.belief(estimate)
     assert known.estimate.largest_difference(estimate.geometry) == 0.0

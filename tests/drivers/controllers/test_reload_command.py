@@ -18,20 +18,20 @@ def python(program: str) -> tuple[str, ...]:
     return (sys.executable, "-c", program)
 
 
-async def test_one_that_cannot_be_run(tmp_path):
+async def test_a_reload_command_that_cannot_be_run_is_reported(tmp_path):
     absent = str(tmp_path / "absent")
     with pytest.raises(DeviceError, match="absent' cannot be run: No such file or directory"):
         await reload_command.run((absent,), "controller", 5.0)
 
 
-async def test_one_that_takes_too_long_is_killed(tmp_path):
+async def test_a_reload_command_that_exceeds_its_timeout_is_killed(tmp_path):
     with pytest.raises(DeviceError, match=r"took longer than 0\.3 s"):
         await reload_command.run(_saying_who(tmp_path), "controller", 0.3)
     if (tmp_path / "pid").exists():  # else it was killed before it could say
         _expect_gone(tmp_path)
 
 
-async def test_a_cancelled_one_is_killed(tmp_path):
+async def test_a_cancelled_reload_command_is_killed(tmp_path):
     running = asyncio.create_task(reload_command.run(_saying_who(tmp_path), "controller", 1800.0))
     await until((tmp_path / "pid").exists)
     running.cancel()

@@ -14,7 +14,7 @@ from hexacell.errors import DeviceError
 from tests.waiting import until
 
 
-async def test_reading_what_is_not_open_is_an_error(bank):
+async def test_reading_a_closed_bank_is_an_error(bank):
     with pytest.raises(DeviceError, match="not open"):
         await bank.read()
 

@@ -87,7 +87,7 @@ async def test_a_silent_leg_is_named_after_bounded_tries(raw, bank, shorten_time
     assert raw.syncs - before == MAX_SYNCS
 
 
-async def test_silence_of_all_suggests_the_bus(raw, bank, shorten_timeout):
+async def test_if_all_nodes_are_silent_the_error_suggests_the_bus(raw, bank, shorten_timeout):
     await bank.open()
     shorten_timeout(bank)
     for node in raw.nodes.values():
@@ -128,7 +128,7 @@ async def test_a_late_response_is_awaited_before_the_next_sync(raw, bank, monkey
     assert raw.syncs == 3
 
 
-async def test_one_position_too_many_is_another_device(raw, bank):
+async def test_more_positions_than_syncs_are_reported_as_a_second_device(raw, bank):
     await bank.open()
     await bank.read()
     raw.send(raw.nodes[4].tpdo, counts(4))

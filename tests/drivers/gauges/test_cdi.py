@@ -55,7 +55,7 @@ def test_a_value_is_read_with_its_unit(frame, value, unit):
 
 
 @pytest.mark.parametrize("refusal", CdiError)
-def test_a_refusal_is_read(refusal):
+def test_an_error_answer_is_parsed(refusal):
     assert parse_value(refusal.value) is refusal
 
 
@@ -78,13 +78,13 @@ def test_a_refusal_is_read(refusal):
         b"",
     ],
 )
-def test_anything_else_is_rejected(frame):
+def test_malformed_values_are_rejected(frame):
     with pytest.raises(FrameRejected):
         parse_value(frame)
 
 
 @given(st.floats(-99, 99), st.booleans())
-def test_what_the_simulated_device_writes_is_read(value, inch):
+def test_values_of_the_simulated_device_are_parsed(value, inch):
     shown = parse_value(Cdi.format_value(1, value, inch=inch).removesuffix(b"\n"))
     assert isinstance(shown, DisplayedValue)
     assert shown.value == pytest.approx(value, abs=0.51e-5 if inch else 0.51e-4)
@@ -113,14 +113,14 @@ def test_a_parameter_is_read_bare_or_named(frame):
 
 
 @pytest.mark.parametrize("frame", [b"NOT FOUND\r", b"NO ACCESS\r"])
-def test_a_parameter_may_be_unknown(frame):
+def test_an_unknown_parameter_is_parsed_as_none(frame):
     assert parse_parameter(frame, Parameter.HOLD) is None
 
 
 @pytest.mark.parametrize(
     "frame", [b"p019=1\r", b"SUCCESS\r", b"1.5\r", b"\r", b"1\xb2\r", b"OUT OF BOUNDS\r"]
 )
-def test_anything_else_is_no_such_parameter(frame):
+def test_malformed_parameters_are_rejected(frame):
     with pytest.raises(FrameRejected):
         parse_parameter(frame, Parameter.HOLD)
 
@@ -128,7 +128,7 @@ def test_anything_else_is_no_such_parameter(frame):
 # Dialogues
 
 
-async def test_it_opens_and_reads(dialogue, gauge):
+async def test_opening_identifies_the_gauge_and_reading_gives_its_value(dialogue, gauge):
     dialogue.expect(*opening(), (b"R\r", VALUE), (b"R\r", VALUE))
     assert await gauge.open() == DeviceIdentity("y", "cdi", "CDI or Starrett indicator")
     assert await gauge.read() == GaugeReading(2.138, "+  2.1380, MM")

@@ -77,13 +77,13 @@ def test_an_error_is_read(frame, code):
         b"",
     ],
 )
-def test_anything_else_is_rejected(frame):
+def test_malformed_values_are_rejected(frame):
     with pytest.raises(FrameRejected):
         parse_value(frame, 2)
 
 
 @given(st.integers(1, 99), st.floats(-99, 99), st.booleans())
-def test_what_the_simulated_device_writes_is_read(channel, value, inch):
+def test_values_of_the_simulated_device_are_parsed(channel, value, inch):
     shown = parse_value(Mux10.format_value(channel, value, inch=inch), channel)
     assert isinstance(shown, DisplayedValue)
     assert shown.value == pytest.approx(value, abs=0.51e-5 if inch else 0.51e-3)
@@ -120,7 +120,7 @@ def test_an_error_or_a_value_is_no_description(frame):
 # Dialogues
 
 
-async def test_it_opens_and_reads(dialogue, gauge):
+async def test_opening_identifies_the_gauge_and_reading_gives_its_value(dialogue, gauge):
     dialogue.expect(*OPENING, (b"2\r", VALUE), (b"2\r", b"02A+0000.124\r"))
     assert await gauge.open() == DeviceIdentity("y", "mux10", "MUX-10F 1.0")
     assert await gauge.read() == GaugeReading(0.124, "02A+0000.124")
@@ -141,7 +141,7 @@ async def test_requests_to_a_busy_multiplexer_are_repeated(dialogue, opened, no_
     assert (await opened.read()).value_mm == 0.123
 
 
-async def test_it_pauses_before_it_repeats_a_request_to_a_busy_multiplexer(dialogue, opened, monkeypatch):
+async def test_a_pause_precedes_the_repeated_request_to_a_busy_multiplexer(dialogue, opened, monkeypatch):
     pauses = []
 
     async def sleep(seconds):
@@ -178,7 +178,7 @@ async def test_a_plunger_at_its_end_does_not_prevent_opening(dialogue, gauge):
     await gauge.check()
 
 
-async def test_the_data_button_of_another_channel_is_not_mistaken(dialogue, opened):
+async def test_a_value_sent_by_the_data_button_of_another_channel_is_discarded(dialogue, opened):
     dialogue.expect((b"2\r", b"01A+0009.999\r" + VALUE), (b"2\r", VALUE), (b"2\r", VALUE))
     dialogue.unasked(b"01A+0008.888\r")
     assert (await opened.read()).value_mm == 0.123

@@ -19,7 +19,7 @@ def test_the_echo_of_the_request_is_no_answer():
     assert cut_frame(b"R\r\n+1, MM\r\n", b"R\r", b"\r\n") == (b"+1, MM\r\n", b"")
 
 
-def test_what_follows_the_frame_is_kept_apart():
+def test_bytes_after_the_frame_are_returned_separately():
     assert cut_frame(b"\n+1.234\r\n+2.345\r", b"?\r", b"\r") == (b"+1.234\r", b"\n+2.345\r")
 
 

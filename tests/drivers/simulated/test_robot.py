@@ -82,7 +82,7 @@ def test_a_pose_out_of_reach_is_refused_and_nothing_moves(twin, pose: Pose) -> N
     assert twin.machine.pose().as_tuple() == pytest.approx(TILTED.as_tuple(), abs=1e-9)
 
 
-def test_after_a_refusal_it_still_moves(twin) -> None:
+def test_a_robot_moves_after_a_refused_pose(twin) -> None:
     with pytest.raises(KinematicsFailure):
         twin.machine.move(Pose(0.0, 0.0, 2000.0))
     twin.machine.move(TILTED)

@@ -45,7 +45,7 @@ async def test_millidegrees_are_read(path: Path, text: str, celsius: float) -> N
         assert await room.read() == TemperatureReading(celsius, text.strip())
 
 
-async def test_its_identity_names_the_file(path: Path) -> None:
+async def test_the_identity_of_a_thermometer_names_its_file(path: Path) -> None:
     show(path, "21375\n")
     async with thermometer(path) as room:
         assert await room.open() == DeviceIdentity("thermometer room", "sysfs", str(path))
@@ -63,7 +63,7 @@ async def test_its_identity_names_the_file(path: Path) -> None:
         ("9" * 5000, "gives 1e[+]61 deg C|gives no number"),
     ],
 )
-async def test_what_is_no_temperature_is_refused(path: Path, text: str, words: str) -> None:
+async def test_contents_that_are_no_temperature_are_refused(path: Path, text: str, words: str) -> None:
     show(path, text)
     async with thermometer(path) as room:
         with pytest.raises(DeviceError, match=f"^thermometer room: {words}") as refusal:
@@ -71,7 +71,7 @@ async def test_what_is_no_temperature_is_refused(path: Path, text: str, words: s
     assert refusal.value.action == f"Check the sensor behind {path}"
 
 
-async def test_a_file_that_cannot_be_read_is_an_error_until_it_can(path: Path) -> None:
+async def test_an_unreadable_file_is_an_error_until_it_can_be_read(path: Path) -> None:
     async with thermometer(path) as room:
         with pytest.raises(DeviceError, match="cannot be read: it does not exist"):
             await room.open()

@@ -24,7 +24,7 @@ from procedures.run.state import fold
 from procedures.run.steps import Phase
 
 
-def test_it_passes(finished) -> None:
+def test_a_calibration_passes(finished) -> None:
     assert finished.ended.exit_code == ExitCode.DONE
     assert "35 parameters, 18 records at 2 points; mean deviation at held-out points" in finished.ended.line
     judged = fold(finished.history).judged
@@ -46,7 +46,7 @@ def test_the_controllers_config_is_changed_in_its_numbers_only(finished) -> None
         assert old.partition("#")[2] == new.partition("#")[2]
 
 
-def test_the_way_back_is_kept(finished) -> None:
+def test_the_receipt_and_the_backup_for_a_rollback_are_kept(finished) -> None:
     receipt = Receipt.of(finished.folder.path)
     assert receipt.backup() == finished.config_before
     assert receipt.sha256_after == fingerprint(finished.cell.config_path)
@@ -83,7 +83,7 @@ def test_raw_readings_are_what_the_devices_sent(finished) -> None:
         assert all(len(answer) == 3 and all(answer) for answer in sample.reading.answers)
 
 
-def test_deviations_shrink(finished) -> None:
+def test_a_calibration_reduces_the_deviations_at_held_out_points(finished) -> None:
     state = fold(finished.history)
     before, after = (np.linalg.norm(state.held_out(phase), axis=1) for phase in (Phase.BEFORE, Phase.AFTER))
     assert before.mean() > 1.0
@@ -171,7 +171,7 @@ async def test_a_damaged_journal_is_not_resumed(make_site, finished) -> None:
         await site.calibrate(resume=True)
 
 
-async def test_a_run_that_somebody_else_writes_is_not_resumed(make_site, finished) -> None:
+async def test_a_run_whose_journal_is_open_elsewhere_is_not_resumed(make_site, finished) -> None:
     site = make_site()
     site.write(finished.until(events.Proposed), finished)
     before = site.folder.journal.read_bytes()

@@ -1,4 +1,4 @@
-"""Drivers by their names, opened together and let go together."""
+"""Drivers loaded by name, opened together and closed together."""
 
 from __future__ import annotations
 
@@ -68,8 +68,8 @@ async def test_connected_devices_answer_and_their_traffic_is_kept(make_site) -> 
     assert cell_now.clock.factor == 500.0
 
 
-async def test_if_one_cannot_be_opened_all_are_closed(make_site) -> None:
-    """What would stay open, the harness finds; and afterwards all can be opened again."""
+async def test_if_one_device_cannot_be_opened_all_are_closed(make_site) -> None:
+    """The test harness finds open descriptors; afterwards all devices can be opened again."""
     site = make_site()
     site.simulated.gauges.indicators["y"].inch = True
     with pytest.raises(DeviceError, match="gauge y"):
@@ -80,7 +80,7 @@ async def test_if_one_cannot_be_opened_all_are_closed(make_site) -> None:
         pass
 
 
-async def test_all_are_closed_after_an_error_inside(make_site) -> None:
+async def test_all_devices_are_closed_after_an_error_inside_the_context(make_site) -> None:
     site = make_site()
     with pytest.raises(ZeroDivisionError):
         async with open_devices(site.simulated.settings):
@@ -106,7 +106,7 @@ def test_a_simulated_cell_is_served_while_the_context_lasts(make_cell) -> None:
         assert (settings.encoders.bus or {})["interface"] == "slcan"
 
 
-def test_only_the_settings_are_others(make_site) -> None:
+def test_a_simulated_cell_differs_in_its_settings_only(make_site) -> None:
     site = make_site()
     cell = replace(site.cell, settings=site.simulated.settings)
     assert (cell.path, cell.text) == (site.cell.path, site.cell.text)

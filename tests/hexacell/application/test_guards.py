@@ -1,4 +1,4 @@
-"""Guards of the whole program: simulated devices, real drivers, and what the journal says."""
+"""Guards of the whole program with simulated devices, real drivers and the journal."""
 
 from __future__ import annotations
 
@@ -58,7 +58,9 @@ def striking(site: Any, key: str, kind: FaultKind, device: str) -> Callable[...,
 
 
 @pytest.mark.parametrize(("kind", "device", "key", "guards"), FAULTS)
-async def test_what_happens_on_a_move_stops_it(make_site, kind, device, key, guards) -> None:
+async def test_a_fault_during_a_move_stops_the_robot_and_trips_its_guard(
+    make_site, kind, device, key, guards
+) -> None:
     site = make_site(**SLOW, guards__stale_s=0.4)
     before = site.config
     struck_s = injection_times(site.simulated)
@@ -81,7 +83,7 @@ async def test_what_happens_on_a_move_stops_it(make_site, kind, device, key, gua
 
 
 @pytest.mark.slow
-async def test_a_cable_that_was_put_back_lets_it_go_on(make_site) -> None:
+async def test_a_run_resumes_after_the_cable_is_plugged_in_again(make_site) -> None:
     site = make_site(**SLOW, guards__stale_s=0.4)
     with pytest.raises(GuardTripped):
         await site.calibrate(striking(site, IN_A_SET, "unplugged", "x"))
@@ -98,7 +100,7 @@ async def test_a_cable_that_was_put_back_lets_it_go_on(make_site) -> None:
         await site.calibrate(enough, resume=True)
 
 
-async def test_a_stop_file_of_the_cell_keeps_it_from_beginning(make_cell) -> None:
+async def test_preflight_fails_while_the_stop_file_exists(make_cell) -> None:
     cell = make_cell(guards__stop_file="stop")
     (cell.path.parent / "stop").touch()
     with pytest.raises(GuardTripped, match=r"stop line: motion is forbidden: .*stop exists\. Release it"):
@@ -107,13 +109,13 @@ async def test_a_stop_file_of_the_cell_keeps_it_from_beginning(make_cell) -> Non
     await preflight(cell, Mode.OPTIMISE, unattended=True)
 
 
-async def test_a_disk_without_room_keeps_it_from_beginning(make_cell) -> None:
+async def test_preflight_fails_without_free_disk_space(make_cell) -> None:
     cell = make_cell(guards__free_disk_mb=1e12)
     with pytest.raises(HexacellError, match=r"MB are free where the run is kept, less than 1e\+12 MB"):
         await preflight(cell, Mode.OPTIMISE, unattended=True)
 
 
-async def test_the_cell_file_may_say_what_goes_wrong_and_when(make_cell, make_site) -> None:
+async def test_a_fault_planned_in_the_cell_file_trips_its_guard(make_cell, make_site) -> None:
     fault = SimulatedFault.model_validate(
         {"kind": "stop line", "at_move": 2, "after_s": 5.0, "lasts_s": 1e6}
     )

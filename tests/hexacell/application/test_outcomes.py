@@ -1,4 +1,4 @@
-"""What may go wrong at the end, over real wires: the controller's config is right all the same."""
+"""Failures at the end of a run, through real drivers: the controller's config is correct in each case."""
 
 from __future__ import annotations
 
@@ -48,13 +48,13 @@ def proposed(finished, make_site) -> Callable[..., Any]:
     return make
 
 
-async def test_it_is_resumed_from_the_proposal(proposed, finished) -> None:
+async def test_a_run_resumed_from_its_proposal_writes_the_config(proposed, finished) -> None:
     site = proposed()
     assert (await site.calibrate(resume=True)).exit_code == ExitCode.DONE
     assert site.config == finished.cell.config_path.read_bytes()
 
 
-async def test_a_gate_that_forbids(proposed, finished) -> None:
+async def test_a_forbidding_gate_refuses_the_proposal(proposed, finished) -> None:
     site = proposed([FORBIDDEN])
     with pytest.raises(LimitError, match="refused: Beyond: l3") as refusal:
         await site.calibrate(resume=True)
@@ -62,7 +62,7 @@ async def test_a_gate_that_forbids(proposed, finished) -> None:
     assert site.config == finished.config_before
 
 
-async def test_a_gate_that_needs_a_person_ends_an_unattended_run(proposed, finished) -> None:
+async def test_a_gate_that_requires_approval_ends_an_unattended_run(proposed, finished) -> None:
     site = proposed([DOUBTFUL])
     with pytest.raises(AnswerNeeded, match="It is 20 mm") as refusal:
         await site.calibrate(resume=True)
@@ -74,7 +74,7 @@ async def test_a_gate_that_needs_a_person_ends_an_unattended_run(proposed, finis
     )
 
 
-async def test_a_gate_that_needs_a_person_who_is_there(proposed, approver) -> None:
+async def test_a_gate_that_requires_approval_is_approved_by_the_operator(proposed, approver) -> None:
     site = proposed([DOUBTFUL])
     assert (await site.calibrate(resume=True, operator=approver)).exit_code == ExitCode.DONE
     assert site.happened(events.Committed) == [events.Committed(approved_by="a tester")]
@@ -89,7 +89,7 @@ def bend(site: Any, millimetres: float) -> None:
         physics._joints = physics._joints + np.nan  # so that the platform is moved along at once
 
 
-async def test_worse_than_before_is_rolled_back_bit_for_bit(proposed, finished) -> None:
+async def test_a_result_worse_than_before_is_rolled_back_bit_for_bit(proposed, finished) -> None:
     site = proposed()
     ended = await site.calibrate(at(events.Committed, lambda: bend(site, 6.0)), resume=True)
     assert ended.exit_code == ExitCode.OUT_OF_LIMITS
@@ -104,7 +104,7 @@ def _drawing(site: Any) -> Geometry:
     return hexaglide_geometry(nominal["S"], nominal["B"], nominal["l"])
 
 
-async def test_better_but_not_good_enough_is_rolled_back_too(proposed, finished) -> None:
+async def test_a_better_result_out_of_limits_is_rolled_back(proposed, finished) -> None:
     site = proposed()
     ended = await site.calibrate(at(events.Committed, lambda: bend(site, 0.7)), resume=True)
     assert ended.exit_code == ExitCode.OUT_OF_LIMITS
@@ -112,7 +112,7 @@ async def test_better_but_not_good_enough_is_rolled_back_too(proposed, finished)
     assert site.config == finished.config_before
 
 
-async def test_a_controller_that_does_not_take_the_reload(proposed, finished, tmp_path) -> None:
+async def test_a_failed_reload_restores_the_config_and_the_controller(proposed, finished, tmp_path) -> None:
     first_time = tmp_path / "tried"
     once = f"test -e {first_time} || {{ touch {first_time}; exit 1; }}"
     site = proposed(controller__reload_command=("sh", "-c", once))
@@ -132,7 +132,7 @@ async def test_a_controller_that_never_reloads_must_be_restarted(proposed, finis
     assert site.config == finished.config_before
 
 
-async def test_a_config_that_somebody_changed_is_left_alone(proposed) -> None:
+async def test_a_config_edited_before_resuming_is_not_overwritten(proposed) -> None:
     site = proposed()
     edited = site.config + b"# somebody was here\n"
     site.cell.config_path.write_bytes(edited)
@@ -142,7 +142,7 @@ async def test_a_config_that_somebody_changed_is_left_alone(proposed) -> None:
     assert site.config == edited
 
 
-async def test_a_config_that_somebody_changes_meanwhile_is_left_alone(proposed) -> None:
+async def test_a_config_edited_during_the_run_is_not_overwritten(proposed) -> None:
     site = proposed()
     edited = site.config + b"# somebody was here\n"
     edit = at(events.StepBegun, lambda: site.cell.config_path.write_bytes(edited))
@@ -151,7 +151,7 @@ async def test_a_config_that_somebody_changes_meanwhile_is_left_alone(proposed) 
     assert site.config == edited
 
 
-async def test_a_gauge_set_to_inches_stops_it(make_site) -> None:
+async def test_a_gauge_set_to_inches_stops_the_run(make_site) -> None:
     site = make_site()
     indicator = site.simulated.gauges.indicators["z"]
     fault = at(events.RecordTaken, lambda: setattr(indicator, "inch", True))
@@ -177,7 +177,7 @@ async def test_two_gauges_that_fail_at_once_are_both_named(make_site) -> None:
     assert interrupted.exit_code == ExitCode.HARDWARE
 
 
-async def test_an_emergency_stop_stops_it(make_site) -> None:
+async def test_an_emergency_stop_during_a_move_stops_the_run(make_site) -> None:
     site = make_site()
 
     def stop_in_the_next_move() -> None:
@@ -192,8 +192,8 @@ async def test_an_emergency_stop_stops_it(make_site) -> None:
     assert arrived in ([1], [1, 2]), "the move in which it struck may just have ended"
 
 
-async def test_a_gauge_carried_away_while_measuring_is_no_record(make_site) -> None:
-    """Its plunger at an end: the record is refused, the run goes on, and the drift tells at the end."""
+async def test_a_gauge_moved_away_while_measuring_gives_rejected_records(make_site) -> None:
+    """Its plunger is at an end: the record is rejected, the run continues, and the drift ends the run."""
     site = make_site(acceptance__drift_mm=0.05)
 
     def push() -> None:

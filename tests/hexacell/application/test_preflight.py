@@ -1,4 +1,4 @@
-"""Before motion: every failure in one report, whatever its kind, and nothing has moved."""
+"""Preflight: all failures are in one report, and the robot does not move."""
 
 from __future__ import annotations
 
@@ -116,7 +116,7 @@ async def test_devices_that_open_but_cannot_be_read_are_reported(make_site, monk
     assert issubclass(kinds[1], DeviceError)
 
 
-async def test_gauges_away_from_the_ball_do_not_stand_in_the_way(make_site) -> None:
+async def test_gauges_away_from_the_ball_are_no_preflight_failure(make_site) -> None:
     site = make_site()
     site.simulated.physics._station += np.array([9.0, -9.0, 0.0])
     assert len(await check(site)) == 10
@@ -135,7 +135,7 @@ async def test_a_single_failure_is_raised_as_it_is(make_site) -> None:
     assert len(await check(site, unattended=False)) == 10
 
 
-async def test_a_cell_in_use_is_not_even_looked_at(make_site) -> None:
+async def test_preflight_of_a_cell_in_use_is_refused(make_site) -> None:
     site = make_site()
     with cell_lock(site.cell.config_path), pytest.raises(CellBusy):
         await check(site)

@@ -1,4 +1,4 @@
-"""Devices pulled out and put back over real wires, with nobody there: the run goes on by itself."""
+"""Devices unplugged and plugged in again in an unattended run: the run recovers by itself."""
 
 from __future__ import annotations
 
@@ -45,7 +45,9 @@ def at_second_point(finished, make_site) -> Any:
         pytest.param(UNPLUGGED, "encoder 3", "P2/o03/sample", True, marks=pytest.mark.slow),
     ],
 )
-async def test_a_device_that_comes_back(at_second_point, kind, device, step, voids) -> None:
+async def test_an_unplugged_device_that_is_plugged_in_again_is_recovered(
+    at_second_point, kind, device, step, voids
+) -> None:
     site = at_second_point
     ended = await site.calibrate(pulled_out(site, kind, device, step), resume=True)
     assert ended.exit_code == ExitCode.DONE, ended.line
@@ -56,7 +58,7 @@ async def test_a_device_that_comes_back(at_second_point, kind, device, step, voi
     assert ("P2" in voided) == voids, "what was opened again has lost its zero"
 
 
-async def test_a_device_that_stays_away(at_second_point) -> None:
+async def test_a_device_left_unplugged_ends_the_run_after_three_attempts(at_second_point) -> None:
     site = at_second_point
     site.simulated.faults.check(UNPLUGGED, "y")
 
@@ -70,8 +72,8 @@ async def test_a_device_that_stays_away(at_second_point) -> None:
     assert attempts == [1, 2, 3]
 
 
-async def test_a_robot_that_cannot_be_stopped_is_left_to_people(at_second_point) -> None:
-    """Whatever the policy says: nobody knows whether it still moves. Plugged in again, the run goes on."""
+async def test_a_robot_that_cannot_be_stopped_ends_the_run_without_recovery(at_second_point) -> None:
+    """Whatever the policy: the robot may still move. Once it is plugged in, the run can be resumed."""
     site = at_second_point
 
     def pull(event: events.Event, _: object) -> None:

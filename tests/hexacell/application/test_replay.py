@@ -42,7 +42,7 @@ def everything_in(folder: Path) -> dict[Path, bytes]:
     return {path: path.read_bytes() for path in folder.rglob("*") if path.is_file()}
 
 
-async def test_a_run_on_the_wire_is_the_same_again(finished, tmp_path, monkeypatch) -> None:
+async def test_the_replay_of_a_run_has_no_differences(finished, tmp_path, monkeypatch) -> None:
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     before = everything_in(finished.cell.path.parent)
     replayed = await replay(finished.folder.path)
@@ -63,7 +63,7 @@ async def test_a_journal_alone_is_replayed(finished, tmp_path) -> None:
 
 
 async def test_a_run_that_followed_a_list_is_the_same_without_the_list(make_cell, tmp_path) -> None:
-    """Gauges with a long travel can follow it; the journal keeps what stood in it."""
+    """Gauges with a long travel can measure it; the journal contains its poses."""
     listed, run = tmp_path / "list.csv", RunFolder(tmp_path / "run")
     points = (100.0, -100.0, 500.0), (0.0, 0.0, 550.0)
     rows = ["point,orientation,x,y,z,a,b,c"]
@@ -87,14 +87,14 @@ async def test_a_run_that_followed_a_list_is_the_same_without_the_list(make_cell
     assert started.pose_list == "\n".join(rows) + "\n"
 
 
-async def test_a_config_that_is_not_the_one_of_the_beginning_is_not_used(finished, tmp_path) -> None:
+async def test_the_replay_ignores_a_saved_config_that_differs_from_the_runs(finished, tmp_path) -> None:
     folder = tmp_path / "run"
     shutil.copytree(finished.folder.path, folder)
     (folder / "config-before").write_text("something else")
     assert (await replay(folder, Scope.RESULTS)).is_same
 
 
-async def test_a_manipulated_journal_is_another_run(finished, tmp_path) -> None:
+async def test_the_replay_of_a_manipulated_journal_has_a_difference(finished, tmp_path) -> None:
     entries = recorded(finished)
     place = next(n for n, entry in enumerate(entries) if isinstance(entry.event, events.Identified))
     identified = entries[place].event
@@ -108,7 +108,7 @@ async def test_a_manipulated_journal_is_another_run(finished, tmp_path) -> None:
     assert (await replay(path, Scope.IDENTIFICATION, tolerance=1e-5)).is_same
 
 
-async def test_another_version_may_decide_otherwise(finished, tmp_path) -> None:
+async def test_different_decisions_of_another_version_are_reported_and_accepted(finished, tmp_path) -> None:
     entries = recorded(finished)
     places = [n for n, entry in enumerate(entries) if isinstance(entry.event, events.StepBegun)]
     begun = entries[places[5]].event

@@ -1,4 +1,4 @@
-"""Thermometers of a cell file, from their files to the journal; whatever they do, the run goes on."""
+"""Thermometers of a cell file, from their files to the journal; their failures never end a run."""
 
 from __future__ import annotations
 
@@ -23,7 +23,9 @@ def in_the_room(tmp_path: Path) -> ThermometerSettings:
     return ThermometerSettings(name="room", path=str(path))
 
 
-async def test_temperatures_stand_in_the_journal_and_its_replay(make_site, tmp_path, caplog) -> None:
+async def test_temperatures_are_in_the_journal_and_do_not_change_its_replay(
+    make_site, tmp_path, caplog
+) -> None:
     nowhere = ThermometerSettings(name="rails", path=str(tmp_path / "nowhere"))
     site = make_site(thermometers=(in_the_room(tmp_path), nowhere))
     with caplog.at_level(logging.WARNING):
@@ -41,7 +43,7 @@ async def test_temperatures_stand_in_the_journal_and_its_replay(make_site, tmp_p
     assert replayed.differences == []
 
 
-async def test_preflight_names_those_that_answer(make_site, tmp_path) -> None:
+async def test_preflight_names_the_thermometers_that_answer(make_site, tmp_path) -> None:
     site = make_site(thermometers=(in_the_room(tmp_path),))
     found = await preflight(site.order().cell, Mode.CHECK, unattended=True)
     assert found[-1].name == "thermometer room"

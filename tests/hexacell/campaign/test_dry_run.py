@@ -32,7 +32,7 @@ def test_the_result_is_that_of_a_campaign(result, campaign, two_points):
     assert outlook.now_mm / 4.0 < result.worst_sigma_mm < 4.0 * outlook.now_mm
 
 
-def test_it_is_the_same_every_time(result, make_plan):
+def test_the_dry_run_is_repeatable(result, make_plan):
     assert dry_run(make_plan(**SMALL), robots=1) == result
 
 

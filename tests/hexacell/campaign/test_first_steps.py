@@ -63,7 +63,9 @@ def test_no_robot_within_the_tolerances_leaves_the_travel_at_its_second_record(p
         (43, Pose(0.0009, -0.1307, 550.0443, -0.29766, -0.29233, -0.10608)),
     ],
 )
-def test_a_search_that_ends_next_to_a_singularity_is_started_elsewhere(plan, number, small_turn):
+def test_an_estimate_that_ends_next_to_a_singularity_is_repeated_from_other_starts(
+    plan, number, small_turn
+):
     """Robots, by number, for which a singularity is between the drawing and both records."""
     measurements = measured(plan, robot_number(plan, number), [plan.reference_pose(1), small_turn])
     assert np.abs(measurements.records[1].deviation).max() > 2.0

@@ -1,4 +1,4 @@
-"""The plan: which point, which pose, and when to stop; on the records so far and nothing else."""
+"""The plan: which point, which pose and when to stop depend on the records so far only."""
 
 from __future__ import annotations
 
@@ -170,7 +170,7 @@ def test_a_budget_of_minutes_counts_moving_the_gauges(make_plan, carry_out):
     assert taken[-1].decision == Finished("the budget of 16 minutes is used")
 
 
-def test_it_stops_when_the_target_is_reached(make_plan, carry_out, campaign):
+def test_the_plan_finishes_when_the_target_is_reached(make_plan, carry_out, campaign):
     errors = forecasts_of(campaign)
     target = 0.5 * (errors[-3].now_mm + errors[-2].now_mm)
     plan = make_plan(
@@ -193,7 +193,7 @@ def test_a_target_is_not_reached_before_the_records_can_identify(make_plan, carr
     assert len(records_of(carry_out(plan))) == 14  # 3 x 12 equations for 35 parameters
 
 
-def test_it_stops_where_nothing_is_worth_measuring(make_plan, carry_out, campaign):
+def test_a_point_is_finished_when_no_record_gains_enough(make_plan, carry_out, campaign):
     gains = [forecast.now_mm - forecast.next_mm for forecast in forecasts_of(campaign)]
     plan = make_plan(
         identification__points=TWO_POINTS,

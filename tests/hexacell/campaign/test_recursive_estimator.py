@@ -44,7 +44,7 @@ def test_the_estimate_does_not_depend_on_earlier_calls(two_points, records):
         np.testing.assert_array_equal(other.free_covariance, one_by_one.free_covariance)
 
 
-def test_it_is_the_estimate_from_the_drawing(two_points, records):
+def test_the_continued_estimate_equals_the_estimate_from_the_drawing(two_points, records):
     chained = estimates(two_points.robot, records)[0]
     anew = estimate_online(two_points.robot.problem(MeasurementSet(records)))
     sigma = np.sqrt(np.diag(anew.free_covariance))

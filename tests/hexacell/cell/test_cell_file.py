@@ -13,7 +13,7 @@ from hexacell.cell.loader import load_cell
 from hexacell.errors import ExitCode, FileError, HexacellError, SeveralErrors
 
 
-def test_what_a_cell_file_gives(load_text, cell_text, cell_path):
+def test_a_valid_cell_file_is_loaded(load_text, cell_text, cell_path):
     cell = load_text(cell_text)
     assert cell.path == cell_path
     assert cell.text == cell_text
@@ -179,7 +179,7 @@ def test_every_mistake_is_named_with_its_line(load_changed, line_with, old, new,
 
 
 @pytest.mark.parametrize("value", ["nan", "[1.0, inf]", "{a = -inf}", "2020-02-02", "07:30:00"])
-def test_what_is_passed_on_is_finite_and_plain_too(load_changed, value):
+def test_serial_settings_are_finite_numbers_or_plain_values(load_changed, value):
     with pytest.raises(FileError, match=r"must be a (finite )?number"):
         load_changed(('protocol = "cdi"', f'protocol = "cdi"\nserial.extra = {value}'))
 
@@ -230,7 +230,7 @@ def test_two_gauges_are_too_few(load_text, cell_text):
         ),
     ],
 )
-def test_gauges_that_make_no_triad(load_changed, line_with, changes, message):
+def test_gauges_with_a_repeated_axis_name_or_channel_are_refused(load_changed, line_with, changes, message):
     with pytest.raises(FileError, match=message) as refused:
         load_changed(*changes)
     assert refused.value.line == line_with("[[gauges]]")

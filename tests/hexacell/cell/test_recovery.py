@@ -48,7 +48,7 @@ def test_a_cell_states_its_own_escalations(with_section) -> None:
         ('[recovery.attended]\ndrifft = ["ask"]\n', "drift"),
     ],
 )
-def test_what_a_cell_may_not_state(with_section, text: str, words: str) -> None:
+def test_invalid_escalations_are_refused(with_section, text: str, words: str) -> None:
     with pytest.raises(FileError, match=words):
         load_cell(with_section(text))
 

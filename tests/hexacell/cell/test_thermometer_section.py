@@ -10,7 +10,7 @@ from hexacell.errors import FileError
 ROOM = '\n[[thermometers]]\nname = "room"\npath = "/sys/class/hwmon/hwmon0/temp1_input"\n'
 
 
-def test_a_cell_needs_none(load_text, cell_text) -> None:
+def test_a_cell_without_thermometers_is_valid(load_text, cell_text) -> None:
     assert load_text(cell_text).settings.thermometers == ()
 
 

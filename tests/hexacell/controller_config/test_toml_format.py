@@ -145,7 +145,7 @@ def test_writing_the_same_values_changes_nothing(
 
 
 @given(layouts, tokens_and_values())
-def test_what_was_written_is_read_and_then_written_no_more(
+def test_writing_the_same_geometry_again_changes_nothing(
     layout: Layout, numbers: tuple[list[str], np.ndarray]
 ) -> None:
     old, new = numbers

@@ -201,10 +201,10 @@ def test_a_missing_receipt_is_an_error(tmp_path: Path) -> None:
         Receipt.of(tmp_path)
 
 
-def test_what_does_not_read_back_is_undone(
+def test_a_config_that_does_not_read_back_is_restored(
     config: Path, run: Path, proposal: ConfigChange, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A disk that garbles what it was given: the backup returns, and what was found is kept."""
+    """A disk that garbles the config: the backup is restored, and the garbled file is kept."""
     replace = os.replace
 
     def garble(source: Path, target: Path) -> None:

@@ -94,7 +94,7 @@ def test_any_single_failure_of_a_commit_leaves_the_old_config(bench: Bench) -> N
 
 
 @pytest.mark.parametrize("width", [2, 5, math.inf])
-def test_whatever_fails_in_a_row_the_config_is_old_or_new_and_the_words_are_true(
+def test_consecutive_failures_leave_the_old_or_new_config_and_a_correct_message(
     bench: Bench, width: float
 ) -> None:
     found = set()

@@ -32,7 +32,7 @@ def chosen(know, much, point):
     return select_validation_poses(know(much), point, COUNT, TURNS)
 
 
-def test_the_first_is_untilted_and_all_are_at_the_point(chosen, point):
+def test_the_first_pose_is_untilted_and_all_are_at_the_point(chosen, point):
     assert len(chosen) == COUNT
     np.testing.assert_array_equal(chosen.rotations[0], np.eye(3))
     np.testing.assert_array_equal(chosen.positions, np.broadcast_to(point, (COUNT, 3)))
@@ -50,7 +50,7 @@ def test_the_uncorrected_robot_keeps_the_ball_inside_the_travel(chosen, paper, r
     assert np.abs(deviations).max() > 0.5  # and it has something to judge
 
 
-def test_they_are_apart_from_each_other(chosen):
+def test_validation_poses_differ_from_each_other(chosen):
     """As commanded, which is about the actual orientation."""
     turns = Rotation.from_matrix(chosen.rotations)
     apart = [(turns[i] * turns[j].inv()).magnitude() for i in range(COUNT) for j in range(i)]
@@ -58,7 +58,7 @@ def test_they_are_apart_from_each_other(chosen):
     assert np.degrees(max(apart)) > 10.0
 
 
-def test_they_are_away_from_the_orientations_used(chosen, know, much, point, paper, reach):
+def test_validation_poses_differ_from_the_orientations_used(chosen, know, much, point, paper, reach):
     """The actual orientations at which the geometry was identified."""
     used = much.poses.rotations
     away = select_validation_poses(know(much), point, COUNT, TURNS, used)
@@ -83,7 +83,7 @@ def test_an_orientation_used_already_is_selected_last(know, paper, limits):
     assert away.pose(1).a == pytest.approx(-12.0)
 
 
-def test_the_corrected_robot_can_take_them_too(chosen, much, legs):
+def test_validation_poses_are_within_the_limits_of_the_corrected_robot(chosen, much, legs):
     corrected = legs(much.geometry)
     for position, rotation in zip(chosen.positions, chosen.rotations, strict=True):
         vector = np.concatenate([position, Rotation.from_matrix(rotation).as_rotvec()])

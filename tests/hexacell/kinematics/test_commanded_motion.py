@@ -32,7 +32,7 @@ def test_an_unreachable_command_changes_nothing_for_the_others(robot):
     np.testing.assert_array_equal(together.poses.positions[:2], alone.poses.positions)
 
 
-def test_the_command_for_an_actual_pose_leads_there(robot):
+def test_the_command_computed_for_an_actual_pose_is_the_original_command(robot):
     actual = robot.actual_poses(COMMANDS[:2])
     commands = robot.commands_for(actual.poses, actual.joints)
     assert commands.found.all()

@@ -16,7 +16,7 @@ poses = st.builds(Pose, length, length, length, angle, angle, angle)
 
 
 @given(poses)
-def test_a_pose_survives_the_way_through_matrices(pose):
+def test_a_pose_converted_to_a_matrix_and_back_is_unchanged(pose):
     back = Pose.of(pose.position, pose.rotation)
     np.testing.assert_allclose(back.as_tuple(), pose.as_tuple(), rtol=0, atol=1e-9)
 
@@ -33,7 +33,7 @@ def test_a_pose_reads_as_a_controllers_block():
 
 
 @given(st.lists(poses, max_size=4))
-def test_many_poses_are_the_same_poses(several):
+def test_a_batch_contains_the_poses_it_was_made_of(several):
     arrays = PoseBatch.of(several)
     assert len(arrays) == len(several)
     assert arrays.positions.shape == (len(several), 3)

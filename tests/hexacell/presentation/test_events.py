@@ -101,5 +101,5 @@ def test_a_closed_set_of_the_identification_is_followed_by_the_forecast():
     ],
     ids=lambda value: getattr(value, "kind", ""),
 )
-def test_what_an_event_reports(event, text):
+def test_the_text_of_each_event(event, text):
     assert event_text(event, RunState()) == text

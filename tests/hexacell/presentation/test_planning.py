@@ -22,7 +22,7 @@ RUN_FORECAST = Forecast(now_mm=0.31, next_mm=0.29, end_mm=0.06, records=24, minu
 MEASURE = MeasurePose(2, 7, Pose(1.0, 2.0, 3.0), ZERO, (0.1, -0.2, 0.0), (0.5, 0.6, 0.7), 1.8, None)
 
 
-def test_what_to_do_now():
+def test_the_text_of_each_decision():
     assert decision_text(Finished("all 5 points are measured")) == "Done: all 5 points are measured."
     start = decision_text(StartPoint(2, Pose(0.0, -200.0, 550.0), ZERO))
     assert start.startswith("Begin point 2: go to X0.000 Y-200.000 Z550.000 A0.000")
@@ -38,7 +38,7 @@ def test_waypoints_are_named_before_the_pose():
     assert ": pass through X4.000 Y5.000 Z6.000" in decision_text(via)
 
 
-def test_what_the_remaining_records_gain():
+def test_the_text_of_a_forecast():
     text = forecast_text(FORECAST)
     assert text.startswith("Predicted error at the worst task pose 0.310 mm (one sigma);")
     assert text.endswith("continuing gains 0.250 mm in 24 records, about 12 minutes.")
@@ -52,7 +52,7 @@ def test_what_the_remaining_records_gain():
     ("minutes", "text"),
     [(0.4, "24 seconds"), (1.4, "84 seconds"), (1.6, "2 minutes"), (61.2, "61 minutes")],
 )
-def test_durations_are_rounded_to_what_is_known(minutes, text):
+def test_durations_are_rounded_to_seconds_or_minutes(minutes, text):
     assert duration(minutes) == text
 
 
@@ -78,7 +78,7 @@ def lines(target_mm=None, **changes):
     ]
 
 
-def test_what_the_plan_will_give():
+def test_the_text_of_a_predicted_plan():
     first, *rest = lines(drawn=2)
     assert first == (
         "55 records at 5 points will give about 0.021 mm at the worst of your task poses (one sigma), "

@@ -49,5 +49,5 @@ def test_a_failure_names_the_choices() -> None:
         ("leave", None),
     ],
 )
-def test_the_only_choice_that_begins_so_is_meant(typed: str, choice: str | None) -> None:
+def test_an_unambiguous_beginning_selects_a_choice(typed: str, choice: str | None) -> None:
     assert matching_choice(typed, FAILURE) == choice

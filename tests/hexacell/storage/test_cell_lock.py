@@ -102,7 +102,7 @@ def test_a_second_descriptor_does_not_keep_the_cell(config: Path, monkeypatch: p
         os.close(copy)
 
 
-def test_one_process_cannot_hold_it_twice(config: Path) -> None:
+def test_a_process_cannot_hold_the_same_lock_twice(config: Path) -> None:
     with cell_lock(config):
         assert is_busy(config)
     assert not is_busy(config)
@@ -155,7 +155,7 @@ def test_other_users_can_open_the_lock_file_whatever_the_umask(config: Path) -> 
 
 
 @pytest.mark.parametrize("note", ["", "rubbish", "[1]", '{"pid": 1}', "\x00\xff" * 5000])
-def test_an_unreadable_note_still_means_busy(config: Path, note: str) -> None:
+def test_a_held_lock_with_an_unreadable_note_is_reported_as_busy(config: Path, note: str) -> None:
     with cell_lock(config):
         lock_path(config).write_bytes(note.encode("latin-1"))
         with pytest.raises(CellBusy, match="in use by another process"), cell_lock(config):

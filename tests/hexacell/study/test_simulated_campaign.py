@@ -28,7 +28,7 @@ def make_campaign(paper):
 
 
 @pytest.mark.parametrize("provisional", [False, True])
-def test_it_measures_all_poses_safely_and_identifies_the_robot(make_campaign, provisional):
+def test_a_campaign_measures_all_poses_safely_and_identifies_the_robot(make_campaign, provisional):
     campaign = make_campaign(provisional=provisional)
     campaign.carry_out()
     limits = campaign.robot.limits

@@ -1,4 +1,4 @@
-"""From wherever the robot stands: the goal, a way round, or a plain refusal; never an unchecked move."""
+"""From any position of the robot: a checked line, a checked route, or a refusal."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def spy(monkeypatch: pytest.MonkeyPatch, *blocked: tuple[float, ...]) -> list[tu
     return asked
 
 
-def test_a_run_begins_with_asking_where_the_robot_stands(make_rig) -> None:
+def test_a_run_begins_by_locating_the_robot(make_rig) -> None:
     rig = make_rig()
     beginning = [rig.started()]
     assert rig.calibration.next_step(fold(beginning)).key == "locate"
@@ -44,7 +44,7 @@ def test_a_run_begins_with_asking_where_the_robot_stands(make_rig) -> None:
     assert step.key == "P1/o01/move"
 
 
-def test_where_the_straight_line_is_not_clear_it_goes_round_and_asks_again(make_rig, monkeypatch) -> None:
+def test_a_blocked_straight_line_is_replaced_by_a_route_over_a_waypoint(make_rig, monkeypatch) -> None:
     rig = make_rig()
     point = rig.cell.settings.identification.points[0]
     blocked = (*point, 0.0, 0.0, 0.0)
@@ -67,7 +67,7 @@ def test_where_the_straight_line_is_not_clear_it_goes_round_and_asks_again(make_
     assert rig.calibration.next_step(after).key == "P1/o01/move"
 
 
-def test_back_to_a_reference_the_ball_stays_inside_the_travel(recording, make_rig, monkeypatch) -> None:
+def test_a_return_to_the_reference_is_checked_against_the_travel(recording, make_rig, monkeypatch) -> None:
     sampled = recording.until(events.RecordTaken, count=5)
     here = sampled[-1].pose
     asked = spy(monkeypatch)
@@ -79,10 +79,10 @@ def test_back_to_a_reference_the_ball_stays_inside_the_travel(recording, make_ri
     assert reference is not None
 
 
-def test_a_robot_that_was_carried_off_comes_back_by_a_line_within_the_limits(
+def test_a_robot_away_from_the_ball_returns_on_a_line_checked_without_the_travel(
     recording, make_rig, monkeypatch
 ) -> None:
-    """The gauges' travel cannot hold for a ball that is outside already."""
+    """The gauges' travel cannot be required of a ball that is outside already."""
     sampled = recording.until(events.RecordTaken, count=5)
     asked = spy(monkeypatch)
     step = make_rig().calibration.next_step(fold([*sampled, INTERRUPTED, found_at(ELSEWHERE)]))
@@ -90,7 +90,7 @@ def test_a_robot_that_was_carried_off_comes_back_by_a_line_within_the_limits(
     assert [reference for *_, reference in asked] == [None]
 
 
-def test_poses_that_were_visited_are_ways_round(recording, make_rig, monkeypatch) -> None:
+def test_visited_poses_serve_as_waypoints(recording, make_rig, monkeypatch) -> None:
     sampled = recording.until(events.RecordTaken, count=4)
     state = fold([*sampled, INTERRUPTED, found_at(sampled[-1].pose)])
     second = next(s for s in state.samples(sampled[-1].at.phase) if s.orientation == 2)
@@ -104,7 +104,7 @@ def test_poses_that_were_visited_are_ways_round(recording, make_rig, monkeypatch
     assert (step.key, step.pose) == ("P1/o02/move", second.pose)
 
 
-async def test_with_no_way_nothing_moves(make_rig, monkeypatch) -> None:
+async def test_without_a_route_the_run_ends_without_moving(make_rig, monkeypatch) -> None:
     rig = make_rig()
     monkeypatch.setattr(path_planning, "find_route", lambda *_: None)
     policy = RecoveryPolicy.of(rig.cell.settings.recovery, attended=False)

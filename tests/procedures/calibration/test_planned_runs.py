@@ -1,4 +1,4 @@
-"""A run measures what the plan decides: it stops where that stops, in the order that it chooses."""
+"""A run measures the points and poses that the plan decides, in its order and until its end."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def moves(recording):
             yield event.step, recording.history[:place]
 
 
-def test_every_chosen_move_foretells_what_it_and_going_on_would_gain(recording) -> None:
+def test_every_chosen_move_has_a_forecast_of_its_gain_and_of_the_remaining_records(recording) -> None:
     forecasts = [step.expected.forecast for step, _ in moves(recording) if step.expected]
     assert [forecast.records for forecast in forecasts if forecast] == [*range(17, 9, -1), *range(8, 0, -1)]
     assert all(f and f.end_mm <= f.next_mm <= f.now_mm and f.minutes > 0.0 for f in forecasts)
@@ -55,14 +55,14 @@ def test_with_the_target_reached_the_set_is_closed_and_the_geometry_identified(
     assert rig.calibration.next_step(fold([*at_reference, story(point=2).closed()])).key == "identify"
 
 
-def test_a_budget_ends_it_between_points(make_rig, story) -> None:
+def test_the_budget_of_records_ends_the_measurements_between_points(make_rig, story) -> None:
     rig = make_rig(identification__budget_records=10)
     assert rig.calibration.next_step(fold(story().whole(9))).key == "identify"
     assert expected_records(rig.cell.settings, rig.calibration.mode) == 10 + 2 + 2 * 2 * 4
 
 
 def test_chosen_points_keep_their_numbers(make_rig) -> None:
-    """Of two points of which one hardly tells anything, the other is first, wherever it stands."""
+    """Of two points the one with more information is first, whatever its number."""
     far, near = (100.0, -100.0, 500.0), (-100.0, 100.0, 500.0)
     openings = set()
     for points in ((far, near), (near, far)):

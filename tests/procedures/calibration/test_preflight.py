@@ -1,4 +1,4 @@
-"""Before motion everything that stands in the way is said at once, and nothing moves."""
+"""Preflight reports all failures at once, and the robot does not move."""
 
 from __future__ import annotations
 
@@ -77,8 +77,8 @@ def stopped_in_its_first_call(work: Callable[..., object], calls: list[object]) 
 
 
 @pytest.mark.parametrize("piece", ["reach_failures", "_no_safe_pose"])
-async def test_a_stop_is_heeded_before_the_next_piece_of_work(make_rig, monkeypatch, piece) -> None:
-    """A whole check takes longer than a stop may."""
+async def test_a_cancelled_plan_check_ends_before_its_next_part(make_rig, monkeypatch, piece) -> None:
+    """A whole check takes longer than a stop is allowed to take."""
     rig = make_rig()
     calls: list[object] = []
     monkeypatch.setattr(feasibility, piece, stopped_in_its_first_call(getattr(feasibility, piece), calls))
@@ -110,7 +110,7 @@ async def test_a_gauge_away_from_the_ball_is_no_failure(bench) -> None:
     assert [error.subject for error in await device_failures(bench.devices)] == ["encoders"]
 
 
-def test_nothing_to_raise() -> None:
+def test_without_failures_nothing_is_raised() -> None:
     raise_all([])
 
 
@@ -119,7 +119,7 @@ def test_one_failure_is_raised_as_it_is() -> None:
         raise_all([ReachError("too far")])
 
 
-def test_several_are_raised_in_one_report() -> None:
+def test_several_failures_are_raised_in_one_report() -> None:
     errors = [ReachError("too far"), DeviceError("dead"), AnswerNeeded("nobody")]
     with pytest.raises(SeveralErrors, match=r"(?s)3 problems .*too far.*dead.*nobody") as refusal:
         raise_all([*errors])

@@ -1,4 +1,4 @@
-"""A provisional geometry: lent between two points, and never left behind."""
+"""A provisional geometry: applied between two points, and always reverted."""
 
 from __future__ import annotations
 
@@ -59,7 +59,9 @@ def cut_power() -> None:
     raise PowerCut
 
 
-async def test_it_is_lent_after_the_first_point_and_taken_back_before_anything_is_judged(rig) -> None:
+async def test_a_provisional_geometry_is_applied_after_the_first_point_and_reverted_before_identification(
+    rig,
+) -> None:
     before = rig.config
     configs: dict[str, bytes] = {}
 
@@ -77,7 +79,7 @@ async def test_it_is_lent_after_the_first_point_and_taken_back_before_anything_i
     assert closed[:3] == ["closed", "lent", "closed"]
 
 
-async def test_what_is_lent_is_nearer_to_the_truth(rig) -> None:
+async def test_a_provisional_geometry_is_closer_to_the_truth_than_the_drawing(rig) -> None:
     lent: list[Geometry] = []
 
     def look() -> None:
@@ -96,7 +98,7 @@ async def test_what_is_lent_is_nearer_to_the_truth(rig) -> None:
     assert better < 0.9 * drawn
 
 
-def test_without_leave_nothing_is_lent(recording) -> None:
+def test_no_provisional_geometry_is_applied_by_default(recording) -> None:
     assert "lent" not in {event.kind for event in recording.history}
 
 
@@ -113,7 +115,7 @@ async def require_finished(rig: Any) -> None:
     assert [len(measured.samples) for measured in state.sets.values()] == [9, 9, 3, 3, 3, 3]
 
 
-async def test_an_abort_where_the_robot_stands_level_takes_it_back(rig) -> None:
+async def test_an_abort_at_a_reference_pose_reverts_the_provisional_geometry(rig) -> None:
     before = rig.config
     with pytest.raises(Interruption):
         await rig.run(at(events.SetClosed, lambda: rig.engine.command(Abort())))
@@ -122,7 +124,9 @@ async def test_an_abort_where_the_robot_stands_level_takes_it_back(rig) -> None:
 
 
 @pytest.mark.parametrize("count", [2, 5])
-async def test_an_abort_in_the_middle_of_a_set_leaves_it_until_the_run_is_resumed(rig, count) -> None:
+async def test_an_abort_within_a_set_leaves_the_provisional_geometry_until_the_run_resumes(
+    rig, count
+) -> None:
     before = rig.config
     with pytest.raises(Interruption):
         await rig.run(at(events.RecordTaken, lambda: rig.engine.command(Abort()), count))
@@ -131,7 +135,9 @@ async def test_an_abort_in_the_middle_of_a_set_leaves_it_until_the_run_is_resume
 
 
 @pytest.mark.parametrize("step", ["lend", "take back"])
-async def test_a_power_cut_while_it_is_written_is_put_right(rig, step) -> None:
+async def test_a_run_resumes_after_a_power_cut_before_the_provisional_geometry_is_written(
+    rig, step
+) -> None:
     before = rig.config
     with pytest.raises(PowerCut):
         await rig.run(began(step, cut_power))
@@ -141,7 +147,9 @@ async def test_a_power_cut_while_it_is_written_is_put_right(rig, step) -> None:
     assert rig.config != before
 
 
-async def test_a_power_cut_after_the_file_was_replaced_is_put_right(rig, monkeypatch) -> None:
+async def test_a_run_resumes_after_a_power_cut_with_the_provisional_geometry_written(
+    rig, monkeypatch
+) -> None:
     before = rig.config
 
     kept: list[bytes] = []
@@ -163,7 +171,7 @@ async def test_a_power_cut_after_the_file_was_replaced_is_put_right(rig, monkeyp
     assert ended.exit_code == ExitCode.DONE
 
 
-async def test_a_controller_that_does_not_take_it_leaves_the_config_as_it_was(rig) -> None:
+async def test_a_provisional_geometry_that_cannot_be_loaded_leaves_the_config_unchanged(rig) -> None:
     before = rig.config
     rig.controller.failures["reload"] = DeviceError("cannot be read", subject="controller")
     with pytest.raises(HexacellError, match="did not take the provisional geometry"):

@@ -1,4 +1,4 @@
-"""Back to a set's reference: straight where that is safe, else over poses that were visited."""
+"""The return to a set's reference: straight if the line is clear, else over visited poses."""
 
 from __future__ import annotations
 
@@ -54,7 +54,9 @@ class ClearLines:
     ("clear_to", "way"),
     [((1,), [1]), ((4, 1), [1]), ((4,), [4, 3, 2, 1]), ((), [8, 7, 6, 5, 4, 3, 2, 1]), ((6, 5, 2), [2, 1])],
 )
-def test_the_way_back_is_safe(make_rig, story, monkeypatch, clear_to, way) -> None:
+def test_the_return_to_the_reference_uses_clear_lines_or_visited_poses(
+    make_rig, story, monkeypatch, clear_to, way
+) -> None:
     ClearLines(monkeypatch, *clear_to)
     calibration, happened = make_rig().calibration, story().whole(ORIENTATIONS)[:-2]
     visited: list[int] = []
@@ -65,7 +67,7 @@ def test_the_way_back_is_safe(make_rig, story, monkeypatch, clear_to, way) -> No
     assert step.key == "P1/close"
 
 
-def test_a_way_back_over_stops_is_gone_stop_by_stop(make_rig, story, monkeypatch) -> None:
+def test_a_return_path_over_waypoints_visits_each_of_them(make_rig, story, monkeypatch) -> None:
     stop = Pose(100.0, -100.0, 500.0, 4.0, 1.0, 0.0)
     ClearLines(monkeypatch, 1, stops=(stop,))
     calibration, happened = make_rig().calibration, story().whole(ORIENTATIONS)[:-2]
@@ -77,8 +79,8 @@ def test_a_way_back_over_stops_is_gone_stop_by_stop(make_rig, story, monkeypatch
     assert step.key == "P1/o01/move"
 
 
-def test_at_a_waypoint_of_the_way_back_nothing_is_decided_again(make_rig, story, monkeypatch) -> None:
-    """From the stop alone nothing leads on, and back to where it came from would go on for ever."""
+def test_a_return_path_is_not_planned_again_at_its_waypoint(make_rig, story, monkeypatch) -> None:
+    """No line is clear from the waypoint; planning from there would go back and forth endlessly."""
     stop = Pose(100.0, -100.0, 500.0, 4.0, 1.0, 0.0)
     stands_in = ClearLines(monkeypatch, 1, stops=(stop,))
     calibration, happened = make_rig().calibration, story().whole(ORIENTATIONS)[:-2]
@@ -97,7 +99,7 @@ def test_at_a_waypoint_of_the_way_back_nothing_is_decided_again(make_rig, story,
     assert asked == pytest.approx([ORIENTATIONS - 1.0])
 
 
-def test_the_way_back_leads_over_stops_that_were_passed_where_nothing_is_safe(
+def test_without_a_clear_line_the_return_visits_the_waypoints_passed_before(
     make_rig, story, monkeypatch
 ) -> None:
     ClearLines(monkeypatch)
@@ -111,14 +113,14 @@ def test_the_way_back_leads_over_stops_that_were_passed_where_nothing_is_safe(
     assert (step.key, step.pose) == ("P1/o00/move", stop)
 
 
-def test_the_way_back_from_a_refused_pose_begins_at_the_last_record(make_rig, story, monkeypatch) -> None:
+def test_the_return_from_a_refused_pose_begins_at_the_last_record(make_rig, story, monkeypatch) -> None:
     ClearLines(monkeypatch)
     refusals = [story().arrived(5), story().refused(5)] * (REFUSALS + 1)
     step = make_rig().calibration.next_step(fold([*story().whole(4)[:-2], *refusals]))
     assert step.key == "P1/o04/move"
 
 
-def test_nothing_known_leads_back_one_by_one(make_rig, story, monkeypatch) -> None:
+def test_without_an_estimate_the_return_visits_every_previous_pose(make_rig, story, monkeypatch) -> None:
     def unknown(*_: Any) -> Any:
         raise IdentifiabilityError("the records cannot be followed")
 
@@ -127,7 +129,7 @@ def test_nothing_known_leads_back_one_by_one(make_rig, story, monkeypatch) -> No
     assert step.key == f"P1/o{ORIENTATIONS - 1:02d}/move"
 
 
-def test_the_ball_stays_inside_the_travel_on_every_way(recording, make_rig) -> None:
+def test_the_ball_stays_inside_the_travel_on_every_path(recording, make_rig) -> None:
     """Judged by the truth, which the procedure does not know."""
     rig = make_rig()
     robot, truth = rig.calibration.robot, rig.physics._truth

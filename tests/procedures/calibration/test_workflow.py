@@ -1,4 +1,4 @@
-"""What to do next, as a table: what has happened, and the one step that follows."""
+"""The next step, as a table of past events and the step that follows."""
 
 from __future__ import annotations
 
@@ -148,7 +148,7 @@ TABLE: Table = {
 
 
 @pytest.mark.parametrize("name", TABLE)
-def test_what_follows(name: str, make_rig, story, told, monkeypatch) -> None:
+def test_the_next_step_of_a_calibration(name: str, make_rig, story, told, monkeypatch) -> None:
     happened, key = TABLE[name]
     rig = make_rig()
     choices = Choices(monkeypatch)
@@ -176,7 +176,7 @@ CHECKS: Table = {
 
 
 @pytest.mark.parametrize("name", CHECKS)
-def test_what_follows_in_a_check(name: str, make_rig, story, told) -> None:
+def test_the_next_step_of_a_check(name: str, make_rig, story, told) -> None:
     happened, key = CHECKS[name]
     step = make_rig(Mode.CHECK).calibration.next_step(fold(happened(story, told)))
     assert (step.key if step else None) == key
@@ -271,7 +271,7 @@ def test_a_held_out_pose_outside_the_travel_ends_the_run_before_anything_is_writ
         make_rig().calibration.next_step(fold(refused))
 
 
-def test_a_choice_keeps_the_ball_inside_and_learns(recording) -> None:
+def test_a_chosen_pose_keeps_the_ball_inside_the_travel_and_gains_information(recording) -> None:
     moves = [event.step for event in recording.history if isinstance(event, events.StepBegun)]
     chosen = [step for step in moves if isinstance(step, Move) and step.expected]
     assert len(chosen) == POINTS * (ORIENTATIONS - 1)
@@ -282,8 +282,8 @@ def test_a_choice_keeps_the_ball_inside_and_learns(recording) -> None:
         assert step.expected.gain > 0.0
 
 
-def test_expectations_hold(recording) -> None:
-    """What the gauges should show, and what they did: within a few sigma, over the whole run."""
+def test_measured_deviations_agree_with_the_expected_ones(recording) -> None:
+    """Expected and measured deviations differ by a few sigma at most, over the whole run."""
     expected = {
         (event.step.at, event.step.orientation): event.step.expected
         for event in recording.history
@@ -299,8 +299,8 @@ def test_expectations_hold(recording) -> None:
     assert np.median(wrong_by) < 1.5
 
 
-def test_the_same_state_gives_the_same_step_in_another_process_of_thought(recording, make_rig) -> None:
-    """Nothing but the state decides: a resumed run chooses as the uninterrupted one did."""
+def test_the_next_step_depends_on_the_state_only(recording, make_rig) -> None:
+    """A resumed run chooses the same steps as an uninterrupted one."""
     history = recording.history
     places = [n for n, event in enumerate(history) if isinstance(event, events.StepBegun)]
     calibration = make_rig().calibration
@@ -323,7 +323,7 @@ def test_after_a_refusal_another_pose_is_chosen(recording, make_rig) -> None:
     assert second.pose != first.pose
 
 
-def test_the_way_after_a_refusal_begins_where_the_robot_is(recording, make_rig, monkeypatch) -> None:
+def test_the_path_after_a_refusal_begins_at_the_present_pose(recording, make_rig, monkeypatch) -> None:
     """Not at the last record: the refused pose is where the straight lines start that are checked."""
     starts: list[Any] = []
 
@@ -350,11 +350,11 @@ def _passes(step: Any, following: Any) -> bool:
 
 
 @pytest.mark.parametrize(("mode", "seen"), [(Mode.OPTIMISE, 36), (Mode.CHECK, 8)])
-def test_how_many_records_are_expected(make_rig, mode: Mode, seen: int) -> None:
+def test_the_number_of_expected_records(make_rig, mode: Mode, seen: int) -> None:
     assert expected_records(make_rig(mode).cell.settings, mode) == seen
 
 
-def test_as_many_records_as_expected_come(recording, make_rig) -> None:
+def test_a_run_takes_the_expected_number_of_records(recording, make_rig) -> None:
     came = sum(isinstance(event, events.RecordTaken | events.SetClosed) for event in recording.history)
     assert came == expected_records(make_rig().cell.settings, Mode.OPTIMISE)
 

@@ -1,4 +1,4 @@
-"""Devices together: all that fail are named at once, and one that fails keeps no other open."""
+"""All devices together: failures are named at once, and a failure leaves no other device open."""
 
 from __future__ import annotations
 
@@ -20,13 +20,13 @@ from procedures.devices.device_set import gather_errors
 from tests.waiting import until
 
 
-async def test_all_are_opened_and_identified(bench) -> None:
+async def test_all_devices_are_opened_and_identified(bench) -> None:
     identities = await bench.devices.open()
     names = [identity.name for identity in identities]
     assert names == ["x", "y", "z", *(f"encoder {leg}" for leg in range(1, 7)), "controller"]
 
 
-async def test_all_that_cannot_be_opened_are_named_at_once(bench) -> None:
+async def test_all_devices_that_cannot_be_opened_are_named_at_once(bench) -> None:
     bench.gauges[1].dead = GaugeSilent("does not answer", subject="gauge y")
     bench.encoders.dead = DeviceError("node 3 is absent", subject="encoders")
     bench.controller.dead = DeviceError("refuses the connection", subject="controller")
@@ -43,7 +43,7 @@ async def test_a_single_failure_is_raised_as_it_is(bench) -> None:
         await bench.devices.open()
 
 
-async def test_several_in_one_device_are_not_lost_among_others(bench) -> None:
+async def test_several_failures_of_one_device_are_all_reported(bench) -> None:
     both = [DeviceError(f"node {node} is absent", subject="encoders") for node in (2, 5)]
     bench.encoders.dead = SeveralErrors("encoders do not answer", list(both))
     bench.gauges[0].dead = GaugeSilent("does not answer", subject="gauge x")
@@ -92,7 +92,7 @@ async def test_a_programming_error_is_not_hidden_behind_others() -> None:
         await gather_errors("no", [answer(DeviceError("broken")), answer(ZeroDivisionError())])
 
 
-async def test_cancelling_goes_to_every_call() -> None:
+async def test_cancelling_cancels_every_call() -> None:
     begun: list[int] = []
     cancelled: list[int] = []
 
@@ -124,6 +124,6 @@ SILENT = GaugeSilent("does not answer")
         (SeveralErrors("two", [END, SILENT]), False),
     ],
 )
-def test_kinds_of_errors_are_told_apart(error: HexacellError, expected: bool) -> None:
+def test_errors_are_classified_by_their_kind(error: HexacellError, expected: bool) -> None:
     assert consists_only_of(error, GaugeAtEnd) is expected
     assert consists_only_of(error, GaugeAtEnd, CellBusy, GaugeSilent)

@@ -1,4 +1,4 @@
-"""Temperatures stand in every record; a thermometer that fails never ends a run."""
+"""Temperatures are in every record; a thermometer that fails never ends a run."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class FakeThermometer:
 GONE = DeviceError("cannot be read", subject="thermometer rails", action="Check it")
 
 
-async def test_all_are_read_in_their_order() -> None:
+async def test_all_thermometers_are_read_in_their_order() -> None:
     thermometers = Thermometers([FakeThermometer("room", 20.5), FakeThermometer("rails", -1.0)])
     assert [identity.name for identity in await thermometers.open()] == [
         "thermometer room",
@@ -54,7 +54,9 @@ async def test_all_are_read_in_their_order() -> None:
 
 
 @pytest.mark.parametrize("failure", [GONE, ZeroDivisionError("in a stranger's driver")])
-async def test_one_that_fails_is_missing_and_warned_of_once(caplog, failure: Exception) -> None:
+async def test_a_failing_thermometer_gives_no_temperature_and_one_warning(
+    caplog, failure: Exception
+) -> None:
     rails = FakeThermometer("rails", failure, failure, failure, 21.0, failure)
     thermometers = Thermometers([rails, FakeThermometer("room", 20.5)])
     with caplog.at_level(logging.WARNING):
@@ -70,13 +72,13 @@ async def test_one_that_fails_is_missing_and_warned_of_once(caplog, failure: Exc
     assert "Records are taken without this temperature" in caplog.records[0].getMessage()
 
 
-async def test_all_are_closed() -> None:
+async def test_all_thermometers_are_closed() -> None:
     both = [FakeThermometer("room", 20.5), FakeThermometer("rails", GONE)]
     await Thermometers(both).close()
     assert [one.closed for one in both] == [1, 1]
 
 
-async def test_every_record_of_a_run_has_them(make_rig, caplog) -> None:
+async def test_every_record_of_a_run_has_the_temperatures(make_rig, caplog) -> None:
     rig: Any = make_rig(Mode.CHECK)
     room = FakeThermometer("room", 20.5)
     rails = FakeThermometer("rails", 20.0, 20.0, GONE)

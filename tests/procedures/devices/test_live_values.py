@@ -31,7 +31,7 @@ def devices(live, bench) -> Devices:
     return replace(devices, live=live)
 
 
-async def test_nothing_is_known_before_the_first_answer(live) -> None:
+async def test_live_values_are_empty_before_the_first_answer(live) -> None:
     for value in (live.gauge("x"), live.encoders, live.controller, live.stop_reason):
         assert value.value is None
         assert math.isinf(value.age_s)
@@ -63,14 +63,14 @@ async def test_a_failure_is_kept_with_the_age_of_the_last_value(live, devices, b
     assert live.encoders.problem == ""
 
 
-async def test_what_settles_is_seen(live, devices, bench) -> None:
+async def test_readings_taken_while_settling_are_published(live, devices, bench) -> None:
     settled = await settle(devices, TimingSettings(), bench.clock)
     assert settled.gauges.mean(axis=0).tolist() == [0.0, 0.0, 0.0]
     assert live.encoders.value == settled.window[-1].encoders
     assert live.gauge("z").value == settled.window[-1].gauges[2]
 
 
-async def test_what_the_guards_poll_is_seen(make_rig) -> None:
+async def test_values_polled_by_the_guards_are_published(make_rig) -> None:
     rig = make_rig()
     live = LiveValues(rig.clock.now)
     rig.folder.path.mkdir()

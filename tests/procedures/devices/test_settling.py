@@ -1,4 +1,4 @@
-"""Settled means seen: by readings that agree, for as long as the cell file says."""
+"""Settling: readings must agree for the time stated in the cell file."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def at_end(name: str) -> GaugeAtEnd:
     return GaugeAtEnd("is at an end of its travel", subject=f"gauge {name}")
 
 
-async def test_what_stands_still_is_settled_after_one_window(bench) -> None:
+async def test_a_robot_at_rest_is_settled_after_one_window(bench) -> None:
     settled = await settle(bench.devices, TIMING, bench.clock)
     times = [look.at_s for look in settled.window]
     assert len(times) >= TIMING.readings
@@ -46,7 +46,7 @@ async def test_a_window_lasts_long_enough_however_fast_they_come(bench) -> None:
 
 
 @pytest.mark.parametrize("axis", [0, 1, 2])
-async def test_ringing_is_waited_for(bench, axis: int) -> None:
+async def test_settling_waits_until_oscillation_decays(bench, axis: int) -> None:
     def ringing() -> float:
         t = bench.clock.now()
         return 1.5 + 0.5 * math.exp(-t / 0.5) * math.cos(2.0 * math.pi * 1.3 * t)
@@ -59,7 +59,7 @@ async def test_ringing_is_waited_for(bench, axis: int) -> None:
     assert settled.gauges[:, axis].mean() == pytest.approx(1.5, abs=TIMING.spread_gauge_mm)
 
 
-async def test_a_jump_empties_nothing_but_is_waited_out(bench) -> None:
+async def test_readings_before_a_jump_are_not_in_the_settled_window(bench) -> None:
     """Readings from before a jump are no part of the window that counts."""
     bench.gauges[0].shown = lambda: 0.0 if bench.clock.now() < 0.45 else 1.0
     settled = await settle(bench.devices, TIMING, bench.clock)
@@ -92,7 +92,7 @@ async def test_a_slider_that_never_settles_is_named(bench) -> None:
         await settle(bench.devices, TIMING, bench.clock)
 
 
-async def test_all_that_moves_is_named(bench) -> None:
+async def test_all_moving_gauges_and_sliders_are_named(bench) -> None:
     bench.gauges[0].shown = bench.gauges[2].shown = lambda: math.sin(3.0 * bench.clock.now())
     bench.encoders.shown = lambda: (0.0, -bench.clock.now(), 0.0, 0.0, 0.0, 0.0)
     with pytest.raises(DeviceError, match=r"gauge x by .*, gauge z by .*, slider 2 by"):
@@ -133,7 +133,7 @@ async def test_several_unsteady_gauges_have_not_settled_yet(bench) -> None:
     await settle(bench.devices, TIMING, bench.clock)
 
 
-async def test_a_swing_that_touches_an_end_has_not_settled_yet(bench) -> None:
+async def test_settling_continues_if_an_oscillation_reaches_an_end_of_the_travel(bench) -> None:
     bench.gauges[0].failures = [unsteady("x")] * 3
     bench.gauges[1].failures = [at_end("y")] * 3
     await settle(bench.devices, TIMING, bench.clock)
@@ -176,7 +176,7 @@ async def test_a_silent_encoder_bus_is_not_waited_out(bench) -> None:
         await settle(bench.devices, TIMING, bench.clock)
 
 
-async def test_time_alone_does_not_end_it(bench) -> None:
+async def test_slow_readings_that_agree_settle_after_the_time_limit(bench) -> None:
     """Readings that take long, or a machine that stalls, are no vibration."""
 
     def slow() -> float:
@@ -206,7 +206,7 @@ async def test_a_window_longer_than_the_time_allowed_is_reported(bench) -> None:
         await settle(bench.devices, timing, bench.clock)
 
 
-async def test_a_snapshot_keeps_what_was_answered(bench) -> None:
+async def test_a_snapshot_contains_raw_answers_counts_and_positions(bench) -> None:
     bench.gauges[1].shown = lambda: -1.25
     bench.encoders.shown = lambda: (0.001, 0.0, 0.0, 0.0, 0.0, -2.5)
     look = await read_all(bench.devices, bench.clock)

@@ -1,4 +1,4 @@
-"""Somebody sets the clock on the wall: durations and decisions do not notice."""
+"""Durations and decisions do not depend on the wall clock."""
 
 from __future__ import annotations
 
@@ -41,8 +41,8 @@ def looks_at_the_wall(source: Path) -> bool:
     return any(ast.unparse(call.func) in WALL_CLOCKS for call in calls)
 
 
-def test_the_clock_on_the_wall_dates_things_and_does_nothing_else() -> None:
-    """Whoever adds a file here must be sure that a clock set back or forth does no harm in it."""
+def test_the_wall_clock_is_read_only_by_the_listed_modules() -> None:
+    """A file may be added here only if a clock that is set back or forth does no harm in it."""
     sources = itertools.chain.from_iterable(
         (CHECKOUT / package).rglob("*.py") for package in ("hexacell", "drivers", "procedures")
     )
@@ -67,7 +67,7 @@ def wild_clock(monkeypatch: pytest.MonkeyPatch) -> Iterator[Any]:
     monkeypatch.undo()
 
 
-async def test_a_run_under_a_clock_that_jumps_is_the_same_run(make_rig, wild_clock) -> None:
+async def test_a_run_does_not_depend_on_the_wall_clock(make_rig, wild_clock) -> None:
     """Noise is drawn by the cell's own clock, so that two runs of it read the same."""
     rig = make_rig(Mode.CHECK)
     begun = rig.clock.time_s

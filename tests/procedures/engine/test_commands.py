@@ -1,4 +1,4 @@
-"""Commands to a running engine: which break a step off, which wait for its end, what each leaves behind."""
+"""Commands to a running engine: which interrupt a step, which wait for its end, and their events."""
 
 from __future__ import annotations
 
@@ -152,7 +152,7 @@ async def test_a_pause_at_once_stops_motion_and_the_step_is_decided_again(stage,
     assert bench.controller.log == ["prepare", "stop", "prepare"]
 
 
-async def test_a_pause_may_be_taken_back_before_it_begins(stage: Stage) -> None:
+async def test_a_resume_before_the_pause_begins_cancels_it(stage: Stage) -> None:
     await stage.held_at("P1/o02/move")
     for command in (Pause(), Resume()):
         stage.engine.command(command)
@@ -160,8 +160,8 @@ async def test_a_pause_may_be_taken_back_before_it_begins(stage: Stage) -> None:
     assert "paused" not in stage.kinds
 
 
-async def test_undo_means_the_last_record_at_the_moment_of_the_command(stage: Stage) -> None:
-    """Not the one that is being taken meanwhile."""
+async def test_undo_discards_the_last_record_at_the_time_of_the_command(stage: Stage) -> None:
+    """Not the record that is being taken at that time."""
     await stage.held_at("P1/o03/sample")
     stage.engine.command(Undo())
     await stage.over()
@@ -170,7 +170,7 @@ async def test_undo_means_the_last_record_at_the_moment_of_the_command(stage: St
     assert taken == [1, 3, 2]
 
 
-async def test_undone_twice_two_records_go(stage: Stage) -> None:
+async def test_two_undo_commands_discard_two_records(stage: Stage) -> None:
     await stage.held_at("P1/o03/move")
     for _ in range(2):
         stage.engine.command(Undo())
@@ -185,7 +185,7 @@ async def test_undone_twice_two_records_go(stage: Stage) -> None:
     assert len(fold(stage.journal.events).set(P1).samples) == 3
 
 
-async def test_what_is_undone_stays_in_the_journal(stage: Stage) -> None:
+async def test_discarded_records_stay_in_the_journal(stage: Stage) -> None:
     await stage.held_at("P1/o03/move")
     stage.engine.command(Undo())
     await stage.over()
@@ -201,7 +201,9 @@ async def test_what_is_undone_stays_in_the_journal(stage: Stage) -> None:
         (MeasureAgain(P1), events.SetInvalidated(at=P1, reason="a person asked for it")),
     ],
 )
-async def test_measured_again(stage: Stage, command: MeasureAgain, event: events.Event) -> None:
+async def test_measure_again_discards_the_record_or_the_set(
+    stage: Stage, command: MeasureAgain, event: events.Event
+) -> None:
     await stage.held_at("P1/o03/sample")
     stage.engine.command(command)
     await stage.over()
@@ -243,7 +245,7 @@ async def test_a_command_that_cannot_be_obeyed_is_rejected(stage, command: Any, 
     assert ended.exit_code == ExitCode.OUT_OF_LIMITS, "nothing was judged in this script"
 
 
-async def test_a_stop_lets_the_step_end(stage: Stage, bench) -> None:
+async def test_a_stop_ends_the_run_after_the_current_step(stage: Stage, bench) -> None:
     await stage.held_at("P1/o02/sample")
     stage.engine.command(Stop("a stop was asked for"))
     await until(lambda: stage.engine.status is Status.STOPPING)
@@ -255,7 +257,7 @@ async def test_a_stop_lets_the_step_end(stage: Stage, bench) -> None:
     assert bench.controller.log == ["prepare", "stop"]
 
 
-async def test_an_abort_ends_in_the_middle_of_a_step_and_in_place(stage: Stage, bench) -> None:
+async def test_an_abort_ends_the_run_within_a_step_and_stops_motion(stage: Stage, bench) -> None:
     await stage.held_at("P1/o02/move")
     stage.engine.command(Abort())
     with pytest.raises(Interruption):
@@ -265,7 +267,7 @@ async def test_an_abort_ends_in_the_middle_of_a_step_and_in_place(stage: Stage, 
     assert bench.controller.log == ["prepare", "stop"]
 
 
-async def test_a_stop_then_an_abort_ends_at_once(stage: Stage) -> None:
+async def test_an_abort_after_a_stop_ends_the_run_at_once(stage: Stage) -> None:
     await stage.held_at("P1/o02/move")
     stage.engine.command(Stop())
     stage.engine.command(Abort())
@@ -274,7 +276,7 @@ async def test_a_stop_then_an_abort_ends_at_once(stage: Stage) -> None:
 
 
 @pytest.mark.parametrize("command", [Stop(), Abort()])
-async def test_a_paused_run_ends_at_once(stage: Stage, command: Any) -> None:
+async def test_a_stop_or_abort_ends_a_paused_run_at_once(stage: Stage, command: Any) -> None:
     await stage.held_at("P1/o02/move")
     stage.engine.command(Pause(at_once=True))
     await stage.until(events.Paused)
@@ -291,7 +293,7 @@ async def test_commands_given_before_the_start_are_obeyed(stage: Stage) -> None:
     assert stage.script.begun == []
 
 
-async def test_a_command_from_another_thread_wakes_the_engine(stage: Stage) -> None:
+async def test_a_command_from_another_thread_is_obeyed_at_once(stage: Stage) -> None:
     await stage.held_at("P1/o02/move")
     thread = threading.Thread(target=stage.engine.command, args=(Abort("from a thread"),))
     thread.start()

@@ -52,7 +52,9 @@ def step_at_end(history: list[events.Event], error: BaseException) -> Compute | 
         ([APPLIED, events.ProvisionalReverted(), arrived(1)], FAILURE, None),
     ],
 )
-def test_what_an_early_end_reverts(history: Any, error: BaseException, step: Compute | None) -> None:
+def test_an_early_end_reverts_unverified_and_provisional_geometries(
+    history: Any, error: BaseException, step: Compute | None
+) -> None:
     assert step_at_end(history, error) == step
 
 

@@ -1,4 +1,4 @@
-"""The engine: written down before it is done, and after; whatever stops it, motion stops in place."""
+"""The engine: steps are journalled before and after; any error or cancellation stops motion in place."""
 
 from __future__ import annotations
 
@@ -79,7 +79,9 @@ def script(bench) -> Script:
     return Script(bench.devices, list(MOVES))
 
 
-async def test_a_step_is_written_down_then_done_then_its_event(script, journal, path) -> None:
+async def test_a_step_is_journalled_before_it_is_performed_and_its_event_afterwards(
+    script, journal, path
+) -> None:
     seen: list[tuple[int, int]] = []
     real = script.perform
 
@@ -134,7 +136,7 @@ async def test_the_state_is_the_fold_of_the_journal(script, journal) -> None:
         (SeveralErrors("two", [LimitError("drifted"), DeviceError("dead")]), ExitCode.HARDWARE),
     ],
 )
-async def test_an_error_stops_motion_and_is_written_down(
+async def test_an_error_stops_motion_and_is_journalled(
     script, journal, bench, error: HexacellError, code: ExitCode
 ) -> None:
     script.failure = error
@@ -159,7 +161,7 @@ async def test_motion_stops_before_the_journal_is_written(script, journal, bench
     assert log == ["prepare", "stop"]
 
 
-async def test_cancelling_stops_motion_and_is_written_down(script, journal, bench) -> None:
+async def test_cancelling_stops_motion_and_is_journalled(script, journal, bench) -> None:
     script.blocks = True
     task = asyncio.create_task(Engine(script, journal).run())
     await script.blocked.wait()
@@ -170,7 +172,7 @@ async def test_cancelling_stops_motion_and_is_written_down(script, journal, benc
     assert journal.events[-1] == events.Interrupted(reason="CancelledError", exit_code=130)
 
 
-async def test_cancelling_again_and_again_does_not_keep_it_from_stopping(script, journal, bench) -> None:
+async def test_repeated_cancellation_does_not_prevent_the_stop(script, journal, bench) -> None:
     script.blocks = True
     stopped: list[bool] = []
 
@@ -218,7 +220,7 @@ async def test_a_controller_that_cannot_be_prepared_ends_the_run_at_once(script,
     assert [event.kind for event in journal.events] == ["interrupted"]
 
 
-async def test_the_first_error_counts_where_stopping_fails_too(script, journal, bench) -> None:
+async def test_if_stopping_fails_too_the_first_error_is_raised(script, journal, bench) -> None:
     script.failure = DeviceError("does not answer", subject="gauge x")
     bench.controller.failures["stop"] = DeviceError("connection lost", subject="controller")
     with pytest.raises(DeviceError, match="gauge x"):
@@ -277,7 +279,9 @@ JUDGED = {
         ([], 1, "nothing was judged"),
     ],
 )
-async def test_how_it_ends(bench, journal, happened: Any, code: int, line: str) -> None:
+async def test_the_end_of_a_run_has_the_exit_code_and_line_of_its_verdict(
+    bench, journal, happened: Any, code: int, line: str
+) -> None:
     engine = Engine(Script(bench.devices, []), journal)  # type: ignore[arg-type]
     for event in happened:
         engine.record(event)

@@ -98,18 +98,24 @@ LATER = [("power cut", 1, 27, 3), ("aborted", 2, 14, 6)]
 
 
 @pytest.mark.parametrize(("how", "first", "second"), HERE_AND_THERE)
-async def test_interrupted_here_and_there(make_rig, how: str, first: int, second: int) -> None:
+async def test_a_run_interrupted_twice_from_its_beginning_finishes_with_every_record_once(
+    make_rig, how: str, first: int, second: int
+) -> None:
     await interrupted_twice(make_rig(), how, first, second)
 
 
 @pytest.mark.parametrize(("how", "sets", "first", "second"), LATER)
-async def test_interrupted_later(recording, replayed, how: str, sets: int, first: int, second: int) -> None:
+async def test_a_run_interrupted_twice_after_whole_sets_finishes_with_every_record_once(
+    recording, replayed, how: str, sets: int, first: int, second: int
+) -> None:
     rig = replayed(recording.until(events.SetClosed, count=sets))
     await interrupted_twice(rig, how, first, second)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("first", range(1, TELLING))
-async def test_interrupted_after_every_event_and_again(make_rig, first: int) -> None:
+async def test_a_run_interrupted_after_any_event_and_again_finishes_with_every_record_once(
+    make_rig, first: int
+) -> None:
     how = list(WAYS)[first % 2]
     await interrupted_twice(make_rig(), how, first, 1 + (7 * first) % 13)

@@ -1,4 +1,4 @@
-"""What follows a failure: escalations that end, attempts counted, sets redone, faults latched."""
+"""Recovery from failures: escalations that end, counted attempts, repeated sets, latched faults."""
 
 from __future__ import annotations
 
@@ -115,7 +115,7 @@ def test_attempts_are_counted_by_kind_and_set_since_the_last_interruption() -> N
     assert failed(UNATTENDED, silent, STEP, fold(told)).attempt == 1
 
 
-def test_of_several_failures_the_gravest_decides() -> None:
+def test_the_most_serious_of_several_failures_determines_the_action() -> None:
     several = SeveralErrors("two", [GaugeSilent("silent"), WrongSetting("inch")])
     failure = failed(UNATTENDED, several, STEP, RunState())
     assert (failure.failure, failure.action) == (FailureKind.GAUGE_SETTING, Action.ABORT)
@@ -160,7 +160,7 @@ def at_second_point(recording, replayed) -> Any:
 
 
 @pytest.mark.parametrize(("times", "reopened", "voided"), [(1, 0, 0), (2, 1, 1), (3, 2, 2)])
-async def test_unattended_a_silent_gauge_is_tried_again_then_its_set(
+async def test_an_unattended_run_retries_a_silent_gauge_and_then_redoes_its_set(
     at_second_point, times: int, reopened: int, voided: int
 ) -> None:
     rig = at_second_point
@@ -172,7 +172,7 @@ async def test_unattended_a_silent_gauge_is_tried_again_then_its_set(
     assert rig.gauges[0].closed == 0, "the others are left alone"
 
 
-async def test_unattended_it_ends_after_a_bounded_number_of_attempts(at_second_point) -> None:
+async def test_an_unattended_run_ends_after_a_bounded_number_of_attempts(at_second_point) -> None:
     rig = at_second_point
     silent = failing(KEY, lambda: rig.gauges[1].failures.append(SILENT), 100)
     with pytest.raises(GaugeSilent):
@@ -187,7 +187,7 @@ async def test_unattended_it_ends_after_a_bounded_number_of_attempts(at_second_p
     assert rig.controller.log[-1] == "stop"
 
 
-async def test_a_lost_encoder_bus_is_reopened_and_the_gauges_are_seen_again(at_second_point) -> None:
+async def test_after_a_lost_encoder_bus_the_reference_is_confirmed_again(at_second_point) -> None:
     rig = at_second_point
     encoders = rig.bench.encoders
 
@@ -206,7 +206,7 @@ async def test_a_lost_encoder_bus_is_reopened_and_the_gauges_are_seen_again(at_s
     assert not happened(rig, events.SetInvalidated)
 
 
-async def test_a_device_that_stays_away_ends_it(at_second_point) -> None:
+async def test_a_device_that_cannot_be_reopened_ends_the_run(at_second_point) -> None:
     rig = at_second_point
     encoders = rig.bench.encoders
     encoders_lost = BusError("has died", subject="encoder bus")
@@ -219,7 +219,7 @@ async def test_a_device_that_stays_away_ends_it(at_second_point) -> None:
     assert len(happened(rig, events.Failed)) == 3
 
 
-async def test_a_zero_that_is_void_costs_the_set(at_second_point) -> None:
+async def test_a_void_zero_invalidates_the_set(at_second_point) -> None:
     rig = at_second_point
     gauge = rig.gauges[0]
     void = ZeroVoid("was off in between", subject="gauge x")
@@ -238,7 +238,7 @@ async def test_a_zero_that_is_void_costs_the_set(at_second_point) -> None:
     ]
 
 
-async def test_a_robot_that_cannot_be_stopped_is_nothing_to_try_again_with(at_second_point) -> None:
+async def test_a_robot_that_cannot_be_stopped_ends_the_run_without_recovery(at_second_point) -> None:
     rig = at_second_point
 
     def break_down() -> None:
@@ -264,7 +264,7 @@ async def test_drift_redoes_the_set(at_second_point) -> None:
     assert [str(event.at) for event in happened(rig, events.SetInvalidated)] == ["P2"]
 
 
-async def test_another_device_in_its_place_is_refused(at_second_point) -> None:
+async def test_a_replaced_device_is_refused(at_second_point) -> None:
     rig = at_second_point
     known = DeviceIdentity(name="y", protocol="fake", description="a device", serial_number="17")
     history = list(read_journal(rig.folder.journal))
@@ -276,11 +276,13 @@ async def test_another_device_in_its_place_is_refused(at_second_point) -> None:
         await rig.run(silent, policy=UNATTENDED)
 
 
-class TestATechnicianIsThere:
+class TestAttendedRun:
     @pytest.mark.parametrize(
         ("choice", "voided"), [(Action.RETRY, 0), (Action.MEASURE_AGAIN, 1), (Action.REDO_SET, 1)]
     )
-    async def test_who_chooses_the_recovery(self, at_second_point, choice, voided) -> None:
+    async def test_the_recovery_chosen_by_the_operator_is_executed(
+        self, at_second_point, choice, voided
+    ) -> None:
         rig = at_second_point
         rig.operator.decisions = [choice]
         silent = failing(KEY, lambda: rig.gauges[1].failures.append(SILENT))
@@ -292,7 +294,7 @@ class TestATechnicianIsThere:
             "a gauge that was opened again costs the set"
         )
 
-    async def test_who_gives_up(self, at_second_point) -> None:
+    async def test_an_operator_who_chooses_abort_ends_the_run(self, at_second_point) -> None:
         rig = at_second_point
         rig.operator.decisions = [Action.ABORT]
         silent = failing(KEY, lambda: rig.gauges[1].failures.append(SILENT))
@@ -300,7 +302,7 @@ class TestATechnicianIsThere:
             await rig.run(silent, policy=ATTENDED)
         assert happened(rig, events.Interrupted)[-1].exit_code == ExitCode.HARDWARE
 
-    async def test_a_fault_stays_until_it_is_answered(self, at_second_point) -> None:
+    async def test_a_fault_rejects_other_commands_until_it_is_answered(self, at_second_point) -> None:
         rig = at_second_point
         asked = asyncio.Event()
 
@@ -323,7 +325,7 @@ class TestATechnicianIsThere:
         assert await running
         assert [event.command for event in happened(rig, events.CommandRejected)] == ["Resume", "Pause"]
 
-    async def test_a_run_with_a_fault_can_be_ended(self, at_second_point) -> None:
+    async def test_a_faulted_run_can_be_aborted(self, at_second_point) -> None:
         rig = at_second_point
 
         async def leave(*_: Any) -> Action:
@@ -353,7 +355,7 @@ class TestANewGeometryThatCannotBeVerified:
         return failing("after-V2/close", farther, 100)
 
     @pytest.mark.parametrize("policy", [GIVE_UP, UNATTENDED])
-    async def test_is_taken_back(self, rig, recording, policy: RecoveryPolicy) -> None:
+    async def test_is_rolled_back(self, rig, recording, policy: RecoveryPolicy) -> None:
         with pytest.raises(DriftTripped):
             await rig.run(self.slip(rig), policy=policy)
         assert rig.config == recording.config_before
@@ -361,14 +363,16 @@ class TestANewGeometryThatCannotBeVerified:
         last = read_journal(rig.folder.journal)[-2:]
         assert [event.kind for event in last] == ["rolled back", "interrupted"]
 
-    async def test_may_be_tried_again_later(self, rig, recording) -> None:
+    async def test_can_be_written_again_by_resuming(self, rig, recording) -> None:
         with pytest.raises(DriftTripped):
             await rig.run(self.slip(rig))
         assert (await rig.run()).exit_code == ExitCode.DONE
         assert rig.config == recording.config_after
         assert len(happened(rig, events.Committed)) == 2
 
-    async def test_stays_after_an_interruption_and_is_verified_later(self, rig, recording) -> None:
+    async def test_stays_in_the_controller_after_an_abort_and_is_verified_on_resuming(
+        self, rig, recording
+    ) -> None:
         abort = failing("after-V2/close", lambda: rig.engine.command(Abort()))
         with pytest.raises(Interruption):
             await rig.run(abort)
@@ -376,7 +380,7 @@ class TestANewGeometryThatCannotBeVerified:
         assert fold(read_journal(rig.folder.journal)).is_unverified
         assert (await rig.run()).exit_code == ExitCode.DONE
 
-    async def test_is_taken_back_on_resuming_where_that_was_interrupted(self, rig, recording) -> None:
+    async def test_is_written_again_on_resuming_after_a_failed_rollback(self, rig, recording) -> None:
         slip = self.slip(rig)
         rig.controller.failures = {}
 

@@ -1,4 +1,4 @@
-"""A run that was interrupted anywhere goes on: nothing lost, nothing trusted that nobody has seen again."""
+"""A run interrupted at any stage resumes: no record is lost, and open sets are confirmed or invalidated."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ KILLED = {"in the first set", "at a held-out point afterwards"}
 
 
 @pytest.mark.parametrize("place", PLACES)
-async def test_it_resumes_from_anywhere(recording, replayed, place: str) -> None:
+async def test_a_run_resumes_after_an_interruption_at_any_stage(recording, replayed, place: str) -> None:
     kind, count = PLACES[place]
     done = recording.until(kind, count=count)
     rig = replayed(done if place in KILLED else [*done, INTERRUPTED])
@@ -103,7 +103,7 @@ async def cancelled_at(rig: Any, number: int) -> None:
 
 
 @pytest.mark.parametrize("number", [1, 6, 22, 25, 28])
-async def test_cancelled_after_any_event_it_resumes(recording, replayed, number: int) -> None:
+async def test_a_run_cancelled_after_any_event_resumes(recording, replayed, number: int) -> None:
     rig = replayed(recording.until(events.SetClosed, count=3))
     begun = len(read_journal(rig.folder.journal))
     await cancelled_at(rig, number)
@@ -118,7 +118,7 @@ async def test_cancelled_after_any_event_it_resumes(recording, replayed, number:
     require_whole_sets(history)
 
 
-async def test_interrupted_over_and_over_it_still_arrives(recording, replayed) -> None:
+async def test_a_run_cancelled_several_times_finishes(recording, replayed) -> None:
     rig = replayed(recording.until(events.SetClosed, count=1))
     for number in (3, 8, 12):
         await cancelled_at(rig, number)
@@ -126,8 +126,8 @@ async def test_interrupted_over_and_over_it_still_arrives(recording, replayed) -
     require_whole_sets(read_journal(rig.folder.journal))
 
 
-async def test_motion_is_never_repeated(recording, replayed) -> None:
-    """A move that had begun is decided again from where things stand, not done because it was noted."""
+async def test_a_move_interrupted_after_its_beginning_is_decided_again(recording, replayed) -> None:
+    """The next move is decided from the located position, not repeated from the journal."""
     sampled = recording.until(events.RecordTaken, count=5)
     begun = recording.history[len(sampled)]
     assert begun.step.key == "P1/o06/move"
@@ -137,7 +137,9 @@ async def test_motion_is_never_repeated(recording, replayed) -> None:
     assert rig.controller.log[1:3] == ["pose", f"move {Pose(x, y, z)}"]
 
 
-async def test_cancelled_while_writing_it_ends_what_it_writes(recording, replayed, monkeypatch) -> None:
+async def test_a_write_back_in_progress_is_completed_despite_cancellation(
+    recording, replayed, monkeypatch
+) -> None:
     rig = replayed(recording.until(events.Proposed))
     running = asyncio.create_task(rig.run())
     cancelled = threading.Event()
@@ -160,7 +162,7 @@ async def test_cancelled_while_writing_it_ends_what_it_writes(recording, replaye
     assert rig.config == recording.config_after
 
 
-async def test_killed_between_writing_and_noting_it_is_not_written_twice(recording, replayed) -> None:
+async def test_a_config_written_but_not_journalled_is_not_written_twice(recording, replayed) -> None:
     rig = replayed(recording.until(events.Proposed))
     commit(ConfigChange.load(rig.folder.proposal), rig.folder.path)
     assert rig.config == recording.config_after

@@ -69,7 +69,7 @@ async def test_the_first_record_of_a_set_is_its_zero(station: Station) -> None:
     assert event.reading.joints_mm == (1.0, 2.0, 3.0, 4.0, 5.0, 6.0)
 
 
-async def test_later_records_are_differences_from_it(station: Station, zeroed: RunState) -> None:
+async def test_later_records_are_differences_from_the_zero(station: Station, zeroed: RunState) -> None:
     station.shown[:] = [-0.5, 1.75, 3.0]
     event = await station.do(SECOND, zeroed)
     assert event.deviation_mm == (0.5, -0.25, 0.0)
@@ -166,7 +166,7 @@ async def test_other_failures_are_no_refusals(
         await station.do(SECOND, zeroed)
 
 
-async def test_coming_back_within_the_limit_closes_the_set(station: Station, zeroed: RunState) -> None:
+async def test_a_drift_within_the_limit_closes_the_set(station: Station, zeroed: RunState) -> None:
     station.shown[:] = [-1.0625, 2.0, 3.09375]
     event = await station.do(CloseSet(at=P1), zeroed)
     assert isinstance(event, events.SetClosed)
@@ -205,7 +205,7 @@ async def test_gauges_are_placed_by_hand_where_the_cell_file_states_it(make_rig)
     assert rig.operator.placed == [2]
 
 
-async def test_a_move_that_fails_has_not_arrived(station: Station) -> None:
+async def test_a_failed_move_raises_its_error(station: Station) -> None:
     station.rig.controller.failures["move"] = DeviceError("stopped on the way", subject="controller")
     with pytest.raises(DeviceError, match="stopped on the way"):
         await station.do(Move(at=P1, orientation=1, pose=POSE))

@@ -1,6 +1,6 @@
-"""Every guard, tripped at every kind of step: the robot stands in time, and the config is as it was.
+"""Every guard, tripped at every kind of step: the robot stops in time, and the config is unchanged.
 
-Here time is the cell's own, so figures are exact; the benchmark has them on the wire and on the wall.
+Time is simulated, so figures are exact; the benchmark measures them with real drivers in real time.
 """
 
 from __future__ import annotations
@@ -209,18 +209,22 @@ def names(cases: list[tuple[Any, Fault]]) -> list[str]:
 
 
 @pytest.mark.parametrize(("step", "fault"), SOME, ids=names(SOME))
-async def test_it_stands_in_time(stage: Any, step: Any, fault: Fault) -> None:
+async def test_the_robot_stops_within_the_limit_for_each_guard_and_step(
+    stage: Any, step: Any, fault: Fault
+) -> None:
     await happens(stage, step, fault)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("step", "fault"), THE_REST, ids=names(THE_REST))
-async def test_it_stands_in_time_at_all_others(stage: Any, step: Any, fault: Fault) -> None:
+async def test_the_robot_stops_within_the_limit_for_all_other_guards_and_steps(
+    stage: Any, step: Any, fault: Fault
+) -> None:
     await happens(stage, step, fault)
 
 
 @pytest.mark.parametrize("step", STEPS, ids=[step.__name__ for step in STEPS])
-async def test_on_a_full_disk_nothing_begins(stage: Any, step: Any, monkeypatch: Any) -> None:
+async def test_no_step_begins_without_free_disk_space(stage: Any, step: Any, monkeypatch: Any) -> None:
     scene = stage(step)
     config = scene.rig.config
     doing = await step(scene)

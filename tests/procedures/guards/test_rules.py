@@ -1,4 +1,4 @@
-"""What each guard says to a snapshot: nothing where all is well, a sentence and an action where not."""
+"""Each guard applied to a snapshot: no trip without a fault, otherwise a problem and an action."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def tripped(limits: GuardLimits = LIMITS, **changes: Any) -> Trip:
     return trip
 
 
-def test_where_all_is_well_nothing_trips() -> None:
+def test_a_snapshot_without_faults_trips_no_guard() -> None:
     assert rules.first_trip(WELL, LIMITS) is None
     assert rules.first_trip(PolledDevices(), LIMITS) is None
 
@@ -98,7 +98,9 @@ def test_the_stop_line_gives_its_reason() -> None:
         (status("a", "Joint 0 Following Error", enabled=False), Guard.FOLLOWING, "Joint 0 Following Error"),
     ],
 )
-def test_a_controller_that_may_not_move(heard: Any, guard: Guard, words: str) -> None:
+def test_a_controller_that_forbids_motion_trips_with_its_reason(
+    heard: Any, guard: Guard, words: str
+) -> None:
     trip = tripped(controller=heard)
     assert (trip.guard, trip.device) == (guard, "controller")
     assert words in trip.problem
@@ -138,7 +140,7 @@ def test_a_ball_must_not_go_farther_than_allowed_nor_than_it_was(
 
 
 @given(leg=st.integers(0, 5), way=st.floats(-3.0, 3.0))
-def test_where_the_robot_must_stand_no_slider_moves(leg: int, way: float) -> None:
+def test_a_slider_that_moves_at_standstill_trips_the_following_guard(leg: int, way: float) -> None:
     now = [10.0] * 6
     now[leg] += way
     snapshot = PolledDevices(encoders=sliders(tuple(now), (10.0,) * 6))
@@ -160,7 +162,7 @@ def test_devices_that_fail_are_all_named() -> None:
 
 
 @pytest.mark.parametrize(("garbled", "trips"), [(1, False), (2, False), (3, True), (4, True)])
-def test_a_noisy_line_is_no_broken_device(garbled: int, trips: bool) -> None:
+def test_a_device_trips_only_after_three_garbled_answers(garbled: int, trips: bool) -> None:
     nonsense = WrongAnswer("answers b'0'", subject="gauge y", action="Check it")
     snapshot = PolledDevices((gauge(axis=1, error=nonsense, garbled_count=garbled),))
     trip = rules.first_trip(snapshot, LIMITS)
@@ -168,7 +170,7 @@ def test_a_noisy_line_is_no_broken_device(garbled: int, trips: bool) -> None:
 
 
 @pytest.mark.parametrize("device", ["gauges", "encoders", "controller", "stop_input"])
-def test_any_device_may_be_silent_for_so_long_and_no_longer(device: str) -> None:
+def test_any_device_silent_beyond_the_limit_trips_the_stale_guard(device: str) -> None:
     def snapshot(silent_s: float) -> PolledDevices:
         heard: Any = polled("it", silent_s)
         only: dict[str, Any] = {device: (heard,) if device == "gauges" else heard}
@@ -180,7 +182,7 @@ def test_any_device_may_be_silent_for_so_long_and_no_longer(device: str) -> None
     assert (trip.guard, trip.device) == (Guard.STALE, "it")
 
 
-def test_a_cause_comes_before_its_effects() -> None:
+def test_the_trip_of_a_cause_precedes_those_of_its_effects() -> None:
     everything: dict[str, Any] = {
         "gauges": (gauge(9.0, error=AT_END, silent_s=1.0),),
         "encoders": polled("encoders", error=DeviceError("has an alarm"), silent_s=1.0),
@@ -195,7 +197,7 @@ def test_a_cause_comes_before_its_effects() -> None:
     assert rules.first_trip(PolledDevices(**everything), LIMITS) is None
 
 
-def test_sliders_are_where_they_were_sent() -> None:
+def test_a_slider_beyond_the_following_limit_is_named() -> None:
     sent = np.arange(6.0)
     assert rules.following_error(sent, sent + 1.0, 1.0) is None
     measured = sent + np.array([0.0, 0.5, 0.0, 0.0, -1.25, 1.0])
@@ -216,7 +218,7 @@ def test_sliders_are_where_they_were_sent() -> None:
         ((), 1.5, False),
     ],
 )
-def test_a_gauge_that_does_not_follow_its_ball(
+def test_an_unchanged_gauge_trips_if_the_ball_should_have_moved(
     shown: tuple[str, ...], expected_mm: float, trips: bool
 ) -> None:
     trip = rules.stuck_gauge("gauge y", shown, expected_mm)
@@ -243,7 +245,7 @@ def test_the_disk_must_have_room(monkeypatch, free: int, trips: bool) -> None:
     assert (rules.low_disk_space(Path("/runs"), 50.0) is not None) is trips
 
 
-def test_a_robot_that_could_not_be_stopped_comes_first() -> None:
+def test_a_trip_without_a_stop_asks_for_the_emergency_stop() -> None:
     trip = Trip(Guard.STALE, "controller", "has not answered", "Check its cable").unstopped("no way to it")
     error = trip.as_error()
     assert isinstance(error, GuardTripped)
@@ -251,7 +253,7 @@ def test_a_robot_that_could_not_be_stopped_comes_first() -> None:
     assert str(error).endswith("could not be stopped: no way to it. Press the emergency stop")
 
 
-def test_a_trip_stands_in_the_journal_as_it_is() -> None:
+def test_a_trip_read_from_the_journal_is_unchanged() -> None:
     trip = Trip(Guard.PLATE, "gauge z", "the ball is off", "Look at it")
     event = events.Tripped.of(trip)
     assert events.Tripped.model_validate_json(event.model_dump_json()) == event

@@ -1,4 +1,4 @@
-"""Watching over an action: when it begins, when it ends, and what must not trip."""
+"""Supervision of an action by the guards: its beginning, its end, and what must not trip."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ async def reference(scene: Any) -> Any:
     return scene
 
 
-async def test_two_sets_from_beginning_to_end_trip_nothing(scene) -> None:
+async def test_two_complete_sets_trip_no_guard(scene) -> None:
     stage = scene()
     await stage.rig.performer.prepare()
     for at in (P1, P2):
@@ -52,7 +52,7 @@ async def test_two_sets_from_beginning_to_end_trip_nothing(scene) -> None:
     assert stage.stops == 0
 
 
-async def test_nothing_begins_before_every_device_has_answered(scene) -> None:
+async def test_a_move_begins_after_every_device_has_answered(scene) -> None:
     stage = await reference(scene())
     begun: list[float] = []
     real = stage.controller.move
@@ -68,7 +68,7 @@ async def test_nothing_begins_before_every_device_has_answered(scene) -> None:
 
 
 @pytest.mark.parametrize("device", ["gauge y", "encoders", "controller"])
-async def test_a_device_that_is_silent_beforehand_keeps_it_from_moving(scene, device: str) -> None:
+async def test_a_device_silent_before_a_move_prevents_the_move(scene, device: str) -> None:
     stage = await reference(scene())
     moves = stage.controller.log.count
     before = len(stage.controller.log)
@@ -80,14 +80,14 @@ async def test_a_device_that_is_silent_beforehand_keeps_it_from_moving(scene, de
     assert len(stage.controller.log) == before
 
 
-async def test_all_devices_that_fail_beforehand_are_named(scene) -> None:
+async def test_all_devices_that_fail_before_a_move_are_named(scene) -> None:
     stage = await reference(scene())
     stage.inch |= {"x", "z"}
     with pytest.raises(GuardTripped, match=r"gauge x: answers in inch; gauge z: answers in inch"):
         await stage.do(move(2))
 
 
-async def test_what_is_latched_lasts_until_it_is_cleared(scene) -> None:
+async def test_a_trip_stays_latched_until_it_is_cleared(scene) -> None:
     stage = await reference(scene())
     stage.forbidden = "the button is pressed"
     with pytest.raises(GuardTripped, match="the button"):
@@ -127,7 +127,7 @@ async def test_a_robot_that_cannot_be_stopped_is_reported(scene) -> None:
         await moving
 
 
-async def test_a_move_that_fails_by_itself_is_explained_by_the_guard_that_knows_why(scene) -> None:
+async def test_a_failed_move_is_reported_as_the_trip_of_the_guard_with_its_cause(scene) -> None:
     stage = await reference(scene())
 
     async def interrupted(pose: Any) -> None:
@@ -149,7 +149,7 @@ async def test_a_move_that_fails_without_a_trip_raises_its_own_error(scene) -> N
     await stage.do(move(2))
 
 
-async def test_a_mistake_in_the_watch_itself_ends_the_move(scene) -> None:
+async def test_a_programming_error_in_the_guards_ends_the_move(scene) -> None:
     stage = await reference(scene())
 
     async def mistaken() -> Any:
@@ -170,7 +170,7 @@ async def test_cancelling_ends_the_action_and_the_watch(scene) -> None:
     assert stage.rig.performer.guards.supervisor.latched is None
 
 
-async def test_a_noisy_line_is_borne(scene) -> None:
+async def test_garbled_answers_on_a_noisy_line_trip_no_guard(scene) -> None:
     stage = await reference(scene())
     gauge = stage.rig.gauges[1]
     real, asked = gauge.read_once, [0]
@@ -188,7 +188,7 @@ async def test_a_noisy_line_is_borne(scene) -> None:
     assert asked[0] > 3
 
 
-async def test_gauges_are_left_alone_on_the_way_to_another_point(scene) -> None:
+async def test_gauges_are_not_read_during_a_move_to_another_point(scene) -> None:
     stage = await reference(scene())
 
     async def forbidden() -> GaugeReading:
@@ -224,7 +224,7 @@ async def test_a_move_that_begins_at_the_end_of_a_plunger_may_lead_away_from_it(
     await moving
 
 
-async def test_sliders_that_are_not_where_they_were_sent(scene) -> None:
+async def test_a_slider_away_from_its_commanded_position_trips_the_following_guard(scene) -> None:
     stage = await reference(scene())
     stage.slip_mm = -1.5
     with pytest.raises(GuardTripped, match=r"slider \d: is -1\.\d+ mm from its commanded") as tripped:
@@ -237,7 +237,9 @@ EXPECTED = Expectation(deviation_mm=(0.0, 0.0, 3.0), sigma_mm=(0.1, 0.1, 0.1), g
 
 
 @pytest.mark.parametrize(("sigma", "trips"), [(0.1, True), (0.5, False)])
-async def test_a_gauge_that_shows_one_value_all_the_way(scene, sigma: float, trips: bool) -> None:
+async def test_a_gauge_that_does_not_change_during_a_move_trips_the_stale_guard(
+    scene, sigma: float, trips: bool
+) -> None:
     stage = await reference(scene())
     stage.frozen["z"] = stage.rig.gauges[2].shown()
     step = move(2, expected=EXPECTED.model_copy(update={"sigma_mm": (sigma,) * 3}))
@@ -249,7 +251,7 @@ async def test_a_gauge_that_shows_one_value_all_the_way(scene, sigma: float, tri
     assert tripped.value.trip.guard is Guard.STALE
 
 
-async def test_what_trips_stands_in_the_journal(scene) -> None:
+async def test_a_trip_is_journalled(scene) -> None:
     stage = scene()
 
     def press(event: events.Event, _: object) -> None:
@@ -272,7 +274,7 @@ async def test_a_drifted_reference_is_not_latched(scene) -> None:
     assert stage.rig.performer.guards.supervisor.latched is None
 
 
-async def test_pollers_on_one_line_share_its_silence(scene) -> None:
+async def test_devices_on_a_shared_line_are_not_silent_while_it_answers(scene) -> None:
     stage = scene()
     clock, shared = stage.rig.clock, LineActivity()
     turn = asyncio.Lock()

@@ -1,4 +1,4 @@
-"""Damage, and versions that this one does not know: refused with the line, and left alone."""
+"""Damaged journals and unknown versions are refused with the line number and not changed."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def test_a_damaged_line_before_the_last_is_refused_with_its_number(
         assert refusal.value.subject == str(path)
 
 
-def test_opening_a_damaged_journal_leaves_it_alone(path: Path, written: bytes) -> None:
+def test_opening_a_damaged_journal_does_not_change_it(path: Path, written: bytes) -> None:
     damaged = written.replace(b"a tester", b"a taster")
     path.write_bytes(damaged)
     with pytest.raises(FileError, match=r":2: .*damaged"):
@@ -95,7 +95,7 @@ def test_a_journal_of_the_first_version_is_read_and_continued(path: Path) -> Non
 
 @settings(max_examples=500, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.data())
-def test_a_changed_byte_is_never_a_wrong_event(path: Path, data) -> None:
+def test_a_changed_byte_is_always_detected(path: Path, data) -> None:
     written = bytearray(path.read_bytes() if path.exists() else write_told(path))
     place = data.draw(st.integers(0, len(written) - 1))
     written[place] ^= data.draw(st.integers(1, 255))

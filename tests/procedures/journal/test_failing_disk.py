@@ -1,4 +1,4 @@
-"""A disk that is full or broken: the journal is as before, and the reason is said."""
+"""A full or broken disk leaves the journal unchanged, and the reason is reported."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class FullDisk:
 
 
 @pytest.mark.parametrize("room", [0, 1, 40])
-def test_a_full_disk_leaves_it_as_before(path: Path, monkeypatch, room: int) -> None:
+def test_a_full_disk_leaves_the_journal_unchanged(path: Path, monkeypatch, room: int) -> None:
     with Journal(path) as journal:
         journal.append(TOLD[0])
         before = path.read_bytes()
@@ -65,7 +65,7 @@ def test_a_journal_that_can_never_be_opened_is_reported(path: Path, monkeypatch,
     Journal(path).close()
 
 
-def test_a_line_that_is_taken_in_pieces_is_whole(path: Path, monkeypatch) -> None:
+def test_partial_writes_are_continued_to_a_whole_line(path: Path, monkeypatch) -> None:
     write = os.write
     with Journal(path) as journal:
         monkeypatch.setattr(os, "write", lambda descriptor, data: write(descriptor, data[:7]))
@@ -73,7 +73,7 @@ def test_a_line_that_is_taken_in_pieces_is_whole(path: Path, monkeypatch) -> Non
     assert read_journal(path) == TOLD[:1]
 
 
-def test_the_reason_for_half_a_line_is_the_true_one(path: Path, monkeypatch) -> None:
+def test_a_partial_write_is_reported_with_the_error_that_ended_it(path: Path, monkeypatch) -> None:
     with Journal(path) as journal:
         disk = FullDisk(monkeypatch, 40)
 
@@ -107,7 +107,7 @@ def test_half_a_line_that_could_not_be_cut_off_is_cut_off_before_the_next(path: 
     assert read_journal(path) == TOLD[:2]
 
 
-def test_an_event_that_could_not_be_forced_out_did_not_happen(path: Path, monkeypatch) -> None:
+def test_an_event_that_cannot_be_synced_is_not_in_the_journal(path: Path, monkeypatch) -> None:
     def broken(_: int) -> None:
         raise OSError(errno.EIO, os.strerror(errno.EIO))
 
@@ -121,7 +121,7 @@ def test_an_event_that_could_not_be_forced_out_did_not_happen(path: Path, monkey
     assert read_journal(path) == TOLD[:1]
 
 
-def test_text_that_has_no_bytes_is_refused_and_nothing_written(path: Path) -> None:
+def test_text_that_cannot_be_encoded_is_refused_and_nothing_is_written(path: Path) -> None:
     with Journal(path) as journal:
         journal.append(TOLD[0])
         with pytest.raises(FileError, match="cannot be written"):

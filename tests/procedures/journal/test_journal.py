@@ -1,4 +1,4 @@
-"""The journal: what was told is read again, by one writer at a time."""
+"""The journal: events are read back as they were appended; there is one writer at a time."""
 
 from __future__ import annotations
 
@@ -34,14 +34,14 @@ def test_a_new_journal_is_empty(path: Path) -> None:
     assert read_journal(path) == ()
 
 
-def test_what_was_appended_is_read(path: Path, written: bytes) -> None:
+def test_appended_events_are_read_back(path: Path, written: bytes) -> None:
     assert read_journal(path) == TOLD
     with Journal(path) as journal:
         assert journal.events == TOLD
     assert path.read_bytes() == written
 
 
-def test_it_continues_where_it_ended(path: Path, written: bytes) -> None:
+def test_a_reopened_journal_is_continued(path: Path, written: bytes) -> None:
     with Journal(path) as journal:
         journal.append(events.RolledBack())
         assert journal.events == (*TOLD, events.RolledBack())
@@ -137,7 +137,7 @@ texts = st.text(st.characters(exclude_categories=["Cs"]))
     values=st.tuples(numbers, numbers, numbers),
     results=st.lists(numbers, max_size=3).map(tuple),
 )
-def test_every_number_and_every_text_comes_back(path: Path, text, values, results) -> None:
+def test_every_number_and_every_text_is_read_back_exactly(path: Path, text, values, results) -> None:
     key = SetKey(phase=Phase.IDENTIFY, point=1)
     told = (
         events.SetClosed(at=key, drift_mm=values),
@@ -151,7 +151,7 @@ def test_every_number_and_every_text_comes_back(path: Path, text, values, result
     assert list(map(repr, read_journal(path))) == list(map(repr, told))
 
 
-def test_what_is_no_file_is_not_waited_for(path: Path) -> None:
+def test_a_pipe_in_place_of_the_journal_is_refused_without_blocking(path: Path) -> None:
     os.mkfifo(path)
     with pytest.raises(FileError, match="not a file"):
         read_journal(path)
@@ -168,8 +168,8 @@ def test_a_file_system_without_locks_is_reported(path: Path, monkeypatch) -> Non
         Journal(path)
 
 
-def test_clocks_that_jump_do_no_harm(path: Path, monkeypatch) -> None:
-    """The wall's clock is set back and forth, the other one only goes on."""
+def test_a_wall_clock_that_jumps_leaves_the_monotonic_times_sorted(path: Path, monkeypatch) -> None:
+    """The wall clock is set back and forth; the monotonic clock is not affected."""
     hours = iter([0, 5, -30_000, 2])
     begun = time.monotonic() - 0.001
     real = datetime.now
@@ -192,7 +192,7 @@ def test_clocks_that_jump_do_no_harm(path: Path, monkeypatch) -> None:
     assert begun <= seconds[0] <= seconds[-1] <= time.monotonic() + 0.001
 
 
-def test_the_collector_of_garbage_is_left_as_it_was(path: Path, written: bytes) -> None:
+def test_reading_restores_the_state_of_the_garbage_collector(path: Path, written: bytes) -> None:
     assert gc.isenabled()
     read_journal(path)
     assert gc.isenabled()

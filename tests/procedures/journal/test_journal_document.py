@@ -1,4 +1,4 @@
-"""``docs/journal.md`` says what the journal holds: every event and every field, and no other."""
+"""``docs/journal.md`` describes every event and every field of the journal, and no other."""
 
 from __future__ import annotations
 

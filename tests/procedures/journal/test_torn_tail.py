@@ -1,4 +1,4 @@
-"""A journal whose last line did not reach the disk: it goes on where the line before ended."""
+"""A journal whose last line did not reach the disk is continued after the line before."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def test_a_tail_torn_at_any_byte_is_dropped(path: Path, written: bytes) -> None:
         assert path.read_bytes() == written[:begin]
 
 
-def test_it_continues_after_a_torn_tail(path: Path, written: bytes) -> None:
+def test_a_journal_is_continued_after_a_torn_tail(path: Path, written: bytes) -> None:
     path.write_bytes(written[:-10])
     with Journal(path) as journal:
         journal.append(TOLD[-1])
@@ -36,7 +36,7 @@ def test_a_last_line_of_garbage_is_a_torn_tail(path: Path, written: bytes) -> No
     assert read_journal(path) == TOLD
 
 
-def test_a_last_line_that_is_whole_but_unknown_is_no_torn_tail(path: Path, written: bytes) -> None:
+def test_a_valid_last_line_of_an_unknown_kind_is_refused(path: Path, written: bytes) -> None:
     body = b'{"n":%d,"at":"2026-11-20T10:30:00.000Z","event":{"kind":"teleported"}}' % (len(TOLD) + 1)
     path.write_bytes(written + checked(body))
     with pytest.raises(FileError, match=r":5: .*not understood .*'teleported'") as refusal:
@@ -46,7 +46,7 @@ def test_a_last_line_that_is_whole_but_unknown_is_no_torn_tail(path: Path, writt
 
 
 @pytest.mark.parametrize("twice", [0, 3])
-def test_a_last_line_that_stood_before_is_no_torn_tail(path: Path, written: bytes, twice: int) -> None:
+def test_a_repeated_record_as_last_line_is_damage(path: Path, written: bytes, twice: int) -> None:
     path.write_bytes(written + written.splitlines(keepends=True)[twice])
     with pytest.raises(FileError, match=rf":5: .*damaged: record {twice + 1} is in the place of record 5"):
         read_journal(path)
@@ -75,7 +75,7 @@ def test_a_last_line_with_zeros_for_bytes_is_a_torn_tail(path: Path, data) -> No
 @pytest.mark.parametrize(
     "tail", [b"\n", b"\r", b"ab\rcd", b"ab\r\n", b"\x85\n", b"{}\n", b'"crc":"00000000"}\n']
 )
-def test_whatever_the_last_line_is_made_of_it_is_one_line(path: Path, written: bytes, tail: bytes) -> None:
+def test_any_bytes_after_the_last_record_are_one_torn_line(path: Path, written: bytes, tail: bytes) -> None:
     path.write_bytes(written + tail)
     assert read_journal(path) == TOLD
 
@@ -97,7 +97,7 @@ def test_a_lost_line_end_before_the_last_line_loses_no_record(path: Path, writte
 
 @settings(max_examples=300, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.data())
-def test_cut_anywhere_it_is_a_part_of_what_was_written(path: Path, data) -> None:
+def test_a_journal_cut_at_any_byte_keeps_all_whole_lines(path: Path, data) -> None:
     written = path.read_bytes() if path.exists() else write_told(path)
     cut = path.with_name("cut")
     cut.write_bytes(written[: data.draw(st.integers(0, len(written)))])

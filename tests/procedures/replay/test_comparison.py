@@ -44,7 +44,7 @@ def event_with(**result: Any) -> Event:
         (None, None),
     ],
 )
-def test_what_is_the_same(recorded: Any, replayed: Any) -> None:
+def test_values_within_the_tolerance_are_equal(recorded: Any, replayed: Any) -> None:
     assert changes(event_with(x=recorded), event_with(x=replayed), 1e-9) == []
 
 
@@ -66,12 +66,12 @@ def test_what_is_the_same(recorded: Any, replayed: Any) -> None:
         ({"gone": 1.0}, {}, "result.x.gone"),
     ],
 )
-def test_what_differs_is_named(recorded: Any, replayed: Any, field: str) -> None:
+def test_a_different_field_is_named(recorded: Any, replayed: Any, field: str) -> None:
     [change] = changes(event_with(x=recorded), event_with(x=replayed), 1e-9)
     assert change.field == field
 
 
-def test_a_field_that_the_recorded_event_does_not_know_is_no_difference() -> None:
+def test_a_field_missing_in_the_recorded_event_is_no_difference() -> None:
     body = b'{"kind":"closed","at":{"phase":"before-V","point":2},"drift_mm":[0.0,0.0,0.0]}'
     line = b'{"n":2,"at":"2026-11-20T10:30:00.000Z","event":%b}' % body
     entry = decode(checked(line), Path("journal.jsonl"), 2)
@@ -88,7 +88,7 @@ def checked(body: bytes) -> bytes:
     return body[:-1] + b',"crc":"%08x"}\n' % zlib.crc32(body)
 
 
-def test_prose_is_told_from_the_rest() -> None:
+def test_sentences_are_recognized_as_wording() -> None:
     gates = [AcceptanceGate(name="n", passed=True, sentence=words) for words in ("One.", "Two.")]
     first, second = (events.Proposed(gates=(gate,)) for gate in gates)
     [change] = changes(first, second, 1e-9)

@@ -1,4 +1,4 @@
-"""A journal goes through the procedure again: what was recorded comes out, and nothing else passes."""
+"""Replaying a journal reproduces its events; any other event is reported as a difference."""
 
 from __future__ import annotations
 
@@ -261,7 +261,7 @@ MANIPULATIONS: dict[str, tuple[type[Any], dict[str, Any], int, Scope, str]] = {
 
 
 @pytest.mark.parametrize("what", MANIPULATIONS)
-def test_what_was_changed_afterwards_is_found_in_its_line(recording, replay, what: str) -> None:
+def test_a_manipulated_event_is_reported_with_its_line(recording, replay, what: str) -> None:
     kind, changes, nth, scope, field = MANIPULATIONS[what]
     history = changed(recording.history, kind, changes, nth)
     line = next(
@@ -275,20 +275,20 @@ def test_what_was_changed_afterwards_is_found_in_its_line(recording, replay, wha
 
 
 @pytest.mark.parametrize("changes", [{"spread_mm": (0.0, 1.0, 0.0)}, {"counts": ((0,) * 6,)}])
-def test_a_reading_that_had_not_settled_is_found(recording, replay, changes: dict[str, Any]) -> None:
+def test_a_reading_that_had_not_settled_is_reported(recording, replay, changes: dict[str, Any]) -> None:
     changes = {f"reading.{key}": value for key, value in changes.items()}
     history = changed(recording.history, events.RecordTaken, changes, 3)
     [first, *_] = replay(history, scope=Scope.RESULTS).differences
     assert "had not settled" in str(first)
 
 
-def test_one_difference_causes_no_other(recording, replay) -> None:
+def test_one_manipulated_event_gives_one_difference(recording, replay) -> None:
     history = changed(recording.history, events.Arrived, {"pose": (100.0, -100.0, 500.0, 1.0, 0.0, 0.0)}, 2)
     [line] = (n for n, event in enumerate(history, 1) if event != recording.history[n - 1])
     assert {difference.line for difference in replay(history, scope=Scope.RESULTS).differences} == {line}
 
 
-def test_other_wording_is_an_aspect_of_its_own(recording, replay) -> None:
+def test_different_wording_is_reported_as_an_aspect_of_its_own(recording, replay) -> None:
     report = replay(
         changed(recording.history, events.ResultValidated, {"line": "all is well"}), scope=Scope.RESULTS
     )
@@ -297,7 +297,7 @@ def test_other_wording_is_an_aspect_of_its_own(recording, replay) -> None:
     assert difference.change.field == "line"
 
 
-def test_a_run_that_ended_too_early_is_found(recording, replay) -> None:
+def test_a_run_that_ended_too_early_is_reported(recording, replay) -> None:
     early = [*recording.until(events.SetClosed), recording.history[-1]]
     [difference] = replay(early).differences
     assert difference.aspect is Aspect.DECISION
@@ -313,7 +313,7 @@ def test_an_event_with_an_external_cause_is_taken_from_the_journal(recording, re
     assert report.taken == 2
 
 
-def test_nothing_is_decided_by_the_time_or_by_chance(recording, replay, monkeypatch) -> None:
+def test_decisions_do_not_depend_on_time_or_random_numbers(recording, replay, monkeypatch) -> None:
     hours = itertools.count(0, -977)
     monkeypatch.setattr(time, "time", lambda: 3600.0 * next(hours))
     monkeypatch.setattr(random, "random", lambda: pytest.fail("chance"))
@@ -321,7 +321,7 @@ def test_nothing_is_decided_by_the_time_or_by_chance(recording, replay, monkeypa
     assert replay(recording.history[:60], scope=Scope.DECISIONS).differences == []
 
 
-def test_an_error_of_the_program_is_found_again(recording, replay, monkeypatch) -> None:
+def test_an_error_of_the_program_is_reproduced(recording, replay, monkeypatch) -> None:
     """For bug reports: what broke the run breaks its replay."""
 
     def broken(*_: object) -> None:

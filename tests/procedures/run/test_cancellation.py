@@ -1,4 +1,4 @@
-"""Some things are done to their end, whoever cancels."""
+"""Shielded work is completed despite cancellation."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ async def work(turns: int, done: list[int]) -> int:
     return turns
 
 
-async def test_a_result_is_handed_on() -> None:
+async def test_shielded_work_returns_its_result() -> None:
     assert await shielded(work(3, [])) == 3
 
 
-async def test_an_error_is_handed_on() -> None:
+async def test_shielded_work_raises_its_error() -> None:
     async def fail() -> None:
         raise DeviceError("broken")
 
@@ -30,7 +30,7 @@ async def test_an_error_is_handed_on() -> None:
 
 
 @pytest.mark.parametrize("times", [1, 2, 4])
-async def test_cancelled_it_ends_first(times: int) -> None:
+async def test_shielded_work_is_completed_before_the_cancellation_is_raised(times: int) -> None:
     done: list[int] = []
     task = asyncio.create_task(shielded(work(8, done)))
     for _ in range(times):
@@ -42,7 +42,7 @@ async def test_cancelled_it_ends_first(times: int) -> None:
     assert done == [8]
 
 
-async def test_an_error_is_not_lost_behind_a_cancellation() -> None:
+async def test_an_error_of_cancelled_shielded_work_is_raised() -> None:
     cancelled = asyncio.Event()
 
     async def fail() -> None:

@@ -22,7 +22,7 @@ from procedures.run.questions import (
 from tests.procedures.fakes import SilentOperator
 
 
-async def test_unattended_no_gauges_are_placed() -> None:
+async def test_an_unattended_run_places_no_gauges() -> None:
     with pytest.raises(AnswerNeeded, match=r"point 3 \(X1\.000 .*fixed stations") as refusal:
         await UnattendedOperator().ask(ask_placement(3, Pose(1.0, 2.0, 3.0)))
     assert refusal.value.exit_code is ExitCode.ANSWER_NEEDED
@@ -44,7 +44,7 @@ async def test_unattended_approval_is_refused_where_the_cell_file_requires_it() 
         await UnattendedOperator().ask(ask_approval([], "diff"))
 
 
-async def test_unattended_no_recovery_is_chosen() -> None:
+async def test_an_unattended_run_chooses_no_recovery() -> None:
     question = ask_recovery("It broke.", (Action.RETRY, Action.ABORT))
     with pytest.raises(AnswerNeeded, match=r"^It broke\. A person must choose: retry, abort"):
         await UnattendedOperator().ask(question)

@@ -1,4 +1,4 @@
-"""Where a run stands is a fold over what happened, event by event."""
+"""The state of a run is a fold over its events."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from tests.procedures.identified import an_identification
 P1 = SetKey(phase=Phase.IDENTIFY, point=1)
 
 
-def test_nothing_happened() -> None:
+def test_the_state_without_events_is_the_initial_one() -> None:
     assert fold([]) == RunState()
 
 
@@ -28,14 +28,14 @@ def test_a_fold_applies_one_event_at_a_time(recording) -> None:
     assert fold(recording.history) == state
 
 
-def test_former_states_stay_as_they_were(story) -> None:
+def test_applying_an_event_does_not_change_the_former_state(story) -> None:
     first = fold([story().arrived(), story().placed()])
     apply(first, story().sampled())
     apply(first, story().voided())
     assert first == fold([story().arrived(), story().placed()])
 
 
-def test_a_step_that_began_has_not_happened() -> None:
+def test_the_beginning_of_a_step_does_not_change_the_state() -> None:
     assert fold([events.StepBegun(step=CloseSet(at=P1))]) == RunState()
 
 
@@ -58,7 +58,7 @@ def test_samples_are_kept_in_the_order_taken(story) -> None:
     assert not state.set(P1).closed
 
 
-def test_a_refusal_counts_and_leaves_the_robot_nowhere(story) -> None:
+def test_a_rejected_record_is_counted_and_voids_the_position(story) -> None:
     state = fold([story().arrived(2), story().refused(), story().arrived(2), story().refused()])
     assert state.set(P1).rejections == 2
     assert state.rejections(Phase.IDENTIFY) == 2
@@ -119,13 +119,13 @@ def test_held_out_deviations_leave_references_out(story) -> None:
         (events.Ended(exit_code=0, line="pass"), "ended"),
     ],
 )
-def test_milestones_are_kept_whole(event: Any, attribute: str) -> None:
+def test_milestone_events_are_kept_unchanged(event: Any, attribute: str) -> None:
     state = fold([event])
     assert getattr(state, attribute) == event
     assert getattr(RunState(), attribute) is None
 
 
-def test_the_beginning_is_kept(recording) -> None:
+def test_the_start_event_is_kept(recording) -> None:
     assert fold(recording.history).started == recording.history[0]
 
 
@@ -144,12 +144,12 @@ def test_after_these_events_the_position_is_unknown(event: Any, story) -> None:
 WORSE = events.ResultValidated(verdict=Verdict.WORSE, line="worse")
 
 
-def test_rolled_back_after_a_verdict_is_remembered() -> None:
+def test_a_rollback_after_a_verdict_is_kept_in_the_state() -> None:
     assert fold([WORSE, events.RolledBack()]).rolled_back
     assert not RunState().rolled_back
 
 
-def test_rolled_back_without_a_verdict_the_proposal_waits_again(story) -> None:
+def test_a_rollback_without_a_verdict_returns_to_the_proposal(story) -> None:
     after = story(Phase.AFTER)
     state = fold([events.Committed(approved_by="a tester"), *after.whole(2), events.RolledBack()])
     assert (state.committed, state.rolled_back, state.sets) == (None, False, {})

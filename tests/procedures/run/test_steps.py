@@ -56,7 +56,7 @@ def test_keys_are_stable(step: Any, key: str) -> None:
     assert step.key == key
 
 
-def test_a_move_knows_its_target() -> None:
+def test_the_target_of_a_move_is_its_pose() -> None:
     assert Move(at=P2, orientation=1, pose=POSE).target.as_tuple() == POSE
 
 

@@ -1,4 +1,4 @@
-"""Who lets a geometry into the controller: gates, and a person."""
+"""Approval of a new geometry: by the gates, or by a person."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from procedures.run.questions import UnattendedOperator
 from tests.procedures.runs.listening import DOUBTFUL, FORBIDDEN, GOOD, happened, proposed
 
 
-async def test_a_gate_that_forbids_ends_it_before_anything_is_written(recording, replayed) -> None:
+async def test_a_forbidding_gate_ends_the_run_before_anything_is_written(recording, replayed) -> None:
     rig = replayed(proposed(recording, GOOD, FORBIDDEN, DOUBTFUL))
     with pytest.raises(LimitError, match=r"refused: Beyond: l3 \(-13\.00 mm\)\.$") as refusal:
         await rig.run()
@@ -30,7 +30,7 @@ async def test_a_geometry_beyond_the_tolerance_is_refused(recording, replayed) -
     assert rig.folder.proposal.exists()
 
 
-async def test_a_gate_that_needs_a_person_waits_for_one(recording, replayed) -> None:
+async def test_a_gate_that_requires_approval_ends_an_unattended_run(recording, replayed) -> None:
     rig = replayed(proposed(recording, GOOD, DOUBTFUL))
     object.__setattr__(rig.performer, "operator", UnattendedOperator())
     with pytest.raises(AnswerNeeded, match=r"approval: It is 20 mm\.") as refusal:
@@ -71,7 +71,7 @@ async def test_a_person_may_decline_and_approve_later(recording, replayed) -> No
     assert len(rig.operator.asked) == 2
 
 
-async def test_within_limits_nobody_is_asked(recording, replayed) -> None:
+async def test_a_change_within_limits_is_approved_by_the_cell_file(recording, replayed) -> None:
     rig = replayed(proposed(recording, GOOD))
     await rig.run()
     assert rig.operator.asked == []

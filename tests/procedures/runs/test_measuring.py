@@ -1,4 +1,4 @@
-"""What goes wrong while it measures, and how the run goes on."""
+"""Failures while measuring, and how the run continues."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from procedures.run.questions import UnattendedOperator
 from tests.procedures.runs.listening import before_sampling, happened, on
 
 
-async def test_a_refused_record_is_chosen_anew_and_the_run_goes_on(make_rig) -> None:
+async def test_after_a_rejected_record_another_pose_is_measured(make_rig) -> None:
     rig = make_rig()
     at_ends = [GaugeAtEnd("is at an end of its travel", subject=f"gauge {name}") for name in "xy"]
 
@@ -58,13 +58,13 @@ async def test_a_gauge_that_falls_silent_stops_the_run(recording, replayed) -> N
     )
 
 
-async def test_gauges_by_hand_are_asked_for_at_every_point(recording, replayed) -> None:
+async def test_gauges_placed_by_hand_are_requested_at_every_point(recording, replayed) -> None:
     rig = replayed(recording.until(events.SetClosed, count=2), stations__placement="by-hand")
     await rig.run()
     assert rig.operator.placed == [1, 2, 1, 2]
 
 
-async def test_with_nobody_there_to_carry_gauges_the_run_ends(make_rig) -> None:
+async def test_an_unattended_run_with_gauges_placed_by_hand_ends(make_rig) -> None:
     rig = make_rig(operator=UnattendedOperator(), stations__placement="by-hand")
     with pytest.raises(AnswerNeeded):
         await rig.run()
@@ -72,7 +72,7 @@ async def test_with_nobody_there_to_carry_gauges_the_run_ends(make_rig) -> None:
     assert [entry.split()[0] for entry in rig.controller.log] == ["prepare", "pose", "move", "stop"]
 
 
-async def test_too_little_to_identify_is_said_and_nothing_is_written(make_rig) -> None:
+async def test_too_few_records_to_identify_are_reported_and_nothing_is_written(make_rig) -> None:
     rig = make_rig(identification__orientations=3)
     before = rig.config
     with pytest.raises(HexacellError, match="12 equations for 35 parameters") as refusal:

@@ -1,4 +1,4 @@
-"""Whole runs on devices that obey, and what is left of them."""
+"""Whole runs on fake devices, and the files of their run folders."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def test_a_whole_run_passes(recording) -> None:
     assert recording.controller_log.count("reload") == 1
 
 
-def test_the_controller_gets_the_true_geometry(recording, tmp_path) -> None:
+def test_the_written_geometry_agrees_with_the_true_one_within_five_sigma(recording, tmp_path) -> None:
     config = tmp_path / "after.toml"
     config.write_bytes(recording.config_after)
     written = NativeToml(HEXAGLIDE_PARAMETERS).read(config).geometry
@@ -41,7 +41,7 @@ def test_the_controller_gets_the_true_geometry(recording, tmp_path) -> None:
     assert (np.abs(found - expected) <= 5.0 * sigma + 1e-6).all()
 
 
-def test_what_a_run_leaves_in_its_folder(recording) -> None:
+def test_the_run_folder_contains_measurements_result_proposal_and_backup(recording) -> None:
     folder = recording.folder
     measured = read_measurements(folder.measurements)
     state = fold(recording.history)
@@ -58,7 +58,7 @@ def test_what_a_run_leaves_in_its_folder(recording) -> None:
     assert Receipt.of(folder.path).backup() == recording.config_before
 
 
-def test_held_out_deviations_shrink(recording) -> None:
+def test_a_run_reduces_the_held_out_deviations(recording) -> None:
     state = fold(recording.history)
     before, after = (np.linalg.norm(state.held_out(phase), axis=1) for phase in (Phase.BEFORE, Phase.AFTER))
     assert before.min() > 1.0
@@ -81,7 +81,7 @@ async def test_a_check_measures_judges_and_changes_nothing(make_rig) -> None:
     assert computed == ["judge"]
 
 
-async def test_a_check_that_finds_too_much_says_so(make_rig) -> None:
+async def test_a_check_out_of_limits_is_reported(make_rig) -> None:
     rig = make_rig(Mode.CHECK, acceptance__mean_deviation_mm=1e-6)
     ended = await rig.run()
     assert ended.exit_code == ExitCode.OUT_OF_LIMITS

@@ -1,4 +1,4 @@
-"""A line that stays in step: what is cancelled, late, garbled or cut off is not for the next question."""
+"""Answers that are cancelled, late, garbled or cut off are never taken for that to the next query."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from tests.drivers.controllers.linuxcnc.motion_dialogue import (
 from tests.waiting import until
 
 
-async def test_a_cancelled_move_is_stopped_and_its_late_answer_is_not_mistaken(play):
+async def test_a_cancelled_move_is_stopped_and_its_late_answer_is_discarded(play):
     aborted = play.Pause()
     driver = await play.opened(
         [(MDI, aborted, ACK), AGAIN_IN_CONTROL, (MDI, ACK), ("get abs_act_pos", ARRIVED)],
@@ -36,7 +36,7 @@ async def test_a_cancelled_move_is_stopped_and_its_late_answer_is_not_mistaken(p
     await driver.move(TARGET)
 
 
-async def test_a_cancelled_move_stays_cancelled_though_it_cannot_be_stopped(play):
+async def test_a_cancelled_move_raises_the_cancellation_even_if_the_stop_fails(play):
     never = play.Pause()
     driver = await play.opened([(MDI, never)], *[[("hello EMC hexacell 1.0", play.HANG_UP)]] * 3)
     moving = asyncio.create_task(driver.move(TARGET))
@@ -60,7 +60,7 @@ async def test_a_move_cancelled_before_its_turn_stops_nothing(play):
         await moving
 
 
-async def test_a_cancelled_question_leaves_the_line_in_step(play):
+async def test_the_late_answer_to_a_cancelled_query_is_discarded(play):
     late = play.Pause()
     driver = await play.opened(
         [
@@ -77,7 +77,7 @@ async def test_a_cancelled_question_leaves_the_line_in_step(play):
     assert await driver.joint_positions() == (6.0, 5.0, 4.0, 3.0, 2.0, 1.0)
 
 
-async def test_an_overdue_answer_leaves_the_line_in_step(play):
+async def test_an_answer_after_its_timeout_is_discarded(play):
     play.patience = play.IMPATIENT
     late = play.Pause()
     driver = await play.opened(
@@ -89,7 +89,7 @@ async def test_an_overdue_answer_leaves_the_line_in_step(play):
     assert (await driver.pose()).x == 5.0
 
 
-async def test_an_answer_that_never_comes_costs_the_connection(play):
+async def test_a_missing_answer_makes_the_driver_reconnect(play):
     play.patience = play.IMPATIENT
     driver = await play.opened(
         [("get abs_act_pos", play.SILENCE)], [*play.OPENING[:-1], ("get abs_act_pos", HALF_WAY)]
@@ -109,7 +109,7 @@ async def test_a_server_that_was_started_anew_is_connected_to_again(play):
     assert (await driver.pose()).x == 5.0
 
 
-async def test_a_garbled_question_is_asked_again_and_an_order_is_not(play):
+async def test_a_garbled_query_is_repeated_and_a_garbled_command_is_not(play):
     driver = await play.opened(
         [
             ("get joint_pos", b"GET EMCTOO NAK\r\n\r\nGET JOINT_POS NAK\r\n\r\n"),
@@ -125,7 +125,7 @@ async def test_a_garbled_question_is_asked_again_and_an_order_is_not(play):
         await driver.move(TARGET)
 
 
-async def test_closing_while_an_answer_is_awaited(play):
+async def test_closing_ends_a_query_in_progress(play):
     play.patience = Timeouts(answer=3600.0)
     never = play.Pause()
     driver = await play.opened([("get joint_pos", never)])

@@ -1,4 +1,4 @@
-"""Moving: what is acknowledged is not yet true, and what is refused is said."""
+"""Moves: arrival is verified by the position, and a refusal is reported with its reason."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ from tests.drivers.controllers.linuxcnc.motion_dialogue import (
 )
 
 
-async def test_a_move_and_its_arrival(play):
+async def test_a_move_returns_when_the_position_is_reached(play):
     driver = await play.opened([(MDI, ACK), ("get abs_act_pos", ARRIVED)])
     await driver.move(TARGET)
 
 
-async def test_the_position_may_take_a_moment_to_agree(play):
+async def test_a_move_returns_when_the_position_is_within_tolerance(play):
     nearly = b"ABS_ACT_POS 10.000000 20.000000 559.980000 5.000000 -4.000000 3.000000\r\n"
     within = b"ABS_ACT_POS 10.009000 20.000000 560.000000 5.009000 -4.000000 363.000000\r\n"
     driver = await play.opened(
@@ -59,7 +59,7 @@ async def test_an_acknowledgement_is_not_an_arrival(play, elsewhere):
         (b"ESTOP OFF\r\n", b"MACHINE ON\r\n", "it is on, and gives no reason"),
     ],
 )
-async def test_a_move_that_ends_elsewhere_without_a_word(play, estop, machine, why):
+async def test_a_move_that_ends_elsewhere_without_an_error_message_is_reported(play, estop, machine, why):
     play.patience = play.IMPATIENT
     driver = await play.opened([(MDI, ACK)])
     play.servers[0].afterwards = {
@@ -72,7 +72,7 @@ async def test_a_move_that_ends_elsewhere_without_a_word(play, estop, machine, w
         await driver.move(TARGET)
 
 
-async def test_a_refused_move_tells_all_errors_and_leaves_none_behind(play):
+async def test_a_refused_move_reports_and_clears_all_error_messages(play):
     driver = await play.opened(
         [
             (MDI, b"SET MDI NAK\n\r"),
@@ -93,7 +93,7 @@ async def test_a_refused_move_tells_all_errors_and_leaves_none_behind(play):
     await driver.move(TARGET)
 
 
-async def test_a_controller_that_never_stops_complaining_does_not_hold_us_up(play):
+async def test_reading_error_messages_ends_if_the_same_message_repeats(play):
     driver = await play.opened([(MDI, b"SET MDI NAK\n\r")])
     play.servers[0].afterwards = {
         "get enable": b"ENABLE ON\r\n",
@@ -103,7 +103,7 @@ async def test_a_controller_that_never_stops_complaining_does_not_hold_us_up(pla
         await driver.move(TARGET)
 
 
-async def test_control_that_another_client_took_is_not_taken_back_unasked(play):
+async def test_a_move_does_not_retake_control_from_another_client(play):
     driver = await play.opened(
         [
             (MDI, b"SET MDI NAK\n\r"),
@@ -117,13 +117,13 @@ async def test_control_that_another_client_took_is_not_taken_back_unasked(play):
             await driver.move(TARGET)
 
 
-async def test_a_pose_that_is_none_is_not_sent(play):
+async def test_a_move_to_a_pose_that_is_not_finite_is_refused(play):
     driver = await play.opened([])
     with pytest.raises(MoveRefused, match="a coordinate is not a finite number"):
         await driver.move(Pose(float("nan"), 0, 0))
 
 
-async def test_a_move_that_takes_too_long_is_stopped_and_its_late_answer_is_not_mistaken(play):
+async def test_a_move_that_exceeds_its_timeout_is_stopped_and_its_late_answer_is_discarded(play):
     stopped = play.Pause()
     driver = await play.opened(
         [
@@ -140,13 +140,13 @@ async def test_a_move_that_takes_too_long_is_stopped_and_its_late_answer_is_not_
     assert await driver.joint_positions() == (1.0, 2.0, 3.0, 4.0, 5.0, 6.0)
 
 
-async def test_a_line_that_breaks_in_mid_move_stops_the_machine(play):
+async def test_a_connection_lost_during_a_move_stops_the_machine(play):
     driver = await play.opened([(MDI, play.HANG_UP)], play.STOPPING)
     with pytest.raises(ConnectionLost, match="closed the connection"):
         await driver.move(TARGET)
 
 
-async def test_a_controller_that_dies_in_mid_move_asks_for_the_emergency_stop(play):
+async def test_a_controller_lost_during_a_move_makes_the_error_ask_for_the_emergency_stop(play):
     driver = await play.opened([(MDI, play.HANG_UP)], *[[("hello EMC hexacell 1.0", play.HANG_UP)]] * 3)
     with pytest.raises(
         DeviceError, match=r"could not be stopped: it closed the connection\. Press the emer"

@@ -1,4 +1,4 @@
-"""The language of linuxcncrsh, without a line."""
+"""The linuxcncrsh protocol: commands and answers, without a connection."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ COORDINATES = st.floats(-1e6, 1e6)
 
 
 @given(st.lists(st.tuples(WORDS, LINE_ENDS)), st.data())
-def test_lines_come_out_whatever_ends_them_and_however_they_are_cut(lines, data):
+def test_lines_are_split_at_any_line_end_and_any_packet_boundary(lines, data):
     stream = b"".join(line.encode() + end for line, end in lines)
     cuts = sorted(data.draw(st.lists(st.integers(0, len(stream)))))
     buffer = LineBuffer()
@@ -37,13 +37,13 @@ def test_lines_come_out_whatever_ends_them_and_however_they_are_cut(lines, data)
     assert buffer.rest == ""
 
 
-def test_what_has_no_line_end_yet_is_kept():
+def test_bytes_without_a_line_end_are_kept():
     buffer = LineBuffer()
     assert buffer.feed(b"login: ") == []
     assert buffer.rest == "login:"
 
 
-def test_bytes_that_are_no_text_do_not_raise():
+def test_bytes_that_are_not_text_are_replaced():
     assert LineBuffer().feed(b"\xff\xfe\x00\r\n") == ["\ufffd\ufffd\x00"]
 
 
@@ -59,13 +59,13 @@ def test_an_encoded_command_fits_the_server_and_is_one_line(command):
         assert line.count(b"\n") == line.count(b"\r") == 1
 
 
-def test_the_longest_command():
+def test_a_command_longer_than_the_limit_is_refused():
     assert len(encode_command("x" * 253)) == 255
     with pytest.raises(ValueError, match="256 bytes is longer than the 255"):
         encode_command("x" * 254)
 
 
-def test_a_rapid_move_word_for_word():
+def test_a_rapid_move_is_formatted_exactly():
     pose = Pose(10.0, -20.5, 560.123456789, 5.0, -4.0, 3.0)
     assert rapid_move(pose) == (
         "G0 X10.00000000 Y-20.50000000 Z560.12345679 A5.00000000 B-4.00000000 C3.00000000"
@@ -73,7 +73,7 @@ def test_a_rapid_move_word_for_word():
 
 
 @given(st.builds(Pose, *[COORDINATES] * 6))
-def test_a_rapid_move_says_the_pose_to_a_millionth_and_fits_a_line(pose):
+def test_a_rapid_move_keeps_the_pose_to_seven_decimals_and_fits_a_line(pose):
     letters, values = zip(*((word[0], float(word[1:])) for word in rapid_move(pose).split()), strict=True)
     assert "".join(letters) == "GXYZABC"
     assert values[1:] == pytest.approx(pose.as_tuple(), abs=1e-7)
@@ -81,7 +81,7 @@ def test_a_rapid_move_says_the_pose_to_a_millionth_and_fits_a_line(pose):
 
 
 @pytest.mark.parametrize("value", [float("nan"), float("inf"), float("-inf")])
-def test_a_pose_that_is_none_is_not_sent(value):
+def test_a_rapid_move_to_a_pose_that_is_not_finite_is_refused(value):
     with pytest.raises(ValueError, match="not a finite number"):
         rapid_move(Pose(0.0, 0.0, 500.0, 0.0, value, 0.0))
 
@@ -109,11 +109,11 @@ def test_a_pose_that_is_none_is_not_sent(value):
         ("SET ESTOP ACK", "get estop", None),
     ],
 )
-def test_what_answers_what(line, command, answer):
+def test_an_answer_is_matched_to_its_command(line, command, answer):
     assert parse_response(line, command) == answer
 
 
-def test_explanations_are_told_from_answers():
+def test_explanations_are_distinguished_from_answers():
     assert (
         parse_explanation("error: Machine must be 'ON' for SET MDI") == "Machine must be 'ON' for SET MDI"
     )
@@ -144,6 +144,6 @@ def test_homed_joints():
     assert parse_homed("") == ()
 
 
-def test_apart_ignores_full_turns_and_keeps_the_worst():
+def test_the_pose_difference_ignores_full_turns_and_gives_the_largest_components():
     one, other = Pose(1, 2, 3, 180.0, 0.1, 0), Pose(1, 2.5, 2, -180.0, -0.2, 0)
     assert pose_difference(one, other) == pytest.approx((1.0, 0.3))

@@ -1,4 +1,4 @@
-"""Reading the config again: off, command, on, and no slider moves."""
+"""Reloading the config: switching off, reload command, switching on; no slider moves."""
 
 from __future__ import annotations
 
@@ -84,7 +84,7 @@ async def test_a_joint_that_moved_is_an_error(play):
         await driver.reload()
 
 
-async def test_lost_references_are_found_again_and_joints_are_then_where_they_are(play):
+async def test_unhomed_joints_are_homed_after_the_reload_without_comparing_positions(play):
     driver = await play.opened([BEFORE, *OFF, *ON, *HOMING, *MDI])
     await driver.reload()
 
@@ -101,7 +101,7 @@ async def test_an_emergency_stop_meanwhile_is_not_reset(play):
         await driver.reload()
 
 
-async def test_a_command_that_starts_the_controller_anew(play):
+async def test_a_reload_command_that_restarts_the_controller_is_followed_by_reconnection(play):
     driver = await play.opened(
         [BEFORE, OFF[0], (*OFF[1], play.HANG_UP)],
         [
@@ -118,7 +118,7 @@ async def test_a_command_that_starts_the_controller_anew(play):
     await driver.reload()
 
 
-async def test_a_controller_that_needs_a_moment_to_come_back(play):
+async def test_connecting_is_repeated_until_the_restarted_controller_answers(play):
     driver = await play.opened(
         [BEFORE, OFF[0], (*OFF[1], play.HANG_UP)],
         [("hello EMC hexacell 1.0", play.HANG_UP)],
@@ -128,7 +128,7 @@ async def test_a_controller_that_needs_a_moment_to_come_back(play):
     await driver.reload()
 
 
-async def test_a_controller_that_does_not_come_back(play):
+async def test_a_controller_that_does_not_restart_is_reported(play):
     play.patience = play.IMPATIENT
     driver = await play.opened(
         [BEFORE, OFF[0], (*OFF[1], play.HANG_UP)],

@@ -1,4 +1,4 @@
-"""Opening: who answers, and what is said when it is not the one that was meant."""
+"""Opening and closing: the greeting, and errors for unexpected or missing answers."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ async def test_opening_twice_is_harmless(play):
     assert (await driver.open()).description == "EMCNETSVR 1.1"
 
 
-async def test_the_dialect_of_2_10(play):
+async def test_opening_a_server_of_version_2_10(play):
     driver = await play.driver(
         [
             (
@@ -84,7 +84,7 @@ async def test_answers_that_come_in_pieces(play):
         (b"\xff\xfd\x18" * 1000, "is no linuxcncrsh, it says"),
     ],
 )
-async def test_another_answer_is_shown(play, said, problem):
+async def test_an_unexpected_answer_to_the_greeting_is_quoted(play, said, problem):
     play.patience = play.IMPATIENT
     driver = await play.driver([(HELLO, said)])
     with pytest.raises(DeviceError, match=problem) as caught:
@@ -95,7 +95,7 @@ async def test_another_answer_is_shown(play, said, problem):
     assert caught.value.exit_code is ExitCode.HARDWARE
 
 
-async def test_a_wrong_enable_password(play):
+async def test_a_refused_enable_password_is_reported(play):
     driver = await play.driver(
         [
             *play.GREETING[:3],
@@ -108,7 +108,7 @@ async def test_a_wrong_enable_password(play):
     assert "sesame" not in str(caught.value)
 
 
-async def test_nothing_listens():
+async def test_opening_without_a_listening_server_is_reported():
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))
         port = taken.getsockname()[1]
@@ -119,7 +119,7 @@ async def test_nothing_listens():
             await driver.open()
 
 
-async def test_a_host_that_does_not_exist(monkeypatch):
+async def test_opening_with_an_unknown_host_name_is_reported(monkeypatch):
     async def fail(*_where: object) -> None:
         raise socket.gaierror(socket.EAI_NONAME, "Name or service not known")
 
@@ -129,7 +129,7 @@ async def test_a_host_that_does_not_exist(monkeypatch):
         await driver.open()
 
 
-async def test_a_host_that_takes_no_notice(monkeypatch):
+async def test_opening_times_out_if_the_host_does_not_accept_the_connection(monkeypatch):
     monkeypatch.setattr(asyncio, "open_connection", lambda *_where: asyncio.Event().wait())
     settings = ControllerSettings(config="x", host="far", port=5007)
     driver = LinuxcncrshController(settings, timeouts=Timeouts(connect=0.01))
@@ -137,21 +137,21 @@ async def test_a_host_that_takes_no_notice(monkeypatch):
         await driver.open()
 
 
-async def test_a_mute_server(play):
+async def test_a_server_that_never_answers_the_greeting_is_reported(play):
     play.patience = play.IMPATIENT
     driver = await play.driver([(HELLO, play.SILENCE)])
     with pytest.raises(ResponseTimeout, match="accepts the connection but does not respond"):
         await driver.open()
 
 
-async def test_a_server_that_falls_silent_while_greeting_is_no_reason_to_wait_for_ever(play):
+async def test_opening_times_out_if_the_server_stops_answering_during_the_greeting(play):
     play.patience = play.IMPATIENT
     driver = await play.driver([*play.GREETING[:2], ("set verbose on", play.SILENCE)])
     with pytest.raises(ResponseTimeout, match=r"did not answer 'set verbose' within 0\.4 s"):
         await driver.open()
 
 
-async def test_a_server_that_hangs_up(play):
+async def test_a_server_that_closes_the_connection_during_opening_is_reported(play):
     driver = await play.driver([(HELLO, play.HANG_UP)])
     with pytest.raises(ConnectionLost, match="closed the connection"):
         await driver.open()
@@ -166,7 +166,7 @@ async def test_a_failed_opening_can_be_repeated_and_leaves_it_closed(play):
     await driver.open()
 
 
-async def test_a_cell_file_without_a_port():
+async def test_a_cell_file_without_a_controller_port_is_refused():
     with pytest.raises(UsageError, match="names no controller port"):
         LinuxcncrshController(ControllerSettings(config="x"))
 
@@ -195,7 +195,7 @@ async def test_a_cancelled_opening_leaves_nothing_behind(play):
         await opening
 
 
-async def test_closing_while_it_connects(play):
+async def test_closing_during_opening_ends_the_opening(play):
     greeted = play.Pause()
     driver = await play.driver(
         [*play.GREETING[:2], ("set verbose on", greeted, b"SET VERBOSE ACK\n\r"), *play.OPENING[3:5]]

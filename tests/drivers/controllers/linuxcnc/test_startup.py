@@ -1,4 +1,4 @@
-"""Preparing: every step is verified, because an acknowledgement is not a proof."""
+"""Preparing for motion: every state is verified after its command is acknowledged."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ UNTIL_HOMED = [*TAKING_CONTROL, *NO_ESTOP, *SWITCHING_ON]
 UNTIL_MDI = [*UNTIL_HOMED, *HOMED, *MDI]
 
 
-async def test_from_emergency_stop_and_unhomed(play):
+async def test_prepare_releases_the_emergency_stop_switches_on_and_homes(play):
     driver = await play.opened(
         [
             *TAKING_CONTROL,
@@ -57,7 +57,7 @@ async def test_from_emergency_stop_and_unhomed(play):
     await driver.prepare()
 
 
-async def test_what_is_already_so_is_left_as_it_is(play):
+async def test_prepare_changes_no_state_that_is_already_right(play):
     driver = await play.opened([*UNTIL_MDI, UNITS, CODES, OFFSETS])
     await driver.prepare()
 
@@ -81,7 +81,7 @@ async def test_homing_leaves_teleoperation_first(play):
     await driver.prepare()
 
 
-async def test_states_may_take_a_moment(play):
+async def test_prepare_waits_until_each_state_is_reached(play):
     driver = await play.opened(
         [
             *TAKING_CONTROL,
@@ -104,7 +104,7 @@ async def test_states_may_take_a_moment(play):
     await driver.prepare()
 
 
-async def test_a_server_that_does_not_know_the_finer_questions(play):
+async def test_prepare_accepts_a_server_without_the_optional_queries(play):
     unknown = [
         ("get user_linear_units", b"GET USER_LINEAR_UNITS NAK\r\n\r\n"),
         ("get program_codes", b"GET PROGRAM_CODES NAK\r\n\r\n"),
@@ -151,7 +151,7 @@ async def test_a_server_that_does_not_know_the_finer_questions(play):
         ),
     ],
 )
-async def test_an_acknowledged_order_without_effect(play, conversation, states, problem):
+async def test_an_acknowledged_command_without_effect_is_reported(play, conversation, states, problem):
     play.patience = play.IMPATIENT
     driver = await play.opened(conversation, move_timeout_s=0.2)
     play.servers[0].afterwards = states
@@ -185,13 +185,13 @@ async def test_an_acknowledged_order_without_effect(play, conversation, states, 
         ),
     ],
 )
-async def test_what_would_falsify_coordinates_is_refused(play, conversation, problem):
+async def test_settings_that_falsify_coordinates_are_refused(play, conversation, problem):
     driver = await play.opened([*UNTIL_MDI, *conversation])
     with pytest.raises(DeviceError, match=problem):
         await driver.prepare()
 
 
-async def test_a_refusal_is_told_in_the_controllers_words(play):
+async def test_a_refusal_quotes_the_controllers_error_messages(play):
     driver = await play.opened(
         [
             *TAKING_CONTROL,
@@ -241,7 +241,7 @@ async def test_a_refusal_of_2_10_without_a_nak(play):
         await driver.prepare()
 
 
-async def test_a_stop_while_preparing_keeps_it_from_homing(play):
+async def test_a_stop_during_prepare_prevents_homing(play):
     stopped = play.Pause()
     driver = await play.opened(
         [
@@ -261,13 +261,13 @@ async def test_a_stop_while_preparing_keeps_it_from_homing(play):
         await preparing
 
 
-async def test_positions_that_are_none(play):
+async def test_positions_that_are_not_finite_are_refused(play):
     driver = await play.opened([("get abs_act_pos", b"ABS_ACT_POS 1.0 nan 0.0 0.0 0.0 0.0\r\n")])
     with pytest.raises(DeviceError, match=r"controller .*it reports '1\.0 nan"):
         await driver.pose()
 
 
-async def test_too_few_joints(play):
+async def test_too_few_joint_positions_are_refused(play):
     driver = await play.opened([("get joint_pos", b"JOINT_POS 1.0 2.0 3.0\r\n")])
     with pytest.raises(DeviceError, match="where six positions belong"):
         await driver.joint_positions()

@@ -1,4 +1,4 @@
-"""How the machine is, asked over a second connection while the first one waits for a move."""
+"""The status of the machine, read over a second connection while the first one waits for a move."""
 
 from __future__ import annotations
 
@@ -31,14 +31,14 @@ ON = ControllerStatus(estop=False, enabled=True)
 ERROR_OK = ("get error", b"ERROR OK\r\n")
 
 
-async def test_it_looks_on_without_taking_control(play) -> None:
+async def test_the_status_is_read_without_taking_control(play) -> None:
     driver = await play.opened([], [*GREETING, *asked(), *asked()])
     assert await driver.status() == ON
     assert await driver.status() == ON
     assert play.servers[0].connections == 2
 
 
-async def test_a_machine_that_went_off_is_asked_why(play) -> None:
+async def test_error_messages_are_read_when_the_machine_switches_off(play) -> None:
     off = asked(estop="OFF", machine="OFF")
     lagging = ("get error", b"ERROR joint 3 following error\r\n")
     driver = await play.opened([], [*GREETING, *asked(), *off, lagging, ERROR_OK, *off, ERROR_OK])
@@ -54,7 +54,7 @@ BLOCK = "set mdi G0 X1.00000000 Y2.00000000 Z3.00000000 A0.00000000 B0.00000000 
 
 
 async def test_status_has_the_messages_that_the_order_is_reading(play) -> None:
-    """LinuxCNC gives a message once; here the order's connection gets it, and is not done reading."""
+    """LinuxCNC gives a message once; here the command's connection gets it and is still reading."""
     reading = play.Pause()
     main = [
         (BLOCK, b"SET MDI NAK\n\r"),
@@ -102,7 +102,9 @@ async def test_a_message_whose_reading_is_cancelled_is_kept(play) -> None:
     assert (await driver.status()).error_messages == ("joint 3 following error",)
 
 
-async def test_a_machine_that_goes_off_before_the_first_status_was_enabled_by_its_preparation(play) -> None:
+async def test_error_messages_are_read_if_the_machine_switches_off_between_prepare_and_the_first_status(
+    play,
+) -> None:
     preparation = [
         ("set enable EMCTOO", b"SET ENABLE ACK\n\r"),
         ("get error", b"ERROR left over from before\r\n"),
@@ -123,12 +125,12 @@ async def test_a_machine_that_goes_off_before_the_first_status_was_enabled_by_it
     assert (await driver.status()).error_messages == ("joint 3 following error",)
 
 
-async def test_messages_of_a_machine_that_was_never_on_are_left_to_who_switches_it_on(play) -> None:
+async def test_error_messages_are_not_read_if_the_machine_was_never_on(play) -> None:
     driver = await play.opened([], [*GREETING, *asked(estop="ON", machine="OFF")])
     assert await driver.status() == ControllerStatus(estop=True, enabled=False)
 
 
-async def test_it_is_answered_while_a_move_is_under_way(play) -> None:
+async def test_the_status_is_read_during_a_move(play) -> None:
     arrived = play.Pause()
     there = b"ABS_ACT_POS 1.000000 2.000000 3.000000 0.000000 0.000000 0.000000\r\n"
     main = [(BLOCK, arrived, b"SET MDI ACK\n\r"), ("get abs_act_pos", there)]
@@ -141,7 +143,7 @@ async def test_it_is_answered_while_a_move_is_under_way(play) -> None:
     await moving
 
 
-async def test_stopping_takes_the_connection_that_looks_on(play) -> None:
+async def test_stopping_uses_the_status_connection(play) -> None:
     stopping = [("set enable EMCTOO", b"SET ENABLE ACK\n\r"), ("set abort", b"SET ABORT ACK\n\r")]
     still = [("get abs_act_pos", play.AT_REST)] * 3
     driver = await play.opened([], [*GREETING, *asked(), *stopping, *still])
@@ -150,7 +152,7 @@ async def test_stopping_takes_the_connection_that_looks_on(play) -> None:
     assert play.servers[0].connections == 2, "no time is lost on opening a third one"
 
 
-async def test_a_connection_that_died_does_not_keep_it_from_stopping(play) -> None:
+async def test_stopping_works_if_the_status_connection_is_closed(play) -> None:
     driver = await play.opened(
         [], [*GREETING, *asked(), ("set enable EMCTOO", play.HANG_UP)], play.STOPPING
     )
@@ -158,7 +160,7 @@ async def test_a_connection_that_died_does_not_keep_it_from_stopping(play) -> No
     await driver.stop()
 
 
-async def test_a_connection_that_is_mute_does_not_keep_it_from_stopping(play) -> None:
+async def test_stopping_works_if_the_status_connection_does_not_answer(play) -> None:
     driver = await play.opened(
         [], [*GREETING, *asked(), ("set enable EMCTOO", play.SILENCE)], play.STOPPING
     )
@@ -166,21 +168,21 @@ async def test_a_connection_that_is_mute_does_not_keep_it_from_stopping(play) ->
     await driver.stop()
 
 
-async def test_a_connection_that_was_cut_is_opened_anew(play) -> None:
+async def test_a_lost_status_connection_is_reopened(play) -> None:
     driver = await play.opened([], [*GREETING, ("get estop", play.HANG_UP)], [*GREETING, *asked()])
     with pytest.raises(DeviceError, match="closed the connection"):
         await driver.status()
     assert await driver.status() == ON
 
 
-async def test_after_closing_it_cannot_be_asked(play) -> None:
+async def test_reading_the_status_after_closing_is_an_error(play) -> None:
     driver = await play.opened([])
     await driver.close()
     with pytest.raises(DeviceError, match="is not connected"):
         await driver.status()
 
 
-async def test_it_is_silent_while_the_machine_is_being_stopped(play) -> None:
+async def test_the_status_is_not_read_during_a_stop(play) -> None:
     at_rest = play.Pause()
     stopping = [*play.STOPPING[:-1], ("get abs_act_pos", at_rest, play.AT_REST)]
     driver = await play.opened([], stopping, [*GREETING, *asked()])
@@ -194,7 +196,7 @@ async def test_it_is_silent_while_the_machine_is_being_stopped(play) -> None:
     assert await looking == ON
 
 
-async def test_two_never_speak_at_once_but_a_long_order_keeps_nobody_waiting() -> None:
+async def test_commands_are_not_sent_at_once_but_a_query_is_sent_while_a_long_command_runs() -> None:
     arbiter = SendArbiter()
     said: list[str] = []
     asked = asyncio.Event()
@@ -214,7 +216,7 @@ async def test_two_never_speak_at_once_but_a_long_order_keeps_nobody_waiting() -
     assert said == ["order", "question", "order done"]
 
 
-async def test_whoever_keeps_the_arbiter_keeps_it() -> None:
+async def test_queries_wait_until_an_exclusive_turn_ends() -> None:
     arbiter = SendArbiter()
     said: list[str] = []
 
@@ -231,8 +233,8 @@ async def test_whoever_keeps_the_arbiter_keeps_it() -> None:
     assert said == ["opened", "question"]
 
 
-async def test_a_stop_that_came_while_it_moved_is_told_by_the_move(play) -> None:
-    """The order that was under way fails by itself; the watch over it needs no second stop."""
+async def test_a_stop_during_a_move_is_reported_by_the_move(play) -> None:
+    """The move raises its own error; the guards need no second stop."""
     stopped = play.Pause()
     main = [(BLOCK, stopped, b"SET MDI ACK\n\r"), ("get abs_act_pos", play.AT_REST)]
     driver = await play.opened(

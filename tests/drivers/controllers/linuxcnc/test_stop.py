@@ -1,4 +1,4 @@
-"""Stopping: over a connection of its own, until the machine stands."""
+"""Stopping: over a separate connection, until the machine is at rest."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ async def test_stopping_goes_over_a_second_connection_while_the_first_is_mute(pl
     await driver.move(TARGET)
 
 
-async def test_one_client_is_silent_while_the_other_speaks(play):
+async def test_no_command_is_sent_on_one_connection_while_the_other_awaits_an_answer(play):
     """LinuxCNC 2.9 garbles commands of two clients that coincide."""
     speak = play.Pause()
     driver = await play.opened(
@@ -58,7 +58,7 @@ async def test_one_client_is_silent_while_the_other_speaks(play):
     assert silent_so_far
 
 
-async def test_stopping_aborts_again_while_it_still_moves(play):
+async def test_the_abort_is_repeated_while_the_machine_still_moves(play):
     moving = [b"ABS_ACT_POS %d 0 0 0 0 0\r\n" % n for n in range(1, 4)]
     driver = await play.opened(
         [],
@@ -77,14 +77,14 @@ async def test_stopping_aborts_again_while_it_still_moves(play):
     await driver.stop()
 
 
-async def test_a_machine_that_is_off_refuses_to_abort_and_stands(play):
+async def test_a_refused_abort_of_a_machine_at_rest_counts_as_stopped(play):
     driver = await play.opened(
         [], [*play.GREETING, ("set abort", b"SET ABORT NAK\n\r"), *[("get abs_act_pos", play.AT_REST)] * 3]
     )
     await driver.stop()
 
 
-async def test_a_machine_that_does_not_stop(play):
+async def test_a_machine_that_keeps_moving_after_the_abort_is_reported(play):
     play.patience = play.IMPATIENT
     driver = await play.opened([], play.GREETING)
     play.servers[0].afterwards = {
@@ -96,12 +96,12 @@ async def test_a_machine_that_does_not_stop(play):
         await driver.stop()
 
 
-async def test_stopping_tries_again_what_another_clients_command_garbled(play):
+async def test_stopping_repeats_a_greeting_that_was_garbled(play):
     driver = await play.opened([], [("hello EMC hexacell 1.0", b"HELLO NAK\r\n")], play.STOPPING)
     await driver.stop()
 
 
-async def test_stopping_without_a_connection_works_all_the_same(play):
+async def test_stopping_works_before_the_driver_is_opened(play):
     driver = await play.driver(play.STOPPING)
     await driver.stop()
 
@@ -118,7 +118,7 @@ async def test_two_stops_at_once_do_not_disturb_each_other(play):
     assert connections_so_far == 2
 
 
-async def test_nothing_is_connected_to_again_while_a_stop_is_under_way(play):
+async def test_the_driver_does_not_reconnect_during_a_stop(play):
     speak = play.Pause()
     joints = ("get joint_pos", b"JOINT_POS 1 2 3 4 5 6\r\n")
     driver = await play.opened(

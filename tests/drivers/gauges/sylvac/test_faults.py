@@ -20,7 +20,7 @@ async def test_a_silent_gauge_is_named_with_what_to_do(dialogue, gauge):
     assert not dialogue.is_open
 
 
-async def test_an_echo_alone_is_silence(dialogue, gauge):
+async def test_an_echo_without_an_answer_is_reported_as_silence(dialogue, gauge):
     dialogue.expect((b"UNI?\r", b"UNI?\r"))
     with pytest.raises(GaugeSilent, match="only the echo of the request comes back"):
         await gauge.open()
@@ -186,7 +186,7 @@ async def test_a_lost_port_is_reported_until_the_gauge_is_opened_again(dialogue,
     assert (await opened.read()).value_mm == 1.0
 
 
-async def test_it_must_be_opened_before_use_and_closes_twice(dialogue, gauge):
+async def test_a_gauge_that_is_not_open_cannot_be_read_and_may_be_closed_twice(dialogue, gauge):
     for call in (gauge.read, gauge.check):
         with pytest.raises(DeviceError, match="gauge y: is not open"):
             await call()

@@ -30,7 +30,7 @@ def test_a_value_is_read(frame, value):
 
 
 @pytest.mark.parametrize("fault", SylvacError)
-def test_a_fault_is_read(fault):
+def test_an_error_frame_is_parsed(fault):
     assert parse_value(fault.value) is fault
 
 
@@ -55,13 +55,13 @@ def test_a_fault_is_read(fault):
         b"",
     ],
 )
-def test_anything_else_is_rejected(frame):
+def test_malformed_frames_are_rejected(frame):
     with pytest.raises(FrameRejected):
         parse_value(frame)
 
 
 @given(st.floats(-999, 999), st.booleans())
-def test_what_the_simulated_device_writes_is_read(value, inch):
+def test_values_of_the_simulated_device_are_parsed(value, inch):
     shown = parse_value(Sylvac.format_value(1, value, inch=inch))
     assert isinstance(shown, DisplayedValue)
     assert shown.value == pytest.approx(value, abs=0.51e-5 if inch else 0.51e-3)

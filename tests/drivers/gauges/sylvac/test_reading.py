@@ -10,7 +10,7 @@ from hexacell.errors import DeviceError
 from tests.drivers.gauges.sylvac.dialogue import OPENING
 
 
-async def test_it_opens_and_reads(dialogue, gauge):
+async def test_opening_identifies_the_gauge_and_reading_gives_its_value(dialogue, gauge):
     dialogue.expect(*OPENING, (b"?\r", b"+1.234\r"), (b"?\r", b"+1.236\r"))
     assert await gauge.open() == DeviceIdentity("y", "sylvac", "SY276")
     assert await gauge.read() == GaugeReading(1.236, "+1.236")
@@ -18,7 +18,7 @@ async def test_it_opens_and_reads(dialogue, gauge):
     assert interface.name == "y"
 
 
-async def test_its_line_has_the_protocols_defaults(dialogue, opened):
+async def test_the_serial_line_has_the_defaults_of_the_protocol(dialogue, opened):
     assert dialogue.settings == {
         "baudrate": 4800,
         "bytesize": 7,

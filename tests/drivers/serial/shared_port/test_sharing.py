@@ -59,7 +59,9 @@ async def test_gauges_on_one_port_share_it_until_the_last_releases_it(links, fak
         ({"baudrate": 9600}, None, "already belongs to gauge x"),
     ],
 )
-async def test_what_cannot_be_shared_is_refused(links, settings, channel, words):
+async def test_conflicting_settings_and_channels_of_a_shared_port_are_refused(
+    links, settings, channel, words
+):
     first = links.acquire("loop://", "x", {"baudrate": 9600}, channel=1)
     with pytest.raises(FileError, match=words) as caught:
         links.acquire("loop://", "y", settings, channel=channel)

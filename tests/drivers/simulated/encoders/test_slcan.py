@@ -54,7 +54,7 @@ def test_format_of_frames(message, text):
 
 
 @given(st.text(alphabet="tTrR0123456789abcdefABCDEFxyz \n", max_size=30))
-def test_other_text_is_refused(text):
+def test_text_is_decoded_only_if_it_is_a_frame(text):
     found = decode_frame(text)
     assert found is None or encode_frame(found).decode()[:-1].upper() == text.upper()
 
@@ -84,7 +84,7 @@ def test_frames_pass_only_while_the_channel_is_open(adapter):
     assert [message.arbitration_id for message in sent] == [0x80, 0x80]
 
 
-def test_listening_only_sends_nothing(adapter):
+def test_in_listen_only_mode_no_frame_is_sent(adapter):
     device, sent = adapter
     assert device.answer("L") == b"\r"
     assert device.is_open
@@ -118,7 +118,7 @@ def test_the_bit_rate_is_not_changed_while_open(adapter):
 
 
 @given(st.lists(st.text(max_size=20), max_size=20))
-def test_no_command_breaks_the_adapter(commands):
+def test_every_command_gets_an_answer(commands):
     device = SlcanAdapter(lambda _message: None)
     assert all(device.answer(command)[-1:] in (b"\r", b"\a") for command in commands)
 

@@ -45,13 +45,13 @@ def cdi(indicator):
 
 
 @pytest.mark.parametrize("position", [6.25, -6.25, 0.0])
-def test_within_its_travel_it_shows_a_value(indicator, ball, position):
+def test_a_position_within_the_travel_is_shown(indicator, ball, position):
     ball.position = position
     assert indicator.shown() == position
 
 
 @pytest.mark.parametrize("position", [6.26, -6.26, 1000.0])
-def test_outside_its_travel_it_does_not(indicator, ball, position):
+def test_a_position_outside_the_travel_is_not_shown(indicator, ball, position):
     ball.position = position
     assert indicator.shown() is None
 
@@ -161,7 +161,7 @@ def test_sylvac_reports_a_low_battery(sylvac, indicator):
     assert sylvac.answer(b"BAT?") == b"BAT0\r"
 
 
-def test_sylvac_introduces_itself_when_it_is_switched_on(sylvac):
+def test_sylvac_sends_its_identification_at_power_up(sylvac):
     assert sylvac.introduction == b"SY276.1\r"
 
 

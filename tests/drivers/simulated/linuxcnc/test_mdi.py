@@ -14,7 +14,7 @@ HERE = Pose(1.0, 2.0, 3.0, 4.0, 5.0, 6.0)
 
 
 @given(st.builds(Pose, *[st.floats(-1e4, 1e4)] * 6))
-def test_what_the_driver_says_is_understood(pose):
+def test_blocks_written_by_the_driver_are_parsed(pose):
     target = parse_block(rapid_move(pose), HERE)
     assert target is not None
     assert target.as_tuple() == pytest.approx(pose.as_tuple(), abs=1e-8)
@@ -46,13 +46,13 @@ def test_missing_words_keep_their_values(block, target):
         ("hello", "No characters found in reading real value"),
     ],
 )
-def test_what_is_not_understood(block, words):
+def test_invalid_blocks_are_refused_with_the_error_of_linuxcnc(block, words):
     with pytest.raises(BlockError, match=words):
         parse_block(block, HERE)
 
 
 @given(st.text())
-def test_nothing_else_is_raised(block):
+def test_parsing_any_text_raises_block_errors_only(block):
     try:
         parse_block(block, HERE)
     except BlockError:

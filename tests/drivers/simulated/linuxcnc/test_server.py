@@ -90,20 +90,20 @@ READY = [
 ]
 
 
-def test_before_and_during_the_greeting(client):
+def test_answers_before_and_during_the_greeting(client):
     me = client()
     for line, answer in NEW_CLIENT:
         me.expect(line, answer)
 
 
-def test_in_emergency_stop_and_before_homing(client):
+def test_answers_in_emergency_stop_and_before_homing(client):
     me = client()
     me.greet()
     for line, answer in GREETED:
         me.expect(line, answer)
 
 
-def test_ready_to_move(client):
+def test_answers_when_ready_to_move(client):
     me = client()
     me.make_ready()
     for line, answer in READY:
@@ -248,7 +248,7 @@ def test_aborted_homing_leaves_the_machine_unhomed(client, machine):
     me.expect("get joint_homed", b"JOINT_HOMED NO NO NO NO NO NO\r\n")
 
 
-def test_a_silent_server_loses_lines(client, simulated):
+def test_lines_sent_to_a_silent_server_are_lost(client, simulated):
     me = client()
     simulated.set_silent(on=True)
     me.send("get estop")

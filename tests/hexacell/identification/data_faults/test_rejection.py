@@ -1,4 +1,4 @@
-"""A bad record is found, named and left out; good ones stay, however bad the bad ones are."""
+"""Bad records are found, named and left out; good records are kept."""
 
 from __future__ import annotations
 

@@ -41,7 +41,7 @@ def test_the_frames_found_on_some_poses_hold_for_others(poses):
     assert np.abs(pose_errors(left, poses[8:])).max() < 1e-8
 
 
-def test_what_is_left_cannot_be_made_smaller(poses):
+def test_aligned_errors_are_minimal(poses):
     random = np.random.default_rng(5)
     jitter = Rotation.from_rotvec(0.01 * random.standard_normal((12, 3))).as_matrix()
     wrong = PoseBatch(poses.positions + random.standard_normal((12, 3)), jitter @ poses.rotations)
@@ -57,7 +57,7 @@ def test_what_is_left_cannot_be_made_smaller(poses):
         assert cost(best) < cost(moved) < cost(wrong)
 
 
-def test_to_first_order_it_is_the_same(poses):
+def test_linear_frame_removal_agrees_with_alignment_to_first_order(poses):
     errors = pose_errors(change(1e-6).poses(poses), poses)
     left = FrameFit(poses, LENGTH).remove_frame_motion(poses, errors[..., None], errors[..., None])
     assert left.shape == (12, 6, 1)

@@ -22,7 +22,7 @@ def visits(*rows):
     )
 
 
-def test_without_a_second_visit_there_is_none():
+def test_without_a_second_visit_there_is_no_repeatability():
     assert repeatability(visits((1, 1, 0.0, (0, 0, 0)), (1, 2, 5.0, (1, 2, 3)))) is None
 
 

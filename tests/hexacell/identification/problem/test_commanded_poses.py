@@ -100,7 +100,7 @@ def test_the_solver_starts_at_the_provisional_geometry(paper, visit, make_proble
     assert identify(problem).geometry.largest_difference(paper.actual) < EXACT_MM
 
 
-def test_while_measuring_too(paper, visit, make_problem):
+def test_the_online_estimate_of_a_calibrated_machine_converges(paper, visit, make_problem):
     measured = visit(paper.actual, paper.actual, degrees=40.0, seed=0).measured(0.01, seed=0)
     for count in (2, 5, 14, 30):
         some = MeasurementSet(measured.records[:count])
@@ -123,7 +123,9 @@ def test_the_controllers_frames_do_not_matter(paper, visit, make_problem):
     assert there.chi2 == pytest.approx(here.chi2, rel=1e-6)
 
 
-def test_nor_do_they_for_records_older_than_the_last_calibration(paper, visit, make_problem):
+def test_the_controllers_frames_do_not_matter_for_records_older_than_the_last_calibration(
+    paper, visit, make_problem
+):
     """A calibration keeps the config's frames, and so commands of before and after share them."""
     problem = make_problem(
         in_frames(visit(seed=2).measured(), WORKSHOP),

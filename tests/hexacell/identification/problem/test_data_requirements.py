@@ -32,7 +32,7 @@ def test_no_records_are_refused(make_problem):
 @pytest.mark.parametrize(
     ("points", "orientations", "equations", "missing"), [(2, 6, 30, 2), (5, 3, 30, 2), (2, 2, 6, 10)]
 )
-def test_too_few_records_say_how_many_are_missing(
+def test_too_few_records_are_refused_with_the_number_missing(
     visit, make_problem, points, orientations, equations, missing
 ):
     exact = visit(points=points, orientations=orientations, seed=1)
@@ -44,7 +44,7 @@ def test_too_few_records_say_how_many_are_missing(
         identify(make_problem(exact.measured()))
 
 
-def test_the_number_said_to_be_missing_is_enough(visit, make_problem):
+def test_the_number_reported_as_missing_is_enough(visit, make_problem):
     """Two more than the 12 above."""
     exact = visit(points=2, orientations=7, seed=1)
     found = identify(make_problem(exact.measured(), noise=Noise(1e-4, 1e-4)))

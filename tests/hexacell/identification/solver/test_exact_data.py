@@ -1,4 +1,4 @@
-"""Data without noise give the machine exactly, through singularities on the way and all."""
+"""Data without noise give the exact geometry, even with singularities between start and solution."""
 
 from __future__ import annotations
 

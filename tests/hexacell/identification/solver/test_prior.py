@@ -37,7 +37,7 @@ def test_the_prior_is_released_where_the_data_determine_the_parameters(paper, vi
     assert identify(problem).geometry.largest_difference(paper.actual) < 1e-6
 
 
-def test_a_drawing_elsewhere_gives_the_same_result(hexaglide, paper, visit, make_problem):
+def test_another_drawing_gives_the_same_result(hexaglide, paper, visit, make_problem):
     measured = visit(seed=2).measured(0.01, seed=4)
     errors = np.random.default_rng(1).uniform(-3.0, 3.0, 35)
     other = Geometry(HEXAGLIDE_PARAMETERS, paper.nominal.vector + hexaglide.convention.basis() @ errors)
@@ -85,7 +85,7 @@ def test_more_records_leave_fewer_parameters_undetermined(visit, make_problem):
 
 
 def test_the_online_estimate_starts_without_records(paper, visit, make_problem):
-    """After the first record nothing is known but the drawing, and that is what is said."""
+    """After the first record the estimate is the drawing with its tolerances."""
     measured = visit(seed=2).measured()
     first = type(measured)(measured.records[:1])
     estimate = estimate_online(make_problem(first))

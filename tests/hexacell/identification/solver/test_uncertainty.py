@@ -31,7 +31,7 @@ def test_the_covariance_predicts_the_errors(repeated, truth):
     assert within(total, len(repeated) * len(truth))
 
 
-def test_no_sigma_is_too_small(repeated, truth):
+def test_the_scatter_of_repeated_estimates_agrees_with_every_sigma(repeated, truth):
     errors = np.array([found.free - truth for found in repeated])
     told = np.sqrt(np.diag(repeated[0].free_covariance))
     low, high = np.sqrt(chi2.interval(1.0 - 1e-4, len(repeated)) / np.array(len(repeated)))
@@ -90,7 +90,7 @@ def test_the_full_covariance_follows_from_the_free_one(identified, hexaglide):
     np.testing.assert_array_equal(identified.covariance[same[0]], identified.covariance[same[1]])
 
 
-def test_noise_where_it_matters_is_what_costs_accuracy(noisy, make_problem):
+def test_encoder_noise_and_gauge_noise_both_reduce_accuracy(noisy, make_problem):
     """Encoder noise goes through the machine, gauge noise does not: both must count."""
     both = identify(make_problem(noisy)).sigma.max()
     for noise in (Noise(0.001, 0.01), Noise(0.01, 0.001)):

@@ -1,4 +1,4 @@
-"""The frame convention: 35 of 42 numbers, by rule, whatever frames a geometry comes in."""
+"""The frame convention: 35 free parameters of 42 numbers, for a geometry in any frames."""
 
 from __future__ import annotations
 
@@ -68,14 +68,14 @@ def test_every_geometry_can_be_brought_to_the_convention(hexaglide, paper, error
 
 
 @given(geometries(), frame_changes())
-def test_frames_do_not_matter(hexaglide, paper, errors, change):
+def test_normalized_geometries_do_not_depend_on_the_frames(hexaglide, paper, errors, change):
     geometry, _ = hexaglide.normalize_frames(Geometry(HEXAGLIDE_PARAMETERS, paper.nominal.vector + errors))
     back, _ = hexaglide.normalize_frames(hexaglide.change_frames(geometry, change))
     np.testing.assert_allclose(back.vector, geometry.vector, atol=CONVENTION_MM)
 
 
 @given(frame_changes())
-def test_the_same_machine_stands_in_other_frames_at_the_same_joint_variables(hexaglide, paper, change):
+def test_a_frame_change_keeps_the_joint_variables(hexaglide, paper, change):
     poses = PoseBatch.at([10.0, -50.0, 540.0], Rotation.from_rotvec([[0.2, -0.1, 0.3]]).as_matrix())
     joints = hexaglide.inverse(paper.actual, paper.branch, poses)
     moved = hexaglide.residual_and_jacobian(
@@ -85,7 +85,7 @@ def test_the_same_machine_stands_in_other_frames_at_the_same_joint_variables(hex
 
 
 @given(frame_changes())
-def test_the_way_back(hexaglide, paper, change):
+def test_a_frame_change_and_its_inverse_cancel(hexaglide, paper, change):
     there_and_back = hexaglide.change_frames(
         hexaglide.change_frames(paper.actual, change), change.inverse()
     )
@@ -97,7 +97,7 @@ def test_the_way_back(hexaglide, paper, change):
 
 
 @given(frame_changes())
-def test_differences_of_ball_positions_turn_with_the_base_and_know_no_origin(change):
+def test_differences_of_ball_positions_rotate_with_the_base_and_do_not_depend_on_the_origin(change):
     positions = np.array([[1.0, 2.0, 3.0], [-4.0, 5.0, 6.5], [0.0, 0.1, -7.0]])
     moved = change.poses(PoseBatch(positions, np.broadcast_to(np.eye(3), (3, 3, 3)))).positions
     np.testing.assert_allclose(
@@ -141,7 +141,9 @@ def test_the_basis_spreads_free_parameters_over_all(hexaglide):
 
 
 @pytest.mark.parametrize(("built", "rank"), [("nominal", 35), ("actual", 36)])
-def test_a_rank_would_not_find_the_convention(hexaglide, paper, visit, built, rank):
+def test_the_rank_of_the_sensitivity_does_not_give_the_number_of_free_parameters(
+    hexaglide, paper, visit, built, rank
+):
     """With errors in the geometry, roll shows in the gauges' own alignment: the data see it too."""
     seen = visit(getattr(paper, built), seed=2)
     poses = PoseBatch(seen.balls, seen.rotations)
@@ -166,6 +168,6 @@ def test_a_rank_would_not_find_the_convention(hexaglide, paper, visit, built, ra
         ("B3y", "B3 y"),
     ],
 )
-def test_a_parameter_for_people(hexaglide, name, words):
-    """One that stands for several names them."""
+def test_display_names_of_parameters(hexaglide, name, words):
+    """A parameter that represents several numbers names them."""
     assert hexaglide.convention.display_name(name) == words

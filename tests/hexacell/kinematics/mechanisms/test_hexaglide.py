@@ -107,7 +107,7 @@ def test_every_branch_closes_the_legs_and_is_recognised(hexaglide, paper, pose, 
     np.testing.assert_array_equal(hexaglide.branch(paper.nominal, at, joints), [branch])
 
 
-def test_the_branch_says_on_which_side_of_its_platform_joint_a_slider_is(hexaglide, paper):
+def test_the_branch_gives_the_side_of_each_slider(hexaglide, paper):
     at = PoseBatch.of([Pose(0, 0, 550)])
     joints = hexaglide.inverse(paper.nominal, paper.branch, at)[0]
     platform_joints = paper.nominal["B"][:, 0]
@@ -123,7 +123,7 @@ def test_only_the_leg_that_cannot_reach_is_missing(hexaglide, paper):
     np.testing.assert_array_equal(np.isnan(joints), [[0, 0, 0, 1, 0, 0], [0] * 6])
 
 
-def test_a_leg_may_stand_exactly_upright(hexaglide, paper):
+def test_inverse_kinematics_of_perpendicular_legs(hexaglide, paper):
     geometry = hexaglide_geometry(np.zeros((6, 3)), np.zeros((6, 3)), np.full(6, 500.0))
     joints = hexaglide.inverse(geometry, paper.branch, PoseBatch.of([Pose(7, 300, 400)]))
     np.testing.assert_array_equal(joints, [[7.0] * 6])

@@ -106,7 +106,7 @@ def test_derivatives_by_every_parameter(truth: Geometry) -> None:
         np.testing.assert_allclose(found[:, row], difference, atol=1e-6, err_msg=PARAMETERS.names[row])
 
 
-def test_it_is_identified_from_exact_records(
+def test_a_second_mechanism_is_identified_from_exact_records(
     drawing: Geometry, truth: Geometry, measurements: MeasurementSet
 ) -> None:
     problem = build_problem(
@@ -127,7 +127,9 @@ def test_it_is_identified_from_exact_records(
     assert np.array(document["covariance"]).shape == (42, 42)
 
 
-def test_its_config_is_read_and_rewritten(tmp_path: Path, drawing: Geometry, truth: Geometry) -> None:
+def test_the_config_of_a_second_mechanism_is_read_and_rewritten(
+    tmp_path: Path, drawing: Geometry, truth: Geometry
+) -> None:
     config = tmp_path / "robot.toml"
     lines = [f"{symbol} = {values}" for symbol, values in drawing.document().items()]
     config.write_text("\n".join(["[geometry]", *lines, f"branch = {list(BRANCH)}", ""]))
@@ -137,7 +139,7 @@ def test_its_config_is_read_and_rewritten(tmp_path: Path, drawing: Geometry, tru
     assert kept.read(config).geometry.largest_difference(truth) < 1e-6
 
 
-def test_what_its_config_lacks_is_named_by_its_own_kinds(tmp_path: Path) -> None:
+def test_missing_keys_are_named_by_the_mechanisms_own_symbols(tmp_path: Path) -> None:
     config = tmp_path / "robot.toml"
     config.write_text("[geometry]\nz = [1.0, 1.0, 1.0, 1.0, 1.0, 1.0]\n")
     with pytest.raises(
@@ -146,14 +148,14 @@ def test_what_its_config_lacks_is_named_by_its_own_kinds(tmp_path: Path) -> None
         NativeToml(PARAMETERS).read(config)
 
 
-def test_the_cell_file_has_its_keys(drawing: Geometry) -> None:
+def test_the_cell_file_has_the_keys_of_the_mechanism(drawing: Geometry) -> None:
     section = geometry_settings(PARAMETERS)
     assert list(section.model_fields) == ["z", "A", "B"]
     assert section.model_validate(drawing.document()).model_dump()["z"] == tuple(drawing["z"])
     assert list(tolerance_settings(PARAMETERS)().model_dump()) == ["z_mm", "A_mm", "B_mm", "ball_mm"]
 
 
-def test_its_parameters_have_names_for_people() -> None:
+def test_display_names_of_its_parameters() -> None:
     assert CONVENTION.display_name("z4") == "leg 4 zero"
     assert CONVENTION.display_name("B1z") == "B1/B2/B3 z"
 
@@ -181,7 +183,7 @@ def test_a_unit_has_its_own_decimals_and_no_tolerance_by_default(tmp_path: Path)
     assert not tolerance_settings(RAILS).model_fields["l_mm"].is_required()
 
 
-def test_each_number_is_in_its_place() -> None:
+def test_vectors_arrays_and_documents_have_consistent_order() -> None:
     numbers = np.arange(len(RAILS), dtype=float)
     assert len(RAILS) == 18
     assert RAILS.names[:3] == ("r1a", "r1b", "r2a")

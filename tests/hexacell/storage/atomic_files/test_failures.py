@@ -79,9 +79,7 @@ def test_failures_are_reported_in_plain_words(
     assert names(path.parent) == [path.name]
 
 
-def test_a_folder_that_does_not_reach_the_disk_is_reported(
-    path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_folder_that_cannot_be_synced_is_reported(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def fail(folder: Path) -> None:
         assert folder == path.parent
         raise OSError(errno.EIO, "x")

@@ -31,7 +31,7 @@ class TestLeftovers:
 
         return write
 
-    def test_those_of_a_file_are_removed_and_no_others(self, path: Path, died: Any) -> None:
+    def test_temporaries_of_one_file_are_removed_and_no_others(self, path: Path, died: Any) -> None:
         other = path.with_name("other.toml")
         died(path)
         died(path)
@@ -43,7 +43,9 @@ class TestLeftovers:
         atomic_files.remove_stale_temporaries(other)
         assert names(path.parent) == [path.name]
 
-    def test_a_link_means_the_temporaries_of_its_file(self, path: Path, tmp_path: Path, died: Any) -> None:
+    def test_temporaries_of_the_target_of_a_link_are_removed(
+        self, path: Path, tmp_path: Path, died: Any
+    ) -> None:
         link = tmp_path / "elsewhere" / "link.toml"
         link.parent.mkdir()
         link.symlink_to(path)
@@ -51,13 +53,13 @@ class TestLeftovers:
         atomic_files.remove_stale_temporaries(link)
         assert names(path.parent) == [path.name, "elsewhere"]
 
-    def test_all_in_a_folder_are_removed(self, path: Path, died: Any) -> None:
+    def test_all_temporaries_in_a_folder_are_removed(self, path: Path, died: Any) -> None:
         died(path)
         died(path.with_name("other.toml"))
         atomic_files.remove_stale_temporaries(path.parent)
         assert names(path.parent) == [path.name]
 
-    def test_those_that_may_not_be_removed_are_left(self, ordinary_folder: Path, died: Any) -> None:
+    def test_temporaries_in_a_read_only_folder_are_left(self, ordinary_folder: Path, died: Any) -> None:
         died(ordinary_folder / "file")
         ordinary_folder.chmod(0o500)
         atomic_files.remove_stale_temporaries(ordinary_folder / "file")

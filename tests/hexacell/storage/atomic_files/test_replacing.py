@@ -17,7 +17,7 @@ from tests.hexacell.storage.atomic_files.ownership import NOBODY, names
 
 
 @given(st.binary(max_size=300), st.binary(max_size=300))
-def test_what_is_written_is_read(old: bytes, new: bytes) -> None:
+def test_written_bytes_are_read_back(old: bytes, new: bytes) -> None:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "file"
         for data in (old, new):
@@ -112,7 +112,7 @@ def test_links_are_kept_and_their_target_is_replaced(path: Path, tmp_path: Path)
     assert names(folder) == ["first", "second"]
 
 
-def test_a_link_to_nowhere_makes_the_file(tmp_path: Path) -> None:
+def test_writing_through_a_dangling_link_creates_its_target(tmp_path: Path) -> None:
     (tmp_path / "link").symlink_to("absent")
     atomic_files.write_atomically(tmp_path / "link", b"new")
     assert (tmp_path / "absent").read_bytes() == b"new"

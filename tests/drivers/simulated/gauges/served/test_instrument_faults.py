@@ -7,7 +7,7 @@ from tests.drivers.simulated.gauges.served.cell import PROTOCOLS, cell, send_uns
 
 
 @pytest.mark.parametrize("protocol", PROTOCOLS)
-async def test_inch(protocol):
+async def test_inch_is_refused_until_the_gauge_is_opened_in_mm(protocol):
     async with cell([protocol] * 3) as made:
         await made.open()
         made.rack.indicators["y"].inch = True
@@ -21,7 +21,7 @@ async def test_inch(protocol):
 
 
 @pytest.mark.parametrize("protocol", ["sylvac", "cdi"])
-async def test_hold(protocol):
+async def test_hold_is_found_by_the_check(protocol):
     async with cell([protocol] * 3) as made:
         await made.open()
         made.rack.indicators["x"].set_hold(on=True)
@@ -35,7 +35,7 @@ async def test_hold(protocol):
 
 
 @pytest.mark.parametrize("protocol", ["sylvac", "cdi"])
-async def test_reversed(protocol):
+async def test_a_reversed_direction_voids_the_zero(protocol):
     async with cell([protocol] * 3) as made:
         await made.open()
         made.rack.indicators["z"].reversed = True
@@ -47,7 +47,7 @@ async def test_reversed(protocol):
         assert (await made.gauges["z"].read()).value_mm == 3.0
 
 
-async def test_battery_low(sylvac):
+async def test_a_low_battery_is_found_by_the_check(sylvac):
     sylvac.rack.indicators["x"].battery_low = True
     with pytest.raises(WrongSetting, match="gauge x: has a low battery"):
         await sylvac.gauges["x"].check()

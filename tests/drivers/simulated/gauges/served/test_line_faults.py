@@ -28,7 +28,7 @@ from tests.drivers.simulated.gauges.served.cell import (
 from tests.waiting import until
 
 
-async def test_silent(sylvac):
+async def test_a_silent_gauge_is_reported_and_read_again_afterwards(sylvac):
     sylvac.rack.line("y").set_silent(on=True)
     with pytest.raises(GaugeSilent, match="gauge y"):
         await sylvac.gauges["y"].read()
@@ -74,7 +74,7 @@ async def test_one_garbled_answer_is_never_accepted(protocol, garbled):
             assert reading.value_mm == pytest.approx(2.0, abs=0.05)
 
 
-async def test_every_answer_garbled(sylvac):
+async def test_readings_garbled_every_time_are_not_accepted(sylvac):
     change_answers(sylvac.rack.line("y"), partial(flip_digit, random=Random(0)))
     outcomes = []
     for _ in range(5):

@@ -76,7 +76,7 @@ async def test_a_pseudo_terminal_opens_with_parity_repeatedly(asked):
             await link.close()
 
 
-def test_pyserial_opens_it_with_parity_repeatedly():
+def test_pyserial_opens_a_served_line_with_parity_repeatedly():
     with served("sylvac") as line:
         for _ in range(5):
             port = serial.Serial(line.url, 4800, bytesize=7, parity="E", stopbits=2, timeout=LONG_S)

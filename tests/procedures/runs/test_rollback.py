@@ -1,4 +1,4 @@
-"""What is worse, not taken or changed meanwhile: the controller has its old geometry."""
+"""A result that is worse, cannot be loaded or meets an edited config does not stay in the controller."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from tests.procedures.runs.listening import (
 )
 
 
-async def test_what_is_worse_is_rolled_back_bit_for_bit(recording, replayed) -> None:
+async def test_a_result_worse_than_before_is_rolled_back_bit_for_bit(recording, replayed) -> None:
     rig = replayed(with_tiny_deviations_before(recording.until(events.Proposed)))
     ended = await rig.run()
     assert ended.exit_code == ExitCode.OUT_OF_LIMITS
@@ -30,7 +30,7 @@ async def test_what_is_worse_is_rolled_back_bit_for_bit(recording, replayed) -> 
     assert commanding(rig).largest_difference(rig.calibration.robot.controller) == 0.0
 
 
-async def test_what_is_better_but_out_of_limits_is_rolled_back_too(recording, replayed) -> None:
+async def test_a_better_result_out_of_limits_is_rolled_back(recording, replayed) -> None:
     rig = replayed(recording.until(events.Proposed), acceptance__mean_deviation_mm=0.0001)
     assert (await rig.run()).exit_code == ExitCode.OUT_OF_LIMITS
     assert happened(rig, events.ResultValidated)[0].verdict is Verdict.OUT_OF_LIMITS
@@ -38,7 +38,9 @@ async def test_what_is_better_but_out_of_limits_is_rolled_back_too(recording, re
 
 
 @pytest.mark.parametrize("key", ["after-V1/o01/sample", "after-V1/o02/sample", "after-V2/o03/sample"])
-async def test_a_ball_outside_the_travel_afterwards_is_rolled_back(recording, replayed, key: str) -> None:
+async def test_a_ball_outside_the_travel_at_verification_causes_a_rollback(
+    recording, replayed, key: str
+) -> None:
     rig = replayed(recording.until(events.Proposed))
     at_end = GaugeAtEnd("is at an end of its travel", subject="gauge x")
     fault = before_sampling(key, lambda: rig.gauges[0].failures.append(at_end))
@@ -48,7 +50,7 @@ async def test_a_ball_outside_the_travel_afterwards_is_rolled_back(recording, re
     assert rig.config == recording.config_before
 
 
-async def test_a_controller_that_does_not_take_it_gets_its_config_back(recording, replayed) -> None:
+async def test_a_failed_reload_restores_the_config(recording, replayed) -> None:
     rig = replayed(recording.until(events.Proposed))
     rig.controller.failures["reload"] = DeviceError("does not come back", subject="controller")
     with pytest.raises(WriteBackUndone, match=r"did not take the new geometry .*is restored$") as undone:
@@ -60,7 +62,9 @@ async def test_a_controller_that_does_not_take_it_gets_its_config_back(recording
     assert happened(rig, events.Interrupted)[-1].exit_code == ExitCode.WRITE_BACK_UNDONE
 
 
-async def test_a_controller_in_an_unknown_state_is_said(recording, replayed, monkeypatch) -> None:
+async def test_a_controller_that_cannot_reload_the_old_config_is_reported(
+    recording, replayed, monkeypatch
+) -> None:
     rig = replayed(recording.until(events.Proposed))
 
     async def broken() -> None:
@@ -72,7 +76,7 @@ async def test_a_controller_in_an_unknown_state_is_said(recording, replayed, mon
     assert rig.config == recording.config_before
 
 
-async def test_after_an_undone_write_back_it_may_be_tried_again(recording, replayed) -> None:
+async def test_an_undone_write_back_can_be_repeated_by_resuming(recording, replayed) -> None:
     rig = replayed(recording.until(events.Proposed))
     rig.controller.failures["reload"] = DeviceError("does not come back", subject="controller")
     with pytest.raises(WriteBackUndone):
@@ -82,7 +86,7 @@ async def test_after_an_undone_write_back_it_may_be_tried_again(recording, repla
 
 
 @pytest.mark.parametrize("stage", ["measuring", "proposed"])
-async def test_a_config_that_somebody_changed_meanwhile_is_left_alone(recording, replayed, stage) -> None:
+async def test_a_config_edited_during_the_run_is_not_overwritten(recording, replayed, stage) -> None:
     kind, count = {"measuring": (events.SetClosed, 4), "proposed": (events.Proposed, 1)}[stage]
     rig = replayed(recording.until(kind, count=count))
     edited = somebody_edits(rig)
@@ -95,7 +99,7 @@ async def test_a_config_that_somebody_changed_meanwhile_is_left_alone(recording,
     assert "reload" not in rig.controller.log
 
 
-async def test_rolling_back_does_not_lose_what_somebody_wrote(recording, replayed) -> None:
+async def test_a_rollback_does_not_overwrite_an_edited_config(recording, replayed) -> None:
     rig = replayed(with_tiny_deviations_before(recording.until(events.Proposed)))
     edited: list[bytes] = []
     edit = on(events.ResultValidated, lambda: edited.append(somebody_edits(rig)))
@@ -104,7 +108,7 @@ async def test_rolling_back_does_not_lose_what_somebody_wrote(recording, replaye
     assert [rig.config] == edited
 
 
-async def test_a_roll_back_that_was_interrupted_is_finished(recording, replayed) -> None:
+async def test_an_interrupted_rollback_is_finished_on_resuming(recording, replayed) -> None:
     rig = replayed(with_tiny_deviations_before(recording.until(events.Proposed)))
     broken = DeviceError("does not come back", subject="controller")
     fault = on(events.ResultValidated, lambda: rig.controller.failures.update(reload=broken))

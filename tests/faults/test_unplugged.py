@@ -1,4 +1,4 @@
-"""Every device pulled out at every kind of step: put back at once, or left out and put back later."""
+"""Every device unplugged at every kind of step, and plugged in again at once or before resuming."""
 
 from __future__ import annotations
 
@@ -64,11 +64,11 @@ def puller(program: Any, new_site: Any, whole_with: Any, case: Any) -> Puller:
     return Puller(program, new_site, whole_with, case)
 
 
-def test_a_gauge_that_comes_back_while_measuring(puller: Puller) -> None:
+def test_a_gauge_plugged_in_again_while_measuring_is_recovered(puller: Puller) -> None:
     assert puller.pull("gauge y", "sampling", back=True) == "done, recovered"
 
 
-def test_a_controller_that_does_not_come_back(puller: Puller) -> None:
+def test_a_controller_left_unplugged_ends_the_run_with_the_old_config(puller: Puller) -> None:
     assert puller.pull("controller", "to orientation", back=False) == "exit 3, old config, resumed"
 
 
@@ -76,6 +76,8 @@ def test_a_controller_that_does_not_come_back(puller: Puller) -> None:
 @pytest.mark.timeout(3600)
 @pytest.mark.parametrize("back", [True, False], ids=["put back", "left out"])
 @pytest.mark.parametrize("device", DEVICES)
-def test_at_every_kind_of_step(device: str, back: bool, puller: Puller) -> None:
+def test_any_device_unplugged_at_any_kind_of_step_is_handled(
+    device: str, back: bool, puller: Puller
+) -> None:
     for step in PULLED:
         puller.pull(device, step, back=back)

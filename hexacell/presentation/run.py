@@ -37,7 +37,7 @@ def clock_notice(factor: float) -> str:
 
 def resume_hint(request: RunRequest) -> str:
     """How to resume a run that was stopped."""
-    return f"Stopped; what was measured is kept. To go on:\n  {resume_command(request)}"
+    return f"Stopped; what was measured is kept. To continue:\n  {resume_command(request)}"
 
 
 def resume_command(request: RunRequest) -> str:

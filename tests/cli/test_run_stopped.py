@@ -58,7 +58,7 @@ def stopped_at_once(process, cell, number: signal.Signals):
 def to_go_on(words: str) -> list[str]:
     """The command that a stopped run prints, without ``hexacell``."""
     lines = words.splitlines()
-    place = lines.index("Stopped; what was measured is kept. To go on:")
+    place = lines.index("Stopped; what was measured is kept. To continue:")
     program, *arguments = shlex.split(lines[place + 1])
     assert program == "hexacell"
     return arguments
@@ -114,7 +114,7 @@ def test_a_stop_before_anything_was_measured_leaves_nothing_to_resume(start, goo
     process.wait_for("times as fast", lambda: process.out)
     outcome = stopped_at_once(process, good_cell, signal.SIGTERM)
     assert outcome.code == 130
-    assert ("To go on" in outcome.out) == bool(good_cell.runs())
+    assert ("To continue" in outcome.out) == bool(good_cell.runs())
 
 
 def test_a_closed_terminal_stops_the_run_with_a_json_document(start, good_cell):
@@ -123,7 +123,7 @@ def test_a_closed_terminal_stops_the_run_with_a_json_document(start, good_cell):
     outcome = stopped_at_once(process, good_cell, signal.SIGHUP)
     assert outcome.code == 130
     assert outcome.document == {"error": "interrupted", "exit_code": 130}
-    assert "To go on:" in outcome.err
+    assert "To continue:" in outcome.err
 
 
 def test_repeated_ctrl_c_changes_nothing(start, good_cell):

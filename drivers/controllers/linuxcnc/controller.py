@@ -98,8 +98,8 @@ class LinuxcncrshController:
         async with self._order:
             commands = await self._session.synchronized()
             if self._was_stopped_since(stops):
-                raise MotionInterrupted("was stopped before it moved", subject=self._name)
-            await self._execute(commands, block, pose)
+                raise self._stopped_before_moving()
+            await self._execute(commands, block, pose, stops)
             await self._verify_arrival(commands, pose, stops)
 
     async def pose(self) -> Pose:
@@ -164,11 +164,13 @@ class LinuxcncrshController:
         except ValueError as error:
             raise MoveRefused(f"to move to {pose}", str(error), subject=self._name) from error
 
-    async def _execute(self, commands: ControllerCommands, block: str, pose: Pose) -> None:
+    async def _execute(self, commands: ControllerCommands, block: str, pose: Pose, stops: int) -> None:
         limit_s = self._settings.move_timeout_s
         try:
             await commands.set(f"mdi {block}", limit_s)
         except CommandRefused as refusal:
+            if self._was_stopped_since(stops):  # the stop took control before the move was received
+                raise self._stopped_before_moving() from refusal
             move = f"to move to {pose}"
             raise MoveRefused(move, refusal.reason, subject=self._name, action=refusal.action) from refusal
         except ResponseTimeout as overdue:
@@ -183,6 +185,9 @@ class LinuxcncrshController:
             with suppress(DeviceError):
                 await self.stop()
             raise
+
+    def _stopped_before_moving(self) -> MotionInterrupted:
+        return MotionInterrupted("was stopped before it moved", subject=self._name)
 
     async def _verify_arrival(self, commands: ControllerCommands, target: Pose, stops: int) -> None:
         deadline = loop_time() + self._timeouts.arrival

@@ -171,7 +171,9 @@ def raw() -> Iterator[RawBus]:
 @pytest.fixture
 def settings(raw: RawBus) -> EncoderSettings:
     """Raw nodes send no heartbeat unless a test does."""
-    return EncoderSettings(bus={"interface": "virtual", "channel": raw.channel}, heartbeat_ms=0)
+    return EncoderSettings(
+        bus={"interface": "virtual", "channel": raw.channel}, heartbeat_ms=0, timeout_s=10.0
+    )
 
 
 @pytest.fixture
@@ -184,17 +186,6 @@ async def bank(settings: EncoderSettings) -> AsyncIterator[Cia406Bank]:
 @pytest.fixture
 async def short_timeout_bank(settings: EncoderSettings) -> AsyncIterator[Cia406Bank]:
     """A bank for tests in which a node is silent."""
-    bank = Cia406Bank(settings.model_copy(update={"timeout_s": 0.2}))
+    bank = Cia406Bank(settings.model_copy(update={"timeout_s": 1.0}))
     yield bank
     await bank.close()
-
-
-@pytest.fixture
-def shorten_timeout() -> Callable[..., None]:
-    """Shorten the time-out of an open bank's samples, for tests in which a node is silent."""
-
-    def shorten(bank: Cia406Bank, timeout_s: float = 0.04) -> None:
-        assert bank._session is not None
-        bank._session._sampler._timeout_s = timeout_s
-
-    return shorten

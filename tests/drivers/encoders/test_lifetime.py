@@ -11,6 +11,7 @@ import pytest
 from drivers.encoders.cia406 import Cia406Bank
 from drivers.errors import BusError
 from hexacell.errors import DeviceError
+from tests.drivers.short_timeout import short_timeout
 from tests.waiting import until
 
 
@@ -157,7 +158,10 @@ async def test_a_bus_that_fails_is_an_error_with_its_cause(raw, bank, monkeypatc
     network = bank._session.bus.network
     monkeypatch.setattr(network.bus, where, fail)
     for _ in range(2):
-        with pytest.raises(BusError, match=r"encoder bus virtual raw-.*adapter gone.*the set .* is void"):
+        failed = pytest.raises(
+            BusError, match=r"encoder bus virtual raw-.*adapter gone.*the set .* is void"
+        )
+        with short_timeout(bank), failed:
             await bank.read()
 
 

@@ -13,6 +13,7 @@ from drivers.encoders.sync_sampling import MAX_SYNCS
 from drivers.errors import BusError, SilentNodeError
 from drivers.wire_trace import TraceEntry, TrafficDirection
 from hexacell.errors import DeviceError
+from tests.drivers.short_timeout import short_timeout
 from tests.waiting import until
 
 
@@ -64,46 +65,46 @@ async def test_unsigned_positions_do_not_turn_negative(raw, settings):
     await bank.close()
 
 
-async def test_an_incomplete_sample_is_discarded_and_repeated(raw, bank, shorten_timeout):
+async def test_an_incomplete_sample_is_discarded_and_repeated(raw, bank):
     await bank.open()
-    shorten_timeout(bank)
     for node in raw.nodes.values():
         node.answers_sync = lambda sync, node=node: (
             [] if (sync, node.node) == (2, 3) else [counts(100 * sync + node.node)]
         )
-    assert (await bank.read()).counts == (301, 302, 303, 304, 305, 306)
+    with short_timeout(bank):
+        assert (await bank.read()).counts == (301, 302, 303, 304, 305, 306)
     assert (await bank.read()).counts == (401, 402, 403, 404, 405, 406)
 
 
-async def test_a_silent_leg_is_named_after_bounded_tries(raw, bank, shorten_timeout):
+async def test_a_silent_leg_is_named_after_bounded_tries(raw, bank):
     await bank.open()
-    shorten_timeout(bank)
     raw.nodes[5].answers_sync = lambda _: []
     before = raw.syncs
-    with pytest.raises(
+    silent = pytest.raises(
         SilentNodeError, match=r"encoder of leg 5 \(node 5\): no response to SYNC.*its supply"
-    ):
+    )
+    with short_timeout(bank), silent:
         await bank.read()
     assert raw.syncs - before == MAX_SYNCS
 
 
-async def test_if_all_nodes_are_silent_the_error_suggests_the_bus(raw, bank, shorten_timeout):
+async def test_if_all_nodes_are_silent_the_error_suggests_the_bus(raw, bank):
     await bank.open()
-    shorten_timeout(bank)
     for node in raw.nodes.values():
         node.answers_sync = lambda _: []
-    with pytest.raises(SilentNodeError, match=r"leg 1 .*leg 6 .*CAN adapter, supply and termination"):
+    silent = pytest.raises(SilentNodeError, match=r"leg 1 .*leg 6 .*CAN adapter, supply and termination")
+    with short_timeout(bank), silent:
         await bank.read()
 
 
-async def test_the_bank_can_be_read_after_silence(raw, bank, shorten_timeout):
+async def test_the_bank_can_be_read_after_silence(raw, bank):
     await bank.open()
-    shorten_timeout(bank)
     raw.nodes[5].answers_sync = lambda _: []
-    with pytest.raises(SilentNodeError):
-        await bank.read()
-    raw.nodes[5].answers_sync = None
-    assert (await bank.read()).counts[4] == 5000
+    with short_timeout(bank):
+        with pytest.raises(SilentNodeError):
+            await bank.read()
+        raw.nodes[5].answers_sync = None
+        assert (await bank.read()).counts[4] == 5000
 
 
 async def test_a_late_response_is_awaited_before_the_next_sync(raw, bank, monkeypatch):

@@ -254,3 +254,19 @@ async def test_a_stop_during_a_move_is_reported_by_the_move(play) -> None:
     stopped.set()
     with pytest.raises(MotionInterrupted, match="it was stopped on request"):
         await moving
+
+
+async def test_a_move_that_is_refused_because_a_stop_took_control_was_stopped(play) -> None:
+    received = play.Pause()
+    main = [(BLOCK, received, b"SET MDI NAK\n\r"), ("get enable", b"ENABLE OFF\r\n")]
+    stopping = [("set enable EMCTOO", b"SET ENABLE ACK\n\r"), ("set abort", b"SET ABORT ACK\n\r")]
+    driver = await play.opened(
+        main, [*GREETING, *asked(), *stopping, *[("get abs_act_pos", play.AT_REST)] * 3]
+    )
+    await driver.status()
+    moving = asyncio.create_task(driver.move(Pose(1.0, 2.0, 3.0)))
+    await received.reached.wait()
+    await driver.stop()
+    received.set()
+    with pytest.raises(MotionInterrupted, match="was stopped before it moved"):
+        await moving

@@ -144,14 +144,3 @@ def listen() -> Iterator[Callable[[SimulatedEncoderBank], Listener]]:
             return Listener(stack.enter_context(can.Bus(**bank.bus_settings)), bank)
 
         yield make
-
-
-@pytest.fixture
-def hurry() -> Callable[..., None]:
-    """Shorten an open bank's wait for rounds, for tests with silent nodes."""
-
-    def shorten(bank: Cia406Bank, timeout_s: float = 0.04) -> None:
-        assert bank._session is not None
-        bank._session._sampler._timeout_s = timeout_s
-
-    return shorten

@@ -19,6 +19,7 @@ from drivers.simulated.serial_line import PtyLine, SocketLine
 from drivers.simulated.slcan import SlcanServer
 from hexacell.clock import CellClock
 from hexacell.errors import DeviceError
+from tests.drivers.short_timeout import short_timeout
 from tests.drivers.simulated.encoders import faults
 from tests.drivers.simulated.encoders.vendors import EVENTS_ONLY, TWO_MAGNETS
 from tests.waiting import until
@@ -122,16 +123,16 @@ async def test_a_node_duplicated_during_a_run(make_bank, driver):
         await bank.open()
 
 
-async def test_a_node_that_falls_silent(make_bank, reach, driver, hurry):
+async def test_a_node_that_falls_silent(make_bank, reach, driver):
     simulated = make_bank()
     bank = driver(reach(simulated))
     await bank.open()
-    hurry(bank)
     simulated.faults(6)["silent"](on=True)
-    with pytest.raises(SilentNodeError, match=r"leg 6"):
-        await bank.read()
-    simulated.faults(6)["silent"](on=False)
-    assert len(set((await bank.read()).counts)) == 1
+    with short_timeout(bank):
+        with pytest.raises(SilentNodeError, match=r"leg 6"):
+            await bank.read()
+        simulated.faults(6)["silent"](on=False)
+        assert len(set((await bank.read()).counts)) == 1
 
 
 async def test_an_emergency_and_its_end(make_bank, reach, driver):
@@ -182,13 +183,12 @@ async def test_the_loss_of_a_heartbeat(make_bank, reach, driver):
         await read_on(bank)
 
 
-async def test_a_node_unplugged_and_plugged_in_again(make_bank, driver, hurry):
+async def test_a_node_unplugged_and_plugged_in_again(make_bank, driver):
     simulated = make_bank()
     bank = driver(simulated.bus_settings)
     await bank.open()
-    hurry(bank)
     simulated.faults(2)["unplugged"](on=True)
-    with pytest.raises(SilentNodeError, match="leg 2"):
+    with short_timeout(bank), pytest.raises(SilentNodeError, match="leg 2"):
         await bank.read()
     simulated.faults(2)["unplugged"](on=False)
     with pytest.raises(RestartedNodeError, match="leg 2"):
@@ -198,15 +198,15 @@ async def test_a_node_unplugged_and_plugged_in_again(make_bank, driver, hurry):
 
 
 @pytest.mark.parametrize("timeouts", [0.5, 1.4, 2.5, 4.5])
-async def test_late_answers_are_never_mixed_with_later_samples(make_bank, driver, hurry, timeouts):
+async def test_late_answers_are_never_mixed_with_later_samples(make_bank, driver, timeouts):
     """Leg 3 answers every SYNC that much later, with what it saw at that SYNC."""
     simulated = make_bank()
     bank = driver(simulated.bus_settings)
     await bank.open()
-    hurry(bank, 0.08)
     faults.delay(simulated, 3, timeouts * 0.08)
     for _ in range(2):
-        outcome = (await asyncio.gather(bank.read(), return_exceptions=True))[0]
+        with short_timeout(bank, 0.08):
+            outcome = (await asyncio.gather(bank.read(), return_exceptions=True))[0]
         if isinstance(outcome, DeviceError):
             assert "leg 3" in str(outcome)
         else:
@@ -214,23 +214,21 @@ async def test_late_answers_are_never_mixed_with_later_samples(make_bank, driver
             assert len(set(outcome.counts)) == 1
 
 
-async def test_a_bus_whose_nodes_are_all_silent(make_bank, reach, driver, hurry):
+async def test_a_bus_whose_nodes_are_all_silent(make_bank, reach, driver):
     simulated = make_bank()
     bank = driver(reach(simulated))
     await bank.open()
-    hurry(bank)
     simulated.bus.stop()
-    with pytest.raises(SilentNodeError, match=r"leg 1 .*leg 6 .*CAN adapter"):
+    with short_timeout(bank), pytest.raises(SilentNodeError, match=r"leg 1 .*leg 6 .*CAN adapter"):
         await bank.read()
 
 
-async def test_an_error_of_the_simulation_silences_the_bus(make_bank, driver, hurry, caplog):
+async def test_an_error_of_the_simulation_silences_the_bus(make_bank, driver, caplog):
     positions = [0.0] * 6
     bank = driver(make_bank(positions=lambda: positions).bus_settings)
     await bank.open()
-    hurry(bank)
     positions.pop()
-    with pytest.raises(SilentNodeError, match=r"leg 1 .*leg 6 "):
+    with short_timeout(bank), pytest.raises(SilentNodeError, match=r"leg 1 .*leg 6 "):
         await bank.read()
     assert "the simulated encoders have failed" in caplog.text
 

@@ -180,7 +180,7 @@ async def test_a_slider_that_jumps_when_the_machine_is_switched_on(ready, machin
 
 
 async def test_a_silent_controller(driver, simulated):
-    controller = driver(Timeouts(answer=0.3))
+    controller = driver(Timeouts(answer=1.0))
     await controller.open()
     simulated.set_silent(on=True)
     with pytest.raises(ResponseTimeout, match="did not answer 'get abs_act_pos'"):

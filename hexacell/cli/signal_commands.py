@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import signal
-from collections.abc import Coroutine
+from collections.abc import Coroutine, Iterable
 from types import FrameType
 from typing import Any, TypeVar
 
@@ -35,20 +35,27 @@ class SignalCommands:
         Raises:
             Interruption: a signal cancelled the work.
         """
+        # An ignored one stays so, as Ctrl-C in a script's background job.
+        heeded = [number for number in ENDING_SIGNALS if signal.getsignal(number) is not signal.SIG_IGN]
+        early: list[int] = []
         try:
-            return asyncio.run(self._with_handlers(work))
+            # An exception while the loop is being made would leave a half-made loop behind.
+            with handled(heeded, lambda number, _: early.append(number)):
+                return asyncio.run(self._with_handlers(work, heeded, early))
         except asyncio.CancelledError:
             raise Interruption("interrupted") from None
 
-    async def _with_handlers(self, work: Coroutine[Any, Any, Result]) -> Result:
+    async def _with_handlers(
+        self, work: Coroutine[Any, Any, Result], heeded: Iterable[signal.Signals], early: list[int]
+    ) -> Result:
         loop, task = asyncio.get_running_loop(), asyncio.ensure_future(work)
 
         def handle(number: int, _: FrameType | None) -> None:
             loop.call_soon_threadsafe(self._handle, signal.Signals(number), task)
 
-        # An ignored one stays so, as Ctrl-C in a script's background job.
-        heeded = [number for number in ENDING_SIGNALS if signal.getsignal(number) is not signal.SIG_IGN]
         with handled(heeded, handle):
+            for number in early:
+                handle(number, None)
             return await task
 
     def _handle(self, number: signal.Signals, task: asyncio.Task[Any]) -> None:

@@ -98,15 +98,15 @@ def test_a_calibration_is_stopped_and_finished(start, typed, quick_cell):
     # The simulated cell began anew with the process: its gauges stand elsewhere now, and are seen to.
     assert "point 2 is measured again: back at its reference the gauges show" in resumed.err
     assert resumed.document["run"] == str(run)
-    assert re.match(r"35 parameters, 2[0-5] records at 5 points", resumed.document["line"])
+    assert re.match(r"35 parameters, 3[0-5] records at 5 points", resumed.document["line"])
     assert quick_cell.controller.read_bytes() != config
     measured = Counter(
         event.at.point
         for event in history(run)
         if isinstance(event, events.RecordTaken) and event.at.phase is Phase.IDENTIFY
     )
-    assert measured.pop(2) > 5
-    assert measured == {1: 5, 3: 5, 4: 5, 5: 5}  # what was finished is not measured again
+    assert measured.pop(2) > 7
+    assert measured == {1: 7, 3: 7, 4: 7, 5: 7}  # what was finished is not measured again
 
 
 def test_a_stop_before_anything_was_measured_leaves_nothing_to_resume(start, good_cell):

@@ -107,6 +107,25 @@ def test_before_an_engine_runs_the_work_is_cancelled_and_cleans_up_undisturbed(s
     assert let_go == ["devices"]
 
 
+@pytest.mark.parametrize("number", ENDING_SIGNALS)
+def test_a_signal_while_the_event_loop_is_being_made_cancels_the_work(signals, monkeypatch, number) -> None:
+    begun = []
+    made = asyncio.new_event_loop
+
+    def interrupted() -> asyncio.AbstractEventLoop:
+        send(number)
+        return made()
+
+    async def work() -> None:
+        await asyncio.sleep(0)
+        begun.append(True)
+
+    monkeypatch.setattr("asyncio.events.new_event_loop", interrupted)
+    with pytest.raises(Interruption):
+        signals.run(work())
+    assert not begun
+
+
 def test_when_the_engine_has_ended_a_signal_changes_nothing(signals) -> None:
     async def over() -> str:
         with signals.queue.attended():

@@ -7,7 +7,7 @@ from drivers.encoders.cia406 import Cia406Bank
 
 
 @contextmanager
-def short_timeout(bank: Cia406Bank, timeout_s: float = 0.3) -> Iterator[None]:
+def short_timeout(bank: Cia406Bank, timeout_s: float = 0.1) -> Iterator[None]:
     assert bank._session is not None
     sampler = bank._session._sampler
     before, sampler._timeout_s = sampler._timeout_s, timeout_s

@@ -7,8 +7,9 @@
 
 PYTHON = python3
 ARGS =
-# Tests of devices mostly wait, so that three processes keep two cores busy.
-THREE_AT_A_TIME = -n 3 --dist loadfile
+# Tests of devices mostly wait, so that three processes keep two cores busy. In the order of the folders
+# the long files come early; by default files with few tests, which are the long ones, would come last.
+THREE_AT_A_TIME = -n 3 --dist loadfile --no-loadscope-reorder
 RUN = .venv/bin/python -m
 
 # Packages of other software on these paths would take precedence over the pinned ones.

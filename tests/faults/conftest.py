@@ -33,10 +33,11 @@ MEMORY = Path("/dev/shm")
 
 @dataclass(frozen=True)
 class Ended:
-    """How a process ended: its exit code, or its signal, negative; what it said, and did to files."""
+    """How a process ended: its exit code, or its signal, negative; after how long; what it said and did."""
 
     code: int
     words: str
+    seconds: float
     calls: tuple[Call, ...] = ()
 
 
@@ -55,14 +56,16 @@ class Program:
         assert self._server.stdout is not None
         self._server.stdin.write(order.to_json() + "\n")
         self._server.stdin.flush()
+        begun = time.monotonic()
         code = int(self._server.stdout.readline())
+        seconds = time.monotonic() - begun
         words = Path(order.output).read_text()
         assert code != UNEXPECTED, words
         assert "Traceback" not in words, words
         told = Path(order.output + ".calls")
         calls = pickle.loads(told.read_bytes()) if told.exists() else []
         told.unlink(missing_ok=True)
-        return Ended(code, words, tuple(calls))
+        return Ended(code, words, seconds, tuple(calls))
 
     def run(self, site: Site, *arguments: object, **breaking: Any) -> Ended:
         """``hexacell run`` on the site's cell, with nobody at the terminal."""
@@ -124,7 +127,6 @@ class Whole:
     ended: Ended
     history: tuple[events.Event, ...]
     config_before: bytes
-    seconds: float
 
     @property
     def config_after(self) -> bytes:
@@ -151,9 +153,8 @@ class Whole:
 def whole(program: Program, folder: Path, *changes: dict[str, Any]) -> Whole:
     site = make_site(folder / "cell", *changes)
     before = site.config.read_bytes()
-    begun = time.monotonic()
     ended = program.run(site, failing={})
-    return Whole(site, changes, ended, read_journal(site.run().journal), before, time.monotonic() - begun)
+    return Whole(site, changes, ended, read_journal(site.run().journal), before)
 
 
 @pytest.fixture(scope="session")

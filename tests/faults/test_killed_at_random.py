@@ -14,7 +14,6 @@ from tests.faults.promises import require_identical
 INSTANTS = 200
 SAMPLE = 2
 
-
 SOONER = 0.95
 
 
@@ -24,7 +23,7 @@ SOONER = 0.95
 def test_a_run_killed_at_a_random_instant_is_resumed(
     number: int, program: Any, new_site: Any, undisturbed: Any, case: Any
 ) -> None:
-    duration_s = undisturbed.seconds
+    duration_s = undisturbed.ended.seconds
     for share in instants(number):
         site, duration_s = killed(program, new_site, share, duration_s)
         step = step_of(history_of(site))
@@ -46,4 +45,4 @@ def killed(program: Any, new_site: Any, share: float, duration_s: float) -> tupl
         if ended.code == KILLED:
             return site, duration_s
         assert ended.code == 0, ended.words
-        duration_s *= SOONER
+        duration_s = SOONER * min(duration_s, ended.seconds)

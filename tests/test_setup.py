@@ -12,6 +12,9 @@ import pytest
 
 CHECKOUT = Path(__file__).parent.parent
 
+THE_TESTS = "-m pytest -n 3 --dist loadfile --no-loadscope-reorder -m not slow and not benchmark"
+"""The arguments that ``make test`` gives to Python."""
+
 FAKE_PYTHON = """\
 #!/bin/sh
 lacks() { case " $LACKING " in *" $1 "*) true ;; *) false ;; esac; }
@@ -108,7 +111,7 @@ def test_every_target_installs_first(newcomer: Newcomer, target: str) -> None:
 
 def test_a_target_with_an_installed_venv_runs_its_command_only(settled: Newcomer) -> None:
     assert settled.make("test") == 0
-    assert settled.calls() == ["-c ", "-m pytest -n 3 --dist loadfile --no-loadscope-reorder -m not slow and not benchmark"]
+    assert settled.calls() == ["-c ", THE_TESTS]
     assert settled.printed == []
 
 
@@ -222,6 +225,6 @@ def test_ci_lints_and_tests_even_if_lint_fails(settled: Newcomer) -> None:
     assert done.returncode != 0
     assert "true -m ruff check" in done.stdout
     assert done.stdout.splitlines()[-2:] == [
-        "true -m pytest -n 3 --dist loadfile --no-loadscope-reorder -m not slow and not benchmark",
+        f"true {THE_TESTS}",
         "make lint failed, see above",
     ]

@@ -1,0 +1,91 @@
+"""The statement of accuracy: the largest error over the task poses, with its expanded uncertainty.
+
+The errors of the task poses are estimated, and what is not known of them is a number of independent
+effects with one standard deviation each: those of the noise, through the covariance of the identified
+parameters, and the systematic ones. The largest error over the poses is not a linear function of them.
+Its uncertainty is therefore computed by drawing the effects, as JCGM 101 (Propagation of distributions
+using a Monte Carlo method) does: U is the half-width about the stated value that holds 95 % of the draws.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from hexacell.kinematics.rotations import Array
+
+DRAWS = 10_000
+SEED = 20_100_101
+COVERAGE = 0.95
+"""Probability that the stated value is wrong by no more than U."""
+
+
+@dataclass(frozen=True, slots=True)
+class LargestError:
+    """The largest error over the task poses, and its expanded uncertainty, both in mm or both in deg."""
+
+    value: float
+    expanded: float
+
+    def __str__(self) -> str:
+        return f"{self.value:.3f} +- {self.expanded:.3f}"
+
+
+@dataclass(frozen=True, eq=False)
+class TaskErrors:
+    """Estimated errors of n task poses, base and platform frames fitted, and what is not known of them.
+
+    Attributes:
+        estimated: (n, 6) positions, mm, then rotation vectors, rad.
+        effects: (n, 6, k) change of these errors by one standard deviation of each independent effect.
+    """
+
+    estimated: Array
+    effects: Array
+
+    @classmethod
+    def of(cls, jacobian: Array, difference: Array, covariance: Array, systematic: Array) -> TaskErrors:
+        """The errors of a geometry that differs from the estimate.
+
+        Args:
+            jacobian: (n, 6, p) of the errors by the free parameters.
+            difference: (p,) of the geometry from the estimate.
+            covariance: (p, p) of the estimate.
+            systematic: (n, 6, k) effects that no covariance contains.
+        """
+        by_noise = jacobian @ _factor(covariance)
+        return cls(jacobian @ difference, np.concatenate([by_noise, systematic], axis=-1))
+
+    @cached_property
+    def position(self) -> LargestError:
+        """Of the position, mm."""
+        return _largest(self.estimated[:, :3], self.effects[:, :3])
+
+    @cached_property
+    def orientation(self) -> LargestError:
+        """Of the orientation, deg."""
+        return _largest(np.degrees(self.estimated[:, 3:]), np.degrees(self.effects[:, 3:]))
+
+    @property
+    def worst(self) -> int:
+        """Row of the task pose with the largest position error, uncertainty included."""
+        squares = (self.estimated[:, :3] ** 2).sum(axis=-1) + (self.effects[:, :3] ** 2).sum(axis=(1, 2))
+        return int(np.argmax(squares))
+
+
+def _largest(estimated: Array, effects: Array) -> LargestError:
+    """From components (n, 3), and the effects (n, 3, k) on them."""
+    value = float(np.linalg.norm(estimated, axis=-1).max())
+    draws = np.random.default_rng(SEED).standard_normal((DRAWS, effects.shape[-1]))
+    drawn = estimated + np.tensordot(draws, effects, axes=(1, 2))
+    largest = np.linalg.norm(drawn, axis=-1).max(axis=-1)
+    return LargestError(value, float(np.quantile(np.abs(largest - value), COVERAGE)))
+
+
+def _factor(covariance: Array) -> Array:
+    """A matrix (p, p) L with ``L L^T`` the covariance, which may be singular."""
+    values, vectors = np.linalg.eigh(covariance)
+    factor: Array = vectors * np.sqrt(np.maximum(values, 0.0))
+    return factor

@@ -1,0 +1,55 @@
+"""The decision rule."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from hexacell.decision import Verdict, decide, worst_verdict
+from hexacell.uncertainty.statement import LargestError
+
+
+@pytest.mark.parametrize(
+    ("value", "expanded", "verdict"),
+    [
+        (0.09, 0.06, Verdict.PASS),
+        (0.10, 0.06, Verdict.CONDITIONAL_PASS),
+        (0.15, 0.06, Verdict.CONDITIONAL_PASS),
+        (0.16, 0.06, Verdict.CONDITIONAL_FAIL),
+        (0.22, 0.06, Verdict.FAIL),
+        (0.00, 0.16, Verdict.NOT_EVALUATED),
+        (0.30, 0.16, Verdict.NOT_EVALUATED),
+        (6.00, 0.16, Verdict.FAIL),
+        (math.nan, 0.01, Verdict.NOT_EVALUATED),
+        (0.05, math.nan, Verdict.NOT_EVALUATED),
+    ],
+)
+def test_a_limit_with_a_guard_band(value: float, expanded: float, verdict: Verdict) -> None:
+    assert decide(LargestError(value, expanded), 0.15) is verdict
+
+
+positive = st.floats(0.0, 10.0)
+
+
+@given(positive, positive, st.floats(0.01, 10.0))
+def test_only_a_value_that_is_surely_within_the_limit_passes(value, expanded, limit) -> None:
+    verdict = decide(LargestError(value, expanded), limit)
+    assert (verdict is Verdict.PASS) == (value + expanded <= limit)
+    assert (verdict is Verdict.FAIL) == (value - expanded > limit)
+
+
+@given(positive, positive, st.floats(0.01, 10.0), st.floats(0.0, 1.0))
+def test_a_wider_limit_gives_no_worse_verdict(value, expanded, limit, wider) -> None:
+    order = list(Verdict)
+    tight, wide = (decide(LargestError(value, expanded), one) for one in (limit, limit + wider))
+    assert order.index(wide) <= order.index(tight) or Verdict.NOT_EVALUATED in {tight, wide}
+
+
+def test_several_are_as_bad_as_the_worst() -> None:
+    assert worst_verdict([Verdict.PASS, Verdict.PASS]) is Verdict.PASS
+    assert worst_verdict([Verdict.PASS, Verdict.NOT_EVALUATED]) is Verdict.NOT_EVALUATED
+    assert worst_verdict([Verdict.FAIL, Verdict.NOT_EVALUATED]) is Verdict.FAIL
+    assert worst_verdict([]) is Verdict.NOT_EVALUATED

@@ -91,7 +91,7 @@ def _small_change(after: Geometry, before: Geometry, largest_change_mm: float) -
     )
 
 
-class Verdict(StrEnum):
+class HeldOutVerdict(StrEnum):
     """The verdict of the held-out measurements."""
 
     PASS = "pass"  # noqa: S105 - a verdict, not a password
@@ -123,14 +123,14 @@ def validate(
     *,
     mean_mm: float,
     largest_mm: float,
-) -> Verdict:
+) -> HeldOutVerdict:
     """The verdict under limits on the mean and the largest distance, mm; missing data never pass."""
     if before is None or after is None:
-        return Verdict.NOT_EVALUATED
+        return HeldOutVerdict.NOT_EVALUATED
     if after.mean_mm > before.mean_mm:
-        return Verdict.WORSE
+        return HeldOutVerdict.WORSE
     within = after.mean_mm <= mean_mm and after.largest_mm <= largest_mm
-    return Verdict.PASS if within else Verdict.OUT_OF_LIMITS
+    return HeldOutVerdict.PASS if within else HeldOutVerdict.OUT_OF_LIMITS
 
 
 def calibration_outcome(
@@ -138,7 +138,7 @@ def calibration_outcome(
     before: DeviationStatistics | None,
     after: DeviationStatistics | None,
     limit_mm: float,
-    verdict: Verdict,
+    verdict: HeldOutVerdict,
 ) -> str:
     """The outcome of a calibration in one line: what was used, deviation before and after, verdict.
 
@@ -152,7 +152,7 @@ def calibration_outcome(
     return f"{what}; mean deviation at held-out points {means} (limit {limit_mm:g}): {verdict}"
 
 
-def check_outcome(found: DeviationStatistics | None, limit_mm: float, verdict: Verdict) -> str:
+def check_outcome(found: DeviationStatistics | None, limit_mm: float, verdict: HeldOutVerdict) -> str:
     """The outcome of a check in one line: deviation at the held-out points, verdict."""
     if found is None:
         return f"held-out points: {verdict}"

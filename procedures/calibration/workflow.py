@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 from functools import cached_property
 
-from hexacell.acceptance import Verdict
+from hexacell.acceptance import HeldOutVerdict
 from hexacell.campaign.planner import Plan
 from hexacell.campaign.pose_list import PoseList
 from hexacell.cell.model import CellSettings
@@ -121,7 +121,7 @@ class Calibration:
                 return Compute(kind="commit")
             after = self._measuring(state).held_out.next_step(state, Phase.AFTER)
             return after or Compute(kind="judge")
-        if state.judged.verdict is not Verdict.PASS and not state.rolled_back:
+        if state.judged.verdict is not HeldOutVerdict.PASS and not state.rolled_back:
             return Compute(kind="roll back")
         return None
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from hexacell.acceptance import (
     DeviationStatistics,
-    Verdict,
+    HeldOutVerdict,
     calibration_outcome,
     check_outcome,
     gates,
@@ -69,7 +69,7 @@ class Computations:
             line = check_outcome(before, self._limit_mm, verdict)
             return events.ResultValidated(verdict=verdict, line=line)
         after = DeviationStatistics.of(state.held_out(Phase.AFTER))
-        verdict = Verdict.WORSE if state.rejections(Phase.AFTER) else self._verdict(before, after)
+        verdict = HeldOutVerdict.WORSE if state.rejections(Phase.AFTER) else self._verdict(before, after)
         counts = self._counts(_identified(state))
         line = calibration_outcome(counts, before, after, self._limit_mm, verdict)
         return events.ResultValidated(verdict=verdict, line=line)
@@ -82,7 +82,9 @@ class Computations:
     def _limit_mm(self) -> float:
         return self.cell.settings.acceptance.mean_deviation_mm
 
-    def _verdict(self, before: DeviationStatistics | None, after: DeviationStatistics | None) -> Verdict:
+    def _verdict(
+        self, before: DeviationStatistics | None, after: DeviationStatistics | None
+    ) -> HeldOutVerdict:
         largest_mm = self.cell.settings.acceptance.max_deviation_mm
         return validate(before, after, mean_mm=self._limit_mm, largest_mm=largest_mm)
 

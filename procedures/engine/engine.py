@@ -6,7 +6,7 @@ import asyncio
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 
-from hexacell.acceptance import Verdict
+from hexacell.acceptance import HeldOutVerdict
 from hexacell.errors import ExitCode, HexacellError, Interruption, SeveralErrors
 from procedures.engine.command_loop import CommandLoop, Status, StepCancelled
 from procedures.engine.config_transactions import Reversal, revert_at_end, revert_unrecorded
@@ -237,7 +237,7 @@ def _ending(state: RunState) -> events.Ended:
     if state.ended is not None:
         return state.ended
     judged = state.judged
-    passed = judged is not None and judged.verdict is Verdict.PASS
+    passed = judged is not None and judged.verdict is HeldOutVerdict.PASS
     code = ExitCode.DONE if passed else ExitCode.OUT_OF_LIMITS
     line = judged.line if judged is not None else "nothing was judged"
     if state.rolled_back:

@@ -11,7 +11,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field
 
 from drivers.interfaces import DeviceIdentity
-from hexacell.acceptance import AcceptanceGate, Verdict
+from hexacell.acceptance import AcceptanceGate, HeldOutVerdict
 from hexacell.cell.fields import Frozen, GeometryDocument
 from hexacell.cell.recovery import Action, FailureKind
 from hexacell.kinematics.mechanism import Branch
@@ -197,7 +197,7 @@ class ResultValidated(Frozen):
     """The deviations at the held-out points were compared with the limits."""
 
     kind: Literal["judged"] = "judged"
-    verdict: Verdict
+    verdict: HeldOutVerdict
     line: str
 
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from hexacell.acceptance import Verdict
+from hexacell.acceptance import HeldOutVerdict
 from procedures.journal.journal import read_entries
 from procedures.journal.line_format import encode
 from procedures.run import events
@@ -42,7 +42,7 @@ def manipulated(demo, tmp_path):
     entries = list(read_entries(demo.run / "journal.jsonl"))
     for place, entry in enumerate(entries):
         if isinstance(entry.event, events.ResultValidated):
-            judged = entry.event.model_copy(update={"verdict": Verdict.WORSE, "line": "Not at all."})
+            judged = entry.event.model_copy(update={"verdict": HeldOutVerdict.WORSE, "line": "Not at all."})
             entries[place] = replace(entry, event=judged)
             line = entry.number
     path = tmp_path / "journal.jsonl"

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from hexacell.acceptance import (
     DeviationStatistics,
-    Verdict,
+    HeldOutVerdict,
     calibration_outcome,
     check_outcome,
     gates,
@@ -149,20 +149,20 @@ def test_no_deviations_give_no_statistics(nothing):
 @pytest.mark.parametrize(
     ("before", "after", "verdict"),
     [
-        (BEFORE, DeviationStatistics(0.012, 0.03, 10), Verdict.PASS),
-        (BEFORE, DeviationStatistics(0.05, 0.15, 10), Verdict.PASS),  # a limit may be reached
-        (BEFORE, DeviationStatistics(0.0501, 0.06, 10), Verdict.OUT_OF_LIMITS),
-        (BEFORE, DeviationStatistics(0.03, 0.1501, 10), Verdict.OUT_OF_LIMITS),
-        (BEFORE, DeviationStatistics(3.42, 6.0, 10), Verdict.WORSE),
+        (BEFORE, DeviationStatistics(0.012, 0.03, 10), HeldOutVerdict.PASS),
+        (BEFORE, DeviationStatistics(0.05, 0.15, 10), HeldOutVerdict.PASS),  # a limit may be reached
+        (BEFORE, DeviationStatistics(0.0501, 0.06, 10), HeldOutVerdict.OUT_OF_LIMITS),
+        (BEFORE, DeviationStatistics(0.03, 0.1501, 10), HeldOutVerdict.OUT_OF_LIMITS),
+        (BEFORE, DeviationStatistics(3.42, 6.0, 10), HeldOutVerdict.WORSE),
         (
             DeviationStatistics(0.01, 0.02, 10),
             DeviationStatistics(0.02, 0.03, 10),
-            Verdict.WORSE,
+            HeldOutVerdict.WORSE,
         ),  # although within limits
-        (DeviationStatistics(0.01, 0.02, 10), DeviationStatistics(0.01, 0.02, 10), Verdict.PASS),
-        (None, DeviationStatistics(0.012, 0.03, 10), Verdict.NOT_EVALUATED),
-        (BEFORE, None, Verdict.NOT_EVALUATED),
-        (None, None, Verdict.NOT_EVALUATED),
+        (DeviationStatistics(0.01, 0.02, 10), DeviationStatistics(0.01, 0.02, 10), HeldOutVerdict.PASS),
+        (None, DeviationStatistics(0.012, 0.03, 10), HeldOutVerdict.NOT_EVALUATED),
+        (BEFORE, None, HeldOutVerdict.NOT_EVALUATED),
+        (None, None, HeldOutVerdict.NOT_EVALUATED),
     ],
 )
 def test_the_verdict_of_each_pair_of_deviations(before, after, verdict):
@@ -171,7 +171,7 @@ def test_the_verdict_of_each_pair_of_deviations(before, after, verdict):
 
 @given(st.none() | spreads, st.none() | spreads)
 def test_a_pass_needs_data_no_increase_and_both_limits(before, after):
-    if validate(before, after, **LIMITS) is Verdict.PASS:
+    if validate(before, after, **LIMITS) is HeldOutVerdict.PASS:
         assert before is not None
         assert after is not None
         assert after.mean_mm <= before.mean_mm
@@ -182,12 +182,12 @@ def test_a_pass_needs_data_no_increase_and_both_limits(before, after):
 @pytest.mark.parametrize("broken", [np.nan, np.inf, -np.inf])
 def test_nan_gives_no_statistics(broken):
     spread = DeviationStatistics.of([[0.01, 0.0, 0.0], [0.0, broken, 0.0]])
-    assert validate(BEFORE, spread, **LIMITS) is Verdict.NOT_EVALUATED
-    assert validate(spread, DeviationStatistics(0.01, 0.02, 1), **LIMITS) is Verdict.NOT_EVALUATED
+    assert validate(BEFORE, spread, **LIMITS) is HeldOutVerdict.NOT_EVALUATED
+    assert validate(spread, DeviationStatistics(0.01, 0.02, 1), **LIMITS) is HeldOutVerdict.NOT_EVALUATED
 
 
 def test_verdicts_read_as_words():
-    assert [str(verdict) for verdict in Verdict] == [
+    assert [str(verdict) for verdict in HeldOutVerdict] == [
         "pass",
         "out of limits",
         "worse than before",
@@ -204,7 +204,7 @@ def test_the_outcome_line():
         DeviationStatistics(3.412, 6.0, 10),
         DeviationStatistics(0.0119, 0.03, 10),
         0.05,
-        Verdict.PASS,
+        HeldOutVerdict.PASS,
     )
     assert line == (
         "35 parameters, 55 records at 5 points; "
@@ -217,13 +217,13 @@ def test_the_outcome_line():
     [(None, None), (DeviationStatistics(3.4, 6.0, 10), None), (None, DeviationStatistics(0.01, 0.03, 10))],
 )
 def test_missing_held_out_data_are_stated_and_do_not_pass(before, after):
-    line = calibration_outcome(COUNTS, before, after, 0.05, Verdict.NOT_EVALUATED)
+    line = calibration_outcome(COUNTS, before, after, 0.05, HeldOutVerdict.NOT_EVALUATED)
     assert line == "35 parameters, 55 records at 5 points; held-out points: not evaluated"
 
 
 def test_the_outcome_of_a_check():
     found = DeviationStatistics(3.412, 6.0, 10)
-    assert check_outcome(found, 0.05, Verdict.OUT_OF_LIMITS) == (
+    assert check_outcome(found, 0.05, HeldOutVerdict.OUT_OF_LIMITS) == (
         "10 poses at held-out points; mean deviation 3.412 mm (limit 0.05): out of limits"
     )
-    assert check_outcome(None, 0.05, Verdict.NOT_EVALUATED) == "held-out points: not evaluated"
+    assert check_outcome(None, 0.05, HeldOutVerdict.NOT_EVALUATED) == "held-out points: not evaluated"

@@ -8,7 +8,7 @@ import json
 import numpy as np
 import pytest
 
-from hexacell.acceptance import Verdict
+from hexacell.acceptance import HeldOutVerdict
 from hexacell.application.calibration_run import calibrate
 from hexacell.cell.loader import load_cell
 from hexacell.controller_config.change import ConfigChange, fingerprint
@@ -29,7 +29,7 @@ def test_a_calibration_passes(finished) -> None:
     assert "35 parameters, 18 records at 2 points; mean deviation at held-out points" in finished.ended.line
     judged = fold(finished.history).judged
     assert judged
-    assert judged.verdict is Verdict.PASS
+    assert judged.verdict is HeldOutVerdict.PASS
 
 
 def test_listeners_get_the_events_of_the_journal(finished) -> None:

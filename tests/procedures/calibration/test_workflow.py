@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from hexacell.acceptance import Verdict
+from hexacell.acceptance import HeldOutVerdict
 from hexacell.campaign import planner as module
 from hexacell.campaign import pose_chooser
 from hexacell.campaign.decisions import MeasurePose
@@ -36,7 +36,12 @@ COMMITTED = events.Committed(approved_by="a tester")
 ENDED = events.Ended(exit_code=0, line="over")
 PASS, WORSE, OUT, UNKNOWN = (
     events.ResultValidated(verdict=verdict, line="so it is")
-    for verdict in (Verdict.PASS, Verdict.WORSE, Verdict.OUT_OF_LIMITS, Verdict.NOT_EVALUATED)
+    for verdict in (
+        HeldOutVerdict.PASS,
+        HeldOutVerdict.WORSE,
+        HeldOutVerdict.OUT_OF_LIMITS,
+        HeldOutVerdict.NOT_EVALUATED,
+    )
 )
 LOCATED = events.Located(pose=(100.0, -100.0, 500.0, 0.0, 0.0, 0.0))
 WITHDRAWING = events.StepBegun(step=Compute(kind="roll back"))

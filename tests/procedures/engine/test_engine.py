@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from hexacell.acceptance import Verdict
+from hexacell.acceptance import HeldOutVerdict
 from hexacell.errors import (
     AnswerNeeded,
     DeviceError,
@@ -261,18 +261,19 @@ async def test_a_listener_that_fails_stops_motion(script, journal, bench) -> Non
 
 
 JUDGED = {
-    verdict: events.ResultValidated(verdict=verdict, line=f"so it is: {verdict}") for verdict in Verdict
+    verdict: events.ResultValidated(verdict=verdict, line=f"so it is: {verdict}")
+    for verdict in HeldOutVerdict
 }
 
 
 @pytest.mark.parametrize(
     ("happened", "code", "line"),
     [
-        ([JUDGED[Verdict.PASS]], 0, "so it is: pass"),
-        ([JUDGED[Verdict.OUT_OF_LIMITS]], 1, "so it is: out of limits"),
-        ([JUDGED[Verdict.NOT_EVALUATED]], 1, "so it is: not evaluated"),
+        ([JUDGED[HeldOutVerdict.PASS]], 0, "so it is: pass"),
+        ([JUDGED[HeldOutVerdict.OUT_OF_LIMITS]], 1, "so it is: out of limits"),
+        ([JUDGED[HeldOutVerdict.NOT_EVALUATED]], 1, "so it is: not evaluated"),
         (
-            [JUDGED[Verdict.WORSE], events.RolledBack()],
+            [JUDGED[HeldOutVerdict.WORSE], events.RolledBack()],
             1,
             "so it is: worse than before; rolled back, the controller has its old config",
         ),

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from pydantic import TypeAdapter, ValidationError
 
 from drivers.interfaces import DeviceIdentity
-from hexacell.acceptance import AcceptanceGate, Verdict
+from hexacell.acceptance import AcceptanceGate, HeldOutVerdict
 from hexacell.cell.fields import Frozen
 from hexacell.cell.recovery import Action, FailureKind
 from hexacell.identification.solver.result import DataFaultKind
@@ -152,7 +152,7 @@ some_event: st.SearchStrategy[Any] = st.one_of(
     ),
     st.builds(events.Proposed, gates=st.lists(gate, max_size=3).map(tuple)),
     st.builds(events.Committed, approved_by=text),
-    st.builds(events.ResultValidated, verdict=st.sampled_from(Verdict), line=text),
+    st.builds(events.ResultValidated, verdict=st.sampled_from(HeldOutVerdict), line=text),
     st.builds(events.RolledBack),
     st.builds(events.Paused, at_once=st.booleans()),
     st.builds(events.Resumed),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from drivers.errors import GaugeAtEnd
-from hexacell.acceptance import Verdict
+from hexacell.acceptance import HeldOutVerdict
 from hexacell.errors import DeviceError, ExitCode, FileError, WriteBackUndone
 from procedures.run import events
 from tests.procedures.runs.listening import (
@@ -23,7 +23,7 @@ async def test_a_result_worse_than_before_is_rolled_back_bit_for_bit(recording, 
     ended = await rig.run()
     assert ended.exit_code == ExitCode.OUT_OF_LIMITS
     assert ended.line.endswith("worse than before; rolled back, the controller has its old config")
-    assert happened(rig, events.ResultValidated)[0].verdict is Verdict.WORSE
+    assert happened(rig, events.ResultValidated)[0].verdict is HeldOutVerdict.WORSE
     assert happened(rig, events.Committed)
     assert rig.config == recording.config_before
     assert rig.controller.log.count("reload") == 2
@@ -33,7 +33,7 @@ async def test_a_result_worse_than_before_is_rolled_back_bit_for_bit(recording, 
 async def test_a_better_result_out_of_limits_is_rolled_back(recording, replayed) -> None:
     rig = replayed(recording.until(events.Proposed), acceptance__mean_deviation_mm=0.0001)
     assert (await rig.run()).exit_code == ExitCode.OUT_OF_LIMITS
-    assert happened(rig, events.ResultValidated)[0].verdict is Verdict.OUT_OF_LIMITS
+    assert happened(rig, events.ResultValidated)[0].verdict is HeldOutVerdict.OUT_OF_LIMITS
     assert rig.config == recording.config_before
 
 
@@ -45,7 +45,7 @@ async def test_a_ball_outside_the_travel_at_verification_causes_a_rollback(
     at_end = GaugeAtEnd("is at an end of its travel", subject="gauge x")
     fault = before_sampling(key, lambda: rig.gauges[0].failures.append(at_end))
     assert (await rig.run(fault)).exit_code == ExitCode.OUT_OF_LIMITS
-    assert happened(rig, events.ResultValidated)[0].verdict is Verdict.WORSE
+    assert happened(rig, events.ResultValidated)[0].verdict is HeldOutVerdict.WORSE
     assert happened(rig, events.RolledBack)
     assert rig.config == recording.config_before
 

@@ -121,6 +121,22 @@ class FrameTransform:
         return FrameTransform(self.base.T, -self.base @ self.origin, self.platform.T)
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Guides:
+    """The guides of the sliders at n poses, and what their straightness does to the constraints.
+
+    Attributes:
+        rails: the legs, counted from 0, whose sliders share a rail.
+        along: (n, 6) position of each slider along its rail, mm.
+        across: (n, 6, 2) derivatives of the constraints by a displacement of the slider's joint across
+            its rail, horizontally and vertically.
+    """
+
+    rails: tuple[tuple[int, ...], ...]
+    along: Array
+    across: Array
+
+
 class Mechanism(Protocol):
     """A six-legged parallel mechanism; all methods are batched over n poses, and none raises."""
 
@@ -156,6 +172,10 @@ class Mechanism(Protocol):
 
     def change_frames(self, geometry: Geometry, change: FrameTransform) -> Geometry:
         """The same machine in other frames."""
+        ...
+
+    def guides(self, geometry: Geometry, poses: PoseBatch, joints: Array) -> Guides | None:
+        """The guides on which sliders move; none for a mechanism without."""
         ...
 
     def platform_radius(self, geometry: Geometry | GeometryBatch) -> Array:

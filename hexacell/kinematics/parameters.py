@@ -33,6 +33,14 @@ class ParameterUnit(StrEnum):
         return 6 if self is ParameterUnit.MM else 9
 
 
+class MachinePart(StrEnum):
+    """The part of the machine that a length is measured on."""
+
+    BASE = "base"
+    PLATFORM = "platform"
+    LEGS = "legs"
+
+
 @dataclass(frozen=True, slots=True)
 class ParameterKind:
     """One quantity that every leg has, such as the joint on its slider.
@@ -46,6 +54,7 @@ class ParameterKind:
         has_ball_offset: the ball's mounting displaces this kind of all legs by the same vector.
         is_positive: only values above zero are physical.
         default_tolerance: where the cell file states none; without one it must.
+        part: the part that expands with the temperature, and this kind with it; none if it does not.
 
     Raises:
         ValueError: the ball's offset needs the components x, y and z.
@@ -60,6 +69,7 @@ class ParameterKind:
     has_ball_offset: bool = False
     is_positive: bool = False
     default_tolerance: float | None = None
+    part: MachinePart | None = None
 
     def __post_init__(self) -> None:
         if self.has_ball_offset and self.components != ("x", "y", "z"):

@@ -11,8 +11,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hexacell.kinematics.geometry import Geometry, GeometryBatch
-from hexacell.kinematics.mechanism import Branch, ConstraintDerivatives, FrameConvention, FrameTransform
-from hexacell.kinematics.parameters import ParameterKind, ParameterSet
+from hexacell.kinematics.mechanism import (
+    Branch,
+    ConstraintDerivatives,
+    FrameConvention,
+    FrameTransform,
+    Guides,
+)
+from hexacell.kinematics.parameters import MachinePart, ParameterKind, ParameterSet
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array
 
@@ -23,6 +29,7 @@ HEXAGLIDE_PARAMETERS = ParameterSet(
             ("x", "y", "z"),
             meaning="spherical joints in the base frame at q = 0, mm, legs 1 to 6",
             tolerance_meaning="every coordinate of a spherical joint",
+            part=MachinePart.BASE,
             default_tolerance=7.0,
         ),
         ParameterKind(
@@ -30,6 +37,7 @@ HEXAGLIDE_PARAMETERS = ParameterSet(
             ("x", "y", "z"),
             meaning="universal joints in the platform frame (origin: the ball), mm",
             tolerance_meaning="every coordinate of a universal joint",
+            part=MachinePart.PLATFORM,
             default_tolerance=7.0,
             has_ball_offset=True,
         ),
@@ -38,6 +46,7 @@ HEXAGLIDE_PARAMETERS = ParameterSet(
             (),
             meaning="leg lengths, mm",
             tolerance_meaning="every leg length",
+            part=MachinePart.LEGS,
             default_tolerance=7.0,
             display="leg {leg} length",
             is_positive=True,
@@ -51,6 +60,10 @@ PAPER_FRAME = FrameConvention(
     zero=("S2x", "S2y", "S2z", "S3z"),
     equal=(("B2z", "B3z", "B5z"), ("B2y", "B5y")),
 )
+
+
+RAILS = ((0, 5), (1, 4), (2, 3))
+"""Legs, counted from 0, whose sliders share a rail: their joints are at the same height and side."""
 
 
 class Hexaglide:
@@ -109,6 +122,12 @@ class Hexaglide:
         """See :class:`~hexacell.kinematics.mechanism.Mechanism`."""
         S = (geometry["S"] - change.origin) @ change.base.T
         return hexaglide_geometry(S, geometry["B"] @ change.platform.T, geometry["l"])
+
+    def guides(self, geometry: Geometry, poses: PoseBatch, joints: Array) -> Guides | None:
+        """See :class:`~hexacell.kinematics.mechanism.Mechanism`."""
+        _, v = _leg_vectors(geometry, poses, joints)
+        n = v / geometry["l"][:, None]
+        return Guides(RAILS, along=geometry["S"][:, 0] + joints, across=n[..., 1:])
 
     def platform_radius(self, geometry: Geometry | GeometryBatch) -> Array:
         """See :class:`~hexacell.kinematics.mechanism.Mechanism`."""

@@ -9,8 +9,14 @@ from __future__ import annotations
 import numpy as np
 
 from hexacell.kinematics.geometry import Geometry, GeometryBatch
-from hexacell.kinematics.mechanism import Branch, ConstraintDerivatives, FrameConvention, FrameTransform
-from hexacell.kinematics.parameters import ParameterKind, ParameterSet
+from hexacell.kinematics.mechanism import (
+    Branch,
+    ConstraintDerivatives,
+    FrameConvention,
+    FrameTransform,
+    Guides,
+)
+from hexacell.kinematics.parameters import MachinePart, ParameterKind, ParameterSet
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array
 
@@ -24,9 +30,15 @@ PARAMETERS = ParameterSet(
             "leg {leg} zero",
             is_positive=True,
             default_tolerance=1.0,
+            part=MachinePart.LEGS,
         ),
         ParameterKind(
-            "A", ("x", "y", "z"), "joints on the base, mm", "every joint on the base", default_tolerance=2.0
+            "A",
+            ("x", "y", "z"),
+            "joints on the base, mm",
+            "every joint on the base",
+            default_tolerance=2.0,
+            part=MachinePart.BASE,
         ),
         ParameterKind(
             "B",
@@ -35,6 +47,7 @@ PARAMETERS = ParameterSet(
             "every joint",
             has_ball_offset=True,
             default_tolerance=2.0,
+            part=MachinePart.PLATFORM,
         ),
     )
 )
@@ -88,6 +101,9 @@ class GoughStewart:
     def change_frames(self, geometry: Geometry, change: FrameTransform) -> Geometry:
         A, B = (geometry["A"] - change.origin) @ change.base.T, geometry["B"] @ change.platform.T
         return Geometry.of(PARAMETERS, {"z": geometry["z"], "A": A, "B": B})
+
+    def guides(self, geometry: Geometry, poses: PoseBatch, joints: Array) -> Guides | None:
+        return None
 
     def platform_radius(self, geometry: Geometry | GeometryBatch) -> Array:
         radius: Array = np.mean(np.linalg.norm(geometry["B"], axis=-1), axis=-1)

@@ -1,0 +1,172 @@
+"""The uncertainty budget of the errors at the task poses: a line for the noise, and one for each effect.
+
+A line is the error that one standard deviation of an effect makes at the task pose where it is largest. The
+lines are independent, so that their squares are added at each pose; the standard uncertainty is the
+largest root over the poses. U is the 95 % quantile of the largest error over all task poses, as every one
+of them counts (:mod:`~hexacell.uncertainty.statement`).
+
+Source: JCGM 100 (Guide to the expression of uncertainty in measurement).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from hexacell.identification.belief import RobotBelief
+from hexacell.identification.solver.result import Identification
+from hexacell.kinematics.pose import PoseBatch
+from hexacell.kinematics.rotations import Array
+from hexacell.uncertainty.effects import Effect
+from hexacell.uncertainty.propagation import Propagation, compressed
+from hexacell.uncertainty.statement import TaskErrors
+
+TELLING_SIGMAS = 4.0
+"""Standard deviations by which an effect must raise the chi-square to be seen."""
+
+HARMLESS_ERROR = 5.0
+"""Times the error by the noise: an effect that is not seen before is one that no record shows."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class BudgetLine:
+    """One systematic effect; lengths are position errors at the task pose where it is largest.
+
+    Attributes:
+        effect: what it is, its size, and where that comes from.
+        through_mm: through the result, as the records had the effect.
+        direct_mm: by the effect itself at the task pose.
+        combined_mm: of both, which partly cancel where the effect is the same.
+        per_unit_mm: the same by one unit of the effect.
+        is_visible: whether the chi-square tells of it while its error is harmless.
+        columns: (t, 6, k) errors at the task poses by one standard deviation of each cause, mm and rad.
+    """
+
+    effect: Effect
+    through_mm: float
+    direct_mm: float
+    combined_mm: float
+    per_unit_mm: float
+    is_visible: bool
+    columns: Array
+
+
+@dataclass(frozen=True, eq=False)
+class UncertaintyBudget:
+    """All that is not known of the errors at t task poses.
+
+    Attributes:
+        noise: (t, 6, p) errors by the noise of the readings, mm and rad, one standard deviation a column.
+        lines: the systematic effects.
+    """
+
+    noise: Array
+    lines: tuple[BudgetLine, ...]
+
+    @classmethod
+    def of(
+        cls,
+        found: Identification,
+        belief: RobotBelief,
+        effects: Iterable[Effect],
+        *,
+        task: PoseBatch,
+        workspace: PoseBatch,
+    ) -> UncertaintyBudget:
+        """The budget of an identification; its estimate reaches all task and workspace poses."""
+        propagation = Propagation.of(found, belief, task=task, workspace=workspace)
+        effects = tuple(effects)
+        covariance = found.free_covariance * found.goodness.noise_factor**2
+        estimated = (effect for effect in effects if effect.is_estimated)
+        for columns in (effect.size * propagation.parameter_columns(effect) for effect in estimated):
+            covariance = covariance - columns @ columns.T
+        noise = propagation.jacobian @ _factor(covariance)
+        telling = TELLING_SIGMAS * np.sqrt(2.0 * found.goodness.expected)
+        visible = telling / (HARMLESS_ERROR * _largest(noise)) ** 2
+        return cls(noise, tuple(_line(propagation, effect, visible) for effect in effects))
+
+    @cached_property
+    def systematic(self) -> Array:
+        """(t, 6, k) errors by one standard deviation of all systematic effects, at most 6 t columns."""
+        return _joined([line.columns for line in self.lines], self.noise.shape[:2])
+
+    @cached_property
+    def not_in_covariance(self) -> Array:
+        """The same without the effects that the covariance of the estimate contains already."""
+        columns = [line.columns for line in self.lines if not line.effect.is_estimated]
+        return _joined(columns, self.noise.shape[:2])
+
+    @property
+    def noise_mm(self) -> float:
+        """Standard uncertainty by the noise at the worst task pose."""
+        return _largest(self.noise)
+
+    @property
+    def systematic_mm(self) -> float:
+        """Standard uncertainty by the systematic effects at the worst task pose."""
+        return _largest(self.systematic)
+
+    @property
+    def standard_mm(self) -> float:
+        """Combined standard uncertainty at the worst task pose."""
+        return _largest(self._all)
+
+    @property
+    def expanded_mm(self) -> float:
+        """U of the largest position error over the task poses, which is estimated as zero."""
+        return self._unknown.position.expanded
+
+    @property
+    def expanded_deg(self) -> float:
+        """U of the largest orientation error, deg."""
+        return self._unknown.orientation.expanded
+
+    @property
+    def unseen(self) -> tuple[BudgetLine, ...]:
+        """Effects that no record can show."""
+        return tuple(line for line in self.lines if not line.is_visible)
+
+    @cached_property
+    def _unknown(self) -> TaskErrors:
+        return TaskErrors(np.zeros(self.noise.shape[:2]), self._all)
+
+    @cached_property
+    def _all(self) -> Array:
+        return np.concatenate([self.noise, self.systematic], axis=-1)
+
+
+def _line(propagation: Propagation, effect: Effect, visible: float) -> BudgetLine:
+    """The line of an effect, which is seen if an error comes with a chi-square of ``visible``, 1/mm^2."""
+    task = propagation.columns(effect)
+    per_unit = _largest(task.combined)
+    return BudgetLine(
+        effect=effect,
+        through_mm=effect.size * _largest(task.through),
+        direct_mm=effect.size * _largest(task.direct),
+        combined_mm=effect.size * per_unit,
+        per_unit_mm=per_unit,
+        is_visible=propagation.chi_square(effect) >= visible * per_unit**2,
+        columns=effect.size * task.combined,
+    )
+
+
+def _largest(columns: Array) -> float:
+    """Root mean square position error at the task pose where it is largest, by columns (t, 6, k)."""
+    return float(np.sqrt((columns[:, :3] ** 2).sum(axis=(1, 2)).max()))
+
+
+def _joined(parts: Sequence[Array], shape: tuple[int, ...]) -> Array:
+    """The columns of all parts, or as many as rows with the same covariance."""
+    rows = shape[0] * shape[1]
+    flat = np.concatenate([np.zeros((rows, 0)), *(part.reshape(rows, -1) for part in parts)], axis=-1)
+    return compressed(flat).reshape(*shape, min(flat.shape))
+
+
+def _factor(covariance: Array) -> Array:
+    """A matrix (p, p) whose product with its transpose is the covariance, which may be singular."""
+    values, vectors = np.linalg.eigh(covariance)
+    factor: Array = vectors * np.sqrt(np.maximum(values, 0.0))
+    return factor

@@ -1,0 +1,116 @@
+"""Systematic effects: what the kinematic model leaves out, and what one unit of it does to a pose.
+
+An effect is a number of independent causes of the same size, such as the scale errors of six encoders.
+Each cause is a column: the error of the pose, or of the gauges' readings, that one unit of it makes, to
+first order. An error ``df`` of the constraints, which is in mm of leg length, moves the platform by
+``-J^-1 df`` (:mod:`hexacell.kinematics.sensitivity`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import Enum
+from functools import cached_property
+
+import numpy as np
+
+from hexacell.kinematics.geometry import Geometry
+from hexacell.kinematics.mechanism import ConstraintDerivatives, Guides, Mechanism
+from hexacell.kinematics.pose import PoseBatch
+from hexacell.kinematics.rotations import Array
+
+UM = 1e-3
+"""A micrometre in mm."""
+
+
+class Occurrence(Enum):
+    """When an effect acts, and whether it is the same each time."""
+
+    CONSTANT = "the same while measuring and at work"
+    EVERY_STOP = "another at every stop"
+    MEASURING = "while measuring only"
+    AT_WORK = "at work only"
+
+
+@dataclass(frozen=True, eq=False)
+class Placement:
+    """A robot at n poses, with the joint variables (n, 6), mm, that close its geometry there."""
+
+    mechanism: Mechanism
+    geometry: Geometry
+    poses: PoseBatch
+    joints: Array
+
+    def __len__(self) -> int:
+        return len(self.poses)
+
+    @cached_property
+    def derivatives(self) -> ConstraintDerivatives:
+        """Of the constraints."""
+        return self.mechanism.derivatives(self.geometry, self.poses, self.joints)
+
+    @cached_property
+    def guides(self) -> Guides | None:
+        """The guides of the sliders, if there are any."""
+        return self.mechanism.guides(self.geometry, self.poses, self.joints)
+
+    @cached_property
+    def by_constraints(self) -> Array:
+        """Derivatives (n, 6, 6) of the pose, mm and rad, by errors of the constraints, mm."""
+        inverse: Array = -np.linalg.inv(self.derivatives.pose)
+        return inverse
+
+    def by_joints(self, errors: Array) -> Array:
+        """Errors of the poses (n, 6, k) by errors (n, 6, k), mm, of the joint variables."""
+        moved: Array = self.by_constraints @ (self.derivatives.joints[..., None] * errors)
+        return moved
+
+    def by_parameters(self, changes: Array) -> Array:
+        """Errors of the poses (n, 6, k) by changes (P, k) of the parameters."""
+        parameters = self.mechanism.parameters
+        of_legs = np.empty_like(changes)
+        of_legs[parameters.leg_order] = changes
+        by_leg = of_legs.reshape(6, parameters.numbers_per_leg, -1)
+        moved: Array = self.by_constraints @ np.einsum("nic,ick->nik", self.derivatives.parameters, by_leg)
+        return moved
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Readings:
+    """What the gauges see at n poses.
+
+    Attributes:
+        rotations: (n, 3, 3) of the platform.
+        deviations: (n, 3), mm, along the base axes.
+        gauges: (3, 3), columns: measuring directions of the gauges.
+    """
+
+    rotations: Array
+    deviations: Array
+    gauges: Array
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Effect:
+    """A systematic effect: independent causes, each with the same standard deviation.
+
+    Attributes:
+        name: in tables, unique within a budget.
+        size: one standard deviation of each cause, in ``unit``; of a wave, its amplitude.
+        source: where the size comes from.
+        occurrence: when it acts.
+        on_poses: errors of poses (n, 6, k), mm and rad, in the base frame, by one unit of each cause.
+        on_readings: likewise errors (n, 3, k), mm, of the deviations that the gauges measure.
+        is_estimated: the estimator has these causes as nuisance parameters of this size, so that the
+            covariance of its result contains them.
+    """
+
+    name: str
+    size: float
+    unit: str
+    occurrence: Occurrence
+    on_poses: Callable[[Placement], Array] | None = None
+    on_readings: Callable[[Readings], Array] | None = None
+    source: str = ""
+    is_estimated: bool = False

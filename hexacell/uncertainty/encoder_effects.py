@@ -1,0 +1,43 @@
+"""Effects of the encoders: errors of their scales, and stops that they do not see."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hexacell.kinematics.parameters import LEGS
+from hexacell.kinematics.rotations import Array
+from hexacell.uncertainty.effects import UM, Effect, Occurrence, Placement
+
+
+def common_encoder_scale(um_per_m: float, source: str = "") -> Effect:
+    """All encoders are wrong by the same share, as of a common temperature or calibration.
+
+    Nothing that the gauges measure tells it from a machine that is larger by the same share.
+    """
+    return Effect(
+        "scale common to all encoders", um_per_m, "um/m", Occurrence.CONSTANT, _common_scale, source=source
+    )
+
+
+def encoder_scales(um_per_m: float, source: str = "") -> Effect:
+    """Each encoder is wrong by a share of its own."""
+    return Effect(
+        "scale of each encoder", um_per_m, "um/m", Occurrence.CONSTANT, _each_scale, source=source
+    )
+
+
+def slider_repeatability(um: float, source: str = "") -> Effect:
+    """A slider's joint stops beside what its encoder shows, each time elsewhere: play, friction."""
+    return Effect("repeatability of a slider", um, "um", Occurrence.EVERY_STOP, _each_joint, source=source)
+
+
+def _common_scale(placement: Placement) -> Array:
+    return placement.by_joints(1e-6 * placement.joints[..., None])
+
+
+def _each_scale(placement: Placement) -> Array:
+    return placement.by_joints(1e-6 * placement.joints[..., None] * np.eye(LEGS))
+
+
+def _each_joint(placement: Placement) -> Array:
+    return placement.by_joints(np.broadcast_to(UM * np.eye(LEGS), (len(placement), LEGS, LEGS)))

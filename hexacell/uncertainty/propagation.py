@@ -1,0 +1,172 @@
+"""First-order propagation of effects: through the estimator, and directly at the task poses.
+
+An effect that moves the ball by e in the records is taken for a deviation. The estimate, at a minimum of
+the weighted squares with the stations' unknowns eliminated, then errs by
+
+    dp = C J~^T W e,
+
+with C the covariance of the estimate and J~ the centred Jacobian
+(:class:`~hexacell.identification.solver.nuisance_parameters.NuisanceElimination`; e needs no centring,
+because J~^T W contains it). A controller with that geometry sets joint variables at which the robot is
+``D e' - H dp`` beside the commanded pose: the effect itself, less what the estimate had taken up of it.
+Base and platform frames are fitted to both over the workspace
+(:mod:`hexacell.identification.diagnostics.frame_alignment`).
+
+What an effect adds to the chi-square is ``e^T M e``, with M the weights less what stations and parameters
+absorb (:mod:`hexacell.identification.solver.linearized_model`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from hexacell.identification.belief import RobotBelief
+from hexacell.identification.diagnostics.frame_alignment import FrameFit
+from hexacell.identification.diagnostics.pose_accuracy import error_jacobian
+from hexacell.identification.solver.nuisance_parameters import NuisanceElimination
+from hexacell.identification.solver.result import Identification
+from hexacell.kinematics.pose import PoseBatch
+from hexacell.kinematics.rotations import Array
+from hexacell.uncertainty.effects import Effect, Occurrence, Placement, Readings
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class TaskColumns:
+    """Errors (t, 6, k) at t task poses, mm and rad, by one unit of each cause of an effect.
+
+    Attributes:
+        through: through the result; of the opposite sign of the parameters' errors.
+        direct: by the effect itself.
+        combined: of both together. Where they have the same cause, they partly cancel.
+    """
+
+    through: Array
+    direct: Array
+    combined: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Propagation:
+    """The linear maps at one identification, for one task.
+
+    Attributes:
+        records: where the robot was measured.
+        readings: what the gauges saw there.
+        task: the t task poses.
+        workspace: poses over which the frames are fitted.
+        gain: (p, n, 3) errors of the free parameters by errors of the records, mm.
+        jacobian: (t, 6, p) of the errors at the task poses by the free parameters.
+        frames: the fit of the frames.
+        elimination: that of the stations' unknowns.
+        record_jacobian: (n, 3, p) of the records by the free parameters.
+        covariance: (p, p) of the free parameters.
+    """
+
+    records: Placement
+    readings: Readings
+    task: Placement
+    workspace: Placement
+    gain: Array
+    jacobian: Array
+    frames: FrameFit
+    elimination: NuisanceElimination
+    record_jacobian: Array
+    covariance: Array
+
+    @classmethod
+    def of(
+        cls, found: Identification, belief: RobotBelief, *, task: PoseBatch, workspace: PoseBatch
+    ) -> Propagation:
+        """Of an identification and the belief made of it, which reaches all task and workspace poses."""
+        problem, prediction = found.problem, found.prediction
+        elimination = NuisanceElimination(problem, prediction.weights)
+        centred = elimination.centred(prediction.jacobian)
+        weighted = np.swapaxes(centred, -1, -2) @ prediction.weights
+        return cls(
+            records=Placement(problem.mechanism, found.geometry, prediction.poses, problem.joints),
+            readings=Readings(prediction.poses.rotations, problem.deviations, problem.gauges),
+            task=_placement(belief, task),
+            workspace=_placement(belief, workspace),
+            gain=np.einsum("pq,nqa->pna", found.free_covariance, weighted),
+            jacobian=error_jacobian(belief, task, workspace),
+            frames=FrameFit(workspace, float(belief.mechanism.platform_radius(belief.estimate))),
+            elimination=elimination,
+            record_jacobian=prediction.jacobian,
+            covariance=found.free_covariance,
+        )
+
+    def parameter_columns(self, effect: Effect) -> Array:
+        """Errors (p, k) of the free parameters by one unit of each cause of an effect."""
+        if effect.occurrence is Occurrence.AT_WORK:
+            return np.zeros((len(self.gain), 0))
+        errors = self._on_records(effect)
+        each: Array = np.einsum("pna,nak->pnk", self.gain, errors)
+        if effect.occurrence is Occurrence.EVERY_STOP:
+            return compressed(each.reshape(len(self.gain), -1))
+        together: Array = each.sum(axis=1)
+        return together
+
+    def columns(self, effect: Effect) -> TaskColumns:
+        """What an effect does at the task poses."""
+        through = -np.tensordot(self.jacobian, self.parameter_columns(effect), axes=1)
+        direct = self._direct(effect)
+        if effect.occurrence is Occurrence.CONSTANT:
+            return TaskColumns(through, direct, through + direct)
+        return TaskColumns(through, direct, np.concatenate([through, direct], axis=-1))
+
+    def chi_square(self, effect: Effect) -> float:
+        """What one unit of every cause adds to the expected chi-square of the residuals."""
+        if effect.occurrence is Occurrence.AT_WORK:
+            return 0.0
+        errors = self._on_records(effect)
+        if effect.occurrence is Occurrence.EVERY_STOP:
+            errors = _each_alone(errors)
+        nothing = np.zeros(errors.shape[:2])
+        rows = self.elimination.system(
+            nothing, np.concatenate([self.record_jacobian, errors], axis=-1)
+        ).rows
+        by_parameters, by_causes = np.split(rows, [self.record_jacobian.shape[-1]], axis=1)
+        absorbed = by_parameters.T @ by_causes
+        return float(np.sum(by_causes**2) - np.sum(absorbed * (self.covariance @ absorbed)))
+
+    def _direct(self, effect: Effect) -> Array:
+        """Errors (t, 6, k) by the effect itself; frames cannot be fitted to what differs at every stop."""
+        if effect.on_poses is None or effect.occurrence is Occurrence.MEASURING:
+            return np.zeros((len(self.task), 6, 0))
+        errors = effect.on_poses(self.task)
+        if effect.occurrence is Occurrence.EVERY_STOP:
+            return _each_alone(errors)
+        return self.frames.remove_frame_motion(self.task.poses, errors, effect.on_poses(self.workspace))
+
+    def _on_records(self, effect: Effect) -> Array:
+        """Errors (n, 3, k) of the records, mm."""
+        parts: list[Array] = [np.zeros((len(self.records), 3, 0))]
+        if effect.on_poses is not None:
+            parts.append(effect.on_poses(self.records)[:, :3])
+        if effect.on_readings is not None:
+            parts.append(effect.on_readings(self.readings))
+        return np.concatenate(parts, axis=-1)
+
+
+def _placement(belief: RobotBelief, poses: PoseBatch) -> Placement:
+    joints = belief.mechanism.inverse(belief.estimate, belief.branch, poses)
+    return Placement(belief.mechanism, belief.estimate, poses, joints)
+
+
+def _each_alone(errors: Array) -> Array:
+    """Columns (n, m, n k) in which each of n poses has causes of its own, from those (n, m, k) of each."""
+    poses, rows, causes = errors.shape
+    alone = np.zeros((poses, rows, poses, causes))
+    each = np.arange(poses)
+    alone[each, :, each] = errors
+    return alone.reshape(poses, rows, -1)
+
+
+def compressed(columns: Array) -> Array:
+    """At most as many columns as rows, whose product with their transpose is the same."""
+    if columns.shape[1] <= columns.shape[0]:
+        return columns
+    upper: Array = np.linalg.qr(columns.T)[1]
+    return upper.T

@@ -1,0 +1,126 @@
+"""The uncertainty budget: its lines, their sum, and what no record can show."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from hexacell.identification.estimator import identify
+from hexacell.identification.problem.problem import Noise
+from hexacell.uncertainty.budget import UncertaintyBudget
+from hexacell.uncertainty.encoder_effects import common_encoder_scale, encoder_scales, slider_repeatability
+from hexacell.uncertainty.gauge_effects import ball_beside_tool, ball_roundness, gauge_scales
+from hexacell.uncertainty.guide_effects import common_sag, rail_directions, rail_waves
+from hexacell.uncertainty.statement import TaskErrors
+from tests.hexacell.uncertainty.conftest import belief_of
+
+GAUGE_SCALE = 2e-3
+
+
+@pytest.fixture(scope="module")
+def budget_of(laboratory, paper):
+    def budget(found, effects=()):
+        belief = belief_of(found, paper.nominal, paper.branch)
+        return UncertaintyBudget.of(
+            found, belief, effects, task=laboratory.task, workspace=laboratory.workspace
+        )
+
+    return budget
+
+
+@pytest.fixture(scope="module")
+def near(visit, make_problem, paper):
+    """From records whose ball hardly leaves its zero, as of a calibrated robot."""
+    exact = visit(commanding=paper.actual, degrees=40.0).measured()
+    return identify(make_problem(exact, controller=paper.actual), find_outliers=False)
+
+
+EFFECTS = (
+    encoder_scales(10.0),
+    rail_waves(5.0, 600.0),
+    slider_repeatability(2.0),
+    ball_roundness(2.0),
+)
+
+
+def test_without_effects_it_is_the_noise_alone(exact, propagation, budget_of) -> None:
+    budget = budget_of(exact)
+    jacobian = propagation.jacobian
+    noise = TaskErrors.of(
+        jacobian, np.zeros(len(exact.free)), exact.free_covariance, np.zeros((len(jacobian), 6, 0))
+    )
+    assert budget.expanded_mm == pytest.approx(noise.position.expanded)
+    assert budget.expanded_deg == pytest.approx(noise.orientation.expanded)
+    squares = np.einsum("tap,pq,taq->t", jacobian[:, :3], exact.free_covariance, jacobian[:, :3])
+    assert budget.noise_mm == pytest.approx(np.sqrt(squares.max()))
+    assert budget.standard_mm == budget.noise_mm
+    assert budget.systematic_mm == 0.0
+
+
+def test_squares_of_all_lines_are_added_at_every_pose(exact, budget_of) -> None:
+    budget = budget_of(exact, EFFECTS)
+    columns = [budget.noise, *(line.columns for line in budget.lines)]
+    each = sum((part[:, :3] ** 2).sum(axis=(1, 2)) for part in columns)
+    assert budget.standard_mm == pytest.approx(np.sqrt(np.max(each)))
+    flat = np.concatenate([line.columns.reshape(12, -1) for line in budget.lines], axis=1)
+    systematic = budget.systematic.reshape(12, -1)
+    assert systematic.shape[1] <= 12
+    assert systematic @ systematic.T == pytest.approx(flat @ flat.T, abs=1e-15)
+
+
+def test_an_effect_of_twice_the_size_has_a_line_twice_as_large(exact, budget_of) -> None:
+    small, large = (budget_of(exact, [rail_waves(um, 600.0)]).lines[0] for um in (5.0, 10.0))
+    assert large.combined_mm == pytest.approx(2.0 * small.combined_mm)
+    assert large.columns == pytest.approx(2.0 * small.columns)
+    assert large.per_unit_mm == pytest.approx(small.per_unit_mm) == pytest.approx(small.combined_mm / 5.0)
+
+
+def test_u_of_the_largest_error_is_its_quantile(exact, budget_of) -> None:
+    """Independent draws of every effect, 5,000 machines of 2 task poses."""
+    budget = budget_of(exact, EFFECTS)
+    random = np.random.default_rng(5)
+    together = np.concatenate([budget.noise, *(line.columns for line in budget.lines)], axis=-1)
+    drawn = random.standard_normal((5000, together.shape[-1])) @ np.swapaxes(together[:, :3], 1, 2)
+    largest = np.linalg.norm(drawn, axis=-1).max(axis=0)
+    assert budget.expanded_mm == pytest.approx(np.quantile(largest, 0.95), rel=0.05)
+
+
+def test_an_estimated_effect_is_taken_out_of_the_noise_and_listed(laboratory, budget_of) -> None:
+    """The covariance of the estimate already contains the gauges' scale: nothing is counted twice."""
+    noise = Noise(0.01, 0.01, gauge_scale=GAUGE_SCALE)
+    measured = laboratory.visits.measured()
+    found = identify(laboratory.make_problem(measured, noise=noise), find_outliers=False)
+    plain = budget_of(found)
+    listed = budget_of(found, [gauge_scales(1e3 * GAUGE_SCALE, is_estimated=True)])
+    assert listed.lines[0].combined_mm > 0.0
+    assert listed.noise_mm < plain.noise_mm
+    assert listed.standard_mm == pytest.approx(plain.standard_mm)
+    assert listed.not_in_covariance.shape[-1] == 0
+
+
+def test_residuals_larger_than_the_noise_widen_the_noise_line(laboratory, visit, budget_of) -> None:
+    found = laboratory.identified(visit(seed=2).measured(0.03, seed=1))
+    assert found.goodness.noise_factor > 2.0
+    as_stated = replace(found, solution=replace(found.solution, chi2=found.goodness.expected))
+    factor = budget_of(found).noise_mm / budget_of(as_stated).noise_mm
+    assert factor == pytest.approx(found.goodness.noise_factor)
+
+
+def test_what_no_record_shows_is_listed(near, budget_of) -> None:
+    effects = (
+        *EFFECTS,
+        rail_directions(0.02),
+        rail_waves(5.0, 1500.0),
+        common_encoder_scale(0.0),
+        common_sag(0.0, 800.0),
+        ball_beside_tool(0.0),
+    )
+    unseen = budget_of(near, effects).unseen
+    assert {line.effect.name for line in unseen} == {
+        "scale common to all encoders",
+        "sag common to all rails",
+        "ball beside the tool's centre",
+    }
+    assert all(line.combined_mm == 0.0 < line.per_unit_mm for line in unseen)

@@ -1,0 +1,85 @@
+"""Effects of mechanisms with and without rails."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from hexacell.kinematics.geometry import Geometry
+from hexacell.kinematics.parameters import MachinePart
+from hexacell.kinematics.pose import Pose, PoseBatch
+from hexacell.uncertainty.effects import Effect, Placement
+from hexacell.uncertainty.encoder_effects import encoder_scales, slider_repeatability
+from hexacell.uncertainty.environment_effects import load_at_work, temperature_at_work
+from hexacell.uncertainty.guide_effects import common_sag, rail_directions, rail_waves
+from tests.hexacell.kinematics.mechanisms.gough_stewart import PARAMETERS, GoughStewart
+
+STEP_MM = 1e-4
+
+
+@pytest.fixture(scope="module")
+def hexapod() -> Placement:
+    """A Gough-Stewart platform 420 mm above its base, tilted."""
+    base, platform = np.radians([-50, 50, 70, 170, 190, 290]), np.radians([-10, 10, 110, 130, 230, 250])
+    values = {
+        "z": np.full(6, 500.0),
+        "A": np.stack([350 * np.cos(base), 350 * np.sin(base), np.zeros(6)], axis=1),
+        "B": np.stack([160 * np.cos(platform), 160 * np.sin(platform), np.full(6, -30.0)], axis=1),
+    }
+    geometry = Geometry.of(PARAMETERS, values)
+    poses = PoseBatch.of([Pose(0.0, 0.0, 420.0, 10.0, 5.0, 0.0), Pose(40.0, -30.0, 450.0, 0.0, -12.0, 8.0)])
+    joints = GoughStewart().inverse(geometry, (1, 1, 1, 1, 1, 1), poses)
+    return Placement(GoughStewart(), geometry, poses, joints)
+
+
+def columns(effect: Effect, placement: Placement) -> np.ndarray:
+    assert effect.on_poses is not None
+    return effect.on_poses(placement)
+
+
+@pytest.mark.parametrize("effect", [rail_directions(1.0), rail_waves(1.0, 600.0), common_sag(1.0, 800.0)])
+def test_a_mechanism_without_rails_has_no_effects_of_rails(hexapod, effect) -> None:
+    assert columns(effect, hexapod).shape == (2, 6, 0)
+
+
+def test_it_has_the_effects_of_encoders_and_loads(hexapod) -> None:
+    assert columns(encoder_scales(1.0), hexapod).shape == (2, 6, 6)
+    assert columns(slider_repeatability(1.0), hexapod).shape == (2, 6, 6)
+    assert columns(load_at_work(1.0, 0.05), hexapod).shape == (2, 6, 3)
+
+
+def test_a_machine_that_expands_evenly_is_the_same_machine_larger(hexapod) -> None:
+    """The platform moves away from the base's origin and does not turn; scales expand with the base."""
+    even = temperature_at_work(1.0, dict.fromkeys(MachinePart, 10.0))
+    warmer = columns(even, hexapod)[..., 0]
+    assert warmer[:, :3] == pytest.approx(10e-6 * hexapod.poses.positions)
+    assert warmer[:, 3:] == pytest.approx(0.0, abs=1e-15)
+
+
+def test_a_slider_across_its_rail_moves_its_joint(paper, hexaglide) -> None:
+    poses = PoseBatch.of([Pose(x, y, z, 5.0, -8.0, 3.0) for x, y, z in paper.points.tolist()])
+    joints = hexaglide.inverse(paper.actual, paper.branch, poses)
+    guides = hexaglide.guides(paper.actual, poses, joints)
+    assert sorted(leg for rail in guides.rails for leg in rail) == list(range(6))
+    assert guides.along == pytest.approx(joints + paper.actual["S"][:, 0])
+    for direction in (1, 2):
+        shift = STEP_MM * np.eye(3)[direction]
+        ahead, behind = (
+            hexaglide.residual_and_jacobian(moved(paper.actual, sign * shift), poses, joints)[0]
+            for sign in (1.0, -1.0)
+        )
+        slope = (ahead - behind) / (2.0 * STEP_MM)
+        assert guides.across[..., direction - 1] == pytest.approx(slope, abs=1e-8)
+
+
+def moved(geometry: Geometry, shift: np.ndarray) -> Geometry:
+    values = {"S": geometry["S"] + shift, "B": geometry["B"], "l": geometry["l"]}
+    return Geometry.of(geometry.parameters, values)
+
+
+def test_legs_of_one_rail_are_beside_each_other_in_the_drawing(paper, hexaglide) -> None:
+    poses = PoseBatch.of([Pose(0.0, 0.0, 550.0)])
+    joints = hexaglide.inverse(paper.nominal, paper.branch, poses)
+    for rail in hexaglide.guides(paper.nominal, poses, joints).rails:
+        places = paper.nominal["S"][list(rail), 1:]
+        assert places == pytest.approx(np.broadcast_to(places[0], places.shape))

@@ -64,12 +64,16 @@ class Task:
         poses = stated if len(stated) else workspace
         return cls(poses, workspace if len(workspace) else poses)
 
+    def reachable(self, belief: RobotBelief) -> Task:
+        """The poses that the estimated robot reaches."""
+        return Task(_reachable(belief, self.poses), _reachable(belief, self.workspace))
+
     def error(self, belief: RobotBelief) -> TaskError | None:
         """How the error depends on the parameters; none if the estimated robot can take no task pose."""
-        task, workspace = _reachable(belief, self.poses), _reachable(belief, self.workspace)
-        if not len(task) or not len(workspace):
+        reached = self.reachable(belief)
+        if not len(reached.poses) or not len(reached.workspace):
             return None
-        return TaskError(error_jacobian(belief, task, workspace)[:, :3])
+        return TaskError(error_jacobian(belief, reached.poses, reached.workspace)[:, :3])
 
 
 def _reachable(belief: RobotBelief, poses: PoseBatch) -> PoseBatch:

@@ -23,6 +23,7 @@ from hexacell.cell.measuring import (
 )
 from hexacell.cell.recovery import RecoverySettings
 from hexacell.cell.simulation import SimulationSettings
+from hexacell.cell.uncertainty import UncertaintySettings
 from hexacell.kinematics.mechanism import Mechanism
 from hexacell.kinematics.parameters import ParameterKind, ParameterSet
 from hexacell.plugins import Group, load
@@ -56,6 +57,7 @@ class CellSettings(Section):
     stations: StationSettings = StationSettings()
     tolerances: ToleranceSettings = ToleranceSettings()
     noise: NoiseSettings = NoiseSettings()
+    uncertainty: UncertaintySettings = UncertaintySettings()
     limits: LimitSettings = LimitSettings()
     timing: TimingSettings = TimingSettings()
     guards: GuardSettings = GuardSettings()

@@ -10,6 +10,7 @@ from hexacell.identification.diagnostics.variance_components import NoiseLevel, 
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.geometry import Geometry
 from hexacell.presentation.layout import wrapped
+from hexacell.presentation.uncertainty import budget_table
 from hexacell.reporting.assessment import Assessment
 from hexacell.reporting.findings import findings, noise_sentence, pair_sentences, residual_sentence
 
@@ -22,6 +23,7 @@ def identification_report(assessed: Assessment) -> str:
     parts = (
         "\n".join(wrapped(sentence) for sentence in findings(assessed)),
         accuracy_table(assessed),
+        budget_table(assessed.budget),
         _data_and_termination(found),
         parameter_table(found, assessed.drawing),
         residual_line(found),

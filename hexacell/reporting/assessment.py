@@ -10,6 +10,7 @@ import numpy as np
 from hexacell.campaign.task_accuracy import Task
 from hexacell.cell.model import CellSettings
 from hexacell.experiment_design.decorrelation import DecorrelatingPose, decorrelating_poses
+from hexacell.identification.belief import RobotBelief
 from hexacell.identification.diagnostics.parameter_checks import (
     CorrelatedPair,
     ToleranceViolation,
@@ -22,9 +23,12 @@ from hexacell.identification.diagnostics.variance_components import NoiseLevels,
 from hexacell.identification.solver.measurement_model import record_covariance
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.geometry import Geometry
-from hexacell.kinematics.pose import Pose, PoseBatch
+from hexacell.kinematics.pose import Pose
 from hexacell.measurements.records import MeasurementSet
 from hexacell.robot_model import Robot
+from hexacell.stated_effects import stated_effects
+from hexacell.uncertainty.budget import UncertaintyBudget
+from hexacell.uncertainty.effects import Effect
 
 CONTRADICTED_RATIO = 10.0
 """Residuals over the stated noise from which noise cannot explain them, only a wrong model or data."""
@@ -46,6 +50,7 @@ class Assessment:
             ``SEPARATED_PAIRS`` the record that would separate them, commanded in the controller's frames.
         task: poses at which the accuracy is predicted, in the controller's frames.
         task_named: whether the cell file names them; else they span the workspace.
+        budget: what is not known of the errors at the reachable ones of these poses; none as above.
         accuracy: at these poses; none where the robot can reach none of them. Where the residuals
             are larger than the stated noise, the predicted error is as well.
     """
@@ -59,6 +64,7 @@ class Assessment:
     task: tuple[Pose, ...]
     task_named: bool
     accuracy: Accuracy | None
+    budget: UncertaintyBudget | None = None
     tolerance_violations: tuple[ToleranceViolation, ...] = ()
 
     @property
@@ -81,11 +87,21 @@ class Assessment:
 
 
 def assess(
-    settings: CellSettings, robot: Robot, measurements: MeasurementSet, found: Identification
+    settings: CellSettings,
+    robot: Robot,
+    measurements: MeasurementSet,
+    found: Identification,
+    *,
+    temperature_range_k: float | None = None,
 ) -> Assessment:
-    """Check an identification of some measurements, and predict the accuracy with it."""
+    """Check an identification of some measurements, and predict the accuracy with it.
+
+    ``temperature_range_k`` is that of the temperatures read while measuring; none without thermometers.
+    """
     left_out = {record for record, _ in found.left_out}
-    task, accuracy = _accuracy(settings, robot, found)
+    belief = robot.belief(found)
+    task = Task.of(settings, robot, belief)
+    accuracy = predicted_accuracy(belief, task=task.poses, workspace=task.workspace)
     return Assessment(
         found=found,
         drawing=robot.drawing,
@@ -93,9 +109,10 @@ def assess(
         repeatability=repeatability(measurements, left_out),
         record_noise_mm=_record_noise_mm(found),
         correlated=_correlated(robot, found),
-        task=tuple(robot.to_command(task.pose(row)) for row in range(len(task))),
+        task=tuple(robot.to_command(task.poses.pose(row)) for row in range(len(task.poses))),
         task_named=bool(settings.task.poses),
         accuracy=accuracy and replace(accuracy, after=accuracy.after.times(found.goodness.noise_factor)),
+        budget=_budget(found, belief, task, stated_effects(settings, temperature_range_k)),
         tolerance_violations=tolerance_violations(found.estimate, robot.drawing, robot.tolerances),
     )
 
@@ -114,10 +131,11 @@ def _correlated(
     return tuple(zip(pairs, chain(in_commands, repeat(None)), strict=False))
 
 
-def _accuracy(
-    settings: CellSettings, robot: Robot, found: Identification
-) -> tuple[PoseBatch, Accuracy | None]:
-    """The task poses in the convention's frames, and the accuracy there."""
-    belief = robot.belief(found)
-    task = Task.of(settings, robot, belief)
-    return task.poses, predicted_accuracy(belief, task=task.poses, workspace=task.workspace)
+def _budget(
+    found: Identification, belief: RobotBelief, task: Task, effects: tuple[Effect, ...]
+) -> UncertaintyBudget | None:
+    """The budget at the task poses that the estimated robot reaches."""
+    reached = task.reachable(belief)
+    if not len(reached.poses) or not len(reached.workspace):
+        return None
+    return UncertaintyBudget.of(found, belief, effects, task=reached.poses, workspace=reached.workspace)

@@ -14,6 +14,7 @@ from hexacell.identification.solver.chi_square import ChiSquareTest
 from hexacell.reporting.assessment import Assessment
 from hexacell.reporting.findings import findings
 from hexacell.reporting.result import IdentificationResult
+from hexacell.uncertainty.budget import BudgetLine, UncertaintyBudget
 
 
 def fit_document(assessed: Assessment) -> dict[str, Any]:
@@ -27,6 +28,7 @@ def fit_document(assessed: Assessment) -> dict[str, Any]:
         "repeatability": _repeatability(assessed),
         "correlated": _correlated(assessed),
         "accuracy": _accuracy(assessed),
+        "uncertainty": assessed.budget and _budget(assessed.budget),
         "refused": assessed.refused,
         "beyond_tolerance": [asdict(violation) for violation in assessed.tolerance_violations],
     }
@@ -95,6 +97,34 @@ def _accuracy(assessed: Assessment) -> dict[str, Any] | None:
         "after": _errors(accuracy.after),
         "poses": [asdict(pose) for pose in assessed.task],
         "reachable": accuracy.reachable.tolist(),
+    }
+
+
+def _budget(budget: UncertaintyBudget) -> dict[str, Any]:
+    return {
+        "noise_mm": budget.noise_mm,
+        "systematic_mm": budget.systematic_mm,
+        "standard_mm": budget.standard_mm,
+        "expanded_mm": budget.expanded_mm,
+        "expanded_deg": budget.expanded_deg,
+        "lines": [_line(line) for line in budget.lines],
+    }
+
+
+def _line(line: BudgetLine) -> dict[str, Any]:
+    effect = line.effect
+    return {
+        "name": effect.name,
+        "size": effect.size,
+        "unit": effect.unit,
+        "source": effect.source,
+        "acts": effect.occurrence.value,
+        "through_mm": line.through_mm,
+        "direct_mm": line.direct_mm,
+        "combined_mm": line.combined_mm,
+        "per_unit_mm": line.per_unit_mm,
+        "visible": line.is_visible,
+        "estimated": effect.is_estimated,
     }
 
 

@@ -20,12 +20,14 @@ from hexacell.identification.belief import RobotBelief
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array
-from hexacell.uncertainty.effects import Effect
+from hexacell.uncertainty.effects import Effect, Occurrence
 from hexacell.uncertainty.propagation import Propagation, compressed
 from hexacell.uncertainty.statement import TaskErrors
 
 TELLING_SIGMAS = 4.0
 """Standard deviations by which an effect must raise the chi-square to be seen."""
+
+OF_THE_MACHINE = (Occurrence.CONSTANT, Occurrence.EVERY_STOP, Occurrence.WITH_TOOL)
 
 HARMLESS_ERROR = 5.0
 """Times the error by the noise: an effect that is not seen before is one that no record shows."""
@@ -76,7 +78,10 @@ class UncertaintyBudget:
         task: PoseBatch,
         workspace: PoseBatch,
     ) -> UncertaintyBudget:
-        """The budget of an identification; its estimate reaches all task and workspace poses."""
+        """The budget of an identification; its estimate reaches all task and workspace poses.
+
+        An effect that the mechanism cannot have gets no line.
+        """
         propagation = Propagation.of(found, belief, task=task, workspace=workspace)
         effects = tuple(effects)
         covariance = found.free_covariance * found.goodness.noise_factor**2
@@ -86,7 +91,8 @@ class UncertaintyBudget:
         noise = propagation.jacobian @ _factor(covariance)
         telling = TELLING_SIGMAS * np.sqrt(2.0 * found.goodness.expected)
         visible = telling / (HARMLESS_ERROR * _largest(noise)) ** 2
-        return cls(noise, tuple(_line(propagation, effect, visible) for effect in effects))
+        lines = (_line(propagation, effect, visible) for effect in effects)
+        return cls(noise, tuple(line for line in lines if line.columns.shape[-1]))
 
     @cached_property
     def systematic(self) -> Array:
@@ -126,8 +132,10 @@ class UncertaintyBudget:
 
     @property
     def unseen(self) -> tuple[BudgetLine, ...]:
-        """Effects that no record can show."""
-        return tuple(line for line in self.lines if not line.is_visible)
+        """Effects of the machine itself, not of its place of work, that no record can show."""
+        return tuple(
+            line for line in self.lines if not line.is_visible and line.effect.occurrence in OF_THE_MACHINE
+        )
 
     @cached_property
     def _unknown(self) -> TaskErrors:
@@ -148,7 +156,7 @@ def _line(propagation: Propagation, effect: Effect, visible: float) -> BudgetLin
         direct_mm=effect.size * _largest(task.direct),
         combined_mm=effect.size * per_unit,
         per_unit_mm=per_unit,
-        is_visible=propagation.chi_square(effect) >= visible * per_unit**2,
+        is_visible=bool(propagation.chi_square(effect) >= visible * per_unit**2),
         columns=effect.size * task.combined,
     )
 

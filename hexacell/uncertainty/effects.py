@@ -31,6 +31,12 @@ class Occurrence(Enum):
     EVERY_STOP = "another at every stop"
     MEASURING = "while measuring only"
     AT_WORK = "at work only"
+    WITH_TOOL = "with the tool, which takes no part in measuring"
+
+    @property
+    def is_in_records(self) -> bool:
+        """Whether it acts while measuring."""
+        return self not in {Occurrence.AT_WORK, Occurrence.WITH_TOOL}
 
 
 @dataclass(frozen=True, eq=False)

@@ -28,7 +28,7 @@ def ball_roundness(um: float, source: str = "") -> Effect:
 
 def ball_beside_tool(mm: float, source: str = "") -> Effect:
     """The tool that works is not centred where the ball was, in any direction of the platform."""
-    return Effect("ball beside the tool's centre", mm, "mm", Occurrence.AT_WORK, _beside, source=source)
+    return Effect("ball beside the tool's centre", mm, "mm", Occurrence.WITH_TOOL, _beside, source=source)
 
 
 def _scales(readings: Readings) -> Array:

@@ -99,7 +99,7 @@ class Propagation:
 
     def parameter_columns(self, effect: Effect) -> Array:
         """Errors (p, k) of the free parameters by one unit of each cause of an effect."""
-        if effect.occurrence is Occurrence.AT_WORK:
+        if not effect.occurrence.is_in_records:
             return np.zeros((len(self.gain), 0))
         errors = self._on_records(effect)
         each: Array = np.einsum("pna,nak->pnk", self.gain, errors)
@@ -118,7 +118,7 @@ class Propagation:
 
     def chi_square(self, effect: Effect) -> float:
         """What one unit of every cause adds to the expected chi-square of the residuals."""
-        if effect.occurrence is Occurrence.AT_WORK:
+        if not effect.occurrence.is_in_records:
             return 0.0
         errors = self._on_records(effect)
         if effect.occurrence is Occurrence.EVERY_STOP:

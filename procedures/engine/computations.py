@@ -41,7 +41,13 @@ class Computations:
         write_measurements(self.folder.measurements, measurements)
         robot = self.calibration.robot_of(state)
         identified = identify(robot.problem(measurements))
-        assessed = assess(self.cell.settings, robot, measurements, identified)
+        assessed = assess(
+            self.cell.settings,
+            robot,
+            measurements,
+            identified,
+            temperature_range_k=state.temperature_range_k,
+        )
         self.folder.write_result(fit_document(assessed))
         result = IdentificationResult.of(identified)
         return events.Identified(result=result, held_out=self.calibration.held_out_poses(identified))

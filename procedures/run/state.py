@@ -134,6 +134,16 @@ class RunState:
         """The records that the geometry is identified from."""
         return MeasurementSet(tuple(record(sample) for sample in self.samples(Phase.IDENTIFY)))
 
+    @property
+    def temperature_range_k(self) -> float | None:
+        """The largest range that a thermometer showed with these records; none without readings."""
+        shown: dict[str, list[float]] = {}
+        for sample in self.samples(Phase.IDENTIFY):
+            for temperature in sample.reading.temperatures:
+                if temperature.celsius is not None:
+                    shown.setdefault(temperature.name, []).append(temperature.celsius)
+        return max((max(values) - min(values) for values in shown.values()), default=None)
+
     def rejections(self, phase: Phase) -> int:
         """How many records of a phase were rejected."""
         return sum(value.rejections for key, value in self.sets.items() if key.phase is phase)

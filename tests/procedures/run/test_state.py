@@ -96,6 +96,25 @@ def test_a_record_has_what_was_commanded_and_measured(story) -> None:
     assert record.deviation == (0.5, -0.5, 0.125)
 
 
+def test_the_range_of_temperatures_is_that_of_one_thermometer(story) -> None:
+    """The room is colder than the rails, which is no change of temperature; one reading is missing."""
+
+    def warm(sampled, **celsius):
+        temperatures = tuple(
+            events.Temperature(name=name, celsius=value) for name, value in celsius.items()
+        )
+        reading = sampled.reading.model_copy(update={"temperatures": temperatures})
+        return sampled.model_copy(update={"reading": reading})
+
+    told = [
+        warm(story().sampled(), room=19.0, rails=24.0),
+        warm(story().sampled(2), room=19.5, rails=None),
+        warm(story().sampled(3), room=19.25, rails=24.125),
+    ]
+    assert fold(told).temperature_range_k == 0.5
+    assert fold([story().sampled()]).temperature_range_k is None
+
+
 def test_held_out_deviations_leave_references_out(story) -> None:
     one, two = story(Phase.AFTER, 1), story(Phase.AFTER, 2)
     told = [

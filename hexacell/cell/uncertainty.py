@@ -1,0 +1,105 @@
+"""The section of what records show hardly or not at all: sizes of effects in the uncertainty budget."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, Literal, Self, get_args
+
+from pydantic import Field, model_validator
+
+from hexacell.cell.fields import NotNegative, Positive, Section, broken_rule
+
+Grade = Literal["precision", "ordinary", "ideal"]
+
+SIZES_OF_GRADES: Mapping[Grade, Mapping[str, float]] = {
+    "precision": {},
+    "ordinary": {
+        "common_encoder_scale_um_m": 30.0,
+        "encoder_scale_um_m": 20.0,
+        "rail_direction_mrad": 0.05,
+        "rail_wave_short_um": 5.0,
+        "rail_wave_long_um": 10.0,
+        "rail_sag_um": 20.0,
+    },
+    "ideal": {
+        "common_encoder_scale_um_m": 0.0,
+        "encoder_scale_um_m": 0.0,
+        "rail_direction_mrad": 0.0,
+        "rail_wave_short_um": 0.0,
+        "rail_wave_long_um": 0.0,
+        "rail_sag_um": 0.0,
+        "slider_repeatability_um": 0.0,
+        "ball_roundness_um": 0.0,
+        "temperature_at_work_k": 0.0,
+        "temperature_measuring_k": 0.0,
+        "load_n": 0.0,
+    },
+}
+"""Where the sizes of a grade differ from the defaults of the keys, which are those of ``precision``."""
+
+
+class UncertaintySettings(Section):
+    """Sizes of systematic effects, one standard deviation; certificates and own measurements say better."""
+
+    grade: Grade = Field(
+        "precision",
+        description="what sizes that are not given are for; precision: glass scales and precision guides; "
+        "ordinary: magnetic tape and ordinary guides; ideal: none of the effects, as in a simulation",
+    )
+    common_encoder_scale_um_m: NotNegative = Field(15.0, description="scale error of all encoders alike")
+    encoder_scale_um_m: NotNegative = Field(10.0, description="scale error of each encoder")
+    rail_direction_mrad: NotNegative = Field(
+        0.02, description="of each rail, horizontally and vertically, from parallel"
+    )
+    rail_wave_short_um: NotNegative = Field(3.0, description="amplitude of a short wave of each rail")
+    rail_wave_short_mm: Positive = Field(600.0, description="its length")
+    rail_wave_long_um: NotNegative = Field(5.0, description="amplitude of a long wave of each rail")
+    rail_wave_long_mm: Positive = Field(1500.0, description="its length")
+    rail_sag_um: NotNegative = Field(
+        10.0, description="depth to which all rails hang through alike, over the range of the joints"
+    )
+    slider_repeatability_um: NotNegative = Field(
+        2.0, description="where a slider's joint stops beside what its encoder shows"
+    )
+    ball_roundness_um: NotNegative = Field(2.0, description="largest departure from the mean radius")
+    ball_beside_tool_mm: NotNegative = Field(
+        0.0, description="distance of the ball's centre from that of the tool, along each platform axis"
+    )
+    temperature_at_work_k: NotNegative = Field(1.0, description="difference between work and measuring")
+    temperature_measuring_k: NotNegative = Field(
+        1.0, description="change while measuring; a run with thermometers takes their range instead"
+    )
+    expansion_base_um_m_k: NotNegative = Field(
+        23.0, description="of the base with its rails and scales: aluminium 23, steel 11.5, granite 6"
+    )
+    expansion_platform_um_m_k: NotNegative = Field(23.0, description="of the platform")
+    expansion_legs_um_m_k: NotNegative = Field(23.0, description="of the legs")
+    load_n: NotNegative = Field(20.0, description="force on the tool at work, in each direction")
+    leg_compliance_um_n: NotNegative = Field(0.03, description="of a leg with its joints")
+    sources: dict[str, str] = Field({}, description="where a size comes from, by its key")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _sizes_of_the_grade(cls, given: Any) -> Any:  # noqa: ANN401 - what pydantic hands on
+        """Sizes that are not given are those of the grade."""
+        if not isinstance(given, dict):
+            return given
+        grade = given.get("grade", "precision")
+        sizes = SIZES_OF_GRADES[grade] if grade in get_args(Grade) else {}
+        return {**sizes, **given}
+
+    @model_validator(mode="after")
+    def _sources_belong_to_sizes(self) -> Self:
+        known = set(type(self).model_fields) - {"grade", "sources"}
+        if unknown := sorted(set(self.sources) - known):
+            raise broken_rule(
+                f"sources has {unknown[0]}, which is no size of this section", "Correct the key"
+            )
+        return self
+
+    def source(self, key: str) -> str:
+        """Where a size comes from."""
+        grade = SIZES_OF_GRADES[self.grade]
+        assumed = grade.get(key, type(self).model_fields[key].default)
+        stated = "cell file" if getattr(self, key) != assumed else f"assumed: {self.grade}"
+        return self.sources.get(key, stated)

@@ -1,0 +1,70 @@
+"""The systematic effects of a robot: what its cell file states of them, as the mathematics takes it."""
+
+from __future__ import annotations
+
+from hexacell.cell.model import CellSettings
+from hexacell.cell.uncertainty import UncertaintySettings
+from hexacell.kinematics.parameters import MachinePart
+from hexacell.uncertainty.effects import Effect
+from hexacell.uncertainty.encoder_effects import common_encoder_scale, encoder_scales, slider_repeatability
+from hexacell.uncertainty.environment_effects import (
+    load_at_work,
+    temperature_at_work,
+    temperature_while_measuring,
+)
+from hexacell.uncertainty.gauge_effects import ball_beside_tool, ball_roundness, gauge_scales
+from hexacell.uncertainty.guide_effects import common_sag, rail_directions, rail_waves
+
+
+def stated_effects(settings: CellSettings, measured_range_k: float | None = None) -> tuple[Effect, ...]:
+    """All effects that the budget of a cell has lines for, also those of size zero.
+
+    Args:
+        settings: of the cell.
+        measured_range_k: range of the temperatures read while measuring; none without thermometers.
+    """
+    stated = settings.uncertainty
+    return (
+        *_of_encoders(stated),
+        *_of_guides(stated, settings.limits.joint_max_mm - settings.limits.joint_min_mm),
+        gauge_scales(1e3 * settings.noise.gauge_scale, is_estimated=True, source="noise.gauge_scale"),
+        ball_roundness(stated.ball_roundness_um, stated.source("ball_roundness_um")),
+        ball_beside_tool(stated.ball_beside_tool_mm, stated.source("ball_beside_tool_mm")),
+        *_of_environment(stated, measured_range_k),
+    )
+
+
+def _of_encoders(stated: UncertaintySettings) -> tuple[Effect, ...]:
+    return (
+        common_encoder_scale(stated.common_encoder_scale_um_m, stated.source("common_encoder_scale_um_m")),
+        encoder_scales(stated.encoder_scale_um_m, stated.source("encoder_scale_um_m")),
+        slider_repeatability(stated.slider_repeatability_um, stated.source("slider_repeatability_um")),
+    )
+
+
+def _of_guides(stated: UncertaintySettings, range_mm: float) -> tuple[Effect, ...]:
+    short, long = "rail_wave_short_um", "rail_wave_long_um"
+    return (
+        rail_directions(stated.rail_direction_mrad, stated.source("rail_direction_mrad")),
+        rail_waves(stated.rail_wave_short_um, stated.rail_wave_short_mm, stated.source(short)),
+        rail_waves(stated.rail_wave_long_um, stated.rail_wave_long_mm, stated.source(long)),
+        common_sag(stated.rail_sag_um, 0.5 * range_mm, stated.source("rail_sag_um")),
+    )
+
+
+def _of_environment(stated: UncertaintySettings, measured_range_k: float | None) -> tuple[Effect, ...]:
+    expansion = {
+        MachinePart.BASE: stated.expansion_base_um_m_k,
+        MachinePart.PLATFORM: stated.expansion_platform_um_m_k,
+        MachinePart.LEGS: stated.expansion_legs_um_m_k,
+    }
+    change, source = stated.temperature_measuring_k, stated.source("temperature_measuring_k")
+    if measured_range_k is not None:
+        change, source = measured_range_k, "thermometers"
+    return (
+        temperature_at_work(
+            stated.temperature_at_work_k, expansion, stated.source("temperature_at_work_k")
+        ),
+        temperature_while_measuring(change, expansion, source),
+        load_at_work(stated.load_n, stated.leg_compliance_um_n, stated.source("load_n")),
+    )

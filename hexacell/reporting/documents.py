@@ -125,6 +125,7 @@ def _line(line: BudgetLine) -> dict[str, Any]:
         "per_unit_mm": line.per_unit_mm,
         "visible": line.is_visible,
         "estimated": effect.is_estimated,
+        "parameter_columns": line.parameter_columns.T.tolist() if effect.size else [],
     }
 
 

@@ -10,7 +10,7 @@ Source: JCGM 100 (Guide to the expression of uncertainty in measurement).
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -45,6 +45,8 @@ class BudgetLine:
         per_unit_mm: the same by one unit of the effect.
         is_visible: whether the chi-square tells of it while its error is harmless.
         columns: (t, 6, k) errors at the task poses by one standard deviation of each cause, mm and rad.
+        parameter_columns: (p, k) errors of the free parameters by one unit of each cause; of an effect that
+            is not in the records, none.
     """
 
     effect: Effect
@@ -54,6 +56,7 @@ class BudgetLine:
     per_unit_mm: float
     is_visible: bool
     columns: Array
+    parameter_columns: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,10 +64,12 @@ class UncertaintyBudget:
     """All that is not known of the errors at t task poses.
 
     Attributes:
+        jacobian: (t, 6, p) of the errors by the free parameters.
         noise: (t, 6, p) errors by the noise of the readings, mm and rad, one standard deviation a column.
         lines: the systematic effects.
     """
 
+    jacobian: Array
     noise: Array
     lines: tuple[BudgetLine, ...]
 
@@ -77,12 +82,14 @@ class UncertaintyBudget:
         *,
         task: PoseBatch,
         workspace: PoseBatch,
+        earlier: Mapping[str, Array] | None = None,
     ) -> UncertaintyBudget:
         """The budget of an identification; its estimate reaches all task and workspace poses.
 
-        An effect that the mechanism cannot have gets no line.
+        An effect that the mechanism cannot have gets no line. Where the prior was an earlier estimate,
+        ``earlier`` has the :attr:`parameter_columns` of that one's budget: both share constant effects.
         """
-        propagation = Propagation.of(found, belief, task=task, workspace=workspace)
+        propagation = Propagation.of(found, belief, task=task, workspace=workspace, earlier=earlier)
         effects = tuple(effects)
         covariance = found.free_covariance * found.goodness.noise_factor**2
         estimated = (effect for effect in effects if effect.is_estimated)
@@ -92,7 +99,23 @@ class UncertaintyBudget:
         telling = TELLING_SIGMAS * np.sqrt(2.0 * found.goodness.expected)
         visible = telling / (HARMLESS_ERROR * _largest(noise)) ** 2
         lines = (_line(propagation, effect, visible) for effect in effects)
-        return cls(noise, tuple(line for line in lines if line.columns.shape[-1]))
+        return cls(propagation.jacobian, noise, tuple(line for line in lines if line.columns.shape[-1]))
+
+    def errors_of(self, difference: Array) -> TaskErrors:
+        """The errors of a geometry whose free parameters differ by (p,) from the estimate.
+
+        They are estimated from the difference; what is not known of them is that of the estimate.
+        """
+        return TaskErrors(-self.jacobian @ difference, self._all)
+
+    @property
+    def parameter_columns(self) -> Mapping[str, Array]:
+        """What one unit of each effect did to the estimate (p, k), by the names of the effects."""
+        return {
+            line.effect.name: line.parameter_columns
+            for line in self.lines
+            if line.effect.occurrence.is_in_records
+        }
 
     @cached_property
     def systematic(self) -> Array:
@@ -139,7 +162,7 @@ class UncertaintyBudget:
 
     @cached_property
     def _unknown(self) -> TaskErrors:
-        return TaskErrors(np.zeros(self.noise.shape[:2]), self._all)
+        return self.errors_of(np.zeros(self.jacobian.shape[-1]))
 
     @cached_property
     def _all(self) -> Array:
@@ -158,6 +181,7 @@ def _line(propagation: Propagation, effect: Effect, visible: float) -> BudgetLin
         per_unit_mm=per_unit,
         is_visible=bool(propagation.chi_square(effect) >= visible * per_unit**2),
         columns=effect.size * task.combined,
+        parameter_columns=propagation.parameter_columns(effect),
     )
 
 

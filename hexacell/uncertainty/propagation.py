@@ -12,12 +12,20 @@ because J~^T W contains it). A controller with that geometry sets joint variable
 Base and platform frames are fitted to both over the workspace
 (:mod:`hexacell.identification.diagnostics.frame_alignment`).
 
+An estimate whose prior is an earlier one errs by that as well: with L the precision of the prior and dp'
+the error of the earlier estimate,
+
+    dp = C (J~^T W e + L dp').
+
+Constant causes are the same in both, so that their columns are added, never averaged away.
+
 What an effect adds to the chi-square is ``e^T M e``, with M the weights less what stations and parameters
 absorb (:mod:`hexacell.identification.solver.linearized_model`).
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -62,6 +70,8 @@ class Propagation:
         elimination: that of the stations' unknowns.
         record_jacobian: (n, 3, p) of the records by the free parameters.
         covariance: (p, p) of the free parameters.
+        prior_gain: (p, p) errors of the free parameters by those of the prior's centre.
+        earlier: errors of that centre (p, k) by one unit of each cause, by the names of the effects.
     """
 
     records: Placement
@@ -74,12 +84,24 @@ class Propagation:
     elimination: NuisanceElimination
     record_jacobian: Array
     covariance: Array
+    prior_gain: Array
+    earlier: Mapping[str, Array]
 
     @classmethod
     def of(
-        cls, found: Identification, belief: RobotBelief, *, task: PoseBatch, workspace: PoseBatch
+        cls,
+        found: Identification,
+        belief: RobotBelief,
+        *,
+        task: PoseBatch,
+        workspace: PoseBatch,
+        earlier: Mapping[str, Array] | None = None,
     ) -> Propagation:
-        """Of an identification and the belief made of it, which reaches all task and workspace poses."""
+        """Of an identification and the belief made of it, which reaches all task and workspace poses.
+
+        ``earlier`` has the :meth:`parameter_columns` of the estimate that was the prior of this one, by the
+        names of the effects; none where the prior is a drawing.
+        """
         problem, prediction = found.problem, found.prediction
         elimination = NuisanceElimination(problem, prediction.weights)
         centred = elimination.centred(prediction.jacobian)
@@ -95,18 +117,21 @@ class Propagation:
             elimination=elimination,
             record_jacobian=prediction.jacobian,
             covariance=found.free_covariance,
+            prior_gain=found.free_covariance @ found.active_prior,
+            earlier=earlier or {},
         )
 
     def parameter_columns(self, effect: Effect) -> Array:
         """Errors (p, k) of the free parameters by one unit of each cause of an effect."""
         if not effect.occurrence.is_in_records:
             return np.zeros((len(self.gain), 0))
-        errors = self._on_records(effect)
-        each: Array = np.einsum("pna,nak->pnk", self.gain, errors)
+        each: Array = np.einsum("pna,nak->pnk", self.gain, self._on_records(effect))
+        before = self.prior_gain @ self.earlier[effect.name] if effect.name in self.earlier else None
         if effect.occurrence is Occurrence.EVERY_STOP:
-            return compressed(each.reshape(len(self.gain), -1))
+            stops = each.reshape(len(self.gain), -1)
+            return compressed(stops if before is None else np.concatenate([before, stops], axis=-1))
         together: Array = each.sum(axis=1)
-        return together
+        return together if before is None else before + together
 
     def columns(self, effect: Effect) -> TaskColumns:
         """What an effect does at the task poses."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from itertools import product
 from typing import Any
@@ -14,6 +14,8 @@ from scipy.spatial.transform import Rotation
 
 from hexacell.identification.belief import Limits, RobotBelief
 from hexacell.identification.estimator import identify
+from hexacell.identification.problem.problem import Prior
+from hexacell.identification.solver.levenberg_marquardt import FINE, solve
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import Branch
@@ -56,9 +58,18 @@ class Laboratory:
         measured = self.visits.measured() if measurements is None else measurements
         return identify(self.make_problem(measured), find_outliers=False)
 
-    def propagation(self, found: Identification) -> Propagation:
+    def updated(self, found: Identification, measurements: MeasurementSet) -> Identification:
+        """The estimate of further records, its prior being that of earlier ones."""
+        prior = Prior(found.geometry, found.free, found.free_covariance)
+        problem = replace(self.make_problem(measurements), prior=prior)
+        start = problem.solve_poses(found.free)
+        assert start.found.all()
+        solution = solve(problem, prior.precision, free=found.free, poses=start.poses, options=FINE)
+        return Identification(problem, solution, prior.precision)
+
+    def propagation(self, found: Identification, earlier: Mapping[str, Array] | None = None) -> Propagation:
         belief = belief_of(found, self.paper.nominal, self.paper.branch)
-        return Propagation.of(found, belief, task=self.task, workspace=self.workspace)
+        return Propagation.of(found, belief, task=self.task, workspace=self.workspace, earlier=earlier)
 
     def records_of(self, machine: Machine) -> MeasurementSet:
         """Its exact records: the encoders show what they did, the ball is elsewhere."""

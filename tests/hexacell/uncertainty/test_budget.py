@@ -124,3 +124,32 @@ def test_what_no_record_shows_is_listed(near, budget_of) -> None:
         "ball beside the tool's centre",
     }
     assert all(line.combined_mm == 0.0 < line.per_unit_mm for line in unseen)
+
+
+def test_a_geometry_beside_the_estimate_errs_by_the_difference_with_the_same_uncertainty(
+    exact, propagation, budget_of
+) -> None:
+    budget = budget_of(exact, EFFECTS)
+    difference = 0.05 * np.random.default_rng(3).standard_normal(len(exact.free))
+    errors = budget.errors_of(difference)
+    moved = np.linalg.norm(propagation.jacobian[:, :3] @ difference, axis=1).max()
+    assert errors.position.value == pytest.approx(moved)
+    assert (errors.effects**2).sum() == pytest.approx(
+        (budget.noise**2).sum() + (budget.systematic**2).sum()
+    )
+
+
+def test_a_budget_with_an_earlier_one_has_its_effects_on_the_prior(laboratory, exact, visit, paper) -> None:
+    """Without them, a short update of a calibrated robot would seem to err by all that cancels."""
+    updated = laboratory.updated(exact, visit(points=2, orientations=6, seed=5).measured())
+    effects = (encoder_scales(10.0),)
+
+    def budget(found, earlier):
+        belief = belief_of(found, paper.nominal, paper.branch)
+        poses = {"task": laboratory.task, "workspace": laboratory.workspace}
+        return UncertaintyBudget.of(found, belief, effects, **poses, earlier=earlier)
+
+    first = budget(exact, None)
+    shared, lost = (budget(updated, earlier) for earlier in (first.parameter_columns, None))
+    assert shared.systematic_mm < 1.5 * first.systematic_mm
+    assert lost.systematic_mm > 1.5 * shared.systematic_mm

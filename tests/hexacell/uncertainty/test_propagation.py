@@ -233,3 +233,32 @@ def test_a_tool_beside_the_ball_turns_with_the_platform(propagation) -> None:
     assert not errors[:, 3:].any()
     assert propagation.chi_square(effect) == 0.0
     assert propagation.parameter_columns(effect).shape[1] == 0
+
+
+def test_an_estimate_shares_constant_effects_with_the_earlier_one_that_is_its_prior(
+    laboratory, exact, propagation, visit
+) -> None:
+    """Few further records: most of what the effect did is in the prior, and is neither lost nor doubled."""
+    effect, column, size, make = CONSTANT["rail of legs 1 and 6, wavy sideways"]
+    machine, further = make(laboratory), replace(laboratory, visits=visit(points=2, orientations=6, seed=5))
+    found = laboratory.identified(laboratory.records_of(machine))
+    updated = laboratory.updated(found, further.records_of(machine))
+    straight = laboratory.updated(exact, further.visits.measured())
+    shared = laboratory.propagation(straight, {effect.name: propagation.parameter_columns(effect)})
+    change = size * shared.parameter_columns(effect)[:, column]
+    assert updated.free - straight.free == pytest.approx(change, abs=SHARE * np.abs(change).max())
+    errors = laboratory.task_errors(machine, updated.geometry)
+    expected = size * shared.columns(effect).combined[..., column]
+    assert errors == pytest.approx(expected, abs=SHARE * np.abs(expected[:, :3]).max())
+
+
+def test_missed_stops_of_an_earlier_estimate_are_other_ones(laboratory, exact, propagation, visit) -> None:
+    effect = slider_repeatability(1.0)
+    further = visit(points=2, orientations=6, seed=5)
+    updated = laboratory.updated(exact, further.measured())
+    before = propagation.parameter_columns(effect)
+    alone = laboratory.propagation(updated).parameter_columns(effect)
+    shared = laboratory.propagation(updated, {effect.name: before}).parameter_columns(effect)
+    through_prior = updated.free_covariance @ np.linalg.inv(exact.free_covariance) @ before
+    together = alone @ alone.T + through_prior @ through_prior.T
+    assert shared @ shared.T == pytest.approx(together, rel=1e-6, abs=1e-6 * np.abs(together).max())

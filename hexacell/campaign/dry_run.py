@@ -23,6 +23,8 @@ from hexacell.identification.problem.data_requirements import is_determined
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.pose import Pose
 from hexacell.measurements.records import MeasurementSet
+from hexacell.stated_effects import stated_effects
+from hexacell.uncertainty.budget import UncertaintyBudget
 from hexacell.virtual_robot import VirtualRobot, robots_within_tolerances
 
 ROBOTS = 2
@@ -131,6 +133,7 @@ class DryRunResult:
         outside: records at which the ball left the gauges' travel, over all robots.
         worst_sigma_mm: predicted error at the worst task pose afterwards; none without task poses.
         minutes: to measure, held-out poses included.
+        expanded_mm: U of the largest error at the task poses, systematic effects included; none likewise.
     """
 
     drawn: int
@@ -140,12 +143,13 @@ class DryRunResult:
     outside: int
     worst_sigma_mm: float | None
     minutes: float
+    expanded_mm: float | None = None
 
 
 def dry_run(plan: Plan, robots: int = ROBOTS) -> DryRunResult:
     """Carry the plan out on a few robots. Takes a second or two for each."""
     quick = replace(plan, candidates=min(plan.candidates, CANDIDATES))
-    identified: list[tuple[VirtualCampaign, Forecast | None]] = []
+    identified: list[_Outcome] = []
     tried = 0
     for truth in robots_within_tolerances(plan.robot, MOST_TRIED, plan.settings.identification.seed):
         if len(identified) == robots:
@@ -156,8 +160,17 @@ def dry_run(plan: Plan, robots: int = ROBOTS) -> DryRunResult:
     return _summary(plan, tried, identified)
 
 
-def _carry_out(plan: Plan, truth: Geometry, number: int) -> tuple[VirtualCampaign, Forecast | None] | None:
-    """The campaign on one robot, and the error that remains; none if it is not identified."""
+@dataclass(frozen=True, slots=True, eq=False)
+class _Outcome:
+    """The campaign on one robot, and the error that remains."""
+
+    campaign: VirtualCampaign
+    forecast: Forecast | None
+    budget: UncertaintyBudget | None
+
+
+def _carry_out(plan: Plan, truth: Geometry, number: int) -> _Outcome | None:
+    """The outcome for one robot; none if it is not identified."""
     random = np.random.default_rng([plan.settings.identification.seed, number])
     campaign = VirtualCampaign(plan, VirtualRobot(plan.robot, truth, random))
     try:
@@ -166,17 +179,19 @@ def _carry_out(plan: Plan, truth: Geometry, number: int) -> tuple[VirtualCampaig
     except HexacellError:
         return None
     found = estimate.identification
-    return None if found is None or not is_determined(found.problem) else (campaign, forecast)
+    if found is None or not is_determined(found.problem):
+        return None
+    budget = plan.task.budget(found, estimate.belief, stated_effects(plan.settings))
+    return _Outcome(campaign, forecast, budget)
 
 
-def _summary(
-    plan: Plan, tried: int, identified: list[tuple[VirtualCampaign, Forecast | None]]
-) -> DryRunResult:
+def _summary(plan: Plan, tried: int, identified: list[_Outcome]) -> DryRunResult:
     if not identified:
         return DryRunResult(tried, 0, 0, 0, 0, None, 0.0)
-    points = round(median(campaign.state.begun_points for campaign, _ in identified))
-    records = round(median(len(campaign.measurements) for campaign, _ in identified))
-    errors = [forecast.now_mm for _, forecast in identified if forecast is not None]
+    points = round(median(outcome.campaign.state.begun_points for outcome in identified))
+    records = round(median(len(outcome.campaign.measurements) for outcome in identified))
+    errors = [outcome.forecast.now_mm for outcome in identified if outcome.forecast is not None]
+    expanded = [outcome.budget.expanded_mm for outcome in identified if outcome.budget is not None]
     held_out = plan.settings.verification
     straight = TimeModel.of(plan.settings, moves=1.0)
     validation = straight.minutes(len(held_out.points) * held_out.orientations, len(held_out.points))
@@ -185,7 +200,8 @@ def _summary(
         robots=len(identified),
         points=points,
         records=records,
-        outside=sum(campaign.outside for campaign, _ in identified),
+        outside=sum(outcome.campaign.outside for outcome in identified),
         worst_sigma_mm=median(errors) if errors else None,
         minutes=plan.budget.time_model.minutes(records, points) + 2.0 * validation,
+        expanded_mm=median(expanded) if expanded else None,
     )

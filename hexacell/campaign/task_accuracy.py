@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,9 +11,12 @@ from hexacell.cell.model import CellSettings
 from hexacell.experiment_design.candidates import workspace_poses
 from hexacell.identification.belief import RobotBelief
 from hexacell.identification.diagnostics.pose_accuracy import error_jacobian
+from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.rotations import Array
 from hexacell.robot_model import Robot
+from hexacell.uncertainty.budget import UncertaintyBudget
+from hexacell.uncertainty.effects import Effect
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -67,6 +71,15 @@ class Task:
     def reachable(self, belief: RobotBelief) -> Task:
         """The poses that the estimated robot reaches."""
         return Task(_reachable(belief, self.poses), _reachable(belief, self.workspace))
+
+    def budget(
+        self, found: Identification, belief: RobotBelief, effects: Iterable[Effect]
+    ) -> UncertaintyBudget | None:
+        """What is not known of the errors; none if the estimated robot can take no task pose."""
+        reached = self.reachable(belief)
+        if not len(reached.poses) or not len(reached.workspace):
+            return None
+        return UncertaintyBudget.of(found, belief, effects, task=reached.poses, workspace=reached.workspace)
 
     def error(self, belief: RobotBelief) -> TaskError | None:
         """How the error depends on the parameters; none if the estimated robot can take no task pose."""

@@ -68,6 +68,11 @@ def plan_trial_lines(trial: PlanTrial) -> Iterator[str]:
             f"{result.worst_sigma_mm:.3f} mm at the worst of your task poses (one sigma), in about "
             f"{duration(result.minutes)}."
         )
+        if result.expanded_mm is not None:
+            yield (
+                f"The expanded uncertainty U of the largest error there will be about "
+                f"{result.expanded_mm:.3f} mm, with the systematic effects of [uncertainty]."
+            )
         if target_mm is not None and result.worst_sigma_mm > target_mm:
             yield f"That is not the target of {target_mm:g} mm: allow more records, points or tilt."
     if 0 < result.robots < result.drawn:

@@ -10,7 +10,6 @@ import numpy as np
 from hexacell.campaign.task_accuracy import Task
 from hexacell.cell.model import CellSettings
 from hexacell.experiment_design.decorrelation import DecorrelatingPose, decorrelating_poses
-from hexacell.identification.belief import RobotBelief
 from hexacell.identification.diagnostics.parameter_checks import (
     CorrelatedPair,
     ToleranceViolation,
@@ -28,7 +27,6 @@ from hexacell.measurements.records import MeasurementSet
 from hexacell.robot_model import Robot
 from hexacell.stated_effects import stated_effects
 from hexacell.uncertainty.budget import UncertaintyBudget
-from hexacell.uncertainty.effects import Effect
 
 CONTRADICTED_RATIO = 10.0
 """Residuals over the stated noise from which noise cannot explain them, only a wrong model or data."""
@@ -112,7 +110,7 @@ def assess(
         task=tuple(robot.to_command(task.poses.pose(row)) for row in range(len(task.poses))),
         task_named=bool(settings.task.poses),
         accuracy=accuracy and replace(accuracy, after=accuracy.after.times(found.goodness.noise_factor)),
-        budget=_budget(found, belief, task, stated_effects(settings, temperature_range_k)),
+        budget=task.budget(found, belief, stated_effects(settings, temperature_range_k)),
         tolerance_violations=tolerance_violations(found.estimate, robot.drawing, robot.tolerances),
     )
 
@@ -129,13 +127,3 @@ def _correlated(
     poses = decorrelating_poses(robot.belief(found), found, pairs[:SEPARATED_PAIRS])
     in_commands = [pose and replace(pose, command=robot.to_command(pose.command)) for pose in poses]
     return tuple(zip(pairs, chain(in_commands, repeat(None)), strict=False))
-
-
-def _budget(
-    found: Identification, belief: RobotBelief, task: Task, effects: tuple[Effect, ...]
-) -> UncertaintyBudget | None:
-    """The budget at the task poses that the estimated robot reaches."""
-    reached = task.reachable(belief)
-    if not len(reached.poses) or not len(reached.workspace):
-        return None
-    return UncertaintyBudget.of(found, belief, effects, task=reached.poses, workspace=reached.workspace)

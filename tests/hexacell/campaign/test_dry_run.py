@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from hexacell.campaign.dry_run import dry_run
+from hexacell.cell.uncertainty import UncertaintySettings
 from hexacell.kinematics.mechanisms.hexaglide import hexaglide_geometry
 from hexacell.robot_model import make_robot
 from hexacell.virtual_robot import robots_within_tolerances
@@ -30,6 +33,14 @@ def test_the_result_is_that_of_a_campaign(result, campaign, two_points):
     assert 12 <= result.records <= 16
     assert result.outside == 0
     assert outlook.now_mm / 4.0 < result.worst_sigma_mm < 4.0 * outlook.now_mm
+
+
+def test_systematic_effects_widen_the_expanded_uncertainty(result, make_plan):
+    plan = make_plan(**SMALL)
+    stated = plan.settings.model_copy(update={"uncertainty": UncertaintySettings(grade="ordinary")})
+    wider = dry_run(replace(plan, settings=stated), robots=1)
+    assert wider.records == result.records
+    assert wider.worst_sigma_mm == result.worst_sigma_mm < result.expanded_mm < wider.expanded_mm
 
 
 def test_the_dry_run_is_repeatable(result, make_plan):

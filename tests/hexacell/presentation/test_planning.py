@@ -88,6 +88,14 @@ def test_the_text_of_a_predicted_plan():
     assert rest[0].startswith("Point 2: 6% of the robots within the tolerances cannot reach it")
 
 
+def test_the_expanded_uncertainty_is_stated_with_the_plan():
+    _, second, *_ = lines(expanded_mm=0.0661)
+    assert second == (
+        "The expanded uncertainty U of the largest error there will be about 0.066 mm, with the systematic "
+        "effects of [uncertainty]."
+    )
+
+
 def test_a_target_that_will_not_be_reached_is_reported():
     assert any("not the target of 0.02 mm" in line for line in lines(target_mm=0.02))
     assert not any("target" in line for line in lines(target_mm=0.05))

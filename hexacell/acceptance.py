@@ -6,14 +6,19 @@ The validation compares the deviations of the ball at held-out points before and
 from __future__ import annotations
 
 from dataclasses import dataclass
-from enum import StrEnum
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from hexacell.cell.fields import Frozen
-from hexacell.identification.diagnostics.parameter_checks import tolerance_violations
-from hexacell.identification.problem.problem import Tolerances
+from hexacell.decision import Verdict
+from hexacell.identification.diagnostics.parameter_checks import SIGNIFICANT_SIGMAS, tolerance_violations
+from hexacell.identification.problem.problem import Noise, Tolerances
+from hexacell.identification.solver.chi_square import (
+    CONTRADICTED_RATIO,
+    ChiSquareTest,
+    ChiSquareVerdict,
+)
 from hexacell.identification.solver.result import GeometryEstimate
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.rotations import Array
@@ -36,6 +41,7 @@ def gates(
     drawing: Geometry,
     tolerances: Tolerances,
     *,
+    residuals: ChiSquareTest,
     largest_change_mm: float,
     before: Geometry,
 ) -> tuple[AcceptanceGate, ...]:
@@ -43,6 +49,7 @@ def gates(
     return (
         _converged(identified),
         _determined(identified),
+        _agrees(residuals),
         _within_tolerance(identified, drawing, tolerances),
         _small_change(identified.geometry, before, largest_change_mm),
     )
@@ -64,6 +71,22 @@ def _determined(identified: GeometryEstimate) -> AcceptanceGate:
         else "The data determine every parameter."
     )
     return AcceptanceGate(name="determined", passed=not names, sentence=sentence, needs_person=True)
+
+
+def _agrees(residuals: ChiSquareTest) -> AcceptanceGate:
+    """A geometry whose residuals the noise does not explain is doubtful: a person decides."""
+    passed = residuals.agreement in {ChiSquareVerdict.AGREES, ChiSquareVerdict.TOO_SMALL}
+    sentence = "The residuals agree with the stated noise."
+    if residuals.agreement is ChiSquareVerdict.NOT_EVALUATED:
+        sentence = "The residuals prove nothing: there are no more records than unknowns."
+    elif not passed:
+        sentence = f"Doubtful: the residuals are {residuals.ratio:.1f} times the stated noise."
+    return AcceptanceGate(
+        name="agrees with the noise",
+        passed=passed,
+        sentence=sentence,
+        needs_person=not residuals.ratio > CONTRADICTED_RATIO,
+    )
 
 
 def _within_tolerance(
@@ -91,15 +114,6 @@ def _small_change(after: Geometry, before: Geometry, largest_change_mm: float) -
     )
 
 
-class HeldOutVerdict(StrEnum):
-    """The verdict of the held-out measurements."""
-
-    PASS = "pass"  # noqa: S105 - a verdict, not a password
-    OUT_OF_LIMITS = "out of limits"
-    WORSE = "worse than before"
-    NOT_EVALUATED = "not evaluated"
-
-
 @dataclass(frozen=True, slots=True)
 class DeviationStatistics:
     """Mean and largest distance of the ball from its point's reference, mm, over a number of poses."""
@@ -117,42 +131,26 @@ class DeviationStatistics:
         return cls(float(distances.mean()), float(distances.max()), len(distances))
 
 
-def validate(
-    before: DeviationStatistics | None,
-    after: DeviationStatistics | None,
-    *,
-    mean_mm: float,
-    largest_mm: float,
-) -> HeldOutVerdict:
-    """The verdict under limits on the mean and the largest distance, mm; missing data never pass."""
-    if before is None or after is None:
-        return HeldOutVerdict.NOT_EVALUATED
-    if after.mean_mm > before.mean_mm:
-        return HeldOutVerdict.WORSE
-    within = after.mean_mm <= mean_mm and after.largest_mm <= largest_mm
-    return HeldOutVerdict.PASS if within else HeldOutVerdict.OUT_OF_LIMITS
+def is_worse(before: DeviationStatistics, after: DeviationStatistics, noise: Noise) -> bool:
+    """Whether the mean distance is significantly larger than before, at the same poses.
 
-
-def calibration_outcome(
-    counts: tuple[int, int, int],
-    before: DeviationStatistics | None,
-    after: DeviationStatistics | None,
-    limit_mm: float,
-    verdict: HeldOutVerdict,
-) -> str:
-    """The outcome of a calibration in one line: what was used, deviation before and after, verdict.
-
-    ``counts`` are the numbers of free parameters, of records, and of points.
+    A mean of n distances to one noisy reference has at most the variance of a record, once for the
+    reference and 1/n for the poses.
     """
-    parameters, records, points = counts
-    what = f"{parameters} parameters, {records} records at {points} points"
-    if before is None or after is None:
-        return f"{what}; held-out points: {verdict}"
-    means = f"{before.mean_mm:.2f} -> {after.mean_mm:.3f} mm"
-    return f"{what}; mean deviation at held-out points {means} (limit {limit_mm:g}): {verdict}"
+    record_mm = float(np.hypot(noise.gauge_mm, noise.encoder_mm))
+    standard_error = record_mm * float(np.sqrt(2.0 + 1.0 / before.poses + 1.0 / after.poses))
+    return after.mean_mm - before.mean_mm > SIGNIFICANT_SIGMAS * standard_error
 
 
-def check_outcome(found: DeviationStatistics | None, limit_mm: float, verdict: HeldOutVerdict) -> str:
+def check_verdict(found: DeviationStatistics | None, *, mean_mm: float, largest_mm: float) -> Verdict:
+    """The verdict of a check under limits on the mean and the largest distance, mm."""
+    if found is None:
+        return Verdict.NOT_EVALUATED
+    within = found.mean_mm <= mean_mm and found.largest_mm <= largest_mm
+    return Verdict.PASS if within else Verdict.FAIL
+
+
+def check_outcome(found: DeviationStatistics | None, limit_mm: float, verdict: Verdict) -> str:
     """The outcome of a check in one line: deviation at the held-out points, verdict."""
     if found is None:
         return f"held-out points: {verdict}"

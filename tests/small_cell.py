@@ -14,9 +14,12 @@ from procedures.run import events
 SMALL: dict[str, Any] = {
     "identification.points": ((100.0, -100.0, 500.0), (-100.0, 100.0, 500.0)),
     "identification.orientations": 9,
+    "verification.points": ((-100.0, -50.0, 450.0), (100.0, 100.0, 550.0)),
     "verification.orientations": 3,
     "noise.encoder_mm": 0.001,
     "noise.gauge_mm": 0.001,
+    "acceptance.position_mm": 5.0,
+    "acceptance.orientation_deg": 2.0,
     "acceptance.mean_deviation_mm": 0.2,
     "acceptance.max_deviation_mm": 0.4,
     "simulation.gauges.noise_mm": 0.001,

@@ -28,7 +28,8 @@ from procedures.engine.config_transactions import holds_provisional
 from procedures.engine.engine import Engine, Listener
 from procedures.engine.recovery import RecoveryPolicy
 from procedures.engine.step_executor import StepExecutor
-from procedures.journal.journal import Journal, read_journal
+from procedures.journal.journal import Journal, read_journal, read_version
+from procedures.journal.line_format import RULES_SINCE
 from procedures.run import events
 from procedures.run.commands import CommandQueue
 from procedures.run.questions import Operator, QuestionBroker
@@ -199,7 +200,7 @@ def _resumed_start(request: RunRequest) -> events.RunStarted:
     """The first event of the run to resume.
 
     Raises:
-        UsageError: it is over, or the cell file has changed since it began.
+        UsageError: it is over, was begun by other rules, or the cell file has changed since it began.
         FileError: its journal cannot be read.
     """
     state = fold(read_journal(request.folder.journal))
@@ -207,6 +208,12 @@ def _resumed_start(request: RunRequest) -> events.RunStarted:
         raise FileError("the journal is empty", subject=request.folder.journal, action="Begin a new run")
     if state.ended is not None:
         raise UsageError(f"the run {request.folder.path} is over: {state.ended.line}")
+    if (version := read_version(request.folder.journal)) < RULES_SINCE:
+        raise UsageError(
+            f"{state.started.software} began this run by other rules (version {version} of the journal)",
+            subject=request.folder.path,
+            action="Finish it with that version, or begin a new run",
+        )
     if state.started.cell_text != request.cell.text:
         raise UsageError(
             f"{request.cell.path} has changed since the run began",

@@ -14,12 +14,12 @@ from hexacell.cell.measuring import IdentificationSettings
 from hexacell.cell.model import CellSettings, geometry_settings
 from hexacell.controller_config.change import ConfigChange
 from hexacell.controller_config.write_back import BEFORE
-from hexacell.errors import FileError, HexacellError
+from hexacell.errors import FileError, HexacellError, UsageError
 from hexacell.runs.run_folder import RunFolder
 from hexacell.storage import atomic_files
 from procedures.calibration.workflow import Calibration, Mode
-from procedures.journal.journal import read_entries
-from procedures.journal.line_format import Entry
+from procedures.journal.journal import read_entries, read_version
+from procedures.journal.line_format import RULES_SINCE, Entry
 from procedures.replay.comparison import TOLERANCE, ReplayReport
 from procedures.replay.recorded_executor import RecordedStepExecutor
 from procedures.replay.replayer import Replayer, Scope
@@ -43,6 +43,7 @@ async def replay(run: Path, scope: Scope = Scope.ALL, tolerance: float = TOLERAN
     folder, journal = _found(run)
     entries = read_entries(journal)
     started = _started(journal, entries)
+    _require_rules(journal, scope)
     report = ReplayReport(journal, started.software, len(entries))
     with TemporaryDirectory(prefix="hexacell-replay-") as name:
         executor, started = _set_up(Path(name), folder, started)
@@ -55,6 +56,20 @@ def _found(run: Path) -> tuple[RunFolder, Path]:
     if run.is_dir():
         return RunFolder(run), RunFolder(run).journal
     return RunFolder(run.parent), run
+
+
+def _require_rules(journal: Path, scope: Scope) -> None:
+    """Earlier versions decided by other rules; only their identification can be repeated.
+
+    Raises:
+        UsageError: more than that is to be repeated.
+    """
+    if (version := read_version(journal)) < RULES_SINCE and scope is not Scope.IDENTIFICATION:
+        raise UsageError(
+            f"the journal has version {version}, whose runs were decided by other rules",
+            subject=journal,
+            action="Replay it with --only identification",
+        )
 
 
 def _started(journal: Path, entries: Sequence[Entry]) -> RunStarted:

@@ -194,7 +194,9 @@ def _summary(plan: Plan, tried: int, identified: list[_Outcome]) -> DryRunResult
     expanded = [outcome.budget.expanded_mm for outcome in identified if outcome.budget is not None]
     held_out = plan.settings.verification
     straight = TimeModel.of(plan.settings, moves=1.0)
-    validation = straight.minutes(len(held_out.points) * held_out.orientations, len(held_out.points))
+    points_held_out = len(held_out.points)
+    common, wide = points_held_out * held_out.orientations, points_held_out * (held_out.orientations - 1)
+    before, after = (straight.minutes(poses, points_held_out) for poses in (common, common + wide))
     return DryRunResult(
         drawn=tried,
         robots=len(identified),
@@ -202,6 +204,6 @@ def _summary(plan: Plan, tried: int, identified: list[_Outcome]) -> DryRunResult
         records=records,
         outside=sum(outcome.campaign.outside for outcome in identified),
         worst_sigma_mm=median(errors) if errors else None,
-        minutes=plan.budget.time_model.minutes(records, points) + 2.0 * validation,
+        minutes=plan.budget.time_model.minutes(records, points) + before + after,
         expanded_mm=median(expanded) if expanded else None,
     )

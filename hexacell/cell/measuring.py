@@ -70,8 +70,10 @@ class VerificationSettings(Section):
 class AcceptanceSettings(Section):
     """When a result is good, and who approves writing it to the controller."""
 
-    mean_deviation_mm: Positive = Field(0.05, description="at held-out points, after")
-    max_deviation_mm: Positive = Field(0.15, description="at held-out points, after")
+    position_mm: Positive = Field(0.15, description="largest position error at the task poses")
+    orientation_deg: Positive = Field(0.05, description="largest orientation error at the task poses")
+    mean_deviation_mm: Positive = Field(0.05, description="of a check, at held-out points")
+    max_deviation_mm: Positive = Field(0.15, description="of a check, at held-out points")
     largest_change_mm: Positive = Field(15.0, description="of a parameter, if no person approves")
     drift_mm: Positive = Field(0.1, description="of a point's reference, from its zeroing to its end")
     approval: Literal["ask", "automatic"] = Field(

@@ -104,7 +104,7 @@ class TerminalOperator:
         text = question_text(question)
         while True:
             typed = await self._answer(text)
-            if question.kind is QuestionKind.APPROVE_CHANGE:
+            if question.kind in {QuestionKind.APPROVE_CHANGE, QuestionKind.KEEP_RESULT}:
                 return APPROVER if typed.strip().lower() == "yes" else None
             if question.default is not None:
                 return question.default

@@ -74,12 +74,16 @@ def preflight_document(devices: Sequence[DeviceIdentity], trial: PlanTrial) -> d
     }
 
 
-def run_document(request: RunRequest, ended: events.Ended) -> dict[str, Any]:
+def run_document(
+    request: RunRequest, ended: events.Ended, judged: events.ResultValidated | None
+) -> dict[str, Any]:
     """What ``run --json`` and ``demo --json`` print."""
     measurements = request.folder.measurements
     return {
         "exit_code": ended.exit_code,
         "line": ended.line,
+        "verdict": judged and judged.verdict.value,
+        "verification": judged and judged.verification and judged.verification.model_dump(mode="json"),
         "run": str(request.folder.path),
         "measurements": str(measurements) if measurements.is_file() else None,
         "config": str(request.cell.config_path),

@@ -5,7 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from hexacell.campaign.decisions import Forecast
+from hexacell.presentation.layout import wrapped
 from hexacell.presentation.planning import run_forecast_line
+from hexacell.presentation.verification import verification_text
+from hexacell.reporting.verification import Verification
 from procedures.run import events
 from procedures.run.state import RunState
 from procedures.run.steps import Compute, Move, Phase, SetKey
@@ -21,7 +24,8 @@ COMPUTATIONS = {
     "identify": "identifying the geometry",
     "propose": "preparing the new config",
     "commit": "writing the config and reloading it",
-    "judge": "evaluating the held-out points",
+    "judge": "verifying the result",
+    "accept": "waiting for a decision on the result",
     "roll back": "restoring the old config",
 }
 CONFIG_CHANGES = {
@@ -88,24 +92,25 @@ def event_text(event: events.Event, state: RunState) -> str | None:
         case events.ProvisionalApplied() | events.ProvisionalReverted() | events.RolledBack():
             return CONFIG_CHANGES[event.kind]
         case _:
-            return _interruption_text(event)
+            return _further_text(event)
 
 
-def _interruption_text(event: events.Event) -> str | None:
-    """What an interruption, a failure or a command reports."""
+def _further_text(event: events.Event) -> str | None:
+    """What a verdict, an interruption, a failure or a command reports."""
     match event:
         case events.ReferenceConfirmed():
             return f"{set_name(event.at)} continues: its reference is unchanged"
+        case events.ResultValidated(verification=Verification() as verified):
+            return verification_text(verified)
         case events.RecordDiscarded():
             return f"{set_name(event.at)}, orientation {event.orientation} is measured again"
         case events.Failed():
-            return f"{event.reason}\n  attempt {event.attempt}: {event.action.value}"
+            reason = "\n".join(wrapped(line, indent=2) for line in event.reason.splitlines())
+            return f"{reason}\n  attempt {event.attempt}: {event.action.value}"
         case events.CommandRejected():
             return f"{event.command}: {event.reason}"
-        case events.Paused() | events.Resumed():
-            return event.kind
         case _:
-            return None
+            return event.kind if isinstance(event, events.Paused | events.Resumed) else None
 
 
 def set_summary(closed: events.SetClosed, state: RunState) -> str:

@@ -10,7 +10,7 @@ from hexacell.presentation.layout import wrapped
 from procedures.calibration.workflow import Mode
 from procedures.replay.comparison import Aspect, Difference, ReplayReport
 from procedures.run import events
-from procedures.run.questions import GaugePlacement, PendingChange, Question, StepFailure
+from procedures.run.questions import GaugePlacement, PendingChange, Question, StepFailure, WrittenResult
 
 UNVERIFIED = (
     "The controller's config holds the new geometry, which is not verified yet: resuming "
@@ -64,6 +64,8 @@ def question_text(question: Question) -> str:
         case PendingChange(gates=gates, diff=diff):
             outcomes = "".join(f"{'ok' if gate.passed else 'NO'}  {gate.sentence}\n" for gate in gates)
             return f"\n{diff}\n{outcomes}Write this into the controller's config? Type yes: "
+        case WrittenResult(line=line):
+            return f"\n{line}.\nThe new geometry is in the controller's config. Keep it? Type yes: "
         case StepFailure(problem=problem):
             return f"\n{problem}\nHow to continue ({', '.join(question.choices)})? "
 

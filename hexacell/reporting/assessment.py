@@ -19,6 +19,7 @@ from hexacell.identification.diagnostics.parameter_checks import (
 from hexacell.identification.diagnostics.pose_accuracy import Accuracy, predicted_accuracy
 from hexacell.identification.diagnostics.repeatability import Repeatability, repeatability
 from hexacell.identification.diagnostics.variance_components import NoiseLevels, noise_levels
+from hexacell.identification.solver.chi_square import CONTRADICTED_RATIO
 from hexacell.identification.solver.measurement_model import record_covariance
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.geometry import Geometry
@@ -27,9 +28,6 @@ from hexacell.measurements.records import MeasurementSet
 from hexacell.robot_model import Robot
 from hexacell.stated_effects import stated_effects
 from hexacell.uncertainty.budget import UncertaintyBudget
-
-CONTRADICTED_RATIO = 10.0
-"""Residuals over the stated noise from which noise cannot explain them, only a wrong model or data."""
 
 SEPARATED_PAIRS = 5
 """How many of the strongest correlations a measurement is searched for."""

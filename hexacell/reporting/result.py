@@ -8,6 +8,7 @@ from __future__ import annotations
 from typing import Any, Self
 
 from hexacell.cell.fields import Frozen, GeometryDocument
+from hexacell.identification.solver.chi_square import ChiSquareTest
 from hexacell.identification.solver.levenberg_marquardt import Termination
 from hexacell.identification.solver.result import (
     DataFault,
@@ -106,6 +107,11 @@ class IdentificationResult(Frozen):
         """What the acceptance gates need."""
         sigma = parameters.vector(self.sigma)
         return GeometryEstimate(self.identified(parameters), sigma, self.termination, self.undetermined)
+
+    @property
+    def residuals(self) -> ChiSquareTest:
+        """The chi-square test of the residuals, of which all parameters are determined."""
+        return ChiSquareTest(self.chi2, float(self.dof))
 
     def identified(self, parameters: ParameterSet) -> Geometry:
         """The geometry in the mechanism's frame convention."""

@@ -1,13 +1,20 @@
-"""The steps that measure the held-out points, before and after the new geometry is written."""
+"""The steps that measure the held-out points, before and after the new geometry is written.
+
+Before, only poses can be taken at which the ball stays inside the travel although the geometry is wrong.
+Afterwards these are taken again, for the comparison, and then poses as wide as the robot's limits, since
+a geometry may be right at small tilts alone.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 from hexacell.cell.model import CellSettings
+from hexacell.errors import LimitError
 from hexacell.experiment_design import candidates
 from hexacell.experiment_design.validation_poses import select_validation_poses
+from hexacell.identification.belief import RobotBelief
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.pose import Pose
 from hexacell.kinematics.rotations import Array
@@ -44,22 +51,49 @@ class HeldOutSteps:
         Raises:
             LimitError: a point has too few that keep the ball inside the travel.
         """
-        verification, robot = self.settings.verification, self.sets.robot
-        belief = robot.belief(identified)
+        belief = self.sets.robot.belief(identified)
         used = None if identified is None else identified.poses.rotations
-        turns = candidates.orientations(self.candidate_count, belief.limits.tilt, verification.seed)
-        chosen = []
-        for point in verification.points:
-            position = robot.from_commands([Pose(*point)]).positions[0]
-            poses = select_validation_poses(belief, position, verification.orientations, turns, used)
-            commands = (robot.to_command(poses.pose(row)) for row in range(len(poses)))
-            chosen.append(tuple(command.as_tuple() for command in commands))
+        points = range(len(self.settings.verification.points))
+        return tuple(self._choose_at(point, belief, used) for point in points)
+
+    def choose_poses_after(self, identified: Identification) -> tuple[tuple[SixNumbers, ...], ...]:
+        """Further poses at each held-out point, for the controller with the identified geometry.
+
+        A point at which it has too few gets none.
+        """
+        belief = replace(self.sets.robot.belief(identified), controller=identified.geometry)
+        used = identified.poses.rotations
+        chosen: list[tuple[SixNumbers, ...]] = []
+        for point in range(len(self.settings.verification.points)):
+            try:
+                chosen.append(self._choose_at(point, belief, used)[1:])
+            except LimitError:
+                chosen.append(())
         return tuple(chosen)
+
+    def _choose_at(self, point: int, belief: RobotBelief, used: Array | None) -> tuple[SixNumbers, ...]:
+        """The poses at a point, counted from 0; the first is its reference."""
+        verification, robot = self.settings.verification, self.sets.robot
+        turns = candidates.orientations(self.candidate_count, belief.limits.tilt, verification.seed)
+        position = robot.from_commands([Pose(*verification.points[point])]).positions[0]
+        poses = select_validation_poses(belief, position, verification.orientations, turns, used)
+        commands = (robot.to_command(poses.pose(row)) for row in range(len(poses)))
+        return tuple(command.as_tuple() for command in commands)
 
     @cached_property
     def _poses_by_drawing(self) -> tuple[tuple[SixNumbers, ...], ...]:
         """The poses of a run that identifies nothing."""
         return self.choose_poses(None)
+
+    def _poses(self, state: RunState, key: SetKey) -> tuple[tuple[SixNumbers, ...], int]:
+        """The poses of a set, and how many of them are measured before and after."""
+        if state.identified is None:
+            poses = self._poses_by_drawing[key.point - 1]
+            return poses, len(poses)
+        common = state.identified.held_out[key.point - 1]
+        if key.phase is Phase.BEFORE or not state.identified.held_out_after:
+            return common, len(common)
+        return common + state.identified.held_out_after[key.point - 1], len(common)
 
     def _in_set(self, state: RunState, key: SetKey) -> Step:
         measured = state.set(key)
@@ -70,7 +104,7 @@ class HeldOutSteps:
             raise TravelError(f"{key}: the ball left the gauges' travel at a held-out pose")
         if measured.reference_unverified:
             return self.sets.at_reference(state, key) or self._to_reference(state, key)
-        if len(measured.samples) < self.settings.verification.orientations:
+        if len(measured.samples) < len(self._poses(state, key)[0]):
             return self.sets.at_pose(state, key) or self._to_next_pose(state, key)
         if step := self.sets.at_reference(state, key):
             return step
@@ -79,12 +113,13 @@ class HeldOutSteps:
         return reference_move(state, key) if is_in_order else self._to_reference(state, key)
 
     def _to_next_pose(self, state: RunState, key: SetKey) -> Move:
-        poses = state.identified.held_out if state.identified else self._poses_by_drawing
+        poses, common = self._poses(state, key)
         orientation = state.set(key).next_orientation
-        move = Move(at=key, orientation=orientation, pose=poses[key.point - 1][orientation - 1])
+        move = Move(at=key, orientation=orientation, pose=poses[orientation - 1])
         if orientation == 1:
             return self.sets.paths.towards(state, move)
-        if state.at_pose == (key, orientation - 1):  # the poses were chosen with safe lines between them
+        # Each list of poses was chosen with safe lines from one to the next.
+        if state.at_pose == (key, orientation - 1) and orientation != common + 1:
             return move
         return self.sets.paths.towards(state, move, self._ball(state, key))
 

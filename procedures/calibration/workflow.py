@@ -12,10 +12,10 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 from functools import cached_property
 
-from hexacell.acceptance import HeldOutVerdict
 from hexacell.campaign.planner import Plan
 from hexacell.campaign.pose_list import PoseList
 from hexacell.cell.model import CellSettings
+from hexacell.decision import Verdict
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.geometry import Geometry
 from hexacell.robot_model import Robot
@@ -40,11 +40,13 @@ class Mode(StrEnum):
 def expected_records(settings: CellSettings, mode: Mode, listed: PoseList | None = None) -> int:
     """The largest number of settled readings in a whole run, closings of sets included."""
     plan, held_out = settings.identification, settings.verification
-    verification = len(held_out.points) * (held_out.orientations + 1)
+    points = len(held_out.points)
+    verification = points * (held_out.orientations + 1)
     if mode is Mode.CHECK:
         return verification
     records = len(plan.points) * plan.orientations if listed is None else len(listed)
-    return min(records, plan.budget_records or records) + len(plan.points) + 2 * verification
+    identification = min(records, plan.budget_records or records) + len(plan.points)
+    return identification + 2 * verification + points * (held_out.orientations - 1)
 
 
 class _Measuring:
@@ -111,6 +113,10 @@ class Calibration:
         """See :meth:`HeldOutSteps.choose_poses`."""
         return self._at_start.held_out.choose_poses(identified)
 
+    def held_out_poses_after(self, identified: Identification) -> tuple[tuple[SixNumbers, ...], ...]:
+        """See :meth:`HeldOutSteps.choose_poses_after`."""
+        return self._at_start.held_out.choose_poses_after(identified)
+
     def _write_back(self, state: RunState) -> Step | None:
         if state.proposed is None:
             return Compute(kind="propose")
@@ -121,9 +127,7 @@ class Calibration:
                 return Compute(kind="commit")
             after = self._measuring(state).held_out.next_step(state, Phase.AFTER)
             return after or Compute(kind="judge")
-        if state.judged.verdict is not HeldOutVerdict.PASS and not state.rolled_back:
-            return Compute(kind="roll back")
-        return None
+        return _after_verdict(state, state.judged)
 
     def _measuring(self, state: RunState) -> _Measuring:
         """The steps for the geometries that the controller has had in this run."""
@@ -146,6 +150,17 @@ class Calibration:
     def _with_provisional(self) -> dict[bool, _Measuring]:
         """By whether the provisional geometry, one in a run, commands now."""
         return {}
+
+
+def _after_verdict(state: RunState, judged: events.ResultValidated) -> Step | None:
+    """What follows a verdict on a written geometry: it stays, or a person decides, or it is rolled back."""
+    if judged.verdict is Verdict.PASS or state.rolled_back:
+        return None
+    is_offered = judged.verification is not None and judged.verification.is_offered
+    if is_offered and state.accepted is None and not state.rolling_back:
+        return Compute(kind="accept")
+    is_kept = state.accepted is not None and state.accepted.by is not None
+    return None if is_kept else Compute(kind="roll back")
 
 
 def geometry_of(applied: events.ProvisionalApplied, robot: Robot) -> Geometry:

@@ -2,27 +2,22 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-from hexacell.acceptance import (
-    DeviationStatistics,
-    HeldOutVerdict,
-    calibration_outcome,
-    check_outcome,
-    gates,
-    validate,
-)
+from hexacell.acceptance import DeviationStatistics, check_outcome, check_verdict, gates
 from hexacell.cell.loader import Cell
 from hexacell.identification.estimator import identify
 from hexacell.measurements.csv_file import write_measurements
+from hexacell.measurements.records import MeasurementSet
 from hexacell.reporting.assessment import assess
 from hexacell.reporting.documents import fit_document
 from hexacell.reporting.result import IdentificationResult
+from hexacell.reporting.verification import HeldOut, outcome_line, verify
 from hexacell.runs.run_folder import RunFolder
 from procedures.calibration.workflow import Calibration, Mode
 from procedures.engine.config_transactions import ConfigTransactions
 from procedures.run import events
-from procedures.run.state import RunState
+from procedures.run.state import RunState, record
 from procedures.run.steps import Phase
 
 
@@ -50,17 +45,23 @@ class Computations:
         )
         self.folder.write_result(fit_document(assessed))
         result = IdentificationResult.of(identified)
-        return events.Identified(result=result, held_out=self.calibration.held_out_poses(identified))
+        return events.Identified(
+            result=result,
+            held_out=self.calibration.held_out_poses(identified),
+            held_out_after=self.calibration.held_out_poses_after(identified),
+        )
 
     def propose(self, state: RunState) -> events.Proposed:
         """Save the change of the config and evaluate the gates; raises ``FileError``."""
         robot = self.calibration.robot
-        identified = _identified(state).estimate(robot.mechanism.parameters)
+        result = _identified(state)
+        identified = result.estimate(robot.mechanism.parameters)
         commanding, _ = robot.mechanism.normalize_frames(robot.controller)
         conditions = gates(
             identified,
             robot.drawing,
             robot.tolerances,
+            residuals=result.residuals,
             largest_change_mm=self.cell.settings.acceptance.largest_change_mm,
             before=commanding,
         )
@@ -68,31 +69,39 @@ class Computations:
         return events.Proposed(gates=conditions)
 
     def judge(self, state: RunState) -> events.ResultValidated:
-        """Compare the deviations at the held-out points with the limits."""
-        before = DeviationStatistics.of(state.held_out(Phase.BEFORE))
+        """Verify the written geometry; raises ``HexacellError``."""
         if self.calibration.mode is Mode.CHECK:
-            verdict = self._verdict(before, before)
-            line = check_outcome(before, self._limit_mm, verdict)
-            return events.ResultValidated(verdict=verdict, line=line)
-        after = DeviationStatistics.of(state.held_out(Phase.AFTER))
-        verdict = HeldOutVerdict.WORSE if state.rejections(Phase.AFTER) else self._verdict(before, after)
-        counts = self._counts(_identified(state))
-        line = calibration_outcome(counts, before, after, self._limit_mm, verdict)
+            return self._judge_check(state)
+        robot = self.calibration.robot_of(state)
+        found = identify(robot.problem(state.measurements()))
+        written = replace(robot, provisional=(*robot.provisional, found.geometry))
+        verification = verify(self.cell.settings, written, found, _held_out(state))
+        line = outcome_line(_identified(state), len(found.free), verification)
+        return events.ResultValidated(verdict=verification.verdict, line=line, verification=verification)
+
+    def _judge_check(self, state: RunState) -> events.ResultValidated:
+        limits = self.cell.settings.acceptance
+        found = DeviationStatistics.of(state.held_out(Phase.BEFORE))
+        verdict = check_verdict(found, mean_mm=limits.mean_deviation_mm, largest_mm=limits.max_deviation_mm)
+        line = check_outcome(found, limits.mean_deviation_mm, verdict)
         return events.ResultValidated(verdict=verdict, line=line)
 
-    def _counts(self, result: IdentificationResult) -> tuple[int, int, int]:
-        free = self.calibration.robot.mechanism.convention.free_names()
-        return len(free), result.records, result.points
 
-    @property
-    def _limit_mm(self) -> float:
-        return self.cell.settings.acceptance.mean_deviation_mm
-
-    def _verdict(
-        self, before: DeviationStatistics | None, after: DeviationStatistics | None
-    ) -> HeldOutVerdict:
-        largest_mm = self.cell.settings.acceptance.max_deviation_mm
-        return validate(before, after, mean_mm=self._limit_mm, largest_mm=largest_mm)
+def _held_out(state: RunState) -> HeldOut:
+    """What was measured at the held-out points, each phase at points of its own."""
+    count = max(sample.at.point for sample in state.samples(Phase.IDENTIFY))
+    records = []
+    for phase in (Phase.BEFORE, Phase.AFTER):
+        samples = state.samples(phase)
+        records += [replace(record(sample), point=sample.at.point + count) for sample in samples]
+        count += max((sample.at.point for sample in samples), default=0)
+    return HeldOut(
+        records=MeasurementSet(tuple(records)),
+        before=state.held_out(Phase.BEFORE),
+        after=state.held_out(Phase.AFTER),
+        left_travel=bool(state.rejections(Phase.AFTER)),
+        temperature_range_k=state.temperature_range_k,
+    )
 
 
 def _identified(state: RunState) -> IdentificationResult:

@@ -26,7 +26,7 @@ from hexacell.acceptance import AcceptanceGate
 from hexacell.cell.loader import Cell
 from hexacell.controller_config.change import ConfigChange, fingerprint, propose
 from hexacell.controller_config.write_back import RECEIPT, Receipt, commit, rollback
-from hexacell.errors import HexacellError, Interruption, LimitError, WriteBackUndone
+from hexacell.errors import AnswerNeeded, HexacellError, Interruption, LimitError, WriteBackUndone
 from hexacell.kinematics.geometry import Geometry
 from hexacell.robot_model import config_format
 from hexacell.runs.run_folder import RunFolder
@@ -35,7 +35,7 @@ from procedures.devices.device_set import Devices
 from procedures.guards.guards import Guards
 from procedures.run import events
 from procedures.run.cancellation import in_thread
-from procedures.run.questions import Operator, ask_approval
+from procedures.run.questions import Operator, ask_acceptance, ask_approval
 from procedures.run.state import RunState
 from procedures.run.steps import Compute
 
@@ -141,6 +141,17 @@ class ConfigTransactions:
                 await in_thread(commit, change, self._provisional_backup)
             raise
         return events.ProvisionalReverted()
+
+    async def ask_whether_kept(self, state: RunState) -> events.ResultAccepted:
+        """Ask a person whether a written geometry that did not pass stays; nothing is changed."""
+        judged = state.judged
+        assert judged is not None  # noqa: S101 - decided only after the verdict
+        assert judged.verification is not None  # noqa: S101 - only then it is offered
+        try:
+            name = await self.operator.ask(ask_acceptance(judged.line, judged.verification))
+        except AnswerNeeded:
+            return events.ResultAccepted(by=None, asked=False)
+        return events.ResultAccepted(by=name)
 
     async def revert_result(self) -> events.RolledBack:
         """Give the controller the geometry of before the run."""

@@ -6,7 +6,7 @@ import asyncio
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 
-from hexacell.acceptance import HeldOutVerdict
+from hexacell.decision import Verdict
 from hexacell.errors import ExitCode, HexacellError, Interruption, SeveralErrors
 from procedures.engine.command_loop import CommandLoop, Status, StepCancelled
 from procedures.engine.config_transactions import Reversal, revert_at_end, revert_unrecorded
@@ -236,13 +236,34 @@ def _ending(state: RunState) -> events.Ended:
     """The last event of a run with nothing left to do."""
     if state.ended is not None:
         return state.ended
-    judged = state.judged
-    passed = judged is not None and judged.verdict is HeldOutVerdict.PASS
-    code = ExitCode.DONE if passed else ExitCode.OUT_OF_LIMITS
-    line = judged.line if judged is not None else "nothing was judged"
+    line = state.judged.line if state.judged is not None else "nothing was judged"
+    if state.accepted is not None and state.accepted.by is not None:
+        line += f"; kept by {state.accepted.by}"
     if state.rolled_back:
-        line += "; rolled back, the controller has its old config"
-    return events.Ended(exit_code=int(code), line=line)
+        line += f"; rolled back, the controller has its old config{_comparison(state)}"
+    return events.Ended(exit_code=int(_final_code(state)), line=line)
+
+
+def _comparison(state: RunState) -> str:
+    """That the old config is the worse one, where that was measured."""
+    verification = state.judged and state.judged.verification
+    if not verification or verification.before_mm is None or verification.after_mm is None:
+        return ""
+    return ", the worse one" if verification.after_mm < verification.before_mm else ""
+
+
+def _final_code(state: RunState) -> ExitCode:
+    """The code of a run that is over."""
+    if state.judged is None:
+        return ExitCode.OUT_OF_LIMITS
+    if state.judged.verdict is Verdict.PASS:
+        return ExitCode.DONE
+    if state.judged.verdict.is_conditional and state.accepted is not None:
+        if state.accepted.by is not None:
+            return ExitCode.DONE
+        if not state.accepted.asked:
+            return ExitCode.ANSWER_NEEDED
+    return ExitCode.OUT_OF_LIMITS
 
 
 def _exit_code(error: BaseException) -> ExitCode:

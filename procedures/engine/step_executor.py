@@ -180,6 +180,8 @@ class StepExecutor:
                 return await self.config.revert_provisional(state)
             case "commit":
                 return await self.config.apply_result(state)
+            case "accept":
+                return await self.config.ask_whether_kept(state)
             case "roll back":
                 return await self.config.revert_result()
 

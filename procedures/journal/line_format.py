@@ -20,8 +20,12 @@ from hexacell.cell.fields import first_mistake
 from hexacell.errors import FileError
 from procedures.run.events import Event
 
-VERSION = 2
-"""What this program writes; it reads this and all before. Version 1 had neither version nor ``s``."""
+VERSION = 3
+"""What this program writes; it reads this and all before. Version 1 had neither version nor ``s``, and
+versions 1 and 2 no verification, so that a run of them was decided by other rules."""
+
+RULES_SINCE = 3
+"""The version since which runs are decided by the present rules; older ones are not resumed."""
 
 RESTORE = "Restore the run folder from a copy; it cannot be continued"
 
@@ -93,6 +97,12 @@ def decode(line: bytes, path: Path, due: int) -> Entry | None:
     return Entry(due, when, float(monotonic) if monotonic else None, found)
 
 
+def stated_version(line: bytes) -> int:
+    """The version that the first line of a journal states."""
+    stated = _FIRST.match(line)
+    return 1 if stated is None else int(stated[1])
+
+
 def is_whole(line: bytes) -> bool:
     """Whether a line, without its line feed, has the checksum that it states."""
     tail = _TAIL.fullmatch(line[-_TAIL_LENGTH:])
@@ -113,11 +123,10 @@ def _checksum(body: bytes) -> int:
 
 
 def _require_known_version(line: bytes, path: Path) -> None:
-    stated = _FIRST.match(line)
-    if stated is not None and int(stated[1]) > VERSION:
+    if (version := stated_version(line)) > VERSION:
         raise FileError(
-            f"a newer hexacell wrote this journal: its format has version {int(stated[1])}, known are "
-            f"1 to {VERSION}",
+            f"a newer hexacell wrote this journal: its format has version {version}, "
+            f"known are 1 to {VERSION}",
             subject=path,
             line=1,
             action="Use that hexacell, or update this one",

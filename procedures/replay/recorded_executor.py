@@ -14,7 +14,7 @@ from drivers.errors import GaugeAtEnd
 from drivers.interfaces import ControllerStatus, DeviceIdentity, EncoderSample
 from hexacell.cell.loader import Cell
 from hexacell.clock import CellClock
-from hexacell.errors import DeviceError
+from hexacell.errors import AnswerNeeded, DeviceError
 from hexacell.kinematics.pose import Pose
 from hexacell.kinematics.rotations import Array
 from hexacell.runs.run_folder import RunFolder
@@ -112,9 +112,14 @@ class RecordedOperator:
     recorded: Recorded
 
     async def ask(self, question: Question) -> str | None:
-        """Who approved a change, if a person did; a question about a failure is never asked here."""
-        if isinstance(self.recorded.outcome, events.Committed):
-            return self.recorded.outcome.approved_by
+        """Who approved a change or kept it, if a person did; a failure is never asked about here."""
+        outcome = self.recorded.outcome
+        if isinstance(outcome, events.Committed):
+            return outcome.approved_by
+        if isinstance(outcome, events.ResultAccepted):
+            if not outcome.asked:
+                raise AnswerNeeded("nobody was asked")
+            return outcome.by
         return question.default
 
 

@@ -215,6 +215,7 @@ OUTCOME_KINDS: dict[str, frozenset[str]] = {
     "propose": frozenset({"proposed"}),
     "commit": frozenset({"committed"}),
     "judge": frozenset({"judged"}),
+    "accept": frozenset({"accepted"}),
     "roll back": frozenset({"rolled back"}),
 }
 """The kinds of events that are outcomes, by kind of step."""

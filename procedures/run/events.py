@@ -8,14 +8,16 @@ from __future__ import annotations
 
 from typing import Annotated, Literal, Self
 
-from pydantic import Field
+from pydantic import BeforeValidator, Field
 
 from drivers.interfaces import DeviceIdentity
-from hexacell.acceptance import AcceptanceGate, HeldOutVerdict
+from hexacell.acceptance import AcceptanceGate
 from hexacell.cell.fields import Frozen, GeometryDocument
 from hexacell.cell.recovery import Action, FailureKind
+from hexacell.decision import Verdict
 from hexacell.kinematics.mechanism import Branch
 from hexacell.reporting.result import IdentificationResult
+from hexacell.reporting.verification import Verification
 from procedures.run.steps import SetKey, SixNumbers, Step, ThreeNumbers
 from procedures.run.trips import Guard, Trip
 
@@ -172,11 +174,16 @@ class ProvisionalReverted(Frozen):
 
 
 class Identified(Frozen):
-    """The geometry was identified, and the held-out poses were chosen."""
+    """The geometry was identified, and the held-out poses were chosen.
+
+    ``held_out`` are measured at each point before and after, ``held_out_after`` only after: the robot
+    cannot take them safely before it is calibrated.
+    """
 
     kind: Literal["identified"] = "identified"
     result: IdentificationResult
     held_out: tuple[tuple[SixNumbers, ...], ...]
+    held_out_after: tuple[tuple[SixNumbers, ...], ...] = ()
 
 
 class Proposed(Frozen):
@@ -193,12 +200,29 @@ class Committed(Frozen):
     approved_by: str
 
 
+def _present_name(verdict: object) -> object:
+    """The verdict for a word of versions 1 and 2."""
+    return Verdict.FAIL if verdict in {"out of limits", "worse than before"} else verdict
+
+
 class ResultValidated(Frozen):
-    """The deviations at the held-out points were compared with the limits."""
+    """The verdict of the run; a check and versions 1 and 2 have no ``verification``."""
 
     kind: Literal["judged"] = "judged"
-    verdict: HeldOutVerdict
+    verdict: Annotated[Verdict, BeforeValidator(_present_name)]
     line: str
+    verification: Verification | None = None
+
+
+class ResultAccepted(Frozen):
+    """A person decided on a result that did not pass; ``by`` is who keeps it, null if nobody does.
+
+    ``asked`` is whether there was somebody to ask.
+    """
+
+    kind: Literal["accepted"] = "accepted"
+    by: str | None
+    asked: bool = True
 
 
 class RolledBack(Frozen):
@@ -293,6 +317,7 @@ Event = Annotated[
     | Proposed
     | Committed
     | ResultValidated
+    | ResultAccepted
     | RolledBack
     | Paused
     | Resumed

@@ -12,6 +12,7 @@ from hexacell.acceptance import AcceptanceGate
 from hexacell.cell.recovery import Action
 from hexacell.errors import AnswerNeeded
 from hexacell.kinematics.pose import Pose
+from hexacell.reporting.verification import Verification
 from procedures.run.cancellation import cancel_and_wait
 
 PLACED = "placed"
@@ -24,6 +25,7 @@ class QuestionKind(StrEnum):
     PLACE_GAUGES = "place"
     APPROVE_CHANGE = "approve"
     CHOOSE_RECOVERY = "decide"
+    KEEP_RESULT = "keep"
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,6 +52,14 @@ class StepFailure:
 
 
 @dataclass(frozen=True, slots=True)
+class WrittenResult:
+    """A result in the controller's config that did not pass: the outcome in one line, and all of it."""
+
+    line: str
+    verification: Verification
+
+
+@dataclass(frozen=True, slots=True)
 class Question:
     """One question to a person. An answer is a text, or None.
 
@@ -62,7 +72,7 @@ class Question:
 
     kind: QuestionKind
     text: str
-    subject: GaugePlacement | PendingChange | StepFailure
+    subject: GaugePlacement | PendingChange | StepFailure | WrittenResult
     choices: tuple[str, ...] = ()
     default: str | None = None
 
@@ -84,6 +94,15 @@ def ask_approval(gates: Sequence[AcceptanceGate], diff: str) -> Question:
         QuestionKind.APPROVE_CHANGE,
         f"Write this into the controller's config?\n{diff}",
         PendingChange(tuple(gates), diff),
+    )
+
+
+def ask_acceptance(line: str, verification: Verification) -> Question:
+    """Ask whether a result that did not pass stays; answered by the name of who keeps it."""
+    return Question(
+        QuestionKind.KEEP_RESULT,
+        f"{line}. Keep the new geometry?",
+        WrittenResult(line, verification),
     )
 
 
@@ -164,5 +183,7 @@ class UnattendedOperator:
                 raise AnswerNeeded(
                     f"the new geometry waits for approval: {reasons or 'the cell file says to ask'}"
                 )
+            case WrittenResult(line=line):
+                raise AnswerNeeded(f"{line}: a person must decide whether the new geometry stays")
             case StepFailure(problem=problem):
                 raise AnswerNeeded(f"{problem} A person must choose: {', '.join(question.choices)}")

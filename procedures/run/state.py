@@ -99,6 +99,7 @@ class RunState:
     proposed: events.Proposed | None = None
     committed: events.Committed | None = None
     judged: events.ResultValidated | None = None
+    accepted: events.ResultAccepted | None = None
     rolled_back: bool = False
     rolling_back: bool = False
     provisional: events.ProvisionalApplied | None = None
@@ -149,8 +150,13 @@ class RunState:
         return sum(value.rejections for key, value in self.sets.items() if key.phase is phase)
 
     def held_out(self, phase: Phase) -> list[tuple[float, float, float]]:
-        """Deviations at held-out poses, mm, references left out."""
-        return [sample.deviation_mm for sample in self.samples(phase) if sample.orientation > 1]
+        """Deviations, mm, at the held-out poses that are measured before and after; no references."""
+        return [sample.deviation_mm for sample in self.samples(phase) if self._is_compared(sample)]
+
+    def _is_compared(self, sample: events.RecordTaken) -> bool:
+        if sample.orientation == 1 or self.identified is None:
+            return sample.orientation > 1
+        return sample.orientation <= len(self.identified.held_out[sample.at.point - 1])
 
 
 def fold(history: Iterable[events.Event]) -> RunState:
@@ -201,6 +207,8 @@ def apply(state: RunState, event: events.Event) -> RunState:  # noqa: C901, PLR0
             return _without_position(replace(state, committed=event))
         case events.ResultValidated():
             return replace(state, judged=event)
+        case events.ResultAccepted():
+            return replace(state, accepted=event)
         case events.RolledBack():
             return _rolled_back(_without_position(replace(state, rolling_back=False)))
         case events.Paused(at_once=True):

@@ -122,7 +122,7 @@ class CloseSet(StepOfSet):
 class Compute(BaseStep):
     """A step that moves nothing."""
 
-    kind: Literal["lend", "take back", "identify", "propose", "commit", "judge", "roll back"]
+    kind: Literal["lend", "take back", "identify", "propose", "commit", "judge", "accept", "roll back"]
 
 
 Step = Annotated[Locate | Move | Place | Sample | Revisit | CloseSet | Compute, Field(discriminator="kind")]

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from hexacell.acceptance import HeldOutVerdict
+from hexacell.decision import Verdict
 from procedures.journal.journal import read_entries
 from procedures.journal.line_format import encode
 from procedures.run import events
@@ -42,7 +42,7 @@ def manipulated(demo, tmp_path):
     entries = list(read_entries(demo.run / "journal.jsonl"))
     for place, entry in enumerate(entries):
         if isinstance(entry.event, events.ResultValidated):
-            judged = entry.event.model_copy(update={"verdict": HeldOutVerdict.WORSE, "line": "Not at all."})
+            judged = entry.event.model_copy(update={"verdict": Verdict.FAIL, "line": "Not at all."})
             entries[place] = replace(entry, event=judged)
             line = entry.number
     path = tmp_path / "journal.jsonl"
@@ -55,7 +55,7 @@ def test_a_manipulated_journal_is_different_and_the_record_is_named(typed_here, 
     outcome = typed_here("replay", path, "--only", "results")
     assert outcome.code == 1
     first, *others, verdict = outcome.out.splitlines()
-    assert first == f"NO  line {line}, judge: verdict: recorded worse than before, replayed pass"
+    assert first == f"NO  line {line}, judge: verdict: recorded fail, replayed pass"
     assert others[0].startswith(f"--  line {line}, judge: line: recorded Not at all., replayed ")
     assert verdict.endswith(f": different, first in line {line} (judge)")
     assert max(map(len, outcome.out.splitlines())) <= 80

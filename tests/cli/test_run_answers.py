@@ -110,14 +110,15 @@ class TestUnattendedRun:
         assert fast_cell.controller.read_bytes() == config
 
     def test_a_result_out_of_limits_is_rolled_back_bit_for_bit(self, typed_here, fast_cell, demo):
-        fast_cell.edit(("mean_deviation_mm = 0.05", "mean_deviation_mm = 0.0001"))
+        fast_cell.edit(("position_mm = 0.15 ", "position_mm = 0.0001 "))
         run = fast_cell.rewound(demo.run, before="propose")
         config = fast_cell.controller.read_bytes()
         outcome = typed_here("run", fast_cell.cell, "--resume", run, "--json")
         assert outcome.code == outcome.document["exit_code"] == 1
         line = outcome.document["line"]
         assert line.endswith(
-            "(limit 0.0001): out of limits; rolled back, the controller has its old config"
+            ": not evaluated (U is above the limit); rolled back, the controller has its old config, "
+            "the worse one"
         )
         assert "the old geometry is back in the controller" in outcome.err
         assert fast_cell.controller.read_bytes() == config
@@ -155,7 +156,7 @@ class TestUnattendedRun:
         assert outcome.code == outcome.document["exit_code"] == 1
         document = outcome.document
         assert re.fullmatch(
-            r"2 poses at held-out points; mean deviation \d\.\d{3} mm \(limit 0\.05\): out of limits",
+            r"3 poses at held-out points; mean deviation \d\.\d{3} mm \(limit 0\.05\): fail",
             document["line"],
         )
         assert document["measurements"] is None
@@ -186,7 +187,7 @@ class TestAPersonAtTheTerminal:
         process, question, cell = waiting
         lines = question.replace("\r\n", "\n").splitlines()
         assert {"--- config-before", "+++ config-after"} <= set(lines)
-        assert len([line for line in lines if line.startswith("ok  ")]) == 4
+        assert len([line for line in lines if line.startswith("ok  ")]) == 5
         terminal.type("yes\n")
         assert ended(process, terminal) == 0
         assert cell.controller.read_bytes() != (demo.run / "config-before").read_bytes()
@@ -224,10 +225,12 @@ class TestAPersonAtTheTerminal:
         placed = [e for e in read_journal(run / "journal.jsonl") if isinstance(e, events.GaugesPlaced)]
         assert len(placed) == 1
         terminal.type("x\n")  # an answer as good as Enter; where no question is open, no letter known
+        terminal.read_until("Press Enter when they are in place. ")
+        terminal.type("\n")
         assert ended(process, terminal) == 1
         assert process.out.count("Letters, each with Enter") == 1, "the second question was still open"
-        assert "out of limits" in process.out
-        assert "6/6" in terminal.shown  # the bar
+        assert ": fail" in process.out
+        assert "9/9" in terminal.shown  # the bar
         assert "held-out point 1, before  2 records" in process.out  # not swallowed by the bar's terminal
 
     def test_pauses_undoes_and_resumes_by_letters(self, quick_cell, start, terminal):

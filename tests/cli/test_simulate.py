@@ -66,8 +66,9 @@ def test_a_run_calibrates_the_simulated_cell_over_its_ports(served, typed_here, 
     assert outcome.code == 0, outcome.err
     line = outcome.document["line"]
     assert re.fullmatch(
-        r"35 parameters, 3[0-5] records at 5 points; mean deviation at held-out points "
-        r"\d\.\d\d -> 0\.\d{3} mm \(limit 0\.5\): pass",
+        r"35 parameters, 3[0-5] records at 5 points; mean deviation at held-out poses "
+        r"\d\.\d\d -> 0\.\d{3} mm; position error at the task poses \d\.\d{3} \+- \d\.\d{3} mm "
+        r"\(limit 20\): pass",
         line,
     ), line
     truth = tomllib.loads(quick_cell.cell.read_text())["simulation"]["geometry"]

@@ -106,7 +106,7 @@ def test_simulated_hexaglide_is_table_1():
     assert actual["l"] == (583.941, 578.279, 610.563, 614.068, 585.272, 593.461)
     assert settings.identification.points == (P1, P2, P3, P4, P5)
     assert settings.identification.orientations == 11
-    assert settings.verification.points == (P6, (100, 100, 550))
+    assert settings.verification.points == (P6, (100, 100, 550), (0, -100, 600))
     assert settings.limits.gauge_travel_mm == 5
     assert settings.tolerances.model_dump() == {"S_mm": 7, "B_mm": 7, "l_mm": 7, "ball_mm": 0}
     assert {settings.noise.encoder_mm, settings.noise.gauge_mm} == {0.01}

@@ -27,9 +27,12 @@ HELD_OUT_ORIENTATIONS = 2
 SMALL: dict[str, Any] = {
     "identification.points": POINTS,
     "identification.orientations": ORIENTATIONS,
+    "verification.points": ((-100.0, -50.0, 450.0), (100.0, 100.0, 550.0)),
     "verification.orientations": HELD_OUT_ORIENTATIONS,
     "noise.encoder_mm": 0.001,
     "noise.gauge_mm": 0.001,
+    "acceptance.position_mm": 5.0,
+    "acceptance.orientation_deg": 2.0,
     "timing.readings": 2,
     "timing.clock_factor": 1000.0,
     "encoders.heartbeat_ms": 65535,
@@ -45,8 +48,7 @@ SMALL: dict[str, Any] = {
 WHATEVER_IS_FREE: dict[str, Any] = {"guards.free_disk_mb": 0.0}
 """Nobody looks beforehand how full the disk is."""
 NEVER_GOOD_ENOUGH: dict[str, Any] = {
-    "acceptance.mean_deviation_mm": 1e-9,
-    "acceptance.max_deviation_mm": 1e-9,
+    "acceptance.position_mm": 1e-9,
 }
 """No result passes this, so that what was written is rolled back."""
 PROVISIONAL: dict[str, Any] = {"identification.provisional": True}

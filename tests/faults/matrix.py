@@ -40,6 +40,7 @@ COMPUTING = {
     "propose": "proposing",
     "commit": "committing",
     "judge": "judging",
+    "accept": "judging",
     "roll back": "rolling back",
 }
 

@@ -16,8 +16,9 @@ from hexacell.cell.recovery import Action
 from hexacell.clock import CellClock
 from hexacell.errors import HexacellError
 from hexacell.kinematics.pose import Pose
+from hexacell.reporting.verification import Verification
 from procedures.devices.device_set import Devices, MountedGauge
-from procedures.run.questions import GaugePlacement, PendingChange, Question, StepFailure
+from procedures.run.questions import GaugePlacement, PendingChange, Question, StepFailure, WrittenResult
 
 HALF_TRAVEL_MM = 6.25
 
@@ -156,6 +157,7 @@ class Approver:
         self.asked: list[tuple[Sequence[AcceptanceGate], str]] = []
         self.problems: list[str] = []
         self.decisions: list[Action] = []
+        self.verifications: list[Verification] = []
 
     async def ask(self, question: Question) -> str | None:
         match question.subject:
@@ -164,6 +166,9 @@ class Approver:
                 return question.default
             case PendingChange(gates=gates, diff=diff):
                 self.asked.append((gates, diff))
+                return self.name
+            case WrittenResult(verification=verification):
+                self.verifications.append(verification)
                 return self.name
             case StepFailure(problem=problem):
                 self.problems.append(problem)

@@ -18,9 +18,11 @@ from hexacell.presentation.documents import run_document
 from hexacell.presentation.run import UNVERIFIED, clock_notice, closing_lines, demo_opening, resume_hint
 from hexacell.runs.run_folder import find_run, new_run
 from procedures.calibration.workflow import Mode, expected_records
+from procedures.journal.journal import read_journal
 from procedures.run import events
 from procedures.run.commands import CommandQueue
 from procedures.run.questions import UnattendedOperator
+from procedures.run.state import fold
 
 
 def main(options: argparse.Namespace) -> ExitCode:
@@ -59,7 +61,8 @@ def _run_to_end(request: RunRequest, console: Console) -> ExitCode:
     if factor != 1.0:
         console.print(clock_notice(factor))
     ended = execute_run(request, console)
-    console.document(run_document(request, ended))
+    judged = fold(read_journal(request.folder.journal)).judged
+    console.document(run_document(request, ended, judged))
     for line in closing_lines(request, ended):
         console.print(line)
     return ExitCode(ended.exit_code)

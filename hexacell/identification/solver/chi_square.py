@@ -18,6 +18,9 @@ import numpy as np
 from scipy.special import chdtr, chdtrc
 
 SMALLEST_PROBABILITY = 1e-3
+CONTRADICTED_RATIO = 10.0
+"""Residuals over the stated noise from which noise cannot explain them, only a wrong model or data."""
+
 RATIOS_THAT_MATTER = (0.9, 1.1)
 """Ratios in between agree: with very many records a percent too much is significant but irrelevant."""
 

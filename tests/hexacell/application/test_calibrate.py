@@ -8,11 +8,11 @@ import json
 import numpy as np
 import pytest
 
-from hexacell.acceptance import HeldOutVerdict
 from hexacell.application.calibration_run import calibrate
 from hexacell.cell.loader import load_cell
 from hexacell.controller_config.change import ConfigChange, fingerprint
 from hexacell.controller_config.write_back import Receipt
+from hexacell.decision import Verdict
 from hexacell.errors import CellBusy, ExitCode, FileError, UsageError
 from hexacell.measurements.csv_file import read_measurements
 from hexacell.runs.run_folder import RunFolder
@@ -26,10 +26,10 @@ from procedures.run.steps import Phase
 
 def test_a_calibration_passes(finished) -> None:
     assert finished.ended.exit_code == ExitCode.DONE
-    assert "35 parameters, 18 records at 2 points; mean deviation at held-out points" in finished.ended.line
+    assert "35 parameters, 18 records at 2 points; mean deviation at held-out poses" in finished.ended.line
     judged = fold(finished.history).judged
     assert judged
-    assert judged.verdict is HeldOutVerdict.PASS
+    assert judged.verdict is Verdict.PASS
 
 
 def test_listeners_get_the_events_of_the_journal(finished) -> None:

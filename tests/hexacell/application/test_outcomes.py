@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from hexacell.acceptance import AcceptanceGate, HeldOutVerdict
+from hexacell.acceptance import AcceptanceGate
 from hexacell.cell.simulation import SimulatedFault
 from hexacell.controller_config.change import ConfigChange
+from hexacell.decision import Verdict
 from hexacell.errors import AnswerNeeded, DeviceError, ExitCode, FileError, LimitError, WriteBackUndone
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS, hexaglide_geometry
@@ -94,7 +95,7 @@ async def test_a_result_worse_than_before_is_rolled_back_bit_for_bit(proposed, f
     ended = await site.calibrate(at(events.Committed, lambda: bend(site, 6.0)), resume=True)
     assert ended.exit_code == ExitCode.OUT_OF_LIMITS
     assert ended.line.endswith("rolled back, the controller has its old config")
-    assert site.happened(events.ResultValidated)[0].verdict is HeldOutVerdict.WORSE
+    assert site.happened(events.ResultValidated)[0].verdict is Verdict.FAIL
     assert site.config == finished.config_before
     assert site.simulated.machine._geometry.geometry.largest_difference(_drawing(site)) == 0.0
 
@@ -108,7 +109,7 @@ async def test_a_better_result_out_of_limits_is_rolled_back(proposed, finished) 
     site = proposed()
     ended = await site.calibrate(at(events.Committed, lambda: bend(site, 0.7)), resume=True)
     assert ended.exit_code == ExitCode.OUT_OF_LIMITS
-    assert site.happened(events.ResultValidated)[0].verdict is HeldOutVerdict.OUT_OF_LIMITS
+    assert site.happened(events.ResultValidated)[0].verdict is Verdict.FAIL
     assert site.config == finished.config_before
 
 

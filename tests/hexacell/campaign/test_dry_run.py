@@ -51,7 +51,8 @@ def test_minutes_are_of_everything_that_is_measured(result, make_plan):
     """Held-out poses are reached on straight lines."""
     plan = make_plan(**SMALL)
     timing = plan.settings.timing
-    held_out = 2 * (2 * 6 + 2) * (timing.move_s + timing.window_s) / 60.0
+    poses = 3 * (6 + 1) + 3 * (6 + 5 + 1)
+    held_out = poses * (timing.move_s + timing.window_s) / 60.0
     assert result.minutes == pytest.approx(plan.budget.time_model.minutes(result.records, 2) + held_out)
 
 

@@ -58,7 +58,7 @@ def test_with_the_target_reached_the_set_is_closed_and_the_geometry_identified(
 def test_the_budget_of_records_ends_the_measurements_between_points(make_rig, story) -> None:
     rig = make_rig(identification__budget_records=10)
     assert rig.calibration.next_step(fold(story().whole(9))).key == "identify"
-    assert expected_records(rig.cell.settings, rig.calibration.mode) == 10 + 2 + 2 * 2 * 4
+    assert expected_records(rig.cell.settings, rig.calibration.mode) == 10 + 2 + 2 * 2 * 4 + 2 * 2
 
 
 def test_chosen_points_keep_their_numbers(make_rig) -> None:
@@ -82,7 +82,7 @@ def test_listed_poses_are_run(make_rig, story) -> None:
     step = calibration.next_step(fold([]))
     assert isinstance(step, Move)
     assert step.pose == here[0][0].as_tuple()
-    assert expected_records(rig.cell.settings, rig.calibration.mode, listed) == 6 + 2 + 2 * 2 * 4
+    assert expected_records(rig.cell.settings, rig.calibration.mode, listed) == 6 + 2 + 2 * 2 * 4 + 2 * 2
     back = calibration.next_step(fold(story().whole(3)[:-2]))
     assert isinstance(back, Move)
     assert back.orientation < 3

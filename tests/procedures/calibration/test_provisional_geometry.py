@@ -112,7 +112,7 @@ async def require_finished(rig: Any) -> None:
     assert kinds(rig)[-3:] == ["identified", "committed", "ended"]
     assert "taken back" in kinds(rig)
     state = fold(read_journal(rig.folder.journal))
-    assert [len(measured.samples) for measured in state.sets.values()] == [9, 9, 3, 3, 3, 3]
+    assert [len(measured.samples) for measured in state.sets.values()] == [9, 9, 3, 3, 5, 5]
 
 
 async def test_an_abort_at_a_reference_pose_reverts_the_provisional_geometry(rig) -> None:

@@ -10,14 +10,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from hexacell.acceptance import HeldOutVerdict
 from hexacell.campaign import planner as module
 from hexacell.campaign import pose_chooser
 from hexacell.campaign.decisions import MeasurePose
 from hexacell.campaign.stopping_rules import REFUSALS
+from hexacell.decision import Verdict
 from hexacell.errors import LimitError
 from hexacell.kinematics.pose import Pose
 from hexacell.motion.paths import find_route
+from hexacell.reporting.verification import Verification
 from procedures.calibration import path_planning
 from procedures.calibration.identification_steps import IdentificationSteps
 from procedures.calibration.workflow import Mode, expected_records
@@ -37,11 +38,16 @@ ENDED = events.Ended(exit_code=0, line="over")
 PASS, WORSE, OUT, UNKNOWN = (
     events.ResultValidated(verdict=verdict, line="so it is")
     for verdict in (
-        HeldOutVerdict.PASS,
-        HeldOutVerdict.WORSE,
-        HeldOutVerdict.OUT_OF_LIMITS,
-        HeldOutVerdict.NOT_EVALUATED,
+        Verdict.PASS,
+        Verdict.FAIL,
+        Verdict.FAIL,
+        Verdict.NOT_EVALUATED,
     )
+)
+OFFERED = events.ResultValidated(
+    verdict=Verdict.CONDITIONAL_FAIL,
+    line="so it is",
+    verification=Verification(verdict=Verdict.CONDITIONAL_FAIL, before_mm=3.0, after_mm=0.2),
 )
 LOCATED = events.Located(pose=(100.0, -100.0, 500.0, 0.0, 0.0, 0.0))
 WITHDRAWING = events.StepBegun(step=Compute(kind="roll back"))
@@ -147,6 +153,12 @@ TABLE: Table = {
     "out of limits": (lambda s, t: [*t["after"], OUT], "roll back"),
     "no evidence": (lambda s, t: [*t["after"], UNKNOWN], "roll back"),
     "rolled back": (lambda s, t: [*t["after"], WORSE, events.RolledBack()], None),
+    "kept by a person": (
+        lambda s, t: [*t["after"], OFFERED, events.ResultAccepted(by="a tester")],
+        None,
+    ),
+    "better but not good enough": (lambda s, t: [*t["after"], OFFERED], "accept"),
+    "kept by nobody": (lambda s, t: [*t["after"], OFFERED, events.ResultAccepted(by=None)], "roll back"),
     "rolling back interrupted": (lambda s, t: [*t["after"], WORSE, INTERRUPTED], "roll back"),
     "over": (lambda s, t: [ENDED], None),
 }
@@ -354,7 +366,7 @@ def _passes(step: Any, following: Any) -> bool:
     return isinstance(step, Move) and isinstance(following, Move)
 
 
-@pytest.mark.parametrize(("mode", "seen"), [(Mode.OPTIMISE, 36), (Mode.CHECK, 8)])
+@pytest.mark.parametrize(("mode", "seen"), [(Mode.OPTIMISE, 40), (Mode.CHECK, 8)])
 def test_the_number_of_expected_records(make_rig, mode: Mode, seen: int) -> None:
     assert expected_records(make_rig(mode).cell.settings, mode) == seen
 
@@ -387,7 +399,7 @@ def test_the_steps_of_a_whole_run_in_their_order(recording) -> None:
         "propose",
         "commit",
         "locate",
-        *of_set("after-V1", HELD_OUT),
-        *of_set("after-V2", HELD_OUT),
+        *of_set("after-V1", 2 * HELD_OUT - 1),
+        *of_set("after-V2", 2 * HELD_OUT - 1),
         "judge",
     ]

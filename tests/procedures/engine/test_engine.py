@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from hexacell.acceptance import HeldOutVerdict
+from hexacell.decision import Verdict
 from hexacell.errors import (
     AnswerNeeded,
     DeviceError,
@@ -261,21 +261,20 @@ async def test_a_listener_that_fails_stops_motion(script, journal, bench) -> Non
 
 
 JUDGED = {
-    verdict: events.ResultValidated(verdict=verdict, line=f"so it is: {verdict}")
-    for verdict in HeldOutVerdict
+    verdict: events.ResultValidated(verdict=verdict, line=f"so it is: {verdict}") for verdict in Verdict
 }
 
 
 @pytest.mark.parametrize(
     ("happened", "code", "line"),
     [
-        ([JUDGED[HeldOutVerdict.PASS]], 0, "so it is: pass"),
-        ([JUDGED[HeldOutVerdict.OUT_OF_LIMITS]], 1, "so it is: out of limits"),
-        ([JUDGED[HeldOutVerdict.NOT_EVALUATED]], 1, "so it is: not evaluated"),
+        ([JUDGED[Verdict.PASS]], 0, "so it is: pass"),
+        ([JUDGED[Verdict.FAIL]], 1, "so it is: fail"),
+        ([JUDGED[Verdict.NOT_EVALUATED]], 1, "so it is: not evaluated"),
         (
-            [JUDGED[HeldOutVerdict.WORSE], events.RolledBack()],
+            [JUDGED[Verdict.FAIL], events.RolledBack()],
             1,
-            "so it is: worse than before; rolled back, the controller has its old config",
+            "so it is: fail; rolled back, the controller has its old config",
         ),
         ([], 1, "nothing was judged"),
     ],

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from drivers.errors import GaugeAtEnd
-from hexacell.acceptance import HeldOutVerdict
+from hexacell.decision import Verdict
 from hexacell.errors import HexacellError, LimitError
 from hexacell.robot_model import robot_of
 from procedures.calibration.workflow import Calibration, Mode
@@ -255,7 +255,7 @@ MANIPULATIONS: dict[str, tuple[type[Any], dict[str, Any], int, Scope, str]] = {
         "result.covariance",
     ),
     "a gate": (events.Proposed, {"gates": ()}, 1, Scope.RESULTS, "gates"),
-    "the verdict": (events.ResultValidated, {"verdict": HeldOutVerdict.WORSE}, 1, Scope.RESULTS, "verdict"),
+    "the verdict": (events.ResultValidated, {"verdict": Verdict.FAIL}, 1, Scope.RESULTS, "verdict"),
     "the end": (events.Ended, {"exit_code": 1}, 1, Scope.ALL, "exit_code"),
 }
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from hexacell.acceptance import HeldOutVerdict
+from hexacell.decision import Verdict
 from procedures.run import events
 from procedures.run.state import RunState, apply, fold
 from procedures.run.steps import CloseSet, Phase, SetKey
@@ -134,7 +134,7 @@ def test_held_out_deviations_leave_references_out(story) -> None:
         (events.Identified(result=an_identification(), held_out=()), "identified"),
         (events.Proposed(gates=()), "proposed"),
         (events.Committed(approved_by="a tester"), "committed"),
-        (events.ResultValidated(verdict=HeldOutVerdict.PASS, line="pass"), "judged"),
+        (events.ResultValidated(verdict=Verdict.PASS, line="pass"), "judged"),
         (events.Ended(exit_code=0, line="pass"), "ended"),
     ],
 )
@@ -160,7 +160,7 @@ def test_after_these_events_the_position_is_unknown(event: Any, story) -> None:
     assert fold([story().arrived(2), event]).at_pose is None
 
 
-WORSE = events.ResultValidated(verdict=HeldOutVerdict.WORSE, line="worse")
+WORSE = events.ResultValidated(verdict=Verdict.FAIL, line="worse")
 
 
 def test_a_rollback_after_a_verdict_is_kept_in_the_state() -> None:

@@ -11,11 +11,13 @@ from hypothesis import strategies as st
 from pydantic import TypeAdapter, ValidationError
 
 from drivers.interfaces import DeviceIdentity
-from hexacell.acceptance import AcceptanceGate, HeldOutVerdict
+from hexacell.acceptance import AcceptanceGate
 from hexacell.cell.fields import Frozen
 from hexacell.cell.recovery import Action, FailureKind
+from hexacell.decision import Verdict
 from hexacell.identification.solver.result import DataFaultKind
 from hexacell.reporting.result import OutlierRecord
+from hexacell.reporting.verification import JudgedError, ModelTest, Verification, VerifiedAccuracy
 from procedures.journal.journal import Journal, read_journal
 from procedures.run import events
 from procedures.run.steps import (
@@ -84,7 +86,9 @@ some_step: st.SearchStrategy[Any] = st.one_of(
     st.builds(Sample, at=set_key, orientation=count, pose=six),
     st.builds(Revisit, at=set_key),
     st.builds(CloseSet, at=set_key),
-    st.builds(Compute, kind=st.sampled_from(["identify", "propose", "commit", "judge", "roll back"])),
+    st.builds(
+        Compute, kind=st.sampled_from(["identify", "propose", "commit", "judge", "accept", "roll back"])
+    ),
 )
 reading = st.builds(
     events.Reading,
@@ -102,6 +106,28 @@ geometry = st.fixed_dictionaries(
     }
 )
 gate = st.builds(AcceptanceGate, name=text, passed=st.booleans(), sentence=text, needs_person=st.booleans())
+judged_error = st.builds(
+    JudgedError, value=number, expanded=number, limit=number, verdict=st.sampled_from(Verdict)
+)
+verification = st.builds(
+    Verification,
+    verdict=st.sampled_from(Verdict),
+    tests=st.lists(st.builds(ModelTest, name=text, passed=st.booleans(), sentence=text), max_size=2).map(
+        tuple
+    ),
+    accuracy=st.none()
+    | st.builds(
+        VerifiedAccuracy,
+        position=judged_error,
+        orientation=judged_error,
+        poses=count,
+        task_named=st.booleans(),
+        worst=six,
+    ),
+    before_mm=st.none() | number,
+    after_mm=st.none() | number,
+    is_worse=st.booleans(),
+)
 outlier = st.builds(
     OutlierRecord,
     point=count,
@@ -149,10 +175,17 @@ some_event: st.SearchStrategy[Any] = st.one_of(
             frame=text,
         ),
         held_out=st.lists(st.lists(six, max_size=2).map(tuple), max_size=2).map(tuple),
+        held_out_after=st.lists(st.lists(six, max_size=2).map(tuple), max_size=2).map(tuple),
     ),
     st.builds(events.Proposed, gates=st.lists(gate, max_size=3).map(tuple)),
     st.builds(events.Committed, approved_by=text),
-    st.builds(events.ResultValidated, verdict=st.sampled_from(HeldOutVerdict), line=text),
+    st.builds(
+        events.ResultValidated,
+        verdict=st.sampled_from(Verdict),
+        line=text,
+        verification=st.none() | verification,
+    ),
+    st.builds(events.ResultAccepted, by=st.none() | text, asked=st.booleans()),
     st.builds(events.RolledBack),
     st.builds(events.Paused, at_once=st.booleans()),
     st.builds(events.Resumed),
@@ -207,5 +240,6 @@ KINDS = (
     *("started", "begun", "arrived", "placed", "sampled", "refused", "closed", "voided", "identified"),
     *("lent", "taken back", "proposed", "committed", "judged", "rolled back", "interrupted", "ended"),
     *("located", "undone", "confirmed", "paused", "resumed", "failed", "declined", "tripped"),
+    "accepted",
 )
 """Journals on disk say these words: they must never change."""

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import pytest
 
 from drivers.errors import GaugeAtEnd
-from hexacell.acceptance import HeldOutVerdict
+from hexacell.decision import Verdict
 from hexacell.errors import DeviceError, ExitCode, FileError, WriteBackUndone
 from procedures.run import events
+from procedures.run.questions import UnattendedOperator
 from tests.procedures.runs.listening import (
     before_sampling,
     commanding,
@@ -22,19 +25,67 @@ async def test_a_result_worse_than_before_is_rolled_back_bit_for_bit(recording, 
     rig = replayed(with_tiny_deviations_before(recording.until(events.Proposed)))
     ended = await rig.run()
     assert ended.exit_code == ExitCode.OUT_OF_LIMITS
-    assert ended.line.endswith("worse than before; rolled back, the controller has its old config")
-    assert happened(rig, events.ResultValidated)[0].verdict is HeldOutVerdict.WORSE
+    assert ended.line.endswith("(worse than before); rolled back, the controller has its old config")
+    assert happened(rig, events.ResultValidated)[0].verdict is Verdict.FAIL
     assert happened(rig, events.Committed)
     assert rig.config == recording.config_before
     assert rig.controller.log.count("reload") == 2
     assert commanding(rig).largest_difference(rig.calibration.robot.controller) == 0.0
 
 
-async def test_a_better_result_out_of_limits_is_rolled_back(recording, replayed) -> None:
-    rig = replayed(recording.until(events.Proposed), acceptance__mean_deviation_mm=0.0001)
-    assert (await rig.run()).exit_code == ExitCode.OUT_OF_LIMITS
-    assert happened(rig, events.ResultValidated)[0].verdict is HeldOutVerdict.OUT_OF_LIMITS
+async def test_a_better_result_out_of_limits_is_rolled_back_if_nobody_keeps_it(recording, replayed) -> None:
+    rig = replayed(recording.until(events.Proposed), acceptance__position_mm=0.0001)
+    rig.operator.name = None
+    ended = await rig.run()
+    assert ended.exit_code == ExitCode.OUT_OF_LIMITS
+    assert ended.line.endswith("rolled back, the controller has its old config, the worse one")
+    assert happened(rig, events.ResultValidated)[0].verdict is Verdict.FAIL
+    assert happened(rig, events.ResultAccepted) == [events.ResultAccepted(by=None)]
     assert rig.config == recording.config_before
+
+
+async def test_a_better_result_out_of_limits_stays_if_a_person_keeps_it(recording, replayed) -> None:
+    rig = replayed(recording.until(events.Proposed), acceptance__position_mm=0.0001)
+    ended = await rig.run()
+    assert ended.exit_code == ExitCode.OUT_OF_LIMITS
+    assert ended.line.endswith(": fail; kept by a tester")
+    (shown,) = rig.operator.verifications
+    assert shown.before_mm > shown.after_mm
+    assert rig.config == recording.config_after
+
+
+@pytest.mark.parametrize("attended", [True, False])
+async def test_a_conditional_verdict_needs_a_person(recording, replayed, attended: bool) -> None:
+    rig = replayed(recording.until(events.Proposed), acceptance__position_mm=limit_within(recording))
+    if not attended:
+        object.__setattr__(rig.performer, "operator", UnattendedOperator())
+    ended = await rig.run()
+    assert happened(rig, events.ResultValidated)[0].verdict.is_conditional
+    assert ended.exit_code == (ExitCode.DONE if attended else ExitCode.ANSWER_NEEDED)
+    assert rig.config == (recording.config_after if attended else recording.config_before)
+    assert rig.folder.proposal.exists()
+
+
+async def test_a_run_killed_before_the_decision_asks_again(recording, replayed) -> None:
+    rig = replayed(recording.until(events.Proposed), acceptance__position_mm=0.0001)
+    broken = KeyboardInterrupt("killed")
+    with pytest.raises(KeyboardInterrupt):
+        await rig.run(on(events.ResultValidated, lambda: raise_(broken)))
+    assert rig.config == recording.config_after
+    assert (await rig.run()).line.endswith("kept by a tester")
+
+
+def limit_within(recording: Any) -> float:
+    """A limit that neither passes nor fails the recorded result."""
+    (judged,) = (event for event in recording.history if isinstance(event, events.ResultValidated))
+    assert judged.verification is not None
+    assert judged.verification.accuracy is not None
+    position = judged.verification.accuracy.position
+    return float(position.value + 0.5 * position.expanded)
+
+
+def raise_(error: BaseException) -> None:
+    raise error
 
 
 @pytest.mark.parametrize("key", ["after-V1/o01/sample", "after-V1/o02/sample", "after-V2/o03/sample"])
@@ -45,7 +96,7 @@ async def test_a_ball_outside_the_travel_at_verification_causes_a_rollback(
     at_end = GaugeAtEnd("is at an end of its travel", subject="gauge x")
     fault = before_sampling(key, lambda: rig.gauges[0].failures.append(at_end))
     assert (await rig.run(fault)).exit_code == ExitCode.OUT_OF_LIMITS
-    assert happened(rig, events.ResultValidated)[0].verdict is HeldOutVerdict.WORSE
+    assert happened(rig, events.ResultValidated)[0].verdict is Verdict.FAIL
     assert happened(rig, events.RolledBack)
     assert rig.config == recording.config_before
 

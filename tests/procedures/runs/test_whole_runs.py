@@ -23,8 +23,8 @@ from tests.procedures.runs.listening import happened
 def test_a_whole_run_passes(recording) -> None:
     ended = recording.history[-1]
     assert ended.exit_code == ExitCode.DONE
-    assert ended.line.startswith("35 parameters, 18 records at 2 points; mean deviation at held-out points")
-    assert ended.line.endswith("(limit 0.2): pass")
+    assert ended.line.startswith("35 parameters, 18 records at 2 points; mean deviation at held-out poses")
+    assert ended.line.endswith("(limit 5): pass")
     assert recording.controller_log[0] == "prepare"
     assert recording.controller_log.count("reload") == 1
 
@@ -85,7 +85,7 @@ async def test_a_check_out_of_limits_is_reported(make_rig) -> None:
     rig = make_rig(Mode.CHECK, acceptance__mean_deviation_mm=1e-6)
     ended = await rig.run()
     assert ended.exit_code == ExitCode.OUT_OF_LIMITS
-    assert ended.line.endswith("out of limits")
+    assert ended.line.endswith(": fail")
 
 
 def test_samples_are_taken_only_where_the_robot_stands(recording) -> None:

@@ -1,0 +1,244 @@
+"""The verification of a result: is the model right, how accurate is the robot, and what is decided?
+
+Three things that are kept apart. *Evidence*: tests of the model, each at a probability of 0.1 % to fail
+although the model is right. *Accuracy*: the error that the written geometry makes at the task poses,
+by an estimate that contains the held-out records as well, with its expanded uncertainty. *Decision*: the
+verdict on that error under the limit, which needs the evidence. See ``docs/method.md``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
+
+from hexacell.acceptance import DeviationStatistics, is_worse
+from hexacell.campaign.task_accuracy import Task
+from hexacell.cell.fields import Frozen, SixNumbers
+from hexacell.cell.model import CellSettings
+from hexacell.decision import Verdict, decide, worst_verdict
+from hexacell.identification.diagnostics.model_tests import leave_one_point_out, prediction_test, update
+from hexacell.identification.solver.chi_square import SMALLEST_PROBABILITY, ChiSquareTest, ChiSquareVerdict
+from hexacell.identification.solver.result import Identification
+from hexacell.measurements.records import MeasurementSet
+from hexacell.reporting.result import IdentificationResult
+from hexacell.robot_model import Robot
+from hexacell.stated_effects import stated_effects
+from hexacell.uncertainty.budget import UncertaintyBudget
+from hexacell.uncertainty.statement import LargestError
+
+
+class ModelTest(Frozen):
+    """One test of the model, whether it holds, and that as a sentence for people."""
+
+    name: str
+    passed: bool
+    sentence: str
+
+
+class JudgedError(Frozen):
+    """The largest error over the task poses, its expanded uncertainty and limit, mm or deg; the verdict."""
+
+    value: float
+    expanded: float
+    limit: float
+    verdict: Verdict
+
+    @classmethod
+    def of(cls, error: LargestError, limit: float) -> JudgedError:
+        """The decision on an error."""
+        return cls(value=error.value, expanded=error.expanded, limit=limit, verdict=decide(error, limit))
+
+
+class VerifiedAccuracy(Frozen):
+    """The error of the written geometry at the task poses.
+
+    Attributes:
+        poses: their number, and whether the cell file names them; else they span the workspace.
+        worst: the pose with the largest position error, in the controller's frames.
+    """
+
+    position: JudgedError
+    orientation: JudgedError
+    poses: int
+    task_named: bool
+    worst: SixNumbers
+
+
+class Verification(Frozen):
+    """Evidence, accuracy and decision.
+
+    Attributes:
+        accuracy: none where the robot can take none of the task poses, or no estimate was found.
+        before_mm, after_mm: mean deviation at the held-out poses that were measured before and after.
+        is_worse: whether the deviations after are significantly larger.
+    """
+
+    verdict: Verdict
+    tests: tuple[ModelTest, ...] = ()
+    accuracy: VerifiedAccuracy | None = None
+    before_mm: float | None = None
+    after_mm: float | None = None
+    is_worse: bool = False
+
+    @property
+    def is_offered(self) -> bool:
+        """Whether a person may keep the result: it did not pass, but it is not worse than before."""
+        return self.verdict is not Verdict.PASS and self.after_mm is not None and not self.is_worse
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class HeldOut:
+    """What was measured at the held-out poses.
+
+    Attributes:
+        records: of both phases, for the identification; no point has the number of another.
+        before: deviations (n, 3), mm, with the old geometry.
+        after: with the new one, at the same poses.
+        left_travel: whether the ball left the gauges' travel with the new geometry.
+        temperature_range_k: of the temperatures read during the run; none without thermometers.
+    """
+
+    records: MeasurementSet
+    before: Sequence[tuple[float, float, float]]
+    after: Sequence[tuple[float, float, float]]
+    left_travel: bool = False
+    temperature_range_k: float | None = None
+
+
+def verify(settings: CellSettings, robot: Robot, found: Identification, held_out: HeldOut) -> Verification:
+    """Verify an identified geometry that commands now.
+
+    ``robot`` has it as the last of its provisional geometries.
+
+    Raises:
+        IdentifiabilityError: no geometry fits the held-out records.
+    """
+    before, after = DeviationStatistics.of(held_out.before), DeviationStatistics.of(held_out.after)
+    if held_out.left_travel:
+        return Verification(verdict=Verdict.FAIL, before_mm=before and before.mean_mm, is_worse=True)
+    if before is None or after is None:
+        return Verification(verdict=Verdict.NOT_EVALUATED)
+    updated = update(found, robot.problem(held_out.records))
+    tests = model_tests(found, updated)
+    accuracy = verified_accuracy(settings, robot, found, updated, held_out.temperature_range_k)
+    worse = is_worse(before, after, robot.noise)
+    return Verification(
+        verdict=_verdict(tests, accuracy, worse=worse),
+        tests=tests,
+        accuracy=accuracy,
+        before_mm=before.mean_mm,
+        after_mm=after.mean_mm,
+        is_worse=worse,
+    )
+
+
+def outcome_line(result: IdentificationResult, parameters: int, verified: Verification) -> str:
+    """The outcome of a calibration in one line: what was used, before and after, the error, the verdict."""
+    parts = [f"{parameters} parameters, {result.records} records at {result.points} points"]
+    if verified.before_mm is not None and verified.after_mm is not None:
+        means = f"{verified.before_mm:.2f} -> {verified.after_mm:.3f} mm"
+        parts.append(f"mean deviation at held-out poses {means}")
+    if verified.accuracy is not None:
+        parts.append(_stated(verified.accuracy))
+    return f"{'; '.join(parts)}: {verified.verdict}{_reason(verified)}"
+
+
+def _stated(accuracy: VerifiedAccuracy) -> str:
+    """The error that decides, position where both do alike."""
+    position, orientation = accuracy.position, accuracy.orientation
+    if worst_verdict([position.verdict, orientation.verdict]) is position.verdict:
+        name, error, unit = "position", position, "mm"
+    else:
+        name, error, unit = "orientation", orientation, "deg"
+    return (
+        f"{name} error at the task poses {error.value:.3f} +- {error.expanded:.3f} {unit} "
+        f"(limit {error.limit:g})"
+    )
+
+
+def _reason(verified: Verification) -> str:
+    """Why a verdict is not that of the stated error."""
+    failed = [test.sentence for test in verified.tests if not test.passed]
+    if verified.is_worse:
+        return " (worse than before)"
+    if verified.verdict is Verdict.NOT_EVALUATED and failed:
+        return f" ({failed[0].rstrip('.')})"
+    if verified.verdict is Verdict.NOT_EVALUATED and verified.accuracy is not None:
+        return " (U is above the limit)"
+    return ""
+
+
+def model_tests(found: Identification, updated: Identification) -> tuple[ModelTest, ...]:
+    """The tests of an identification; ``updated`` contains the held-out records as well."""
+    points = leave_one_point_out(found)
+    return (
+        _residual_test(found.goodness),
+        _prediction_test(
+            "held-out records", prediction_test(updated), "The held-out records", SMALLEST_PROBABILITY
+        ),
+        *(
+            _prediction_test(
+                f"point {one.point} from the others",
+                one.test,
+                f"The records of point {one.point}, predicted from the other points,",
+                SMALLEST_PROBABILITY / len(points),
+            )
+            for one in points
+        ),
+    )
+
+
+def verified_accuracy(
+    settings: CellSettings,
+    robot: Robot,
+    found: Identification,
+    updated: Identification,
+    temperature_range_k: float | None = None,
+) -> VerifiedAccuracy | None:
+    """The error that the geometry of ``found`` makes at the task poses, by the updated estimate."""
+    belief = robot.belief(updated)
+    task = Task.of(settings, robot, belief).reachable(belief)
+    if not len(task.poses) or not len(task.workspace):
+        return None
+    effects = stated_effects(settings, temperature_range_k)
+    budget_of = partial(UncertaintyBudget.of, task=task.poses, workspace=task.workspace)
+    first = budget_of(found, robot.belief(found), effects)
+    budget = budget_of(updated, belief, effects, earlier=first.parameter_columns)
+    errors = budget.errors_of(found.free - updated.free)
+    limits = settings.acceptance
+    return VerifiedAccuracy(
+        position=JudgedError.of(errors.position, limits.position_mm),
+        orientation=JudgedError.of(errors.orientation, limits.orientation_deg),
+        poses=len(task.poses),
+        task_named=bool(settings.task.poses),
+        worst=robot.to_command(task.poses.pose(errors.worst)).as_tuple(),
+    )
+
+
+def _verdict(tests: Sequence[ModelTest], accuracy: VerifiedAccuracy | None, *, worse: bool) -> Verdict:
+    if worse:
+        return Verdict.FAIL
+    if accuracy is None:
+        return Verdict.NOT_EVALUATED
+    evidence = Verdict.PASS if all(test.passed for test in tests) else Verdict.NOT_EVALUATED
+    return worst_verdict([evidence, accuracy.position.verdict, accuracy.orientation.verdict])
+
+
+def _residual_test(test: ChiSquareTest) -> ModelTest:
+    passed = test.agreement in {ChiSquareVerdict.AGREES, ChiSquareVerdict.TOO_SMALL}
+    return ModelTest(name="residuals", passed=passed, sentence=_sentence("The residuals", test, passed))
+
+
+def _prediction_test(name: str, test: ChiSquareTest, what: str, smallest: float) -> ModelTest:
+    """Records that are too close to their prediction are no evidence against the model."""
+    passed = test.probability >= smallest
+    return ModelTest(name=name, passed=passed, sentence=_sentence(what, test, passed))
+
+
+def _sentence(what: str, test: ChiSquareTest, passed: bool) -> str:
+    if passed:
+        return f"{what} agree with the stated noise."
+    if test.expected < 0.5:
+        return f"{what} prove nothing: there are no more records than unknowns."
+    return f"{what} are {test.ratio:.1f} times as far off as the stated noise explains."

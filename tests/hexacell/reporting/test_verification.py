@@ -1,0 +1,124 @@
+"""Evidence, accuracy and decision on simulated results of the bundled cell."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from hexacell.campaign.task_accuracy import Task
+from hexacell.cell.bundled import bundled_config
+from hexacell.cell.loader import Cell, load_cell
+from hexacell.decision import Verdict
+from hexacell.identification.diagnostics.pose_accuracy import error_jacobian
+from hexacell.identification.estimator import identify
+from hexacell.identification.solver.result import Identification
+from hexacell.measurements.records import MeasurementSet
+from hexacell.presentation.verification import verification_text
+from hexacell.reporting.result import IdentificationResult
+from hexacell.reporting.verification import HeldOut, Verification, outcome_line, verify
+from hexacell.robot_model import Robot, robot_of
+
+NOISE_MM = 0.01
+FAR = [(3.0, 2.0, -1.0), (2.0, 2.0, 2.0)]
+NEAR = [(0.010, 0.002, -0.004), (0.003, 0.012, 0.002)]
+
+
+def verified_by(cell: Cell, result: tuple[Robot, Identification], held_out: HeldOut) -> Verification:
+    robot, found = result
+    return verify(cell.settings, robot, found, held_out)
+
+
+@pytest.fixture(scope="module")
+def cell():
+    return load_cell(bundled_config("simulated-hexaglide"))
+
+
+@pytest.fixture(scope="module")
+def result(cell, visit):
+    """The robot with the identified geometry in its controller, and the identification."""
+    robot = robot_of(cell)
+    found = identify(robot.problem(visit(seed=2).measured(NOISE_MM, 1)))
+    return replace(robot, provisional=(found.geometry,)), found
+
+
+@pytest.fixture
+def held_out(visit):
+    """What three held-out points of six wide poses give, with another machine if one is named."""
+
+    def measure(*machine, before=FAR, after=NEAR, left_travel=False):
+        exact = visit(*machine, points=3, orientations=6, seed=7).measured(NOISE_MM, 3)
+        records = tuple(replace(record, point=record.point + 5) for record in exact.records)
+        return HeldOut(MeasurementSet(records), before, after, left_travel)
+
+    return measure
+
+
+def test_a_good_result_passes_and_its_true_error_is_within_u(cell, result, held_out, paper):
+    robot, found = result
+    verified = verified_by(cell, result, held_out())
+    assert verified.verdict is Verdict.PASS
+    assert all(test.passed for test in verified.tests)
+    assert [test.name for test in verified.tests][:2] == ["residuals", "held-out records"]
+    assert verified.accuracy is not None
+    position = verified.accuracy.position
+    belief = robot.belief(found)
+    task = Task.of(cell.settings, robot, belief)
+    actual = robot.mechanism.convention.free_parameters(robot.mechanism.normalize_frames(paper.actual)[0])
+    errors = error_jacobian(belief, task.poses, task.workspace) @ (found.free - actual)
+    true = np.linalg.norm(errors[:, :3], axis=-1).max()
+    assert abs(position.value - true) <= position.expanded
+    assert 0.02 < position.expanded < 0.1
+
+
+def test_held_out_records_that_were_not_predicted_are_no_evidence(cell, result, held_out, paper):
+    lengths = paper.actual["l"] + np.array([0.4, 0.0, 0.0, -0.4, 0.0, 0.0])
+    bent = type(paper.actual).of(paper.actual.parameters, {**paper.actual.document(), "l": lengths})
+    verified = verified_by(cell, result, held_out(bent))
+    assert verified.verdict in {Verdict.NOT_EVALUATED, Verdict.FAIL, Verdict.CONDITIONAL_FAIL}
+    failed = [test for test in verified.tests if not test.passed]
+    assert [test.name for test in failed] == ["held-out records"]
+    assert "times as far off as the stated noise explains" in failed[0].sentence
+    assert verified.is_offered
+
+
+def test_significantly_worse_is_a_fail_that_nobody_is_offered(cell, result, held_out):
+    verified = verified_by(cell, result, held_out(before=NEAR, after=FAR))
+    assert (verified.verdict, verified.is_worse, verified.is_offered) == (Verdict.FAIL, True, False)
+
+
+def test_a_ball_that_left_its_plates_is_a_fail_that_nobody_is_offered(cell, result, held_out):
+    verified = verified_by(cell, result, held_out(left_travel=True))
+    assert (verified.verdict, verified.is_offered) == (Verdict.FAIL, False)
+
+
+@pytest.mark.parametrize("missing", ["before", "after"])
+def test_without_both_measurements_nothing_is_evaluated(cell, result, held_out, missing):
+    verified = verified_by(cell, result, held_out(**{missing: []}))
+    assert (verified.verdict, verified.is_offered) == (Verdict.NOT_EVALUATED, False)
+
+
+def test_the_outcome_says_what_was_used_the_error_and_the_verdict(cell, result, held_out):
+    _, found = result
+    verified = verified_by(cell, result, held_out())
+    line = outcome_line(IdentificationResult.of(found), 35, verified)
+    assert line.startswith(
+        "35 parameters, 55 records at 5 points; mean deviation at held-out poses 3.60 -> "
+    )
+    assert line.endswith(" mm (limit 0.15): pass")
+    text = verification_text(verified)
+    assert text.splitlines()[0] == "verdict: pass"
+    assert len(text.splitlines()) <= 6
+    assert max(map(len, text.splitlines())) <= 80
+
+
+def test_a_stricter_limit_gives_a_conditional_verdict(cell, result, held_out):
+    stated = verified_by(cell, result, held_out()).accuracy
+    assert stated is not None
+    limit = stated.position.value + 0.5 * stated.position.expanded
+    strict = cell.settings.acceptance.model_copy(
+        update={"position_mm": max(limit, stated.position.expanded)}
+    )
+    settings = cell.settings.model_copy(update={"acceptance": strict})
+    assert verified_by(replace(cell, settings=settings), result, held_out()).verdict.is_conditional

@@ -36,6 +36,7 @@ class Robot:
         provisional: geometries, in the frame convention, that the controller commanded with for a time
             while measuring.
         uses_provisional: whether it commands with the last of them now.
+        known: what is known before measuring, if that is more than the drawing with its tolerances.
     """
 
     mechanism: Mechanism
@@ -48,6 +49,7 @@ class Robot:
     frames: FrameTransform
     provisional: tuple[Geometry, ...] = ()
     uses_provisional: bool = False
+    known: Prior | None = None
 
     @cached_property
     def commanding(self) -> Geometry:
@@ -63,6 +65,8 @@ class Robot:
     @cached_property
     def prior(self) -> Prior:
         """What is known before measuring."""
+        if self.known is not None:
+            return self.known
         return Prior.of(self.mechanism, self.drawing, self.tolerances)
 
     def problem(self, measurements: MeasurementSet) -> Problem:

@@ -25,8 +25,8 @@ from hexacell.campaign.decisions import (
 from hexacell.campaign.forecast import Forecaster, select_sets
 from hexacell.campaign.pose_chooser import PoseChooser
 from hexacell.campaign.pose_list import PoseList
-from hexacell.campaign.recursive_estimator import OnlineEstimate, OnlineEstimator
-from hexacell.campaign.stopping_rules import StoppingRules
+from hexacell.campaign.recursive_estimator import OnlineEstimate, OnlineEstimator, RecordEstimator
+from hexacell.campaign.stopping_rules import Goal, StoppingRules
 from hexacell.campaign.task_accuracy import Task
 from hexacell.cell.model import CellSettings
 from hexacell.errors import IdentifiabilityError, LimitError
@@ -52,6 +52,8 @@ class Plan:
         pose_list: poses to visit; none where they are to be selected.
         candidates: number of candidate orientations for each record.
         with_forecast: whether to forecast for every record what it gains at the task poses.
+        estimator: of the robot from the records; none for the usual one.
+        goal: what the records are for; none to identify the geometry as well as the settings ask for.
     """
 
     settings: CellSettings
@@ -59,6 +61,8 @@ class Plan:
     pose_list: PoseList | None = None
     candidates: int = CANDIDATES
     with_forecast: bool = True
+    estimator: RecordEstimator | None = None
+    goal: Goal | None = None
 
     def decide(self, state: CampaignState) -> Decision:
         """What to do now.
@@ -149,12 +153,12 @@ class Plan:
         return Forecaster(sizes, self.budget, self.task, lambda: self.planned_sets)
 
     @cached_property
-    def _estimator(self) -> OnlineEstimator:
-        return OnlineEstimator(self.robot)
+    def _estimator(self) -> RecordEstimator:
+        return self.estimator or OnlineEstimator(self.robot)
 
     @cached_property
     def _stopping(self) -> StoppingRules:
-        return StoppingRules(self.settings, self.forecaster, self._estimator)
+        return StoppingRules(self.settings, self.forecaster, self._estimator, self.goal)
 
     def _between_points(self, state: CampaignState) -> Decision:
         if reason := self._stopping.end_of_campaign(state):

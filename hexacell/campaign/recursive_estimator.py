@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
@@ -51,11 +52,28 @@ class OnlineEstimate:
         return gauge_zero_at(self.belief, found, point)
 
 
-class OnlineEstimator:
-    """Estimates from any records, quickly where they continue the last ones asked for."""
+class RecordEstimator(Protocol):
+    """Estimates the robot from any records."""
 
-    def __init__(self, robot: Robot) -> None:
+    def estimate(self, measurements: MeasurementSet) -> OnlineEstimate:
+        """The estimate from some records, in their order.
+
+        Raises:
+            IdentifiabilityError: they do not belong to this robot.
+        """
+        ...
+
+
+class OnlineEstimator:
+    """Estimates from any records, quickly where they continue the last ones asked for.
+
+    With ``tries_other_starts`` false an implausible estimate is kept: the robot is near its prior, or the
+    prior is wrong.
+    """
+
+    def __init__(self, robot: Robot, *, tries_other_starts: bool = True) -> None:
         self._robot = robot
+        self._tries_other_starts = tries_other_starts
         self._records: tuple[Record, ...] = ()
         self._last: Identification | None = None
 
@@ -70,12 +88,14 @@ class OnlineEstimator:
             self._records, self._last = (), None
         for count in range(len(self._records) + 1, len(records) + 1):
             problem = self._robot.problem(MeasurementSet(records[:count]))
-            self._last = update_estimate(problem, self._last)
+            self._last = update_estimate(problem, self._last, self._tries_other_starts)
             self._records = records[:count]
         return OnlineEstimate(self._robot.belief(self._last), self._last)
 
 
-def update_estimate(problem: Problem, before: Identification | None) -> Identification:
+def update_estimate(
+    problem: Problem, before: Identification | None, tries_other_starts: bool = True
+) -> Identification:
     """The estimate from that of all records but the last; from other starts if it is implausible."""
     poses = None if before is None else _start_poses(problem, before)
     if before is None or poses is None:
@@ -83,7 +103,7 @@ def update_estimate(problem: Problem, before: Identification | None) -> Identifi
     # While the records leave much open, undamped steps may diverge.
     options = INCREMENTAL if is_determined(problem) else COARSE
     found = estimate_online(problem.starting_at(before.free, poses), options)
-    others = _from_other_starts(problem)
+    others = _from_other_starts(problem) if tries_other_starts else iter(())
     while not _is_plausible(problem, found) and (other := next(others, None)):
         is_better = (other.records, -cost(other)) > (found.records, -cost(found))
         found = other if is_better else found

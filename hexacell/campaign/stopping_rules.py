@@ -3,15 +3,29 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Protocol
 
 from hexacell.campaign.decisions import CampaignState, MeasurePose
 from hexacell.campaign.forecast import Forecaster
-from hexacell.campaign.recursive_estimator import OnlineEstimator
+from hexacell.campaign.recursive_estimator import RecordEstimator
 from hexacell.cell.model import CellSettings
 from hexacell.identification.problem.data_requirements import is_determined
+from hexacell.measurements.records import MeasurementSet
 
 REFUSALS = 3
 """Records of one point that may leave the travel before the point is given up."""
+
+
+class Goal(Protocol):
+    """What a campaign is for, if it is not the accuracy of the identified geometry."""
+
+    def reached(self, measurements: MeasurementSet) -> str | None:
+        """Why the records are enough; none if they are not."""
+        ...
+
+    def reached_at(self, point: int, measurements: MeasurementSet) -> str | None:
+        """Why a point needs no more records, although others may; none if it does."""
+        ...
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -20,14 +34,18 @@ class StoppingRules:
 
     settings: CellSettings
     forecaster: Forecaster
-    estimator: OnlineEstimator
+    estimator: RecordEstimator
+    goal: Goal | None = None
 
     def end_of_campaign(self, state: CampaignState) -> str | None:
         """Between points: why no other point is to be begun, whichever it is."""
         sizes, count = self.forecaster.sizes, len(self.forecaster.sizes)
         if all(state.records_at(point) >= size for point, size in sizes.items()):
             return f"all {count} points are measured"
-        if reason := self._budget_used(state, points=1, records=2) or self._target_reached(state):
+        reached = (
+            self._target_reached(state) if self.goal is None else self.goal.reached(state.measurements)
+        )
+        if reason := self._budget_used(state, points=1, records=2) or reached:
             return reason
         if state.done.issuperset(sizes):
             return f"all {count} points are measured as far as they could be"
@@ -40,11 +58,11 @@ class StoppingRules:
             return f"all its {size} orientations are measured"
         if state.rejections > REFUSALS:
             return f"the ball left the gauges' travel {state.rejections} times"
-        return (
-            self._budget_used(state, points=0, records=1)
-            or self._target_reached(state)
-            or self._another_point(state, point)
-        )
+        if reason := self._budget_used(state, points=0, records=1):
+            return reason
+        if self.goal is not None:
+            return self.goal.reached_at(point, state.measurements)
+        return self._target_reached(state) or self._another_point(state, point)
 
     def little_gain(self, proposed: MeasurePose) -> str | None:
         """Why a proposed record is not worth its time."""

@@ -83,10 +83,18 @@ class Task:
 
     def error(self, belief: RobotBelief) -> TaskError | None:
         """How the error depends on the parameters; none if the estimated robot can take no task pose."""
+        jacobian = self.jacobian(belief)
+        return None if jacobian is None else TaskError(jacobian[:, :3])
+
+    def jacobian(self, belief: RobotBelief) -> Array | None:
+        """Derivatives (n, 6, p) of positions, mm, and rotation vectors, rad, by the free parameters.
+
+        Without what another choice of frames would explain; none if no task pose can be taken.
+        """
         reached = self.reachable(belief)
         if not len(reached.poses) or not len(reached.workspace):
             return None
-        return TaskError(error_jacobian(belief, reached.poses, reached.workspace)[:, :3])
+        return error_jacobian(belief, reached.poses, reached.workspace)
 
 
 def _reachable(belief: RobotBelief, poses: PoseBatch) -> PoseBatch:

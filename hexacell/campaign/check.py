@@ -1,0 +1,203 @@
+"""A check: a short identification that decides whether the robot, as it is now, is within a limit.
+
+It starts from what the last accepted result left known of the geometry, and from what may have drifted
+since; without such a result from the drawing. Poses are chosen for the error at the task poses. The check
+ends as soon as that error and its uncertainty decide against the limit, or its budget is used.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from hexacell.campaign.check_statement import (
+    CheckStatement,
+    ErrorEstimate,
+    guarded_verdict,
+    records_to_decide,
+)
+from hexacell.campaign.drift_estimator import GUARDED_SCALE, DriftEstimator, ScaledEstimate
+from hexacell.campaign.forecast import PlannedInformation
+from hexacell.campaign.planner import CANDIDATES, Plan
+from hexacell.campaign.pose_list import PoseList
+from hexacell.campaign.recursive_estimator import OnlineEstimator, RecordEstimator
+from hexacell.cell.model import CellSettings
+from hexacell.decision import Verdict
+from hexacell.identification.solver.chi_square import ChiSquareVerdict
+from hexacell.kinematics.rotations import Array
+from hexacell.measurements.records import MeasurementSet, Record
+from hexacell.robot_model import Robot
+from hexacell.uncertainty.geometry_drift import IdentifiedBefore, drift_covariance, drift_sigma
+
+FEWEST_POINTS = 2
+"""Points with more than the reference, at which a check measures whatever was known before."""
+
+
+@dataclass(frozen=True, eq=False)
+class Check:
+    """The check of one robot against a limit of the position error at its task poses.
+
+    Attributes:
+        before: the last accepted result, and its drift since; none without such a result.
+        limit_mm: at the worst task pose.
+        budget: most records, references included.
+        listed: poses to measure; none if they are chosen.
+        systematic: (t, 6, k) systematic effects at the task poses, mm and rad, one standard deviation
+            each: a check shares them with the result before it, and its records do not reduce them.
+        candidates: number of candidate orientations for each record.
+    """
+
+    settings: CellSettings
+    robot: Robot
+    before: IdentifiedBefore | None
+    limit_mm: float
+    budget: int
+    listed: PoseList | None = None
+    systematic: Array | None = None
+    candidates: int = CANDIDATES
+
+    @cached_property
+    def plan(self) -> Plan:
+        """What to measure, until the check is decided or its budget is used."""
+        drifting = self._drifting
+        return Plan(
+            check_settings(self.settings, self.budget),
+            self.robot if drifting is None else drifting.robot,
+            self.listed,
+            self.candidates,
+            estimator=self._by_drawing if drifting is None else drifting,
+            goal=self,
+        )
+
+    def reached(self, measurements: MeasurementSet) -> str | None:
+        """That the records are enough: see :class:`~hexacell.campaign.stopping_rules.Goal`."""
+        _, records = np.unique(measurements.points, return_counts=True)
+        is_enough = np.count_nonzero(records > 1) >= FEWEST_POINTS
+        return self._decided(measurements) if is_enough else None
+
+    def reached_at(self, point: int, measurements: MeasurementSet) -> str | None:
+        """That the records are enough, but perhaps at too few points."""
+        is_measured = np.count_nonzero(measurements.points == point) > 1
+        return self._decided(measurements) if is_measured else None
+
+    def statement(self, measurements: MeasurementSet) -> CheckStatement | None:
+        """What is said by some records; none if the estimated robot can take no task pose.
+
+        Raises:
+            IdentifiabilityError: the records do not belong to this robot.
+        """
+        records = measurements.records
+        if records not in self._stated:
+            self._stated.clear()  # only the last one is asked for again
+            self._stated[records] = self._statement(measurements)
+        return self._stated[records]
+
+    def final_statement(self, measurements: MeasurementSet) -> CheckStatement | None:
+        """The same at the end of the check, where what is not decided is not evaluated.
+
+        Raises:
+            IdentifiabilityError: the records do not belong to this robot.
+        """
+        stated = self.statement(measurements)
+        if stated is None or stated.is_decided:
+            return stated
+        further = self._further_records(measurements) if stated.is_consistent else None
+        return replace(stated, verdict=Verdict.NOT_EVALUATED, further_records=further)
+
+    def _decided(self, measurements: MeasurementSet) -> str | None:
+        stated = self.statement(measurements)
+        if stated is None or not stated.is_decided:
+            return None
+        return f"the error at the task poses is {stated.position} mm: {stated.verdict}"
+
+    def _statement(self, measurements: MeasurementSet) -> CheckStatement | None:
+        likeliest, guarded = self._estimates(measurements)
+        estimates = self._errors(likeliest), self._errors(guarded)
+        if estimates[0] is None or estimates[1] is None:
+            return None
+        errors = estimates[0].errors
+        is_consistent = _is_consistent(likeliest)
+        verdict = guarded_verdict(errors, estimates[1].errors, self.limit_mm)
+        return CheckStatement(
+            position=errors.position,
+            orientation=errors.orientation,
+            verdict=verdict if is_consistent else Verdict.NOT_EVALUATED,
+            drift_scale=None if self.before is None else likeliest.scale,
+            is_consistent=is_consistent,
+            records=len(measurements),
+        )
+
+    def _estimates(self, measurements: MeasurementSet) -> tuple[ScaledEstimate, ScaledEstimate]:
+        """Under the likeliest scale of the drift, and under the guarded one; by the drawing the same."""
+        if self._drifting is not None:
+            guarded = self._drifting.at_least(GUARDED_SCALE, measurements)
+            return self._drifting.likeliest(measurements), guarded
+        estimate = ScaledEstimate(1.0, self._by_drawing.estimate(measurements), 0.0)
+        return estimate, estimate
+
+    def _errors(self, estimate: ScaledEstimate) -> ErrorEstimate | None:
+        return ErrorEstimate.of(self.plan.task, estimate.estimate, self.systematic)
+
+    def _further_records(self, measurements: MeasurementSet) -> int | None:
+        """How many more would decide, each as informative as those of well spread sets on average."""
+        likeliest, guarded = self._estimates(measurements)
+        first, second = self._errors(likeliest), self._errors(guarded)
+        if first is None or second is None:
+            return None
+        sets = replace(self.plan, settings=self.settings).planned_sets
+        planned = PlannedInformation.of(sets, likeliest.estimate.belief)
+        total = np.sum(
+            [planned.information(point, len(sets[point - 1])) for point in self.plan.points], axis=0
+        )
+        return records_to_decide(first, second, self.limit_mm, total / sum(map(len, sets)))
+
+    @cached_property
+    def _drifting(self) -> DriftEstimator | None:
+        return None if self.before is None else DriftEstimator(self.robot, self.before)
+
+    @cached_property
+    def _by_drawing(self) -> RecordEstimator:
+        return OnlineEstimator(self.robot)
+
+    @cached_property
+    def _stated(self) -> dict[tuple[Record, ...], CheckStatement | None]:
+        return {}
+
+
+def check_settings(settings: CellSettings, budget: int) -> CellSettings:
+    """A cell's settings with those of a check, of ``budget`` records, in the place of the calibration's."""
+    plan = settings.identification
+    identification = plan.model_copy(
+        update={
+            "criterion": "task",
+            "orientations": max(2, math.ceil(budget / len(plan.points))),
+            "budget_records": budget,
+            "budget_minutes": None,
+            "target_mm": None,
+            "least_gain_mm": 0.0,
+            "choose_points": False,
+            "provisional": False,
+        }
+    )
+    return settings.model_copy(update={"identification": identification})
+
+
+def identified_before(robot: Robot, covariance: Array, drift_mm: float) -> IdentifiedBefore:
+    """The controller's geometry, as identified with a covariance (P, P), mm^2, of all parameters.
+
+    ``drift_mm`` is the standard deviation of what each length may have changed since.
+    """
+    mechanism, geometry = robot.mechanism, robot.commanding
+    rows = mechanism.convention.free_rows()
+    sigma = drift_sigma(mechanism, drift_mm, robot.tolerances)
+    drift = drift_covariance(mechanism, geometry, sigma)
+    return IdentifiedBefore(mechanism, geometry, covariance[np.ix_(rows, rows)], drift)
+
+
+def _is_consistent(estimate: ScaledEstimate) -> bool:
+    """Whether the residuals are not too large for the stated noise."""
+    found = estimate.estimate.identification
+    return found is None or found.goodness.agreement is not ChiSquareVerdict.TOO_LARGE

@@ -1,0 +1,119 @@
+"""What a check says of a robot: its errors at the task poses, and the verdict on them."""
+
+from __future__ import annotations
+
+from bisect import bisect_left
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from hexacell.campaign.recursive_estimator import OnlineEstimate
+from hexacell.campaign.task_accuracy import Task
+from hexacell.decision import Verdict, decide
+from hexacell.experiment_design.criteria import add_information
+from hexacell.kinematics.rotations import Array
+from hexacell.uncertainty.statement import LargestError, TaskErrors
+
+MOST_FURTHER_RECORDS = 200
+"""A verdict that takes more is not forecast: repeatability and drift end what records can do before."""
+
+
+@dataclass(frozen=True, slots=True)
+class CheckStatement:
+    """What is said of the robot by the records so far.
+
+    Attributes:
+        position: the largest position error over the task poses, mm.
+        orientation: the largest orientation error, deg.
+        verdict: on the position.
+        drift_scale: the likeliest one; none where the robot was not identified before.
+        is_consistent: whether the residuals agree with the stated noise.
+        records: that it is made from.
+        further_records: about how many more would decide; none where none would, or nothing is open.
+    """
+
+    position: LargestError
+    orientation: LargestError
+    verdict: Verdict
+    drift_scale: float | None
+    is_consistent: bool
+    records: int
+    further_records: int | None = None
+
+    @property
+    def is_decided(self) -> bool:
+        """Whether the records are enough for a verdict."""
+        return is_final(self.verdict)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ErrorEstimate:
+    """The errors at t task poses by one estimate of the robot.
+
+    Attributes:
+        jacobian: (t, 6, p) of the errors by the free parameters.
+        difference: (p,) of the estimate from the controller's geometry.
+        covariance: of the estimate (p, p).
+        systematic: (t, 6, k) effects that the covariance does not contain.
+    """
+
+    jacobian: Array
+    difference: Array
+    covariance: Array
+    systematic: Array
+
+    @classmethod
+    def of(cls, task: Task, estimate: OnlineEstimate, systematic: Array | None) -> ErrorEstimate | None:
+        """By an estimate while measuring; none if the estimated robot can take no task pose."""
+        belief = estimate.belief
+        jacobian = task.jacobian(belief)
+        if jacobian is None:
+            return None
+        commanding = belief.mechanism.convention.free_parameters(belief.controller)
+        none = np.zeros((*jacobian.shape[:2], 0))
+        return cls(
+            jacobian,
+            belief.free - commanding,
+            belief.covariance,
+            none if systematic is None else systematic,
+        )
+
+    @property
+    def errors(self) -> TaskErrors:
+        """The errors with their uncertainty."""
+        return TaskErrors.of(self.jacobian, self.difference, self.covariance, self.systematic)
+
+    def after(self, information: Array) -> ErrorEstimate:
+        """The same after records that add information (p, p) and confirm the estimate."""
+        return replace(self, covariance=add_information(self.covariance, information))
+
+
+def is_final(verdict: Verdict) -> bool:
+    """Whether a verdict is one that a check ends with."""
+    return verdict in {Verdict.PASS, Verdict.FAIL}
+
+
+def guarded_verdict(likeliest: TaskErrors, guarded: TaskErrors, limit_mm: float) -> Verdict:
+    """The verdict on the position by the likeliest errors; a pass holds for the guarded ones as well."""
+    verdict = decide(likeliest.position, limit_mm)
+    if verdict is Verdict.PASS and decide(guarded.position, limit_mm) is not Verdict.PASS:
+        return Verdict.CONDITIONAL_PASS
+    return verdict
+
+
+def records_to_decide(
+    likeliest: ErrorEstimate, guarded: ErrorEstimate, limit_mm: float, per_record: Array
+) -> int | None:
+    """How many more records would decide if they confirm the likeliest estimate.
+
+    ``per_record`` (p, p), 1/mm^2, is the information of each.
+    """
+    confirmed = replace(guarded, difference=likeliest.difference)
+
+    def is_decided(records: int) -> bool:
+        likely, careful = (one.after(records * per_record).errors for one in (likeliest, confirmed))
+        return is_final(guarded_verdict(likely, careful, limit_mm))
+
+    if not is_decided(MOST_FURTHER_RECORDS):
+        return None
+    return 1 + bisect_left(range(1, MOST_FURTHER_RECORDS + 1), True, key=is_decided)

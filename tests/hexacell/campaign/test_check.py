@@ -1,0 +1,175 @@
+"""Checks of robots that were calibrated, and of one that was not, without hardware."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from hexacell.campaign.check import FEWEST_POINTS, Check, check_settings, identified_before
+from hexacell.campaign.check_statement import CheckStatement
+from hexacell.campaign.decisions import CampaignState
+from hexacell.campaign.drift_estimator import DriftEstimator
+from hexacell.campaign.dry_run import VirtualCampaign
+from hexacell.decision import Verdict
+from hexacell.kinematics.geometry import Geometry
+from hexacell.measurements.records import MeasurementSet
+from hexacell.robot_model import Robot
+from hexacell.virtual_robot import VirtualRobot
+
+TWO_POINTS = ((100.0, -100.0, 500.0), (-100.0, 100.0, 500.0))
+SIGMA_MM = 0.005
+"""Of each parameter by the calibration."""
+
+MakeCheck = Callable[..., Check]
+
+
+def calibrated_to(robot: Robot, geometry: Geometry) -> Robot:
+    normal, frames = robot.mechanism.normalize_frames(geometry)
+    return replace(robot, controller=normal, frames=frames)
+
+
+@pytest.fixture(scope="module")
+def make_check(make_plan, paper) -> MakeCheck:
+    """A check of the paper's robot, whose controller has its true geometry, with quick readings."""
+
+    def make(*, calibrated: bool = True, budget: int = 40, **changes: Any) -> Check:
+        changes = {
+            "identification__points": TWO_POINTS,
+            "noise__encoder_mm": 0.002,
+            "noise__gauge_mm": 0.002,
+        } | changes
+        plan = make_plan(**changes)
+        robot = calibrated_to(plan.robot, paper.actual) if calibrated else plan.robot
+        parameters = len(robot.mechanism.parameters)
+        covariance = SIGMA_MM**2 * np.eye(parameters)
+        before = identified_before(robot, covariance, 0.02) if calibrated else None
+        return Check(plan.settings, robot, before, 0.15, budget, candidates=32)
+
+    return make
+
+
+def carried_out(check: Check, truth: Geometry, seed: int = 1) -> CampaignState:
+    robot = VirtualRobot(check.robot, truth, np.random.default_rng(seed))
+    campaign = VirtualCampaign(replace(check.plan, with_forecast=False), robot)
+    campaign.carry_out()
+    assert campaign.outside == 0
+    return campaign.state
+
+
+def changed(check: Check, change: np.ndarray) -> Geometry:
+    convention = check.robot.mechanism.convention
+    return convention.geometry(convention.free_parameters(check.robot.commanding) + change)
+
+
+def said(check: Check, measurements: MeasurementSet) -> CheckStatement:
+    stated = check.final_statement(measurements)
+    assert stated is not None
+    return stated
+
+
+@pytest.fixture(scope="module")
+def unchanged(make_check) -> tuple[Check, CampaignState]:
+    check = make_check()
+    return check, carried_out(check, check.robot.commanding)
+
+
+def test_an_unchanged_robot_passes_before_the_budget_is_used(unchanged) -> None:
+    check, state = unchanged
+    stated = said(check, state.measurements)
+    assert stated.verdict is Verdict.PASS
+    assert stated.position.value + stated.position.expanded <= 0.15
+    assert stated.drift_scale == 1.0
+    assert stated.records == len(state.measurements) < check.budget
+    assert stated.further_records is None
+
+
+def test_the_statement_covers_the_true_error(unchanged) -> None:
+    check, state = unchanged
+    position = said(check, state.measurements).position
+    assert abs(position.value) <= position.expanded
+
+
+def test_a_check_measures_at_two_points_at_least(unchanged) -> None:
+    check, state = unchanged
+    _, records = np.unique(state.measurements.points, return_counts=True)
+    assert len(records) == FEWEST_POINTS
+    assert records.min() >= 2
+    at_first = MeasurementSet(tuple(r for r in state.measurements.records if r.point == 1))
+    assert check.reached_at(1, at_first) is not None
+    assert check.reached(at_first) is None
+    assert check.reached(state.measurements) is not None
+
+
+def test_decisions_depend_on_the_records_alone(make_check, unchanged) -> None:
+    """A resumed check decides as the one that was interrupted."""
+    _, state = unchanged
+    half = MeasurementSet(state.measurements.records[:4])
+    at_half = CampaignState(half, point=1, present=half.records[-1].pose)
+    first, second = (replace(make_check().plan, with_forecast=False).decide(at_half) for _ in range(2))
+    assert first == second
+    assert first.pose == state.measurements.records[4].pose
+
+
+def test_a_robot_that_was_hit_fails(make_check) -> None:
+    check = make_check()
+    state = carried_out(check, changed(check, 0.4 * np.random.default_rng(3).standard_normal(35)))
+    stated = said(check, state.measurements)
+    assert stated.verdict is Verdict.FAIL
+    assert stated.drift_scale is not None
+    assert stated.drift_scale >= 10.0
+
+
+def test_without_enough_records_it_is_not_evaluated_and_says_how_many_would_do(make_check) -> None:
+    check = make_check(noise__encoder_mm=0.01, noise__gauge_mm=0.01, budget=6)
+    state = carried_out(check, check.robot.commanding)
+    stated = said(check, state.measurements)
+    assert stated.records == 6
+    assert stated.verdict is Verdict.NOT_EVALUATED
+    assert stated.further_records is not None
+    assert 1 <= stated.further_records <= 60
+
+
+def test_readings_that_no_drift_explains_are_not_evaluated(unchanged) -> None:
+    check, state = unchanged
+    *others, last = state.measurements.records
+    false = replace(last, deviation=tuple(value + 1.0 for value in last.deviation))
+    stated = said(check, MeasurementSet((*others, false)))
+    assert stated.verdict in {Verdict.NOT_EVALUATED, Verdict.FAIL}
+
+
+def test_without_a_result_a_robot_as_drawn_is_checked_from_its_tolerances(make_check, paper) -> None:
+    check = make_check(calibrated=False, budget=16)
+    truth = check.robot.mechanism.normalize_frames(paper.actual)[0]
+    stated = said(check, carried_out(check, truth).measurements)
+    assert stated.drift_scale is None
+    assert stated.verdict in {Verdict.FAIL, Verdict.NOT_EVALUATED}
+    assert stated.position.value > 1.0
+
+
+def test_systematic_effects_may_forbid_a_pass(unchanged) -> None:
+    check, state = unchanged
+    columns = np.zeros((len(check.plan.task.poses), 6, 1))
+    columns[:, 0] = 0.1
+    stated = said(replace(check, systematic=columns), state.measurements)
+    assert stated.verdict is not Verdict.PASS
+
+
+def test_settings_of_a_check_leave_the_calibration_s_targets_out(make_plan) -> None:
+    settings = make_plan(identification__points=TWO_POINTS, identification__target_mm=0.5).settings
+    plan = check_settings(settings, 40).identification
+    assert plan.criterion == "task"
+    assert plan.target_mm is None
+    assert plan.budget_records == 40
+    assert plan.orientations * len(plan.points) >= 40
+
+
+def test_without_records_the_smallest_scale_is_taken(make_check) -> None:
+    check = make_check()
+    assert check.before is not None
+    estimator = DriftEstimator(check.robot, check.before)
+    assert estimator.likeliest(MeasurementSet(())).scale == 1.0
+    assert estimator.at_least(3.0, MeasurementSet(())).scale == 3.0

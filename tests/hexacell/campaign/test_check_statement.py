@@ -1,0 +1,72 @@
+"""Verdicts of a check, and how many more records would give one."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.stats import chi2
+
+from hexacell.campaign.check_statement import (
+    MOST_FURTHER_RECORDS,
+    ErrorEstimate,
+    guarded_verdict,
+    records_to_decide,
+)
+from hexacell.decision import Verdict
+
+QUANTILE = float(np.sqrt(chi2.ppf(0.95, 3)))
+NONE = np.zeros((1, 6, 0))
+
+
+def at_one_pose(error: tuple[float, float, float] = (0.0, 0.0, 0.0), sigma: float = 0.1) -> ErrorEstimate:
+    """Three parameters that are the position error itself, with isotropic uncertainty."""
+    jacobian = np.zeros((1, 6, 3))
+    jacobian[0, :3] = np.eye(3)
+    return ErrorEstimate(jacobian, np.array(error), sigma**2 * np.eye(3), NONE)
+
+
+def verdict(likeliest: ErrorEstimate, guarded: ErrorEstimate, limit_mm: float = 0.15) -> Verdict:
+    return guarded_verdict(likeliest.errors, guarded.errors, limit_mm)
+
+
+def test_a_pass_holds_for_both_estimates() -> None:
+    sure, unsure = at_one_pose(sigma=0.03), at_one_pose(sigma=0.1)
+    assert verdict(sure, sure) is Verdict.PASS
+    assert verdict(sure, unsure) is Verdict.CONDITIONAL_PASS
+
+
+def test_a_fail_needs_the_likeliest_only() -> None:
+    bad, unsure = at_one_pose((0.3, 0.0, 0.0), 0.03), at_one_pose((0.2, 0.0, 0.0), 0.1)
+    assert verdict(bad, unsure) is Verdict.FAIL
+
+
+def test_systematic_effects_count_beside_the_covariance() -> None:
+    columns = np.zeros((1, 6, 3))
+    columns[0, :3] = 0.04 * np.eye(3)
+    both = replace(at_one_pose(sigma=0.03), systematic=columns)
+    assert both.errors.position.expanded == pytest.approx(0.05 * QUANTILE, rel=0.02)
+    assert both.after(1e9 * np.eye(3)).errors.position.expanded == pytest.approx(0.04 * QUANTILE, rel=0.02)
+
+
+def test_the_forecast_is_the_first_number_with_which_the_interval_is_inside() -> None:
+    # The variance after n records of information i is 1 / (100 + n i).
+    needed = ((QUANTILE / 0.15) ** 2 - 100.0) / 20.0
+    found = records_to_decide(at_one_pose(), at_one_pose(), 0.15, 20.0 * np.eye(3))
+    assert found == pytest.approx(np.ceil(needed), abs=1)
+
+
+def test_the_guarded_estimate_delays_a_pass() -> None:
+    slow = at_one_pose(sigma=1.0)
+    alone = records_to_decide(at_one_pose(), at_one_pose(), 0.15, 20.0 * np.eye(3))
+    guarded = records_to_decide(at_one_pose(), slow, 0.15, 20.0 * np.eye(3))
+    assert alone is not None
+    assert guarded is not None
+    assert guarded > alone
+
+
+def test_an_error_as_large_as_the_limit_is_never_decided() -> None:
+    on_limit = at_one_pose((0.15, 0.0, 0.0))
+    assert records_to_decide(on_limit, on_limit, 0.15, 20.0 * np.eye(3)) is None
+    assert MOST_FURTHER_RECORDS >= 100

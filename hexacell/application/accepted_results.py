@@ -8,10 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
-from hexacell.decision import Verdict
 from hexacell.cell.loader import Cell
 from hexacell.controller_config.change import fingerprint
 from hexacell.controller_config.write_back import Receipt
+from hexacell.decision import Verdict
 from hexacell.errors import HexacellError
 from hexacell.kinematics.rotations import Array
 from hexacell.runs.run_folder import RunFolder, runs_folder

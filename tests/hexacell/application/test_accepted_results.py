@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hexacell.decision import Verdict
 from hexacell.application.accepted_results import last_accepted_result
 from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import Cell, load_cell
 from hexacell.controller_config.change import fingerprint
 from hexacell.controller_config.write_back import RECEIPT, Receipt
+from hexacell.decision import Verdict
 from hexacell.runs.run_folder import RunFolder, runs_folder
 from procedures.journal.journal import Journal
 from procedures.run import events

@@ -55,9 +55,9 @@ def test_the_continued_estimate_equals_the_estimate_from_the_drawing(two_points,
 def test_the_same_records_are_not_fitted_twice(two_points, records, monkeypatch):
     fitted = []
 
-    def counting(problem, before):
+    def counting(problem, *before):
         fitted.append(problem.records)
-        return update_estimate(problem, before)
+        return update_estimate(problem, *before)
 
     monkeypatch.setattr(recursive_estimator, "update_estimate", counting)
     tracker = OnlineEstimator(two_points.robot)

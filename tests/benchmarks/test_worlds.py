@@ -1,0 +1,167 @@
+"""The statement of accuracy against what imperfect machines really do.
+
+Worlds (``tests/benchmarks/worlds``) are measured at 5 points x 11 orientations within 45 deg, identified,
+and stated with the uncertainty budget of their machine; what they really do at the task poses is known.
+``RUNS`` in the environment says how many there are of each kind and size; the targets are for 100.
+All cores are used.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
+
+import numpy as np
+import pytest
+
+from hexacell.cell.uncertainty import Grade
+from hexacell.identification.estimator import identify
+from hexacell.identification.solver.result import Identification
+from tests.benchmarks.worlds.budgets import drawn, machine
+from tests.benchmarks.worlds.campaigns import Setting
+from tests.benchmarks.worlds.effects import Effect
+from tests.benchmarks.worlds.kinds import KINDS, NONE, ORDINARY, PRECISION
+from tests.benchmarks.worlds.stating import stated
+from tests.benchmarks.worlds.table import HEAD, Totals, least_by_chance, lines, most_by_chance
+from tests.benchmarks.worlds.trials import Outcome, Trial, carry_out, settings
+from tests.benchmarks.worlds.world import World
+
+RUNS = int(os.environ.get("RUNS", "1"))
+DRAWN = 30
+"""Machines drawn from each budget, for one run of each kind."""
+
+FACTORS = (1.0, 3.0, 10.0)
+ORDINARY_LIMIT_MM = 0.25
+"""Of a machine whose U is above the usual limit."""
+
+UNSUSPICIOUS = 1.2
+"""Residuals over the noise; three standard deviations above one for a campaign."""
+
+ALIKE = 40
+"""Machines with one effect, for one run of each kind."""
+
+HOUR = 1.0
+"""At which a machine is at work, long after nothing drifts any more."""
+
+ONE_BY_ONE = [effect for effect in machine("ordinary") if effect.size and not effect.is_estimated]
+
+MACHINES: dict[str, tuple[str, Grade, float]] = {
+    "no effects": (NONE, "ideal", 0.15),
+    "precision": (PRECISION, "precision", 0.15),
+    "ordinary": (ORDINARY, "ordinary", ORDINARY_LIMIT_MM),
+}
+
+
+def identified(own: Setting, effect: Effect, seed: int) -> tuple[World, Identification]:
+    """A machine without noise, and what its records give."""
+    world = World(own.robot, own.truth, effect, seed, is_noisy=False)
+    records = world.records(own.commands, own.robot.commanding)
+    return world, identify(own.robot.problem(records), find_outliers=False)
+
+
+def outcomes(trials: Iterable[Trial]) -> list[Outcome]:
+    settings()  # before the processes are forked, so that they share them
+    with ProcessPoolExecutor(mp_context=get_context("fork")) as pool:
+        return list(pool.map(carry_out, trials, chunksize=4))
+
+
+@pytest.mark.parametrize("name", MACHINES)
+def test_machines_drawn_from_their_budget_err_by_no_more_than_is_stated(say, name):
+    kind, grade, limit = MACHINES[name]
+    totals = Totals(outcomes(Trial(kind, 1.0, number, grade, limit) for number in range(DRAWN * RUNS)))
+    judged = totals.judged
+    true = np.array([one.true_mm for one in judged])
+    u = np.median([one.u_mm for one in judged])
+    say(
+        f"{name}: largest error, median and 95 %",
+        f"{np.median(true):.3f}, {np.quantile(true, 0.95):.3f} mm",
+        f"{len(judged)} machines",
+    )
+    say("  U, median", f"{u:.3f} mm", f"limit {limit:g}")
+    say("  |stated - true| <= U", f"{100 * totals.covered:.1f} %", "93 to 98 %")
+    say(
+        "  passes, false ones",
+        f"{totals.passes}, {totals.false_passes} of {len(totals.outcomes)}",
+        "no false",
+    )
+    say("  causes named wrongly", f"{totals.wrongly_named}", "at most 1 %")
+    covered = round(totals.covered * len(judged))
+    assert least_by_chance(0.93, len(judged)) <= covered <= most_by_chance(0.98, len(judged))
+    assert not totals.false_passes
+    assert totals.wrongly_named <= most_by_chance(0.01, len(totals.outcomes))
+
+
+@pytest.mark.parametrize("effect", ONE_BY_ONE, ids=lambda effect: effect.name)
+def test_a_line_of_the_budget_is_the_error_that_machines_with_that_effect_make(say, effect):
+    own = settings()[0]
+    _, found = identified(own, Effect(), 0)
+    says = stated(own.cell.settings, own.robot, found, [effect])
+    line = says.budget.lines[0]
+    random = np.random.default_rng(11)
+    squares = []
+    for _ in range(ALIKE * RUNS):
+        world, found = identified(own, drawn([effect], 1.0, random), int(random.integers(1 << 31)))
+        errors = world.errors(found.geometry, says.poses, says.workspace, HOUR)
+        squares.append(np.sum(errors.once**2, axis=-1))
+    simulated = float(np.sqrt(np.mean(squares, axis=0).max()))
+    ratio = simulated / line.combined_mm
+    slack = 0.1 + 3.5 / np.sqrt(2 * ALIKE * RUNS)
+    figure = f"{effect.name}, {effect.size:g} {effect.unit}"
+    say(figure, f"{simulated:.4f} mm", f"budget {line.combined_mm:.4f}")
+    assert 1.0 - slack <= ratio <= 1.0 + slack
+
+
+@pytest.fixture(scope="module")
+def swept() -> list[Outcome]:
+    """Every kind, in multiples of its usual size, stated with the budget of a precision machine."""
+    return outcomes(
+        Trial(kind, factor, number) for kind in KINDS for factor in FACTORS for number in range(RUNS)
+    )
+
+
+def test_no_machine_beyond_the_budget_passes_that_records_show_to_be_wrong(swept, say):
+    print(HEAD, *lines(swept), sep="\n")
+    for factor in FACTORS:
+        each = Totals([one for one in swept if one.trial.factor == factor])
+        say(
+            f"{factor:g} times the usual size: passes, false ones",
+            f"{each.passes}, {each.false_passes} of {len(each.outcomes)}",
+            "",
+        )
+        say("  |stated - true| <= U", f"{100 * each.covered:.1f} %", "")
+    shown = Totals([one for one in swept if one.trial.factor > 1.0 and not KINDS[one.trial.kind].hidden])
+    share = 100 * shown.false_passes / len(shown.outcomes)
+    say("false passes, effects that records can show", f"{share:.2f} %", "below 1 %")
+    assert len({one.trial.kind for one in swept}) >= 60
+    assert shown.false_passes <= most_by_chance(0.01, len(shown.outcomes))
+
+
+def test_effects_that_no_record_shows_are_known(swept, say):
+    """They change the error and not the evidence; a statement can only list them."""
+    for name, kind in KINDS.items():
+        if kind.hidden:
+            largest = [
+                one
+                for one in swept
+                if one.trial.kind == name and one.trial.factor == FACTORS[-1] and one.verdict is not None
+            ]
+            true = np.median([one.true_mm for one in largest])
+            ratio = np.median([one.ratio for one in largest])
+            say(
+                f"{name}, {FACTORS[-1] * kind.usual:g} {kind.unit}",
+                f"{true:.3f} mm",
+                f"residuals {ratio:.2f}",
+            )
+            assert ratio < UNSUSPICIOUS
+
+
+@pytest.mark.xfail(reason="records of an imperfect machine are left out as if they were false")
+def test_causes_are_not_named_wrongly(swept, say):
+    for factor in FACTORS:
+        each = Totals([one for one in swept if one.trial.factor == factor])
+        share = 100 * each.wrongly_named / len(each.outcomes)
+        say(f"{factor:g} times: causes named wrongly", f"{share:.1f} %", "at most 1 %")
+    every = Totals(swept)
+    assert every.wrongly_named <= most_by_chance(0.01, len(swept))

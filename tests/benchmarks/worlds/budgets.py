@@ -1,0 +1,104 @@
+"""Machines whose effects are drawn from the uncertainty budget that is stated of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from functools import cache
+
+import numpy as np
+
+from hexacell.cell.bundled import bundled_config
+from hexacell.cell.loader import load_cell
+from hexacell.cell.model import CellSettings
+from hexacell.cell.uncertainty import Grade, UncertaintySettings
+from hexacell.kinematics.rotations import Array
+from hexacell.stated_effects import stated_effects
+from hexacell.uncertainty.effects import Effect as StatedEffect
+from tests.benchmarks.worlds import encoders, gauges, legs, rails
+from tests.benchmarks.worlds.effects import Effect, Only, Several
+from tests.benchmarks.worlds.legs import Course
+
+Random = np.random.Generator
+Draw = Callable[[float, Random], Effect]
+
+GAUGE_SCALE = 0.001
+COMPLIANCE = 0.03
+"""Of a leg, um/N; this and the next are what a cell file states unless it is told otherwise."""
+
+EXPANSIONS_UM_M_K = (23.0, 23.0, 23.0)
+"""Of legs, base with its scales, platform."""
+
+WAVES_MM = (600.0, 1500.0)
+UM, PPM, MRAD = 1e-3, 1e-6, 1e-3
+
+
+@cache
+def settings_of(grade: Grade) -> CellSettings:
+    """The bundled cell, with gauges as they are and a machine of some grade."""
+    settings = load_cell(bundled_config("simulated-hexaglide")).settings
+    noise = settings.noise.model_copy(update={"gauge_scale": GAUGE_SCALE})
+    stated = UncertaintySettings.model_validate({"grade": grade})
+    return settings.model_copy(update={"noise": noise, "uncertainty": stated})
+
+
+def machine(grade: Grade) -> tuple[StatedEffect, ...]:
+    """What is stated of a machine of some grade."""
+    return stated_effects(settings_of(grade))
+
+
+def drawn(stated: Iterable[StatedEffect], factor: float, random: Random) -> Effect:
+    """A machine with each of these effects, ``factor`` times as large as it is stated.
+
+    Raises:
+        KeyError: there is no such effect here.
+    """
+    return Several(tuple(_DRAWS[effect.name](factor * effect.size, random) for effect in stated))
+
+
+def _directions(mrad: float, random: Random) -> Effect:
+    yaw, pitch = mrad * MRAD * random.standard_normal((2, 3))[:, rails.RAILS]
+    return rails.NotParallel(yaw, pitch)
+
+
+def _waves(wave_mm: float) -> Draw:
+    def draw(um: float, random: Random) -> Effect:
+        phases = random.uniform(0.0, 2.0 * np.pi, (3, 3))[rails.RAILS]
+        return rails.Wavy(um * UM, wave_mm, np.array([0.0, 1.0, 1.0]), phases)
+
+    return draw
+
+
+def _warmer(kelvin: float, course: Course) -> Effect:
+    leg, base, platform = kelvin * PPM * np.array(EXPANSIONS_UM_M_K)
+    return legs.Warm(leg * np.ones(6), base, platform, base, course)
+
+
+def _oval(um: float, random: Random) -> Effect:
+    xy, yz, zx, xx, zz = um * UM * np.sqrt(1.5) * random.standard_normal(5)
+    form = np.array([[xx, xy, zx], [xy, -xx, yz], [zx, yz, 0.0]]) / 2.0
+    return gauges.Oval(form + zz / np.sqrt(12.0) * np.diag([-1.0, -1.0, 2.0]))
+
+
+def _scale(shares: Array) -> Effect:
+    return encoders.Scale(shares * PPM)
+
+
+_DRAWS: dict[str, Draw] = {
+    "scale common to all encoders": lambda s, r: _scale(s * r.standard_normal() * np.ones(6)),
+    "scale of each encoder": lambda s, r: _scale(s * r.standard_normal(6)),
+    "repeatability of a slider": lambda s, _: rails.Stopping(s * UM, np.array([1.0, 0.0, 0.0])),
+    "direction of each rail": _directions,
+    **{f"waves of the rails, {wave:g} mm long": _waves(wave) for wave in WAVES_MM},
+    "sag common to all rails": lambda s, r: rails.Sagging(s * UM * r.standard_normal() * np.ones(6)),
+    "temperature at work": lambda s, r: Only(_warmer(s * r.standard_normal(), Course.STEADY), at_work=True),
+    "temperature while measuring": lambda s, r: Only(
+        _warmer(s * r.standard_normal(), Course.CENTRED), at_work=False
+    ),
+    "load at work": lambda s, r: Only(
+        legs.Elastic(COMPLIANCE * UM * np.ones(6), s * r.standard_normal(3), np.zeros(3)), at_work=True
+    ),
+    "scale of each gauge": lambda s, r: gauges.Linear(np.diag(1e-3 * s * r.standard_normal(3))[None]),
+    "roundness of the ball": _oval,
+    "ball beside the tool's centre": lambda s, r: gauges.BallElsewhere(s * r.standard_normal(3)),
+}
+"""By the names of the effects of a budget."""

@@ -1,0 +1,124 @@
+"""Fixed campaigns of robots: poses that a run might have chosen, prepared once for a robot."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+import numpy as np
+
+from hexacell.campaign.forecast import select_sets
+from hexacell.campaign.task_accuracy import Task
+from hexacell.cell.bundled import bundled_config
+from hexacell.cell.loader import Cell, load_cell
+from hexacell.experiment_design.candidates import orientations, reachable
+from hexacell.kinematics.geometry import Geometry
+from hexacell.kinematics.mechanisms.hexaglide import hexaglide_geometry
+from hexacell.kinematics.pose import Pose, PoseBatch
+from hexacell.kinematics.rotations import Array
+from hexacell.robot_model import Robot, robot_of
+from hexacell.study.data_sets import random_robot
+from tests.benchmarks.worlds.world import Commands
+
+TILT_DEG = 45.0
+RECORDS = 11
+ALIGNMENT_DEG, GAUGE_SCALE = 0.3, 0.001
+"""As a cell states them whose gauges are placed by hand; the simulated one has neither."""
+
+MARGIN = 0.05
+"""Of the robot without effects from singularities: more than a run keeps, as large effects bend it."""
+
+AIM_MM = 2.5
+"""How far the ball is from the gauges' zero at most, along each axis: the travel of a run is used."""
+
+ERROR_MM = 7.0
+HELD_OUT = 6
+HELD_OUT_CANDIDATES = 64
+
+
+class UnreachableError(Exception):
+    """A robot cannot take a campaign's poses."""
+
+
+@dataclass(frozen=True, eq=False)
+class Setting:
+    """A robot, what is measured of it, and its task.
+
+    Attributes:
+        truth: its geometry without effects, in the convention's frames.
+        commands: of the campaign, through the controller's geometry.
+        task: poses of the task, and across the workspace.
+        held_out: poses that are commanded through whatever geometry is written.
+    """
+
+    cell: Cell
+    robot: Robot
+    truth: Geometry
+    commands: Commands
+    task: Task
+    held_out: Commands
+
+
+@lru_cache
+def setting(number: int) -> Setting:
+    """The robot of Table 1 is number 0; others are drawn within the tolerances.
+
+    Raises:
+        UnreachableError: it cannot take the poses; try the next number.
+    """
+    cell = load_cell(bundled_config("simulated-hexaglide"))
+    robot = robot_of(cell)
+    robot = replace(
+        robot,
+        limits=replace(robot.limits, tilt=float(np.radians(TILT_DEG))),
+        noise=replace(robot.noise, alignment=float(np.radians(ALIGNMENT_DEG)), gauge_scale=GAUGE_SCALE),
+    )
+    truth = _truth(cell, robot, number)
+    limits = replace(robot.limits, singularity_margin=MARGIN)
+    free = robot.mechanism.convention.free_parameters(truth)
+    belief = replace(robot.belief(), free=free, limits=limits)
+    points = robot.frames.poses(
+        PoseBatch.of(Pose(*point) for point in cell.settings.identification.points)
+    ).positions
+    random = np.random.default_rng([17, number])
+    parts, labels = [], []
+    for point, chosen in enumerate(select_sets(belief, points, RECORDS + 4, 1), start=1):
+        aimed = chosen.positions + random.uniform(-AIM_MM, AIM_MM, chosen.positions.shape)
+        _, commands = reachable(belief, PoseBatch(aimed, chosen.rotations))
+        if len(commands) < RECORDS:
+            raise UnreachableError(f"robot {number} takes {len(commands)} poses at point {point}")
+        parts.append(commands[:RECORDS])
+        labels += [(point, turn) for turn in range(1, RECORDS + 1)]
+    task = Task.of(cell.settings, robot, belief)
+    return Setting(
+        cell,
+        robot,
+        truth,
+        Commands(PoseBatch.concatenate(parts), np.array(labels)),
+        task,
+        _held_out(cell, belief, robot, number),
+    )
+
+
+def _truth(cell: Cell, robot: Robot, number: int) -> Geometry:
+    if number:
+        return random_robot(robot.mechanism, robot.drawing, ERROR_MM, np.random.default_rng([4, number]))
+    assert cell.settings.simulation is not None
+    built = cell.settings.simulation.geometry.model_dump()
+    geometry = hexaglide_geometry(built["S"], built["B"], built["l"])
+    return robot.mechanism.normalize_frames(geometry)[0]
+
+
+def _held_out(cell: Cell, belief, robot: Robot, number: int) -> Commands:
+    """Random orientations at the points of the verification."""
+    own = replace(belief, controller=belief.estimate)
+    turns: Array = orientations(HELD_OUT_CANDIDATES, belief.limits.tilt, 100 + number)
+    parts, labels = [], []
+    for place, point in enumerate(cell.settings.verification.points, start=1):
+        position = robot.from_commands([Pose(*point)]).positions[0]
+        _, commands = reachable(own, PoseBatch.at(position, np.concatenate([np.eye(3)[None], turns])))
+        if len(commands) < HELD_OUT:
+            raise UnreachableError(f"robot {number} cannot take the held-out poses")
+        parts.append(commands[:HELD_OUT])
+        labels += [(place, turn) for turn in range(1, HELD_OUT + 1)]
+    return Commands(PoseBatch.concatenate(parts), np.array(labels))

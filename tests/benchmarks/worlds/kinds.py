@@ -1,0 +1,387 @@
+"""Kinds of imperfect machines: an effect, its usual size, and what may rightly be said of it.
+
+Sizes are standard deviations where something is drawn for each leg or point, and amplitudes where it is
+not. The usual ones are those of a cell with glass scales and precision guides; where no such figure
+exists, what a careful shop would reach.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from hexacell.identification.solver.result import DataFaultKind
+from hexacell.kinematics.rotations import Array
+from tests.benchmarks.worlds import budgets, encoders, gauges, legs, rails
+from tests.benchmarks.worlds.effects import MOVE_GAUGES_HOURS, RECORD_HOURS, Effect, Only, Several
+from tests.benchmarks.worlds.legs import Course
+
+Random = np.random.Generator
+Make = Callable[[float, Random], Effect]
+
+UM = 1e-3
+PPM = 1e-6
+MRAD = 1e-3
+DEG = float(np.radians(1.0))
+
+STATED_MM = 0.01
+"""Noise of encoders and gauges that the simulated cell states."""
+
+POINTS = 8
+ALUMINIUM, STEEL, GRANITE = 23e-6, 11.5e-6, 6e-6
+DOWN = np.array([0.0, 0.0, -1.0])
+CENTRE = np.array([10.0, -5.0, -90.0])
+"""Of mass, in the platform frame: above the ball, and not quite in the middle."""
+
+X, Y, Z = np.eye(3)
+EVERY = np.ones(3)
+
+PRECISION, ORDINARY = "all of the budget, precision machine", "all of the budget, ordinary one"
+NONE = "no effect"
+
+GROSS = frozenset({DataFaultKind.GROSS_ERROR})
+SHIFT = frozenset({DataFaultKind.ZERO_SHIFT, DataFaultKind.GROSS_ERROR})
+
+
+@dataclass(frozen=True)
+class Kind:
+    """One kind of world.
+
+    Attributes:
+        usual: the usual size, in ``unit``.
+        make: the effect of a size in that unit.
+        hidden: whether no record can show it.
+        faults: data faults that are rightly named; any other is a wrong one.
+    """
+
+    name: str
+    unit: str
+    usual: float
+    make: Make
+    hidden: bool = False
+    faults: frozenset[DataFaultKind] = frozenset()
+
+    def world(self, factor: float, random: Random) -> Effect:
+        """The effect at a multiple of its usual size."""
+        return self.make(factor * self.usual, random)
+
+
+def each(random: Random) -> Array:
+    """A number (6,) for each leg."""
+    return random.standard_normal(6)
+
+
+def per_rail(random: Random) -> Array:
+    """A number (6,) for each leg, the same for two on one rail."""
+    drawn: Array = random.standard_normal(3)[rails.RAILS]
+    return drawn
+
+
+def one(random: Random) -> Array:
+    """A number (6,) for one leg only."""
+    alone: Array = (np.arange(6) == random.integers(6)) * random.choice([-1.0, 1.0])
+    return alone
+
+
+def direction(random: Random) -> Array:
+    """A unit vector (3,)."""
+    drawn = random.standard_normal(3)
+    unit: Array = drawn / np.linalg.norm(drawn)
+    return unit
+
+
+def phases(random: Random, *shape: int) -> Array:
+    return random.uniform(0.0, 2.0 * np.pi, shape)
+
+
+def hour(random: Random) -> float:
+    """Between two records of one point in the middle of a campaign of five points with eleven records."""
+    point, record = int(random.integers(5)), float(random.integers(3, 9))
+    return (11 * point + record + 0.5) * RECORD_HOURS + point * MOVE_GAUGES_HOURS
+
+
+def wavy(wave_mm: float, directions: Array) -> Make:
+    return lambda size, random: rails.Wavy(size * UM, wave_mm, directions, phases(random, 6, 3))
+
+
+def wavy_rails(wave_mm: float, directions: Array) -> Make:
+    """The sliders of one rail have one way."""
+    return lambda size, random: rails.Wavy(
+        size * UM, wave_mm, directions, phases(random, 3, 3)[rails.RAILS]
+    )
+
+
+def parallel(yaw: Callable[[Random], Array] | None, pitch: Callable[[Random], Array] | None) -> Make:
+    def make(size: float, random: Random) -> Effect:
+        parts = [np.zeros(6) if drawn is None else size * MRAD * drawn(random) for drawn in (yaw, pitch)]
+        return rails.NotParallel(*parts)
+
+    return make
+
+
+def everywhere(_: Random) -> Array:
+    return np.ones(6)
+
+
+def elastic(weight_n: float, spread: float) -> Make:
+    def make(size: float, random: Random) -> Effect:
+        compliances = size * UM * (1.0 + spread * each(random))
+        return legs.Elastic(compliances, weight_n * DOWN, CENTRE)
+
+    return make
+
+
+def run_out(*, slider: bool, platform: bool) -> Make:
+    def make(size: float, random: Random) -> Effect:
+        return Several(
+            tuple(
+                legs.RunOut(size * UM, 3.0 * random.standard_normal((6, 3)), phases(random, 6, 3), at)
+                for at, has in ((False, slider), (True, platform))
+                if has
+            )
+        )
+
+    return make
+
+
+def warm(
+    legs_share: Callable[[Random], Array], base: float, platform: float, course: Course = Course.STEADY
+) -> Make:
+    """So many K warmer: shares a K of legs, base and platform."""
+    return lambda size, random: legs.Warm(
+        size * legs_share(random), size * base, size * platform, size * base, course
+    )
+
+
+def at_work(make: Make) -> Make:
+    """Only while nothing is measured."""
+    return lambda size, random: Only(make(size, random), at_work=True)
+
+
+def load(compliance: float) -> Make:
+    """A force of so many N along each axis on the tool, one sigma; legs yield ``compliance``, um/N."""
+    return lambda size, random: legs.Elastic(
+        compliance * UM * np.ones(6), size * random.standard_normal(3), np.zeros(3)
+    )
+
+
+def alike(share: float) -> Callable[[Random], Array]:
+    return lambda _: share * np.ones(6)
+
+
+def differing(share: float) -> Callable[[Random], Array]:
+    return lambda random: share * each(random)
+
+
+def turned(vectors: Array) -> Array:
+    """What gauges that are turned by small vectors (n, 3), rad, read too much: matrices (n, 3, 3)."""
+    x, y, z = vectors.T
+    zero = np.zeros(len(vectors))
+    rows = [[zero, z, -y], [-z, zero, x], [y, -x, zero]]
+    return np.moveaxis(np.array(rows), -1, 0)
+
+
+def scaled(shares: Array) -> Array:
+    return np.diag(shares)[None]
+
+
+def not_square(random: Random) -> Array:
+    """Each gauge's direction leans by a vector of its own: (1, 3, 3), nothing on the diagonal."""
+    drawn = random.standard_normal((3, 3))
+    lean: Array = (drawn - np.diag(np.diag(drawn)))[None]
+    return lean
+
+
+def noisier(factor_of_size: Array, freedom: float | None = None) -> Make:
+    """Gauges as noisy as ``1 + size`` times what is stated."""
+    return lambda size, _: gauges.MoreNoise(
+        STATED_MM * np.sqrt((1.0 + size) ** 2 - 1.0) * factor_of_size, freedom
+    )
+
+
+def together(*parts: tuple[str, float]) -> Make:
+    """Some kinds at multiples of their usual size, all at ``size`` times that."""
+    return lambda size, random: Several(
+        tuple(KINDS[name].world(size * factor, random) for name, factor in parts)
+    )
+
+
+_NONE = [Kind(NONE, "", 1, lambda _size, _random: Effect())]
+
+_ENCODERS = [
+    Kind("encoders, common scale", "ppm", 15, lambda s, _: encoders.Scale(s * PPM * np.ones(6)), True),
+    Kind("encoders, each its scale", "ppm", 10, lambda s, r: encoders.Scale(s * PPM * each(r))),
+    Kind("encoders, one its scale", "ppm", 20, lambda s, r: encoders.Scale(s * PPM * one(r))),
+    Kind("encoders, scale bent", "um", 5, lambda s, r: encoders.Curved(s * UM * each(r))),
+    Kind("encoders, interpolation 2 mm", "um", 1, lambda s, r: encoders.Periodic(s * UM, 2, phases(r, 6))),
+    Kind("encoders, periodic 20 mm", "um", 2, lambda s, r: encoders.Periodic(s * UM, 20, phases(r, 6))),
+    Kind("encoders, periodic 200 mm", "um", 3, lambda s, r: encoders.Periodic(s * UM, 200, phases(r, 6))),
+    Kind("encoders, zeros off", "um", 30, lambda s, r: encoders.Offset(s * UM * each(r))),
+    Kind("encoders, hysteresis", "um", 1, lambda s, _: encoders.Hysteresis(s * UM)),
+    Kind("encoders, zeros creep", "um/h", 3, lambda s, r: encoders.Creep(s * UM * each(r))),
+    Kind(
+        "encoders, one loses counts", "um", 10, lambda s, r: encoders.LostCounts(s * UM * one(r), hour(r))
+    ),
+    Kind("encoders, resolution", "um", 5, lambda s, _: encoders.Resolution(s * UM)),
+    Kind(
+        "encoders, noisier",
+        "times more",
+        0.2,
+        lambda s, _: encoders.MoreNoise(STATED_MM * float(np.sqrt((1 + s) ** 2 - 1))),
+    ),
+    Kind("encoders, 1 % outliers", "um", 50, lambda s, _: encoders.Outliers(s * UM), faults=GROSS),
+]
+
+_RAILS = [
+    Kind("rails wavy y, 150 mm", "um", 3, wavy(150, Y)),
+    Kind("rails wavy y, 600 mm", "um", 3, wavy(600, Y)),
+    Kind("rails wavy y, 1500 mm", "um", 5, wavy(1500, Y)),
+    Kind("rails wavy y, 2000 mm", "um", 5, wavy(2000, Y)),
+    Kind("rails wavy z, 150 mm", "um", 3, wavy(150, Z)),
+    Kind("rails wavy z, 600 mm", "um", 3, wavy(600, Z)),
+    Kind("rails wavy z, 1500 mm", "um", 5, wavy(1500, Z)),
+    Kind("rails wavy z, 2000 mm", "um", 5, wavy(2000, Z)),
+    Kind("rails wavy x, 150 mm", "um", 3, wavy(150, X)),
+    Kind("rails wavy x, 600 mm", "um", 3, wavy(600, X)),
+    Kind("rails wavy x, 1500 mm", "um", 5, wavy(1500, X)),
+    Kind("rails wavy yz, 300 mm", "um", 3, wavy(300, Y + Z)),
+    Kind("rails wavy xyz, 600 mm", "um", 3, wavy(600, EVERY)),
+    Kind("three rails wavy yz, 600 mm", "um", 3, wavy_rails(600, Y + Z)),
+    Kind("three rails wavy yz, 1500 mm", "um", 5, wavy_rails(1500, Y + Z)),
+    Kind("rails sag alike", "um", 20, lambda s, _: rails.Sagging(s * UM * np.ones(6)), True),
+    Kind("rails sag, each", "um", 5, lambda s, r: rails.Sagging(s * UM * each(r))),
+    Kind("three rails sag, each", "um", 5, lambda s, r: rails.Sagging(s * UM * per_rail(r))),
+    Kind("rails yaw, each", "mrad", 0.02, parallel(each, None)),
+    Kind("rails pitch, each", "mrad", 0.02, parallel(None, each)),
+    Kind("three rails yaw, each", "mrad", 0.02, parallel(per_rail, None)),
+    Kind("three rails pitch, each", "mrad", 0.02, parallel(None, per_rail)),
+    Kind("rails yaw and pitch, each", "mrad", 0.02, parallel(each, each)),
+    Kind("rails yaw alike", "mrad", 0.5, parallel(everywhere, None)),
+    Kind("rails pitch alike", "mrad", 0.5, parallel(None, everywhere)),
+    Kind(
+        "rails twisted, arm 60 mm",
+        "mrad",
+        0.05,
+        lambda s, r: rails.Twisted(s * MRAD * per_rail(r), np.array([0.0, 20.0, 60.0])),
+    ),
+    Kind(
+        "sliders nod, arm 60 mm", "mrad", 0.03, lambda s, r: rails.Nodding(s * MRAD, 600, 60, phases(r, 6))
+    ),
+    Kind("rails, a bump each", "um", 3, lambda s, r: rails.Bump(s * UM, 40, r.uniform(-600, 600, 6))),
+    Kind("rails yield under load", "um/N", 0.02, lambda s, _: rails.Yielding(
+        s * UM * np.ones(6), 20 * DOWN, CENTRE
+    )),
+]  # fmt: skip
+
+_SLIDERS = [
+    Kind("sliders do not repeat x", "um", 2, lambda s, _: rails.Stopping(s * UM, X)),
+    Kind("sliders do not repeat yz", "um", 2, lambda s, _: rails.Stopping(s * UM, Y + Z)),
+    Kind("sliders do not repeat xyz", "um", 2, lambda s, _: rails.Stopping(s * UM, EVERY)),
+    Kind("sliders stop elsewhere, seen", "um", 5, lambda s, _: rails.Following(s * UM)),
+    Kind("backlash by direction", "um", 2, lambda s, _: encoders.Hysteresis(s * UM)),
+    Kind("play of legs by load", "um", 2, lambda s, _: legs.Play(s * UM, 20 * DOWN, CENTRE)),
+]
+
+_LEGS = [
+    Kind("legs elastic, 20 N", "um/N", 0.03, elastic(20, 0.0)),
+    Kind("legs elastic, 100 N", "um/N", 0.03, elastic(100, 0.0)),
+    Kind("legs elastic, each other", "um/N", 0.03, elastic(20, 0.3)),
+    Kind("joints run out, sliders", "um", 2, run_out(slider=True, platform=False)),
+    Kind("joints run out, platform", "um", 2, run_out(slider=False, platform=True)),
+    Kind("joints run out, both", "um", 2, run_out(slider=True, platform=True)),
+    Kind("axes of joints apart", "um", 10, lambda s, r: legs.AxesApart(s * UM * each(r))),
+    Kind("legs warmer, steel", "K", 1, warm(alike(STEEL), 0, 0)),
+    Kind("legs differ in temperature", "K", 0.3, warm(differing(STEEL), 0, 0)),
+    Kind("all warmer, granite base", "K", 1, warm(alike(ALUMINIUM), GRANITE, ALUMINIUM)),
+    Kind("base warmer", "K", 1, warm(alike(0.0), GRANITE, 0)),
+    Kind("platform warmer", "K", 1, warm(alike(0.0), 0, ALUMINIUM)),
+    Kind("legs get warmer steadily", "K/h", 1, warm(alike(STEEL), 0, 0, Course.RISING)),
+    Kind("legs warm up", "K", 1, warm(alike(STEEL), 0, 0, Course.WARMING_UP)),
+    Kind("all get warmer steadily", "K/h", 1, warm(alike(ALUMINIUM), GRANITE, ALUMINIUM, Course.RISING)),
+    Kind("legs warmer at work", "K", 1, at_work(warm(alike(STEEL), 0, 0)), hidden=True),
+    Kind("all warmer at work", "K", 1, at_work(warm(alike(ALUMINIUM), GRANITE, ALUMINIUM)), hidden=True),
+    Kind("load at work", "N", 20, at_work(load(0.03)), hidden=True),
+    Kind("legs creep, each", "um/h", 3, lambda s, r: legs.Growing(s * UM * each(r))),
+    Kind("a leg slips once", "um", 10, lambda s, r: legs.Growing(s * UM * one(r), hour(r))),
+]
+
+_BALL = [
+    Kind("ball out of round, order 2", "um", 2, lambda s, r: gauges.OutOfRound(s * UM, direction(r), 2)),
+    Kind("ball out of round, order 3", "um", 2, lambda s, r: gauges.OutOfRound(s * UM, direction(r), 3)),
+    Kind("ball and tool off the drawing", "um", 300, lambda s, r: gauges.ToolElsewhere(
+        s * UM * direction(r)
+    )),
+    Kind("ball off the tool", "um", 20, lambda s, r: gauges.BallElsewhere(s * UM * direction(r)), True),
+    Kind(
+        "ball slips once", "um", 10, lambda s, r: gauges.BallMoves(s * UM * direction(r), hour(r)),
+        faults=SHIFT,
+    ),
+    Kind("ball creeps", "um/h", 5, lambda s, r: gauges.BallMoves(s * UM * direction(r))),
+    Kind("ball's stem bends", "per mille", 1, lambda s, _: gauges.StemBends(1e-3 * s)),
+]  # fmt: skip
+
+_GAUGES = [
+    Kind("gauges, common scale", "per mille", 1, lambda s, _: gauges.Linear(scaled(1e-3 * s * EVERY))),
+    Kind("gauges, each its scale", "per mille", 1, lambda s, r: gauges.Linear(
+        scaled(1e-3 * s * r.standard_normal(3))
+    )),
+    Kind("gauges, scale bent", "um", 2, lambda s, r: gauges.Bent(s * UM * r.standard_normal(3))),
+    Kind("gauges, periodic 1 mm", "um", 2, lambda s, r: gauges.Periodic(s * UM, 1.0, phases(r, 3))),
+    Kind("gauges, hysteresis", "um", 2, lambda s, _: gauges.Hysteresis(s * UM)),
+    Kind("gauges, resolution", "um", 5, lambda s, _: gauges.Resolution(s * UM)),
+    Kind("triad turned, once for all", "deg", 0.3, lambda s, r: gauges.Linear(
+        turned(s * DEG * r.standard_normal((1, 3)))
+    )),
+    Kind("triad turned, at each point", "deg", 0.3, lambda s, r: gauges.Linear(
+        turned(s * DEG * r.standard_normal((POINTS, 3)))
+    )),
+    Kind("plungers not square", "deg", 0.1, lambda s, r: gauges.Linear(s * DEG * not_square(r))),
+    Kind("cosine error", "deg", 1, lambda s, r: gauges.Linear(
+        scaled(1.0 / np.cos(s * DEG * np.abs(r.standard_normal(3))) - 1.0)
+    )),
+    Kind("gauges noisier", "times more", 0.2, noisier(EVERY)),
+    Kind("one gauge noisier", "times more", 0.5, noisier(X)),
+    Kind("gauges noisier, long tails", "times more", 0.2, noisier(EVERY, 3.0)),
+    Kind("gauges, 1 % outliers", "um", 50, lambda s, _: gauges.Outliers(s * UM), faults=GROSS),
+    Kind("stands drift", "um/h", 10, lambda s, r: gauges.Drifting(s * UM * r.standard_normal((POINTS, 3)))),
+    Kind("stands warm up", "um/h", 30, lambda s, r: gauges.Drifting(
+        s * UM * r.standard_normal((POINTS, 3)), warming_up=True
+    )),
+    Kind("one gauge's zero drifts", "um/h", 20, lambda s, r: gauges.Drifting(
+        s * UM * r.standard_normal((POINTS, 1)) * X
+    )),
+    Kind("stands turn", "mrad/h", 0.05, lambda s, r: gauges.Turning(
+        s * MRAD * r.standard_normal(3), np.array([0.0, 0.0, 200.0])
+    )),
+    Kind(
+        "a stand is pushed", "um", 10, lambda s, r: gauges.Jump(s * UM * direction(r), hour(r)),
+        faults=SHIFT,
+    ),
+]  # fmt: skip
+
+_TOGETHER = [
+    Kind(PRECISION, "times", 1, lambda s, r: budgets.drawn(budgets.machine("precision"), s, r)),
+    Kind(ORDINARY, "times", 1, lambda s, r: budgets.drawn(budgets.machine("ordinary"), s, r)),
+    Kind("encoders' scale and waves", "times", 1, together(
+        ("encoders, each its scale", 1), ("rails wavy y, 600 mm", 1), ("rails wavy z, 1500 mm", 1),
+    )),
+    Kind("a warm day", "times", 1, together(
+        ("all get warmer steadily", 1), ("stands drift", 1), ("legs differ in temperature", 1),
+    )),
+    Kind("worn sliders", "times", 1, together(
+        ("backlash by direction", 1), ("sliders do not repeat xyz", 1), ("rails, a bump each", 1),
+    )),
+    Kind("poor gauges", "times", 1, together(
+        ("gauges, each its scale", 1), ("plungers not square", 1), ("gauges, hysteresis", 1),
+        ("triad turned, at each point", 1),
+    )),
+    Kind("heavy tool", "times", 1, together(
+        ("legs elastic, 100 N", 1), ("rails yield under load", 3), ("play of legs by load", 1),
+    )),
+]  # fmt: skip
+
+KINDS = {kind.name: kind for group in (_NONE, _ENCODERS, _RAILS, _SLIDERS, _LEGS, _BALL, _GAUGES, _TOGETHER)
+         for kind in group}  # fmt: skip
+"""All kinds by their names."""

@@ -1,4 +1,4 @@
-"""The interface of a mechanism: one constraint per leg, its derivatives, and the frame convention."""
+"""The interface of a mechanism: one constraint per leg, its derivatives, and its frames."""
 
 from __future__ import annotations
 
@@ -94,6 +94,30 @@ class FrameConvention:
         return first.kind.display_name(first.leg, first.component, joints)
 
 
+@dataclass(frozen=True, slots=True)
+class FrameFreedom:
+    """The changes of frames that the parameters of a mechanism can express: by which axes.
+
+    Where rails run along base x, for example, no parameters describe the machine in a base frame that is
+    turned about y or z. Each attribute has some of the letters of ``xyz``.
+
+    Attributes:
+        shift: along which axes of the base frame its origin may be shifted.
+        base: about which of them it may be turned.
+        platform: about which axes of the platform frame that frame may be turned; its origin is the ball.
+    """
+
+    shift: str = "xyz"
+    base: str = "xyz"
+    platform: str = "xyz"
+
+    @property
+    def columns(self) -> list[int]:
+        """Which of nine small changes are free: shifts, then turns of the base, then of the platform."""
+        kinds = (self.shift, self.base, self.platform)
+        return [3 * kind + "xyz".index(axis) for kind, axes in enumerate(kinds) for axis in axes]
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class FrameTransform:
     """The change from one choice of base and platform frames to another, for the same machine.
@@ -104,6 +128,11 @@ class FrameTransform:
     base: Array
     origin: Array
     platform: Array
+
+    def then(self, further: FrameTransform) -> FrameTransform:
+        """This change and a further one in one."""
+        origin = self.origin + self.base.T @ further.origin
+        return FrameTransform(further.base @ self.base, origin, further.platform @ self.platform)
 
     def poses(self, poses: PoseBatch) -> PoseBatch:
         """The same poses in the new frames."""
@@ -143,6 +172,7 @@ class Mechanism(Protocol):
     name: str
     parameters: ParameterSet
     convention: FrameConvention
+    frame_freedom: FrameFreedom
 
     def residual_and_jacobian(
         self, geometry: Geometry | GeometryBatch, poses: PoseBatch, joints: Array

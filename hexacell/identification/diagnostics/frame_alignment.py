@@ -43,7 +43,7 @@ class FrameFit:
     def coefficients(self, errors: Array) -> Array:
         """The best (t, f, p) (9, ...), mm and rad, for errors (n, 6, ...)."""
         scale = np.repeat([1.0, self.length], 3)
-        design = (_design(self.workspace) * scale[:, None]).reshape(-1, 9)
+        design = (frame_derivatives(self.workspace) * scale[:, None]).reshape(-1, 9)
         values = (errors.reshape(len(errors), 6, -1) * scale[:, None]).reshape(len(design), -1)
         # Equal poses do not determine the frames; lstsq then gives the smallest change.
         best: Array = np.linalg.lstsq(design, values)[0]
@@ -51,7 +51,9 @@ class FrameFit:
 
     def remove_frame_motion(self, poses: PoseBatch, errors: Array, workspace_errors: Array) -> Array:
         """Errors (k, 6, ...) of other poses minus what the best frames explain, to first order."""
-        explained: Array = np.tensordot(_design(poses), self.coefficients(workspace_errors), axes=1)
+        explained: Array = np.tensordot(
+            frame_derivatives(poses), self.coefficients(workspace_errors), axes=1
+        )
         return errors - explained
 
     def aligned(self, reached: PoseBatch, others: PoseBatch) -> PoseBatch:
@@ -65,7 +67,7 @@ class FrameFit:
         return others
 
 
-def _design(poses: PoseBatch) -> Array:
+def frame_derivatives(poses: PoseBatch) -> Array:
     """Derivatives (n, 6, 9) of pose errors by t, f and p."""
     design = np.zeros((len(poses), 6, 9))
     design[:, :3, :3] = np.eye(3)

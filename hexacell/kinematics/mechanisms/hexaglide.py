@@ -15,6 +15,7 @@ from hexacell.kinematics.mechanism import (
     Branch,
     ConstraintDerivatives,
     FrameConvention,
+    FrameFreedom,
     FrameTransform,
     Guides,
 )
@@ -72,6 +73,7 @@ class Hexaglide:
     name = "hexaglide"
     parameters = HEXAGLIDE_PARAMETERS
     convention = PAPER_FRAME
+    frame_freedom = FrameFreedom(base="x")  # the rails run along base x
 
     def residual_and_jacobian(
         self, geometry: Geometry | GeometryBatch, poses: PoseBatch, joints: Array

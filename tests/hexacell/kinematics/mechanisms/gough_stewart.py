@@ -13,6 +13,7 @@ from hexacell.kinematics.mechanism import (
     Branch,
     ConstraintDerivatives,
     FrameConvention,
+    FrameFreedom,
     FrameTransform,
     Guides,
 )
@@ -65,6 +66,7 @@ class GoughStewart:
     name = "gough-stewart"
     parameters = PARAMETERS
     convention = CONVENTION
+    frame_freedom = FrameFreedom()
 
     def residual_and_jacobian(
         self, geometry: Geometry | GeometryBatch, poses: PoseBatch, joints: Array

@@ -9,10 +9,11 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from hexacell.kinematics.geometry import Geometry
-from hexacell.kinematics.mechanism import FrameTransform
-from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS
+from hexacell.kinematics.mechanism import FrameTransform, Mechanism
+from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS, Hexaglide
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.sensitivity import pose_sensitivity
+from tests.hexacell.kinematics.mechanisms.gough_stewart import GoughStewart
 
 CONVENTION_MM = 1e-9
 place = st.floats(-500.0, 500.0)
@@ -171,3 +172,38 @@ def test_the_rank_of_the_sensitivity_does_not_give_the_number_of_free_parameters
 def test_display_names_of_parameters(hexaglide, name, words):
     """A parameter that represents several numbers names them."""
     assert hexaglide.convention.display_name(name) == words
+
+
+def a_small_change(column: int, size: float = 1e-3) -> FrameTransform:
+    """One of nine: a shift of the base frame, a turn of it, or a turn of the platform frame."""
+    step = np.zeros(9)
+    step[column] = size
+    turns = Rotation.from_rotvec(step[3:].reshape(2, 3)).as_matrix()
+    return FrameTransform(turns[0], 100.0 * step[:3], turns[1])
+
+
+@pytest.mark.parametrize("mechanism", [Hexaglide(), GoughStewart()], ids=lambda mechanism: mechanism.name)
+def test_just_the_free_changes_of_frames_leave_a_geometry_that_is_the_same_machine(mechanism: Mechanism):
+    free = mechanism.frame_freedom.columns
+    convention = mechanism.convention
+    assert len(mechanism.parameters) - len(convention.free_names()) == len(free)
+    random = np.random.default_rng(3)
+    geometry = Geometry(mechanism.parameters, random.uniform(100.0, 300.0, len(mechanism.parameters)))
+    poses = PoseBatch(
+        random.uniform(-100.0, 100.0, (5, 3)), Rotation.from_rotvec(random.normal(size=(5, 3))).as_matrix()
+    )
+    joints = random.uniform(-300.0, 300.0, (5, 6))
+    errors = mechanism.residual_and_jacobian(geometry, poses, joints)[0]
+    for column in range(9):
+        change = a_small_change(column)
+        moved = mechanism.change_frames(geometry, change)
+        same = mechanism.residual_and_jacobian(moved, change.poses(poses), joints)[0]
+        assert (np.abs(same - errors).max() < 1e-9) == (column in free), column
+
+
+@given(frame_changes(), frame_changes())
+def test_two_changes_of_frames_are_one(first, second):
+    poses = PoseBatch.at([10.0, -50.0, 540.0], Rotation.from_rotvec([[0.2, -0.1, 0.3]]).as_matrix())
+    one, by_one = first.then(second).poses(poses), second.poses(first.poses(poses))
+    np.testing.assert_allclose(one.positions, by_one.positions, atol=CONVENTION_MM)
+    np.testing.assert_allclose(one.rotations, by_one.rotations, atol=1e-12)

@@ -3,20 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from itertools import product
+from itertools import islice, product
 from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from hexacell.cell.model import geometry_settings, tolerance_settings
 from hexacell.controller_config.toml_format import NativeToml
 from hexacell.errors import FileError
+from hexacell.identification.diagnostics.frame_choice import choose_frames
 from hexacell.identification.estimator import identify
 from hexacell.identification.problem.problem import Noise, Prior, Tolerances, build_problem
 from hexacell.kinematics.forward import continue_solution
 from hexacell.kinematics.geometry import Geometry
-from hexacell.kinematics.mechanism import Branch, Mechanism
+from hexacell.kinematics.mechanism import Branch, FrameTransform, Mechanism
 from hexacell.kinematics.parameters import ParameterKind, ParameterSet, ParameterUnit
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.rotations import Array
@@ -125,6 +127,20 @@ def test_a_second_mechanism_is_identified_from_exact_records(
     assert list(document["geometry"]) == ["z", "A", "B"]
     assert [entry["name"] for entry in document["parameters"]] == list(PARAMETERS.names)
     assert np.array(document["covariance"]).shape == (42, 42)
+
+
+def test_all_nine_numbers_of_its_frames_are_chosen(drawing: Geometry, truth: Geometry) -> None:
+    change = FrameTransform(
+        Rotation.from_rotvec([0.2, -0.3, 0.4]).as_matrix(),
+        np.array([10.0, -20.0, 30.0]),
+        Rotation.from_rotvec([-0.1, 0.2, 0.3]).as_matrix(),
+    )
+    own = PoseBatch.of(pose for _, _, pose in islice(poses(drawing, np.random.default_rng(2)), 20))
+    taught = MECHANISM.change_frames(truth, change)
+    chosen = choose_frames(MECHANISM, BRANCH, taught=taught, new=truth, poses=change.poses(own))
+    assert chosen.found.all()
+    assert chosen.displacement.position_largest_mm < 1e-8
+    np.testing.assert_allclose(chosen.geometry.vector, taught.vector, atol=1e-8)
 
 
 def test_the_config_of_a_second_mechanism_is_read_and_rewritten(

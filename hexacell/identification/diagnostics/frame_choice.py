@@ -1,9 +1,11 @@
 """The frames of a new geometry in which taught poses move least at equal joint variables.
 
 An identification leaves the frames of a geometry open: the mechanism's parameters can express it in any
-of them (:class:`~hexacell.kinematics.mechanism.FrameFreedom`). Points, work frames and tool frames were
-taught with an earlier geometry. At the joint variables q of a taught pose X the new geometry has another
-pose Y, in frames of its own. The chosen change of frames c is the one with the smallest
+of them (:class:`~hexacell.kinematics.mechanism.FrameFreedom`). The base frame is not turned all the same:
+the gauges measure along its axes, and stay where they are when a new geometry is written. Points, work
+frames and tool frames were taught with an earlier geometry. At the joint variables q of a taught pose X the
+new geometry has another pose Y, in frames of its own. The chosen change of frames c is the one with the
+smallest
 
     sum over taught poses of |dP|^2 + (r |dw|)^2,    (dP, dw) = pose errors of c(Y) against X,
 
@@ -14,7 +16,7 @@ to dP, and a small turn w changes the length of dw by ``w . dw / |dw|``, however
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -74,7 +76,8 @@ def choose_frames(
     length = float(mechanism.platform_radius(new))
     frames = convention.inverse()
     if len(targets):
-        change = closest_frames(mechanism.frame_freedom, length, frames.poses(reached_poses), targets)
+        freedom = replace(mechanism.frame_freedom, base="")  # gauges measure along the axes of the base
+        change = closest_frames(freedom, length, frames.poses(reached_poses), targets)
         frames = frames.then(change)
     return FrameChoice(
         mechanism.change_frames(new, frames),

@@ -129,7 +129,7 @@ def test_a_second_mechanism_is_identified_from_exact_records(
     assert np.array(document["covariance"]).shape == (42, 42)
 
 
-def test_all_nine_numbers_of_its_frames_are_chosen(drawing: Geometry, truth: Geometry) -> None:
+def test_its_frames_are_found_again(drawing: Geometry, truth: Geometry) -> None:
     change = FrameTransform(
         Rotation.from_rotvec([0.2, -0.3, 0.4]).as_matrix(),
         np.array([10.0, -20.0, 30.0]),

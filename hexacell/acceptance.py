@@ -1,6 +1,6 @@
 """Acceptance of a result: gates before its geometry is written to a controller, validation afterwards.
 
-The validation compares the deviations of the ball at held-out points before and after the calibration.
+The deviations of the ball at held-out points are compared before and after the calibration.
 """
 
 from __future__ import annotations

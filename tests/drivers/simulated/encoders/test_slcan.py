@@ -133,7 +133,7 @@ def pair(request):
         can.Bus(**server.bus_settings) as far,
     ):
         far.send(can.Message(is_extended_id=False))
-        assert near.recv(1.0) is not None  # the adapter has opened its channel
+        assert near.recv(10.0) is not None  # the adapter has opened its channel
         yield near, far
 
 

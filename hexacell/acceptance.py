@@ -75,7 +75,7 @@ def _determined(identified: GeometryEstimate) -> AcceptanceGate:
 
 def _agrees(residuals: ChiSquareTest) -> AcceptanceGate:
     """A geometry whose residuals the noise does not explain is doubtful: a person decides."""
-    passed = residuals.agreement in {ChiSquareVerdict.AGREES, ChiSquareVerdict.TOO_SMALL}
+    passed = residuals.is_explained
     sentence = "The residuals agree with the stated noise."
     if residuals.agreement is ChiSquareVerdict.NOT_EVALUATED:
         sentence = "The residuals prove nothing: there are no more records than unknowns."

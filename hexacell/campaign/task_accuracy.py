@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -73,13 +73,23 @@ class Task:
         return Task(_reachable(belief, self.poses), _reachable(belief, self.workspace))
 
     def budget(
-        self, found: Identification, belief: RobotBelief, effects: Iterable[Effect]
+        self,
+        found: Identification,
+        belief: RobotBelief,
+        effects: Iterable[Effect],
+        earlier: Mapping[str, Array] | None = None,
     ) -> UncertaintyBudget | None:
-        """What is not known of the errors; none if the estimated robot can take no task pose."""
+        """What is not known of the errors; none if the estimated robot can take no task pose.
+
+        ``earlier``: see :meth:`UncertaintyBudget.of`.
+        """
         reached = self.reachable(belief)
         if not len(reached.poses) or not len(reached.workspace):
             return None
-        return UncertaintyBudget.of(found, belief, effects, task=reached.poses, workspace=reached.workspace)
+        poses, workspace = reached.poses, reached.workspace
+        return UncertaintyBudget.of(
+            found, belief, effects, task=poses, workspace=workspace, earlier=earlier
+        )
 
     def error(self, belief: RobotBelief) -> TaskError | None:
         """How the error depends on the parameters; none if the estimated robot can take no task pose."""

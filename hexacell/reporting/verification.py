@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
 
 from hexacell.acceptance import DeviationStatistics, is_worse
 from hexacell.campaign.task_accuracy import Task
@@ -18,13 +17,12 @@ from hexacell.cell.fields import Frozen, SixNumbers
 from hexacell.cell.model import CellSettings
 from hexacell.decision import Verdict, decide, worst_verdict
 from hexacell.identification.diagnostics.model_tests import leave_one_point_out, prediction_test, update
-from hexacell.identification.solver.chi_square import SMALLEST_PROBABILITY, ChiSquareTest, ChiSquareVerdict
+from hexacell.identification.solver.chi_square import SMALLEST_PROBABILITY, ChiSquareTest
 from hexacell.identification.solver.result import Identification
 from hexacell.measurements.records import MeasurementSet
 from hexacell.reporting.result import IdentificationResult
 from hexacell.robot_model import Robot
 from hexacell.stated_effects import stated_effects
-from hexacell.uncertainty.budget import UncertaintyBudget
 from hexacell.uncertainty.statement import LargestError
 
 
@@ -199,12 +197,11 @@ def verified_accuracy(
     """The error that the geometry of ``found`` makes at the task poses, by the updated estimate."""
     belief = robot.belief(updated)
     task = Task.of(settings, robot, belief).reachable(belief)
-    if not len(task.poses) or not len(task.workspace):
-        return None
     effects = stated_effects(settings, temperature_range_k)
-    budget_of = partial(UncertaintyBudget.of, task=task.poses, workspace=task.workspace)
-    first = budget_of(found, robot.belief(found), effects)
-    budget = budget_of(updated, belief, effects, earlier=first.parameter_columns)
+    first = task.budget(found, robot.belief(found), effects)
+    budget = first and task.budget(updated, belief, effects, earlier=first.parameter_columns)
+    if budget is None:
+        return None
     errors = budget.errors_of(found.free - updated.free)
     limits = settings.acceptance
     return VerifiedAccuracy(
@@ -226,8 +223,8 @@ def _verdict(tests: Sequence[ModelTest], accuracy: VerifiedAccuracy | None, *, w
 
 
 def _residual_test(test: ChiSquareTest) -> ModelTest:
-    passed = test.agreement in {ChiSquareVerdict.AGREES, ChiSquareVerdict.TOO_SMALL}
-    return ModelTest(name="residuals", passed=passed, sentence=_sentence("The residuals", test, passed))
+    sentence = _sentence("The residuals", test, test.is_explained)
+    return ModelTest(name="residuals", passed=test.is_explained, sentence=sentence)
 
 
 def _prediction_test(name: str, test: ChiSquareTest, what: str, smallest: float) -> ModelTest:

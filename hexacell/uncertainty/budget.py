@@ -22,7 +22,7 @@ from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array
 from hexacell.uncertainty.effects import Effect, Occurrence
 from hexacell.uncertainty.propagation import Propagation, compressed
-from hexacell.uncertainty.statement import TaskErrors
+from hexacell.uncertainty.statement import TaskErrors, covariance_factor
 
 TELLING_SIGMAS = 4.0
 """Standard deviations by which an effect must raise the chi-square to be seen."""
@@ -95,7 +95,7 @@ class UncertaintyBudget:
         estimated = (effect for effect in effects if effect.is_estimated)
         for columns in (effect.size * propagation.parameter_columns(effect) for effect in estimated):
             covariance = covariance - columns @ columns.T
-        noise = propagation.jacobian @ _factor(covariance)
+        noise = propagation.jacobian @ covariance_factor(covariance)
         telling = TELLING_SIGMAS * np.sqrt(2.0 * found.goodness.expected)
         visible = telling / (HARMLESS_ERROR * _largest(noise)) ** 2
         lines = (_line(propagation, effect, visible) for effect in effects)
@@ -195,10 +195,3 @@ def _joined(parts: Sequence[Array], shape: tuple[int, ...]) -> Array:
     rows = shape[0] * shape[1]
     flat = np.concatenate([np.zeros((rows, 0)), *(part.reshape(rows, -1) for part in parts)], axis=-1)
     return compressed(flat).reshape(*shape, min(flat.shape))
-
-
-def _factor(covariance: Array) -> Array:
-    """A matrix (p, p) whose product with its transpose is the covariance, which may be singular."""
-    values, vectors = np.linalg.eigh(covariance)
-    factor: Array = vectors * np.sqrt(np.maximum(values, 0.0))
-    return factor

@@ -55,7 +55,7 @@ class TaskErrors:
             covariance: (p, p) of the estimate.
             systematic: (n, 6, k) effects that no covariance contains.
         """
-        by_noise = jacobian @ _factor(covariance)
+        by_noise = jacobian @ covariance_factor(covariance)
         return cls(jacobian @ difference, np.concatenate([by_noise, systematic], axis=-1))
 
     @cached_property
@@ -84,7 +84,7 @@ def _largest(estimated: Array, effects: Array) -> LargestError:
     return LargestError(value, float(np.quantile(np.abs(largest - value), COVERAGE)))
 
 
-def _factor(covariance: Array) -> Array:
+def covariance_factor(covariance: Array) -> Array:
     """A matrix (p, p) L with ``L L^T`` the covariance, which may be singular."""
     values, vectors = np.linalg.eigh(covariance)
     factor: Array = vectors * np.sqrt(np.maximum(values, 0.0))

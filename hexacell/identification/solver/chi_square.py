@@ -70,6 +70,11 @@ class ChiSquareTest:
         return ChiSquareVerdict.AGREES
 
     @property
+    def is_explained(self) -> bool:
+        """Whether the noise explains the residuals; not where there is no redundancy to tell."""
+        return self.agreement in {ChiSquareVerdict.AGREES, ChiSquareVerdict.TOO_SMALL}
+
+    @property
     def noise_factor(self) -> float:
         """Factor for every standard deviation, above 1 where the residuals are significantly too large."""
         return self.ratio if self.agreement is ChiSquareVerdict.TOO_LARGE else 1.0

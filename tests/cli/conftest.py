@@ -39,9 +39,12 @@ QUICK = (
 )
 
 # A busy machine may leave a simulated device waiting longer than a real one ever takes.
-PATIENT = tuple(
-    (f'protocol = "{protocol}"', f'protocol = "{protocol}"\ntimeout_s = 20.0')
-    for protocol in ("sylvac", "mux10", "cdi", "cia406")
+PATIENT = (
+    *(
+        (f'protocol = "{protocol}"', f'protocol = "{protocol}"\ntimeout_s = 20.0')
+        for protocol in ("sylvac", "mux10", "cdi", "cia406")
+    ),
+    ("measuring_step_nm = 1000 ", "heartbeat_ms = 5000\nmeasuring_step_nm = 1000 "),
 )
 
 # As few records as identify it.

@@ -163,7 +163,7 @@ def forward_kinematics(
 
 def continue_solution(
     mechanism: Mechanism,
-    geometry: Geometry,
+    geometry: Geometry | GeometryBatch,
     joints: Array,
     *,
     start: PoseBatch,
@@ -174,7 +174,8 @@ def continue_solution(
     """Poses of n joint vectors (n, 6), mm, by continuation from n known poses.
 
     ``start`` closes ``start_geometry`` at ``start_joints`` (n, 6), mm; by default these are ``joints``, and
-    only the geometry changes. Of ``stage_counts`` the next one is tried for the poses where one fails.
+    only the geometry changes. ``geometry`` is one for all poses, or one for each. Of ``stage_counts`` the
+    next one is tried for the poses where one fails.
     """
     if start_joints is None:
         start_joints = joints
@@ -185,9 +186,8 @@ def continue_solution(
         if not len(rows):
             break
         both_joints = (start_joints[rows], joints[rows])
-        result = _continue_in_stages(
-            mechanism, (start_geometry, geometry), both_joints, start[rows], stages
-        )
+        ends = (start_geometry, _of_rows(geometry, rows))
+        result = _continue_in_stages(mechanism, ends, both_joints, start[rows], stages)
         poses = poses.with_rows(rows, result.poses)
         found[rows] = result.found
     return ForwardResult(poses, found)
@@ -195,7 +195,7 @@ def continue_solution(
 
 def _continue_in_stages(
     mechanism: Mechanism,
-    geometries: tuple[Geometry, Geometry],
+    geometries: tuple[Geometry, Geometry | GeometryBatch],
     joints: tuple[Array, Array],
     start: PoseBatch,
     stages: int,
@@ -206,7 +206,7 @@ def _continue_in_stages(
     mode = assembly_mode(mechanism.residual_and_jacobian(geometries[0], start, joints[0])[1])
     for stage in range(1, stages + 1):
         fraction = stage / stages
-        geometry = geometries[0].interpolate(geometries[1], fraction)
+        geometry = _between(geometries[0], _of_rows(geometries[1], rows), fraction)
         stage_joints = (1.0 - fraction) * joints[0][rows] + fraction * joints[1][rows]
         tolerance_mm = TOLERANCE_MM if stage == stages else STAGE_TOLERANCE_MM
         result = forward_kinematics(
@@ -224,3 +224,15 @@ def _continue_in_stages(
     found = np.zeros(len(start), dtype=bool)
     found[rows] = True
     return ForwardResult(poses, found)
+
+
+def _of_rows(geometry: Geometry | GeometryBatch, rows: NDArray[np.intp]) -> Geometry | GeometryBatch:
+    """The geometry of some poses."""
+    return geometry.subset(rows) if isinstance(geometry, GeometryBatch) else geometry
+
+
+def _between(start: Geometry, end: Geometry | GeometryBatch, fraction: float) -> Geometry | GeometryBatch:
+    """Linear interpolation between one geometry and one or many."""
+    if isinstance(end, GeometryBatch):
+        return end.interpolate_from(start, fraction)
+    return start.interpolate(end, fraction)

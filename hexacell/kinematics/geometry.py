@@ -78,6 +78,10 @@ class GeometryBatch:
             self._arrays[symbol] = self.parameters.array(self.vectors, symbol)
         return self._arrays[symbol]
 
+    def interpolate_from(self, start: Geometry, fraction: float) -> GeometryBatch:
+        """Linear interpolation from one geometry: 0 gives ``start`` for each pose, 1 gives this batch."""
+        return GeometryBatch(self.parameters, (1.0 - fraction) * start.vector + fraction * self.vectors)
+
     def subset(self, rows: NDArray[np.intp]) -> GeometryBatch:
         """The geometries of some poses."""
         return GeometryBatch(self.parameters, self.vectors[rows])

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hexacell.kinematics.forward import CONTINUATION_STAGES, ForwardResult, continue_solution
-from hexacell.kinematics.geometry import Geometry
+from hexacell.kinematics.geometry import Geometry, GeometryBatch
 from hexacell.kinematics.mechanism import Branch, Mechanism
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array, Mask
@@ -66,8 +66,11 @@ class CommandedPoses:
     def __getitem__(self, rows: Mask | NDArray[np.intp]) -> CommandedPoses:
         return replace(self, poses=self.poses[rows], choice=self.choice[rows], joints=self.joints[rows])
 
-    def solve_poses(self, geometry: Geometry, joints: Array) -> ForwardResult:
-        """Poses that close ``geometry`` at joint variables (n, 6), mm, near the commanded ones."""
+    def solve_poses(self, geometry: Geometry | GeometryBatch, joints: Array) -> ForwardResult:
+        """Poses that close ``geometry`` at joint variables (n, 6), mm, near the commanded ones.
+
+        It is one geometry for all records, or one for each.
+        """
         poses = self.poses
         found = np.zeros(len(joints), dtype=bool)
         for choice, commanding in enumerate(self.candidate_geometries):
@@ -76,7 +79,7 @@ class CommandedPoses:
                 continue
             result = continue_solution(
                 self.mechanism,
-                geometry,
+                geometry.subset(rows) if isinstance(geometry, GeometryBatch) else geometry,
                 joints[rows],
                 start=self.poses[rows],
                 start_geometry=commanding,

@@ -2,7 +2,7 @@
 
 With few records, and a pose near a singularity at the drawing, the true geometry may lie beyond that
 singularity, where no descent from the drawing ends. Geometries are drawn from the tolerance prior,
-and those of lowest cost are the start points.
+and those of lowest cost are the start points. The poses of all draws are solved in one batch.
 
 Source: Rinnooy Kan and Timmer, Stochastic global optimization methods, Mathematical Programming 39, 1987.
 """
@@ -16,29 +16,45 @@ import numpy as np
 from hexacell.identification.problem.problem import Problem
 from hexacell.identification.solver.measurement_model import predict
 from hexacell.identification.solver.nuisance_parameters import NuisanceElimination
+from hexacell.kinematics.geometry import GeometryBatch
+from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array
 
 DRAWS = 240
 START_POINTS = 12
+
+BATCH_ROWS = 20_000
+"""Poses solved at once, for the sake of memory."""
 
 
 def restarts(problem: Problem) -> Iterator[Problem]:
     """The problem with other start points, that of lowest cost first."""
     root = np.linalg.cholesky(problem.prior.covariance)
     draws = np.random.default_rng(0).standard_normal((DRAWS, len(root)))
-    costs = np.array([_cost(problem, problem.initial_parameters + root @ draw) for draw in draws])
+    starts = problem.initial_parameters + draws @ root.T
+    reached = list(_with_poses(problem, starts))
+    costs = np.array([_cost(problem, free, poses) for free, poses in reached])
     order = np.argsort(costs, kind="stable")[:START_POINTS]
     for row in order[np.isfinite(costs[order])]:
-        free = problem.initial_parameters + root @ draws[row]
-        yield problem.starting_at(free, problem.solve_poses(free).poses)
+        yield problem.starting_at(*reached[row])
 
 
-def _cost(problem: Problem, free: Array) -> float:
-    """The chi-square of the residuals; infinite where a pose is not found or next to a singularity."""
-    solved = problem.solve_poses(free)
-    if not solved.found.all():
-        return np.inf
-    prediction = predict(problem, free, solved.poses)
+def _with_poses(problem: Problem, starts: Array) -> Iterator[tuple[Array, PoseBatch]]:
+    """Those of some free parameters (k, p), mm, for which the poses of all records are found."""
+    records = problem.records
+    for some in np.array_split(starts, -(-len(starts) * records // BATCH_ROWS)):
+        rows = np.tile(np.arange(records), len(some))
+        vectors = np.repeat(some @ problem.basis.T, records, axis=0)
+        geometries = GeometryBatch(problem.mechanism.parameters, vectors)
+        solved = problem.commands[rows].solve_poses(geometries, problem.joints[rows])
+        found = solved.found.reshape(len(some), records).all(axis=1)
+        for start in np.flatnonzero(found):
+            yield some[start], solved.poses[start * records + np.arange(records)]
+
+
+def _cost(problem: Problem, free: Array, poses: PoseBatch) -> float:
+    """The chi-square of the residuals; infinite next to a singularity."""
+    prediction = predict(problem, free, poses)
     if prediction.singular.any():
         return np.inf
     return NuisanceElimination(problem, prediction.weights).cost(prediction.residuals)

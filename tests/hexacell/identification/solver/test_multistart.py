@@ -1,0 +1,58 @@
+"""Start points of the solver: drawn within the tolerances, solved in one batch, the best ones first."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from hexacell.identification.solver import multistart
+from hexacell.identification.solver.measurement_model import predict
+from hexacell.identification.solver.multistart import restarts
+from hexacell.identification.solver.nuisance_parameters import NuisanceElimination
+from hexacell.measurements.records import MeasurementSet
+
+
+@pytest.fixture(scope="module")
+def problem(visit, make_problem):
+    """Of few records, so that their poses are found under many of the drawn geometries."""
+    return make_problem(MeasurementSet(visit(seed=2).measured(0.01, seed=1).records[:8]))
+
+
+@pytest.fixture(scope="module")
+def started(problem):
+    return list(restarts(problem))
+
+
+def test_the_poses_of_each_start_close_its_own_geometry(problem, started):
+    assert len(started) > 3
+    for one in started:
+        alone = problem.solve_poses(one.initial_parameters)
+        assert alone.found.all()
+        np.testing.assert_allclose(one.start.positions, alone.poses.positions, atol=1e-8)
+        np.testing.assert_allclose(one.start.rotations, alone.poses.rotations, atol=1e-10)
+
+
+def test_every_drawn_geometry_that_records_can_take_counts_and_the_least_contradicted_are_first(
+    problem, started
+):
+    def cost(free):
+        solved = problem.solve_poses(free)
+        prediction = predict(problem, free, solved.poses)
+        if not solved.found.all() or prediction.singular.any():
+            return np.inf
+        return NuisanceElimination(problem, prediction.weights).cost(prediction.residuals)
+
+    root = np.linalg.cholesky(problem.prior.covariance)
+    draws = np.random.default_rng(0).standard_normal((multistart.DRAWS, len(root)))
+    least = np.sort([cost(problem.initial_parameters + root @ draw) for draw in draws])
+    expected = least[: multistart.START_POINTS]
+    found = [cost(one.initial_parameters) for one in started]
+    np.testing.assert_allclose(found, expected[np.isfinite(expected)], rtol=1e-6)
+
+
+def test_small_batches_give_the_same_starts(problem, started, monkeypatch):
+    monkeypatch.setattr(multistart, "BATCH_ROWS", 5 * problem.records)
+    again = list(restarts(problem))
+    np.testing.assert_array_equal(
+        [one.initial_parameters for one in again], [one.initial_parameters for one in started]
+    )

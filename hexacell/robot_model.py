@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -13,6 +13,7 @@ from hexacell.cell.model import CellSettings
 from hexacell.controller_config.interface import ConfigFormat, ControllerGeometry
 from hexacell.errors import ReachError
 from hexacell.identification.belief import Limits, RobotBelief
+from hexacell.identification.problem.commanded_poses import CommandingGeometry
 from hexacell.identification.problem.problem import Noise, Prior, Problem, Tolerances, build_problem
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.commanded_motion import CommandedRobot
@@ -37,6 +38,9 @@ class Robot:
             while measuring.
         uses_provisional: whether it commands with the last of them now.
         known: what is known before measuring, if that is more than the drawing with its tolerances.
+        taught: the geometry with which points and frames were taught last, in the frames of that time; none
+            in runs of before there was a choice of frames, which wrote a geometry in the convention's.
+        earlier: geometries that may have commanded older records.
     """
 
     mechanism: Mechanism
@@ -50,6 +54,8 @@ class Robot:
     provisional: tuple[Geometry, ...] = ()
     uses_provisional: bool = False
     known: Prior | None = None
+    taught: Geometry | None = None
+    earlier: tuple[CommandingGeometry, ...] = ()
 
     @cached_property
     def commanding(self) -> Geometry:
@@ -79,6 +85,7 @@ class Robot:
             prior=self.prior,
             noise=self.noise,
             provisional=self.provisional,
+            earlier=self.earlier,
         )
 
     def belief(self, identified: Identification | None = None) -> RobotBelief:
@@ -94,6 +101,19 @@ class Robot:
     def for_controller(self, geometry: Geometry) -> Geometry:
         """A geometry in the convention's frames, in the frames of the controller's config."""
         return self.mechanism.change_frames(geometry, self.frames.inverse())
+
+    def with_controller(self, written: Geometry) -> Robot:
+        """The robot once its controller has a ``written`` geometry, in frames of that geometry's own."""
+        own = self.mechanism.normalize_frames(self.controller)[0]
+        before = (CommandingGeometry(one, self.frames) for one in (own, *self.provisional))
+        return replace(
+            self,
+            controller=written,
+            frames=self.mechanism.normalize_frames(written)[1],
+            provisional=(),
+            uses_provisional=False,
+            earlier=(*before, *self.earlier),
+        )
 
     def from_commands(self, commands: Iterable[Pose]) -> PoseBatch:
         """Poses (n) commanded in the controller's frames, in the convention's frames."""
@@ -139,17 +159,20 @@ def robot_of(cell: Cell) -> Robot:
     Raises:
         FileError: the config is absent or does not hold a geometry.
     """
-    return make_robot(cell.settings, config_format(cell.settings).read(cell.config_path))
+    controller = config_format(cell.settings).read(cell.config_path)
+    return make_robot(cell.settings, controller, taught=controller.geometry)
 
 
-def make_robot(settings: CellSettings, controller: ControllerGeometry) -> Robot:
-    """The robot of a cell's settings and a controller geometry."""
+def make_robot(
+    settings: CellSettings, controller: ControllerGeometry, *, taught: Geometry | None = None
+) -> Robot:
+    """The robot of a cell's settings and a controller geometry; ``taught`` as in :class:`Robot`."""
     mechanism, limits = settings.mechanism, settings.limits
     nominal = Geometry.of(mechanism.parameters, settings.robot.nominal.model_dump())
-    drawing, _ = mechanism.normalize_frames(nominal)
+    drawn = CommandingGeometry.of(mechanism, nominal)
     return Robot(
         mechanism=mechanism,
-        drawing=drawing,
+        drawing=drawn.geometry,
         controller=controller.geometry,
         branch=controller.branch,
         tolerances=Tolerances.of_settings(mechanism.parameters, settings.tolerances.model_dump()),
@@ -167,4 +190,6 @@ def make_robot(settings: CellSettings, controller: ControllerGeometry) -> Robot:
             limits.singularity_margin,
         ),
         frames=mechanism.normalize_frames(controller.geometry)[1],
+        taught=taught,
+        earlier=(drawn,),
     )

@@ -193,6 +193,7 @@ def run_started(
         branch=robot.branch,
         devices=identities,
         pose_list=None if calibration.listed is None else read_text(calibration.listed.path),
+        taught=None if robot.taught is None else robot.taught.document(),
     )
 
 
@@ -230,4 +231,5 @@ def robot_of_run(cell: Cell, started: events.RunStarted) -> Robot:
     """The robot with the geometry that the controller had when the run began."""
     parameters = cell.settings.mechanism.parameters
     geometry = Geometry.of(parameters, started.controller)
-    return make_robot(cell.settings, ControllerGeometry(geometry, started.branch))
+    taught = None if started.taught is None else Geometry.of(parameters, started.taught)
+    return make_robot(cell.settings, ControllerGeometry(geometry, started.branch), taught=taught)

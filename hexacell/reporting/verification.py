@@ -105,9 +105,7 @@ class HeldOut:
 
 
 def verify(settings: CellSettings, robot: Robot, found: Identification, held_out: HeldOut) -> Verification:
-    """Verify an identified geometry that commands now.
-
-    ``robot`` has it as the last of its provisional geometries.
+    """Verify an identified geometry that commands ``robot`` now, in the frames in which it was written.
 
     Raises:
         IdentifiabilityError: no geometry fits the held-out records.

@@ -7,7 +7,7 @@ a geometry may be right at small tilts alone.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 from hexacell.cell.model import CellSettings
@@ -57,11 +57,11 @@ class HeldOutSteps:
         return tuple(self._choose_at(point, belief, used) for point in points)
 
     def choose_poses_after(self, identified: Identification) -> tuple[tuple[SixNumbers, ...], ...]:
-        """Further poses at each held-out point, for the controller with the identified geometry.
+        """Further poses at each held-out point, for a robot whose controller has the identified geometry.
 
         A point at which it has too few gets none.
         """
-        belief = replace(self.sets.robot.belief(identified), controller=identified.geometry)
+        belief = self.sets.robot.belief(identified)
         used = identified.poses.rotations
         chosen: list[tuple[SixNumbers, ...]] = []
         for point in range(len(self.settings.verification.points)):

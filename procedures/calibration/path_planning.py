@@ -104,13 +104,12 @@ class RunPathPlanner:
         return self.robot.from_commands([Pose(*pose)])
 
     def _belief(self, state: RunState) -> RobotBelief:
-        """What is known by now; the identified geometry commands once it is written."""
+        """What is known by now."""
         if state.identified is None:
             return self._by_records(state)
         geometry = state.identified.result.identified(self.robot.mechanism.parameters)
         free = self.robot.mechanism.convention.free_parameters(geometry)
-        known = replace(self.robot.belief(), free=np.asarray(free))
-        return replace(known, controller=geometry) if state.committed else known
+        return replace(self.robot.belief(), free=np.asarray(free))
 
     def _by_records(self, state: RunState) -> RobotBelief:
         measurements = state.measurements()

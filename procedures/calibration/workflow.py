@@ -14,6 +14,7 @@ from functools import cached_property
 
 from hexacell.campaign.planner import Plan
 from hexacell.campaign.pose_list import PoseList
+from hexacell.campaign.teaching import WrittenGeometry, as_written
 from hexacell.cell.model import CellSettings
 from hexacell.decision import Verdict
 from hexacell.identification.solver.result import Identification
@@ -94,8 +95,16 @@ class Calibration:
         return measuring.held_out.next_step(state, Phase.BEFORE) or self._write_back(state)
 
     def robot_of(self, state: RunState) -> Robot:
-        """The robot with all geometries that commanded the run's records."""
-        return self._measuring(state).robot
+        """The robot with all geometries that commanded the records of the identification."""
+        return self._identifying(state).robot
+
+    def as_written(self, identified: Geometry) -> WrittenGeometry:
+        """What the controller gets of a geometry in the frame convention."""
+        return as_written(self.settings, self.robot, identified)
+
+    def written_robot(self, state: RunState) -> Robot:
+        """The robot with the proposed geometry in its controller."""
+        return self._commanded_by(self._written(state)).robot
 
     def provisional_geometry(self, state: RunState) -> Geometry:
         """The estimate by now, or the provisional geometry that the run applied before an interruption.
@@ -115,7 +124,8 @@ class Calibration:
 
     def held_out_poses_after(self, identified: Identification) -> tuple[tuple[SixNumbers, ...], ...]:
         """See :meth:`HeldOutSteps.choose_poses_after`."""
-        return self._at_start.held_out.choose_poses_after(identified)
+        written = self._commanded_by(self.as_written(identified.geometry).geometry)
+        return written.held_out.choose_poses_after(identified)
 
     def _write_back(self, state: RunState) -> Step | None:
         if state.proposed is None:
@@ -130,7 +140,29 @@ class Calibration:
         return _after_verdict(state, state.judged)
 
     def _measuring(self, state: RunState) -> _Measuring:
-        """The steps for the geometries that the controller has had in this run."""
+        """The steps for the geometry that the controller has now, and for those that it had."""
+        if state.committed is None:
+            return self._identifying(state)
+        return self._commanded_by(self._written(state))
+
+    def _written(self, state: RunState) -> Geometry:
+        """The proposed geometry; runs of before there was a choice of frames did not note it."""
+        assert state.identified is not None  # noqa: S101 - only then there is a proposal
+        parameters = self.robot.mechanism.parameters
+        if state.proposed is None or state.proposed.written is None:
+            return self.as_written(state.identified.result.identified(parameters)).geometry
+        return Geometry.of(parameters, state.proposed.written)
+
+    def _commanded_by(self, written: Geometry) -> _Measuring:
+        """The steps once the controller has a geometry."""
+        key = written.vector.tobytes()
+        if key not in self._with_result:
+            robot = self.robot.with_controller(written)
+            self._with_result[key] = _Measuring(self.settings, robot, self.listed)
+        return self._with_result[key]
+
+    def _identifying(self, state: RunState) -> _Measuring:
+        """The steps for the geometries that the controller has while the points are measured."""
         if state.provisional is None:
             return self._at_start
         if state.provisional_active not in self._with_provisional:
@@ -149,6 +181,11 @@ class Calibration:
     @cached_property
     def _with_provisional(self) -> dict[bool, _Measuring]:
         """By whether the provisional geometry, one in a run, commands now."""
+        return {}
+
+    @cached_property
+    def _with_result(self) -> dict[bytes, _Measuring]:
+        """By the geometry that is written."""
         return {}
 
 

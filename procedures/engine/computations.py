@@ -65,8 +65,11 @@ class Computations:
             largest_change_mm=self.cell.settings.acceptance.largest_change_mm,
             before=commanding,
         )
-        self.config.change_to(identified.geometry, state).save(self.folder.proposal)
-        return events.Proposed(gates=conditions)
+        written = self.calibration.as_written(identified.geometry)
+        self.config.change_to(written.geometry, state).save(self.folder.proposal)
+        return events.Proposed(
+            gates=conditions, written=written.geometry.document(), displacement=written.displacement
+        )
 
     def judge(self, state: RunState) -> events.ResultValidated:
         """Verify the written geometry; raises ``HexacellError``."""
@@ -74,7 +77,7 @@ class Computations:
             return self._judge_check(state)
         robot = self.calibration.robot_of(state)
         found = identify(robot.problem(state.measurements()))
-        written = replace(robot, provisional=(*robot.provisional, found.geometry))
+        written = self.calibration.written_robot(state)
         verification = verify(self.cell.settings, written, found, _held_out(state))
         line = outcome_line(_identified(state), len(found.free), verification)
         return events.ResultValidated(verdict=verification.verdict, line=line, verification=verification)

@@ -22,7 +22,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from hexacell.acceptance import AcceptanceGate
 from hexacell.cell.loader import Cell
 from hexacell.controller_config.change import ConfigChange, fingerprint, propose
 from hexacell.controller_config.write_back import RECEIPT, Receipt, commit, rollback
@@ -61,13 +60,13 @@ class ConfigTransactions:
     operator: Operator
 
     def change_to(self, geometry: Geometry, state: RunState) -> ConfigChange:
-        """The change of the config to a geometry in the frame convention; nothing is written."""
+        """The change of the config to a geometry in the controller's frames; nothing is written."""
         settings = self.cell.settings
         return propose(
             self.cell.config_path,
             config_format(settings),
             settings.controller.config_format,
-            self.calibration.robot.for_controller(geometry),
+            geometry,
             fingerprint_at_start=state.started.config_sha256 if state.started else "",
         )
 
@@ -75,7 +74,7 @@ class ConfigTransactions:
         """Give the controller a geometry to measure the remaining points with."""
         geometry = await in_thread(self.calibration.provisional_geometry, state)
         await self._apply(
-            await in_thread(self.change_to, geometry, state),
+            await in_thread(self.change_to, self.calibration.robot.for_controller(geometry), state),
             self._provisional_backup,
             "the provisional geometry",
             action="Correct that, or run without `provisional`",
@@ -89,15 +88,18 @@ class ConfigTransactions:
         if refused:
             raise LimitError("the new geometry is refused: " + " ".join(refused))
         change = ConfigChange.load(self.folder.proposal)
-        approved_by = await self._approval(conditions, change)
+        approved_by = await self._approval(state, change)
         await self._apply(change, self.folder.path, "the new geometry")
         return events.Committed(approved_by=approved_by)
 
-    async def _approval(self, conditions: tuple[AcceptanceGate, ...], change: ConfigChange) -> str:
+    async def _approval(self, state: RunState, change: ConfigChange) -> str:
+        proposed = state.proposed
+        conditions = proposed.gates if proposed else ()
         automatic = self.cell.settings.acceptance.approval == "automatic"
         if automatic and all(gate.passed for gate in conditions):
             return "the cell file: within its limits"
-        name = await self.operator.ask(ask_approval(conditions, change.diff))
+        displacement = proposed.displacement if proposed else None
+        name = await self.operator.ask(ask_approval(conditions, change.diff, displacement))
         if name is None:
             raise LimitError("the new geometry was declined; nothing was applied")
         return name
@@ -135,9 +137,9 @@ class ConfigTransactions:
             # Far from level, the slider positions may belong to no pose of the old geometry. The file
             # must not differ from what the controller has until it can be reloaded.
             if written and state.provisional is not None:
-                change = await in_thread(
-                    self.change_to, geometry_of(state.provisional, self.calibration.robot), state
-                )
+                robot = self.calibration.robot
+                provisional = robot.for_controller(geometry_of(state.provisional, robot))
+                change = await in_thread(self.change_to, provisional, state)
                 await in_thread(commit, change, self._provisional_backup)
             raise
         return events.ProvisionalReverted()

@@ -241,7 +241,9 @@ def _ending(state: RunState) -> events.Ended:
         line += f"; kept by {state.accepted.by}"
     if state.rolled_back:
         line += f"; rolled back, the controller has its old config{_comparison(state)}"
-    return events.Ended(exit_code=int(_final_code(state)), line=line)
+    kept = state.proposed if state.committed is not None and not state.rolled_back else None
+    displacement = kept.displacement if kept is not None else None
+    return events.Ended(exit_code=int(_final_code(state)), line=line, displacement=displacement)
 
 
 def _comparison(state: RunState) -> str:

@@ -12,6 +12,7 @@ from pydantic import BeforeValidator, Field
 
 from drivers.interfaces import DeviceIdentity
 from hexacell.acceptance import AcceptanceGate
+from hexacell.campaign.teaching import TaskDisplacement
 from hexacell.cell.fields import Frozen, GeometryDocument
 from hexacell.cell.recovery import Action, FailureKind
 from hexacell.decision import Verdict
@@ -23,7 +24,11 @@ from procedures.run.trips import Guard, Trip
 
 
 class RunStarted(Frozen):
-    """The first event of a run."""
+    """The first event of a run.
+
+    ``taught`` is the geometry with which the robot was taught last, in frames of its own. Without it the
+    result is written in frames by the mechanism's convention.
+    """
 
     kind: Literal["started"] = "started"
     software: str
@@ -36,6 +41,7 @@ class RunStarted(Frozen):
     branch: Branch
     devices: tuple[DeviceIdentity, ...]
     pose_list: str | None = None
+    taught: GeometryDocument | None = None
 
 
 class StepBegun(Frozen):
@@ -187,10 +193,15 @@ class Identified(Frozen):
 
 
 class Proposed(Frozen):
-    """The new config was saved in the run folder, and the gates for writing it were evaluated."""
+    """The new config was saved in the run folder, and the gates for writing it were evaluated.
+
+    ``written`` is the geometry in it; ``displacement`` is how far that moves the task poses.
+    """
 
     kind: Literal["proposed"] = "proposed"
     gates: tuple[AcceptanceGate, ...]
+    written: GeometryDocument | None = None
+    displacement: TaskDisplacement | None = None
 
 
 class Committed(Frozen):
@@ -292,11 +303,12 @@ class Interrupted(Frozen):
 
 
 class Ended(Frozen):
-    """The run is over."""
+    """The run is over; ``displacement`` is that of the new geometry, if it stays in the controller."""
 
     kind: Literal["ended"] = "ended"
     exit_code: int
     line: str
+    displacement: TaskDisplacement | None = None
 
 
 Event = Annotated[

@@ -9,6 +9,7 @@ from enum import StrEnum
 from typing import Protocol
 
 from hexacell.acceptance import AcceptanceGate
+from hexacell.campaign.teaching import TaskDisplacement
 from hexacell.cell.recovery import Action
 from hexacell.errors import AnswerNeeded
 from hexacell.kinematics.pose import Pose
@@ -38,10 +39,14 @@ class GaugePlacement:
 
 @dataclass(frozen=True, slots=True)
 class PendingChange:
-    """A change of the controller's config: its acceptance gates, and the text change as a diff."""
+    """A change of the controller's config: its acceptance gates, and the text change as a diff.
+
+    ``displacement`` is how far it moves taught points; none if that is not known.
+    """
 
     gates: tuple[AcceptanceGate, ...]
     diff: str
+    displacement: TaskDisplacement | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,12 +93,14 @@ def ask_placement(point: int, pose: Pose) -> Question:
     )
 
 
-def ask_approval(gates: Sequence[AcceptanceGate], diff: str) -> Question:
+def ask_approval(
+    gates: Sequence[AcceptanceGate], diff: str, displacement: TaskDisplacement | None = None
+) -> Question:
     """Ask whether the config may be written; answered by the name of who approves."""
     return Question(
         QuestionKind.APPROVE_CHANGE,
         f"Write this into the controller's config?\n{diff}",
-        PendingChange(tuple(gates), diff),
+        PendingChange(tuple(gates), diff, displacement),
     )
 
 

@@ -1,8 +1,9 @@
 """The commanded poses of records: the start of their forward kinematics.
 
-A pose is commanded under a geometry: that of the controller, or that of the drawing if the record is
-older than the last calibration. Each record is attributed to the geometry whose inverse kinematics is
-nearest to its encoders. Its pose under any other geometry is found by continuation from there.
+A pose is commanded under a geometry and in its frames: those of the controller, or those of before if the
+record is older than the last calibration. Each record is attributed to the geometry whose inverse
+kinematics is nearest to its encoders. Its pose under any other geometry is found by continuation from
+there.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from numpy.typing import NDArray
 
 from hexacell.kinematics.forward import CONTINUATION_STAGES, ForwardResult, continue_solution
 from hexacell.kinematics.geometry import Geometry, GeometryBatch
-from hexacell.kinematics.mechanism import Branch, Mechanism
+from hexacell.kinematics.mechanism import Branch, FrameTransform, Mechanism
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array, Mask
 
@@ -24,11 +25,29 @@ SAME_GEOMETRY_STAGES = (1, *CONTINUATION_STAGES)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class CommandingGeometry:
+    """A geometry that commanded records, and the frames in which it was given their poses.
+
+    Attributes:
+        geometry: in the mechanism's frame convention.
+        frames: from the frames of its commands to the convention's.
+    """
+
+    geometry: Geometry
+    frames: FrameTransform
+
+    @classmethod
+    def of(cls, mechanism: Mechanism, stated: Geometry) -> CommandingGeometry:
+        """A geometry as a controller's config states it, in frames of its own."""
+        return cls(*mechanism.normalize_frames(stated))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class CommandedPoses:
     """The commands of n records.
 
     Attributes:
-        poses: the commanded poses.
+        poses: the commanded poses, in the convention's frames.
         candidate_geometries: geometries that may have commanded them.
         choice: (n,) the index of the one that did.
         joints: (n, 6), mm, its inverse kinematics; NaN where no candidate reaches the pose.
@@ -44,18 +63,24 @@ class CommandedPoses:
     def of(
         cls,
         mechanism: Mechanism,
-        poses: PoseBatch,
-        candidate_geometries: Sequence[Geometry],
+        commands: PoseBatch,
+        candidates: Sequence[CommandingGeometry],
         branch: Branch,
         measured: Array,
     ) -> CommandedPoses:
-        """Attribute commanded poses to candidate geometries by the measured joint variables (n, 6), mm."""
+        """Attribute poses, as sent, to candidate geometries by the measured joint variables (n, 6), mm."""
+        poses = [candidate.frames.poses(commands) for candidate in candidates]
+        geometries = [candidate.geometry for candidate in candidates]
         computed = np.stack(
-            [mechanism.inverse(geometry, branch, poses) for geometry in candidate_geometries]
+            [mechanism.inverse(one, branch, at) for one, at in zip(geometries, poses, strict=True)]
         )
         distance = np.abs(np.nan_to_num(computed - measured, nan=np.inf)).max(axis=-1)
-        choice = np.argmin(distance, axis=0)
-        return cls(mechanism, poses, candidate_geometries, choice, computed[choice, np.arange(len(poses))])
+        choice, rows = np.argmin(distance, axis=0), np.arange(len(commands))
+        chosen = PoseBatch(
+            np.stack([each.positions for each in poses])[choice, rows],
+            np.stack([each.rotations for each in poses])[choice, rows],
+        )
+        return cls(mechanism, chosen, geometries, choice, computed[choice, rows])
 
     @property
     def most_frequent_geometry(self) -> Geometry:

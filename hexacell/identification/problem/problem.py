@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hexacell.errors import IdentifiabilityError
-from hexacell.identification.problem.commanded_poses import CommandedPoses
+from hexacell.identification.problem.commanded_poses import CommandedPoses, CommandingGeometry
 from hexacell.identification.problem.encoder_consistency import EncoderConsistency
 from hexacell.kinematics.forward import ForwardResult
 from hexacell.kinematics.geometry import Geometry
@@ -205,12 +205,13 @@ def build_problem(
     prior: Prior,
     noise: Noise,
     provisional: Sequence[Geometry] = (),
+    earlier: Sequence[CommandingGeometry] = (),
 ) -> Problem:
     """The problem of a measurement set.
 
-    The poses were commanded under the ``controller``'s geometry, in any frames, or under ``provisional``
-    ones, in the frame convention, the last one used last. Records from before the last calibration may
-    have been commanded under the drawing.
+    The poses were commanded under the ``controller``'s geometry, in any frames, or in the same frames under
+    ``provisional`` ones, in the frame convention, the last one used last. Records from before the last
+    calibration may have been commanded under the drawing, or under ``earlier`` geometries in their frames.
 
     Raises:
         IdentifiabilityError: joint variables do not belong to the commanded poses, or for most records
@@ -220,8 +221,8 @@ def build_problem(
     order = np.argsort(measurements.group, kind="stable")
     joints, labels = measurements.joints[order], measurements.labels[order]
     commanding, change = mechanism.normalize_frames(controller)
-    poses = change.poses(measurements.poses[order])
-    commands = CommandedPoses.of(mechanism, poses, (commanding, *provisional, prior.centre), branch, joints)
+    here = [CommandingGeometry(one, change) for one in (commanding, *provisional, prior.centre)]
+    commands = CommandedPoses.of(mechanism, measurements.poses[order], [*here, *earlier], branch, joints)
     EncoderConsistency(commands, joints, labels, branch, prior.centre, prior.leg_widths(mechanism)).check()
     initial = provisional[-1] if provisional else commands.most_frequent_geometry
     start = commands.solve_poses(initial, joints)

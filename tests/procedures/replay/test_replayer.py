@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import dataclasses
 import itertools
 import random
 import time
@@ -15,6 +16,7 @@ import numpy as np
 import pytest
 
 from drivers.errors import GaugeAtEnd
+from hexacell.application.calibration_run import robot_of_run
 from hexacell.decision import Verdict
 from hexacell.errors import HexacellError, LimitError
 from hexacell.robot_model import robot_of
@@ -25,7 +27,7 @@ from procedures.replay.comparison import Aspect, ReplayReport
 from procedures.replay.recorded_executor import RecordedStepExecutor
 from procedures.replay.replayer import Replayer, Scope
 from procedures.run import events
-from procedures.run.state import RunState
+from procedures.run.state import RunState, fold
 from procedures.run.steps import Phase, SetKey
 
 Replay = Callable[..., ReplayReport]
@@ -41,7 +43,9 @@ def through(
 ) -> ReplayReport:
     """A history through the procedure of a rig's cell, whose config is as it was at the beginning."""
     folder.mkdir()
-    calibration = Calibration(rig.cell.settings, robot_of(rig.cell), rig.mode)
+    started = history[0]
+    assert isinstance(started, events.RunStarted)
+    calibration = Calibration(rig.cell.settings, robot_of_run(rig.cell, started), rig.mode)
     executor = RecordedStepExecutor.of(rig.cell, calibration, type(rig.folder)(folder))
     report = ReplayReport(rig.folder.journal, "hexacell", len(history))
     asyncio.run(Replayer(executor, report, scope).replay(numbered(history)))
@@ -68,6 +72,27 @@ def test_a_run_is_reproduced(recording, replay) -> None:
     assert report.decisions == len(begun)
     assert report.results == len(begun) + 1, "every step has its result, and so has the run"
     assert report.taken == 1, "only the beginning is taken as it stands"
+
+
+def test_a_run_of_before_there_was_a_choice_of_frames_is_reproduced(make_rig, replay) -> None:
+    """It wrote its result in frames by the mechanism's convention, and noted nothing of it."""
+    rig = make_rig()
+    robot = dataclasses.replace(robot_of(rig.cell), taught=None)
+    rig.calibration = Calibration(rig.cell.settings, robot, rig.mode)
+    rig.performer = dataclasses.replace(rig.performer, calibration=rig.calibration)
+    asyncio.run(rig.run())
+    new = {"taught", "written", "displacement"}
+    history = [
+        type(event).model_validate(event.model_dump(exclude=new))
+        for event in read_journal(rig.folder.journal)
+    ]
+    state = fold(history)
+    assert state.started is not None
+    assert state.started.taught is None
+    assert state.proposed is not None
+    assert state.proposed.written is None
+    assert any(isinstance(event, events.RecordTaken) and event.at.phase is Phase.AFTER for event in history)
+    assert replay(history).differences == []
 
 
 def test_a_check_is_reproduced(make_rig, replay) -> None:

@@ -11,6 +11,7 @@ from hexacell.decision import Verdict
 from hexacell.errors import DeviceError, ExitCode, FileError, WriteBackUndone
 from procedures.run import events
 from procedures.run.questions import UnattendedOperator
+from procedures.run.state import fold
 from tests.procedures.runs.listening import (
     before_sampling,
     commanding,
@@ -28,6 +29,7 @@ async def test_a_result_worse_than_before_is_rolled_back_bit_for_bit(recording, 
     assert ended.line.endswith("(worse than before); rolled back, the controller has its old config")
     assert happened(rig, events.ResultValidated)[0].verdict is Verdict.FAIL
     assert happened(rig, events.Committed)
+    assert ended.displacement is None, "nothing need be taught anew"
     assert rig.config == recording.config_before
     assert rig.controller.log.count("reload") == 2
     assert commanding(rig).largest_difference(rig.calibration.robot.controller) == 0.0
@@ -51,6 +53,9 @@ async def test_a_better_result_out_of_limits_stays_if_a_person_keeps_it(recordin
     assert ended.line.endswith(": fail; kept by a tester")
     (shown,) = rig.operator.verifications
     assert shown.before_mm > shown.after_mm
+    proposed = fold(recording.history).proposed
+    assert proposed is not None
+    assert ended.displacement == proposed.displacement
     assert rig.config == recording.config_after
 
 
@@ -138,7 +143,11 @@ async def test_an_undone_write_back_can_be_repeated_by_resuming(recording, repla
 
 @pytest.mark.parametrize("stage", ["measuring", "proposed"])
 async def test_a_config_edited_during_the_run_is_not_overwritten(recording, replayed, stage) -> None:
-    kind, count = {"measuring": (events.SetClosed, 4), "proposed": (events.Proposed, 1)}[stage]
+    kinds: dict[str, tuple[type[Any], int]] = {
+        "measuring": (events.SetClosed, 4),
+        "proposed": (events.Proposed, 1),
+    }
+    kind, count = kinds[stage]
     rig = replayed(recording.until(kind, count=count))
     edited = somebody_edits(rig)
     rig.controller.log.clear()

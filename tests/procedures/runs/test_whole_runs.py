@@ -41,6 +41,28 @@ def test_the_written_geometry_agrees_with_the_true_one_within_five_sigma(recordi
     assert (np.abs(found - expected) <= 5.0 * sigma + 1e-6).all()
 
 
+def test_the_config_has_the_geometry_that_was_proposed_in_frames_near_those_of_before(
+    recording, tmp_path
+) -> None:
+    """The journal has it, and says how far it moves what was taught."""
+    config = tmp_path / "after.toml"
+    config.write_bytes(recording.config_after)
+    written = NativeToml(HEXAGLIDE_PARAMETERS).read(config).geometry
+    state = fold(recording.history)
+    assert state.started is not None
+    assert state.started.taught == state.started.controller
+    assert state.proposed is not None
+    assert state.proposed.written is not None
+    noted = hexaglide_geometry(**state.proposed.written)
+    assert written.largest_difference(noted) <= 1e-6
+    assert Hexaglide().normalize_frames(written)[0].largest_difference(written) > 1.0
+    displacement = state.proposed.displacement
+    assert displacement is not None
+    assert displacement.poses == 6
+    assert displacement.position_mm > 1.0
+    assert recording.history[-1].displacement == displacement
+
+
 def test_the_run_folder_contains_measurements_result_proposal_and_backup(recording) -> None:
     folder = recording.folder
     measured = read_measurements(folder.measurements)

@@ -15,6 +15,9 @@ SAME_AXIS_RATIO = 0.02
 SMALLEST_ROTATION = 1e-3
 """rad, root mean square; below it the platform counts as not rotated."""
 
+LEAST_SPARE_EQUATIONS = 13
+"""Beyond the parameters, from which the agreement of some records is a proof: fewer agree by chance."""
+
 MAX_COUNTED_POSES = 1000
 """With more records, all poses count as different."""
 
@@ -27,6 +30,12 @@ def equations(problem: Problem) -> int:
 def is_determined(problem: Problem) -> bool:
     """Whether at least two points give at least as many equations as parameters."""
     return problem.points >= 2 and equations(problem) >= len(problem.prior.covariance)
+
+
+def is_overdetermined(problem: Problem) -> bool:
+    """Whether at least two points give so many equations to spare that their agreement proves something."""
+    spare = equations(problem) - len(problem.prior.covariance)
+    return problem.points >= 2 and spare >= LEAST_SPARE_EQUATIONS
 
 
 def require_enough_records(problem: Problem) -> None:

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from hexacell.campaign import recursive_estimator
-from hexacell.campaign.recursive_estimator import OnlineEstimator, update_estimate
+from hexacell.campaign.estimate_chain import ChainedEstimate, cost, update_estimate
+from hexacell.campaign.recursive_estimator import OnlineEstimator
 from hexacell.errors import LimitError
 from hexacell.identification.estimator import estimate_online
 from hexacell.measurements.records import MeasurementSet
@@ -74,8 +75,8 @@ def test_an_implausible_estimate_is_repeated_from_other_starts(two_points, recor
     far = before.free + 10.0 * np.sign(np.sin(2.0 * np.arange(len(before.free))))
     prediction = replace(before.prediction, free=far)
     worse = replace(before, solution=replace(before.solution, prediction=prediction))
-    found = recursive_estimator.update_estimate(problem, worse)
-    assert recursive_estimator.cost(found) <= recursive_estimator.cost(good) * (1.0 + 1e-6)
+    found = update_estimate(problem, ChainedEstimate(worse)).identification
+    assert cost(found) <= cost(good) * (1.0 + 1e-6)
 
 
 def test_the_zero_is_where_the_gauges_were_zeroed(two_points, records, paper):

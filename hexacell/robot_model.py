@@ -11,7 +11,7 @@ import numpy as np
 from hexacell.cell.loader import Cell
 from hexacell.cell.model import CellSettings
 from hexacell.controller_config.interface import ConfigFormat, ControllerGeometry
-from hexacell.errors import ReachError
+from hexacell.errors import FileError, ReachError
 from hexacell.identification.belief import Limits, RobotBelief
 from hexacell.identification.problem.commanded_poses import CommandingGeometry
 from hexacell.identification.problem.problem import Noise, Prior, Problem, Tolerances, build_problem
@@ -157,10 +157,17 @@ def robot_of(cell: Cell) -> Robot:
     """The robot of a cell, with the geometry its controller's config holds now.
 
     Raises:
-        FileError: the config is absent or does not hold a geometry.
+        FileError: the config, or that of the time of teaching, is absent or does not hold a geometry.
     """
-    controller = config_format(cell.settings).read(cell.config_path)
-    return make_robot(cell.settings, controller, taught=controller.geometry)
+    configs = config_format(cell.settings)
+    controller, taught = configs.read(cell.config_path), configs.read(cell.taught_path)
+    if taught.branch != controller.branch:
+        raise FileError(
+            "its branch is not that of the controller's config, so it is not of this robot",
+            subject=cell.taught_path,
+            action="Copy the config there when you teach points and frames, or remove `taught`",
+        )
+    return make_robot(cell.settings, controller, taught=taught.geometry)
 
 
 def make_robot(

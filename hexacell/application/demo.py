@@ -43,7 +43,10 @@ def served_cell(cell: Cell) -> Iterator[str]:
     """
     require_simulation(cell)
     with device_addresses(cell, other_processes=True) as settings:
-        controller = settings.controller.model_copy(update={"config": str(cell.config_path.resolve())})
+        paths = {"config": str(cell.config_path.resolve())}
+        if settings.controller.taught is not None:
+            paths["taught"] = str(cell.taught_path.resolve())
+        controller = settings.controller.model_copy(update=paths)
         yield dump(settings.model_copy(update={"controller": controller}))
 
 

@@ -98,6 +98,11 @@ class ControllerSettings(Section):
     enable_password: str = Field("EMCTOO", description="linuxcncrsh: sent to enable commands")
     config: str = Field(description="the file with its geometry, relative to the cell file")
     config_format: str = Field("toml", description="toml, or one that a plug-in adds")
+    taught: str | None = Field(
+        None,
+        description="copy of config from when points and frames were taught last, relative to the cell "
+        "file; without it, the config that runs when a run begins",
+    )
     reload_command: tuple[str, ...] = Field(
         (), description="run with the machine off, so that the controller reads its config again"
     )

@@ -45,6 +45,11 @@ class Cell:
         """The controller's config; its name in the cell file is relative to the cell file."""
         return self.path.parent / self.settings.controller.config
 
+    @property
+    def taught_path(self) -> Path:
+        """The config with which points and frames were taught last."""
+        return self.path.parent / (self.settings.controller.taught or self.settings.controller.config)
+
 
 def load_cell(path: Path) -> Cell:
     """Read and check a cell file.

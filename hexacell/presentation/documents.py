@@ -10,6 +10,7 @@ from drivers.interfaces import DeviceIdentity
 from hexacell.application.calibration_run import RunRequest
 from hexacell.application.offline import NextPose, PlanTrial
 from hexacell.campaign.decisions import Finished, Forecast, MeasurePose, StartPoint
+from hexacell.presentation.teaching import teaching_sentence
 from procedures.replay.comparison import ReplayReport
 from procedures.run import events
 
@@ -78,12 +79,14 @@ def run_document(
     request: RunRequest, ended: events.Ended, judged: events.ResultValidated | None
 ) -> dict[str, Any]:
     """What ``run --json`` and ``demo --json`` print."""
-    measurements = request.folder.measurements
+    measurements, moved = request.folder.measurements, ended.displacement
     return {
         "exit_code": ended.exit_code,
         "line": ended.line,
         "verdict": judged and judged.verdict.value,
         "verification": judged and judged.verification and judged.verification.model_dump(mode="json"),
+        "displacement": moved and moved.model_dump(mode="json"),
+        "teaching": moved and teaching_sentence(moved),
         "run": str(request.folder.path),
         "measurements": str(measurements) if measurements.is_file() else None,
         "config": str(request.cell.config_path),

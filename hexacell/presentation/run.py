@@ -7,6 +7,7 @@ from pathlib import Path
 
 from hexacell.application.calibration_run import RunRequest
 from hexacell.presentation.layout import wrapped
+from hexacell.presentation.teaching import teaching_line, teaching_sentence
 from procedures.calibration.workflow import Mode
 from procedures.replay.comparison import Aspect, Difference, ReplayReport
 from procedures.run import events
@@ -47,9 +48,10 @@ def resume_command(request: RunRequest) -> str:
     return shlex.join(words)
 
 
-def closing_lines(request: RunRequest, ended: events.Ended) -> tuple[str, str]:
-    """Where everything about the run is, and its result in one line."""
-    return f"Everything about this run is in {request.folder.path}", ended.line
+def closing_lines(request: RunRequest, ended: events.Ended) -> tuple[str, ...]:
+    """Where everything about the run is, what must be taught anew, and last its result in one line."""
+    teaching = () if ended.displacement is None else (teaching_line(ended.displacement),)
+    return (f"Everything about this run is in {request.folder.path}", *teaching, ended.line)
 
 
 def question_text(question: Question) -> str:
@@ -61,9 +63,10 @@ def question_text(question: Question) -> str:
                 "Put the three gauges around the ball, plungers in the middle of their travel.\n"
                 "Press Enter when they are in place. "
             )
-        case PendingChange(gates=gates, diff=diff):
+        case PendingChange(gates=gates, diff=diff, displacement=moved):
             outcomes = "".join(f"{'ok' if gate.passed else 'NO'}  {gate.sentence}\n" for gate in gates)
-            return f"\n{diff}\n{outcomes}Write this into the controller's config? Type yes: "
+            teaching = "" if moved is None else f"{wrapped(teaching_sentence(moved), indent=4)}\n"
+            return f"\n{diff}\n{outcomes}{teaching}Write this into the controller's config? Type yes: "
         case WrittenResult(line=line):
             return f"\n{line}.\nThe new geometry is in the controller's config. Keep it? Type yes: "
         case StepFailure(problem=problem):

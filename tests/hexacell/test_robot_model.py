@@ -12,11 +12,12 @@ from scipy.spatial.transform import Rotation
 
 from hexacell.cell.loader import load_cell
 from hexacell.controller_config.interface import ControllerGeometry
-from hexacell.errors import ReachError
+from hexacell.controller_config.toml_format import NativeToml
+from hexacell.errors import FileError, ReachError
 from hexacell.identification.estimator import estimate_online, identify
 from hexacell.identification.problem.problem import Tolerances
 from hexacell.kinematics.mechanism import FrameTransform, inverse_kinematics
-from hexacell.kinematics.mechanisms.hexaglide import Hexaglide, hexaglide_geometry
+from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS, Hexaglide, hexaglide_geometry
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.measurements.records import MeasurementSet, Record
 from hexacell.robot_model import make_robot, robot_of
@@ -56,6 +57,41 @@ def test_the_bundled_cell_is_the_papers_simulated_robot(robot, paper):
     assert robot.branch == paper.branch
     assert robot.tolerances == Tolerances({"S": 7.0, "B": 7.0, "l": 7.0})
     assert (robot.noise.encoder_mm, robot.noise.gauge_mm) == (0.01, 0.01)
+
+
+@pytest.fixture
+def copied(cell, tmp_path):
+    """The bundled cell in a folder of its own, with a copy of its config from the time of teaching."""
+    for name in (CELL.name, "simulated-hexaglide.controller.toml"):
+        (tmp_path / name).write_bytes((CELL.parent / name).read_bytes())
+    path = tmp_path / CELL.name
+    path.write_text(path.read_text().replace('# taught = "robot-taught', 'taught = "robot-taught'))
+    copied = load_cell(path)
+    assert copied.taught_path == tmp_path / "robot-taught.toml"
+    return copied
+
+
+def test_the_robot_was_taught_with_its_config_if_the_cell_says_nothing_else(robot):
+    assert robot.taught is not None
+    np.testing.assert_array_equal(robot.taught.vector, robot.controller.vector)
+
+
+def test_the_taught_geometry_is_in_the_file_that_the_cell_names(copied, paper):
+    text = copied.config_path.read_text()
+    copied.taught_path.write_text(NativeToml(HEXAGLIDE_PARAMETERS).rewrite(text, paper.actual))
+    robot = robot_of(copied)
+    assert robot.taught is not None
+    np.testing.assert_allclose(robot.taught.vector, paper.actual.vector)
+    np.testing.assert_array_equal(robot.controller.vector, paper.nominal.vector)
+
+
+def test_a_taught_config_must_exist_and_be_of_this_robot(copied):
+    with pytest.raises(FileError, match="robot-taught"):
+        robot_of(copied)
+    text = copied.config_path.read_text()
+    copied.taught_path.write_text(text.replace("branch = [-1,", "branch = [1,"))
+    with pytest.raises(FileError, match=r"robot-taught.*branch is not that of the controller"):
+        robot_of(copied)
 
 
 def test_limits_are_in_millimetres_and_radians(robot):

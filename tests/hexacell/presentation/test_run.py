@@ -7,10 +7,13 @@ import shlex
 import pytest
 
 from hexacell.application.calibration_run import RunRequest
+from hexacell.campaign.teaching import TaskDisplacement
 from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import load_cell
 from hexacell.cli.parser import make_parser
+from hexacell.presentation.documents import run_document
 from hexacell.presentation.run import closing_lines, resume_command, resume_hint
+from hexacell.presentation.teaching import teaching_line, teaching_sentence
 from hexacell.runs.run_folder import RunFolder
 from procedures.calibration.workflow import Mode
 from procedures.run import events
@@ -42,3 +45,22 @@ def test_the_result_is_the_last_line(request_of):
     where, line = closing_lines(request, events.Ended(exit_code=0, line="all well"))
     assert where.endswith(str(request.folder.path))
     assert line == "all well"
+
+
+def test_one_line_before_the_result_says_what_must_be_taught_anew(request_of):
+    moved = TaskDisplacement(position_mm=8.25, orientation_deg=3.0, poses=6, is_within_limits=False)
+    ended = events.Ended(exit_code=0, line="all well", displacement=moved)
+    request = request_of(Mode.OPTIMISE)
+    _, teaching, line = closing_lines(request, ended)
+    assert teaching == teaching_line(moved)
+    assert line == "all well"
+    document = run_document(request, ended, None)
+    assert document["displacement"] == {
+        "position_mm": 8.25,
+        "orientation_deg": 3.0,
+        "poses": 6,
+        "is_within_limits": False,
+    }
+    assert document["teaching"] == teaching_sentence(moved)
+    untouched = run_document(request, events.Ended(exit_code=0, line="all well"), None)
+    assert untouched["displacement"] is untouched["teaching"] is None

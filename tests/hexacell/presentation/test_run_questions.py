@@ -5,9 +5,11 @@ from __future__ import annotations
 import pytest
 
 from hexacell.acceptance import AcceptanceGate
+from hexacell.campaign.teaching import TaskDisplacement
 from hexacell.cell.recovery import Action
 from hexacell.kinematics.pose import Pose
 from hexacell.presentation.run import matching_choice, question_text, repeated_text
+from hexacell.presentation.teaching import teaching_sentence
 from procedures.run.questions import ask_approval, ask_placement, ask_recovery
 
 CHOICES = (Action.RETRY, Action.MEASURE_AGAIN, Action.REDO_SET, Action.ABORT)
@@ -29,6 +31,13 @@ def test_an_approval_shows_the_change_then_every_gate() -> None:
         "\n-1\n+2\nok  The solver ended.\nNO  It is 9 mm.\n"
         "Write this into the controller's config? Type yes: "
     )
+
+
+def test_an_approval_says_what_must_be_taught_anew_before_it_asks() -> None:
+    moved = TaskDisplacement(position_mm=30.8, orientation_deg=4.0, poses=6, is_within_limits=False)
+    *_, first, second, asked = question_text(ask_approval([], "-1\n+2", moved)).splitlines()
+    assert f"{first} {second.strip()}" == teaching_sentence(moved)
+    assert asked.startswith("Write this")
 
 
 def test_a_failure_names_the_choices() -> None:

@@ -116,9 +116,11 @@ class TestUnattendedRun:
         outcome = typed_here("run", fast_cell.cell, "--resume", run, "--json")
         assert outcome.code == outcome.document["exit_code"] == 1
         line = outcome.document["line"]
-        assert line.endswith(
-            ": not evaluated (U is above the limit); rolled back, the controller has its old config, "
-            "the worse one"
+        # By chance the error may be larger than its U as well: then the robot fails.
+        assert re.search(
+            r": (not evaluated \(U is above the limit\)|fail); rolled back, the controller has its old "
+            "config, the worse one$",
+            line,
         )
         assert "the old geometry is back in the controller" in outcome.err
         assert fast_cell.controller.read_bytes() == config

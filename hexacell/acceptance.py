@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hexacell.cell.fields import Frozen
-from hexacell.decision import Verdict
 from hexacell.identification.diagnostics.parameter_checks import SIGNIFICANT_SIGMAS, tolerance_violations
 from hexacell.identification.problem.problem import Noise, Tolerances
 from hexacell.identification.solver.chi_square import (
@@ -140,21 +139,3 @@ def is_worse(before: DeviationStatistics, after: DeviationStatistics, noise: Noi
     record_mm = float(np.hypot(noise.gauge_mm, noise.encoder_mm))
     standard_error = record_mm * float(np.sqrt(2.0 + 1.0 / before.poses + 1.0 / after.poses))
     return after.mean_mm - before.mean_mm > SIGNIFICANT_SIGMAS * standard_error
-
-
-def check_verdict(found: DeviationStatistics | None, *, mean_mm: float, largest_mm: float) -> Verdict:
-    """The verdict of a check under limits on the mean and the largest distance, mm."""
-    if found is None:
-        return Verdict.NOT_EVALUATED
-    within = found.mean_mm <= mean_mm and found.largest_mm <= largest_mm
-    return Verdict.PASS if within else Verdict.FAIL
-
-
-def check_outcome(found: DeviationStatistics | None, limit_mm: float, verdict: Verdict) -> str:
-    """The outcome of a check in one line: deviation at the held-out points, verdict."""
-    if found is None:
-        return f"held-out points: {verdict}"
-    return (
-        f"{found.poses} poses at held-out points; mean deviation {found.mean_mm:.3f} mm "
-        f"(limit {limit_mm:g}): {verdict}"
-    )

@@ -12,10 +12,11 @@ model is right. Source: ILAC-G8:09/2019, Guidelines on decision rules and statem
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import dataclass
 from enum import StrEnum
 from math import isfinite
 
-from hexacell.uncertainty.statement import LargestError
+from hexacell.uncertainty.statement import LargestError, TaskErrors
 
 
 class Verdict(StrEnum):
@@ -49,3 +50,16 @@ def worst_verdict(verdicts: Iterable[Verdict]) -> Verdict:
     """The verdict of several together: the worst of them; not evaluated if there is none."""
     order = list(Verdict)
     return max(verdicts, key=order.index, default=Verdict.NOT_EVALUATED)
+
+
+@dataclass(frozen=True, slots=True)
+class ErrorLimits:
+    """Limits of the largest position error, mm, and of the largest orientation error, deg."""
+
+    position_mm: float
+    orientation_deg: float
+
+    def decide(self, errors: TaskErrors) -> Verdict:
+        """The verdict on both errors together."""
+        position = decide(errors.position, self.position_mm)
+        return worst_verdict([position, decide(errors.orientation, self.orientation_deg)])

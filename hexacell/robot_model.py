@@ -8,6 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
+from hexacell.cell.fields import GeometryDocument
 from hexacell.cell.loader import Cell
 from hexacell.cell.model import CellSettings
 from hexacell.controller_config.interface import ConfigFormat, ControllerGeometry
@@ -168,6 +169,17 @@ def robot_of(cell: Cell) -> Robot:
             action="Copy the config there when you teach points and frames, or remove `taught`",
         )
     return make_robot(cell.settings, controller, taught=taught.geometry)
+
+
+def robot_of_start(
+    settings: CellSettings, controller: GeometryDocument, branch: Branch, taught: GeometryDocument | None
+) -> Robot:
+    """The robot of a cell's settings and of the geometries that its controller had and was taught with."""
+    parameters = settings.mechanism.parameters
+    commanding = ControllerGeometry(Geometry.of(parameters, controller), branch)
+    return make_robot(
+        settings, commanding, taught=None if taught is None else Geometry.of(parameters, taught)
+    )
 
 
 def make_robot(

@@ -20,8 +20,6 @@ SMALL: dict[str, Any] = {
     "noise.gauge_mm": 0.001,
     "acceptance.position_mm": 5.0,
     "acceptance.orientation_deg": 2.0,
-    "acceptance.mean_deviation_mm": 0.2,
-    "acceptance.max_deviation_mm": 0.4,
     "simulation.gauges.noise_mm": 0.001,
     "simulation.gauges.flicker_mm": 0.0002,
     "simulation.encoders.noise_mm": 0.001,

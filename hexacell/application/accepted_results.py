@@ -2,36 +2,24 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from datetime import datetime
+from collections.abc import Sequence
 from pathlib import Path
 
-import numpy as np
-
+from hexacell.campaign.task_accuracy import Task
 from hexacell.cell.loader import Cell
 from hexacell.controller_config.change import fingerprint
 from hexacell.controller_config.write_back import Receipt
 from hexacell.decision import Verdict
 from hexacell.errors import HexacellError
-from hexacell.kinematics.rotations import Array
+from hexacell.identification.estimator import identify
+from hexacell.reporting.result import AcceptedResult
+from hexacell.robot_model import robot_of_start
 from hexacell.runs.run_folder import RunFolder, runs_folder
+from hexacell.stated_effects import stated_effects
+from procedures.calibration.workflow import Calibration, Mode
 from procedures.journal.journal import read_entries
-from procedures.run.state import fold
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class AcceptedResult:
-    """A result that was written to the controller and passed.
-
-    Attributes:
-        run: its run folder.
-        covariance: of the identified parameters (P, P), mm^2, in the mechanism's frame convention.
-        at: when its run ended.
-    """
-
-    run: Path
-    covariance: Array
-    at: datetime
+from procedures.journal.line_format import Entry
+from procedures.run.state import RunState, fold
 
 
 def last_accepted_result(cell: Cell) -> AcceptedResult | None:
@@ -45,8 +33,12 @@ def last_accepted_result(cell: Cell) -> AcceptedResult | None:
     written = fingerprint(cell.config_path)
     folder = runs_folder(cell)
     paths = sorted(folder.iterdir()) if folder.is_dir() else []
-    found = (_accepted(RunFolder(path)) for path in paths if _wrote(path, written))
-    return max((one for one in found if one is not None), key=lambda one: one.at, default=None)
+    histories = {path: _accepted(path) for path in paths if _wrote(path, written)}
+    accepted = {path: entries for path, entries in histories.items() if entries}
+    if not accepted:
+        return None
+    newest = max(accepted, key=lambda path: accepted[path][-1].at)
+    return _result(cell, newest, accepted[newest])
 
 
 def _wrote(path: Path, sha256: str) -> bool:
@@ -57,14 +49,50 @@ def _wrote(path: Path, sha256: str) -> bool:
         return False
 
 
-def _accepted(folder: RunFolder) -> AcceptedResult | None:
-    """The result of a run, if it passed and stayed in the controller."""
+def _accepted(path: Path) -> Sequence[Entry]:
+    """The journal of a run whose result stayed in the controller; nothing of any other."""
     try:
-        entries = read_entries(folder.journal)
+        entries = read_entries(RunFolder(path).journal)
     except HexacellError:
-        return None
+        return ()
+    return entries if _is_accepted(fold(entry.event for entry in entries)) else ()
+
+
+def _is_accepted(state: RunState) -> bool:
+    """Whether the result passed, or a person kept it although its error is not certain to be within limits.
+
+    Where the model did not hold, nothing is known of the geometry, whoever kept it.
+    """
+    if state.judged is None or state.identified is None or state.rolled_back or state.rolling_back:
+        return False
+    if state.judged.verdict is Verdict.PASS:
+        return True
+    verification = state.judged.verification
+    holds = verification is not None and all(test.passed for test in verification.tests)
+    return holds and state.accepted is not None and state.accepted.by is not None
+
+
+def _result(cell: Cell, path: Path, entries: Sequence[Entry]) -> AcceptedResult:
     state = fold(entry.event for entry in entries)
-    passed = state.judged is not None and state.judged.verdict is Verdict.PASS
-    if not passed or state.identified is None or state.rolled_back or state.rolling_back:
-        return None
-    return AcceptedResult(folder.path, np.array(state.identified.result.covariance), entries[-1].at)
+    assert state.identified is not None  # noqa: S101 - it is accepted
+    return AcceptedResult(
+        run=str(path),
+        at=entries[-1].at,
+        covariance=state.identified.result.covariance,
+        effects=_effects(cell, state),
+    )
+
+
+def _effects(cell: Cell, state: RunState) -> dict[str, tuple[tuple[float, ...], ...]]:
+    """What the systematic effects, as the cell file has them now, did to the result."""
+    settings = cell.settings
+    effects = [one for one in stated_effects(settings, state.temperature_range_k) if one.size]
+    if not effects or state.started is None:
+        return {}
+    start = robot_of_start(settings, state.started.controller, state.started.branch, state.started.taught)
+    robot = Calibration(settings, start, Mode.OPTIMISE).robot_of(state)
+    found = identify(robot.problem(state.measurements()))
+    belief = robot.belief(found)
+    budget = Task.of(settings, robot, belief).budget(found, belief, effects)
+    columns = {} if budget is None else budget.parameter_columns
+    return {name: tuple(map(tuple, each.T.tolist())) for name, each in columns.items()}

@@ -9,14 +9,13 @@ from pathlib import Path
 
 from drivers.interfaces import DeviceIdentity
 from hexacell import __version__
+from hexacell.application.accepted_results import last_accepted_result
 from hexacell.application.device_setup import Connected, device_addresses, open_devices
 from hexacell.campaign.pose_list import pose_list_of
 from hexacell.cell.loader import Cell
 from hexacell.controller_config.change import fingerprint
-from hexacell.controller_config.interface import ControllerGeometry
 from hexacell.errors import FileError, HexacellError, UsageError, flatten_errors
-from hexacell.kinematics.geometry import Geometry
-from hexacell.robot_model import Robot, make_robot, robot_of
+from hexacell.robot_model import robot_of, robot_of_start
 from hexacell.runs.run_folder import RunFolder, runs_folder
 from hexacell.storage.atomic_files import read_text, remove_stale_temporaries, write_atomically
 from hexacell.storage.cell_lock import cell_lock
@@ -54,7 +53,7 @@ async def preflight(cell: Cell, mode: Mode, *, unattended: bool) -> tuple[Device
     Raises:
         HexacellError: every failure, in one report.
     """
-    calibration = Calibration(cell.settings, robot_of(cell), mode, pose_list_of(cell))
+    calibration = _new_calibration(cell, mode)
     with cell_lock(cell.config_path):
         async with _checked_devices(cell, calibration, runs_folder(cell), unattended) as connected:
             return connected.identities
@@ -84,8 +83,9 @@ async def calibrate(
         started = _resumed_start(request) if request.resume else None
         if started is None:
             _require_own_geometry(cell)
-        robot = robot_of(cell) if started is None else robot_of_run(cell, started)
-        calibration = Calibration(cell.settings, robot, request.mode, pose_list_of(cell))
+            calibration = _new_calibration(cell, request.mode)
+        else:
+            calibration = calibration_of_run(cell, started)
         async with _checked_devices(cell, calibration, folder.path, request.unattended) as connected:
             require_known(connected.identities, started.devices if started else ())
             devices = connected.devices if live is None else replace(connected.devices, live=live)
@@ -194,6 +194,7 @@ def run_started(
         devices=identities,
         pose_list=None if calibration.listed is None else read_text(calibration.listed.path),
         taught=None if robot.taught is None else robot.taught.document(),
+        accepted=calibration.accepted,
     )
 
 
@@ -227,9 +228,13 @@ def _resumed_start(request: RunRequest) -> events.RunStarted:
     return state.started
 
 
-def robot_of_run(cell: Cell, started: events.RunStarted) -> Robot:
-    """The robot with the geometry that the controller had when the run began."""
-    parameters = cell.settings.mechanism.parameters
-    geometry = Geometry.of(parameters, started.controller)
-    taught = None if started.taught is None else Geometry.of(parameters, started.taught)
-    return make_robot(cell.settings, ControllerGeometry(geometry, started.branch), taught=taught)
+def calibration_of_run(cell: Cell, started: events.RunStarted) -> Calibration:
+    """The calibration or check that a run was begun for."""
+    robot = robot_of_start(cell.settings, started.controller, started.branch, started.taught)
+    return Calibration(cell.settings, robot, Mode(started.mode), pose_list_of(cell), started.accepted)
+
+
+def _new_calibration(cell: Cell, mode: Mode) -> Calibration:
+    """The calibration or check of a cell as it is now."""
+    accepted = last_accepted_result(cell) if mode is Mode.CHECK else None
+    return Calibration(cell.settings, robot_of(cell), mode, pose_list_of(cell), accepted)

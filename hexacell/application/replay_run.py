@@ -7,8 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from hexacell.application.calibration_run import robot_of_run
-from hexacell.campaign.pose_list import pose_list_of
+from hexacell.application.calibration_run import calibration_of_run
 from hexacell.cell.loader import Cell, dump, load_cell
 from hexacell.cell.measuring import IdentificationSettings
 from hexacell.cell.model import CellSettings, geometry_settings
@@ -17,7 +16,6 @@ from hexacell.controller_config.write_back import BEFORE
 from hexacell.errors import FileError, HexacellError, UsageError
 from hexacell.runs.run_folder import RunFolder
 from hexacell.storage import atomic_files
-from procedures.calibration.workflow import Calibration, Mode
 from procedures.journal.journal import read_entries, read_version
 from procedures.journal.line_format import RULES_SINCE, Entry
 from procedures.replay.comparison import TOLERANCE, ReplayReport
@@ -99,8 +97,7 @@ def _set_up(
     cell.config_path.write_bytes(text)
     run = RunFolder(scratch / "run")
     run.path.mkdir()
-    calibration = Calibration(settings, robot_of_run(cell, started), Mode(started.mode), pose_list_of(cell))
-    executor = RecordedStepExecutor.of(cell, calibration, run)
+    executor = RecordedStepExecutor.of(cell, calibration_of_run(cell, started), run)
     return executor, started.model_copy(update={"config_sha256": atomic_files.sha256(text)})
 
 

@@ -8,7 +8,8 @@ ends as soon as that error and its uncertainty decide against the limit, or its 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -25,11 +26,12 @@ from hexacell.campaign.planner import CANDIDATES, Plan
 from hexacell.campaign.pose_list import PoseList
 from hexacell.campaign.recursive_estimator import OnlineEstimator, RecordEstimator
 from hexacell.cell.model import CellSettings
-from hexacell.decision import Verdict
+from hexacell.decision import ErrorLimits, Verdict
 from hexacell.identification.solver.chi_square import ChiSquareVerdict
 from hexacell.kinematics.rotations import Array
 from hexacell.measurements.records import MeasurementSet, Record
 from hexacell.robot_model import Robot
+from hexacell.uncertainty.effects import Effect
 from hexacell.uncertainty.geometry_drift import IdentifiedBefore, drift_covariance, drift_sigma
 
 FEWEST_POINTS = 2
@@ -38,25 +40,27 @@ FEWEST_POINTS = 2
 
 @dataclass(frozen=True, eq=False)
 class Check:
-    """The check of one robot against a limit of the position error at its task poses.
+    """The check of one robot against limits of the errors at its task poses.
 
     Attributes:
         before: the last accepted result, and its drift since; none without such a result.
-        limit_mm: at the worst task pose.
+        limits: at the worst task pose.
         budget: most records, references included.
         listed: poses to measure; none if they are chosen.
-        systematic: (t, 6, k) systematic effects at the task poses, mm and rad, one standard deviation
-            each: a check shares them with the result before it, and its records do not reduce them.
+        effects: the systematic ones. A check shares the constant ones with the result before it, so that
+            its records do not reduce them.
+        earlier: what these did to that result, as errors (p, k) of its free parameters by effect.
         candidates: number of candidate orientations for each record.
     """
 
     settings: CellSettings
     robot: Robot
     before: IdentifiedBefore | None
-    limit_mm: float
+    limits: ErrorLimits
     budget: int
     listed: PoseList | None = None
-    systematic: Array | None = None
+    effects: tuple[Effect, ...] = ()
+    earlier: Mapping[str, Array] = field(default_factory=dict)
     candidates: int = CANDIDATES
 
     @cached_property
@@ -92,19 +96,24 @@ class Check:
         records = measurements.records
         if records not in self._stated:
             self._stated.clear()  # only the last one is asked for again
-            self._stated[records] = self._statement(measurements)
+            self._stated[records] = self._statement(measurements, self.effects)
         return self._stated[records]
 
-    def final_statement(self, measurements: MeasurementSet) -> CheckStatement | None:
+    def final_statement(
+        self, measurements: MeasurementSet, effects: tuple[Effect, ...] | None = None
+    ) -> CheckStatement | None:
         """The same at the end of the check, where what is not decided is not evaluated.
+
+        ``effects`` are the systematic ones as they are known by then, if not as before.
 
         Raises:
             IdentifiabilityError: the records do not belong to this robot.
         """
-        stated = self.statement(measurements)
+        effects = self.effects if effects is None else effects
+        stated = self._statement(measurements, effects)
         if stated is None or stated.is_decided:
             return stated
-        further = self._further_records(measurements) if stated.is_consistent else None
+        further = self._further_records(measurements, effects) if stated.is_consistent else None
         return replace(stated, verdict=Verdict.NOT_EVALUATED, further_records=further)
 
     def _decided(self, measurements: MeasurementSet) -> str | None:
@@ -113,17 +122,19 @@ class Check:
             return None
         return f"the error at the task poses is {stated.position} mm: {stated.verdict}"
 
-    def _statement(self, measurements: MeasurementSet) -> CheckStatement | None:
+    def _statement(
+        self, measurements: MeasurementSet, effects: tuple[Effect, ...]
+    ) -> CheckStatement | None:
         likeliest, guarded = self._estimates(measurements)
-        estimates = self._errors(likeliest), self._errors(guarded)
+        estimates = self._errors(likeliest, effects), self._errors(guarded, effects)
         if estimates[0] is None or estimates[1] is None:
             return None
         errors = estimates[0].errors
         is_consistent = _is_consistent(likeliest)
-        verdict = guarded_verdict(errors, estimates[1].errors, self.limit_mm)
+        verdict = guarded_verdict(errors, estimates[1].errors, self.limits)
         return CheckStatement(
-            position=errors.position,
-            orientation=errors.orientation,
+            estimate=likeliest.estimate,
+            errors=errors,
             verdict=verdict if is_consistent else Verdict.NOT_EVALUATED,
             drift_scale=None if self.before is None else likeliest.scale,
             is_consistent=is_consistent,
@@ -138,13 +149,13 @@ class Check:
         estimate = ScaledEstimate(1.0, self._by_drawing.estimate(measurements), 0.0)
         return estimate, estimate
 
-    def _errors(self, estimate: ScaledEstimate) -> ErrorEstimate | None:
-        return ErrorEstimate.of(self.plan.task, estimate.estimate, self.systematic)
+    def _errors(self, estimate: ScaledEstimate, effects: tuple[Effect, ...]) -> ErrorEstimate | None:
+        return ErrorEstimate.of(self.plan.task, estimate.estimate, effects, self.earlier)
 
-    def _further_records(self, measurements: MeasurementSet) -> int | None:
+    def _further_records(self, measurements: MeasurementSet, effects: tuple[Effect, ...]) -> int | None:
         """How many more would decide, each as informative as those of well spread sets on average."""
         likeliest, guarded = self._estimates(measurements)
-        first, second = self._errors(likeliest), self._errors(guarded)
+        first, second = self._errors(likeliest, effects), self._errors(guarded, effects)
         if first is None or second is None:
             return None
         sets = replace(self.plan, settings=self.settings).planned_sets
@@ -152,7 +163,7 @@ class Check:
         total = np.sum(
             [planned.information(point, len(sets[point - 1])) for point in self.plan.points], axis=0
         )
-        return records_to_decide(first, second, self.limit_mm, total / sum(map(len, sets)))
+        return records_to_decide(first, second, self.limits, total / sum(map(len, sets)))
 
     @cached_property
     def _drifting(self) -> DriftEstimator | None:

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from bisect import bisect_left
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from hexacell.campaign.recursive_estimator import OnlineEstimate
 from hexacell.campaign.task_accuracy import Task
-from hexacell.decision import Verdict, decide
+from hexacell.decision import ErrorLimits, Verdict
 from hexacell.experiment_design.criteria import add_information
 from hexacell.kinematics.rotations import Array
+from hexacell.uncertainty.effects import Effect
 from hexacell.uncertainty.statement import LargestError, TaskErrors
 
 MOST_FURTHER_RECORDS = 200
@@ -23,22 +25,32 @@ class CheckStatement:
     """What is said of the robot by the records so far.
 
     Attributes:
-        position: the largest position error over the task poses, mm.
-        orientation: the largest orientation error, deg.
-        verdict: on the position.
+        estimate: that it is made from.
+        errors: of the controller's geometry at the task poses that the estimated robot reaches.
+        verdict: on their position and orientation.
         drift_scale: the likeliest one; none where the robot was not identified before.
         is_consistent: whether the residuals agree with the stated noise.
         records: that it is made from.
         further_records: about how many more would decide; none where none would, or nothing is open.
     """
 
-    position: LargestError
-    orientation: LargestError
+    estimate: OnlineEstimate
+    errors: TaskErrors
     verdict: Verdict
     drift_scale: float | None
     is_consistent: bool
     records: int
     further_records: int | None = None
+
+    @property
+    def position(self) -> LargestError:
+        """The largest position error over the task poses, mm."""
+        return self.errors.position
+
+    @property
+    def orientation(self) -> LargestError:
+        """The largest orientation error, deg."""
+        return self.errors.orientation
 
     @property
     def is_decided(self) -> bool:
@@ -63,20 +75,29 @@ class ErrorEstimate:
     systematic: Array
 
     @classmethod
-    def of(cls, task: Task, estimate: OnlineEstimate, systematic: Array | None) -> ErrorEstimate | None:
-        """By an estimate while measuring; none if the estimated robot can take no task pose."""
+    def of(
+        cls,
+        task: Task,
+        estimate: OnlineEstimate,
+        effects: Iterable[Effect] = (),
+        earlier: Mapping[str, Array] | None = None,
+    ) -> ErrorEstimate | None:
+        """By an estimate while measuring; none if the estimated robot can take no task pose.
+
+        ``effects`` are the systematic ones. Where the prior is an earlier estimate, ``earlier`` says what
+        they did to that one (:attr:`~hexacell.uncertainty.budget.UncertaintyBudget.parameter_columns`).
+        """
         belief = estimate.belief
         jacobian = task.jacobian(belief)
         if jacobian is None:
             return None
         commanding = belief.mechanism.convention.free_parameters(belief.controller)
+        acting = [effect for effect in effects if effect.size]
+        found = estimate.identification
+        budget = task.budget(found, belief, acting, earlier) if found is not None and acting else None
         none = np.zeros((*jacobian.shape[:2], 0))
-        return cls(
-            jacobian,
-            belief.free - commanding,
-            belief.covariance,
-            none if systematic is None else systematic,
-        )
+        systematic = none if budget is None else budget.not_in_covariance
+        return cls(jacobian, belief.free - commanding, belief.covariance, systematic)
 
     @property
     def errors(self) -> TaskErrors:
@@ -93,16 +114,16 @@ def is_final(verdict: Verdict) -> bool:
     return verdict in {Verdict.PASS, Verdict.FAIL}
 
 
-def guarded_verdict(likeliest: TaskErrors, guarded: TaskErrors, limit_mm: float) -> Verdict:
-    """The verdict on the position by the likeliest errors; a pass holds for the guarded ones as well."""
-    verdict = decide(likeliest.position, limit_mm)
-    if verdict is Verdict.PASS and decide(guarded.position, limit_mm) is not Verdict.PASS:
+def guarded_verdict(likeliest: TaskErrors, guarded: TaskErrors, limits: ErrorLimits) -> Verdict:
+    """The verdict by the likeliest errors; a pass holds for the guarded ones as well."""
+    verdict = limits.decide(likeliest)
+    if verdict is Verdict.PASS and limits.decide(guarded) is not Verdict.PASS:
         return Verdict.CONDITIONAL_PASS
     return verdict
 
 
 def records_to_decide(
-    likeliest: ErrorEstimate, guarded: ErrorEstimate, limit_mm: float, per_record: Array
+    likeliest: ErrorEstimate, guarded: ErrorEstimate, limits: ErrorLimits, per_record: Array
 ) -> int | None:
     """How many more records would decide if they confirm the likeliest estimate.
 
@@ -112,7 +133,7 @@ def records_to_decide(
 
     def is_decided(records: int) -> bool:
         likely, careful = (one.after(records * per_record).errors for one in (likeliest, confirmed))
-        return is_final(guarded_verdict(likely, careful, limit_mm))
+        return is_final(guarded_verdict(likely, careful, limits))
 
     if not is_decided(MOST_FURTHER_RECORDS):
         return None

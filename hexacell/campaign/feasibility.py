@@ -106,18 +106,24 @@ def _records_needed(plan: Plan, unknowns: int) -> int:
 
 
 def optimisation_failures(plan: Plan) -> Iterator[list[HexacellError]]:
-    """What prevents a plan whose poses can be reached from selecting its poses.
+    """What prevents a plan whose poses can be reached from identifying the geometry.
 
     Yields the failures after each part of the work, often none, so that the caller may stop in between.
     """
-    yield [*_unreachable_points(plan)]
-    yield [*_blocked_lines(plan)]
     any_failure = False
-    for found in _points_without_poses(plan):
+    for found in measuring_failures(plan):
         any_failure = any_failure or bool(found)
         yield found
     if not any_failure:
         yield [*_undetermined_parameters(plan)]
+
+
+def measuring_failures(plan: Plan) -> Iterator[list[HexacellError]]:
+    """What prevents a plan whose poses can be reached from selecting its poses, likewise in parts."""
+    if plan.robot.known is None:
+        yield [*_unreachable_points(plan)]
+    yield [*_blocked_lines(plan)]
+    yield from _points_without_poses(plan)
 
 
 def unreachable_share(plan: Plan) -> dict[int, float]:

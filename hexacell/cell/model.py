@@ -12,6 +12,7 @@ from hexacell.cell.devices import ControllerSettings, EncoderSettings, GaugeSett
 from hexacell.cell.fields import Finite, GeometrySettings, NotNegative, Positive, Section, broken_rule
 from hexacell.cell.measuring import (
     AcceptanceSettings,
+    CheckSettings,
     GuardSettings,
     IdentificationSettings,
     LimitSettings,
@@ -64,6 +65,7 @@ class CellSettings(Section):
     identification: IdentificationSettings
     verification: VerificationSettings
     acceptance: AcceptanceSettings = AcceptanceSettings()
+    check: CheckSettings = CheckSettings()
     recovery: RecoverySettings = RecoverySettings()
     task: TaskSettings = TaskSettings()
     simulation: SimulationSettings | None = None

@@ -110,7 +110,7 @@ def _run(commands: Any) -> None:  # noqa: ANN401
     parser.add_argument(
         "--mode",
         choices=("check", "optimise"),
-        help="check: measure held-out poses, change nothing (default if unattended); "
+        help="check: measure until the error is decided, change nothing (default if unattended); "
         "optimise: calibrate and write back (default otherwise)",
     )
     _add_json(parser)

@@ -85,6 +85,7 @@ def run_document(
         "line": ended.line,
         "verdict": judged and judged.verdict.value,
         "verification": judged and judged.verification and judged.verification.model_dump(mode="json"),
+        "check": judged and judged.check and judged.check.model_dump(mode="json"),
         "displacement": moved and moved.model_dump(mode="json"),
         "teaching": moved and teaching_sentence(moved),
         "run": str(request.folder.path),

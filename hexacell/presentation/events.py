@@ -7,8 +7,7 @@ import numpy as np
 from hexacell.campaign.decisions import Forecast
 from hexacell.presentation.layout import wrapped
 from hexacell.presentation.planning import run_forecast_line
-from hexacell.presentation.verification import verification_text
-from hexacell.reporting.verification import Verification
+from hexacell.presentation.verification import check_start_text, check_text, verification_text
 from procedures.run import events
 from procedures.run.state import RunState
 from procedures.run.steps import Compute, Move, Phase, SetKey
@@ -95,13 +94,22 @@ def event_text(event: events.Event, state: RunState) -> str | None:
             return _further_text(event)
 
 
+def _basis_or_verdict(event: events.RunStarted | events.ResultValidated) -> str | None:
+    """What a check starts from, and the verdict of any run."""
+    if isinstance(event, events.RunStarted):
+        return check_start_text(event.accepted) if event.mode == "check" else None
+    if event.verification is not None:
+        return verification_text(event.verification)
+    return None if event.check is None else check_text(event.check)
+
+
 def _further_text(event: events.Event) -> str | None:
-    """What a verdict, an interruption, a failure or a command reports."""
+    """What a start, a verdict, an interruption, a failure or a command reports."""
     match event:
+        case events.RunStarted() | events.ResultValidated():
+            return _basis_or_verdict(event)
         case events.ReferenceConfirmed():
             return f"{set_name(event.at)} continues: its reference is unchanged"
-        case events.ResultValidated(verification=Verification() as verified):
-            return verification_text(verified)
         case events.RecordDiscarded():
             return f"{set_name(event.at)}, orientation {event.orientation} is measured again"
         case events.Failed():

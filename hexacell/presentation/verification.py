@@ -2,7 +2,13 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
+from hexacell.decision import Verdict
+from hexacell.identification.diagnostics.parameter_checks import SIGNIFICANT_SIGMAS
 from hexacell.presentation.layout import wrapped
+from hexacell.reporting.check_result import CheckResult
+from hexacell.reporting.result import AcceptedResult
 from hexacell.reporting.verification import JudgedError, Verification, VerifiedAccuracy
 
 SCALE = "The length scale is that of the encoders; it was not checked."
@@ -17,6 +23,35 @@ def verification_text(verified: Verification) -> str:
     if verified.accuracy is not None:
         lines.append(f"  {SCALE}")
     return "\n".join(lines)
+
+
+def check_text(found: CheckResult) -> str:
+    """The same for a check: the verdict, the error now, and what has changed."""
+    lines = [f"verdict: {found.verdict}", *_errors(found.accuracy), *_drift(found)]
+    if not found.is_consistent:
+        lines.append("  the residuals are larger than the stated noise explains: the model does not hold")
+    if found.accuracy is not None:
+        lines.append(f"  {SCALE}")
+    return "\n".join(lines)
+
+
+def check_start_text(accepted: AcceptedResult | None) -> str:
+    """What a check starts from."""
+    if accepted is None:
+        return "no accepted result has the controller's config: the check starts from the drawing"
+    return f"the check starts from the result of {accepted.at:%Y-%m-%d}, {Path(accepted.run).name}"
+
+
+def _drift(found: CheckResult) -> list[str]:
+    """The parameter that has changed most, by its standard deviation, if that is significant."""
+    worst = max(found.changes, key=lambda one: abs(one.change) / one.sigma, default=None)
+    if found.earlier_at is None or worst is None:
+        return []
+    if abs(worst.change) < SIGNIFICANT_SIGMAS * worst.sigma:
+        unchanged = f"  no parameter has changed significantly since {found.earlier_at:%Y-%m-%d}"
+        return [unchanged] if found.verdict is Verdict.PASS else []
+    change = f"{worst.name} by {worst.change:+.3f} {worst.unit} (sigma {worst.sigma:.3f})"
+    return [f"  changed most since {found.earlier_at:%Y-%m-%d}: {change}"]
 
 
 def _errors(accuracy: VerifiedAccuracy | None) -> list[str]:

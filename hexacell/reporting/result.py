@@ -5,7 +5,11 @@ The acceptance gates and the write-back are derived from it without further comp
 
 from __future__ import annotations
 
+from datetime import datetime
 from typing import Any, Self
+
+import numpy as np
+from pydantic import Field
 
 from hexacell.cell.fields import Frozen, GeometryDocument
 from hexacell.identification.solver.chi_square import ChiSquareTest
@@ -18,6 +22,7 @@ from hexacell.identification.solver.result import (
 )
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.parameters import ParameterSet
+from hexacell.kinematics.rotations import Array
 from hexacell.measurements.records import Deviation, RecordId
 
 
@@ -116,3 +121,25 @@ class IdentificationResult(Frozen):
     def identified(self, parameters: ParameterSet) -> Geometry:
         """The geometry in the mechanism's frame convention."""
         return Geometry.of(parameters, self.geometry)
+
+
+class AcceptedResult(Frozen):
+    """A result whose geometry the controller has: it passed, or a person kept it.
+
+    Attributes:
+        run: the folder of its run.
+        at: when that ended.
+        covariance: of the parameters, mm^2, in the mechanism's frame convention.
+        effects: what one unit of each cause of a systematic effect did to the free parameters: by the
+            name of the effect, a row a cause.
+    """
+
+    run: str
+    at: datetime
+    covariance: tuple[tuple[float, ...], ...]
+    effects: dict[str, tuple[tuple[float, ...], ...]] = Field(default_factory=dict)
+
+    @property
+    def parameter_columns(self) -> dict[str, Array]:
+        """The same as errors (p, k) of the free parameters."""
+        return {name: np.array(rows).T for name, rows in self.effects.items()}

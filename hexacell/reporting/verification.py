@@ -135,9 +135,16 @@ def outcome_line(result: IdentificationResult, parameters: int, verified: Verifi
     if verified.before_mm is not None and verified.after_mm is not None:
         means = f"{verified.before_mm:.2f} -> {verified.after_mm:.3f} mm"
         parts.append(f"mean deviation at held-out poses {means}")
-    if verified.accuracy is not None:
-        parts.append(_stated(verified.accuracy))
-    return f"{'; '.join(parts)}: {verified.verdict}{_reason(verified)}"
+    return outcome_of(parts, verified.accuracy, verified.verdict, _reason(verified))
+
+
+def outcome_of(
+    parts: Sequence[str], accuracy: VerifiedAccuracy | None, verdict: Verdict, reason: str
+) -> str:
+    """An outcome in one line: some parts, the error that decides, the verdict, and its reason if any."""
+    stated = [] if accuracy is None else [_stated(accuracy)]
+    because = f" ({reason})" if reason else ""
+    return f"{'; '.join([*parts, *stated])}: {verdict}{because}"
 
 
 def _stated(accuracy: VerifiedAccuracy) -> str:
@@ -157,11 +164,11 @@ def _reason(verified: Verification) -> str:
     """Why a verdict is not that of the stated error."""
     failed = [test.sentence for test in verified.tests if not test.passed]
     if verified.is_worse:
-        return " (worse than before)"
+        return "worse than before"
     if verified.verdict is Verdict.NOT_EVALUATED and failed:
-        return f" ({failed[0].rstrip('.')})"
+        return failed[0].rstrip(".")
     if verified.verdict is Verdict.NOT_EVALUATED and verified.accuracy is not None:
-        return " (U is above the limit)"
+        return "U is above the limit"
     return ""
 
 

@@ -8,7 +8,6 @@ a geometry may be right at small tilts alone.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 
 from hexacell.cell.model import CellSettings
 from hexacell.errors import LimitError
@@ -45,14 +44,14 @@ class HeldOutSteps:
                 return Locate() if state.position_unknown else self._in_set(state, key)
         return None
 
-    def choose_poses(self, identified: Identification | None) -> tuple[tuple[SixNumbers, ...], ...]:
+    def choose_poses(self, identified: Identification) -> tuple[tuple[SixNumbers, ...], ...]:
         """Poses at each held-out point, in the controller's frames.
 
         Raises:
             LimitError: a point has too few that keep the ball inside the travel.
         """
         belief = self.sets.robot.belief(identified)
-        used = None if identified is None else identified.poses.rotations
+        used = identified.poses.rotations
         points = range(len(self.settings.verification.points))
         return tuple(self._choose_at(point, belief, used) for point in points)
 
@@ -80,16 +79,9 @@ class HeldOutSteps:
         commands = (robot.to_command(poses.pose(row)) for row in range(len(poses)))
         return tuple(command.as_tuple() for command in commands)
 
-    @cached_property
-    def _poses_by_drawing(self) -> tuple[tuple[SixNumbers, ...], ...]:
-        """The poses of a run that identifies nothing."""
-        return self.choose_poses(None)
-
     def _poses(self, state: RunState, key: SetKey) -> tuple[tuple[SixNumbers, ...], int]:
         """The poses of a set, and how many of them are measured before and after."""
-        if state.identified is None:
-            poses = self._poses_by_drawing[key.point - 1]
-            return poses, len(poses)
+        assert state.identified is not None  # noqa: S101 - its poses are held out of an identification
         common = state.identified.held_out[key.point - 1]
         if key.phase is Phase.BEFORE or not state.identified.held_out_after:
             return common, len(common)

@@ -30,13 +30,15 @@ async def plan_failures(calibration: Calibration, *, unattended: bool) -> list[H
 
 def _plan_failures(calibration: Calibration, *, unattended: bool) -> Iterator[list[HexacellError]]:
     """What each piece of the work found."""
-    unreachable = [*feasibility.reach_failures(calibration.plan), *_held_out_failures(calibration)]
-    yield unreachable
-    if calibration.mode is Mode.OPTIMISE:
-        too_few = [*feasibility.too_few_records(calibration.plan)]
-        yield too_few
-        if not unreachable and not too_few:
-            yield from feasibility.optimisation_failures(calibration.plan)
+    is_check = calibration.mode is Mode.CHECK
+    failures = [*feasibility.reach_failures(calibration.plan)]
+    failures += [] if is_check else _held_out_failures(calibration)
+    yield failures
+    too_few = [] if is_check else [*feasibility.too_few_records(calibration.plan)]
+    yield too_few
+    if not failures and not too_few:
+        find = feasibility.measuring_failures if is_check else feasibility.optimisation_failures
+        yield from find(calibration.plan)
     if unattended and calibration.settings.stations.placement == "by-hand":
         yield [
             AnswerNeeded(

@@ -2,8 +2,9 @@
 
 The points are measured (:mod:`~procedures.calibration.identification_steps`) and the geometry is
 identified. The held-out points are measured (:mod:`~procedures.calibration.held_out_steps`), the geometry
-is written to the controller, and the held-out points are measured again. Nothing here uses hardware or
-files, so a run, its resumption and its replay decide alike.
+is written to the controller, and the held-out points are measured again. A check measures points, until
+they decide, and nothing else (:mod:`~hexacell.campaign.check`). Nothing here uses hardware or files, so a
+run, its resumption and its replay decide alike.
 """
 
 from __future__ import annotations
@@ -12,14 +13,19 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 from functools import cached_property
 
+import numpy as np
+
+from hexacell.campaign.check import Check, identified_before
 from hexacell.campaign.planner import Plan
 from hexacell.campaign.pose_list import PoseList
 from hexacell.campaign.teaching import WrittenGeometry, as_written
 from hexacell.cell.model import CellSettings
-from hexacell.decision import Verdict
+from hexacell.decision import ErrorLimits, Verdict
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.geometry import Geometry
+from hexacell.reporting.result import AcceptedResult
 from hexacell.robot_model import Robot
+from hexacell.stated_effects import stated_effects
 from procedures.calibration.held_out_steps import HeldOutSteps
 from procedures.calibration.identification_steps import IdentificationSteps
 from procedures.calibration.set_steps import SetSteps
@@ -44,7 +50,7 @@ def expected_records(settings: CellSettings, mode: Mode, listed: PoseList | None
     points = len(held_out.points)
     verification = points * (held_out.orientations + 1)
     if mode is Mode.CHECK:
-        return verification
+        return settings.check.budget_records + len(plan.points)
     records = len(plan.points) * plan.orientations if listed is None else len(listed)
     identification = min(records, plan.budget_records or records) + len(plan.points)
     return identification + 2 * verification + points * (held_out.orientations - 1)
@@ -53,27 +59,54 @@ def expected_records(settings: CellSettings, mode: Mode, listed: PoseList | None
 class _Measuring:
     """What is measured, for the geometries that command one robot."""
 
-    def __init__(self, settings: CellSettings, robot: Robot, listed: PoseList | None) -> None:
-        self.robot = robot
-        self.plan = Plan(settings, robot, listed, CANDIDATES)
-        sets = SetSteps(robot)
-        self.points = IdentificationSteps(self.plan, sets, settings.identification.provisional)
-        self.held_out = HeldOutSteps(settings, sets, HELD_OUT_CANDIDATES)
+    def __init__(self, plan: Plan) -> None:
+        self.robot = plan.robot
+        self.plan = plan
+        sets = SetSteps(plan.robot)
+        self.points = IdentificationSteps(plan, sets, plan.settings.identification.provisional)
+        self.held_out = HeldOutSteps(plan.settings, sets, HELD_OUT_CANDIDATES)
 
 
 @dataclass(frozen=True, eq=False)
 class Calibration:
-    """The calibration of one cell; ``listed`` are the poses to measure, if a file lists them."""
+    """The calibration or check of one cell.
+
+    Attributes:
+        listed: the poses to measure, if a file lists them.
+        accepted: the result that the controller has, of which a check starts; none where that is the
+            drawing.
+    """
 
     settings: CellSettings
     robot: Robot
     mode: Mode
     listed: PoseList | None = None
+    accepted: AcceptedResult | None = None
 
     @property
     def plan(self) -> Plan:
-        """What is measured to identify the geometry."""
+        """What is measured to identify the geometry, or to check it."""
         return self._at_start.plan
+
+    @cached_property
+    def check(self) -> Check:
+        """The check of the robot as it is now."""
+        limits, wanted, accepted = self.settings.acceptance, self.settings.check, self.accepted
+        before = None
+        if accepted is not None:
+            covariance = np.array(accepted.covariance)
+            before = identified_before(self.robot, covariance, wanted.drift_per_parameter_mm)
+        return Check(
+            self.settings,
+            self.robot,
+            before,
+            ErrorLimits(limits.position_mm, limits.orientation_deg),
+            wanted.budget_records,
+            self.listed,
+            stated_effects(self.settings),
+            {} if accepted is None else accepted.parameter_columns,
+            CANDIDATES,
+        )
 
     def next_step(self, state: RunState) -> Step | None:
         """The step to execute; None if the run is over.
@@ -87,8 +120,7 @@ class Calibration:
             return Compute(kind="take back")
         measuring = self._measuring(state)
         if self.mode is Mode.CHECK:
-            step = measuring.held_out.next_step(state, Phase.BEFORE)
-            return step or (None if state.judged else Compute(kind="judge"))
+            return None if state.judged else measuring.points.next_step(state) or Compute(kind="judge")
         if state.identified is None:
             step = measuring.points.next_step(state)
             return step or Compute(kind="take back" if state.provisional_active else "identify")
@@ -118,7 +150,7 @@ class Calibration:
             return geometry_of(state.provisional, self.robot)
         return self._at_start.points.estimate(state)
 
-    def held_out_poses(self, identified: Identification | None) -> tuple[tuple[SixNumbers, ...], ...]:
+    def held_out_poses(self, identified: Identification) -> tuple[tuple[SixNumbers, ...], ...]:
         """See :meth:`HeldOutSteps.choose_poses`."""
         return self._at_start.held_out.choose_poses(identified)
 
@@ -158,7 +190,7 @@ class Calibration:
         key = written.vector.tobytes()
         if key not in self._with_result:
             robot = self.robot.with_controller(written)
-            self._with_result[key] = _Measuring(self.settings, robot, self.listed)
+            self._with_result[key] = _Measuring(self._calibrating(robot))
         return self._with_result[key]
 
     def _identifying(self, state: RunState) -> _Measuring:
@@ -171,12 +203,16 @@ class Calibration:
                 provisional=(geometry_of(state.provisional, self.robot),),
                 uses_provisional=state.provisional_active,
             )
-            self._with_provisional[state.provisional_active] = _Measuring(self.settings, robot, self.listed)
+            plan = self._calibrating(robot)
+            self._with_provisional[state.provisional_active] = _Measuring(plan)
         return self._with_provisional[state.provisional_active]
 
     @cached_property
     def _at_start(self) -> _Measuring:
-        return _Measuring(self.settings, self.robot, self.listed)
+        return _Measuring(self.check.plan if self.mode is Mode.CHECK else self._calibrating(self.robot))
+
+    def _calibrating(self, robot: Robot) -> Plan:
+        return Plan(self.settings, robot, self.listed, CANDIDATES)
 
     @cached_property
     def _with_provisional(self) -> dict[bool, _Measuring]:

@@ -4,16 +4,18 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from hexacell.acceptance import DeviationStatistics, check_outcome, check_verdict, gates
+from hexacell.acceptance import gates
 from hexacell.cell.loader import Cell
 from hexacell.identification.estimator import identify
 from hexacell.measurements.csv_file import write_measurements
 from hexacell.measurements.records import MeasurementSet
 from hexacell.reporting.assessment import assess
+from hexacell.reporting.check_result import check_line, check_result
 from hexacell.reporting.documents import fit_document
 from hexacell.reporting.result import IdentificationResult
 from hexacell.reporting.verification import HeldOut, outcome_line, verify
 from hexacell.runs.run_folder import RunFolder
+from hexacell.stated_effects import stated_effects
 from procedures.calibration.workflow import Calibration, Mode
 from procedures.engine.config_transactions import ConfigTransactions
 from procedures.run import events
@@ -72,7 +74,7 @@ class Computations:
         )
 
     def judge(self, state: RunState) -> events.ResultValidated:
-        """Verify the written geometry; raises ``HexacellError``."""
+        """Verify the written geometry, or state what a check found; raises ``HexacellError``."""
         if self.calibration.mode is Mode.CHECK:
             return self._judge_check(state)
         robot = self.calibration.robot_of(state)
@@ -83,11 +85,11 @@ class Computations:
         return events.ResultValidated(verdict=verification.verdict, line=line, verification=verification)
 
     def _judge_check(self, state: RunState) -> events.ResultValidated:
-        limits = self.cell.settings.acceptance
-        found = DeviationStatistics.of(state.held_out(Phase.BEFORE))
-        verdict = check_verdict(found, mean_mm=limits.mean_deviation_mm, largest_mm=limits.max_deviation_mm)
-        line = check_outcome(found, limits.mean_deviation_mm, verdict)
-        return events.ResultValidated(verdict=verdict, line=line)
+        measurements = state.measurements()
+        write_measurements(self.folder.measurements, measurements)
+        effects = stated_effects(self.cell.settings, state.temperature_range_k)
+        found = check_result(self.calibration.check, measurements, self.calibration.accepted, effects)
+        return events.ResultValidated(verdict=found.verdict, line=check_line(found), check=found)
 
 
 def _held_out(state: RunState) -> HeldOut:

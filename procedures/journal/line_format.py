@@ -20,11 +20,12 @@ from hexacell.cell.fields import first_mistake
 from hexacell.errors import FileError
 from procedures.run.events import Event
 
-VERSION = 3
+VERSION = 4
 """What this program writes; it reads this and all before. Version 1 had neither version nor ``s``, and
-versions 1 and 2 no verification, so that a run of them was decided by other rules."""
+versions 1 and 2 no verification; checks of version 3 measured held-out points. So a run of them was decided
+by other rules."""
 
-RULES_SINCE = 3
+RULES_SINCE = 4
 """The version since which runs are decided by the present rules; older ones are not resumed."""
 
 RESTORE = "Restore the run folder from a copy; it cannot be continued"

@@ -17,7 +17,8 @@ from hexacell.cell.fields import Frozen, GeometryDocument
 from hexacell.cell.recovery import Action, FailureKind
 from hexacell.decision import Verdict
 from hexacell.kinematics.mechanism import Branch
-from hexacell.reporting.result import IdentificationResult
+from hexacell.reporting.check_result import CheckResult
+from hexacell.reporting.result import AcceptedResult, IdentificationResult
 from hexacell.reporting.verification import Verification
 from procedures.run.steps import SetKey, SixNumbers, Step, ThreeNumbers
 from procedures.run.trips import Guard, Trip
@@ -27,7 +28,8 @@ class RunStarted(Frozen):
     """The first event of a run.
 
     ``taught`` is the geometry with which the robot was taught last, in frames of its own. Without it the
-    result is written in frames by the mechanism's convention.
+    result is written in frames by the mechanism's convention. ``accepted`` is the result that a check
+    starts from, if there is one.
     """
 
     kind: Literal["started"] = "started"
@@ -42,6 +44,7 @@ class RunStarted(Frozen):
     devices: tuple[DeviceIdentity, ...]
     pose_list: str | None = None
     taught: GeometryDocument | None = None
+    accepted: AcceptedResult | None = None
 
 
 class StepBegun(Frozen):
@@ -217,12 +220,16 @@ def _present_name(verdict: object) -> object:
 
 
 class ResultValidated(Frozen):
-    """The verdict of the run; a check and versions 1 and 2 have no ``verification``."""
+    """The verdict of the run, of a calibration by its ``verification``, of a check by its result ``check``.
+
+    Versions 1 and 2 have neither, checks of version 3 have no ``check``.
+    """
 
     kind: Literal["judged"] = "judged"
     verdict: Annotated[Verdict, BeforeValidator(_present_name)]
     line: str
     verification: Verification | None = None
+    check: CheckResult | None = None
 
 
 class ResultAccepted(Frozen):

@@ -23,7 +23,7 @@ from hexacell.campaign.dry_run import VirtualCampaign
 from hexacell.campaign.planner import Plan
 from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import load_cell
-from hexacell.decision import Verdict
+from hexacell.decision import ErrorLimits, Verdict
 from hexacell.identification.estimator import identify
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.rotations import Array
@@ -36,6 +36,7 @@ pytestmark = pytest.mark.benchmark
 
 RUNS = int(os.environ.get("RUNS", "8"))
 LIMIT_MM = 0.15
+LIMITS = ErrorLimits(LIMIT_MM, 0.05)
 DRIFT_MM = 0.02
 BUDGET = 40
 SIGMAS = 3.0
@@ -60,7 +61,7 @@ class Calibrated:
     def check(self) -> Check:
         settings = load_cell(bundled_config("simulated-hexaglide")).settings
         before = identified_before(self.robot, self.covariance, DRIFT_MM)
-        return Check(settings, self.robot, before, LIMIT_MM, BUDGET, candidates=CANDIDATES)
+        return Check(settings, self.robot, before, LIMITS, BUDGET, candidates=CANDIDATES)
 
 
 @dataclass(frozen=True)

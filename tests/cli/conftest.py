@@ -34,7 +34,7 @@ QUICK = (
     ("clock_factor = 50.0", "clock_factor = 200.0\ngive_up_s = 2000.0"),
     ("orientations = 11", "orientations = 7"),
     ("orientations = 6", "orientations = 2"),
-    ("position_mm = 0.15 ", "mean_deviation_mm = 0.5\nmax_deviation_mm = 1.5\nposition_mm = 20.0"),
+    ("position_mm = 0.15 ", "position_mm = 20.0"),
     ("orientation_deg = 0.05", "orientation_deg = 5.0"),
 )
 

@@ -9,6 +9,7 @@ import select
 import signal
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import pytest
 
@@ -152,20 +153,23 @@ class TestUnattendedRun:
         assert fast_cell.controller.read_bytes() == config
 
     def test_a_check_changes_nothing(self, typed_here, fast_cell):
-        fast_cell.edit(("orientations = 6", "orientations = 2"))
         config = fast_cell.controller.read_bytes()
         outcome = typed_here("run", fast_cell.cell, "--unattended", "--json")
         assert outcome.code == outcome.document["exit_code"] == 1
         document = outcome.document
         assert re.fullmatch(
-            r"3 poses at held-out points; mean deviation \d\.\d{3} mm \(limit 0\.05\): fail",
+            r"check: \d+ records at 2 points; position error at the task poses "
+            r"\d+\.\d{3} \+- \d+\.\d{3} mm \(limit 0\.15\): fail",
             document["line"],
         )
-        assert document["measurements"] is None
+        assert document["verdict"] == document["check"]["verdict"] == "fail"
+        assert document["check"]["earlier_run"] is None
+        assert "the check starts from the drawing" in outcome.err
+        assert Path(document["measurements"]).is_file()
         assert fast_cell.controller.read_bytes() == config
         [run] = fast_cell.runs()
         sampled = [e for e in read_journal(run / "journal.jsonl") if isinstance(e, events.RecordTaken)]
-        assert {event.at.phase.value for event in sampled} == {"before-V"}
+        assert {event.at.phase.value for event in sampled} == {"P"}
 
     def test_closed_standard_streams_are_unattended(self, start, fast_cell, demo):
         fast_cell.edit(ASK)
@@ -222,18 +226,16 @@ class TestAPersonAtTheTerminal:
         terminal.read_until("Press Enter when they are in place. ")
         terminal.type("\n\n")  # an Enter too many must not answer the next question
         second = terminal.read_until("Press Enter when they are in place. ")
-        assert "Point 2: the robot is at X100.000 Y100.000 Z550.000" in second
+        assert "Point 2: the robot is at X0.000 Y-200.000 Z550.000" in second
         [run] = quick_cell.runs()
         placed = [e for e in read_journal(run / "journal.jsonl") if isinstance(e, events.GaugesPlaced)]
         assert len(placed) == 1
         terminal.type("x\n")  # an answer as good as Enter; where no question is open, no letter known
-        terminal.read_until("Press Enter when they are in place. ")
-        terminal.type("\n")
         assert ended(process, terminal) == 1
         assert process.out.count("Letters, each with Enter") == 1, "the second question was still open"
         assert ": fail" in process.out
-        assert "9/9" in terminal.shown  # the bar
-        assert "held-out point 1, before  2 records" in process.out  # not swallowed by the bar's terminal
+        assert "/45" in terminal.shown  # the bar
+        assert re.search(r"point 1  +\d+ records", process.out), "not swallowed by the bar's terminal"
 
     def test_pauses_undoes_and_resumes_by_letters(self, quick_cell, start, terminal):
         quick_cell.edit(BY_HAND)

@@ -20,7 +20,7 @@ from hexacell.cell.loader import Cell, dump, load_cell
 from hexacell.cell.model import CellSettings
 from hexacell.controller_config.toml_format import NativeToml
 from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS, Hexaglide
-from hexacell.runs.run_folder import RunFolder
+from hexacell.runs.run_folder import RunFolder, runs_folder
 from procedures.calibration.workflow import Mode
 from procedures.engine.engine import Listener
 from procedures.journal.journal import Journal, read_journal
@@ -104,7 +104,7 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> Finished:
     folder = tmp_path_factory.mktemp("finished")
     cell = maker(folder)()
     before = cell.config_path.read_bytes()
-    run = RunFolder(folder / "run")
+    run = RunFolder(runs_folder(cell) / "run")
     told: list[events.Event] = []
     with few_candidates():
         ended = asyncio.run(calibrate(order_of(cell, run), [lambda event, _: told.append(event)]))
@@ -146,7 +146,7 @@ class Site:
                 if isinstance(event, events.RunStarted):
                     event = event.model_copy(update={"cell_text": self.cell.text})  # noqa: PLW2901
                 journal.append(event)
-        moved = str(moved_from.folder.path.parent), str(self.folder.path.parent)
+        moved = str(moved_from.cell.path.parent), str(self.cell.path.parent)
         self.folder.proposal.write_text(moved_from.folder.proposal.read_text().replace(*moved))
 
 

@@ -14,6 +14,7 @@ from hexacell.cell.loader import Cell, load_cell
 from hexacell.controller_config.change import fingerprint
 from hexacell.controller_config.write_back import RECEIPT, Receipt
 from hexacell.decision import Verdict
+from hexacell.reporting.verification import ModelTest, Verification
 from hexacell.runs.run_folder import RunFolder, runs_folder
 from procedures.journal.journal import Journal
 from procedures.run import events
@@ -54,7 +55,7 @@ def test_it_is_the_run_that_wrote_the_present_config(cell: Cell) -> None:
     folder = run(cell, "2026-11-20T120000Z", IDENTIFIED, PASSED)
     found = last_accepted_result(cell)
     assert found is not None
-    assert found.run == folder.path
+    assert found.run == str(folder.path)
     np.testing.assert_array_equal(found.covariance, an_identification().covariance)
 
 
@@ -63,7 +64,7 @@ def test_of_several_the_newest_counts(cell: Cell) -> None:
     newest = run(cell, "first", IDENTIFIED, PASSED)
     found = last_accepted_result(cell)
     assert found is not None
-    assert found.run == newest.path
+    assert found.run == str(newest.path)
 
 
 def test_without_runs_there_is_none(cell: Cell) -> None:
@@ -73,6 +74,26 @@ def test_without_runs_there_is_none(cell: Cell) -> None:
 def test_another_config_has_none(cell: Cell) -> None:
     run(cell, "run", IDENTIFIED, PASSED)
     cell.config_path.write_bytes(cell.config_path.read_bytes() + b"# changed\n")
+    assert last_accepted_result(cell) is None
+
+
+def judged(*, holds: bool) -> events.ResultValidated:
+    """A result that is not certain to be within its limits, of a model that holds or does not."""
+    test = ModelTest(name="residuals", passed=holds, sentence="what it says")
+    verified = Verification(verdict=Verdict.CONDITIONAL_PASS, tests=(test,))
+    return events.ResultValidated(verdict=verified.verdict, line="perhaps", verification=verified)
+
+
+def test_a_result_that_a_person_kept_counts(cell: Cell) -> None:
+    run(cell, "run", IDENTIFIED, judged(holds=True), events.ResultAccepted(by="a person"))
+    assert last_accepted_result(cell) is not None
+
+
+@pytest.mark.parametrize(
+    ("holds", "by"), [(True, None), (False, "a person")], ids=["nobody kept it", "the model does not hold"]
+)
+def test_a_result_of_which_nothing_is_known_does_not(cell: Cell, holds: bool, by: str | None) -> None:
+    run(cell, "run", IDENTIFIED, judged(holds=holds), events.ResultAccepted(by=by))
     assert last_accepted_result(cell) is None
 
 
@@ -98,4 +119,4 @@ def test_runs_that_cannot_be_read_are_left_out(cell: Cell) -> None:
     (runs_folder(cell) / "a file").touch()
     found = last_accepted_result(cell)
     assert found is not None
-    assert found.run == readable.path
+    assert found.run == str(readable.path)

@@ -4,18 +4,21 @@ from __future__ import annotations
 
 import asyncio
 import json
+import shutil
 
 import numpy as np
 import pytest
 
+from hexacell.application.accepted_results import last_accepted_result
 from hexacell.application.calibration_run import calibrate
+from hexacell.application.replay_run import replay
 from hexacell.cell.loader import load_cell
 from hexacell.controller_config.change import ConfigChange, fingerprint
 from hexacell.controller_config.write_back import Receipt
 from hexacell.decision import Verdict
 from hexacell.errors import CellBusy, ExitCode, FileError, UsageError
 from hexacell.measurements.csv_file import read_measurements
-from hexacell.runs.run_folder import RunFolder
+from hexacell.runs.run_folder import RunFolder, runs_folder
 from hexacell.storage.cell_lock import cell_lock
 from procedures.calibration.workflow import Mode
 from procedures.journal.journal import Journal, read_journal
@@ -135,6 +138,36 @@ async def test_after_a_calibration_a_check_finds_it_good(finished, tmp_path) -> 
     ended = await calibrate(order)
     assert ended.exit_code == ExitCode.DONE
     assert finished.cell.config_path.read_bytes() == before
+    told = fold(read_journal(order.folder.journal))
+    assert told.started is not None
+    assert told.started.accepted is not None
+    assert told.started.accepted.run == str(finished.folder.path)
+    assert told.judged is not None
+    assert told.judged.check is not None
+    assert told.judged.check.drift_scale == 1.0
+    assert (await replay(order.folder.path)).differences == []
+
+
+async def test_a_check_of_a_config_that_no_run_wrote_starts_from_the_drawing(make_site) -> None:
+    site = make_site()
+    ended = await site.calibrate(mode=Mode.CHECK)
+    [started] = site.happened(events.RunStarted)
+    assert started.accepted is None
+    assert ended.exit_code == ExitCode.OUT_OF_LIMITS
+    assert "position error at the task poses" in ended.line
+
+
+async def test_the_effects_of_an_accepted_result_are_those_of_its_records(make_cell, finished) -> None:
+    cell = make_cell(uncertainty__encoder_scale_um_m=100.0)
+    cell.config_path.write_bytes(finished.cell.config_path.read_bytes())
+    shutil.copytree(runs_folder(finished.cell), runs_folder(cell))
+    found = last_accepted_result(cell)
+    assert found is not None
+    assert list(found.effects) == ["scale of each encoder"]
+    columns = found.parameter_columns["scale of each encoder"]
+    # Of 1 um/m over some 300 mm of travel, in parameters that the records determine.
+    assert columns.shape == (35, 6)
+    assert 1e-4 < np.abs(columns).max() < 1e-1
 
 
 async def test_a_run_without_a_beginning_cannot_be_resumed(make_site) -> None:

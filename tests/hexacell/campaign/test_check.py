@@ -14,13 +14,15 @@ from hexacell.campaign.check_statement import CheckStatement
 from hexacell.campaign.decisions import CampaignState
 from hexacell.campaign.drift_estimator import DriftEstimator
 from hexacell.campaign.dry_run import VirtualCampaign
-from hexacell.decision import Verdict
+from hexacell.decision import ErrorLimits, Verdict
 from hexacell.kinematics.geometry import Geometry
 from hexacell.measurements.records import MeasurementSet
 from hexacell.robot_model import Robot
+from hexacell.uncertainty.encoder_effects import common_encoder_scale, encoder_scales
 from hexacell.virtual_robot import VirtualRobot
 
 TWO_POINTS = ((100.0, -100.0, 500.0), (-100.0, 100.0, 500.0))
+LIMITS = ErrorLimits(position_mm=0.15, orientation_deg=0.05)
 SIGMA_MM = 0.005
 """Of each parameter by the calibration."""
 
@@ -47,7 +49,7 @@ def make_check(make_plan, paper) -> MakeCheck:
         parameters = len(robot.mechanism.parameters)
         covariance = SIGMA_MM**2 * np.eye(parameters)
         before = identified_before(robot, covariance, 0.02) if calibrated else None
-        return Check(plan.settings, robot, before, 0.15, budget, candidates=32)
+        return Check(plan.settings, robot, before, LIMITS, budget, candidates=32)
 
     return make
 
@@ -152,10 +154,22 @@ def test_without_a_result_a_robot_as_drawn_is_checked_from_its_tolerances(make_c
 
 def test_systematic_effects_may_forbid_a_pass(unchanged) -> None:
     check, state = unchanged
-    columns = np.zeros((len(check.plan.task.poses), 6, 1))
-    columns[:, 0] = 0.1
-    stated = said(replace(check, systematic=columns), state.measurements)
+    effects = (encoder_scales(300.0),)
+    stated = said(replace(check, effects=effects), state.measurements)
     assert stated.verdict is not Verdict.PASS
+    assert stated.position.expanded > said(check, state.measurements).position.expanded
+
+
+def test_what_an_effect_did_to_the_earlier_result_is_not_averaged_away(unchanged) -> None:
+    """The earlier result and the check err alike, so that the check cannot reduce that error."""
+    check, state = unchanged
+    effects = (common_encoder_scale(100.0),)
+    belief = check.plan.estimate(state).belief
+    convention = belief.mechanism.convention
+    before = 1e-6 * convention.free_parameters(belief.controller)[:, None]
+    shared = said(replace(check, effects=effects, earlier={effects[0].name: before}), state.measurements)
+    alone = said(replace(check, effects=effects), state.measurements)
+    assert shared.position.expanded != pytest.approx(alone.position.expanded, rel=1e-3)
 
 
 def test_settings_of_a_check_leave_the_calibration_s_targets_out(make_plan) -> None:

@@ -14,10 +14,11 @@ from hexacell.campaign.check_statement import (
     guarded_verdict,
     records_to_decide,
 )
-from hexacell.decision import Verdict
+from hexacell.decision import ErrorLimits, Verdict
 
 QUANTILE = float(np.sqrt(chi2.ppf(0.95, 3)))
 NONE = np.zeros((1, 6, 0))
+LIMITS = ErrorLimits(position_mm=0.15, orientation_deg=0.05)
 
 
 def at_one_pose(error: tuple[float, float, float] = (0.0, 0.0, 0.0), sigma: float = 0.1) -> ErrorEstimate:
@@ -27,8 +28,8 @@ def at_one_pose(error: tuple[float, float, float] = (0.0, 0.0, 0.0), sigma: floa
     return ErrorEstimate(jacobian, np.array(error), sigma**2 * np.eye(3), NONE)
 
 
-def verdict(likeliest: ErrorEstimate, guarded: ErrorEstimate, limit_mm: float = 0.15) -> Verdict:
-    return guarded_verdict(likeliest.errors, guarded.errors, limit_mm)
+def verdict(likeliest: ErrorEstimate, guarded: ErrorEstimate) -> Verdict:
+    return guarded_verdict(likeliest.errors, guarded.errors, LIMITS)
 
 
 def test_a_pass_holds_for_both_estimates() -> None:
@@ -42,6 +43,15 @@ def test_a_fail_needs_the_likeliest_only() -> None:
     assert verdict(bad, unsure) is Verdict.FAIL
 
 
+def test_an_orientation_out_of_limits_fails() -> None:
+    turned = at_one_pose(sigma=0.001)
+    jacobian = turned.jacobian.copy()
+    jacobian[0, 3:] = np.eye(3)
+    turned = replace(turned, jacobian=jacobian, difference=np.array([np.radians(0.2), 0.0, 0.0]))
+    assert turned.errors.position.value < LIMITS.position_mm
+    assert verdict(turned, turned) is Verdict.FAIL
+
+
 def test_systematic_effects_count_beside_the_covariance() -> None:
     columns = np.zeros((1, 6, 3))
     columns[0, :3] = 0.04 * np.eye(3)
@@ -53,14 +63,14 @@ def test_systematic_effects_count_beside_the_covariance() -> None:
 def test_the_forecast_is_the_first_number_with_which_the_interval_is_inside() -> None:
     # The variance after n records of information i is 1 / (100 + n i).
     needed = ((QUANTILE / 0.15) ** 2 - 100.0) / 20.0
-    found = records_to_decide(at_one_pose(), at_one_pose(), 0.15, 20.0 * np.eye(3))
+    found = records_to_decide(at_one_pose(), at_one_pose(), LIMITS, 20.0 * np.eye(3))
     assert found == pytest.approx(np.ceil(needed), abs=1)
 
 
 def test_the_guarded_estimate_delays_a_pass() -> None:
     slow = at_one_pose(sigma=1.0)
-    alone = records_to_decide(at_one_pose(), at_one_pose(), 0.15, 20.0 * np.eye(3))
-    guarded = records_to_decide(at_one_pose(), slow, 0.15, 20.0 * np.eye(3))
+    alone = records_to_decide(at_one_pose(), at_one_pose(), LIMITS, 20.0 * np.eye(3))
+    guarded = records_to_decide(at_one_pose(), slow, LIMITS, 20.0 * np.eye(3))
     assert alone is not None
     assert guarded is not None
     assert guarded > alone
@@ -68,5 +78,5 @@ def test_the_guarded_estimate_delays_a_pass() -> None:
 
 def test_an_error_as_large_as_the_limit_is_never_decided() -> None:
     on_limit = at_one_pose((0.15, 0.0, 0.0))
-    assert records_to_decide(on_limit, on_limit, 0.15, 20.0 * np.eye(3)) is None
+    assert records_to_decide(on_limit, on_limit, LIMITS, 20.0 * np.eye(3)) is None
     assert MOST_FURTHER_RECORDS >= 100

@@ -176,19 +176,10 @@ def test_the_next_step_of_a_calibration(name: str, make_rig, story, told, monkey
 
 
 CHECKS: Table = {
-    "nothing": (lambda s, t: [], "before-V1/o01/move"),
-    "measured": (
-        lambda s, t: [*s(Phase.BEFORE, 1).whole(HELD_OUT), *s(Phase.BEFORE, 2).whole(HELD_OUT)],
-        "judge",
-    ),
-    "passed": (
-        lambda s, t: [*s(Phase.BEFORE, 1).whole(HELD_OUT), *s(Phase.BEFORE, 2).whole(HELD_OUT), PASS],
-        None,
-    ),
-    "out of limits": (
-        lambda s, t: [*s(Phase.BEFORE, 1).whole(HELD_OUT), *s(Phase.BEFORE, 2).whole(HELD_OUT), OUT],
-        None,
-    ),
+    "nothing": (lambda s, t: [], "P1/o01/move"),
+    "at the first point": (lambda s, t: [s().arrived(), s().placed()], "P1/o01/sample"),
+    "passed": (lambda s, t: [*t["measured"], PASS], None),
+    "out of limits": (lambda s, t: [*t["measured"], OUT], None),
 }
 
 
@@ -366,7 +357,7 @@ def _passes(step: Any, following: Any) -> bool:
     return isinstance(step, Move) and isinstance(following, Move)
 
 
-@pytest.mark.parametrize(("mode", "seen"), [(Mode.OPTIMISE, 40), (Mode.CHECK, 8)])
+@pytest.mark.parametrize(("mode", "seen"), [(Mode.OPTIMISE, 40), (Mode.CHECK, 42)])
 def test_the_number_of_expected_records(make_rig, mode: Mode, seen: int) -> None:
     assert expected_records(make_rig(mode).cell.settings, mode) == seen
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, is_dataclass
+from datetime import datetime
 from enum import Enum
 from pathlib import Path
 from types import NoneType, UnionType
@@ -105,7 +106,13 @@ def words(annotation: Any) -> str:  # noqa: PLR0911 - a case a kind of type
         return " or ".join(f"`{one.value}`" for one in annotation)
     if is_model(annotation):
         return heading_of(annotation)
-    plain = {float: "number", int: "whole number", str: "text", bool: "true or false"}
+    plain = {
+        float: "number",
+        int: "whole number",
+        str: "text",
+        bool: "true or false",
+        datetime: "time",
+    }
     return plain.get(annotation, "object")
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import tomllib
 
 import numpy as np
@@ -92,22 +93,23 @@ async def test_a_check_measures_judges_and_changes_nothing(make_rig) -> None:
     before = rig.config
     ended = await rig.run()
     assert ended.exit_code in {ExitCode.DONE, ExitCode.OUT_OF_LIMITS}
-    assert "4 poses at held-out points" in ended.line
+    assert re.match(r"check: \d+ records at 2 points; position error at the task poses \d", ended.line)
     assert rig.config == before
     assert "reload" not in rig.controller.log
     phases = {event.at.phase for event in happened(rig, events.RecordTaken)}
-    assert phases == {Phase.BEFORE}
+    assert phases == {Phase.IDENTIFY}
     computed = [
         event.step.kind for event in happened(rig, events.StepBegun) if isinstance(event.step, Compute)
     ]
     assert computed == ["judge"]
 
 
-async def test_a_check_out_of_limits_is_reported(make_rig) -> None:
-    rig = make_rig(Mode.CHECK, acceptance__mean_deviation_mm=1e-6)
+async def test_a_check_whose_budget_is_used_says_how_many_records_would_decide(make_rig) -> None:
+    rig = make_rig(Mode.CHECK, check__budget_records=4, acceptance__position_mm=30.0)
     ended = await rig.run()
     assert ended.exit_code == ExitCode.OUT_OF_LIMITS
-    assert ended.line.endswith(": fail")
+    assert re.search(r": not evaluated \(about \d+ more records would decide\)$", ended.line)
+    assert len(happened(rig, events.RecordTaken)) == 4
 
 
 def test_samples_are_taken_only_where_the_robot_stands(recording) -> None:

@@ -1,0 +1,124 @@
+"""The result of a check: the error of the controller's geometry now, what has changed, and the verdict."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from datetime import datetime
+
+import numpy as np
+
+from hexacell.campaign.check import Check
+from hexacell.campaign.check_statement import CheckStatement
+from hexacell.campaign.recursive_estimator import OnlineEstimate
+from hexacell.cell.fields import Frozen
+from hexacell.decision import Verdict
+from hexacell.measurements.records import MeasurementSet
+from hexacell.reporting.result import AcceptedResult
+from hexacell.reporting.verification import JudgedError, VerifiedAccuracy, outcome_of
+from hexacell.uncertainty.effects import Effect
+
+
+class ParameterChange(Frozen):
+    """How far a free parameter is from the controller's, and one standard deviation of that."""
+
+    name: str
+    unit: str
+    change: float
+    sigma: float
+
+
+class CheckResult(Frozen):
+    """What a check says of the robot as it is now.
+
+    Attributes:
+        accuracy: errors of the controller's geometry; none where the robot can take none of the task poses.
+        is_consistent: whether the residuals agree with the stated noise, however far the robot drifted.
+        further_records: about how many more would decide; none where none would, or nothing is open.
+        earlier_run, earlier_at: the accepted result that it started from; none where that is the drawing.
+        drift_scale: how many times as large as stated the drift since then is.
+        changes: of the free parameters, in the mechanism's frame convention.
+    """
+
+    verdict: Verdict
+    records: int
+    points: int
+    accuracy: VerifiedAccuracy | None = None
+    is_consistent: bool = True
+    further_records: int | None = None
+    earlier_run: str | None = None
+    earlier_at: datetime | None = None
+    drift_scale: float | None = None
+    changes: tuple[ParameterChange, ...] = ()
+
+
+def check_result(
+    check: Check,
+    measurements: MeasurementSet,
+    earlier: AcceptedResult | None,
+    effects: tuple[Effect, ...],
+) -> CheckResult:
+    """The result of a check that has ended.
+
+    ``earlier`` is what it started from; ``effects`` are the systematic ones.
+
+    Raises:
+        IdentifiabilityError: the records do not belong to this robot.
+    """
+    stated = check.final_statement(measurements, effects) if len(measurements) else None
+    records, points = len(measurements), len(set(measurements.points.tolist()))
+    if stated is None:
+        return CheckResult(verdict=Verdict.NOT_EVALUATED, records=records, points=points)
+    return CheckResult(
+        verdict=stated.verdict,
+        records=records,
+        points=points,
+        accuracy=_accuracy(check, stated),
+        is_consistent=stated.is_consistent,
+        further_records=stated.further_records,
+        earlier_run=earlier and earlier.run,
+        earlier_at=earlier and earlier.at,
+        drift_scale=stated.drift_scale,
+        changes=tuple(_changes(stated.estimate)),
+    )
+
+
+def check_line(result: CheckResult) -> str:
+    """The outcome of a check in one line: what was measured, the error, the verdict and its reason."""
+    measured = f"{result.records} records at {result.points} points"
+    return outcome_of([f"check: {measured}"], result.accuracy, result.verdict, _reason(result))
+
+
+def _reason(result: CheckResult) -> str:
+    if result.verdict is not Verdict.NOT_EVALUATED:
+        return ""
+    if result.accuracy is None:
+        return "the robot can take none of the task poses"
+    if not result.is_consistent:
+        return "the residuals are larger than the stated noise explains"
+    if result.further_records is None:
+        return "further records would not decide"
+    return f"about {result.further_records} more records would decide"
+
+
+def _accuracy(check: Check, stated: CheckStatement) -> VerifiedAccuracy:
+    task = check.plan.task.reachable(stated.estimate.belief)
+    return VerifiedAccuracy(
+        position=JudgedError.of(stated.position, check.limits.position_mm),
+        orientation=JudgedError.of(stated.orientation, check.limits.orientation_deg),
+        poses=len(task.poses),
+        task_named=bool(check.settings.task.poses),
+        worst=check.robot.to_command(task.poses.pose(stated.errors.worst)).as_tuple(),
+    )
+
+
+def _changes(estimate: OnlineEstimate) -> Iterator[ParameterChange]:
+    belief = estimate.belief
+    convention = belief.mechanism.convention
+    change = belief.free - convention.free_parameters(belief.controller)
+    sigma = np.sqrt(np.diag(belief.covariance))
+    rows = convention.free_rows()
+    for row, moved, deviation in zip(rows, change.tolist(), sigma.tolist(), strict=True):
+        parameter = belief.mechanism.parameters.parameters[row]
+        yield ParameterChange(
+            name=parameter.name, unit=parameter.kind.unit.value, change=moved, sigma=deviation
+        )

@@ -42,6 +42,7 @@ class Robot:
         taught: the geometry with which points and frames were taught last, in the frames of that time; none
             in runs of before there was a choice of frames, which wrote a geometry in the convention's.
         earlier: geometries that may have commanded older records.
+        work_frame: the axes of the controller's base frame about which a work frame can be taught.
     """
 
     mechanism: Mechanism
@@ -57,6 +58,7 @@ class Robot:
     known: Prior | None = None
     taught: Geometry | None = None
     earlier: tuple[CommandingGeometry, ...] = ()
+    work_frame: str = "xyz"
 
     @cached_property
     def commanding(self) -> Geometry:
@@ -96,7 +98,14 @@ class Robot:
         if identified is not None:
             free, covariance = identified.free, identified.free_covariance
         return RobotBelief(
-            self.mechanism, self.commanding, self.branch, free, covariance, self.noise, self.limits
+            self.mechanism,
+            self.commanding,
+            self.branch,
+            free,
+            covariance,
+            self.noise,
+            self.limits,
+            self.frames.base[:, ["xyz".index(axis) for axis in self.work_frame]].T,
         )
 
     def for_controller(self, geometry: Geometry) -> Geometry:
@@ -107,10 +116,12 @@ class Robot:
         """The robot once its controller has a ``written`` geometry, in frames of that geometry's own."""
         own = self.mechanism.normalize_frames(self.controller)[0]
         before = (CommandingGeometry(one, self.frames) for one in (own, *self.provisional))
+        frames = self.mechanism.normalize_frames(written)[1]
         return replace(
             self,
             controller=written,
-            frames=self.mechanism.normalize_frames(written)[1],
+            frames=frames,
+            limits=replace(self.limits, frames=frames),
             provisional=(),
             uses_provisional=False,
             earlier=(*before, *self.earlier),
@@ -189,6 +200,7 @@ def make_robot(
     mechanism, limits = settings.mechanism, settings.limits
     nominal = Geometry.of(mechanism.parameters, settings.robot.nominal.model_dump())
     drawn = CommandingGeometry.of(mechanism, nominal)
+    frames = mechanism.normalize_frames(controller.geometry)[1]
     return Robot(
         mechanism=mechanism,
         drawing=drawn.geometry,
@@ -207,8 +219,10 @@ def make_robot(
             limits.joint_min_mm,
             limits.joint_max_mm,
             limits.singularity_margin,
+            frames,
         ),
-        frames=mechanism.normalize_frames(controller.geometry)[1],
+        frames=frames,
         taught=taught,
         earlier=(drawn,),
+        work_frame=settings.task.work_frame,
     )

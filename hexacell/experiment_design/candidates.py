@@ -128,7 +128,7 @@ def reachable(belief: RobotBelief, poses: PoseBatch) -> tuple[ReachableTargets, 
 def within_limits(limits: Limits, poses: PoseBatch, joints: Array) -> Mask:
     """Which poses keep the tilt and joint limits; an unreachable one (NaN) does not."""
     in_range = (joints >= limits.joint_min_mm) & (joints <= limits.joint_max_mm)
-    return in_range.all(axis=-1) & (poses.tilts() <= limits.tilt)
+    return in_range.all(axis=-1) & (limits.tilts(poses) <= limits.tilt)
 
 
 def workspace_poses(belief: RobotBelief, points: Array) -> PoseBatch:

@@ -38,7 +38,8 @@ def select_validation_poses(
     Raises:
         LimitError: too few of them do.
     """
-    every = PoseBatch.at(point, np.concatenate([np.eye(3)[None], orientations]))
+    turns = np.concatenate([np.eye(3)[None], orientations])
+    every = PoseBatch.at(point, belief.limits.orientations(turns))
     in_range = within_limits(belief.limits, every, belief.commanded.joints(every))
     poses = reachable_targets(belief, every[in_range]).poses
     if not len(poses) or not np.array_equal(poses.rotations[0], every.rotations[0]):

@@ -2,25 +2,44 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
+
+import numpy as np
 
 from hexacell.identification.problem.problem import Noise
 from hexacell.kinematics.commanded_motion import CommandedRobot
 from hexacell.kinematics.geometry import Geometry
-from hexacell.kinematics.mechanism import Branch, Mechanism
+from hexacell.kinematics.mechanism import Branch, FrameTransform, Mechanism
+from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array
+
+SAME_FRAMES = FrameTransform(np.eye(3), np.zeros(3), np.eye(3))
 
 
 @dataclass(frozen=True, slots=True)
 class Limits:
-    """Limits that every commanded pose keeps: mm and rad; the singularity margin is dimensionless."""
+    """Limits that every commanded pose keeps: mm and rad; the singularity margin is dimensionless.
+
+    Attributes:
+        frames: from the frames of the commands, in which a level platform is level, to the convention's.
+    """
 
     gauge_travel_mm: float
     tilt: float
     joint_min_mm: float
     joint_max_mm: float
     singularity_margin: float
+    frames: FrameTransform = field(default=SAME_FRAMES, compare=False)
+
+    def tilts(self, poses: PoseBatch) -> Array:
+        """The tilts (n,), rad, of poses in the convention's frames."""
+        return self.frames.inverse().poses(poses).tilts()
+
+    def orientations(self, turns: Array) -> Array:
+        """Turns (n, 3, 3) of a level platform, as orientations in the convention's frames."""
+        turned: Array = self.frames.base @ turns @ self.frames.platform.T
+        return turned
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,6 +51,7 @@ class RobotBelief:
     Attributes:
         free: estimated free parameters (p,), mm.
         covariance: theirs (p, p), mm^2.
+        work_frame_turns: axes (k, 3) about which a work frame can be taught.
     """
 
     mechanism: Mechanism
@@ -41,6 +61,7 @@ class RobotBelief:
     covariance: Array
     noise: Noise
     limits: Limits
+    work_frame_turns: Array = field(default_factory=lambda: np.eye(3))
 
     @property
     def basis(self) -> Array:

@@ -32,7 +32,7 @@ import numpy as np
 
 from hexacell.identification.belief import RobotBelief
 from hexacell.identification.diagnostics.frame_alignment import FrameFit
-from hexacell.identification.diagnostics.pose_accuracy import error_jacobian
+from hexacell.identification.diagnostics.pose_accuracy import error_jacobian, teachable_frames
 from hexacell.identification.solver.nuisance_parameters import NuisanceElimination
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.pose import PoseBatch
@@ -113,7 +113,7 @@ class Propagation:
             workspace=_placement(belief, workspace),
             gain=np.einsum("pq,nqa->pna", found.free_covariance, weighted),
             jacobian=error_jacobian(belief, task, workspace),
-            frames=FrameFit(workspace, float(belief.mechanism.platform_radius(belief.estimate))),
+            frames=teachable_frames(belief, workspace),
             elimination=elimination,
             record_jacobian=prediction.jacobian,
             covariance=found.free_covariance,

@@ -8,12 +8,13 @@ frame shifted by t and rotated by f, and a platform frame rotated by p about the
     dP = t + f x P,    dr = f + R p,
 
 with dr the rotation vector in the base frame. The best (t, f, p) minimize the sum of squares over
-poses that span the workspace, with rotations weighted by a length, the platform's radius.
+poses that span the workspace, with rotations weighted by a length, the platform's radius. Not every
+controller can turn a work frame about every axis: f is restricted to the axes about which it can be taught.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -35,19 +36,31 @@ def pose_errors(reached: PoseBatch, commanded: PoseBatch) -> Array:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FrameFit:
-    """The best frames over n poses, rotations weighted by ``length``, mm."""
+    """The best frames over n poses, rotations weighted by ``length``, mm.
+
+    ``turns`` are the axes (k, 3) about which the base frame may be turned.
+    """
 
     workspace: PoseBatch
     length: float
+    turns: Array = field(default_factory=lambda: np.eye(3))
 
     def coefficients(self, errors: Array) -> Array:
         """The best (t, f, p) (9, ...), mm and rad, for errors (n, 6, ...)."""
-        scale = np.repeat([1.0, self.length], 3)
-        design = (frame_derivatives(self.workspace) * scale[:, None]).reshape(-1, 9)
+        scale, free = np.repeat([1.0, self.length], 3), self._free
+        design = (frame_derivatives(self.workspace) * scale[:, None]).reshape(-1, 9) @ free
         values = (errors.reshape(len(errors), 6, -1) * scale[:, None]).reshape(len(design), -1)
         # Equal poses do not determine the frames; lstsq then gives the smallest change.
-        best: Array = np.linalg.lstsq(design, values)[0]
+        best: Array = free @ np.linalg.lstsq(design, values)[0]
         return best.reshape(9, *errors.shape[2:])
+
+    @property
+    def _free(self) -> Array:
+        """From shifts, turns about the free axes and turns of the platform (6 + k) to (t, f, p) (9,)."""
+        free = np.zeros((9, 6 + len(self.turns)))
+        free[:3, :3] = free[6:, -3:] = np.eye(3)
+        free[3:6, 3:-3] = self.turns.T
+        return free
 
     def remove_frame_motion(self, poses: PoseBatch, errors: Array, workspace_errors: Array) -> Array:
         """Errors (k, 6, ...) of other poses minus what the best frames explain, to first order."""

@@ -94,7 +94,7 @@ def predicted_accuracy(belief: RobotBelief, *, task: PoseBatch, workspace: PoseB
     if not task_reachable.any() or not workspace_reachable.any():
         return None
     task, workspace = task[task_reachable], workspace[workspace_reachable]
-    aligned = _frame_fit(belief, workspace).aligned(
+    aligned = teachable_frames(belief, workspace).aligned(
         reached_workspace[workspace_reachable], reached[task_reachable]
     )
     jacobian = error_jacobian(belief, task, workspace)
@@ -113,12 +113,15 @@ def error_jacobian(belief: RobotBelief, task: PoseBatch, workspace: PoseBatch) -
 
     The estimated robot reaches all poses, and the frames are fitted over the workspace.
     """
-    fit = _frame_fit(belief, workspace)
+    fit = teachable_frames(belief, workspace)
     return fit.remove_frame_motion(task, _derivatives(belief, task), _derivatives(belief, workspace))
 
 
-def _frame_fit(belief: RobotBelief, workspace: PoseBatch) -> FrameFit:
-    return FrameFit(workspace, float(belief.mechanism.platform_radius(belief.estimate)))
+def teachable_frames(belief: RobotBelief, workspace: PoseBatch) -> FrameFit:
+    """The frames that are fitted over workspace poses: those that can be taught to the controller."""
+    return FrameFit(
+        workspace, float(belief.mechanism.platform_radius(belief.estimate)), belief.work_frame_turns
+    )
 
 
 def _reached(belief: RobotBelief, commanded: PoseBatch) -> tuple[PoseBatch, Mask]:

@@ -80,7 +80,11 @@ cells = st.builds(
     verification=st.builds(
         measuring.VerificationSettings, points=st.lists(points, min_size=1, max_size=2).map(tuple)
     ),
-    task=st.builds(measuring.TaskSettings, poses=st.lists(six, max_size=2).map(tuple)),
+    task=st.builds(
+        measuring.TaskSettings,
+        poses=st.lists(six, max_size=2).map(tuple),
+        work_frame=st.sampled_from(["", "z", "xyz"]),
+    ),
     simulation=st.builds(
         SIMULATION,
         geometry=geometries,

@@ -9,6 +9,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from hexacell.experiment_design.candidates import orientations, reachable, within_limits
+from hexacell.kinematics.mechanism import FrameTransform
 from hexacell.kinematics.pose import Pose, PoseBatch
 
 TILT = float(np.radians(45.0))
@@ -108,3 +109,17 @@ def test_an_unreachable_pose_is_outside_the_limits(limits, hexaglide, paper):
     poses = PoseBatch.of([Pose(0, 0, 550), Pose(0, 0, 900), Pose(0, 0, 550, 50), Pose(330, 0, 550)])
     joints = hexaglide.inverse(paper.nominal, paper.branch, poses)
     np.testing.assert_array_equal(within_limits(limits, poses, joints), [True, False, False, False])
+
+
+def test_tilts_are_those_of_the_commands_in_whatever_frames_these_are(limits, hexaglide, paper):
+    """A platform frame that is turned by 8 degrees about x: the limit moves with it."""
+    turned = Rotation.from_rotvec(np.radians([-8.0, 0.0, 0.0])).as_matrix()
+    frames = FrameTransform(np.eye(3), np.zeros(3), turned)
+    here = replace(limits, tilt=float(np.radians(20.0)), frames=frames)
+    commands = PoseBatch.of([Pose(0, 0, 550, 19), Pose(0, 0, 550, 21), Pose(0, 0, 550, -21)])
+    poses = frames.poses(commands)
+    np.testing.assert_allclose(np.degrees(poses.tilts()), [27.0, 29.0, 13.0])
+    joints = hexaglide.inverse(paper.nominal, paper.branch, poses)
+    np.testing.assert_array_equal(within_limits(here, poses, joints), [True, False, False])
+    level = PoseBatch.at([0.0, 0.0, 550.0], here.orientations(np.eye(3)[None]))
+    np.testing.assert_allclose(here.tilts(level), 0.0, atol=1e-7)

@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation
 from hexacell.errors import LimitError
 from hexacell.experiment_design.candidates import orientations
 from hexacell.experiment_design.validation_poses import select_validation_poses
+from hexacell.kinematics.mechanism import FrameTransform
 from hexacell.kinematics.mechanisms.hexaglide import hexaglide_geometry
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.motion.path_check import is_clear
@@ -160,3 +161,13 @@ def test_equal_orientations_do_not_count_twice(know, much):
 
 def test_poses_are_batches_of_the_point_given(know, much):
     assert isinstance(select_validation_poses(know(much), CORNER, 2, TURNS), PoseBatch)
+
+
+def test_the_first_pose_is_level_as_the_controller_has_it(know, much, paper):
+    """In a config whose platform frame is turned by 8 degrees."""
+    turned = Rotation.from_rotvec(np.radians([-8.0, 0.0, 0.0])).as_matrix()
+    frames = FrameTransform(np.eye(3), np.zeros(3), turned)
+    belief = know(much)
+    there = replace(belief, limits=replace(belief.limits, frames=frames))
+    commands = frames.inverse().poses(select_validation_poses(there, paper.points[5], 2, TURNS))
+    np.testing.assert_allclose(commands.rotations[0], np.eye(3), atol=1e-12)

@@ -6,8 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.optimize import least_squares
+from scipy.spatial.transform import Rotation
 
 from hexacell.campaign.task_accuracy import Task
+from hexacell.campaign.teaching import as_written
 from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import Cell, load_cell
 from hexacell.decision import Verdict
@@ -37,10 +40,10 @@ def cell():
 
 @pytest.fixture(scope="module")
 def result(cell, visit):
-    """The robot with the identified geometry in its controller, and the identification."""
+    """The robot with the identified geometry as it is written, and the identification."""
     robot = robot_of(cell)
     found = identify(robot.problem(visit(seed=2).measured(NOISE_MM, 1)))
-    return replace(robot, provisional=(found.geometry,)), found
+    return robot.with_controller(as_written(cell.settings, robot, found.geometry).geometry), found
 
 
 @pytest.fixture
@@ -70,6 +73,52 @@ def test_a_good_result_passes_and_its_true_error_is_within_u(cell, result, held_
     true = np.linalg.norm(errors[:, :3], axis=-1).max()
     assert abs(position.value - true) <= position.expanded
     assert 0.02 < position.expanded < 0.1
+
+
+def turned_in(frames, axes, there, wanted):
+    """Errors (2, n, 3) of poses (n, 6) in other frames; a rad counts as 180 mm.
+
+    ``frames`` are a shift, turns about some base axes, and a turn of the platform.
+    """
+    base = Rotation.from_rotvec(np.eye(3)[["xyz".index(axis) for axis in axes]].T @ frames[3:-3])
+    turned = base * Rotation.from_rotvec(there[:, 3:]) * Rotation.from_rotvec(frames[-3:])
+    angles = (turned * Rotation.from_matrix(wanted.rotations).inv()).as_rotvec()
+    return np.stack([base.apply(there[:, :3]) + frames[:3] - wanted.positions, 180.0 * angles])
+
+
+@pytest.mark.parametrize("axes", ["", "z", "xyz"])
+def test_an_error_is_none_only_if_a_frame_that_takes_it_away_can_be_taught(
+    cell, result, paper, reach, axes
+):
+    """The error that is stated, against the true robot's motion in the frames that can be taught."""
+    robot, found = replace(result[0], work_frame=axes), result[1]
+    belief = robot.belief(found)
+    task = Task.of(cell.settings, robot, belief)
+    actual = robot.mechanism.convention.free_parameters(paper.actual)
+    stated = -error_jacobian(belief, task.poses, task.workspace) @ (found.free - actual)
+
+    def there(poses):
+        return np.array(
+            [reach(paper.actual, found.geometry, poses.pose(row))[1] for row in range(len(poses))]
+        )
+
+    workspace = there(task.workspace)
+
+    def left(frames):
+        return turned_in(frames, axes, workspace, task.workspace).ravel()
+
+    best = least_squares(left, np.zeros(6 + len(axes)), x_scale="jac").x
+    true = turned_in(best, axes, there(task.poses), task.poses)[0]
+    np.testing.assert_allclose(stated[:, :3], true, atol=0.002)
+    assert np.linalg.norm(true, axis=-1).max() > 0.01
+
+
+def test_what_cannot_be_taught_adds_to_u(cell, result, held_out):
+    robot, found = result
+    every = (replace(robot, work_frame=axes) for axes in ("", "z", "xyz"))
+    verified = [verified_by(cell, (one, found), held_out()).accuracy for one in every]
+    shifted, about_z, free = (accuracy.position.expanded for accuracy in verified if accuracy is not None)
+    assert shifted > about_z > free
 
 
 def test_held_out_records_that_were_not_predicted_are_no_evidence(cell, result, held_out, paper):

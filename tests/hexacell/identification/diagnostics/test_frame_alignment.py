@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 from hexacell.identification.diagnostics.frame_alignment import FrameFit, pose_errors
@@ -69,3 +70,31 @@ def test_one_pose_alone_has_no_error(poses):
     seen = change(0.02).poses(one)
     left = FrameFit(one, LENGTH).aligned(seen, seen)
     assert np.abs(pose_errors(left, one)).max() < 1e-8
+
+
+@pytest.mark.parametrize("axes", ["", "z", "xz"])
+def test_a_base_frame_is_turned_about_the_axes_that_can_be_taught_alone(poses, axes):
+    """Against scipy's general minimizer over as many numbers."""
+    random = np.random.default_rng(6)
+    jitter = Rotation.from_rotvec(1e-4 * random.standard_normal((12, 3))).as_matrix()
+    seen = change(1e-3).poses(
+        PoseBatch(poses.positions + 0.05 * random.standard_normal((12, 3)), jitter @ poses.rotations)
+    )
+    turns = np.eye(3)[["xyz".index(axis) for axis in axes]]
+    weights = np.repeat([1.0, LENGTH], 3)
+
+    def left(numbers):
+        turn = turns.T @ numbers[3:-3] / LENGTH
+        base, platform = Rotation.from_rotvec(turn), Rotation.from_rotvec(numbers[-3:] / LENGTH)
+        there = FrameTransform(base.as_matrix(), numbers[:3], platform.as_matrix()).poses(seen)
+        return (pose_errors(there, poses) * weights).ravel()
+
+    best = least_squares(left, np.zeros(6 + len(axes)), xtol=1e-14, ftol=1e-14, gtol=1e-14)
+    aligned = FrameFit(poses, LENGTH, turns).aligned(seen, seen)
+    cost = np.sum((pose_errors(aligned, poses) * weights) ** 2)
+    assert cost == pytest.approx(np.sum(best.fun**2), rel=1e-6)
+    free = np.sum((pose_errors(FrameFit(poses, LENGTH).aligned(seen, seen), poses) * weights) ** 2)
+    assert cost > 1.5 * free
+    linear = pose_errors(seen, poses)
+    removed = FrameFit(poses, LENGTH, turns).remove_frame_motion(poses, linear, linear)
+    np.testing.assert_allclose(removed[:, :3], pose_errors(aligned, poses)[:, :3], atol=2e-3)

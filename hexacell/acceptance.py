@@ -44,7 +44,10 @@ def gates(
     largest_change_mm: float,
     before: Geometry,
 ) -> tuple[AcceptanceGate, ...]:
-    """All conditions on an identification; ``before`` is the controller's geometry in its frame."""
+    """All conditions on an identification; ``before`` is the controller's geometry.
+
+    Both are in the mechanism's frame convention: a choice of other frames changes numbers, and no robot.
+    """
     return (
         _converged(identified),
         _determined(identified),
@@ -107,7 +110,8 @@ def _small_change(after: Geometry, before: Geometry, largest_change_mm: float) -
         name="small change",
         passed=change_mm <= largest_change_mm,
         sentence=(
-            f"The largest change is {change_mm:.2f} mm (limit without a person {largest_change_mm:g} mm)."
+            f"The largest change is {change_mm:.2f} mm, the choice of frames apart "
+            f"(limit without a person {largest_change_mm:g} mm)."
         ),
         needs_person=True,
     )

@@ -107,7 +107,9 @@ class TestUnattendedRun:
         config = fast_cell.controller.read_bytes()
         outcome = typed_here("run", fast_cell.cell, "--resume", run)
         assert outcome.code == 4
-        assert re.search(r"The largest change is \d\.\d\d mm \(limit without a person 1 mm\)", outcome.err)
+        assert re.search(
+            r"largest change is \d\.\d\d mm, the .* apart \(limit without a person 1 mm\)", outcome.err
+        )
         assert fast_cell.controller.read_bytes() == config
 
     def test_a_result_out_of_limits_is_rolled_back_bit_for_bit(self, typed_here, fast_cell, demo):

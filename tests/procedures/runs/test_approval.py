@@ -45,7 +45,7 @@ async def test_a_large_change_needs_a_person(recording, replayed) -> None:
     measured = recording.until(events.SetClosed, count=4)
     rig = replayed(measured, acceptance__largest_change_mm=3.0)
     object.__setattr__(rig.performer, "operator", UnattendedOperator())
-    with pytest.raises(AnswerNeeded, match=r"largest change is \d\.\d+ mm \(limit without a person 3 mm\)"):
+    with pytest.raises(AnswerNeeded, match=r"largest change is \d\.\d+ mm, .*apart \(limit .* 3 mm\)"):
         await rig.run()
     assert rig.config == recording.config_before
 

@@ -41,7 +41,8 @@ class Robot:
         known: what is known before measuring, if that is more than the drawing with its tolerances.
         taught: the geometry with which points and frames were taught last, in the frames of that time; none
             in runs of before there was a choice of frames, which wrote a geometry in the convention's.
-        earlier: geometries that may have commanded older records.
+        earlier: geometries that may have commanded older records: the drawing, the taught one, and those
+            that the controller had before in the same run.
         work_frame: the axes of the controller's base frame about which a work frame can be taught.
     """
 
@@ -223,6 +224,6 @@ def make_robot(
         ),
         frames=frames,
         taught=taught,
-        earlier=(drawn,),
+        earlier=(drawn,) if taught is None else (drawn, CommandingGeometry.of(mechanism, taught)),
         work_frame=settings.task.work_frame,
     )

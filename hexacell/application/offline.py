@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
+from hexacell.application.recorded_commands import commanding_geometries
 from hexacell.campaign.decisions import (
     CampaignState,
     Finished,
@@ -23,6 +24,7 @@ from hexacell.identification.estimator import identify
 from hexacell.measurements.records import MeasurementSet
 from hexacell.reporting.assessment import Assessment, assess
 from hexacell.robot_model import robot_of
+from hexacell.runs.run_folder import RunFolder
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,14 +49,21 @@ class PlanTrial:
     target_mm: float | None
 
 
-def fit_measurements(cell: Cell, measurements: MeasurementSet) -> Assessment:
+def fit_measurements(
+    cell: Cell, measurements: MeasurementSet, folder: RunFolder | None = None
+) -> Assessment:
     """Identify the geometry of a cell's robot from records, and check it.
+
+    ``folder`` is where they are kept: if it is that of a run, its journal tells what commanded them.
 
     Raises:
         IdentifiabilityError: the records cannot determine it.
         FileError: the controller's config cannot be read.
     """
     robot = robot_of(cell)
+    if folder is not None:
+        recorded = commanding_geometries(folder, robot.mechanism)
+        robot = replace(robot, earlier=(*recorded, *robot.earlier))
     return assess(cell.settings, robot, measurements, identify(robot.problem(measurements)))
 
 

@@ -104,9 +104,8 @@ class TaskSettings(Section):
     """The robot's task: poses for which its accuracy is predicted, and the frames that can be taught."""
 
     poses: tuple[SixNumbers, ...] = Field((), description="x y z a b c, mm and deg")
-    work_frame: str = Field(
+    work_frame: Literal["", "x", "y", "z", "xy", "xz", "yz", "xyz"] = Field(
         "xyz",
-        pattern="^x?y?z?$",
         description="base axes about which the controller can turn a work frame; it can always shift it. "
         "An error that a work frame or a tool frame takes away is none",
     )

@@ -6,6 +6,7 @@ import itertools
 import json
 import os
 import re
+import shutil
 import tomllib
 from collections.abc import Iterator
 from pathlib import Path
@@ -129,6 +130,20 @@ def test_the_ball_never_leaves_the_gauges_travel(demo):
         shown = event.reading.gauges_mm - zeros[event.at]
         assert np.abs(shown).max() < 5.0
         assert event.deviation_mm == pytest.approx(tuple(shown), abs=1e-12)
+
+
+@pytest.mark.slow
+def test_recalibrating_the_demos_cell_passes_and_nothing_need_be_taught_anew(demo, typed, tmp_path):
+    for path in (demo.cell, demo.controller):
+        shutil.copy(path, tmp_path)
+    for _ in range(2):
+        outcome = typed("run", tmp_path / demo.cell.name, "--unattended", "--mode", "optimise", "--json")
+        assert outcome.code == 0, outcome.err
+        document = outcome.document
+        assert document["verdict"] == "pass"
+        assert document["displacement"]["is_within_limits"], document["teaching"]
+        assert "Taught points and frames stay: they move by at most 0." in outcome.err
+        assert document["displacement"]["position_mm"] > 0.0
 
 
 def test_only_number_tokens_of_the_geometry_are_new_in_the_config(demo):

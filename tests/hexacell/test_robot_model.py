@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+from hexacell.campaign.teaching import as_written
 from hexacell.cell.loader import load_cell
 from hexacell.controller_config.interface import ControllerGeometry
 from hexacell.controller_config.toml_format import NativeToml
@@ -145,6 +147,28 @@ def test_records_in_the_configs_frames_are_identified(on_floor, paper, visit):
     assert found.geometry.largest_difference(paper.actual) < 0.5  # stations may be turned: less is known
     written = on_floor.for_controller(found.geometry)
     assert written.largest_difference(Hexaglide().change_frames(found.geometry, TO_FLOOR)) < 1e-9
+
+
+def test_records_of_before_a_write_back_give_the_same_geometry_after_it(cell, on_floor, paper, visit):
+    """The controller has other frames by then; what was commanded with the taught config keeps its own."""
+    exact = visit(seed=2).measured(0.01, 1)
+    commands, deviations = TO_FLOOR.poses(exact.poses), TO_FLOOR.deviations(exact.deviations)
+    told = MeasurementSet(
+        tuple(
+            replace(r, pose=commands.pose(row), deviation=tuple(deviations[row].tolist()))
+            for row, r in enumerate(exact.records)
+        )
+    )
+    on_floor = replace(on_floor, taught=on_floor.controller)
+    found = identify(on_floor.problem(told))
+    written = as_written(cell.settings, on_floor, found.geometry).geometry
+    assert written.largest_difference(on_floor.for_controller(found.geometry)) > 1.0
+    later = make_robot(
+        cell.settings, ControllerGeometry(written, paper.branch), taught=on_floor.controller
+    ).problem(told)
+    np.testing.assert_allclose(later.commands.joints, on_floor.problem(told).commands.joints, atol=1e-6)
+    again = identify(later)
+    np.testing.assert_allclose(again.geometry.vector, found.geometry.vector, atol=1e-6)
 
 
 def test_the_belief_before_measuring_is_the_drawing_with_its_tolerances(robot, on_floor, paper):

@@ -14,13 +14,15 @@ from hexacell.presentation.identification import identification_report
 from hexacell.presentation.layout import wrapped
 from hexacell.presentation.planning import decision_text, forecast_text
 from hexacell.reporting.documents import fit_document
+from hexacell.runs.run_folder import RunFolder
 
 
 def fit(options: argparse.Namespace) -> ExitCode:
     """Identify the geometry and report all that is known of the result."""
     console = Console(options.json)
     cell = load_cell(options.cell)
-    assessed = fit_measurements(cell, read_measurements(options.measurements))
+    folder = RunFolder(options.measurements.parent)
+    assessed = fit_measurements(cell, read_measurements(options.measurements), folder)
     console.document(fit_document(assessed))
     if not options.json:
         console.print(identification_report(assessed))

@@ -6,6 +6,7 @@ import shlex
 from pathlib import Path
 
 from hexacell.application.calibration_run import RunRequest
+from hexacell.campaign.teaching import TaskDisplacement
 from hexacell.presentation.layout import wrapped
 from hexacell.presentation.teaching import teaching_line, teaching_sentence
 from procedures.calibration.workflow import Mode
@@ -65,12 +66,18 @@ def question_text(question: Question) -> str:
             )
         case PendingChange(gates=gates, diff=diff, displacement=moved):
             outcomes = "".join(f"{'ok' if gate.passed else 'NO'}  {gate.sentence}\n" for gate in gates)
-            teaching = "" if moved is None else f"{wrapped(teaching_sentence(moved), indent=4)}\n"
-            return f"\n{diff}\n{outcomes}{teaching}Write this into the controller's config? Type yes: "
-        case WrittenResult(line=line):
-            return f"\n{line}.\nThe new geometry is in the controller's config. Keep it? Type yes: "
+            write = f"{_teaching(moved)}Write this into the controller's config? Type yes: "
+            return f"\n{diff}\n{outcomes}{write}"
+        case WrittenResult(line=line, displacement=moved):
+            keep = "The new geometry is in the controller's config. Keep it? Type yes: "
+            return f"\n{line}.\n{_teaching(moved)}{keep}"
         case StepFailure(problem=problem):
             return f"\n{problem}\nHow to continue ({', '.join(question.choices)})? "
+
+
+def _teaching(moved: TaskDisplacement | None) -> str:
+    """What must be taught anew, in lines of its own."""
+    return "" if moved is None else f"{wrapped(teaching_sentence(moved), indent=4)}\n"
 
 
 def repeated_text(question: Question) -> str:

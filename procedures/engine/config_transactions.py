@@ -149,8 +149,9 @@ class ConfigTransactions:
         judged = state.judged
         assert judged is not None  # noqa: S101 - decided only after the verdict
         assert judged.verification is not None  # noqa: S101 - only then it is offered
+        moved = state.proposed.displacement if state.proposed else None
         try:
-            name = await self.operator.ask(ask_acceptance(judged.line, judged.verification))
+            name = await self.operator.ask(ask_acceptance(judged.line, judged.verification, moved))
         except AnswerNeeded:
             return events.ResultAccepted(by=None, asked=False)
         return events.ResultAccepted(by=name)

@@ -58,10 +58,14 @@ class StepFailure:
 
 @dataclass(frozen=True, slots=True)
 class WrittenResult:
-    """A result in the controller's config that did not pass: the outcome in one line, and all of it."""
+    """A result in the controller's config that did not pass: the outcome in one line, and all of it.
+
+    ``displacement`` is how far it moves taught points; none if that is not known.
+    """
 
     line: str
     verification: Verification
+    displacement: TaskDisplacement | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,12 +108,14 @@ def ask_approval(
     )
 
 
-def ask_acceptance(line: str, verification: Verification) -> Question:
+def ask_acceptance(
+    line: str, verification: Verification, displacement: TaskDisplacement | None = None
+) -> Question:
     """Ask whether a result that did not pass stays; answered by the name of who keeps it."""
     return Question(
         QuestionKind.KEEP_RESULT,
         f"{line}. Keep the new geometry?",
-        WrittenResult(line, verification),
+        WrittenResult(line, verification, displacement),
     )
 
 

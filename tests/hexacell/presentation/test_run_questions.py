@@ -7,10 +7,12 @@ import pytest
 from hexacell.acceptance import AcceptanceGate
 from hexacell.campaign.teaching import TaskDisplacement
 from hexacell.cell.recovery import Action
+from hexacell.decision import Verdict
 from hexacell.kinematics.pose import Pose
 from hexacell.presentation.run import matching_choice, question_text, repeated_text
 from hexacell.presentation.teaching import teaching_sentence
-from procedures.run.questions import ask_approval, ask_placement, ask_recovery
+from hexacell.reporting.verification import Verification
+from procedures.run.questions import ask_acceptance, ask_approval, ask_placement, ask_recovery
 
 CHOICES = (Action.RETRY, Action.MEASURE_AGAIN, Action.REDO_SET, Action.ABORT)
 FAILURE = ask_recovery("It broke.", CHOICES)
@@ -33,11 +35,14 @@ def test_an_approval_shows_the_change_then_every_gate() -> None:
     )
 
 
-def test_an_approval_says_what_must_be_taught_anew_before_it_asks() -> None:
+def test_approval_and_acceptance_say_what_must_be_taught_anew_before_it_asks() -> None:
     moved = TaskDisplacement(position_mm=30.8, orientation_deg=4.0, poses=6, is_within_limits=False)
-    *_, first, second, asked = question_text(ask_approval([], "-1\n+2", moved)).splitlines()
-    assert f"{first} {second.strip()}" == teaching_sentence(moved)
-    assert asked.startswith("Write this")
+    whether_written = ask_approval([], "-1\n+2", moved)
+    whether_kept = ask_acceptance("all ill", Verification(verdict=Verdict.FAIL), moved)
+    for question, asks in ((whether_written, "Write this"), (whether_kept, "The new geometry is in")):
+        *_, first, second, asked = question_text(question).splitlines()
+        assert f"{first} {second.strip()}" == teaching_sentence(moved)
+        assert asked.startswith(asks)
 
 
 def test_a_failure_names_the_choices() -> None:

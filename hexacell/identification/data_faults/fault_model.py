@@ -13,6 +13,9 @@ from hexacell.identification.solver.result import Identification
 PENALTY_PER_UNKNOWN = 10.0
 """By how much a hypothesis must lower the chi-square for each number that it is free to choose."""
 
+SUFFICIENT_DECREASE = 20.0
+"""Of the mean square residual, for a hypothesis to be accepted although the fit is not yet consistent."""
+
 LARGEST_TRUSTED_RATIO = 10.0
 """Residuals over the stated noise up to which first-order tests around the solution are valid."""
 
@@ -96,4 +99,9 @@ class CorrectedFit:
     @property
     def misfit(self) -> float:
         """The mean square residual; a lost record counts as one at the largest trusted ratio."""
-        return self.fit.goodness.ratio**2 + LARGEST_TRUSTED_RATIO**2 * self.lost
+        squares = self.fit.goodness.ratio**2 * self.fit.records + LARGEST_TRUSTED_RATIO**2 * self.lost
+        return squares / self.problem.records
+
+    def is_better_by_far_than(self, other: CorrectedFit) -> bool:
+        """Whether it explains so much more that it is right although something else is still wrong."""
+        return self.misfit < other.misfit / SUFFICIENT_DECREASE

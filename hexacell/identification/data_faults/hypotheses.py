@@ -22,7 +22,7 @@ from hexacell.identification.data_faults.score_tests import (
     ZeroShiftStatistics,
     known_change_gains,
 )
-from hexacell.identification.problem.data_requirements import is_determined
+from hexacell.identification.problem.data_requirements import is_determined, is_overdetermined
 from hexacell.identification.problem.problem import Problem
 from hexacell.identification.solver.chi_square import ChiSquareTest
 from hexacell.identification.solver.linearized_model import LinearizedModel
@@ -62,6 +62,10 @@ class OutlierHypothesis(FaultHypothesis):
 
     records: tuple[RecordId, ...]
 
+    def of(self, records: Collection[RecordId]) -> OutlierHypothesis:
+        """The same of other records."""
+        return replace(self, records=tuple(records))
+
     def corrected(self, problem: Problem) -> Problem:
         """The problem without these records."""
         return problem.subset(~record_mask(problem, self.records))
@@ -77,11 +81,13 @@ class ZeroShiftHypothesis(FaultHypothesis):
 
     Attributes:
         shift: (3,), mm, by which the gauges x, y and z read too much since then.
+        significance: the gain over its critical value, by the scatter that the records have.
     """
 
     point: int
     orientation: int
     shift: Array = field(compare=False)
+    significance: float = field(compare=False)
 
     def rows(self, problem: Problem) -> Mask:
         """The records (n,) after the shift."""
@@ -96,7 +102,9 @@ class ZeroShiftHypothesis(FaultHypothesis):
     def trial(self, current: CorrectedFit) -> CorrectedFit | None:
         """The fit without the records after the shift, if these agree with the others up to a constant."""
         split = CorrectedFit.uncorrected(self._split(current.problem))
-        if not split.is_reliable:
+        if not split.is_reliable or not is_overdetermined(split.problem):
+            return None
+        if not split.is_consistent and not is_determined(self.corrected(current.problem)):
             return None
         concerned = np.isin(split.fit.problem.labels[:, 0], [self.point, SPLIT_POINT])
         statistics = OutlierStatistics.of(LinearizedModel.at_solution(split.fit))
@@ -135,11 +143,21 @@ class GaugeFaultHypothesis(FaultHypothesis):
         deviations = np.where(rows[:, None], problem.deviations @ remedy.T, problem.deviations)
         return replace(problem, deviations=deviations)
 
+    def trial(self, current: CorrectedFit) -> CorrectedFit | None:
+        """The fit with true readings, if there are equations to spare that could contradict them."""
+        return current.corrected_for(self) if is_overdetermined(current.problem) else None
+
     def confirmed(self, current: CorrectedFit) -> CorrectedFit | None:
-        """The fit with true readings, if it has a sufficient part of the first-order gain."""
-        corrected = current.corrected_for(self)
+        """The fit with true readings, if it has a sufficient part of the first-order gain and is a proof.
+
+        It is one if it agrees with the noise, or is better by far.
+        """
+        corrected = self.trial(current)
+        if corrected is None:
+            return None
         limit = current.fit.goodness.chi2 - CONFIRMED_SHARE * self.gain
-        return corrected if corrected.fit.goodness.chi2 < limit else None
+        is_proof = corrected.is_consistent or corrected.is_better_by_far_than(current)
+        return corrected if is_proof and corrected.fit.goodness.chi2 < limit else None
 
 
 def _in_base_frame(problem: Problem, gauge_fault: GaugeFault) -> Array:
@@ -216,8 +234,14 @@ def _zero_shift(model: LinearizedModel, scale: float) -> Iterator[ZeroShiftHypot
         return
     best = int(np.argmax(statistics.gains))
     gain = float(statistics.gains[best])
-    if gain / scale > chdtri(3, FALSE_SHIFTS_PER_FILE / len(statistics.rows)):
+    significance = gain / scale / float(chdtri(3, FALSE_SHIFTS_PER_FILE / len(statistics.rows)))
+    if significance > 1.0:
         point, orientation = model.problem.labels[statistics.rows[best]].tolist()
         yield ZeroShiftHypothesis(
-            gain=gain, unknowns=3, point=point, orientation=orientation, shift=statistics.shifts[best]
+            gain=gain,
+            unknowns=3,
+            point=point,
+            orientation=orientation,
+            shift=statistics.shifts[best],
+            significance=significance,
         )

@@ -4,7 +4,8 @@ First-order tests around a wrong solution are unreliable. The drawing is a bette
 within millimetres of the truth, whatever the gauges read. The most likely hypotheses of three lists
 are tried in turn: gauge faults around the drawing, all kinds around the solution, and all kinds
 around the solution with the records that the solver left out. Two candidates reject several records
-at once: greedy deletion with a refit after each, and deletion around the drawing. The first corrected fit
+at once: greedy deletion with a refit after each, and deletion around the drawing. The fit without the
+deleted records is one more place to look for gauge faults that they have in common. The first corrected fit
 that agrees with the noise is taken, else the best one if it is better by far.
 
 Source: Atkinson and Riani, Robust Diagnostic Regression Analysis, 2000, on masking: several outliers
@@ -14,7 +15,7 @@ hide each other around a fit to all of them, and show around one that they did n
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import chain, zip_longest
 
 import numpy as np
@@ -39,21 +40,18 @@ LARGEST_REJECTED_SHARE = 0.1
 """Of all records: if more disagree, they are not single mistakes."""
 
 TRIED_FROM_EACH_LIST = 3
-SUFFICIENT_DECREASE = 20.0
-"""Of the mean square residual, for a hypothesis to be accepted although the fit is not yet consistent."""
-
 LARGEST_TRIMMED_SHARE = 0.25
 CRITICAL_STATISTIC = float(chdtri(3, 1e-4))
 
 
 def search(current: CorrectedFit) -> CorrectedFit | None:
     """The first correction that gives a consistent fit, or the best if it lowers the misfit by far."""
-    best, least = None, current.misfit / SUFFICIENT_DECREASE
+    best: CorrectedFit | None = None
     for trial in _trials(current):
         if trial.is_consistent:
             return trial
-        if trial.misfit < least:
-            best, least = trial, trial.misfit
+        if trial.is_better_by_far_than(current) and (best is None or trial.misfit < best.misfit):
+            best = trial
     return best
 
 
@@ -74,10 +72,13 @@ def _trials(current: CorrectedFit) -> Iterator[CorrectedFit]:
     ranks = [*zip_longest(*(hypotheses[:TRIED_FROM_EACH_LIST] for hypotheses in lists))]
     tried: set[FaultHypothesis] = set()
     yield from _one_by_one(current, chain(*ranks[:1]), tried)
-    yield _greedy_deletion(current)
+    deleted = _greedy_deletion(current)
+    yield deleted
     yield from _one_by_one(current, [start.gross_errors()], tried)
     at_all_points = (hypothesis for hypothesis in gauge_faults if hypothesis.point is None)
-    yield from _one_by_one(current, chain(*ranks[1:], at_all_points), tried)
+    without_deleted = _ExpansionPoint.solution(replace(deleted, problem=current.problem)).gauge_faults()
+    last = chain(without_deleted[:TRIED_FROM_EACH_LIST], *ranks[1:], at_all_points)
+    yield from _one_by_one(current, last, tried)
 
 
 def _one_by_one(

@@ -67,16 +67,27 @@ def refused_zero_shift(shift: ZeroShiftHypothesis, equations: int) -> DataFault:
     return _zero_shift(shift, consequence)
 
 
-def gauge_fault(hypothesis: GaugeFaultHypothesis, before: ChiSquareTest, after: ChiSquareTest) -> DataFault:
-    """A gauge fault, refused; the residuals before and after its correction are the evidence."""
+def gauge_fault(
+    hypothesis: GaugeFaultHypothesis, before: ChiSquareTest, after: ChiSquareTest, *, lost: int = 0
+) -> DataFault:
+    """A gauge fault, refused; the residuals before and after its correction are the evidence.
+
+    ``lost`` counts the records that had no place in the fit before, next to a singularity.
+    """
     fault = hypothesis.gauge_fault
     where = "at every point" if hypothesis.point is None else f"at point {hypothesis.point}"
     looks, correction, action = _looks_correction_action(fault, where)
     sentence = (
         f"{_names(fault.gauges)} {looks} {where}: the residuals are {before.ratio:.3g} times the stated "
-        f"noise, and {after.ratio:.3g} times {correction}"
+        f"noise{_without(lost)}, and {after.ratio:.3g} times {correction}"
     )
     return DataFault(fault.kind, sentence, action, gauges=fault.gauges)
+
+
+def _without(lost: int) -> str:
+    if not lost:
+        return ""
+    return f" without {lost} record{'s' if lost > 1 else ''} that no geometry explains"
 
 
 def _mismatched_joints(leg: tuple[int, float]) -> tuple[str, str]:

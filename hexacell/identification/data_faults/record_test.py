@@ -42,6 +42,13 @@ class DeletionTest:
     statistics: OutlierStatistics | None = None
     row: int = 0
 
+    @property
+    def significance(self) -> float:
+        """The larger statistic of the record over its critical value; infinite without tests."""
+        if self.statistics is None:
+            return float("inf")
+        return float(self.statistics.threshold_ratio()[self.row])
+
     def agrees(self, found_before: int = 0) -> bool:
         """Whether chance explains the difference, after some records that certainly disagree."""
         if self.statistics is None:

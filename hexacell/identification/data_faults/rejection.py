@@ -10,6 +10,7 @@ Starting with no fault at all:
    around it are not valid: hypotheses are tried by refits instead (:mod:`.hypothesis_search`).
 2. Backward. Test each rejected record against the final fit, in which it takes no part, readmit
    those that agree, and go forward again.
+3. Proof. Readmit those whose fault the rest of the records does not prove (:mod:`.proof`).
 
 Gross errors, and all records after a shift of a gauge's zero, are left out. Gauge faults are
 refused: their readings would have to be guessed, so a person has to check the machine or the file.
@@ -43,6 +44,7 @@ from hexacell.identification.data_faults.hypothesis_search import (
     hypotheses_at_solution,
     search,
 )
+from hexacell.identification.data_faults.proof import proven_faults
 from hexacell.identification.data_faults.record_test import DeletionTest, deletion_test
 from hexacell.identification.problem.data_requirements import equations, is_determined
 from hexacell.identification.problem.problem import Problem
@@ -84,7 +86,7 @@ def _stepwise_selection(problem: Problem) -> CorrectedFit:
     if len(_rejected(selected)) > 1 or not selected.is_consistent:
         _refuse_inches(uncorrected)
     readmitted = _readmit(selected)
-    return selected if readmitted is None else _forward(readmitted)
+    return _only_proven(selected if readmitted is None else _forward(readmitted))
 
 
 def _forward(current: CorrectedFit) -> CorrectedFit:
@@ -117,16 +119,36 @@ def _require_correctable(current: CorrectedFit, extended: CorrectedFit) -> None:
         problem = fault.corrected(problem)
         if isinstance(fault, GaugeFaultHypothesis):
             before, after = current.fit.goodness, extended.fit.goodness
-            raise GaugeFaultError(messages.gauge_fault(fault, before, after))
+            raise GaugeFaultError(messages.gauge_fault(fault, before, after, lost=current.lost))
         if isinstance(fault, ZeroShiftHypothesis) and not is_determined(problem):
             raise GaugeFaultError(messages.refused_zero_shift(fault, equations(problem)))
 
 
 def _refuse_inches(uncorrected: CorrectedFit) -> None:
     """Readings in inches resemble a machine that needs no calibration, with some gross errors."""
-    in_mm = uncorrected.corrected_for(ALL_IN_INCHES)
-    if in_mm.is_consistent:
+    in_mm = ALL_IN_INCHES.trial(uncorrected)
+    if in_mm is not None and in_mm.is_consistent:
         _require_correctable(uncorrected, in_mm)
+
+
+def _only_proven(selected: CorrectedFit) -> CorrectedFit:
+    """The fit without only those records that are proven false by the rest, which grows meanwhile."""
+    proven = proven_faults(selected, _deletion_tests(selected))
+    while proven != selected.faults:
+        selected = _refit(selected, proven)
+        proven = proven_faults(selected, _deletion_tests(selected))
+    return selected
+
+
+def _refit(selected: CorrectedFit, faults: tuple[FaultHypothesis, ...]) -> CorrectedFit:
+    """The fit corrected for some of the faults only."""
+    problem = selected.original
+    for fault in faults:
+        problem = fault.corrected(problem)
+    solved = problem.solve_poses(selected.fit.free)
+    if solved.found.all():
+        problem = problem.starting_at(selected.fit.free, solved.poses, solved.found)
+    return CorrectedFit(selected.original, problem, fit_regularized(problem), faults)
 
 
 def _readmit(selected: CorrectedFit) -> CorrectedFit | None:
@@ -147,7 +169,7 @@ def _readmit(selected: CorrectedFit) -> CorrectedFit | None:
 def _without(records: set[RecordId], faults: Sequence[FaultHypothesis]) -> tuple[FaultHypothesis, ...]:
     """The faults without the gross errors of some records."""
     return tuple(
-        replace(fault, records=tuple(record for record in fault.records if record not in records))
+        fault.of([record for record in fault.records if record not in records])
         if isinstance(fault, OutlierHypothesis)
         else fault
         for fault in faults

@@ -1,0 +1,142 @@
+"""A cause is named only where the rest of the records proves it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from hexacell.identification.data_faults import proof
+from hexacell.identification.data_faults.fault_model import LARGEST_TRUSTED_RATIO, CorrectedFit
+from hexacell.identification.data_faults.hypotheses import ALL_IN_INCHES
+from hexacell.identification.data_faults.proof import required_significance
+from hexacell.identification.estimator import identify
+from hexacell.identification.solver.chi_square import ChiSquareTest, ChiSquareVerdict
+from hexacell.identification.solver.regularized_fit import fit_regularized
+from hexacell.identification.solver.result import DataFaultKind, GaugeFaultError
+from hexacell.measurements.records import MeasurementSet
+
+
+def with_encoders(measurements, error):
+    """Joint variables q (6,) that are wrong by ``error(q)``: an imperfect machine with true gauges."""
+    return MeasurementSet(
+        tuple(
+            replace(
+                record, joints=tuple((np.array(record.joints) + error(np.array(record.joints))).tolist())
+            )
+            for record in measurements.records
+        )
+    )
+
+
+def scales(seed, size):
+    shares = size * np.random.default_rng(seed).standard_normal(6)
+    return lambda joints: shares * joints
+
+
+def waves(seed, amplitude_mm):
+    random = np.random.default_rng(seed)
+    random.standard_normal(18)
+    phases = random.uniform(0.0, 6.0, 6)
+    return lambda joints: amplitude_mm * np.sin(joints / 60.0 + phases)
+
+
+@pytest.fixture
+def without_proof(monkeypatch):
+    """Whatever is significant is named, as if every fault were proven."""
+    monkeypatch.setattr(proof, "required_significance", lambda rest, faults: 0.0)
+
+
+IMPERFECT = [waves(2, 0.03), waves(5, 0.03), waves(5, 0.1)]
+
+
+@pytest.mark.parametrize("error", IMPERFECT)
+def test_an_imperfect_machine_is_not_blamed_on_its_records(noisy, make_problem, error):
+    found = identify(make_problem(with_encoders(noisy, error)))
+    assert found.data_faults == ()
+    assert found.records == len(noisy)
+    assert found.goodness.agreement is ChiSquareVerdict.TOO_LARGE
+
+
+@pytest.mark.parametrize("error", IMPERFECT)
+def test_its_worst_records_would_be_called_false_without_a_proof(noisy, make_problem, error, without_proof):
+    """Or the test above would tell nothing."""
+    assert identify(make_problem(with_encoders(noisy, error))).data_faults
+
+
+@pytest.mark.parametrize("error", IMPERFECT)
+def test_a_large_gross_error_in_an_imperfect_machine_is_named(noisy, make_problem, spoil, error):
+    spoilt = spoil(with_encoders(noisy, error), (4, 4), deviation=(0.0, 3.0, 0.0))
+    (fault,) = identify(make_problem(spoilt)).data_faults
+    assert fault.kind is DataFaultKind.GROSS_ERROR
+    assert fault.left_out == ((4, 4),)
+
+
+@pytest.mark.parametrize("error", IMPERFECT)
+def test_gauges_reversed_in_an_imperfect_machine_are_named(noisy, make_problem, error):
+    imperfect = with_encoders(noisy, error)
+    wrong = MeasurementSet(
+        tuple(
+            replace(record, deviation=tuple(-value for value in record.deviation))
+            for record in imperfect.records
+        )
+    )
+    with pytest.raises(GaugeFaultError) as raised:
+        identify(make_problem(wrong))
+    assert raised.value.fault.kind is DataFaultKind.REVERSED
+
+
+@pytest.mark.parametrize(("records", "named"), [(7, False), (8, False), (9, False), (10, True)])
+def test_a_slip_is_named_only_with_equations_to_spare(visit, make_problem, records, named):
+    """Split at the slip, 2 x 10 records give 51 equations for 35 parameters; 2 x 9 only 45."""
+    few = visit(points=2, orientations=records, seed=81).measured(0.01, seed=81)
+    slipped = MeasurementSet(
+        tuple(
+            replace(record, deviation=tuple(np.add(record.deviation, [0.0, 1.5, 0.5]).tolist()))
+            if record.point == 1 and record.orientation >= 4
+            else record
+            for record in few.records
+        )
+    )
+    problem = make_problem(slipped)
+    if named:
+        with pytest.raises(GaugeFaultError, match="slipped before orientation 4"):
+            identify(problem)
+    else:
+        found = identify(problem)
+        assert found.data_faults == ()
+        assert found.goodness.agreement is ChiSquareVerdict.TOO_LARGE
+
+
+@pytest.mark.parametrize(
+    ("chi2", "faults", "required"),
+    [
+        (100.0, 1, proof.BESIDE_GOOD),
+        (100.0, 2, proof.BESIDE_AGREEING),  # more faults chosen: less of a proof
+        (130.0, 1, proof.BESIDE_AGREEING),  # probability 0.02
+        (200.0, 1, proof.BESIDE_DISAGREEING),
+    ],
+)
+def test_the_less_the_rest_agrees_the_more_significant_a_fault_must_be(chi2, faults, required):
+    assert required_significance(ChiSquareTest(chi2, 100.0), faults) == required
+
+
+def test_a_lost_record_counts_once_in_the_mean(noisy, make_problem):
+    problem = make_problem(noisy)
+    rows = np.arange(problem.records) >= 3
+    fit = fit_regularized(problem.subset(rows))
+    current = CorrectedFit(problem, problem, fit)
+    assert current.lost == 3
+    expected = (fit.goodness.ratio**2 * 52 + LARGEST_TRUSTED_RATIO**2 * 3) / 55
+    assert current.misfit == pytest.approx(expected)
+    assert CorrectedFit(problem, problem.subset(rows), fit).misfit == pytest.approx(fit.goodness.ratio**2)
+
+
+def test_one_lost_record_does_not_make_a_fit_better_by_far_than_one_that_has_it(noisy, make_problem):
+    problem = make_problem(noisy)
+    whole = CorrectedFit.uncorrected(problem)
+    rows = np.arange(problem.records) > 0
+    lost = CorrectedFit(problem, problem, fit_regularized(problem.subset(rows)))
+    assert not whole.is_better_by_far_than(lost)
+    assert whole.is_better_by_far_than(lost.corrected_for(ALL_IN_INCHES))

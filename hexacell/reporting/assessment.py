@@ -19,7 +19,7 @@ from hexacell.identification.diagnostics.parameter_checks import (
 from hexacell.identification.diagnostics.pose_accuracy import Accuracy, predicted_accuracy
 from hexacell.identification.diagnostics.repeatability import Repeatability, repeatability
 from hexacell.identification.diagnostics.variance_components import NoiseLevels, noise_levels
-from hexacell.identification.solver.chi_square import CONTRADICTED_RATIO
+from hexacell.identification.solver.chi_square import CONTRADICTED_RATIO, ChiSquareVerdict
 from hexacell.identification.solver.measurement_model import record_covariance
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.geometry import Geometry
@@ -28,6 +28,7 @@ from hexacell.measurements.records import MeasurementSet
 from hexacell.robot_model import Robot
 from hexacell.stated_effects import stated_effects
 from hexacell.uncertainty.budget import UncertaintyBudget
+from hexacell.uncertainty.possible_causes import PossibleCause, possible_causes
 
 SEPARATED_PAIRS = 5
 """How many of the strongest correlations a measurement is searched for."""
@@ -49,6 +50,7 @@ class Assessment:
         budget: what is not known of the errors at the reachable ones of these poses; none as above.
         accuracy: at these poses; none where the robot can reach none of them. Where the residuals
             are larger than the stated noise, the predicted error is as well.
+        possible_causes: of residuals that are too large, the largest share first.
     """
 
     found: Identification
@@ -62,6 +64,7 @@ class Assessment:
     accuracy: Accuracy | None
     budget: UncertaintyBudget | None = None
     tolerance_violations: tuple[ToleranceViolation, ...] = ()
+    possible_causes: tuple[PossibleCause, ...] = ()
 
     @property
     def refused(self) -> bool:
@@ -110,7 +113,15 @@ def assess(
         accuracy=accuracy and replace(accuracy, after=accuracy.after.times(found.goodness.noise_factor)),
         budget=task.budget(found, belief, stated_effects(settings, temperature_range_k)),
         tolerance_violations=tolerance_violations(found.estimate, robot.drawing, robot.tolerances),
+        possible_causes=possible_causes(found) if _is_doubtful(found) else (),
     )
+
+
+def _is_doubtful(found: Identification) -> bool:
+    """Whether the residuals are too large, and small enough to be explained to first order."""
+    goodness = found.goodness
+    is_near = found.converged and goodness.ratio <= CONTRADICTED_RATIO
+    return is_near and goodness.agreement is ChiSquareVerdict.TOO_LARGE
 
 
 def _record_noise_mm(found: Identification) -> float:

@@ -30,6 +30,7 @@ def fit_document(assessed: Assessment) -> dict[str, Any]:
         "accuracy": _accuracy(assessed),
         "uncertainty": assessed.budget and _budget(assessed.budget),
         "refused": assessed.refused,
+        "possible_causes": [asdict(cause) for cause in assessed.possible_causes],
         "beyond_tolerance": [asdict(violation) for violation in assessed.tolerance_violations],
     }
 

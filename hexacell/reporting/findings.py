@@ -25,6 +25,7 @@ def findings(assessed: Assessment) -> tuple[str, ...]:
     """The verdict, the accuracy, and everything else to know before the result is used."""
     sentences = (
         _verdict(assessed),
+        _possible_causes(assessed),
         _accuracy(assessed),
         _poor_repeatability(assessed),
         _noise(assessed),
@@ -130,6 +131,21 @@ def _residual_verdict(goodness: ChiSquareTest) -> str:
             return f"Good: the records determine every parameter. {residual_sentence(goodness)}"
         case ChiSquareVerdict.AGREES:
             return "Good: the records determine every parameter, and agree with the stated noise."
+
+
+def _possible_causes(assessed: Assessment) -> str:
+    """What may be, where the residuals are too large and nothing that was left out explains it."""
+    if causes := ", ".join(f"{cause.name} {100 * cause.share:.0f} %" for cause in assessed.possible_causes):
+        return (
+            "The model does not fit, and no cause is proven. What may be, by the share of the excess that "
+            f"it would explain: {causes}."
+        )
+    if assessed.refused or assessed.found.goodness.agreement is not ChiSquareVerdict.TOO_LARGE:
+        return ""
+    return (
+        "The model does not fit, and no cause is proven: neither encoders, guides, load, temperature "
+        "nor gauges would explain a tenth of the excess."
+    )
 
 
 def _undetermined(found: Identification) -> str:

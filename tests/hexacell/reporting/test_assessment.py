@@ -29,6 +29,9 @@ from hexacell.robot_model import make_robot
 AGAIN = 100
 """Added to the orientation's number at a second visit."""
 
+TURNED = np.eye(3) + 0.004 * np.array([[0.0, 1.0, -0.5], [0.3, 0.0, 0.2], [0.4, -0.8, 0.0]])
+"""Readings of gauges that are not square to each other."""
+
 
 @pytest.fixture(scope="module")
 def settings():
@@ -81,6 +84,33 @@ def test_far_too_much_noise_makes_it_doubtful_and_names_the_levels(visit, assess
     assert verdict.startswith("Doubtful: the residuals are ")
     assert "times the stated noise" in verdict
     assert any("encoders 0.0" in sentence and "gauges 0.0" in sentence for sentence in more)
+
+
+def test_residuals_that_are_too_large_are_followed_by_what_may_be(visit, assessed_of, good):
+    measured = visit(seed=2).measured(0.01, seed=1)
+    turned = [
+        replace(record, deviation=tuple((np.array(record.deviation) @ TURNED).tolist()))
+        for record in measured.records
+    ]
+    assessed = assessed_of(MeasurementSet(tuple(turned)))
+    verdict, causes, *_ = findings(assessed)
+    assert verdict.startswith("Doubtful: ")
+    assert causes.startswith("The model does not fit, and no cause is proven. What may be")
+    assert ": the gauges (scale, alignment, drift of the zero) or an oval ball " in causes
+    assert assessed.possible_causes[0].share > 0.9
+    listed = fit_document(assessed)["possible_causes"]
+    assert [set(cause) for cause in listed] == [{"name", "share"}] * len(assessed.possible_causes)
+    assert listed[0]["share"] == assessed.possible_causes[0].share
+    assert good.possible_causes == ()
+
+
+def test_residuals_that_no_known_cause_explains_are_not_blamed_on_one(visit, assessed_of):
+    assessed = assessed_of(visit(seed=2).measured(0.03, seed=1))
+    assessed = replace(assessed, possible_causes=())
+    assert (
+        "no cause is proven: neither encoders, guides, load, temperature nor gauges"
+        in findings(assessed)[1]
+    )
 
 
 def test_more_noise_increases_the_predicted_error(visit, assessed_of, good):

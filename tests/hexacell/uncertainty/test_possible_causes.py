@@ -1,0 +1,128 @@
+"""What may be wrong where residuals are too large: the cause that was simulated explains most of them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from hexacell.identification.estimator import identify
+from hexacell.identification.solver.chi_square import ChiSquareVerdict
+from hexacell.measurements.records import MeasurementSet
+from hexacell.uncertainty.effects import Placement
+from hexacell.uncertainty.environment_effects import load_at_work
+from hexacell.uncertainty.excess_test import ExcessTest
+from hexacell.uncertainty.guide_effects import rail_waves
+from hexacell.uncertainty.possible_causes import possible_causes
+
+ENCODERS, GUIDES, LOAD, TEMPERATURE, GAUGES = (
+    "errors of the encoders",
+    "guides that are not straight or parallel",
+    "legs that yield under the load",
+    "a temperature that changed while measuring",
+    "the gauges (scale, alignment, drift of the zero) or an oval ball",
+)
+
+
+@pytest.fixture(scope="module")
+def clean(noisy, make_problem):
+    return identify(make_problem(noisy))
+
+
+@pytest.fixture
+def found_with(noisy, make_problem):
+    """The identification of records whose joint variables and deviations are changed."""
+
+    def identified(joints=0.0, deviations=0.0):
+        joints, deviations = np.broadcast_to(joints, (55, 6)), np.broadcast_to(deviations, (55, 3))
+        records = [
+            replace(
+                record,
+                joints=tuple((record.joints + joints[row]).tolist()),
+                deviation=tuple((record.deviation + deviations[row]).tolist()),
+            )
+            for row, record in enumerate(noisy.records)
+        ]
+        found = identify(make_problem(MeasurementSet(tuple(records))), find_outliers=False)
+        assert found.goodness.agreement is ChiSquareVerdict.TOO_LARGE
+        return found
+
+    return identified
+
+
+@pytest.fixture
+def moved(clean):
+    """What the causes (k,) of an effect do to the ball (55, 3), mm."""
+
+    def errors(effect, causes):
+        placement = Placement(clean.problem.mechanism, clean.geometry, clean.poses, clean.problem.joints)
+        return -(effect.on_poses(placement)[:, :3] @ causes)
+
+    return errors
+
+
+def first(found):
+    return possible_causes(found)[0].name
+
+
+def test_encoders_that_are_wrong_by_a_share_of_their_own(found_with, noisy):
+    joints = np.array([record.joints for record in noisy.records])
+    shares = 3e-3 * np.random.default_rng(1).standard_normal(6)
+    assert first(found_with(joints=shares * joints)) == ENCODERS
+
+
+def test_gauges_that_are_not_square(found_with, noisy):
+    deviations = np.array([record.deviation for record in noisy.records])
+    lean = 0.01 * np.random.default_rng(2).standard_normal((3, 3))
+    assert first(found_with(deviations=deviations @ lean)) == GAUGES
+
+
+def test_wavy_rails(found_with, moved):
+    waves = 40.0 * np.random.default_rng(3).standard_normal(12)
+    assert first(found_with(deviations=moved(rail_waves(1.0, 600.0), waves))) == GUIDES
+
+
+def test_a_load(found_with, moved):
+    assert first(found_with(deviations=moved(load_at_work(1.0, 1.0), np.array([5.0, -5.0, -40.0])))) == LOAD
+
+
+def test_legs_that_grow_while_measuring(found_with, clean):
+    placement = Placement(clean.problem.mechanism, clean.geometry, clean.poses, clean.problem.joints)
+    grown = 0.1 * np.random.default_rng(4).standard_normal(6)
+    progress = np.linspace(-0.5, 0.5, 55)[:, None]
+    assert first(found_with(deviations=progress * (placement.by_constraints[:, :3] @ grown))) == TEMPERATURE
+
+
+def test_more_noise_is_not_explained_by_the_machine(found_with):
+    random = np.random.default_rng(5)
+    found = found_with(deviations=0.05 * random.standard_normal((55, 3)))
+    assert all(cause.share < 0.4 for cause in possible_causes(found))
+
+
+def test_a_false_reading_is_listed_with_its_record(found_with):
+    deviations = np.zeros((55, 3))
+    deviations[17, 1] = 0.4
+    causes = possible_causes(found_with(deviations=deviations))
+    assert causes[0].name == "a false reading at point 2, orientation 7"
+    assert causes[0].share > 0.9
+    assert [cause.share for cause in causes] == sorted((cause.share for cause in causes), reverse=True)
+
+
+def test_the_share_of_unknowns_that_explain_no_more_than_chance_is_none(found_with):
+    random = np.random.default_rng(6)
+    test = ExcessTest(found_with(deviations=0.05 * random.standard_normal((55, 3))))
+    goodness = test.found.goodness
+    by_chance = 12 * goodness.chi2 / goodness.expected
+    assert test.share_of_gain(by_chance, 12) == pytest.approx(0.0, abs=1e-9)
+    assert test.share_of_gain(goodness.chi2 - goodness.expected, 0) == pytest.approx(1.0)
+
+
+def test_the_gain_of_columns_is_what_the_records_without_the_cause_save(found_with, clean, moved):
+    effect = load_at_work(1.0, 1.0)
+    wrong = found_with(deviations=moved(effect, np.array([0.0, 0.0, -20.0])))
+    saved = wrong.goodness.chi2 - clean.goodness.chi2
+    test = ExcessTest(wrong)
+    assert test.share_of_columns(test.by_effects(effect)) == pytest.approx(
+        test.share_of_gain(saved, 3), abs=0.02
+    )

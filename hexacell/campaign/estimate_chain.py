@@ -38,6 +38,9 @@ COST_FACTOR = 2.0
 RECORDS_FACTOR = 1.5
 """By how much cost or records have grown since a search in vain when the next one is made."""
 
+TRIAL = replace(COARSE, iterations=20, searches=12)
+"""As many iterations as true records need; where others need more, they are in vain."""
+
 
 @dataclass(frozen=True, slots=True)
 class SearchInVain:
@@ -46,10 +49,9 @@ class SearchInVain:
     cost: float
     records: int
 
-    def is_outdated(self, present: Identification) -> bool:
-        """Whether an estimate has so much more to explain, or to explain it by, that another may help."""
-        grown = cost(present) >= COST_FACTOR * self.cost
-        return grown or present.records >= RECORDS_FACTOR * self.records
+    def is_outdated(self, present_cost: float, records: int) -> bool:
+        """Whether there is so much more to explain, or to explain it by, that another one may help."""
+        return present_cost >= COST_FACTOR * self.cost or records >= RECORDS_FACTOR * self.records
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -76,7 +78,7 @@ def update_estimate(
     found = _continued(kept, before.identification)
     if not tries_others or _is_plausible(kept, found):
         return ChainedEstimate(found, before.false_records)
-    if before.in_vain is not None and not before.in_vain.is_outdated(found):
+    if before.in_vain is not None and not before.in_vain.is_outdated(cost(found), problem.records):
         return replace(before, identification=found)
     return _search(problem, _continued(problem, found) if before.false_records else found)
 
@@ -93,7 +95,7 @@ def _search(problem: Problem, found: Identification) -> ChainedEstimate:
     best = _best(problem, found)
     if _is_plausible(problem, best):
         return ChainedEstimate(best)
-    in_vain = SearchInVain(cost(best), best.records)
+    in_vain = SearchInVain(cost(best), problem.records)
     return _without_false_records(best) or ChainedEstimate(best, in_vain=in_vain)
 
 
@@ -112,7 +114,7 @@ def _best(problem: Problem, found: Identification) -> Identification:
     while not _is_plausible(problem, found) and (other := next(others, None)):
         is_better = (other.records, -cost(other)) > (found.records, -cost(found))
         found = other if is_better else found
-    return found
+    return found if found.converged else _continued(problem, found)
 
 
 def _is_plausible(problem: Problem, found: Identification) -> bool:
@@ -126,7 +128,8 @@ def _from_other_starts(problem: Problem) -> Iterator[Identification]:
     With few records, one of them may be beyond a singularity for all robots near the drawing.
     """
     yield estimate_online(problem)
-    yield from map(estimate_online, restarts(problem))
+    for restarted in restarts(problem):
+        yield estimate_online(restarted, TRIAL)
 
 
 def _continued(problem: Problem, before: Identification) -> Identification:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from hexacell.campaign import estimate_chain
-from hexacell.campaign.estimate_chain import SearchInVain, cost, update_estimate
+from hexacell.campaign.estimate_chain import SearchInVain, update_estimate
 from hexacell.identification.estimator import estimate_online
 from hexacell.identification.problem.data_requirements import is_overdetermined
 from hexacell.identification.solver import multistart
@@ -98,11 +98,8 @@ def test_a_search_in_vain_is_not_repeated_at_every_record(noisy, chain, monkeypa
 
 
 @pytest.mark.parametrize(
-    ("cost_share", "records_share", "outdated"),
-    [(1.0, 1.0, False), (0.6, 0.7, False), (0.49, 1.0, True), (1.0, 0.65, True)],
+    ("cost", "records", "outdated"),
+    [(100.0, 20, False), (199.0, 29, False), (200.0, 20, True), (100.0, 30, True), (10.0, 10, False)],
 )
-def test_a_search_is_repeated_for_twice_the_cost_or_half_as_many_records_again(
-    identified, cost_share, records_share, outdated
-):
-    in_vain = SearchInVain(cost_share * cost(identified), round(records_share * identified.records))
-    assert in_vain.is_outdated(identified) is outdated
+def test_a_search_is_repeated_for_twice_the_cost_or_half_as_many_records_again(cost, records, outdated):
+    assert SearchInVain(cost=100.0, records=20).is_outdated(cost, records) is outdated

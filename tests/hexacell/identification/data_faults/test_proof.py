@@ -140,3 +140,31 @@ def test_one_lost_record_does_not_make_a_fit_better_by_far_than_one_that_has_it(
     lost = CorrectedFit(problem, problem, fit_regularized(problem.subset(rows)))
     assert not whole.is_better_by_far_than(lost)
     assert whole.is_better_by_far_than(lost.corrected_for(ALL_IN_INCHES))
+
+
+@pytest.mark.parametrize(
+    ("before_mm", "after_mm", "confirmed"),
+    [
+        (0.1, 0.05, False),  # fewer residuals, and still far too large
+        (0.1, 0.0, True),  # the corrected records agree
+        (1.0, 0.05, True),  # far better, and something else is wrong as well
+    ],
+)
+def test_a_gauge_fault_is_confirmed_by_agreement_or_by_far_smaller_residuals(
+    noisy, make_problem, monkeypatch, before_mm, after_mm, confirmed
+):
+    def fitted(amplitude_mm):
+        problem = make_problem(with_encoders(noisy, waves(5, amplitude_mm)))
+        return CorrectedFit(problem, problem, fit_regularized(problem))
+
+    current, corrected = fitted(before_mm), fitted(after_mm)
+    assert corrected.fit.goodness.chi2 < 0.5 * current.fit.goodness.chi2
+    monkeypatch.setattr(CorrectedFit, "corrected_for", lambda *_: corrected)
+    found = replace(ALL_IN_INCHES, gain=0.5 * current.fit.goodness.chi2).confirmed(current)
+    assert found is (corrected if confirmed else None)
+
+
+def test_a_gauge_fault_needs_equations_that_could_contradict_it(visit, make_problem):
+    few, many = (visit(points=2, orientations=n, seed=81).measured(0.01, seed=81) for n in (8, 9))
+    assert ALL_IN_INCHES.trial(CorrectedFit.uncorrected(make_problem(few))) is None
+    assert ALL_IN_INCHES.trial(CorrectedFit.uncorrected(make_problem(many))) is not None

@@ -21,7 +21,7 @@ from hexacell.campaign.pose_list import pose_list_of
 from hexacell.cell.loader import Cell
 from hexacell.errors import UsageError
 from hexacell.identification.estimator import identify
-from hexacell.measurements.records import MeasurementSet
+from hexacell.measurements.records import MeasurementSet, RecordId
 from hexacell.reporting.assessment import Assessment, assess
 from hexacell.robot_model import robot_of
 from hexacell.runs.run_folder import RunFolder
@@ -29,10 +29,16 @@ from hexacell.runs.run_folder import RunFolder
 
 @dataclass(frozen=True, slots=True)
 class NextPose:
-    """What to measure next; ``forecast`` is absent where the robot can take no task pose."""
+    """What to measure next.
+
+    Attributes:
+        forecast: absent where the robot can take no task pose.
+        left_out: the records so far that the others prove false.
+    """
 
     decision: StartPoint | MeasurePose | Finished
     forecast: Forecast | None
+    left_out: tuple[RecordId, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,7 +85,7 @@ def next_pose(cell: Cell, measurements: MeasurementSet, *, rejections: int = 0) 
     state = _state_of_records(plan, measurements, rejections)
     decision = _decide(plan, state)
     forecast = decision.forecast if isinstance(decision, MeasurePose) else plan.forecast(state)
-    return NextPose(decision, forecast)
+    return NextPose(decision, forecast, tuple(sorted(plan.estimate(state).false_records)))
 
 
 def try_plan(cell: Cell) -> PlanTrial:

@@ -14,7 +14,7 @@ from hexacell.errors import LimitError
 from hexacell.experiment_design.predicted_records import GaugeZero, gauge_zero_at
 from hexacell.identification.belief import RobotBelief
 from hexacell.identification.solver.result import Identification
-from hexacell.measurements.records import MeasurementSet, Record
+from hexacell.measurements.records import MeasurementSet, Record, RecordId
 from hexacell.robot_model import Robot
 
 
@@ -22,11 +22,14 @@ from hexacell.robot_model import Robot
 class OnlineEstimate:
     """The estimate of the robot from the records so far.
 
-    ``identification`` is None before the first one; records that were found false are not in it.
+    Attributes:
+        identification: none before the first record.
+        false_records: those that the others prove false; they are not in the identification.
     """
 
     belief: RobotBelief
     identification: Identification | None
+    false_records: frozenset[RecordId] = frozenset()
 
     def gauge_zero(self, point: int) -> GaugeZero:
         """Where a point's gauges were zeroed.
@@ -78,5 +81,7 @@ class OnlineEstimator:
             problem = self._robot.problem(MeasurementSet(records[:count]))
             self._last = update_estimate(problem, self._last, self._tries_other_starts)
             self._records = records[:count]
-        found = None if self._last is None else self._last.identification
-        return OnlineEstimate(self._robot.belief(found), found)
+        if self._last is None:
+            return OnlineEstimate(self._robot.belief(), None)
+        found = self._last.identification
+        return OnlineEstimate(self._robot.belief(found), found, self._last.false_records)

@@ -19,10 +19,17 @@ def next_document(proposed: NextPose) -> dict[str, Any]:
     """What ``next --json`` prints."""
     decision, forecast = proposed.decision, proposed.forecast
     now = None if forecast is None else forecast.now_mm
+    left_out = [list(record) for record in proposed.left_out]
     if isinstance(decision, Finished):
-        return {"done": True, "reason": decision.reason, "present_worst_sigma_mm": now}
+        return {
+            "done": True,
+            "reason": decision.reason,
+            "present_worst_sigma_mm": now,
+            "left_out": left_out,
+        }
     return {
         "done": False,
+        "left_out": left_out,
         "point": decision.point,
         **_expected_record(decision),
         "pose": asdict(decision.pose),

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 from drivers.interfaces import DeviceIdentity
 from hexacell.application.offline import PlanTrial
 from hexacell.campaign.decisions import Finished, Forecast, MeasurePose, StartPoint
+from hexacell.measurements.records import RecordId
 
 
 def decision_text(decision: StartPoint | MeasurePose | Finished) -> str:
@@ -39,6 +40,14 @@ def forecast_text(forecast: Forecast | None) -> str:
         f"{now}; continuing gains {forecast.gain_mm:.3f} mm in {forecast.records} records, about "
         f"{duration(forecast.minutes)}."
     )
+
+
+def left_out_text(records: Sequence[RecordId]) -> str:
+    """The records that were left out; empty without any."""
+    if not records:
+        return ""
+    named = "; ".join(f"point {point}, orientation {orientation}" for point, orientation in records)
+    return f"Left out, as the other records contradict them: {named}. hexacell fit says why."
 
 
 def run_forecast_line(forecast: Forecast) -> str:

@@ -12,7 +12,7 @@ from hexacell.measurements.csv_file import read_measurements
 from hexacell.presentation.documents import next_document
 from hexacell.presentation.identification import identification_report
 from hexacell.presentation.layout import wrapped
-from hexacell.presentation.planning import decision_text, forecast_text
+from hexacell.presentation.planning import decision_text, forecast_text, left_out_text
 from hexacell.reporting.documents import fit_document
 from hexacell.runs.run_folder import RunFolder
 
@@ -37,6 +37,11 @@ def propose_next(options: argparse.Namespace) -> ExitCode:
     proposed = next_pose(cell, measurements, rejections=options.refused)
     console.document(next_document(proposed))
     if not options.json:
-        for line in (decision_text(proposed.decision), forecast_text(proposed.forecast)):
+        lines = (
+            decision_text(proposed.decision),
+            forecast_text(proposed.forecast),
+            left_out_text(proposed.left_out),
+        )
+        for line in filter(None, lines):
             console.print(wrapped(line))
     return ExitCode.DONE

@@ -2,12 +2,20 @@
 
 from __future__ import annotations
 
+import json
+from dataclasses import replace
+
 import pytest
 
 from hexacell.application.offline import PlanTrial
 from hexacell.campaign.decisions import Finished, Forecast, MeasurePose, StartPoint
 from hexacell.campaign.dry_run import DryRunResult
+from hexacell.cell.bundled import bundled_config
+from hexacell.cli.app import main
+from hexacell.errors import ExitCode
 from hexacell.kinematics.pose import Pose
+from hexacell.measurements.csv_file import write_measurements
+from hexacell.measurements.records import MeasurementSet
 from hexacell.presentation.planning import (
     decision_text,
     duration,
@@ -105,3 +113,32 @@ def test_a_plan_that_fails_on_simulated_robots_is_reported():
     assert "1 of 3 simulated robots could not be calibrated with this plan." in lines()
     assert lines(robots=0, drawn=6)[0].startswith("None of 6 robots drawn within the tolerances")
     assert "no accuracy is predicted" in lines(worst_sigma_mm=None)[0]
+
+
+@pytest.fixture
+def propose(tmp_path, capsys):
+    """``hexacell next`` for some records."""
+
+    def run(measurements, *options):
+        file = tmp_path / "measured.csv"
+        write_measurements(file, measurements)
+        cell = str(bundled_config("simulated-hexaglide"))
+        assert main(["next", cell, "--measurements", str(file), *options]) == ExitCode.DONE
+        return capsys.readouterr().out
+
+    return run
+
+
+def test_next_says_which_records_it_leaves_out(propose, visit):
+    measured = visit(seed=2).measured(0.01, seed=1)
+    wrong = measured.records[17]
+    x, y, z = wrong.deviation
+    records = [
+        replace(wrong, deviation=(x, y, z + 1.0)) if one is wrong else one for one in measured.records
+    ]
+    spoilt = MeasurementSet(tuple(records))
+    sentence = "Left out, as the other records contradict them: point 2, orientation 7."
+    assert sentence in " ".join(propose(spoilt).split())
+    assert json.loads(propose(spoilt, "--json"))["left_out"] == [[2, 7]]
+    assert "Left out" not in propose(measured)
+    assert json.loads(propose(measured, "--json"))["left_out"] == []

@@ -1,7 +1,6 @@
 """The fault hypotheses: gross errors of records, a shift of the gauges' zero, gauge faults.
 
-A gauge fault is a known matrix T, at one point or at all of them: gauges exchanged, reversed or
-reading in inches. The readings were d and should have been T d.
+A gauge fault (:mod:`.gauge_faults`) may be at one point or at all of them.
 """
 
 from __future__ import annotations
@@ -17,6 +16,7 @@ from hexacell.identification.data_faults.fault_model import (
     CorrectedFit,
     FaultHypothesis,
 )
+from hexacell.identification.data_faults.gauge_faults import GAUGE_FAULTS, GaugeFault
 from hexacell.identification.data_faults.score_tests import (
     OutlierStatistics,
     ZeroShiftStatistics,
@@ -26,11 +26,8 @@ from hexacell.identification.problem.data_requirements import is_determined, is_
 from hexacell.identification.problem.problem import Problem
 from hexacell.identification.solver.chi_square import ChiSquareTest
 from hexacell.identification.solver.linearized_model import LinearizedModel
-from hexacell.identification.solver.result import GAUGES, DataFaultKind
 from hexacell.kinematics.rotations import Array, Mask
 from hexacell.measurements.records import RecordId
-
-MM_PER_INCH = 25.4
 
 WORTH_TESTING = 0.05
 """Probability of the residuals below which zero shifts and gauge faults are tested too."""
@@ -120,15 +117,6 @@ class ZeroShiftHypothesis(FaultHypothesis):
         return replace(problem, labels=labels, first_rows=first_rows)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class GaugeFault:
-    """A known fault of gauges; ``remedy`` (3, 3) turns false readings x, y, z into true ones."""
-
-    kind: DataFaultKind
-    gauges: str
-    remedy: Array
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class GaugeFaultHypothesis(FaultHypothesis):
     """A gauge fault at one point, or at every point (``point`` is none)."""
@@ -165,20 +153,6 @@ def _in_base_frame(problem: Problem, gauge_fault: GaugeFault) -> Array:
     return turned
 
 
-def _gauge_faults() -> Iterator[GaugeFault]:
-    for first, second in ((0, 1), (0, 2), (1, 2)):
-        order = [0, 1, 2]
-        order[first], order[second] = second, first
-        yield GaugeFault(DataFaultKind.EXCHANGED, GAUGES[first] + GAUGES[second], np.eye(3)[order])
-    for order in ([1, 2, 0], [2, 0, 1]):
-        yield GaugeFault(DataFaultKind.EXCHANGED, GAUGES, np.eye(3)[order])
-    for kind, factor in ((DataFaultKind.REVERSED, -1.0), (DataFaultKind.INCHES, MM_PER_INCH)):
-        for axis, gauge in enumerate(GAUGES):
-            yield GaugeFault(kind, gauge, np.diag(np.where(np.arange(3) == axis, factor, 1.0)))
-        yield GaugeFault(kind, GAUGES, factor * np.eye(3))
-
-
-GAUGE_FAULTS = tuple(_gauge_faults())
 ALL_IN_INCHES = GaugeFaultHypothesis(gain=0.0, unknowns=0, gauge_fault=GAUGE_FAULTS[-1], point=None)
 
 
@@ -232,10 +206,12 @@ def _zero_shift(model: LinearizedModel, scale: float) -> Iterator[ZeroShiftHypot
     statistics = ZeroShiftStatistics.of(model)
     if not len(statistics.rows):
         return
-    best = int(np.argmax(statistics.gains))
+    best, critical = (
+        int(np.argmax(statistics.gains)),
+        chdtri(3, FALSE_SHIFTS_PER_FILE / len(statistics.rows)),
+    )
     gain = float(statistics.gains[best])
-    significance = gain / scale / float(chdtri(3, FALSE_SHIFTS_PER_FILE / len(statistics.rows)))
-    if significance > 1.0:
+    if (significance := gain / scale / float(critical)) > 1.0:
         point, orientation = model.problem.labels[statistics.rows[best]].tolist()
         yield ZeroShiftHypothesis(
             gain=gain,

@@ -14,7 +14,7 @@ hide each other around a fit to all of them, and show around one that they did n
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain, zip_longest
 
@@ -64,12 +64,8 @@ def hypotheses_at_solution(current: CorrectedFit, found_before: int) -> list[Fau
 def _trials(current: CorrectedFit) -> Iterator[CorrectedFit]:
     start = _ExpansionPoint.start(current.problem)
     gauge_faults = start.gauge_faults()
-    lists = (
-        gauge_faults,
-        hypotheses_at_solution(current, 0),
-        _ExpansionPoint.solution(current).hypotheses(),
-    )
-    ranks = [*zip_longest(*(hypotheses[:TRIED_FROM_EACH_LIST] for hypotheses in lists))]
+    elsewhere = _ExpansionPoint.solution(current).hypotheses()
+    ranks = _by_rank(gauge_faults, hypotheses_at_solution(current, 0), elsewhere)
     tried: set[FaultHypothesis] = set()
     yield from _one_by_one(current, chain(*ranks[:1]), tried)
     deleted = _greedy_deletion(current)
@@ -79,6 +75,11 @@ def _trials(current: CorrectedFit) -> Iterator[CorrectedFit]:
     without_deleted = _ExpansionPoint.solution(replace(deleted, problem=current.problem)).gauge_faults()
     last = chain(without_deleted[:TRIED_FROM_EACH_LIST], *ranks[1:], at_all_points)
     yield from _one_by_one(current, last, tried)
+
+
+def _by_rank(*lists: Sequence[FaultHypothesis]) -> list[tuple[FaultHypothesis | None, ...]]:
+    """The most likely hypothesis of each list, the second of each, and so on."""
+    return [*zip_longest(*(hypotheses[:TRIED_FROM_EACH_LIST] for hypotheses in lists))]
 
 
 def _one_by_one(

@@ -6,12 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from hexacell.identification.data_faults.hypotheses import (
-    MM_PER_INCH,
-    GaugeFault,
-    GaugeFaultHypothesis,
-    ZeroShiftHypothesis,
-)
+from hexacell.identification.data_faults.gauge_faults import MM_PER_INCH, GaugeFault
+from hexacell.identification.data_faults.hypotheses import GaugeFaultHypothesis, ZeroShiftHypothesis
 from hexacell.identification.solver.chi_square import ChiSquareTest
 from hexacell.identification.solver.result import GAUGES, DataFault, DataFaultKind
 from hexacell.measurements.records import Deviation, RecordId

@@ -8,7 +8,8 @@ import numpy as np
 from scipy.special import chdtri
 
 from hexacell.identification.data_faults import messages
-from hexacell.identification.data_faults.hypotheses import GAUGE_FAULTS, record_ids, record_mask
+from hexacell.identification.data_faults.gauge_faults import GAUGE_FAULTS
+from hexacell.identification.data_faults.hypotheses import record_ids, record_mask
 from hexacell.identification.data_faults.score_tests import OutlierStatistics
 from hexacell.identification.problem.encoder_consistency import ACCEPTED_MM
 from hexacell.identification.problem.problem import Problem

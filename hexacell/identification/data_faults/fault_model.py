@@ -16,6 +16,10 @@ PENALTY_PER_UNKNOWN = 10.0
 SUFFICIENT_DECREASE = 20.0
 """Of the mean square residual, for a hypothesis to be accepted although the fit is not yet consistent."""
 
+SETTLING_DECREASE = 400.0
+SETTLING_MISFIT = 4.0
+"""Of the mean square residual, and what it must be, for a hypothesis to need no comparison with others."""
+
 LARGEST_TRUSTED_RATIO = 10.0
 """Residuals over the stated noise up to which first-order tests around the solution are valid."""
 
@@ -105,3 +109,8 @@ class CorrectedFit:
     def is_better_by_far_than(self, other: CorrectedFit) -> bool:
         """Whether it explains so much more that it is right although something else is still wrong."""
         return self.misfit < other.misfit / SUFFICIENT_DECREASE
+
+    def settles(self, other: CorrectedFit) -> bool:
+        """Whether no other hypothesis can explain it better: it agrees, or an imperfect machine is left."""
+        is_near_noise = self.is_reliable and self.misfit <= SETTLING_MISFIT
+        return self.is_consistent or (is_near_noise and self.misfit < other.misfit / SETTLING_DECREASE)

@@ -6,7 +6,8 @@ are tried in turn: gauge faults around the drawing, all kinds around the solutio
 around the solution with the records that the solver left out. Two candidates reject several records
 at once: greedy deletion with a refit after each, and deletion around the drawing. The fit without the
 deleted records is one more place to look for gauge faults that they have in common. The first corrected fit
-that agrees with the noise is taken, else the best one if it is better by far.
+that agrees with the noise, or nearly so and is incomparably better, is taken, else the best one if it is
+better by far.
 
 Source: Atkinson and Riani, Robust Diagnostic Regression Analysis, 2000, on masking: several outliers
 hide each other around a fit to all of them, and show around one that they did not influence.
@@ -45,10 +46,10 @@ CRITICAL_STATISTIC = float(chdtri(3, 1e-4))
 
 
 def search(current: CorrectedFit) -> CorrectedFit | None:
-    """The first correction that gives a consistent fit, or the best if it lowers the misfit by far."""
+    """The first correction that settles the matter, or the best if it lowers the misfit by far."""
     best: CorrectedFit | None = None
     for trial in _trials(current):
-        if trial.is_consistent:
+        if trial.settles(current):
             return trial
         if trial.is_better_by_far_than(current) and (best is None or trial.misfit < best.misfit):
             best = trial

@@ -168,3 +168,22 @@ def test_a_gauge_fault_needs_equations_that_could_contradict_it(visit, make_prob
     few, many = (visit(points=2, orientations=n, seed=81).measured(0.01, seed=81) for n in (8, 9))
     assert ALL_IN_INCHES.trial(CorrectedFit.uncorrected(make_problem(few))) is None
     assert ALL_IN_INCHES.trial(CorrectedFit.uncorrected(make_problem(many))) is not None
+
+
+@pytest.mark.parametrize(
+    ("before", "after_mm", "settled"),
+    [
+        (ALL_IN_INCHES, 0.0, True),
+        (ALL_IN_INCHES, 0.03, True),  # an imperfect machine with true gauges
+        (ALL_IN_INCHES, 0.1, False),  # better by far, but something else is wrong
+        (None, 0.03, False),  # not much better
+    ],
+)
+def test_a_trial_that_leaves_an_imperfect_machine_settles_the_search(
+    noisy, make_problem, before, after_mm, settled
+):
+    problem = make_problem(with_encoders(noisy, waves(5, after_mm)))
+    after = CorrectedFit(problem, problem, fit_regularized(problem))
+    wrong = make_problem(with_encoders(noisy, waves(5, 0.1)))
+    wrong = wrong if before is None else before.corrected(wrong)
+    assert after.settles(CorrectedFit(wrong, wrong, fit_regularized(wrong))) is settled

@@ -5,14 +5,15 @@ The deviations of the ball at held-out points are compared before and after the 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from hexacell.cell.fields import Frozen
-from hexacell.identification.diagnostics.parameter_checks import SIGNIFICANT_SIGMAS, tolerance_violations
-from hexacell.identification.problem.problem import Noise, Tolerances
+from hexacell.identification.diagnostics.tolerance_check import SIGNIFICANT_SIGMAS, ToleranceViolation
+from hexacell.identification.problem.problem import Noise
 from hexacell.identification.solver.chi_square import (
     CONTRADICTED_RATIO,
     ChiSquareTest,
@@ -26,33 +27,35 @@ from hexacell.kinematics.rotations import Array
 class AcceptanceGate(Frozen):
     """One condition for writing back, whether it is met, and that as a sentence for people.
 
-    ``needs_person``: where it is not met, a person may accept the geometry nevertheless.
+    ``needs_person``: where it is not met, a person may accept the geometry nevertheless, with
+    ``needs_cell_name`` by typing the name of the cell.
     """
 
     name: str
     passed: bool
     sentence: str
     needs_person: bool = False
+    needs_cell_name: bool = False
 
 
 def gates(
     identified: GeometryEstimate,
-    drawing: Geometry,
-    tolerances: Tolerances,
+    violations: Sequence[ToleranceViolation],
     *,
     residuals: ChiSquareTest,
     largest_change_mm: float,
     before: Geometry,
 ) -> tuple[AcceptanceGate, ...]:
-    """All conditions on an identification; ``before`` is the controller's geometry.
+    """All conditions on an identification.
 
-    Both are in the mechanism's frame convention: a choice of other frames changes numbers, and no robot.
+    ``violations`` are those of the drawing's tolerances. ``before`` is the controller's geometry, as the
+    identified one in the mechanism's frame convention: other frames change numbers, and no robot.
     """
     return (
         _converged(identified),
         _determined(identified),
         _agrees(residuals),
-        _within_tolerance(identified, drawing, tolerances),
+        _within_tolerance(violations),
         _small_change(identified.geometry, before, largest_change_mm),
     )
 
@@ -91,17 +94,21 @@ def _agrees(residuals: ChiSquareTest) -> AcceptanceGate:
     )
 
 
-def _within_tolerance(
-    identified: GeometryEstimate, drawing: Geometry, tolerances: Tolerances
-) -> AcceptanceGate:
-    violations = tolerance_violations(identified, drawing, tolerances)
+def _within_tolerance(violations: Sequence[ToleranceViolation]) -> AcceptanceGate:
+    """The drawing may be of another machine; who knows better takes the responsibility by its name."""
     names = ", ".join(f"{violation.name} ({violation.change_mm:+.2f} mm)" for violation in violations)
     sentence = (
         f"Beyond the drawing's tolerance: {names}."
         if violations
         else "Every parameter is within the drawing's tolerance."
     )
-    return AcceptanceGate(name="within tolerance", passed=not violations, sentence=sentence)
+    return AcceptanceGate(
+        name="within tolerance",
+        passed=not violations,
+        sentence=sentence,
+        needs_person=True,
+        needs_cell_name=True,
+    )
 
 
 def _small_change(after: Geometry, before: Geometry, largest_change_mm: float) -> AcceptanceGate:

@@ -14,9 +14,10 @@ from hexacell.cell.model import CellSettings
 from hexacell.controller_config.interface import ConfigFormat, ControllerGeometry
 from hexacell.errors import FileError, ReachError
 from hexacell.identification.belief import Limits, RobotBelief
+from hexacell.identification.diagnostics.tolerance_check import ToleranceViolation, tolerance_violations
 from hexacell.identification.problem.commanded_poses import CommandingGeometry
 from hexacell.identification.problem.problem import Noise, Prior, Problem, Tolerances, build_problem
-from hexacell.identification.solver.result import Identification
+from hexacell.identification.solver.result import GeometryEstimate, Identification
 from hexacell.kinematics.commanded_motion import CommandedRobot
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import Branch, FrameTransform, Mechanism, inverse_kinematics
@@ -30,8 +31,8 @@ from hexacell.plugins import Group, load
 class Robot:
     """A mechanism, its drawing, and the geometry that its controller commands with.
 
-    ``controller`` is as the config states it, in the config's own frames; ``drawing`` and all that
-    is computed are in the mechanism's frame convention.
+    ``controller`` is as the config states it, in the config's own frames, ``drawing`` in those in which
+    its tolerances hold; all that is computed is in the mechanism's frame convention.
 
     Attributes:
         frames: from the controller's frames to the convention's.
@@ -78,6 +79,10 @@ class Robot:
         if self.known is not None:
             return self.known
         return Prior.of(self.mechanism, self.drawing, self.tolerances)
+
+    def tolerance_violations(self, found: GeometryEstimate) -> tuple[ToleranceViolation, ...]:
+        """The parameters of an estimate that are outside the drawing's tolerances."""
+        return tolerance_violations(found, self.mechanism, self.drawing, self.tolerances)
 
     def problem(self, measurements: MeasurementSet) -> Problem:
         """The identification problem of records that were commanded with the controller's geometries."""
@@ -204,7 +209,7 @@ def make_robot(
     frames = mechanism.normalize_frames(controller.geometry)[1]
     return Robot(
         mechanism=mechanism,
-        drawing=drawn.geometry,
+        drawing=nominal,
         controller=controller.geometry,
         branch=controller.branch,
         tolerances=Tolerances.of_settings(mechanism.parameters, settings.tolerances.model_dump()),

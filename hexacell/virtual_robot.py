@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from hexacell.errors import LimitError, ReachError
+from hexacell.identification.problem.problem import Tolerances
 from hexacell.kinematics.commanded_motion import ActualPoses
 from hexacell.kinematics.forward import continue_solution
 from hexacell.kinematics.geometry import Geometry
-from hexacell.kinematics.mechanism import inverse_kinematics
+from hexacell.kinematics.mechanism import Mechanism, inverse_kinematics
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.rotations import Array, Mask
 from hexacell.kinematics.sensitivity import singularity_margin
@@ -165,21 +166,26 @@ class VirtualRobot:
 
 
 def robots_within_tolerances(robot: Robot, count: int, seed: int) -> list[Geometry]:
-    """Geometries in the frame convention, with errors uniform within the tolerances.
+    """Geometries, each built with errors uniform within the tolerances, in the frame convention.
 
-    A controller whose geometry is not the drawing's was calibrated before. Then errors are a share of
-    the tolerances, about the controller's geometry.
+    The errors are those of all parameters of the drawing, in its frames. A controller whose geometry is not
+    the drawing's was calibrated before. Then they are a share of the tolerances, about its geometry.
     """
+    mechanism, tolerances = robot.mechanism, robot.tolerances
+    drawn, _ = mechanism.normalize_frames(robot.drawing)
+    is_as_drawn = robot.commanding.largest_difference(drawn) < AS_DRAWN_MM
+    centre = robot.drawing if is_as_drawn else robot.commanding
+    widths = tolerances if is_as_drawn else tolerances.scaled(WEAR_SHARE)
     random = np.random.default_rng(seed)
-    convention, tolerances = robot.mechanism.convention, robot.tolerances
-    parameters, rows = convention.parameters, convention.free_rows()
-    widths = tolerances.widths(parameters)[rows]
-    centre = convention.free_parameters(robot.commanding)
-    as_drawn = np.abs(centre - convention.free_parameters(robot.prior.centre)).max() < AS_DRAWN_MM
-    share = 1.0 if as_drawn else WEAR_SHARE
-    geometries = []
-    for _ in range(count):
-        ball = random.uniform(-tolerances.ball_mm, tolerances.ball_mm, 3)
-        free = centre + share * (random.uniform(-widths, widths) + ball @ parameters.ball_offset[:, rows])
-        geometries.append(convention.geometry(free))
-    return geometries
+    return [random_robot(mechanism, centre, widths, random) for _ in range(count)]
+
+
+def random_robot(
+    mechanism: Mechanism, drawing: Geometry, tolerances: Tolerances, random: np.random.Generator
+) -> Geometry:
+    """A robot in the frame convention, built after a drawing with errors uniform within the tolerances."""
+    parameters = mechanism.parameters
+    widths = tolerances.widths(parameters)
+    ball = random.uniform(-tolerances.ball_mm, tolerances.ball_mm, 3) @ parameters.ball_offset
+    built = Geometry(parameters, drawing.vector + random.uniform(-widths, widths) + ball)
+    return mechanism.normalize_frames(built)[0]

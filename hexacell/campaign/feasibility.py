@@ -211,7 +211,7 @@ def _expected_zero(plan: Plan, belief: RobotBelief, point: int) -> GaugeZero:
 def _undetermined_parameters(plan: Plan) -> Iterator[HexacellError]:
     """That even well spread poses within the limits leave many parameters as uncertain as drawn."""
     names = plan.robot.mechanism.convention.free_names()
-    before = np.sqrt(np.diag(plan.robot.prior.covariance))
+    before = plan.robot.prior.sigma
     after = np.sqrt(np.diag(plan.predicted_belief().covariance))
     rows = np.flatnonzero(after > UNDETERMINED_RATIO * before)
     if len(rows) > UNDETERMINED_SHARE * len(names):

@@ -105,7 +105,7 @@ class TerminalOperator:
         while True:
             typed = await self._answer(text)
             if question.kind in {QuestionKind.APPROVE_CHANGE, QuestionKind.KEEP_RESULT}:
-                return APPROVER if typed.strip().lower() == "yes" else None
+                return APPROVER if typed.strip().lower() == question.consent.lower() else None
             if question.default is not None:
                 return question.default
             if (chosen := matching_choice(typed, question)) is not None:

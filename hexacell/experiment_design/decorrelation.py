@@ -20,7 +20,7 @@ from hexacell.experiment_design.predicted_records import (
     predict_records,
 )
 from hexacell.identification.belief import RobotBelief
-from hexacell.identification.diagnostics.parameter_checks import CorrelatedPair
+from hexacell.identification.diagnostics.correlations import CorrelatedPair
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics import rotations
 from hexacell.kinematics.pose import Pose, PoseBatch

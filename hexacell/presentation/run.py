@@ -66,10 +66,10 @@ def question_text(question: Question) -> str:
             )
         case PendingChange(gates=gates, diff=diff, displacement=moved):
             outcomes = "".join(f"{'ok' if gate.passed else 'NO'}  {gate.sentence}\n" for gate in gates)
-            write = f"{_teaching(moved)}Write this into the controller's config? Type yes: "
+            write = f"{_teaching(moved)}Write this into the controller's config? {_consent(question)}"
             return f"\n{diff}\n{outcomes}{write}"
         case WrittenResult(line=line, displacement=moved):
-            keep = "The new geometry is in the controller's config. Keep it? Type yes: "
+            keep = f"The new geometry is in the controller's config. Keep it? {_consent(question)}"
             return f"\n{line}.\n{_teaching(moved)}{keep}"
         case StepFailure(problem=problem):
             return f"\n{problem}\nHow to continue ({', '.join(question.choices)})? "
@@ -78,6 +78,13 @@ def question_text(question: Question) -> str:
 def _teaching(moved: TaskDisplacement | None) -> str:
     """What must be taught anew, in lines of its own."""
     return "" if moved is None else f"{wrapped(teaching_sentence(moved), indent=4)}\n"
+
+
+def _consent(question: Question) -> str:
+    """What to type; the name of the cell where more than a yes is asked for."""
+    if question.consent == "yes":
+        return "Type yes: "
+    return f"Type the cell's name, {question.consent}, to take the responsibility: "
 
 
 def repeated_text(question: Question) -> str:

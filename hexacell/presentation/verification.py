@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from hexacell.decision import Verdict
-from hexacell.identification.diagnostics.parameter_checks import SIGNIFICANT_SIGMAS
+from hexacell.identification.diagnostics.tolerance_check import SIGNIFICANT_SIGMAS
 from hexacell.presentation.layout import wrapped
 from hexacell.reporting.check_result import CheckResult
 from hexacell.reporting.result import AcceptedResult

@@ -10,14 +10,10 @@ import numpy as np
 from hexacell.campaign.task_accuracy import Task
 from hexacell.cell.model import CellSettings
 from hexacell.experiment_design.decorrelation import DecorrelatingPose, decorrelating_poses
-from hexacell.identification.diagnostics.parameter_checks import (
-    CorrelatedPair,
-    ToleranceViolation,
-    strongly_correlated,
-    tolerance_violations,
-)
+from hexacell.identification.diagnostics.correlations import CorrelatedPair, strongly_correlated
 from hexacell.identification.diagnostics.pose_accuracy import Accuracy, predicted_accuracy
 from hexacell.identification.diagnostics.repeatability import Repeatability, repeatability
+from hexacell.identification.diagnostics.tolerance_check import ToleranceViolation
 from hexacell.identification.diagnostics.variance_components import NoiseLevels, noise_levels
 from hexacell.identification.solver.chi_square import CONTRADICTED_RATIO, ChiSquareVerdict
 from hexacell.identification.solver.measurement_model import record_covariance
@@ -103,7 +99,7 @@ def assess(
     accuracy = predicted_accuracy(belief, task=task.poses, workspace=task.workspace)
     return Assessment(
         found=found,
-        drawing=robot.drawing,
+        drawing=robot.mechanism.normalize_frames(robot.drawing)[0],
         noise=noise_levels(found),
         repeatability=repeatability(measurements, left_out),
         record_noise_mm=_record_noise_mm(found),
@@ -112,7 +108,7 @@ def assess(
         task_named=bool(settings.task.poses),
         accuracy=accuracy and replace(accuracy, after=accuracy.after.times(found.goodness.noise_factor)),
         budget=task.budget(found, belief, stated_effects(settings, temperature_range_k)),
-        tolerance_violations=tolerance_violations(found.estimate, robot.drawing, robot.tolerances),
+        tolerance_violations=robot.tolerance_violations(found.estimate),
         possible_causes=possible_causes(found) if _is_doubtful(found) else (),
     )
 

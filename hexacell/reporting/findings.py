@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from hexacell.identification.diagnostics.parameter_checks import ToleranceViolation
+from hexacell.identification.diagnostics.tolerance_check import ToleranceViolation
 from hexacell.identification.diagnostics.variance_components import NoiseLevel, NoiseLevels
 from hexacell.identification.solver.chi_square import ChiSquareTest, ChiSquareVerdict
 from hexacell.identification.solver.result import Identification

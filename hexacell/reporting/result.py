@@ -110,8 +110,10 @@ class IdentificationResult(Frozen):
 
     def estimate(self, parameters: ParameterSet) -> GeometryEstimate:
         """What the acceptance gates need."""
-        sigma = parameters.vector(self.sigma)
-        return GeometryEstimate(self.identified(parameters), sigma, self.termination, self.undetermined)
+        covariance = np.array(self.covariance)
+        return GeometryEstimate(
+            self.identified(parameters), covariance, self.termination, self.undetermined
+        )
 
     @property
     def residuals(self) -> ChiSquareTest:

@@ -16,7 +16,6 @@ from hexacell.experiment_design.candidates import within_limits
 from hexacell.kinematics import rotations
 from hexacell.kinematics.forward import CONTINUATION_STAGES
 from hexacell.kinematics.geometry import Geometry
-from hexacell.kinematics.mechanism import Mechanism
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array, Mask
 from hexacell.kinematics.sensitivity import has_singularity_margin
@@ -188,14 +187,3 @@ def _data_set(sets: list[_Reached], orientations: int) -> DataSet:
     labels = [(point, turn) for point in range(1, len(sets) + 1) for turn in range(1, orientations + 1)]
     found = _Reached.concatenate(sets)
     return DataSet(np.array(labels), found.commands, found.joints, found.actual.positions)
-
-
-def random_robot(
-    mechanism: Mechanism, drawing: Geometry, error_mm: float, random: np.random.Generator
-) -> Geometry:
-    """A geometry in the frame convention, each free parameter uniform within ``error_mm``.
-
-    As in Table 1 of Abtahi et al. 2010 (section 3.1, +-7 mm).
-    """
-    free = mechanism.convention.free_parameters(drawing)
-    return mechanism.convention.geometry(free + random.uniform(-error_mm, error_mm, len(free)))

@@ -14,13 +14,11 @@ import numpy as np
 
 from hexacell.identification.problem.problem import Prior, Tolerances
 from hexacell.identification.solver.result import Identification
+from hexacell.kinematics.frame_derivatives import free_parameter_derivatives
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import Mechanism
 from hexacell.kinematics.parameters import ParameterUnit
 from hexacell.kinematics.rotations import Array
-
-STEP = 1e-4
-"""Of the differences, mm or rad: the change of frames is nearly linear over it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,15 +48,7 @@ def drift_covariance(mechanism: Mechanism, geometry: Geometry, sigma: Array) -> 
     Every parameter (P,) of the machine changes, with standard deviations ``sigma``, those that the frame
     convention fixes as well: the convention then moves the others. ``geometry`` is in that convention.
     """
-    convention, vector = mechanism.convention, geometry.vector
-
-    def free(values: Array) -> Array:
-        normal, _ = mechanism.normalize_frames(Geometry(mechanism.parameters, values))
-        return convention.free_parameters(normal)
-
-    steps = STEP * np.eye(len(vector))
-    rows = [(free(vector + step) - free(vector - step)) / (2.0 * STEP) for step in steps]
-    factor = sigma[:, None] * np.array(rows)
+    factor = sigma[:, None] * free_parameter_derivatives(mechanism, geometry)
     covariance: Array = factor.T @ factor
     return covariance
 

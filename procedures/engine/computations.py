@@ -61,8 +61,7 @@ class Computations:
         commanding, _ = robot.mechanism.normalize_frames(robot.controller)
         conditions = gates(
             identified,
-            robot.drawing,
-            robot.tolerances,
+            robot.tolerance_violations(identified),
             residuals=result.residuals,
             largest_change_mm=self.cell.settings.acceptance.largest_change_mm,
             before=commanding,

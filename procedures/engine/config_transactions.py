@@ -99,7 +99,8 @@ class ConfigTransactions:
         if automatic and all(gate.passed for gate in conditions):
             return "the cell file: within its limits"
         displacement = proposed.displacement if proposed else None
-        name = await self.operator.ask(ask_approval(conditions, change.diff, displacement))
+        cell = self.cell.settings.name
+        name = await self.operator.ask(ask_approval(conditions, change.diff, displacement, cell=cell))
         if name is None:
             raise LimitError("the new geometry was declined; nothing was applied")
         return name

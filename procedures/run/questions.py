@@ -77,6 +77,7 @@ class Question:
         choices: the answers that are accepted. If empty, any text is (the name of who approves) and
             None declines.
         default: the choice that an empty answer selects; None if a choice must be made.
+        consent: what a person types to consent, where the answer is that person's name.
     """
 
     kind: QuestionKind
@@ -84,6 +85,7 @@ class Question:
     subject: GaugePlacement | PendingChange | StepFailure | WrittenResult
     choices: tuple[str, ...] = ()
     default: str | None = None
+    consent: str = "yes"
 
 
 def ask_placement(point: int, pose: Pose) -> Question:
@@ -98,13 +100,19 @@ def ask_placement(point: int, pose: Pose) -> Question:
 
 
 def ask_approval(
-    gates: Sequence[AcceptanceGate], diff: str, displacement: TaskDisplacement | None = None
+    gates: Sequence[AcceptanceGate],
+    diff: str,
+    displacement: TaskDisplacement | None = None,
+    *,
+    cell: str,
 ) -> Question:
-    """Ask whether the config may be written; answered by the name of who approves."""
+    """Ask whether the config of a cell may be written; answered by the name of who approves."""
+    is_grave = any(gate.needs_cell_name and not gate.passed for gate in gates)
     return Question(
         QuestionKind.APPROVE_CHANGE,
         f"Write this into the controller's config?\n{diff}",
         PendingChange(tuple(gates), diff, displacement),
+        consent=cell if is_grave else "yes",
     )
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from hexacell.errors import LimitError
 from hexacell.identification.estimator import identify
 from hexacell.study import data_sets
-from hexacell.study.data_sets import random_robot
+from hexacell.virtual_robot import random_robot
 
 ROBOTS = 1000
 SIGMAS = 6.0
@@ -18,7 +18,7 @@ def test_every_robot_is_found(table_one, say) -> None:
     unreachable, failed, wrong, short = 0, 0, 0, 0
     for seed in range(ROBOTS):
         random = np.random.default_rng(seed)
-        truth = random_robot(robot.mechanism, robot.drawing, 7.0, random)
+        truth = random_robot(robot.mechanism, robot.drawing, robot.tolerances, random)
         try:
             campaign = data_sets.within_travel(robot, truth, table_one.points, 11, np.radians(30), random)
         except LimitError:

@@ -27,16 +27,14 @@ from hexacell.kinematics.mechanisms.hexaglide import hexaglide_geometry
 from hexacell.kinematics.pose import Pose
 from hexacell.measurements.records import MeasurementSet
 from hexacell.robot_model import Robot, robot_of
-from hexacell.study.data_sets import random_robot
 from hexacell.study.simulated_campaign import SimulatedCampaign
-from hexacell.virtual_robot import VirtualRobot
+from hexacell.virtual_robot import VirtualRobot, random_robot
 
 Say = Callable[[str, str, str], None]
 
 pytestmark = pytest.mark.benchmark
 
 ROBOTS = int(os.environ.get("ROBOTS", "40"))
-ERROR_MM = 7.0
 PAPER_MM = 0.57
 RECORDS_FOR_PAPER = 33
 POINTS = 5
@@ -84,7 +82,9 @@ def truth_of(cell: Cell, robot: Robot, number: int) -> Geometry:
         return robot.mechanism.normalize_frames(hexaglide_geometry(actual["S"], actual["B"], actual["l"]))[
             0
         ]
-    return random_robot(robot.mechanism, robot.drawing, ERROR_MM, np.random.default_rng([4, number]))
+    return random_robot(
+        robot.mechanism, robot.drawing, robot.tolerances, np.random.default_rng([4, number])
+    )
 
 
 def can_stand_everywhere(cell: Cell, robot: Robot, truth: Geometry) -> bool:

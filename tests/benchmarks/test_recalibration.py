@@ -28,8 +28,7 @@ from hexacell.identification.estimator import identify
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.robot_model import Robot, make_robot, robot_of
-from hexacell.study.data_sets import random_robot
-from hexacell.virtual_robot import VirtualRobot
+from hexacell.virtual_robot import VirtualRobot, random_robot
 from tests.benchmarks.worlds.closure import Bodies, CannotCloseError, follow, slider_places
 from tests.benchmarks.worlds.effects import Effect
 from tests.benchmarks.worlds.stating import LIMIT_MM, stated
@@ -38,7 +37,6 @@ from tests.benchmarks.worlds.world import World
 
 MACHINES = int(os.environ.get("MACHINES", "4"))
 TIMES = 5
-ERROR_MM = 7.0
 PASSES = 0.99
 
 
@@ -78,7 +76,7 @@ def _truth(cell: Cell, robot: Robot, number: int) -> Geometry:
     """A geometry within the tolerances."""
     random = np.random.default_rng([7, number])
     while True:
-        truth = random_robot(robot.mechanism, robot.drawing, ERROR_MM, random)
+        truth = random_robot(robot.mechanism, robot.drawing, robot.tolerances, random)
         poses = robot.from_commands(Pose(*point) for point in cell.settings.identification.points)
         if VirtualRobot(robot, truth).can_take(poses).all():
             return truth

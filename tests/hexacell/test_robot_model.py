@@ -175,7 +175,7 @@ def test_the_belief_before_measuring_is_the_drawing_with_its_tolerances(robot, o
     for known in (robot.belief(), on_floor.belief()):
         np.testing.assert_allclose(known.estimate.vector, paper.nominal.vector, atol=1e-9)
         np.testing.assert_allclose(known.controller.vector, paper.nominal.vector, atol=1e-9)
-        np.testing.assert_allclose(np.diag(known.covariance), 49.0 / 3.0)
+        np.testing.assert_allclose(known.covariance, robot.prior.covariance, atol=1e-6)
 
 
 def test_the_belief_after_measuring_is_the_estimate_with_its_covariance(robot, noisy):

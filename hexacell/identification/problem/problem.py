@@ -13,6 +13,7 @@ from hexacell.errors import IdentifiabilityError
 from hexacell.identification.problem.commanded_poses import CommandedPoses, CommandingGeometry
 from hexacell.identification.problem.encoder_consistency import EncoderConsistency
 from hexacell.kinematics.forward import ForwardResult
+from hexacell.kinematics.frame_derivatives import free_parameter_derivatives
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import Branch, Mechanism
 from hexacell.kinematics.parameters import ParameterSet, ParameterUnit
@@ -58,6 +59,11 @@ class Tolerances:
         """The half-width of each parameter (P,), without the ball's offset."""
         return parameters.by_kind(self.by_kind)
 
+    def scaled(self, share: float) -> Tolerances:
+        """A share of all of them."""
+        by_kind = {symbol: share * width for symbol, width in self.by_kind.items()}
+        return Tolerances(by_kind, share * self.ball_mm)
+
     def sum_mm(self, parameters: ParameterSet) -> float:
         """Sum of all length tolerances, the ball's offset included."""
         lengths = (self.by_kind[kind.symbol] for kind in parameters.kinds if kind.unit is ParameterUnit.MM)
@@ -72,21 +78,39 @@ class Prior:
         centre: the drawing, in the mechanism's frame convention.
         free: its free parameters (p,), mm.
         covariance: (p, p) of the free parameters, mm^2.
+        tolerance_sigma: (p,) their standard deviations by their own tolerances, mm, without those of the
+            parameters that define the frames; none where the prior is no drawing.
     """
 
     centre: Geometry
     free: Array
     covariance: Array
+    tolerance_sigma: Array | None = None
 
     @classmethod
     def of(cls, mechanism: Mechanism, drawing: Geometry, tolerances: Tolerances) -> Prior:
-        """The Gaussian with the second moments of errors uniform within the tolerances."""
+        """The Gaussian with the second moments of errors uniform within the tolerances, to first order.
+
+        The tolerances hold for all parameters in the frames of the ``drawing``; the change to the
+        convention's frames correlates them.
+        """
         centre, _ = mechanism.normalize_frames(drawing)
-        rows = mechanism.convention.free_rows()
-        covariance = np.diag(tolerances.widths(mechanism.parameters)[rows] ** 2 / 3.0)
-        for common in mechanism.parameters.ball_offset[:, rows]:
-            covariance += tolerances.ball_mm**2 / 3.0 * np.outer(common, common)
-        return cls(centre, mechanism.convention.free_parameters(centre), covariance)
+        by_parameters = free_parameter_derivatives(mechanism, drawing)
+        by_ball = mechanism.parameters.ball_offset @ by_parameters
+        widths = tolerances.widths(mechanism.parameters)[:, None]
+        factor = np.vstack([widths * by_parameters, tolerances.ball_mm * by_ball])
+        own = np.vstack([np.diag(widths[:, 0]), tolerances.ball_mm * mechanism.parameters.ball_offset])
+        own_sigma = np.linalg.norm(own, axis=0)[mechanism.convention.free_rows()] / np.sqrt(3.0)
+        free = mechanism.convention.free_parameters(centre)
+        return cls(centre, free, factor.T @ factor / 3.0, own_sigma)
+
+    @property
+    def sigma(self) -> Array:
+        """What counts as unknown of each free parameter (p,): the tolerances, if there are any; mm."""
+        if self.tolerance_sigma is not None:
+            return self.tolerance_sigma
+        sigma: Array = np.sqrt(np.diag(self.covariance))
+        return sigma
 
     @cached_property
     def precision(self) -> Array:

@@ -71,13 +71,13 @@ class GaugeFaultError(IdentifiabilityError):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class GeometryEstimate:
-    """An identified geometry with the standard deviations (P,), mm, of its parameters.
+    """An identified geometry with the covariance (P, P), mm^2, of its parameters.
 
     About the ``undetermined`` parameters the data have almost no information.
     """
 
     geometry: Geometry
-    sigma: Array
+    covariance: Array
     termination: Termination
     undetermined: tuple[str, ...]
 
@@ -132,7 +132,7 @@ class Identification:
     @property
     def prior_sigma(self) -> Array:
         """The same before measuring."""
-        return self.problem.basis @ np.sqrt(np.diag(self.problem.prior.covariance))
+        return self.problem.basis @ self.problem.prior.sigma
 
     @property
     def undetermined(self) -> tuple[str, ...]:
@@ -144,7 +144,7 @@ class Identification:
     @property
     def estimate(self) -> GeometryEstimate:
         """The geometry with its uncertainty."""
-        return GeometryEstimate(self.geometry, self.sigma, self.termination, self.undetermined)
+        return GeometryEstimate(self.geometry, self.covariance, self.termination, self.undetermined)
 
     @property
     def poses(self) -> PoseBatch:

@@ -17,7 +17,7 @@ from hexacell.kinematics.mechanisms.hexaglide import hexaglide_geometry
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.rotations import Array
 from hexacell.robot_model import Robot, robot_of
-from hexacell.study.data_sets import random_robot
+from hexacell.virtual_robot import random_robot
 from tests.benchmarks.worlds.world import Commands
 
 TILT_DEG = 45.0
@@ -31,7 +31,6 @@ MARGIN = 0.05
 AIM_MM = 2.5
 """How far the ball is from the gauges' zero at most, along each axis: the travel of a run is used."""
 
-ERROR_MM = 7.0
 HELD_OUT = 6
 HELD_OUT_CANDIDATES = 64
 
@@ -102,7 +101,9 @@ def setting(number: int) -> Setting:
 
 def _truth(cell: Cell, robot: Robot, number: int) -> Geometry:
     if number:
-        return random_robot(robot.mechanism, robot.drawing, ERROR_MM, np.random.default_rng([4, number]))
+        return random_robot(
+            robot.mechanism, robot.drawing, robot.tolerances, np.random.default_rng([4, number])
+        )
     assert cell.settings.simulation is not None
     built = cell.settings.simulation.geometry.model_dump()
     geometry = hexaglide_geometry(built["S"], built["B"], built["l"])

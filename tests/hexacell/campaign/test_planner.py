@@ -83,11 +83,11 @@ def test_the_error_after_each_record_is_as_forecast(campaign):
     forecasts = forecasts_of(campaign)
     for before, after in pairwise(forecasts[3:7]):
         assert after.now_mm == pytest.approx(before.next_mm, rel=0.1)
-    assert forecasts[-1].now_mm < 0.1 * forecasts[0].now_mm
+    assert forecasts[-1].now_mm < 0.15 * forecasts[0].now_mm
     assert [forecast.records for forecast in forecasts] == [*range(15, 8, -1), *range(7, 0, -1)]
     assert all(forecast.end_mm <= forecast.next_mm <= forecast.now_mm for forecast in forecasts)
     assert forecasts[-1].end_mm == forecasts[-1].next_mm
-    assert 1.0 < forecasts[-1].end_mm / forecasts[0].end_mm < 10.0  # so few records grow late
+    assert 1.0 < forecasts[-1].end_mm / forecasts[0].end_mm < 20.0  # so few records grow late
 
 
 def test_poses_and_expectations_are_in_the_controllers_frames(campaign, two_points, paper):
@@ -223,14 +223,14 @@ def test_points_are_chosen_by_their_gain_per_minute(make_plan, carry_out):
             ),
             identification__orientations=8,
             identification__choose_points=choose_points,
-            identification__budget_records=16,
+            identification__budget_records=14,
             limits__tilt_deg=20.0,  # so that what one point can tell is soon told
         )
 
     taken, in_order = (carry_out(plan(choose_points)) for choose_points in (True, False))
     begun = [one.decision.point for one in taken if isinstance(one.decision, StartPoint)]
     assert 3 in begun[:2]
-    assert len(records_of(taken)) == 16
+    assert len(records_of(taken)) == 14
     worst = [plan(False).forecast(end[-1].state).now_mm for end in (taken, in_order)]
     assert worst[0] < worst[1]
 
@@ -240,10 +240,11 @@ def test_points_that_take_long_to_set_up_are_left_later(make_plan, carry_out):
         return make_plan(
             identification__choose_points=True,
             identification__minutes_per_station=minutes,
+            limits__tilt_deg=20.0,
             stations__placement="by-hand",
         )
 
-    taken = carry_out(plan(0.0), most=10)
+    taken = carry_out(plan(0.0), most=25)
     left = next(one for one in taken if isinstance(one.decision, FinishPoint))
     assert "gains more in the same time" in left.decision.reason
     assert isinstance(plan(60.0).decide(left.state), MeasurePose)
@@ -255,5 +256,5 @@ def test_no_provisional_geometry_before_the_robot_is_known_well_enough(campaign,
     by_records = {len(one.state.measurements): one.state for one in campaign}
     assert not plan.allows_provisional(CampaignState())
     assert not plan.allows_provisional(by_records[2])
-    assert plan.allows_provisional(by_records[8])
+    assert plan.allows_provisional(by_records[13])
     assert plan.allows_provisional(campaign[-1].state)

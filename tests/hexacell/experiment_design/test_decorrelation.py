@@ -9,7 +9,7 @@ import pytest
 
 from hexacell.experiment_design.decorrelation import decorrelating_poses
 from hexacell.identification.belief import Limits, RobotBelief
-from hexacell.identification.diagnostics.parameter_checks import strongly_correlated
+from hexacell.identification.diagnostics.correlations import strongly_correlated
 from hexacell.identification.estimator import identify
 from hexacell.measurements.records import MeasurementSet, Record
 

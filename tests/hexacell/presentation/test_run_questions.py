@@ -29,7 +29,7 @@ def test_an_approval_shows_the_change_then_every_gate() -> None:
         AcceptanceGate(name="converged", passed=True, sentence="The solver ended."),
         AcceptanceGate(name="small change", passed=False, sentence="It is 9 mm.", needs_person=True),
     ]
-    assert question_text(ask_approval(gates, "-1\n+2")) == (
+    assert question_text(ask_approval(gates, "-1\n+2", cell="bench")) == (
         "\n-1\n+2\nok  The solver ended.\nNO  It is 9 mm.\n"
         "Write this into the controller's config? Type yes: "
     )
@@ -37,7 +37,7 @@ def test_an_approval_shows_the_change_then_every_gate() -> None:
 
 def test_approval_and_acceptance_say_what_must_be_taught_anew_before_it_asks() -> None:
     moved = TaskDisplacement(position_mm=30.8, orientation_deg=4.0, poses=6, is_within_limits=False)
-    whether_written = ask_approval([], "-1\n+2", moved)
+    whether_written = ask_approval([], "-1\n+2", moved, cell="bench")
     whether_kept = ask_acceptance("all ill", Verification(verdict=Verdict.FAIL), moved)
     for question, asks in ((whether_written, "Write this"), (whether_kept, "The new geometry is in")):
         *_, first, second, asked = question_text(question).splitlines()

@@ -36,12 +36,12 @@ async def test_unattended_approval_is_refused_with_the_reasons() -> None:
         AcceptanceGate(name="converged", passed=True, sentence="The solver ended."),
     ]
     with pytest.raises(AnswerNeeded, match=r"approval: The largest change is 9 mm\.$"):
-        await UnattendedOperator().ask(ask_approval(gates, "diff"))
+        await UnattendedOperator().ask(ask_approval(gates, "diff", cell="bench"))
 
 
 async def test_unattended_approval_is_refused_where_the_cell_file_requires_it() -> None:
     with pytest.raises(AnswerNeeded, match="the cell file says to ask"):
-        await UnattendedOperator().ask(ask_approval([], "diff"))
+        await UnattendedOperator().ask(ask_approval([], "diff", cell="bench"))
 
 
 async def test_an_unattended_run_chooses_no_recovery() -> None:
@@ -78,7 +78,7 @@ async def test_an_empty_answer_is_the_default() -> None:
 
 async def test_an_approval_may_be_declined() -> None:
     broker = QuestionBroker(SilentOperator())
-    asking = asyncio.create_task(broker.ask(ask_approval([], "diff")))
+    asking = asyncio.create_task(broker.ask(ask_approval([], "diff", cell="bench")))
     await asyncio.sleep(0)
     assert broker.answer(None)
     assert await asking is None

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hexacell.identification.diagnostics.parameter_checks import strongly_correlated
+from hexacell.identification.diagnostics.correlations import strongly_correlated
 
 
 def test_pairs_are_those_of_repeated_measurements(repeated, hexaglide):

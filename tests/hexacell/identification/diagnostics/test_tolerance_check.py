@@ -1,0 +1,117 @@
+"""Robots built within their tolerances, and beyond: in any frames, with the ball anywhere allowed."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from hexacell.identification.diagnostics.tolerance_check import tolerance_violations
+from hexacell.identification.problem.problem import Tolerances
+from hexacell.identification.solver.levenberg_marquardt import Termination
+from hexacell.identification.solver.result import GeometryEstimate
+from hexacell.kinematics import rotations
+from hexacell.kinematics.geometry import Geometry
+from hexacell.kinematics.mechanism import FrameTransform
+from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS, Hexaglide
+from hexacell.virtual_robot import random_robot
+
+MECHANISM = Hexaglide()
+THREE_MM = Tolerances({"S": 3.0, "B": 3.0, "l": 3.0})
+SEEDS = st.integers(0, 2**32 - 1)
+TO_FLOOR = FrameTransform(
+    rotations.from_vector([np.pi, 0.0, 0.0]), np.array([250.0, -80.0, 900.0]), np.eye(3)
+)
+"""Of a drawing whose base frame is on the floor, with z downwards."""
+
+
+def estimate(geometry: Geometry, sigma: float = 0.0) -> GeometryEstimate:
+    normal = MECHANISM.normalize_frames(geometry)[0]
+    covariance = sigma**2 * np.eye(len(HEXAGLIDE_PARAMETERS))
+    return GeometryEstimate(normal, covariance, Termination.STEP, ())
+
+
+def names(found: GeometryEstimate, drawing: Geometry, tolerances: Tolerances) -> list[str]:
+    return [one.name for one in tolerance_violations(found, MECHANISM, drawing, tolerances)]
+
+
+def with_errors(drawing: Geometry, errors: dict[str, float], seed: int) -> Geometry:
+    """A robot built within a third of 3 mm, but for some parameters."""
+    vector = drawing.vector + np.random.default_rng(seed).uniform(-1.0, 1.0, len(drawing.vector))
+    for name, error in errors.items():
+        row = HEXAGLIDE_PARAMETERS.names.index(name)
+        vector[row] = drawing.vector[row] + error
+    return Geometry(HEXAGLIDE_PARAMETERS, vector)
+
+
+@pytest.mark.parametrize("ball_mm", [0.0, 35.0])
+@given(seed=SEEDS)
+def test_no_robot_built_within_its_tolerances_is_refused(paper, ball_mm, seed):
+    tolerances = replace(THREE_MM, ball_mm=ball_mm)
+    built = random_robot(MECHANISM, paper.nominal, tolerances, np.random.default_rng(seed))
+    assert names(estimate(built), paper.nominal, tolerances) == []
+
+
+@given(seed=SEEDS)
+def test_nor_one_whose_drawing_is_in_other_frames(paper, seed):
+    drawing = MECHANISM.change_frames(paper.nominal, TO_FLOOR)
+    built = random_robot(MECHANISM, drawing, THREE_MM, np.random.default_rng(seed))
+    assert names(estimate(built), drawing, THREE_MM) == []
+
+
+def test_robots_are_refused_although_their_coordinates_in_the_convention_s_frames_may_be_outside(paper):
+    """What the check is for: by the convention's frames every second healthy robot is outside."""
+    outside = 0
+    for seed in range(40):
+        built = random_robot(MECHANISM, paper.nominal, THREE_MM, np.random.default_rng(seed))
+        outside += bool(np.abs(built.vector - paper.nominal.vector).max() > 3.0)
+    assert outside >= 20
+
+
+@given(seed=SEEDS, sign=st.sampled_from([-1.0, 1.0]), leg=st.integers(1, 6))
+def test_a_leg_beyond_its_tolerance_is_named_and_no_other_parameter(paper, seed, sign, leg):
+    built = with_errors(paper.nominal, {f"l{leg}": sign * 3.5}, seed)
+    [violation] = tolerance_violations(estimate(built), MECHANISM, paper.nominal, THREE_MM)
+    assert violation.name == f"l{leg}"
+    assert violation.change_mm == pytest.approx(sign * 3.5)
+    assert violation.tolerance_mm == 3.0
+
+
+@given(seed=SEEDS, name=st.sampled_from(["S1z", "S3y", "S6x", "B2y", "B4z", "B6x"]))
+def test_a_joint_far_from_its_place_is_named(paper, seed, name):
+    """Frames explain an error of one joint in part, those of three joints wholly."""
+    built = with_errors(paper.nominal, {name: 25.0}, seed)
+    assert name in names(estimate(built), paper.nominal, THREE_MM)
+
+
+def test_errors_that_another_choice_of_frames_explains_are_none(paper):
+    turned = FrameTransform(
+        rotations.from_vector([0.05, 0.0, 0.0]),
+        np.array([20.0, -10.0, 5.0]),
+        rotations.from_vector([0.03, -0.04, 0.02]),
+    )
+    built = MECHANISM.change_frames(paper.nominal, turned)
+    assert np.abs(built.vector - paper.nominal.vector).max() > 10.0
+    assert names(estimate(built), paper.nominal, Tolerances({"S": 0.01, "B": 0.01, "l": 0.01})) == []
+
+
+def test_the_ball_may_be_mounted_elsewhere_within_its_tolerance(paper):
+    offset = np.array([8.0, -5.0, 30.0]) @ HEXAGLIDE_PARAMETERS.ball_offset
+    built = Geometry(HEXAGLIDE_PARAMETERS, paper.nominal.vector + offset)
+    assert names(estimate(built), paper.nominal, replace(THREE_MM, ball_mm=30.0)) == []
+    assert names(estimate(built), paper.nominal, replace(THREE_MM, ball_mm=20.0)) != []
+
+
+def test_an_excess_below_three_sigma_is_none(paper):
+    built = with_errors(paper.nominal, {"l3": 3.29}, seed=1)
+    assert names(estimate(built, sigma=0.1), paper.nominal, THREE_MM) == []
+    assert names(estimate(built, sigma=0.09), paper.nominal, THREE_MM) == ["l3"]
+
+
+def test_an_estimate_that_is_not_a_number_is_outside(paper):
+    broken = Geometry(HEXAGLIDE_PARAMETERS, np.full(42, np.nan))
+    found = replace(estimate(paper.nominal), geometry=broken)
+    assert len(names(found, paper.nominal, THREE_MM)) == 42

@@ -90,7 +90,7 @@ class HeldOutSteps:
     def _in_set(self, state: RunState, key: SetKey) -> Step:
         measured = state.set(key)
         if measured.rejections and key.phase is Phase.AFTER:
-            return Compute(kind="judge")
+            return self._back(state, key) or Compute(kind="judge")
         require_zero(state, key)
         if measured.rejections:
             raise TravelError(f"{key}: the ball left the gauges' travel at a held-out pose")
@@ -114,6 +114,20 @@ class HeldOutSteps:
         if state.at_pose == (key, orientation - 1) and orientation != common + 1:
             return move
         return self.sets.paths.towards(state, move, self._ball(state, key))
+
+    def _back(self, state: RunState, key: SetKey) -> Move | None:
+        """The move to the reference after the ball has left the travel; none there, or where none is found.
+
+        The verdict is certain, and the old config is to be restored. Far from level, the slider positions
+        may belong to no pose of the old geometry. One attempt is made.
+        """
+        measured = state.set(key)
+        if not measured.samples or measured.rejections > 1 or state.at_pose == (key, 1):
+            return None
+        try:
+            return self._to_reference(state, key)
+        except LimitError:
+            return None
 
     def _to_reference(self, state: RunState, key: SetKey) -> Move:
         return self.sets.to_reference(state, key, self._ball(state, key))

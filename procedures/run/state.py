@@ -187,8 +187,7 @@ def apply(state: RunState, event: events.Event) -> RunState:  # noqa: C901, PLR0
         case events.RecordTaken():
             return _with_set(state, event.at, state.set(event.at).with_sample(event))
         case events.RecordRejected():
-            rejected = state.set(event.at).with_rejection(event.orientation)
-            return _with_set(replace(state, at_pose=None), event.at, rejected)
+            return _rejected(state, event)
         case events.RecordDiscarded():
             return _with_set(state, event.at, state.set(event.at).without(event.orientation))
         case events.ReferenceConfirmed():
@@ -234,6 +233,14 @@ def _arrived(state: RunState, event: events.Arrived) -> RunState:
         path_from_reference=_path(state, event),
         position_unknown=False,
     )
+
+
+def _rejected(state: RunState, event: events.RecordRejected) -> RunState:
+    """At the pose the ball was outside the travel; before it, a guard stopped the robot on the way."""
+    rejected = state.set(event.at).with_rejection(event.orientation)
+    is_on_the_way = event.at.phase is Phase.AFTER and state.at_pose != (event.at, event.orientation)
+    left = _without_position(state) if is_on_the_way else replace(state, at_pose=None)
+    return _with_set(left, event.at, rejected)
 
 
 def _path(state: RunState, event: events.Arrived) -> tuple[tuple[int, SixNumbers], ...]:

@@ -47,7 +47,7 @@ IMPOSSIBLE: dict[str, tuple[tuple[tuple[str, str], ...], tuple[str, ...]]] = {
         ("the budget of 12 records allows 11 records at 1 points, 30 equations for 35", "Allow 14 records"),
     ),
     "a point that most robots cannot reach": (
-        ((P5, "[179.0, -280.0, 322.0],\n]\norientations = 11"),),
+        ((P5, "[185.0, -290.0, 318.0],\n]\norientations = 11"),),
         ("identification point 5: ", "of the robots within the tolerances cannot reach it"),
     ),
     "a way across a singularity": (
@@ -86,7 +86,7 @@ def test_the_predicted_accuracy_is_printed_before_any_motion(typed_here: Any, ce
     assert expected["points"] == 5
     assert expected["outside"] <= 1
     assert 0.02 < expected["worst_sigma_mm"] < 1.0
-    assert 1.0 < expected["minutes"] < 6.0
+    assert 1.0 < expected["minutes"] < 8.0
     assert all(0.0 <= share < 0.3 for share in expected["lost"].values())
     said = re.sub(r"\s+", " ", outcome.err)
     words = r"\d+ records at 5 points will give about 0\.\d{3} mm at the worst of your task poses"

@@ -1,7 +1,7 @@
 """Random multistart: other start points for the solver if it finds a wrong minimum from the drawing.
 
 With few records, and a pose near a singularity at the drawing, the true geometry may lie beyond that
-singularity, where no descent from the drawing ends. Geometries are drawn from the tolerance prior,
+singularity, where no descent from the drawing ends. Geometries are drawn within the tolerances,
 and those of lowest cost are the start points. The poses of all draws are solved in one batch.
 
 Source: Rinnooy Kan and Timmer, Stochastic global optimization methods, Mathematical Programming 39, 1987.
@@ -29,14 +29,23 @@ BATCH_ROWS = 20_000
 
 def restarts(problem: Problem) -> Iterator[Problem]:
     """The problem with other start points, that of lowest cost first."""
-    root = np.linalg.cholesky(problem.prior.covariance)
-    draws = np.random.default_rng(0).standard_normal((DRAWS, len(root)))
-    starts = problem.initial_parameters + draws @ root.T
+    starts = problem.initial_parameters + tolerance_draws(problem)
     reached = list(_with_poses(problem, starts))
     costs = np.array([_cost(problem, free, poses) for free, poses in reached])
     order = np.argsort(costs, kind="stable")[:START_POINTS]
     for row in order[np.isfinite(costs[order])]:
         yield problem.starting_at(*reached[row])
+
+
+def tolerance_draws(problem: Problem) -> Array:
+    """Changes of the free parameters (k, p), mm: by the prior, and by each parameter's own tolerance.
+
+    The frames make the prior so wide in some directions that few of its draws are near the drawing.
+    """
+    root = np.linalg.cholesky(problem.prior.covariance)
+    normal = np.random.default_rng(0).standard_normal((2, DRAWS // 2, len(root)))
+    changes: Array = np.concatenate([normal[0] @ root.T, normal[1] * problem.prior.sigma])
+    return changes
 
 
 def _with_poses(problem: Problem, starts: Array) -> Iterator[tuple[Array, PoseBatch]]:

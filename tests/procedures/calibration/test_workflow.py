@@ -139,8 +139,38 @@ TABLE: Table = {
         lambda s, t: [*t["committed"], WITHDRAWING, events.RolledBack()],
         "commit",
     ),
-    "refused afterwards": (
+    "refused on the way afterwards": (
         lambda s, t: [*t["committed"], *s(Phase.AFTER).whole(1)[:3], s(Phase.AFTER).refused()],
+        "locate",
+    ),
+    "refused at a pose afterwards": (
+        lambda s, t: [
+            *t["committed"],
+            *s(Phase.AFTER).whole(1)[:3],
+            s(Phase.AFTER).arrived(2),
+            s(Phase.AFTER).refused(),
+        ],
+        "after-V1/o01/move",
+    ),
+    "back at the reference afterwards": (
+        lambda s, t: [
+            *t["committed"],
+            *s(Phase.AFTER).whole(1)[:3],
+            s(Phase.AFTER).arrived(2),
+            s(Phase.AFTER).refused(),
+            s(Phase.AFTER).arrived(1),
+        ],
+        "judge",
+    ),
+    "refused again on the way back": (
+        lambda s, t: [
+            *t["committed"],
+            *s(Phase.AFTER).whole(1)[:3],
+            s(Phase.AFTER).arrived(2),
+            s(Phase.AFTER).refused(),
+            s(Phase.AFTER).refused(1),
+            LOCATED,
+        ],
         "judge",
     ),
     "reference refused afterwards": (

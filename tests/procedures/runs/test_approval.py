@@ -21,10 +21,11 @@ async def test_a_forbidding_gate_ends_the_run_before_anything_is_written(recordi
     assert "reload" not in rig.controller.log
 
 
-async def test_a_geometry_beyond_the_tolerance_is_refused(recording, replayed) -> None:
+async def test_a_geometry_beyond_the_tolerance_waits_for_a_person(recording, replayed) -> None:
     measured = recording.until(events.SetClosed, count=4)
     rig = replayed(measured, tolerances__l_mm=2.0)
-    with pytest.raises(LimitError, match="Beyond the drawing's tolerance: l"):
+    object.__setattr__(rig.performer, "operator", UnattendedOperator())
+    with pytest.raises(AnswerNeeded, match=r"Beyond the drawing's tolerance: .*l"):
         await rig.run()
     assert rig.config == recording.config_before
     assert rig.folder.proposal.exists()

@@ -42,12 +42,20 @@ def test_every_drawn_geometry_that_records_can_take_counts_and_the_least_contrad
             return np.inf
         return NuisanceElimination(problem, prediction.weights).cost(prediction.residuals)
 
-    root = np.linalg.cholesky(problem.prior.covariance)
-    draws = np.random.default_rng(0).standard_normal((multistart.DRAWS, len(root)))
-    least = np.sort([cost(problem.initial_parameters + root @ draw) for draw in draws])
+    changes = multistart.tolerance_draws(problem)
+    assert len(changes) == multistart.DRAWS
+    least = np.sort([cost(problem.initial_parameters + change) for change in changes])
     expected = least[: multistart.START_POINTS]
     found = [cost(one.initial_parameters) for one in started]
     np.testing.assert_allclose(found, expected[np.isfinite(expected)], rtol=1e-6)
+
+
+def test_half_of_the_draws_are_as_wide_as_the_prior_and_half_as_the_tolerances(problem):
+    by_prior, by_tolerances = np.split(multistart.tolerance_draws(problem), 2)
+    prior = problem.prior
+    assert by_prior.std(axis=0) == pytest.approx(np.sqrt(np.diag(prior.covariance)), rel=0.3)
+    assert by_tolerances.std(axis=0) == pytest.approx(prior.sigma, rel=0.3)
+    assert by_prior.std() > 1.3 * by_tolerances.std()
 
 
 def test_small_batches_give_the_same_starts(problem, started, monkeypatch):

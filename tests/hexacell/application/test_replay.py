@@ -70,7 +70,7 @@ async def test_a_run_that_followed_a_list_is_the_same_without_the_list(make_cell
     for number, (x, y, z) in enumerate(points, start=1):
         for n in range(1, 13):
             turned = [0.0] * 3
-            turned[n % 3] = 0.2 * n * (n - 1)
+            turned[n % 3] = 0.3 * n * (n - 1)
             rows.append(",".join(map(str, (number, n, x, y, z, *turned))))
     listed.write_text("\n".join(rows) + "\n")
     gauges = [gauge.model_copy(update={"travel_mm": 130.0}) for gauge in make_cell().settings.gauges]

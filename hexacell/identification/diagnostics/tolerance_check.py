@@ -37,9 +37,12 @@ STEP = 1e-4
 LARGEST_TURN = 0.2
 """Between the drawing's frames and the machine's, rad; tolerances that allow more are no tolerances."""
 
-ROUNDS = 10
-CONVERGED = 1e-7
-"""Largest change of the frames in the last round, rad or a share of the platform's radius."""
+SMALLEST_TURN = 1e-6
+"""Where nothing is gained any more, rad."""
+
+SMALLER = 0.25
+LEAST_GAIN = 1e-3
+"""Of the excess, by a step that counts."""
 
 EXCESS_SHARE = 1e-5
 """Of a tolerance: less is rounding."""
@@ -90,15 +93,21 @@ class _Check:
     covariance: Array
 
     def solve(self, frames: FrameTransform) -> tuple[FrameTransform, Array, Array]:
-        """The best frames, from the convention's, offset of the ball (3,), mm, and excesses (P,)."""
+        """The best frames, from the convention's, offset of the ball (3,), mm, and excesses (P,).
+
+        A step that does not lower the excess went farther than the linear programme is right: it is
+        repeated within a smaller region.
+        """
         ball: Array = np.zeros(3)
-        excess: Array = np.zeros(len(self._widths))
-        for _ in range(ROUNDS):
-            change, ball = self._programme(frames)
-            frames = frames.then(_small_change(change))
-            excess = self._excess(frames, ball)
-            if not excess.any() or np.abs(change / self._scales).max() < CONVERGED:
-                break
+        excess, reach = self._excess(frames, ball), LARGEST_TURN
+        while excess.any() and reach > SMALLEST_TURN:
+            change, offset = self._programme(frames, reach)
+            there = frames.then(_small_change(change))
+            left = self._excess(there, offset)
+            if np.sum(left / self._widths) < (1.0 - LEAST_GAIN) * np.sum(excess / self._widths):
+                frames, ball, excess = there, offset, left
+            else:
+                reach *= SMALLER
         return frames, ball, excess
 
     def violations(
@@ -122,14 +131,15 @@ class _Check:
         """Largest differences (P,) from the drawing that are not significantly outside."""
         return self._widths + SIGNIFICANT_SIGMAS * self._sigma(frames)
 
-    def _programme(self, frames: FrameTransform) -> tuple[Array, Array]:
+    def _programme(self, frames: FrameTransform, reach: float) -> tuple[Array, Array]:
         """The best small change of frames (9,), and the best offset of the ball (3,), mm.
 
         First the least excess; then, with that allowed, the largest margin to all other tolerances.
+        ``reach`` is the largest turn, rad; shifts are limited in proportion.
         """
         free = self.mechanism.frame_freedom.columns
         columns = np.hstack([self._frame_columns(frames)[:, free], self._ball_offset.T])
-        largest = np.concatenate([self._scales[free] * LARGEST_TURN, np.full(3, self.tolerances.ball_mm)])
+        largest = np.concatenate([self._scales[free] * reach, np.full(3, self.tolerances.ball_mm)])
         difference, allowed = self._difference(frames), self._allowed(frames)
         by_excess = np.diag(-np.ones_like(allowed)), 1.0 / self._widths
         excess = _best(columns, difference, allowed, largest, *by_excess)[len(largest) :]

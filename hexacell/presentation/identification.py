@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from hexacell.decision import Verdict
 from hexacell.identification.diagnostics.pose_accuracy import PoseErrors
 from hexacell.identification.diagnostics.repeatability import Repeatability
 from hexacell.identification.diagnostics.variance_components import NoiseLevel, NoiseLevels
@@ -22,6 +23,7 @@ def identification_report(assessed: Assessment) -> str:
     found = assessed.found
     parts = (
         "\n".join(wrapped(sentence) for sentence in findings(assessed)),
+        verdict_line(assessed),
         accuracy_table(assessed),
         budget_table(assessed.budget),
         _data_and_termination(found),
@@ -32,6 +34,15 @@ def identification_report(assessed: Assessment) -> str:
         correlation_lines(pair_sentences(assessed), len(assessed.correlated)),
     )
     return "\n\n".join(part for part in parts if part)
+
+
+def verdict_line(assessed: Assessment) -> str:
+    """That records of the identification alone give no verdict on the robot, and what U it would have."""
+    sentence = f"Verdict: {Verdict.NOT_EVALUATED}, as no held-out records test this model."
+    budget = assessed.budget
+    if budget is None or assessed.refused:
+        return wrapped(sentence)
+    return wrapped(f"{sentence} U at the task poses is {budget.expanded_mm:.3f} mm.")
 
 
 def accuracy_table(assessed: Assessment) -> str:

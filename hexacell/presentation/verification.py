@@ -16,13 +16,18 @@ SCALE = "The length scale is that of the encoders; it was not checked."
 
 def verification_text(verified: Verification) -> str:
     """A few lines: the verdict with its reason first."""
-    lines = [f"verdict: {verified.verdict}", *_errors(verified.accuracy), *_comparison(verified)]
-    lines += [wrapped(test.sentence, indent=2) for test in verified.tests if not test.passed]
-    if verified.tests and all(test.passed for test in verified.tests):
-        lines.append(f"  the model agrees with the records in {len(verified.tests)} tests")
+    lines = [_verdict(verified), *_errors(verified.accuracy), *_comparison(verified)]
+    lines += [f"  {wrapped(test.sentence, indent=2)}" for test in verified.tests if not test.passed]
     if verified.accuracy is not None:
         lines.append(f"  {SCALE}")
     return "\n".join(lines)
+
+
+def _verdict(verified: Verification) -> str:
+    """With the evidence, where all of it is for the model."""
+    if not verified.tests or not all(test.passed for test in verified.tests):
+        return f"verdict: {verified.verdict}"
+    return f"verdict: {verified.verdict}; the model agrees with the records in {len(verified.tests)} tests"
 
 
 def check_text(found: CheckResult) -> str:

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from hexacell.decision import Verdict
 from hexacell.experiment_design.decorrelation import DecorrelatingPose
 from hexacell.identification.diagnostics.pose_accuracy import PoseErrors
 from hexacell.identification.diagnostics.variance_components import NoiseLevels
@@ -23,6 +24,7 @@ def fit_document(assessed: Assessment) -> dict[str, Any]:
     return {
         **IdentificationResult.of(found).document(found.geometry.parameters),
         "findings": list(findings(assessed)),
+        "verdict": Verdict.NOT_EVALUATED.value,  # no held-out records
         "goodness": _goodness(found.goodness),
         "noise": _noise(assessed.noise),
         "repeatability": _repeatability(assessed),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import replace
 
 import pytest
@@ -16,8 +17,8 @@ from hexacell.measurements.records import MeasurementSet
 
 KEYS = (
     "converged termination iterations records points residual_rms_mm chi2 dof geometry sigma covariance "
-    "undetermined outliers frame parameters findings goodness noise repeatability correlated accuracy "
-    "uncertainty refused possible_causes beyond_tolerance"
+    "undetermined outliers frame parameters findings verdict goodness noise repeatability correlated "
+    "accuracy uncertainty refused possible_causes beyond_tolerance"
 )
 
 
@@ -94,3 +95,10 @@ def test_json_is_one_document_with_the_keys_programs_rely_on(fit, clean):
     captured = fit(clean, "--json")
     document = json.loads(captured.out)
     assert list(document) == KEYS.split()
+
+
+def test_a_fit_gives_no_verdict_on_the_robot_but_the_uncertainty_of_one(clean, fit):
+    said = " ".join(fit(clean).out.split())
+    assert "Verdict: not evaluated, as no held-out records test this model." in said
+    assert re.search(r"U at the task poses is \d\.\d{3} mm\.", said)
+    assert json.loads(fit(clean, "--json").out)["verdict"] == "not evaluated"

@@ -293,6 +293,7 @@ def test_pairs_are_named_with_the_measurement_that_separates_them(good):
 def test_the_document_is_json_and_has_the_findings(good):
     document = json.loads(json.dumps(fit_document(good), allow_nan=False))
     assert document["findings"] == list(findings(good))
+    assert document["verdict"] == "not evaluated"
     assert document["goodness"]["agreement"] == "agrees"
     assert document["goodness"]["expected_chi2"] == pytest.approx(document["dof"], abs=0.1)
     assert document["noise"]["encoder_mm"]["stated"] == 0.01

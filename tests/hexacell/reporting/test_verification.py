@@ -157,7 +157,7 @@ def test_the_outcome_says_what_was_used_the_error_and_the_verdict(cell, result, 
     )
     assert line.endswith(" mm (limit 0.15): pass")
     text = verification_text(verified)
-    assert text.splitlines()[0] == "verdict: pass"
+    assert text.splitlines()[0] == "verdict: pass; the model agrees with the records in 7 tests"
     assert len(text.splitlines()) <= 6
     assert max(map(len, text.splitlines())) <= 80
 

@@ -18,10 +18,12 @@ CELL = "simulated-hexaglide.toml"
 # Fewer records and wide limits, on a cell that lives fast.
 QUICK = (
     ("clock_factor = 50.0", "clock_factor = 200.0\ngive_up_s = 2000.0"),
-    ("orientations = 11", "orientations = 5"),
+    ("orientations = 11", "orientations = 7"),
     ("orientations = 6", "orientations = 2"),
     ("position_mm = 0.15 ", "position_mm = 20.0"),
     ("orientation_deg = 0.05", "orientation_deg = 5.0"),
+    # From so few records the held-out ones are predicted less well than their covariance says.
+    ("encoder_mm = 0.01\ngauge_mm = 0.01", "encoder_mm = 0.014\ngauge_mm = 0.014"),
 )
 
 

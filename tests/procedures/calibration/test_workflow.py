@@ -3,25 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from itertools import pairwise
 from types import SimpleNamespace
 from typing import Any
 
-import numpy as np
 import pytest
 
 from hexacell.campaign import planner as module
-from hexacell.campaign import pose_chooser
 from hexacell.campaign.decisions import MeasurePose
 from hexacell.campaign.stopping_rules import REFUSALS
 from hexacell.decision import Verdict
 from hexacell.errors import LimitError
 from hexacell.kinematics.pose import Pose
-from hexacell.motion.paths import find_route
 from hexacell.reporting.verification import Verification
 from procedures.calibration import path_planning
 from procedures.calibration.identification_steps import IdentificationSteps
-from procedures.calibration.workflow import Mode, expected_records
+from procedures.calibration.workflow import Mode
 from procedures.run import events
 from procedures.run.state import fold
 from procedures.run.steps import Compute, Move, Phase, Place, Sample
@@ -67,6 +63,11 @@ def told(story) -> dict[str, list[events.Event]]:
     stages["committed"] = [*stages["before"], PROPOSED, COMMITTED]
     stages["after"] = [*stages["committed"], *sets(Phase.AFTER, HELD_OUT)]
     return stages
+
+
+def refused_at_a_pose(told_of: Any) -> list[events.Event]:
+    """The set of a story up to its second pose, at which the ball is outside the travel."""
+    return [*told_of.whole(1)[:3], told_of.arrived(2), told_of.refused()]
 
 
 Table = dict[str, tuple[Callable[[Any, Any], list[events.Event]], str | None]]
@@ -144,30 +145,17 @@ TABLE: Table = {
         "locate",
     ),
     "refused at a pose afterwards": (
-        lambda s, t: [
-            *t["committed"],
-            *s(Phase.AFTER).whole(1)[:3],
-            s(Phase.AFTER).arrived(2),
-            s(Phase.AFTER).refused(),
-        ],
+        lambda s, t: [*t["committed"], *refused_at_a_pose(s(Phase.AFTER))],
         "after-V1/o01/move",
     ),
     "back at the reference afterwards": (
-        lambda s, t: [
-            *t["committed"],
-            *s(Phase.AFTER).whole(1)[:3],
-            s(Phase.AFTER).arrived(2),
-            s(Phase.AFTER).refused(),
-            s(Phase.AFTER).arrived(1),
-        ],
+        lambda s, t: [*t["committed"], *refused_at_a_pose(s(Phase.AFTER)), s(Phase.AFTER).arrived(1)],
         "judge",
     ),
     "refused again on the way back": (
         lambda s, t: [
             *t["committed"],
-            *s(Phase.AFTER).whole(1)[:3],
-            s(Phase.AFTER).arrived(2),
-            s(Phase.AFTER).refused(),
+            *refused_at_a_pose(s(Phase.AFTER)),
             s(Phase.AFTER).refused(1),
             LOCATED,
         ],
@@ -307,120 +295,3 @@ def test_a_held_out_pose_outside_the_travel_ends_the_run_before_anything_is_writ
     refused = [*told["identified"], *story(Phase.BEFORE).whole(1)[:3], story(Phase.BEFORE).refused()]
     with pytest.raises(LimitError, match="before-V1: the ball left the gauges' travel"):
         make_rig().calibration.next_step(fold(refused))
-
-
-def test_a_chosen_pose_keeps_the_ball_inside_the_travel_and_gains_information(recording) -> None:
-    moves = [event.step for event in recording.history if isinstance(event, events.StepBegun)]
-    chosen = [step for step in moves if isinstance(step, Move) and step.expected]
-    assert len(chosen) == POINTS * (ORIENTATIONS - 1)
-    for step in chosen:
-        assert step.expected is not None
-        reach = np.abs(step.expected.deviation_mm) + 3.0 * np.array(step.expected.sigma_mm)
-        assert reach.max() <= 0.9 * 5.0
-        assert step.expected.gain > 0.0
-
-
-def test_measured_deviations_agree_with_the_expected_ones(recording) -> None:
-    """Expected and measured deviations differ by a few sigma at most, over the whole run."""
-    expected = {
-        (event.step.at, event.step.orientation): event.step.expected
-        for event in recording.history
-        if isinstance(event, events.StepBegun) and isinstance(event.step, Move) and event.step.expected
-    }
-    wrong_by = [
-        np.abs(np.subtract(event.deviation_mm, expected[event.at, event.orientation].deviation_mm))
-        / expected[event.at, event.orientation].sigma_mm
-        for event in recording.history
-        if isinstance(event, events.RecordTaken) and (event.at, event.orientation) in expected
-    ]
-    assert np.max(wrong_by) < 5.0
-    assert np.median(wrong_by) < 1.5
-
-
-def test_the_next_step_depends_on_the_state_only(recording, make_rig) -> None:
-    """A resumed run chooses the same steps as an uninterrupted one."""
-    history = recording.history
-    places = [n for n, event in enumerate(history) if isinstance(event, events.StepBegun)]
-    calibration = make_rig().calibration
-    for place in places[3::9]:
-        event = history[place]
-        assert isinstance(event, events.StepBegun)
-        assert calibration.next_step(fold(history[:place])) == event.step
-
-
-def test_after_a_refusal_another_pose_is_chosen(recording, make_rig) -> None:
-    sampled = recording.until(events.RecordTaken, count=6)
-    calibration = make_rig().calibration
-    first = calibration.next_step(fold(sampled))
-    assert isinstance(first, Move)
-    arrived = events.Arrived(at=first.at, orientation=first.orientation, pose=first.pose)
-    refused = events.RecordRejected(at=first.at, orientation=first.orientation, reason="outside")
-    second = calibration.next_step(fold([*sampled, arrived, refused]))
-    assert isinstance(second, Move)
-    assert second.key == first.key
-    assert second.pose != first.pose
-
-
-def test_the_path_after_a_refusal_begins_at_the_present_pose(recording, make_rig, monkeypatch) -> None:
-    """Not at the last record: the refused pose is where the straight lines start that are checked."""
-    starts: list[Any] = []
-
-    def spy(belief: Any, start: Any, *others: Any) -> Any:
-        starts.append(start.pose(0).as_tuple())
-        return find_route(belief, start, *others)
-
-    monkeypatch.setattr(pose_chooser, "find_route", spy)
-    sampled = recording.until(events.RecordTaken, count=4)
-    refused_at = (101.0, -99.0, 502.0, 4.0, -3.0, 2.0)
-    key = sampled[-1].at
-    happened = [
-        *sampled,
-        events.Arrived(at=key, orientation=5, pose=refused_at),
-        events.RecordRejected(at=key, orientation=5, reason="outside"),
-    ]
-    make_rig().calibration.next_step(fold(happened))
-    assert starts[0] == pytest.approx(refused_at)
-
-
-def _passes(step: Any, following: Any) -> bool:
-    """Whether a step is a move to a pose on the way back, where nothing is measured."""
-    return isinstance(step, Move) and isinstance(following, Move)
-
-
-@pytest.mark.parametrize(("mode", "seen"), [(Mode.OPTIMISE, 40), (Mode.CHECK, 42)])
-def test_the_number_of_expected_records(make_rig, mode: Mode, seen: int) -> None:
-    assert expected_records(make_rig(mode).cell.settings, mode) == seen
-
-
-def test_a_run_takes_the_expected_number_of_records(recording, make_rig) -> None:
-    came = sum(isinstance(event, events.RecordTaken | events.SetClosed) for event in recording.history)
-    assert came == expected_records(make_rig().cell.settings, Mode.OPTIMISE)
-
-
-def test_the_steps_of_a_whole_run_in_their_order(recording) -> None:
-    begun = [event.step for event in recording.history if isinstance(event, events.StepBegun)]
-    keys = [
-        step.key for step, following in pairwise([*begun, None]) if step and not _passes(step, following)
-    ]
-
-    def of_set(name: str, orientations: int) -> list[str]:
-        rest = [
-            f"{name}/o{n:02d}/{what}" for n in range(2, orientations + 1) for what in ("move", "sample")
-        ]
-        begin = [f"{name}/o01/move", f"{name}/place", f"{name}/o01/sample"]
-        return [*begin, *rest, f"{name}/o01/move", f"{name}/close"]
-
-    assert keys == [
-        "locate",
-        *of_set("P1", ORIENTATIONS),
-        *of_set("P2", ORIENTATIONS),
-        "identify",
-        *of_set("before-V1", HELD_OUT),
-        *of_set("before-V2", HELD_OUT),
-        "propose",
-        "commit",
-        "locate",
-        *of_set("after-V1", 2 * HELD_OUT - 1),
-        *of_set("after-V2", 2 * HELD_OUT - 1),
-        "judge",
-    ]

@@ -126,10 +126,9 @@ def _small_change(after: Geometry, before: Geometry, largest_change_mm: float) -
 
 @dataclass(frozen=True, slots=True)
 class DeviationStatistics:
-    """Mean and largest distance of the ball from its point's reference, mm, over a number of poses."""
+    """Mean distance of the ball from its point's reference, mm, over a number of poses."""
 
     mean_mm: float
-    largest_mm: float
     poses: int
 
     @classmethod
@@ -138,7 +137,7 @@ class DeviationStatistics:
         distances: Array = np.linalg.norm(np.reshape(np.asarray(deviations, dtype=float), (-1, 3)), axis=-1)
         if not len(distances) or not np.isfinite(distances).all():
             return None
-        return cls(float(distances.mean()), float(distances.max()), len(distances))
+        return cls(float(distances.mean()), len(distances))
 
 
 def is_worse(before: DeviationStatistics, after: DeviationStatistics, noise: Noise) -> bool:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import datetime
 from pathlib import Path
 
 from hexacell.campaign.task_accuracy import Task
@@ -18,7 +19,7 @@ from hexacell.runs.run_folder import RunFolder, runs_folder
 from hexacell.stated_effects import stated_effects
 from procedures.calibration.workflow import Calibration, Mode
 from procedures.journal.journal import read_entries
-from procedures.journal.line_format import Entry
+from procedures.run import events
 from procedures.run.state import RunState, fold
 
 
@@ -33,12 +34,19 @@ def last_accepted_result(cell: Cell) -> AcceptedResult | None:
     written = fingerprint(cell.config_path)
     folder = runs_folder(cell)
     paths = sorted(folder.iterdir()) if folder.is_dir() else []
-    histories = {path: _accepted(path) for path in paths if _wrote(path, written)}
-    accepted = {path: entries for path, entries in histories.items() if entries}
-    if not accepted:
-        return None
-    newest = max(accepted, key=lambda path: accepted[path][-1].at)
-    return _result(cell, newest, accepted[newest])
+    found = (_accepted(path) for path in paths if _wrote(path, written))
+    newest = max((one for one in found if one is not None), key=lambda one: one.at, default=None)
+    return None if newest is None else _result(cell, newest)
+
+
+@dataclass(frozen=True, slots=True)
+class _AcceptedRun:
+    """A run whose result stayed in the controller, and when it ended."""
+
+    path: Path
+    at: datetime
+    state: RunState
+    identified: events.Identified
 
 
 def _wrote(path: Path, sha256: str) -> bool:
@@ -49,13 +57,16 @@ def _wrote(path: Path, sha256: str) -> bool:
         return False
 
 
-def _accepted(path: Path) -> Sequence[Entry]:
-    """The journal of a run whose result stayed in the controller; nothing of any other."""
+def _accepted(path: Path) -> _AcceptedRun | None:
+    """A run, if its result stayed in the controller."""
     try:
         entries = read_entries(RunFolder(path).journal)
     except HexacellError:
-        return ()
-    return entries if _is_accepted(fold(entry.event for entry in entries)) else ()
+        return None
+    state = fold(entry.event for entry in entries)
+    if state.identified is None or not _is_accepted(state):
+        return None
+    return _AcceptedRun(path, entries[-1].at, state, state.identified)
 
 
 def _is_accepted(state: RunState) -> bool:
@@ -63,7 +74,7 @@ def _is_accepted(state: RunState) -> bool:
 
     Where the model did not hold, nothing is known of the geometry, whoever kept it.
     """
-    if state.judged is None or state.identified is None or state.rolled_back or state.rolling_back:
+    if state.judged is None or state.rolled_back or state.rolling_back:
         return False
     if state.judged.verdict is Verdict.PASS:
         return True
@@ -72,14 +83,12 @@ def _is_accepted(state: RunState) -> bool:
     return holds and state.accepted is not None and state.accepted.by is not None
 
 
-def _result(cell: Cell, path: Path, entries: Sequence[Entry]) -> AcceptedResult:
-    state = fold(entry.event for entry in entries)
-    assert state.identified is not None  # noqa: S101 - it is accepted
+def _result(cell: Cell, accepted: _AcceptedRun) -> AcceptedResult:
     return AcceptedResult(
-        run=str(path),
-        at=entries[-1].at,
-        covariance=state.identified.result.covariance,
-        effects=_effects(cell, state),
+        run=str(accepted.path),
+        at=accepted.at,
+        covariance=accepted.identified.result.covariance,
+        effects=_effects(cell, accepted.state),
     )
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 
 from hexacell.decision import Verdict
-from hexacell.identification.diagnostics.tolerance_check import SIGNIFICANT_SIGMAS
 from hexacell.presentation.layout import wrapped
 from hexacell.reporting.check_result import CheckResult
 from hexacell.reporting.result import AcceptedResult
@@ -48,15 +47,15 @@ def check_start_text(accepted: AcceptedResult | None) -> str:
 
 
 def _drift(found: CheckResult) -> list[str]:
-    """The parameter that has changed most, by its standard deviation, if that is significant."""
-    worst = max(found.changes, key=lambda one: abs(one.change) / one.sigma, default=None)
-    if found.earlier_at is None or worst is None:
+    """The parameter that has changed most, if that is significant."""
+    if found.earlier_at is None or not found.changes:
         return []
-    if abs(worst.change) < SIGNIFICANT_SIGMAS * worst.sigma:
-        unchanged = f"  no parameter has changed significantly since {found.earlier_at:%Y-%m-%d}"
-        return [unchanged] if found.verdict is Verdict.PASS else []
-    change = f"{worst.name} by {worst.change:+.3f} {worst.unit} (sigma {worst.sigma:.3f})"
-    return [f"  changed most since {found.earlier_at:%Y-%m-%d}: {change}"]
+    most, since = found.significant_change, f"{found.earlier_at:%Y-%m-%d}"
+    if most is not None:
+        change = f"{most.name} by {most.change:+.3f} {most.unit} (sigma {most.sigma:.3f})"
+        return [f"  changed most since {since}: {change}"]
+    unchanged = f"  no parameter has changed significantly since {since}"
+    return [unchanged] if found.verdict is Verdict.PASS else []
 
 
 def _errors(accuracy: VerifiedAccuracy | None) -> list[str]:

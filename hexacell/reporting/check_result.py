@@ -12,6 +12,7 @@ from hexacell.campaign.check_statement import CheckStatement
 from hexacell.campaign.recursive_estimator import OnlineEstimate
 from hexacell.cell.fields import Frozen
 from hexacell.decision import Verdict
+from hexacell.identification.diagnostics.tolerance_check import SIGNIFICANT_SIGMAS
 from hexacell.measurements.records import MeasurementSet
 from hexacell.reporting.result import AcceptedResult
 from hexacell.reporting.verification import JudgedError, VerifiedAccuracy, outcome_of
@@ -25,6 +26,11 @@ class ParameterChange(Frozen):
     unit: str
     change: float
     sigma: float
+
+    @property
+    def significance(self) -> float:
+        """The change in standard deviations."""
+        return abs(self.change) / self.sigma
 
 
 class CheckResult(Frozen):
@@ -49,6 +55,12 @@ class CheckResult(Frozen):
     earlier_at: datetime | None = None
     drift_scale: float | None = None
     changes: tuple[ParameterChange, ...] = ()
+
+    @property
+    def significant_change(self) -> ParameterChange | None:
+        """The most significant change; none where all may be chance."""
+        most = max(self.changes, key=lambda one: one.significance, default=None)
+        return most if most is not None and most.significance >= SIGNIFICANT_SIGMAS else None
 
 
 def check_result(

@@ -25,6 +25,7 @@ from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import load_cell
 from hexacell.decision import ErrorLimits, Verdict
 from hexacell.identification.estimator import identify
+from hexacell.kinematics.frame_derivatives import free_parameter_derivatives
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.rotations import Array
 from hexacell.robot_model import Robot, robot_of
@@ -48,6 +49,7 @@ ALLOWANCE = 1.5 / RUNS
 SHOWN = (Verdict.PASS, Verdict.FAIL, Verdict.NOT_EVALUATED)
 
 UNCHANGED, LEAST_FAVOURABLE = "unchanged", "off by limit + U, least favourable"
+CHANGED, CHANGE_MM = "every parameter changed by up to 0.1 mm", 0.1
 DRIFTED = {1.0: "drift as stated", 3.0: "3 times the drift", 10.0: "10 times the drift"}
 
 
@@ -132,6 +134,13 @@ def changes(known: Calibrated, scale: float) -> list[Array]:
     return [np.einsum("kij,kj->i", np.array(factors), one) for one in drawn]
 
 
+def random_changes(known: Calibrated) -> list[Array]:
+    """Changes of all parameters, those that the frame convention fixes as well."""
+    random, robot = np.random.default_rng(5), known.robot
+    to_free = free_parameter_derivatives(robot.mechanism, robot.commanding)
+    return [random.uniform(-CHANGE_MM, CHANGE_MM, len(to_free)) @ to_free for _ in range(RUNS)]
+
+
 def hidden_changes(known: Calibrated) -> list[Array]:
     """Changes within three sigma of the drift that make the error limit + U and show least of it.
 
@@ -184,6 +193,7 @@ def least_seen(row: Array, estimated: Array, wanted: float) -> Array | None:
 def outcomes() -> dict[str, list[Outcome]]:
     known = calibrated()
     cases = {UNCHANGED: changes(known, 0.0), LEAST_FAVOURABLE: hidden_changes(known)}
+    cases[CHANGED] = random_changes(known)
     cases |= {name: changes(known, scale) for scale, name in DRIFTED.items()}
     jobs = [(known, change, number) for case in cases.values() for number, change in enumerate(case)]
     with ProcessPoolExecutor(mp_context=get_context("fork")) as pool:
@@ -231,6 +241,13 @@ def test_robots_beyond_limit_and_uncertainty_do_not_pass(outcomes, say):
     found = outcomes[LEAST_FAVOURABLE]
     say("robots off by limit + U pass", f"{100 * passes(found):.1f} %", "at most 1 %")
     assert passes(found) <= 0.01 + ALLOWANCE
+
+
+def test_robots_that_changed_beyond_the_limit_do_not_pass(outcomes, say):
+    found = outcomes[CHANGED]
+    false = [one for one in found if one.verdict is Verdict.PASS and one.true_mm > LIMIT_MM]
+    say("robots changed by up to 0.1 mm pass falsely", f"{len(false)} of {len(found)}", "at most 1 %")
+    assert len(false) <= (0.01 + ALLOWANCE) * len(found)
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,60 @@
+"""Robots built as their drawing allows, and robots that are not: how many are refused.
+
+``BUILT`` in the environment says how many robots are drawn in each case.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from hexacell.cell.bundled import bundled_config
+from hexacell.cell.loader import load_cell
+from hexacell.identification.diagnostics.tolerance_check import tolerance_violations
+from hexacell.identification.problem.problem import Tolerances
+from hexacell.identification.solver.levenberg_marquardt import Termination
+from hexacell.identification.solver.result import GeometryEstimate
+from hexacell.kinematics.geometry import Geometry
+from hexacell.robot_model import robot_of
+from hexacell.virtual_robot import random_robot
+
+Say = Callable[[str, str, str], None]
+
+pytestmark = pytest.mark.benchmark
+
+BUILT = int(os.environ.get("BUILT", "300"))
+ROBOT = robot_of(load_cell(bundled_config("simulated-hexaglide")))
+MECHANISM, DRAWING = ROBOT.mechanism, ROBOT.drawing
+THREE_MM = Tolerances({"S": 3.0, "B": 3.0, "l": 3.0})
+
+
+def is_refused(built: Geometry, tolerances: Tolerances) -> bool:
+    """Of a geometry that is known exactly."""
+    normal = MECHANISM.normalize_frames(built)[0]
+    exact = GeometryEstimate(normal, np.zeros((len(built.vector),) * 2), Termination.STEP, ())
+    return bool(tolerance_violations(exact, MECHANISM, DRAWING, tolerances))
+
+
+@pytest.mark.parametrize("ball_mm", [0.0, 35.0])
+def test_healthy_robots_are_not_refused(say: Say, ball_mm: float) -> None:
+    tolerances = replace(THREE_MM, ball_mm=ball_mm)
+    drawn = [random_robot(MECHANISM, DRAWING, tolerances, np.random.default_rng(n)) for n in range(BUILT)]
+    refused = sum(is_refused(robot, tolerances) for robot in drawn)
+    say(f"healthy robots refused, ball_mm = {ball_mm:g}", f"{refused} of {BUILT}", "none")
+    assert refused == 0
+
+
+def test_robots_with_one_coordinate_twice_as_far_out_are_refused(say: Say) -> None:
+    refused = 0
+    for number in range(BUILT):
+        random = np.random.default_rng([1, number])
+        built = DRAWING.vector + random.uniform(-3.0, 3.0, len(DRAWING.vector))
+        wrong = random.integers(len(built))
+        built[wrong] = DRAWING.vector[wrong] + random.choice([-6.0, 6.0])
+        refused += is_refused(Geometry(MECHANISM.parameters, built), THREE_MM)
+    say("robots with one coordinate at 6 of 3 mm refused", f"{refused} of {BUILT}", "at least 90 %")
+    assert refused >= 0.9 * BUILT

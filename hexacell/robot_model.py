@@ -25,6 +25,9 @@ from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.sensitivity import singularity_margin
 from hexacell.measurements.records import MeasurementSet
 from hexacell.plugins import Group, load
+from hexacell.stated_effects import stated_effects
+from hexacell.uncertainty.effects import Effect
+from hexacell.uncertainty.record_effects import RecordEffects
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,6 +48,7 @@ class Robot:
         earlier: geometries that may have commanded older records: the drawing, the taught one, and those
             that the controller had before in the same run.
         work_frame: the axes of the controller's base frame about which a work frame can be taught.
+        effects: systematic ones, as they are stated of the machine.
     """
 
     mechanism: Mechanism
@@ -61,6 +65,7 @@ class Robot:
     taught: Geometry | None = None
     earlier: tuple[CommandingGeometry, ...] = ()
     work_frame: str = "xyz"
+    effects: tuple[Effect, ...] = ()
 
     @cached_property
     def commanding(self) -> Geometry:
@@ -95,6 +100,7 @@ class Robot:
             noise=self.noise,
             provisional=self.provisional,
             earlier=self.earlier,
+            systematic=RecordEffects(self.effects),
         )
 
     def belief(self, identified: Identification | None = None) -> RobotBelief:
@@ -231,4 +237,5 @@ def make_robot(
         taught=taught,
         earlier=(drawn,) if taught is None else (drawn, CommandingGeometry.of(mechanism, taught)),
         work_frame=settings.task.work_frame,
+        effects=stated_effects(settings),
     )

@@ -16,7 +16,6 @@ from hexacell.identification.estimator import identify
 from hexacell.reporting.result import AcceptedResult
 from hexacell.robot_model import robot_of_start
 from hexacell.runs.run_folder import RunFolder, runs_folder
-from hexacell.stated_effects import stated_effects
 from procedures.calibration.workflow import Calibration, Mode
 from procedures.journal.journal import read_entries
 from procedures.run import events
@@ -95,11 +94,13 @@ def _result(cell: Cell, accepted: _AcceptedRun) -> AcceptedResult:
 def _effects(cell: Cell, state: RunState) -> dict[str, tuple[tuple[float, ...], ...]]:
     """What the systematic effects, as the cell file has them now, did to the result."""
     settings = cell.settings
-    effects = [one for one in stated_effects(settings, state.temperature_range_k) if one.size]
-    if not effects or state.started is None:
+    if state.started is None:
         return {}
     start = robot_of_start(settings, state.started.controller, state.started.branch, state.started.taught)
     robot = Calibration(settings, start, Mode.OPTIMISE).robot_of(state)
+    effects = [one for one in robot.effects if one.size]
+    if not effects:
+        return {}
     found = identify(robot.problem(state.measurements()))
     belief = robot.belief(found)
     budget = Task.of(settings, robot, belief).budget(found, belief, effects)

@@ -23,7 +23,6 @@ from hexacell.identification.problem.data_requirements import is_determined
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.pose import Pose
 from hexacell.measurements.records import MeasurementSet
-from hexacell.stated_effects import stated_effects
 from hexacell.uncertainty.budget import UncertaintyBudget
 from hexacell.virtual_robot import VirtualRobot, robots_within_tolerances
 
@@ -181,7 +180,7 @@ def _carry_out(plan: Plan, truth: Geometry, number: int) -> _Outcome | None:
     found = estimate.identification
     if found is None or not is_determined(found.problem):
         return None
-    budget = plan.task.budget(found, estimate.belief, stated_effects(plan.settings))
+    budget = plan.task.budget(found, estimate.belief, plan.robot.effects)
     return _Outcome(campaign, forecast, budget)
 
 

@@ -22,7 +22,6 @@ from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.pose import Pose
 from hexacell.measurements.records import MeasurementSet
 from hexacell.robot_model import Robot
-from hexacell.stated_effects import stated_effects
 from hexacell.uncertainty.budget import UncertaintyBudget
 from hexacell.uncertainty.possible_causes import PossibleCause, possible_causes
 
@@ -86,13 +85,8 @@ def assess(
     robot: Robot,
     measurements: MeasurementSet,
     found: Identification,
-    *,
-    temperature_range_k: float | None = None,
 ) -> Assessment:
-    """Check an identification of some measurements, and predict the accuracy with it.
-
-    ``temperature_range_k`` is that of the temperatures read while measuring; none without thermometers.
-    """
+    """Check an identification of some measurements, and predict the accuracy with it."""
     left_out = {record for record, _ in found.left_out}
     belief = robot.belief(found)
     task = Task.of(settings, robot, belief)
@@ -107,7 +101,7 @@ def assess(
         task=tuple(robot.to_command(task.poses.pose(row)) for row in range(len(task.poses))),
         task_named=bool(settings.task.poses),
         accuracy=accuracy and replace(accuracy, after=accuracy.after.times(found.goodness.noise_factor)),
-        budget=task.budget(found, belief, stated_effects(settings, temperature_range_k)),
+        budget=task.budget(found, belief, robot.effects),
         tolerance_violations=robot.tolerance_violations(found.estimate),
         possible_causes=possible_causes(found) if _is_doubtful(found) else (),
     )

@@ -77,7 +77,7 @@ class IdentificationResult(Frozen):
             records=found.records,
             points=found.points,
             residual_rms_mm=found.residual_rms_mm,
-            chi2=found.chi2,
+            chi2=found.goodness.chi2,
             dof=found.dof,
             geometry=parameters.document(found.geometry.vector),
             sigma=parameters.document(found.sigma),

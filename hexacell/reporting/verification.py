@@ -11,6 +11,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from hexacell.acceptance import DeviationStatistics, is_worse
 from hexacell.campaign.task_accuracy import Task
 from hexacell.cell.fields import Frozen, SixNumbers
@@ -22,7 +24,6 @@ from hexacell.identification.solver.result import Identification
 from hexacell.measurements.records import MeasurementSet
 from hexacell.reporting.result import IdentificationResult
 from hexacell.robot_model import Robot
-from hexacell.stated_effects import stated_effects
 from hexacell.uncertainty.statement import LargestError
 
 
@@ -94,14 +95,12 @@ class HeldOut:
         before: deviations (n, 3), mm, with the old geometry.
         after: with the new one, at the same poses.
         left_travel: whether the ball left the gauges' travel with the new geometry.
-        temperature_range_k: of the temperatures read during the run; none without thermometers.
     """
 
     records: MeasurementSet
     before: Sequence[tuple[float, float, float]]
     after: Sequence[tuple[float, float, float]]
     left_travel: bool = False
-    temperature_range_k: float | None = None
 
 
 def verify(settings: CellSettings, robot: Robot, found: Identification, held_out: HeldOut) -> Verification:
@@ -117,7 +116,7 @@ def verify(settings: CellSettings, robot: Robot, found: Identification, held_out
         return Verification(verdict=Verdict.NOT_EVALUATED)
     updated = update(found, robot.problem(held_out.records))
     tests = model_tests(found, updated)
-    accuracy = verified_accuracy(settings, robot, found, updated, held_out.temperature_range_k)
+    accuracy = verified_accuracy(settings, robot, found, updated)
     worse = is_worse(before, after, robot.noise)
     return Verification(
         verdict=_verdict(tests, accuracy, worse=worse),
@@ -175,11 +174,11 @@ def _reason(verified: Verification) -> str:
 def model_tests(found: Identification, updated: Identification) -> tuple[ModelTest, ...]:
     """The tests of an identification; ``updated`` contains the held-out records as well."""
     points = leave_one_point_out(found)
+    held_out = ~np.isin(updated.problem.labels[:, 0], found.problem.labels[:, 0])
+    predicted = prediction_test(updated, held_out)
     return (
         _residual_test(found.goodness),
-        _prediction_test(
-            "held-out records", prediction_test(updated), "The held-out records", SMALLEST_PROBABILITY
-        ),
+        _prediction_test("held-out records", predicted, "The held-out records", SMALLEST_PROBABILITY),
         *(
             _prediction_test(
                 f"point {one.point} from the others",
@@ -197,14 +196,11 @@ def verified_accuracy(
     robot: Robot,
     found: Identification,
     updated: Identification,
-    temperature_range_k: float | None = None,
 ) -> VerifiedAccuracy | None:
     """The error that the geometry of ``found`` makes at the task poses, by the updated estimate."""
     belief = robot.belief(updated)
     task = Task.of(settings, robot, belief).reachable(belief)
-    effects = stated_effects(settings, temperature_range_k)
-    first = task.budget(found, robot.belief(found), effects)
-    budget = first and task.budget(updated, belief, effects, earlier=first.parameter_columns)
+    budget = task.budget(updated, belief, robot.effects)
     if budget is None:
         return None
     errors = budget.errors_of(found.free - updated.free)

@@ -28,6 +28,7 @@ from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.parameters import LEGS, MachinePart
 from hexacell.kinematics.rotations import Array, skew
 from hexacell.uncertainty.effects import Effect, Placement, Readings
+from hexacell.uncertainty.record_effects import errors_of_records
 
 SMALLEST_REMAINDER = 1e-4
 """Of the square of a direction of Z, that stations and parameters must leave: the rest is rounding."""
@@ -45,7 +46,7 @@ class ExcessTest:
 
     def share_of_gain(self, gain: float, unknowns: int) -> float:
         """The share (0 to 1) that a decrease of the chi-square by some unknowns explains."""
-        before = self.found.goodness
+        before = self.found.noise_test
         after = ChiSquareTest(before.chi2 - gain, before.expected - unknowns)
         if before.ratio <= 1.0 or after.expected < 1.0:
             return 0.0
@@ -53,9 +54,7 @@ class ExcessTest:
 
     def by_effects(self, *effects: Effect) -> list[Array]:
         """What one unit of each cause of some effects does to the records."""
-        on_poses = [effect.on_poses(self._placement)[:, :3] for effect in effects if effect.on_poses]
-        on_readings = [effect.on_readings(self._readings) for effect in effects if effect.on_readings]
-        return [*on_poses, *on_readings]
+        return [errors_of_records(effect, self._placement, self._readings) for effect in effects]
 
     def by_encoders(self) -> list[Array]:
         """Encoders whose scale changes along them."""

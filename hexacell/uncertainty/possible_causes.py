@@ -67,7 +67,7 @@ def _of_the_records(test: ExcessTest) -> Iterator[PossibleCause]:
     """Of each kind of data fault the most likely one, if it is significant."""
     model = LinearizedModel.at_solution(test.found)
     kinds: set[type[FaultHypothesis]] = set()
-    for hypothesis in rank_hypotheses(model, test.found.goodness):
+    for hypothesis in rank_hypotheses(model, test.found.noise_test):
         if type(hypothesis) not in kinds:
             kinds.add(type(hypothesis))
             share = test.share_of_gain(hypothesis.gain, hypothesis.unknowns)

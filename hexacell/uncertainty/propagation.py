@@ -38,6 +38,7 @@ from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array
 from hexacell.uncertainty.effects import Effect, Occurrence, Placement, Readings
+from hexacell.uncertainty.record_effects import errors_of_records
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -125,7 +126,8 @@ class Propagation:
         """Errors (p, k) of the free parameters by one unit of each cause of an effect."""
         if not effect.occurrence.is_in_records:
             return np.zeros((len(self.gain), 0))
-        each: Array = np.einsum("pna,nak->pnk", self.gain, self._on_records(effect))
+        on_records = errors_of_records(effect, self.records, self.readings)
+        each: Array = np.einsum("pna,nak->pnk", self.gain, on_records)
         before = self.prior_gain @ self.earlier[effect.name] if effect.name in self.earlier else None
         if effect.occurrence is Occurrence.EVERY_STOP:
             stops = each.reshape(len(self.gain), -1)
@@ -145,7 +147,7 @@ class Propagation:
         """What one unit of every cause adds to the expected chi-square of the residuals."""
         if not effect.occurrence.is_in_records:
             return 0.0
-        errors = self._on_records(effect)
+        errors = errors_of_records(effect, self.records, self.readings)
         if effect.occurrence is Occurrence.EVERY_STOP:
             errors = _each_alone(errors)
         nothing = np.zeros(errors.shape[:2])
@@ -164,15 +166,6 @@ class Propagation:
         if effect.occurrence is Occurrence.EVERY_STOP:
             return _each_alone(errors)
         return self.frames.remove_frame_motion(self.task.poses, errors, effect.on_poses(self.workspace))
-
-    def _on_records(self, effect: Effect) -> Array:
-        """Errors (n, 3, k) of the records, mm."""
-        parts: list[Array] = [np.zeros((len(self.records), 3, 0))]
-        if effect.on_poses is not None:
-            parts.append(effect.on_poses(self.records)[:, :3])
-        if effect.on_readings is not None:
-            parts.append(effect.on_readings(self.readings))
-        return np.concatenate(parts, axis=-1)
 
 
 def _placement(belief: RobotBelief, poses: PoseBatch) -> Placement:

@@ -103,7 +103,7 @@ class Calibration:
             ErrorLimits(limits.position_mm, limits.orientation_deg),
             wanted.budget_records,
             self.listed,
-            stated_effects(self.settings),
+            self.robot.effects,
             {} if accepted is None else accepted.parameter_columns,
             CANDIDATES,
         )
@@ -128,7 +128,7 @@ class Calibration:
 
     def robot_of(self, state: RunState) -> Robot:
         """The robot with all geometries that commanded the records of the identification."""
-        return self._identifying(state).robot
+        return self._at_temperatures(self._identifying(state).robot, state)
 
     def as_written(self, identified: Geometry) -> WrittenGeometry:
         """What the controller gets of a geometry in the frame convention."""
@@ -136,7 +136,11 @@ class Calibration:
 
     def written_robot(self, state: RunState) -> Robot:
         """The robot with the proposed geometry in its controller."""
-        return self._commanded_by(self._written(state)).robot
+        return self._at_temperatures(self._commanded_by(self._written(state)).robot, state)
+
+    def _at_temperatures(self, robot: Robot, state: RunState) -> Robot:
+        """The robot with the effects of the temperatures that were read while measuring."""
+        return replace(robot, effects=stated_effects(self.settings, state.temperature_range_k))
 
     def provisional_geometry(self, state: RunState) -> Geometry:
         """The estimate by now, or the provisional geometry that the run applied before an interruption.

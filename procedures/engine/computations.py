@@ -15,7 +15,6 @@ from hexacell.reporting.documents import fit_document
 from hexacell.reporting.result import IdentificationResult
 from hexacell.reporting.verification import HeldOut, outcome_line, verify
 from hexacell.runs.run_folder import RunFolder
-from hexacell.stated_effects import stated_effects
 from procedures.calibration.workflow import Calibration, Mode
 from procedures.engine.config_transactions import ConfigTransactions
 from procedures.run import events
@@ -38,13 +37,7 @@ class Computations:
         write_measurements(self.folder.measurements, measurements)
         robot = self.calibration.robot_of(state)
         identified = identify(robot.problem(measurements))
-        assessed = assess(
-            self.cell.settings,
-            robot,
-            measurements,
-            identified,
-            temperature_range_k=state.temperature_range_k,
-        )
+        assessed = assess(self.cell.settings, robot, measurements, identified)
         self.folder.write_result(fit_document(assessed))
         result = IdentificationResult.of(identified)
         return events.Identified(
@@ -86,7 +79,7 @@ class Computations:
     def _judge_check(self, state: RunState) -> events.ResultValidated:
         measurements = state.measurements()
         write_measurements(self.folder.measurements, measurements)
-        effects = stated_effects(self.cell.settings, state.temperature_range_k)
+        effects = self.calibration.robot_of(state).effects
         found = check_result(self.calibration.check, measurements, self.calibration.accepted, effects)
         return events.ResultValidated(verdict=found.verdict, line=check_line(found), check=found)
 
@@ -104,7 +97,6 @@ def _held_out(state: RunState) -> HeldOut:
         before=state.held_out(Phase.BEFORE),
         after=state.held_out(Phase.AFTER),
         left_travel=bool(state.rejections(Phase.AFTER)),
-        temperature_range_k=state.temperature_range_k,
     )
 
 

@@ -143,9 +143,9 @@ class GaugeFaultHypothesis(FaultHypothesis):
         corrected = self.trial(current)
         if corrected is None:
             return None
-        limit = current.fit.goodness.chi2 - CONFIRMED_SHARE * self.gain
+        limit = current.fit.chi2 - CONFIRMED_SHARE * self.gain
         is_proof = corrected.is_consistent or corrected.is_better_by_far_than(current)
-        return corrected if is_proof and corrected.fit.goodness.chi2 < limit else None
+        return corrected if is_proof and corrected.fit.chi2 < limit else None
 
 
 def _in_base_frame(problem: Problem, gauge_fault: GaugeFault) -> Array:

@@ -59,7 +59,7 @@ def search(current: CorrectedFit) -> CorrectedFit | None:
 def hypotheses_at_solution(current: CorrectedFit, found_before: int) -> list[FaultHypothesis]:
     """The significant hypotheses by tests around the solution, the most likely first."""
     model = LinearizedModel.at_solution(current.fit)
-    return rank_hypotheses(model, current.fit.goodness, found_before=found_before)
+    return rank_hypotheses(model, current.fit.noise_test, found_before=found_before)
 
 
 def _trials(current: CorrectedFit) -> Iterator[CorrectedFit]:

@@ -1,10 +1,14 @@
 """Tests of the model by records that it was not fitted to: held-out ones, and each point by the others.
 
-An identification with its covariance is a prior for further records. Their weighted residuals and the
-distance from that prior, both at the minimum of their sum, have the chi-square distribution of as many
-degrees of freedom as there are measured coordinates, less the unknown constants of the points: it is the
-chi-square of the records against their predicted covariance. At the same minimum the estimate contains
-both. Source: Gelb (ed.), Applied Optimal Estimation, 1974 (innovations).
+By how much more records raise the least cost is, if the model is right, distributed as the chi-square of as
+many degrees of freedom as they have measured coordinates, less the unknown constants of their points: it is
+the chi-square of these records against their covariance as predicted from the others. Both costs are
+linearized at the solution of all records, where the poses, and with them the weights, are known best. The
+systematic errors that are stated of the machine are in the covariance
+(:mod:`~hexacell.identification.solver.linear_costs`).
+
+Sources: Gelb (ed.), Applied Optimal Estimation, 1974 (innovations); Cook and Weisberg, Residuals and
+Influence in Regression, 1982 (deletion).
 """
 
 from __future__ import annotations
@@ -13,13 +17,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hexacell.identification.estimator import estimate_online
 from hexacell.identification.problem.data_requirements import is_determined
-from hexacell.identification.problem.problem import Prior, Problem
+from hexacell.identification.problem.problem import Problem
 from hexacell.identification.solver.chi_square import ChiSquareTest
 from hexacell.identification.solver.levenberg_marquardt import FINE
-from hexacell.identification.solver.regularized_fit import fit_regularized
+from hexacell.identification.solver.linear_costs import LinearCosts
 from hexacell.identification.solver.result import Identification
+from hexacell.identification.solver.singular_records import solve_around_singularities
 from hexacell.kinematics.rotations import Mask
 
 
@@ -32,39 +36,33 @@ class PointPrediction:
 
 
 def update(found: Identification, further: Problem) -> Identification:
-    """The estimate with further records; its covariance is that of both together.
-
-    Raises:
-        IdentifiabilityError: no geometry fits them.
-    """
-    prior = Prior(found.geometry, found.free, found.free_covariance)
+    """The estimate by the records of an identification and further ones, at other points."""
     solved = further.solve_poses(found.free)
-    start = replace(further, prior=prior).starting_at(found.free, solved.poses, solved.found)
-    return estimate_online(start, FINE)
+    used = found.problem.starting_at(found.free, found.poses, np.ones(found.records, dtype=bool))
+    both = used.joined(further.starting_at(found.free, solved.poses, solved.found))
+    kept, solution = solve_around_singularities(both, found.active_prior, FINE)
+    return replace(found, problem=kept, solution=solution)
 
 
-def prediction_test(updated: Identification) -> ChiSquareTest:
-    """The chi-square of the further records of :func:`update` against what was predicted of them."""
-    distance = updated.problem.prior.squared_distance(updated.free)
-    return ChiSquareTest(updated.chi2 + distance, updated.problem.coordinates)
+def prediction_test(found: Identification, rows: Mask) -> ChiSquareTest:
+    """The chi-square of some records (n,) of an identification, against what the others predict of them."""
+    costs = LinearCosts.at(found.problem, found.prediction)
+    return _prediction_test(costs, rows)
 
 
 def leave_one_point_out(found: Identification) -> tuple[PointPrediction, ...]:
-    """Each point's records predicted by the others, where those determine the geometry.
-
-    Raises:
-        IdentifiabilityError: no geometry fits some of the points.
-    """
+    """Each point's records predicted by the others, where those determine the geometry."""
+    costs = LinearCosts.at(found.problem, found.prediction)
     points = found.problem.labels[:, 0]
-    kept = ((int(point), points != point) for point in np.unique(points))
+    each = ((int(point), points == point) for point in np.unique(points))
     return tuple(
-        PointPrediction(point, prediction_test(_update_without(found, rows)))
-        for point, rows in kept
-        if is_determined(found.problem.subset(rows))
+        PointPrediction(point, _prediction_test(costs, rows))
+        for point, rows in each
+        if is_determined(found.problem.subset(~rows))
     )
 
 
-def _update_without(found: Identification, rows: Mask) -> Identification:
-    """The estimate from some records, updated with the others."""
-    solved = found.problem.starting_at(found.free, found.poses)
-    return update(fit_regularized(solved.subset(rows)), solved.subset(~rows))
+def _prediction_test(costs: LinearCosts, rows: Mask) -> ChiSquareTest:
+    every = np.ones(len(rows), dtype=bool)
+    coordinates = costs.problem.subset(rows).coordinates
+    return ChiSquareTest(costs.least(every) - costs.least(~rows), coordinates)

@@ -91,6 +91,16 @@ class CommandedPoses:
     def __getitem__(self, rows: Mask | NDArray[np.intp]) -> CommandedPoses:
         return replace(self, poses=self.poses[rows], choice=self.choice[rows], joints=self.joints[rows])
 
+    def joined(self, other: CommandedPoses) -> CommandedPoses:
+        """The commands of both."""
+        return replace(
+            self,
+            poses=PoseBatch.concatenate([self.poses, other.poses]),
+            candidate_geometries=(*self.candidate_geometries, *other.candidate_geometries),
+            choice=np.concatenate([self.choice, other.choice + len(self.candidate_geometries)]),
+            joints=np.concatenate([self.joints, other.joints]),
+        )
+
     def solve_poses(self, geometry: Geometry | GeometryBatch, joints: Array) -> ForwardResult:
         """Poses that close ``geometry`` at joint variables (n, 6), mm, near the commanded ones.
 

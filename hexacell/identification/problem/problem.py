@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from hexacell.errors import IdentifiabilityError
 from hexacell.identification.problem.commanded_poses import CommandedPoses, CommandingGeometry
 from hexacell.identification.problem.encoder_consistency import EncoderConsistency
+from hexacell.identification.problem.systematic_errors import SystematicModel, no_systematic_errors
 from hexacell.kinematics.forward import ForwardResult
 from hexacell.kinematics.frame_derivatives import free_parameter_derivatives
 from hexacell.kinematics.geometry import Geometry
@@ -148,6 +149,8 @@ class Problem:
         labels: (n, 2) point and orientation, counted from 1.
         gauges: (3, 3), columns: measuring directions of the gauges x, y and z in the convention's
             base frame.
+        systematic: the errors of records that are no noise. The estimate takes no account of them, the
+            tests of it do.
     """
 
     mechanism: Mechanism
@@ -162,6 +165,7 @@ class Problem:
     has_start_pose: Mask
     labels: NDArray[np.int_]
     gauges: Array
+    systematic: SystematicModel = field(default=no_systematic_errors)
 
     @property
     def basis(self) -> Array:
@@ -219,6 +223,22 @@ class Problem:
             labels=self.labels[kept],
         )
 
+    def joined(self, other: Problem) -> Problem:
+        """The problem of both sets of records, which have no point in common, from the same start."""
+        labels = np.concatenate([self.labels, other.labels])
+        order = np.argsort(labels[:, 0], kind="stable")
+        commands = self.commands.joined(other.commands)
+        return replace(
+            self,
+            joints=np.concatenate([self.joints, other.joints])[order],
+            deviations=np.concatenate([self.deviations, other.deviations])[order],
+            first_rows=_first_rows(labels[order, 0]),
+            commands=commands[order],
+            start=PoseBatch.concatenate([self.start, other.start])[order],
+            has_start_pose=np.concatenate([self.has_start_pose, other.has_start_pose])[order],
+            labels=labels[order],
+        )
+
 
 def build_problem(
     mechanism: Mechanism,
@@ -230,6 +250,7 @@ def build_problem(
     noise: Noise,
     provisional: Sequence[Geometry] = (),
     earlier: Sequence[CommandingGeometry] = (),
+    systematic: SystematicModel = no_systematic_errors,
 ) -> Problem:
     """The problem of a measurement set.
 
@@ -264,6 +285,7 @@ def build_problem(
         has_start_pose=start.found,
         labels=labels,
         gauges=change.base,
+        systematic=systematic,
     )
 
 

@@ -12,6 +12,7 @@ from hexacell.errors import IdentifiabilityError
 from hexacell.identification.problem.problem import Problem
 from hexacell.identification.solver.chi_square import ChiSquareTest
 from hexacell.identification.solver.levenberg_marquardt import Solution, Termination
+from hexacell.identification.solver.linear_costs import LinearCosts
 from hexacell.identification.solver.measurement_model import Prediction
 from hexacell.identification.solver.nuisance_parameters import NuisanceElimination
 from hexacell.kinematics.geometry import Geometry
@@ -178,10 +179,16 @@ class Identification:
         return self.problem.coordinates - len(self.free)
 
     @property
-    def goodness(self) -> ChiSquareTest:
-        """The chi-square test of the residuals."""
+    def noise_test(self) -> ChiSquareTest:
+        """The chi-square test of the residuals of a machine that has no error but the noise."""
         trace = float(np.sum(self.free_covariance * self.solution.information))
         return ChiSquareTest(self.chi2, self.problem.coordinates - trace)
+
+    @cached_property
+    def goodness(self) -> ChiSquareTest:
+        """The chi-square test of the residuals, which the stated systematic errors may enlarge."""
+        costs = LinearCosts.at(self.problem, self.prediction)
+        return self.noise_test if costs.are_of_noise else costs.residual_test(self.active_prior)
 
     @property
     def termination(self) -> Termination:

@@ -3,24 +3,33 @@
 from __future__ import annotations
 
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
 
+from hexacell.campaign.task_accuracy import Task
+from hexacell.cell.model import CellSettings
 from hexacell.cell.uncertainty import Grade
 from hexacell.decision import Verdict
 from hexacell.errors import HexacellError
+from hexacell.identification.belief import RobotBelief
 from hexacell.identification.estimator import identify
 from hexacell.identification.solver.result import GaugeFaultError, Identification
+from hexacell.measurements.records import MeasurementSet
+from hexacell.reporting.verification import HeldOut, verify
 from tests.benchmarks.worlds import budgets
 from tests.benchmarks.worlds.campaigns import Setting, UnreachableError, setting
 from tests.benchmarks.worlds.closure import CannotCloseError
 from tests.benchmarks.worlds.kinds import KINDS
-from tests.benchmarks.worlds.stating import LIMIT_MM, stated
+from tests.benchmarks.worlds.stating import LIMIT_MM
 from tests.benchmarks.worlds.world import World
 
 ROBOTS = 6
+HELD_OUT_FROM = 100
+"""Points of the held-out records, which are of no other records."""
+
+NO_LIMIT_DEG = 90.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,6 +60,7 @@ class Outcome:
         ratio: residuals over the stated noise.
         named: what data faults were said to be in the records.
         is_wrongly_named: whether one of them is not in this world.
+        failed_tests: which tests of the model failed.
     """
 
     trial: Trial
@@ -63,6 +73,7 @@ class Outcome:
     ratio: float = np.nan
     named: tuple[str, ...] = ()
     is_wrongly_named: bool = False
+    failed_tests: tuple[str, ...] = ()
     reason: str = ""
 
     @property
@@ -80,8 +91,9 @@ def carry_out(trial: Trial) -> Outcome:
     """Measure, identify, state and compare."""
     world, own = world_of(trial)
     try:
-        found = identify(own.robot.problem(world.records(own.commands, own.robot.commanding)))
-        return _judged(trial, world, found)
+        robot = replace(own.robot, effects=budgets.machine(trial.grade))
+        found = identify(robot.problem(world.records(own.commands, robot.commanding)))
+        return _judged(trial, replace(world, robot=robot), found)
     except GaugeFaultError as refused:
         wrong = refused.fault.kind not in KINDS[trial.kind].faults
         return Outcome(trial, named=(str(refused.fault.kind),), is_wrongly_named=wrong, reason=str(refused))
@@ -111,19 +123,46 @@ def settings() -> tuple[Setting, ...]:
 
 def _judged(trial: Trial, world: World, found: Identification) -> Outcome:
     own = settings()[trial.number % ROBOTS]
-    says = stated(own.cell.settings, own.robot, found, budgets.machine(trial.grade))
-    hour = world.hours(own.commands, own.robot.commanding)
-    errors = world.errors(found.geometry, says.poses, says.workspace, hour)
+    stated = settings_with_limit(trial)
+    written = world.robot.with_controller(world.robot.for_controller(found.geometry))
+    hour = world.hours(own.commands, world.robot.commanding)
+    says = verify(stated, written, found, _held_out(replace(world, robot=written), found, own, hour))
+    belief = written.belief(found)
+    task = Task.of(stated, written, belief).reachable(belief)
+    errors = world.errors(found.geometry, task.poses, task.workspace, hour)
     faults = KINDS[trial.kind].faults
+    accuracy = says.accuracy
     return Outcome(
         trial=trial,
-        verdict=says.verdict(trial.limit_mm),
+        verdict=says.verdict,
         true_mm=errors.largest_mm,
         once_mm=errors.largest_once_mm,
-        value_mm=says.error.value,
-        u_mm=says.error.expanded,
-        sigma_mm=says.sigma_mm,
+        value_mm=np.nan if accuracy is None else accuracy.position.value,
+        u_mm=np.nan if accuracy is None else accuracy.position.expanded,
+        sigma_mm=task_sigma_mm(found, belief, task),
         ratio=found.goodness.ratio,
         named=tuple(str(fault.kind) for fault in found.data_faults),
         is_wrongly_named=any(fault.kind not in faults for fault in found.data_faults),
+        failed_tests=tuple(test.name for test in says.tests if not test.passed),
     )
+
+
+def settings_with_limit(trial: Trial) -> CellSettings:
+    """The cell of a machine of some grade, with a limit on the position alone."""
+    stated = budgets.settings_of(trial.grade)
+    limits = {"position_mm": trial.limit_mm, "orientation_deg": NO_LIMIT_DEG}
+    return stated.model_copy(update={"acceptance": stated.acceptance.model_copy(update=limits)})
+
+
+def task_sigma_mm(found: Identification, belief: RobotBelief, task: Task) -> float:
+    """One standard deviation at the worst task pose, by the noise of the records."""
+    budget = task.budget(found, belief, ())
+    return np.nan if budget is None else budget.noise_mm
+
+
+def _held_out(world: World, found: Identification, own: Setting, hour: float) -> HeldOut:
+    """What the held-out poses give that are commanded with the identified geometry."""
+    records = world.records(own.held_out, found.geometry, hour).records
+    deviations = [record.deviation for record in records if record.orientation > 1]
+    moved = tuple(replace(record, point=record.point + HELD_OUT_FROM) for record in records)
+    return HeldOut(MeasurementSet(moved), deviations, deviations)

@@ -13,6 +13,7 @@ from hexacell.identification.solver.levenberg_marquardt import Termination
 from hexacell.identification.solver.result import GeometryEstimate
 from hexacell.kinematics.mechanisms.hexaglide import hexaglide_geometry
 from hexacell.robot_model import make_robot
+from hexacell.stated_effects import stated_effects
 from hexacell.virtual_robot import robots_within_tolerances
 
 TWO_POINTS = ((100.0, -100.0, 500.0), (-100.0, 100.0, 500.0))
@@ -40,7 +41,8 @@ def test_the_result_is_that_of_a_campaign(result, campaign, two_points):
 def test_systematic_effects_widen_the_expanded_uncertainty(result, make_plan):
     plan = make_plan(**SMALL)
     stated = plan.settings.model_copy(update={"uncertainty": UncertaintySettings(grade="ordinary")})
-    wider = dry_run(replace(plan, settings=stated), robots=1)
+    machine = replace(plan.robot, effects=stated_effects(stated))
+    wider = dry_run(replace(plan, settings=stated, robot=machine), robots=1)
     assert wider.records == result.records
     assert wider.worst_sigma_mm == result.worst_sigma_mm < result.expanded_mm < wider.expanded_mm
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 from hexacell.cell.bundled import bundled_config
@@ -12,6 +14,7 @@ from hexacell.presentation.uncertainty import budget_table
 from hexacell.reporting.assessment import assess
 from hexacell.reporting.documents import fit_document
 from hexacell.robot_model import make_robot
+from hexacell.stated_effects import stated_effects
 
 
 @pytest.fixture(scope="module")
@@ -21,7 +24,8 @@ def assessed_of(identified, noisy, paper):
 
     def assessed(range_k=None, **sizes):
         stated = settings.model_copy(update={"uncertainty": UncertaintySettings(**sizes)})
-        return assess(stated, robot, noisy, identified, temperature_range_k=range_k)
+        machine = replace(robot, effects=stated_effects(stated, range_k))
+        return assess(stated, machine, noisy, identified)
 
     return assessed
 

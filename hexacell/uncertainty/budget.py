@@ -5,13 +5,17 @@ lines are independent, so that their squares are added at each pose; the standar
 largest root over the poses. U is the 95 % quantile of the largest error over all task poses, as every one
 of them counts (:mod:`~hexacell.uncertainty.statement`).
 
+Where a length check measured the scale common to all encoders, what that makes at the task is known, and
+only the check's own uncertainty is left. The check errs by the noise of the estimate and by the other
+effects as well: what these do at the task, and what they do by the scale that is measured, is one line.
+
 Source: JCGM 100 (Guide to the expression of uncertainty in measurement).
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -21,7 +25,9 @@ from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array
 from hexacell.uncertainty.effects import Effect, Occurrence
+from hexacell.uncertainty.encoder_effects import COMMON_SCALE
 from hexacell.uncertainty.propagation import Propagation, compressed
+from hexacell.uncertainty.scale_observation import MeasuredScale, ScaleObservation
 from hexacell.uncertainty.statement import TaskErrors, covariance_factor
 
 TELLING_SIGMAS = 4.0
@@ -43,7 +49,7 @@ class BudgetLine:
         direct_mm: by the effect itself at the task pose.
         combined_mm: of both, which partly cancel where the effect is the same.
         per_unit_mm: the same by one unit of the effect.
-        is_visible: whether the chi-square tells of it while its error is harmless.
+        is_visible: whether a length check or the chi-square tells of it while its error is harmless.
         columns: (t, 6, k) errors at the task poses by one standard deviation of each cause, mm and rad.
         parameter_columns: (p, k) errors of the free parameters by one unit of each cause; of an effect that
             is not in the records, none.
@@ -67,11 +73,13 @@ class UncertaintyBudget:
         jacobian: (t, 6, p) of the errors by the free parameters.
         noise: (t, 6, p) errors by the noise of the readings, mm and rad, one standard deviation a column.
         lines: the systematic effects.
+        known: (t, 6) errors that a measurement of an effect tells, mm and rad.
     """
 
     jacobian: Array
     noise: Array
     lines: tuple[BudgetLine, ...]
+    known: Array
 
     @classmethod
     def of(
@@ -83,30 +91,37 @@ class UncertaintyBudget:
         task: PoseBatch,
         workspace: PoseBatch,
         earlier: Mapping[str, Array] | None = None,
+        scale: ScaleObservation | None = None,
     ) -> UncertaintyBudget:
         """The budget of an identification; its estimate reaches all task and workspace poses.
 
         An effect that the mechanism cannot have gets no line. Where the prior was an earlier estimate,
         ``earlier`` has the :attr:`parameter_columns` of that one's budget: both share constant effects.
+        ``scale`` is what a length check, with the :attr:`parameter_columns` of this budget, measured of the
+        scale common to all encoders, in the place of the size stated for it.
         """
         propagation = Propagation.of(found, belief, task=task, workspace=workspace, earlier=earlier)
-        effects = tuple(effects)
+        effects = tuple(_measured(effect, scale) for effect in effects)
+        measured = MeasuredScale.of(propagation, scale)
         covariance = found.free_covariance * found.goodness.noise_factor**2
         estimated = (effect for effect in effects if effect.is_estimated)
         for columns in (effect.size * propagation.parameter_columns(effect) for effect in estimated):
             covariance = covariance - columns @ columns.T
-        noise = propagation.jacobian @ covariance_factor(covariance)
+        factor = covariance_factor(covariance)
+        noise = propagation.jacobian @ factor + measured.by_parameters(factor)
         telling = TELLING_SIGMAS * np.sqrt(2.0 * found.goodness.expected)
         visible = telling / (HARMLESS_ERROR * _largest(noise)) ** 2
-        lines = (_line(propagation, effect, visible) for effect in effects)
-        return cls(propagation.jacobian, noise, tuple(line for line in lines if line.columns.shape[-1]))
+        lines = (_line(propagation, effect, visible, measured) for effect in effects)
+        acting = tuple(line for line in lines if line.columns.shape[-1])
+        return cls(propagation.jacobian, noise, acting, measured.known)
 
     def errors_of(self, difference: Array) -> TaskErrors:
         """The errors of a geometry whose free parameters differ by (p,) from the estimate.
 
-        They are estimated from the difference; what is not known of them is that of the estimate.
+        They are estimated from the difference, and from the scale if a length check measured it; what is
+        not known of them is that of the estimate.
         """
-        return TaskErrors(-self.jacobian @ difference, self._all)
+        return TaskErrors(self.known - self.jacobian @ difference, self._all)
 
     @property
     def parameter_columns(self) -> Mapping[str, Array]:
@@ -162,25 +177,34 @@ class UncertaintyBudget:
 
     @cached_property
     def _unknown(self) -> TaskErrors:
-        return self.errors_of(np.zeros(self.jacobian.shape[-1]))
+        return TaskErrors(np.zeros_like(self.known), self._all)
 
     @cached_property
     def _all(self) -> Array:
         return np.concatenate([self.noise, self.systematic], axis=-1)
 
 
-def _line(propagation: Propagation, effect: Effect, visible: float) -> BudgetLine:
+def _measured(effect: Effect, scale: ScaleObservation | None) -> Effect:
+    """The effect with the size that is left once it is measured."""
+    if scale is None or effect.name != COMMON_SCALE:
+        return effect
+    return replace(effect, size=scale.sigma_um_m, source="length check")
+
+
+def _line(propagation: Propagation, effect: Effect, visible: float, measured: MeasuredScale) -> BudgetLine:
     """The line of an effect, which is seen if an error comes with a chi-square of ``visible``, 1/mm^2."""
     task = propagation.columns(effect)
-    per_unit = _largest(task.combined)
+    combined = measured.combined(effect, task)
+    per_unit = _largest(combined)
+    is_measured = measured.scale is not None and effect.name == COMMON_SCALE
     return BudgetLine(
         effect=effect,
         through_mm=effect.size * _largest(task.through),
         direct_mm=effect.size * _largest(task.direct),
         combined_mm=effect.size * per_unit,
         per_unit_mm=per_unit,
-        is_visible=bool(propagation.chi_square(effect) >= visible * per_unit**2),
-        columns=effect.size * task.combined,
+        is_visible=is_measured or bool(propagation.chi_square(effect) >= visible * per_unit**2),
+        columns=effect.size * combined,
         parameter_columns=propagation.parameter_columns(effect),
     )
 

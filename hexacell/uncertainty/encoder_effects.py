@@ -8,15 +8,16 @@ from hexacell.kinematics.parameters import LEGS
 from hexacell.kinematics.rotations import Array
 from hexacell.uncertainty.effects import UM, Effect, Occurrence, Placement
 
+COMMON_SCALE = "scale common to all encoders"
+"""The effect that a length check measures."""
+
 
 def common_encoder_scale(um_per_m: float, source: str = "") -> Effect:
     """All encoders are wrong by the same share, as of a common temperature or calibration.
 
     Nothing that the gauges measure tells it from a machine that is larger by the same share.
     """
-    return Effect(
-        "scale common to all encoders", um_per_m, "um/m", Occurrence.CONSTANT, _common_scale, source=source
-    )
+    return Effect(COMMON_SCALE, um_per_m, "um/m", Occurrence.CONSTANT, _common_scale, source=source)
 
 
 def encoder_scales(um_per_m: float, source: str = "") -> Effect:

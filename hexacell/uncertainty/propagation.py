@@ -149,7 +149,7 @@ class Propagation:
             return 0.0
         errors = errors_of_records(effect, self.records, self.readings)
         if effect.occurrence is Occurrence.EVERY_STOP:
-            errors = _each_alone(errors)
+            errors = each_alone(errors)
         nothing = np.zeros(errors.shape[:2])
         rows = self.elimination.system(
             nothing, np.concatenate([self.record_jacobian, errors], axis=-1)
@@ -164,7 +164,7 @@ class Propagation:
             return np.zeros((len(self.task), 6, 0))
         errors = effect.on_poses(self.task)
         if effect.occurrence is Occurrence.EVERY_STOP:
-            return _each_alone(errors)
+            return each_alone(errors)
         return self.frames.remove_frame_motion(self.task.poses, errors, effect.on_poses(self.workspace))
 
 
@@ -173,7 +173,7 @@ def _placement(belief: RobotBelief, poses: PoseBatch) -> Placement:
     return Placement(belief.mechanism, belief.estimate, poses, joints)
 
 
-def _each_alone(errors: Array) -> Array:
+def each_alone(errors: Array) -> Array:
     """Columns (n, m, n k) in which each of n poses has causes of its own, from those (n, m, k) of each."""
     poses, rows, causes = errors.shape
     alone = np.zeros((poses, rows, poses, causes))

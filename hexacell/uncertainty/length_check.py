@@ -1,0 +1,271 @@
+"""The length check: the machine's unit of length against a certified distance.
+
+A scale error that all encoders have in common goes into the identified geometry as a machine that is larger
+by the same share. No gauge that stays at its point shows it. With the gauges mounted in two seats whose
+distance L is known, each record r has the place of its seat,
+
+    P_r - d_r = z_seat + errors,
+
+with P_r by the forward kinematics of the judged geometry at the joint variables shown. ``|z_2 - z_1|`` is
+the length by the robot; what it is longer than L shows the scale of the encoders. All errors are propagated
+to first order: noise of the readings, seating of the gauges, their alignment, covariance of the geometry,
+and systematic effects, which also moved the geometry. They give the covariance V of all records, and
+generalized least squares the places z (Aitken 1936). The weighted residuals have a chi-square distribution
+with 3 n - 6 degrees of freedom: a fixture that moved, or gauges that were zeroed in between, do not agree
+with it.
+
+How much of a scale error the geometry took up is known from the identification; without that, all of it. A
+length along which all joints move alike needs no geometry: for a Hexaglide along its rails.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from hexacell.identification.problem.problem import Noise
+from hexacell.identification.solver.chi_square import ChiSquareTest
+from hexacell.identification.solver.measurement_model import record_covariance
+from hexacell.kinematics.parameters import ParameterUnit
+from hexacell.kinematics.rotations import Array
+from hexacell.kinematics.sensitivity import position_sensitivity
+from hexacell.uncertainty.effects import Effect
+from hexacell.uncertainty.encoder_effects import COMMON_SCALE, common_encoder_scale
+from hexacell.uncertainty.length_errors import (
+    JudgedGeometry,
+    LengthError,
+    errors_by_effect,
+    errors_by_gauges,
+    shared_errors,
+)
+from hexacell.uncertainty.length_records import LengthRecords, LengthStandard
+from hexacell.uncertainty.scale_observation import ScaleObservation
+from hexacell.uncertainty.statement import covariance_factor
+
+COVERAGE_FACTOR = 2.0
+"""k of the expanded uncertainty (JCGM 100)."""
+
+HARDLY_MM2 = 0.01
+"""A sum of squared displacements below tells nothing of the direction of a gauge."""
+
+
+@dataclass(frozen=True, eq=False)
+class LengthCheck:
+    """A length by the robot, and all that is not known of it.
+
+    Attributes:
+        jacobian: (n, 3, p) of the ball's positions by the free parameters.
+        noise: (n, 3, 3) covariance of each record by the noise of its readings, mm^2.
+        errors: all other errors of the records.
+        by_effects: (n, 3, k) errors of the places by one unit of each shared cause of an effect, by name.
+        by_scale: (n, 3, 1) the same by 1 um/m of the scale common to all encoders.
+    """
+
+    records: LengthRecords
+    standard: LengthStandard
+    jacobian: Array
+    noise: Array
+    errors: tuple[LengthError, ...]
+    by_effects: Mapping[str, Array]
+    by_scale: Array
+
+    @classmethod
+    def of(
+        cls,
+        records: LengthRecords,
+        standard: LengthStandard,
+        noise: Noise,
+        judged: JudgedGeometry,
+        effects: Iterable[Effect] = (),
+    ) -> LengthCheck:
+        """The check of a judged geometry; the scale common to all encoders is none of the ``effects``."""
+        placement = records.placement
+        basis = placement.mechanism.convention.basis()
+        by_all, by_joints = position_sensitivity(
+            placement.mechanism, placement.geometry, placement.poses, placement.joints
+        )
+        jacobian = by_all @ basis
+        acting = [one for one in effects if one.occurrence.is_in_records and one.name != COMMON_SCALE]
+        shared = {one.name: shared_errors(records, jacobian, judged, one) for one in acting}
+        geometry = LengthError(
+            "covariance of the geometry", jacobian @ covariance_factor(judged.covariance), is_shared=True
+        )
+        by_effect = (error for one in acting for error in errors_by_effect(records, one, shared[one.name]))
+        errors = (geometry, *errors_by_gauges(records, standard, noise), *by_effect)
+        by_scale = shared_errors(records, jacobian, _with_scale(records, judged), common_encoder_scale(1.0))
+        noises = record_covariance(by_joints, noise)
+        return cls(records, standard, jacobian, noises, errors, shared, by_scale)
+
+    @property
+    def length_mm(self) -> float:
+        """Distance of the two places by the robot."""
+        return float(np.linalg.norm(self._between))
+
+    @property
+    def encoders_long_um_m(self) -> float:
+        """By how much the encoders show more than the certified length."""
+        return float(self._share(self.length_mm - self.standard.distance_mm))
+
+    @property
+    def expanded_um_m(self) -> float:
+        """Its expanded uncertainty U, k = 2."""
+        return COVERAGE_FACTOR * math.hypot(*self.lines.values())
+
+    @cached_property
+    def lines(self) -> Mapping[str, float]:
+        """One standard deviation by each source, um/m."""
+        lines = {**self._of_standard, "noise of the readings": self._of_noise}
+        for error in self.errors:
+            lines[error.name] = math.hypot(lines.get(error.name, 0.0), self._of(error))
+        return lines
+
+    @cached_property
+    def agreement(self) -> ChiSquareTest:
+        """Whether all records agree with two places."""
+        residuals = self.residuals.ravel()
+        chi2 = float(residuals @ np.linalg.solve(self._covariance, residuals))
+        return ChiSquareTest(chi2, float(len(residuals) - 6))
+
+    @cached_property
+    def residuals(self) -> Array:
+        """(n, 3) of the records' places less that of their seat, mm."""
+        left: Array = self.records.places - self._places[self.records.seats]
+        return left
+
+    @property
+    def closure_mm(self) -> Array:
+        """(3,) how far the first seat's place is, at its last mounting, from that at the first one."""
+        mountings = self.records.mountings
+        first = mountings == 1
+        last = mountings == mountings[self.records.seats == 0].max()
+        closure: Array = self.residuals[last].mean(axis=0) - self.residuals[first].mean(axis=0)
+        return closure
+
+    def following(self) -> Mapping[int, Array]:
+        """By mounting, how far each gauge (3,) followed the ball: 1 as far as it moved, -1 the other way.
+
+        A gauge is not a number where the ball hardly moved.
+        """
+        along = self.records.gauges
+        moved, shown = self.records.placement.poses.positions @ along, self.records.deviations @ along
+        return {
+            number: _slope(moved[rows], shown[rows])
+            for number in np.unique(self.records.mountings).tolist()
+            for rows in [self.records.mountings == number]
+        }
+
+    @property
+    def observation(self) -> ScaleObservation:
+        """What the check tells of the error that the encoders have in common, for an uncertainty budget."""
+        alone = [self._of(error) for error in self.errors if not error.is_shared]
+        alone += [*self._of_standard.values(), self._of_noise]
+        return ScaleObservation(
+            farther_um_m=-self.encoders_long_um_m,
+            sigma_um_m=float(np.linalg.norm(alone)),
+            by_parameters=-self._share(self._to_length(self.jacobian)),
+            by_effects={
+                name: -self._share(self._to_length(columns)) for name, columns in self.by_effects.items()
+            },
+        )
+
+    @property
+    def _of_standard(self) -> dict[str, float]:
+        standard = self.standard
+        return {
+            "certificate": float(self._share(standard.certificate_mm)),
+            "temperature of the fixture": standard.temperature_um_m,
+            "angle between the seats": float(self._share(standard.parallel * standard.height_mm)),
+        }
+
+    @cached_property
+    def _of_noise(self) -> float:
+        weights = self._weights
+        return float(self._share(np.sqrt(np.einsum("na,nab,nb->", weights, self.noise, weights))))
+
+    def _of(self, error: LengthError) -> float:
+        """One standard deviation of the length by a source, um/m."""
+        return float(np.linalg.norm(self._share(self._to_length(error.columns))))
+
+    def _share(self, length_mm: Array | float) -> Array:
+        """The scale error of the encoders, um/m, that would make an error of the length."""
+        return np.asarray(length_mm) / self._by_long_encoders
+
+    @cached_property
+    def _by_long_encoders(self) -> float:
+        """Error of the length, mm, by 1 um/m; the sliders move less than such encoders show."""
+        return -float(self._to_length(self.by_scale)[0])
+
+    def _to_length(self, columns: Array) -> Array:
+        """Errors (k,) of the length by errors (n, 3, k) of the places, mm."""
+        errors: Array = np.tensordot(self._weights, columns, axes=2)
+        return errors
+
+    @property
+    def _between(self) -> Array:
+        between: Array = self._places[1] - self._places[0]
+        return between
+
+    @cached_property
+    def _weights(self) -> Array:
+        """(n, 3) derivatives of the length by the places of the records."""
+        direction = self._between / np.linalg.norm(self._between)
+        weights: Array = np.einsum("a,anb->nb", direction, self._gain[1] - self._gain[0])
+        return weights
+
+    @cached_property
+    def _places(self) -> Array:
+        """(2, 3) of the seats."""
+        places: Array = np.einsum("sanb,nb->sa", self._gain, self.records.places)
+        return places
+
+    @cached_property
+    def _gain(self) -> Array:
+        """(2, 3, n, 3) from the places of the records to those of the seats."""
+        design = np.zeros((len(self.records), 3, 2, 3))
+        design[np.arange(len(self.records)), :, self.records.seats] = np.eye(3)
+        rows = design.reshape(-1, 6)
+        weighted = np.linalg.solve(self._covariance, rows)
+        gain = np.linalg.solve(rows.T @ weighted, weighted.T)
+        by_seat: Array = gain.reshape(2, 3, -1, 3)
+        return by_seat
+
+    @cached_property
+    def _covariance(self) -> Array:
+        """(3 n, 3 n) of the places of all records, mm^2."""
+        size = 3 * len(self.records)
+        covariance = np.zeros((len(self.records), 3, len(self.records), 3))
+        each = np.arange(len(self.records))
+        covariance[each, :, each] = self.noise
+        together: Array = covariance.reshape(size, size)
+        for error in self.errors:
+            columns = error.columns.reshape(size, -1)
+            together = together + columns @ columns.T
+        return together
+
+
+def _with_scale(records: LengthRecords, judged: JudgedGeometry) -> JudgedGeometry:
+    """The judged geometry; if nothing else is known, it took up all of the scale."""
+    if COMMON_SCALE in judged.parameter_columns:
+        return judged
+    placement = records.placement
+    convention = placement.mechanism.convention
+    parameters = placement.mechanism.parameters.parameters
+    is_length = [parameters[row].kind.unit is ParameterUnit.MM for row in convention.free_rows()]
+    smaller = -1e-6 * convention.free_parameters(placement.geometry) * is_length
+    columns = {**judged.parameter_columns, COMMON_SCALE: smaller[:, None]}
+    return JudgedGeometry(judged.covariance, columns)
+
+
+def _slope(moved: Array, shown: Array) -> Array:
+    """Of each gauge (3,), by positions and readings (n, 3) along them."""
+    moved, shown = moved - moved.mean(axis=0), shown - shown.mean(axis=0)
+    squares = (moved**2).sum(axis=0)
+    undefined = np.full(3, np.nan)
+    slope: Array = np.divide(
+        (moved * shown).sum(axis=0), squares, out=undefined, where=squares > HARDLY_MM2
+    )
+    return slope

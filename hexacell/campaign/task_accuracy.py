@@ -17,6 +17,7 @@ from hexacell.kinematics.rotations import Array
 from hexacell.robot_model import Robot
 from hexacell.uncertainty.budget import UncertaintyBudget
 from hexacell.uncertainty.effects import Effect
+from hexacell.uncertainty.scale_observation import ScaleObservation
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -78,17 +79,18 @@ class Task:
         belief: RobotBelief,
         effects: Iterable[Effect],
         earlier: Mapping[str, Array] | None = None,
+        scale: ScaleObservation | None = None,
     ) -> UncertaintyBudget | None:
         """What is not known of the errors; none if the estimated robot can take no task pose.
 
-        ``earlier``: see :meth:`UncertaintyBudget.of`.
+        ``earlier``, ``scale``: see :meth:`UncertaintyBudget.of`.
         """
         reached = self.reachable(belief)
         if not len(reached.poses) or not len(reached.workspace):
             return None
         poses, workspace = reached.poses, reached.workspace
         return UncertaintyBudget.of(
-            found, belief, effects, task=poses, workspace=workspace, earlier=earlier
+            found, belief, effects, task=poses, workspace=workspace, earlier=earlier, scale=scale
         )
 
     def error(self, belief: RobotBelief) -> TaskError | None:

@@ -10,6 +10,7 @@ from pydantic_core import InitErrorDetails
 
 from hexacell.cell.devices import ControllerSettings, EncoderSettings, GaugeSettings, ThermometerSettings
 from hexacell.cell.fields import Finite, GeometrySettings, NotNegative, Positive, Section, broken_rule
+from hexacell.cell.length_check import LengthCheckSettings
 from hexacell.cell.measuring import (
     AcceptanceSettings,
     CheckSettings,
@@ -66,6 +67,7 @@ class CellSettings(Section):
     verification: VerificationSettings
     acceptance: AcceptanceSettings = AcceptanceSettings()
     check: CheckSettings = CheckSettings()
+    length_check: LengthCheckSettings | None = None
     recovery: RecoverySettings = RecoverySettings()
     task: TaskSettings = TaskSettings()
     simulation: SimulationSettings | None = None
@@ -95,6 +97,19 @@ class CellSettings(Section):
         if len({thermometer.name for thermometer in thermometers}) != len(thermometers):
             raise broken_rule("two thermometers have the same name", "Give each another name")
         return thermometers
+
+    @model_validator(mode="after")
+    def _the_thermometer_of_the_fixture_exists(self) -> Self:
+        named = self.length_check and self.length_check.thermometer
+        if named and named not in {thermometer.name for thermometer in self.thermometers}:
+            refusal = broken_rule(
+                f"the cell has no thermometer '{named}'",
+                "Write the name of one of [[thermometers]], or remove it and write temperature_c",
+            )
+            place = ("length_check", "thermometer")
+            detail = InitErrorDetails(type=refusal, loc=place, input=named)
+            raise ValidationError.from_exception_data(self.name, [detail])
+        return self
 
     @model_validator(mode="after")
     def _real_devices_can_be_reached(self) -> Self:

@@ -6,11 +6,10 @@ from pathlib import Path
 
 from hexacell.decision import Verdict
 from hexacell.presentation.layout import wrapped
+from hexacell.presentation.length import scale_lines
 from hexacell.reporting.check_result import CheckResult
 from hexacell.reporting.result import AcceptedResult
 from hexacell.reporting.verification import JudgedError, Verification, VerifiedAccuracy
-
-SCALE = "The length scale is that of the encoders; it was not checked."
 
 
 def verification_text(verified: Verification) -> str:
@@ -18,7 +17,7 @@ def verification_text(verified: Verification) -> str:
     lines = [_verdict(verified), *_errors(verified.accuracy), *_comparison(verified)]
     lines += [f"  {wrapped(test.sentence, indent=2)}" for test in verified.tests if not test.passed]
     if verified.accuracy is not None:
-        lines.append(f"  {SCALE}")
+        lines += [f"  {line}" for line in scale_lines(verified.accuracy.length)]
     return "\n".join(lines)
 
 
@@ -35,7 +34,7 @@ def check_text(found: CheckResult) -> str:
     if not found.is_consistent:
         lines.append("  the residuals are larger than the stated noise explains: the model does not hold")
     if found.accuracy is not None:
-        lines.append(f"  {SCALE}")
+        lines += [f"  {line}" for line in scale_lines(found.accuracy.length)]
     return "\n".join(lines)
 
 

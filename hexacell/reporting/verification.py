@@ -22,8 +22,12 @@ from hexacell.identification.diagnostics.model_tests import leave_one_point_out,
 from hexacell.identification.solver.chi_square import SMALLEST_PROBABILITY, ChiSquareTest
 from hexacell.identification.solver.result import Identification
 from hexacell.measurements.records import MeasurementSet
+from hexacell.reporting.length_result import LengthMeasurements, LengthResult, length_check
 from hexacell.reporting.result import IdentificationResult
 from hexacell.robot_model import Robot
+from hexacell.uncertainty.budget import UncertaintyBudget
+from hexacell.uncertainty.length_check import LengthCheck
+from hexacell.uncertainty.length_errors import JudgedGeometry
 from hexacell.uncertainty.statement import LargestError
 
 
@@ -55,6 +59,7 @@ class VerifiedAccuracy(Frozen):
     Attributes:
         poses: their number, and whether the cell file names them; else they span the workspace.
         worst: the pose with the largest position error, in the controller's frames.
+        length: what a length check found; none if there was none.
     """
 
     position: JudgedError
@@ -62,6 +67,7 @@ class VerifiedAccuracy(Frozen):
     poses: int
     task_named: bool
     worst: SixNumbers
+    length: LengthResult | None = None
 
 
 class Verification(Frozen):
@@ -95,19 +101,22 @@ class HeldOut:
         before: deviations (n, 3), mm, with the old geometry.
         after: with the new one, at the same poses.
         left_travel: whether the ball left the gauges' travel with the new geometry.
+        length: what was measured with the new geometry in two seats; none without a length check.
     """
 
     records: MeasurementSet
     before: Sequence[tuple[float, float, float]]
     after: Sequence[tuple[float, float, float]]
     left_travel: bool = False
+    length: LengthMeasurements | None = None
 
 
 def verify(settings: CellSettings, robot: Robot, found: Identification, held_out: HeldOut) -> Verification:
     """Verify an identified geometry that commands ``robot`` now, in the frames in which it was written.
 
     Raises:
-        IdentifiabilityError: no geometry fits the held-out records.
+        IdentifiabilityError: no geometry fits the held-out records, or those of the length check are of
+            other poses.
     """
     before, after = DeviationStatistics.of(held_out.before), DeviationStatistics.of(held_out.after)
     if held_out.left_travel:
@@ -115,8 +124,8 @@ def verify(settings: CellSettings, robot: Robot, found: Identification, held_out
     if before is None or after is None:
         return Verification(verdict=Verdict.NOT_EVALUATED)
     updated = update(found, robot.problem(held_out.records))
-    tests = model_tests(found, updated)
-    accuracy = verified_accuracy(settings, robot, found, updated)
+    accuracy = verified_accuracy(settings, robot, found, updated, held_out.length)
+    tests = (*model_tests(found, updated), *_length_test(accuracy))
     worse = is_worse(before, after, robot.noise)
     return Verification(
         verdict=_verdict(tests, accuracy, worse=worse),
@@ -196,6 +205,7 @@ def verified_accuracy(
     robot: Robot,
     found: Identification,
     updated: Identification,
+    measured: LengthMeasurements | None = None,
 ) -> VerifiedAccuracy | None:
     """The error that the geometry of ``found`` makes at the task poses, by the updated estimate."""
     belief = robot.belief(updated)
@@ -203,6 +213,10 @@ def verified_accuracy(
     budget = task.budget(updated, belief, robot.effects)
     if budget is None:
         return None
+    check = measured and _length_check(settings, robot, updated, budget, measured)
+    length = check and LengthResult.of(check, settings.uncertainty.common_encoder_scale_um_m)
+    if check and length and length.replaces_stated:
+        budget = task.budget(updated, belief, robot.effects, scale=check.observation) or budget
     errors = budget.errors_of(found.free - updated.free)
     limits = settings.acceptance
     return VerifiedAccuracy(
@@ -211,7 +225,31 @@ def verified_accuracy(
         poses=len(task.poses),
         task_named=bool(settings.task.poses),
         worst=robot.to_command(task.poses.pose(errors.worst)).as_tuple(),
+        length=length,
     )
+
+
+def _length_check(
+    settings: CellSettings,
+    robot: Robot,
+    updated: Identification,
+    budget: UncertaintyBudget,
+    measured: LengthMeasurements,
+) -> LengthCheck:
+    """By the best estimate of the geometry, whose errors the budget has."""
+    covariance = updated.free_covariance * updated.goodness.noise_factor**2
+    judged = JudgedGeometry(covariance, budget.parameter_columns)
+    return length_check(settings, robot, updated.geometry, judged, measured, robot.effects)
+
+
+def _length_test(accuracy: VerifiedAccuracy | None) -> tuple[ModelTest, ...]:
+    """Whether the records of a length check agree with each other; none without one."""
+    length = accuracy and accuracy.length
+    if not length:
+        return ()
+    agree = "The records of the length check agree with each other."
+    sentence = agree if length.is_consistent else f"The length check says nothing: {length.reason}."
+    return (ModelTest(name="length check", passed=length.is_consistent, sentence=sentence),)
 
 
 def _verdict(tests: Sequence[ModelTest], accuracy: VerifiedAccuracy | None, *, worse: bool) -> Verdict:

@@ -73,7 +73,7 @@ class TwoSeats:
         second = mounting % 2 == 0
         place = self.start + (self.distance_mm * self.direction if second else NOTHING)
         beside = [(place + PROBE_MM, (0.0, 0.0)), *((place, tilt) for tilt in TILTS)]
-        return [(mounting, PoseBatch.of([Pose(*position.tolist(), *tilt)])) for position, tilt in beside]
+        return [(mounting, _pose(position, *tilt)) for position, tilt in beside]
 
     def _shown(self, found: Identification, pose: PoseBatch, laboratory: Laboratory) -> Array:
         turn = Rotation.from_matrix(pose.rotations[0]).as_rotvec()
@@ -92,3 +92,8 @@ class TwoSeats:
             deviations[rows] = self.turned.apply(shown) if second else shown
             deviations[rows] -= self.zeroed_mm if number > 1 else NOTHING
         return deviations
+
+
+def _pose(position: Array, a: float, b: float) -> PoseBatch:
+    x, y, z = position.tolist()
+    return PoseBatch.of([Pose(x, y, z, a, b)])

@@ -1,0 +1,81 @@
+"""The section of the fixture with two seats, whose known distance checks the scale of all encoders."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal, Self
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from hexacell.cell.fields import Finite, NotNegative, Point, Positive, Section, broken_rule
+
+MicrometresPerMetreKelvin = Annotated[float, Field(ge=0, le=100, allow_inf_nan=False)]
+COARSEST_SHARE = 1e-3
+"""Largest expanded uncertainty of the distance, over it: beyond, the certificate is in another unit."""
+
+
+class LengthCheckSettings(Section):
+    """A fixture with two parallel seats for the gauges, a certified distance apart."""
+
+    first_seat: Point = Field(description="where the ball is measured in the first seat, mm, in the base")
+    direction: Point = Field(
+        (1.0, 0.0, 0.0), description="from the first seat to the second; along the rails is best"
+    )
+    distance_mm: float = Field(ge=20, le=5000, description="of the two places of the ball, as certified")
+    uncertainty_mm: Positive = Field(description="of that distance, expanded (k = 2), as certified")
+    parallel_mrad: NotNegative = Field(
+        0.1, le=20, description="angle between the seats about each axis, 1 sigma"
+    )
+    height_mm: NotNegative = Field(
+        50.0, description="of the ball above the line along which the distance is certified; 0: at the ball"
+    )
+    seating_um: NotNegative = Field(
+        5.0, le=1000, description="where the gauges sit in a seat, from one mounting to the next, 1 sigma"
+    )
+    certified_at_c: Finite = Field(20.0, description="temperature that the certificate holds for, deg C")
+    temperature_c: Finite = Field(20.0, description="of the fixture, deg C, where no thermometer tells it")
+    thermometer: str | None = Field(
+        None, description="name of the one that tells the fixture's temperature"
+    )
+    temperature_sigma_k: NotNegative = Field(1.0, le=50, description="of that temperature, 1 sigma")
+    expansion_um_m_k: MicrometresPerMetreKelvin = Field(
+        11.5, description="of the fixture: steel 11.5, aluminium 23, Invar 1.5"
+    )
+    repeats: int = Field(1, ge=1, le=20, description="how often the second seat is measured")
+    orientations: int = Field(
+        5, ge=1, le=25, description="of the platform with the ball in a seat's middle"
+    )
+    tilt_deg: Positive = Field(10.0, le=45, description="of all of them but the first, which is level")
+    placement: Literal["by-hand", "fixed"] = Field(
+        "by-hand", description="fixed: no person is needed to mount the gauges in the seats"
+    )
+
+    @property
+    def second_seat(self) -> tuple[float, float, float]:
+        """Where the ball is measured in the second seat, mm, in the base."""
+        first, towards = np.array(self.first_seat), np.array(self.direction)
+        x, y, z = (first + self.distance_mm * towards / np.linalg.norm(towards)).tolist()
+        return x, y, z
+
+    @property
+    def mountings(self) -> int:
+        """How often the gauges are mounted: in the first seat before and after each time in the second."""
+        return 2 * self.repeats + 1
+
+    @model_validator(mode="after")
+    def _the_distance_has_a_direction(self) -> Self:
+        if not np.linalg.norm(self.direction) > 1e-6:
+            raise broken_rule(
+                "direction has no length", "Write the base axis from seat to seat, as [1, 0, 0]"
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _the_certificate_is_better_than_a_ruler(self) -> Self:
+        largest = COARSEST_SHARE * self.distance_mm
+        if self.uncertainty_mm > largest:
+            raise broken_rule(
+                f"uncertainty_mm is {self.uncertainty_mm:g}, more than {largest:g} (0.1 % of distance_mm)",
+                "Write the expanded uncertainty of the certificate, in mm",
+            )
+        return self

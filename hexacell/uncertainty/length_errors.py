@@ -16,6 +16,7 @@ from hexacell.kinematics.rotations import Array
 from hexacell.uncertainty.effects import Effect, Occurrence
 from hexacell.uncertainty.length_records import LengthRecords, LengthStandard
 from hexacell.uncertainty.propagation import each_alone
+from hexacell.uncertainty.record_effects import errors_of_records
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -55,7 +56,7 @@ def shared_errors(records: LengthRecords, jacobian: Array, judged: JudgedGeometr
     through = None if columns is None else jacobian @ columns
     if effect.occurrence is not Occurrence.CONSTANT:
         return np.zeros((len(records), 3, 0)) if through is None else through
-    direct = -_on_records(records, effect)
+    direct = -errors_of_records(effect, records.placement, records.readings)
     return direct if through is None else through + direct
 
 
@@ -64,19 +65,14 @@ def errors_by_effect(records: LengthRecords, effect: Effect, shared: Array) -> I
     if not effect.is_estimated:  # else the covariance has them
         yield LengthError(effect.name, effect.size * shared, is_shared=True)
     if effect.occurrence is Occurrence.EVERY_STOP:
-        yield LengthError(effect.name, effect.size * each_alone(_on_records(records, effect)))
+        yield LengthError(
+            effect.name,
+            effect.size * each_alone(errors_of_records(effect, records.placement, records.readings)),
+        )
     elif effect.occurrence is not Occurrence.CONSTANT:
-        yield LengthError(effect.name, effect.size * _on_records(records, effect))
-
-
-def _on_records(records: LengthRecords, effect: Effect) -> Array:
-    """Errors (n, 3, k) of the deviations by one unit of each cause, mm."""
-    parts: list[Array] = [np.zeros((len(records), 3, 0))]
-    if effect.on_poses is not None:
-        parts.append(effect.on_poses(records.placement)[:, :3])
-    if effect.on_readings is not None:
-        parts.append(effect.on_readings(records.readings))
-    return np.concatenate(parts, axis=-1)
+        yield LengthError(
+            effect.name, effect.size * errors_of_records(effect, records.placement, records.readings)
+        )
 
 
 def errors_by_gauges(

@@ -53,7 +53,7 @@ def verified(visit, paper, legs):
     def made(long_um_m=0.0, *, checked=True, fixture=FIXTURE, stated_um_m=15.0, celsius=None, **seats):
         sizes = UncertaintySettings(grade="ideal", common_encoder_scale_um_m=stated_um_m)
         settings = cell.settings.model_copy(update={"length_check": fixture, "uncertainty": sizes})
-        robot = robot_of(cell)
+        robot = robot_of(replace(cell, settings=settings))
         exact = visit(seed=2, commanding=paper.actual, degrees=40.0)
         found = identify(robot.problem(scaled(exact.measured(0.005, 1), long_um_m)))
         written = robot.with_controller(as_written(settings, robot, found.geometry).geometry)

@@ -120,6 +120,10 @@ class Robot:
             self.frames.base[:, ["xyz".index(axis) for axis in self.work_frame]].T,
         )
 
+    def with_errors_of(self, settings: CellSettings) -> Robot:
+        """The robot with the noise and the systematic effects that some settings state."""
+        return replace(self, noise=noise_of(settings), effects=stated_effects(settings))
+
     def for_controller(self, geometry: Geometry) -> Geometry:
         """A geometry in the convention's frames, in the frames of the controller's config."""
         return self.mechanism.change_frames(geometry, self.frames.inverse())
@@ -205,6 +209,17 @@ def robot_of_start(
     )
 
 
+def noise_of(settings: CellSettings) -> Noise:
+    """The noise of a record that a cell's settings state."""
+    stated = settings.noise
+    alignment = float(np.radians(settings.stations.alignment_deg))
+    noise = Noise(stated.encoder_mm, stated.gauge_mm, alignment, stated.gauge_scale)
+    if stated.encoders_mm is None and stated.gauges_mm is None:
+        return noise
+    encoders, gauges = noise.encoders_mm.tolist(), noise.gauges_mm.tolist()
+    return noise.with_devices(stated.encoders_mm or encoders, stated.gauges_mm or gauges)
+
+
 def make_robot(
     settings: CellSettings, controller: ControllerGeometry, *, taught: Geometry | None = None
 ) -> Robot:
@@ -219,12 +234,7 @@ def make_robot(
         controller=controller.geometry,
         branch=controller.branch,
         tolerances=Tolerances.of_settings(mechanism.parameters, settings.tolerances.model_dump()),
-        noise=Noise(
-            settings.noise.encoder_mm,
-            settings.noise.gauge_mm,
-            float(np.radians(settings.stations.alignment_deg)),
-            settings.noise.gauge_scale,
-        ),
+        noise=noise_of(settings),
         limits=Limits(
             limits.gauge_travel_mm,
             float(np.radians(limits.tilt_deg)),

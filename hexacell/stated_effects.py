@@ -38,7 +38,11 @@ def _of_encoders(stated: UncertaintySettings) -> tuple[Effect, ...]:
     return (
         common_encoder_scale(stated.common_encoder_scale_um_m, stated.source("common_encoder_scale_um_m")),
         encoder_scales(stated.encoder_scale_um_m, stated.source("encoder_scale_um_m")),
-        slider_repeatability(stated.slider_repeatability_um, stated.source("slider_repeatability_um")),
+        slider_repeatability(
+            stated.slider_repeatability_um,
+            stated.source("slider_repeatability_um"),
+            is_in_noise=stated.slider_repeatability_acts == "at work",
+        ),
     )
 
 

@@ -93,10 +93,10 @@ def _result(cell: Cell, accepted: _AcceptedRun) -> AcceptedResult:
 
 def _effects(cell: Cell, state: RunState) -> dict[str, tuple[tuple[float, ...], ...]]:
     """What the systematic effects, as the cell file has them now, did to the result."""
-    settings = cell.settings
     if state.started is None:
         return {}
-    start = robot_of_start(settings, state.started.controller, state.started.branch, state.started.taught)
+    settings, started = cell.settings, state.started
+    start = robot_of_start(settings, started.controller, started.branch, started.taught)
     robot = Calibration(settings, start, Mode.OPTIMISE).robot_of(state)
     effects = [one for one in robot.effects if one.size]
     if not effects:

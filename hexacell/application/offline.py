@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
-from hexacell.application.recorded_commands import commanding_geometries
+from hexacell.application.recorded_commands import commanding_geometries, noise_of_run
 from hexacell.campaign.decisions import (
     CampaignState,
     Finished,
@@ -16,6 +16,7 @@ from hexacell.campaign.decisions import (
 )
 from hexacell.campaign.dry_run import DryRunResult, dry_run
 from hexacell.campaign.feasibility import unreachable_share
+from hexacell.campaign.measured_noise import with_measured_noise
 from hexacell.campaign.planner import Plan
 from hexacell.campaign.pose_list import pose_list_of
 from hexacell.cell.loader import Cell
@@ -60,7 +61,8 @@ def fit_measurements(
 ) -> Assessment:
     """Identify the geometry of a cell's robot from records, and check it.
 
-    ``folder`` is where they are kept: if it is that of a run, its journal tells what commanded them.
+    ``folder`` is where they are kept: if it is that of a run, its journal tells what commanded them, and
+    the noise that it measured.
 
     Raises:
         IdentifiabilityError: the records cannot determine it.
@@ -70,7 +72,12 @@ def fit_measurements(
     if folder is not None:
         recorded = commanding_geometries(folder, robot.mechanism)
         robot = replace(robot, earlier=(*recorded, *robot.earlier))
-    return assess(cell.settings, robot, measurements, identify(robot.problem(measurements)))
+    settings, measured = cell.settings, None if folder is None else noise_of_run(folder)
+    if measured is not None:
+        settings = with_measured_noise(settings, measured)
+        robot = robot.with_errors_of(settings)
+    found = identify(robot.problem(measurements))
+    return assess(settings, robot, measurements, found, measured_noise=measured)
 
 
 def next_pose(cell: Cell, measurements: MeasurementSet, *, rejections: int = 0) -> NextPose:

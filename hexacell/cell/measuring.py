@@ -87,6 +87,8 @@ class AcceptanceSettings(Section):
         return {key: value for key, value in given.items() if key not in RETIRED_KEYS}
 
 
+FEWEST_STANDSTILL_READINGS = 8
+"""Fewer readings at standstill show no noise."""
 RETIRED_KEYS = frozenset({"mean_deviation_mm", "max_deviation_mm"})
 """Of ``[acceptance]`` in earlier versions, whose checks judged the deviations at held-out points."""
 
@@ -127,13 +129,40 @@ class TimingSettings(Section):
 
 
 class NoiseSettings(Section):
-    """Standard deviations of the numbers of one record."""
+    """Standard deviations of the numbers of one record, and how a run measures them at its start."""
 
     encoder_mm: Positive = Field(0.01, description="of a slider's position")
     gauge_scale: NotNegative = Field(
         0.001, description="relative error of each gauge's scale, one standard deviation"
     )
     gauge_mm: Positive = Field(0.01, description="of a gauge's reading")
+    encoders_mm: tuple[Positive, Positive, Positive, Positive, Positive, Positive] | None = Field(
+        None, description="of each slider's position, where they differ; takes the place of encoder_mm"
+    )
+    gauges_mm: tuple[Positive, Positive, Positive] | None = Field(
+        None, description="of the gauges x, y and z, where they differ; takes the place of gauge_mm"
+    )
+    figures: Literal["stated", "measured"] = Field(
+        "stated",
+        description="stated: they hold unless a run measures significantly more; measured: what a run "
+        "measures replaces them where it is less, too",
+    )
+    standstill_readings: int = Field(
+        40, ge=0, description="at the first point, without moving, for the noise of readings; 0: none"
+    )
+    revisits: int = Field(6, ge=0, description="of the first reference, from different directions; 0: none")
+    averaged_windows: int = Field(
+        1, ge=1, le=16, description="most settled windows that a record may be the mean of, if it pays"
+    )
+
+    @model_validator(mode="after")
+    def _series_are_long_enough(self) -> Self:
+        if 0 < self.standstill_readings < FEWEST_STANDSTILL_READINGS:
+            raise broken_rule(
+                f"{self.standstill_readings} standstill_readings are no series",
+                f"Ask for {FEWEST_STANDSTILL_READINGS} or more, or for 0",
+            )
+        return self
 
 
 class LimitSettings(Section):

@@ -61,6 +61,9 @@ class UncertaintySettings(Section):
     slider_repeatability_um: NotNegative = Field(
         2.0, description="where a slider's joint stops beside what its encoder shows"
     )
+    slider_repeatability_acts: Literal["everywhere", "at work"] = Field(
+        "everywhere", description="at work: the noise of the records contains it already"
+    )
     ball_roundness_um: NotNegative = Field(2.0, description="largest departure from the mean radius")
     ball_beside_tool_mm: NotNegative = Field(
         0.0, description="distance of the ball's centre from that of the tool, along each platform axis"
@@ -90,7 +93,7 @@ class UncertaintySettings(Section):
 
     @model_validator(mode="after")
     def _sources_belong_to_sizes(self) -> Self:
-        known = set(type(self).model_fields) - {"grade", "sources"}
+        known = set(type(self).model_fields) - {"grade", "sources", "slider_repeatability_acts"}
         if unknown := sorted(set(self.sources) - known):
             raise broken_rule(
                 f"sources has {unknown[0]}, which is no size of this section", "Correct the key"

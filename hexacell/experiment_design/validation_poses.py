@@ -59,7 +59,7 @@ def select_validation_poses(
 def _stays_inside(belief: RobotBelief, actual: ActualPoses) -> Mask:
     """At which poses the ball stays inside the travel of gauges that are zeroed at the first of them."""
     jacobian, _ = position_derivatives(belief, ReachableTargets(actual.poses, actual.joints))
-    noise = 2.0 * belief.noise.gauge_mm**2 * np.eye(3)
+    noise = 2.0 * belief.noise.gauge_covariance
     covariance = innovation_covariance(belief.covariance, jacobian - jacobian[0], noise)
     sigma = np.sqrt(np.diagonal(covariance, axis1=-2, axis2=-1))
     deviation = actual.poses.positions - actual.poses.positions[0]

@@ -6,11 +6,12 @@ import numpy as np
 
 from hexacell.campaign.decisions import Forecast
 from hexacell.presentation.layout import wrapped
+from hexacell.presentation.measured_noise import measured_noise_text
 from hexacell.presentation.planning import run_forecast_line
 from hexacell.presentation.verification import check_start_text, check_text, verification_text
 from procedures.run import events
 from procedures.run.state import RunState
-from procedures.run.steps import Compute, Move, Phase, SetKey
+from procedures.run.steps import Compute, Move, Phase, Repeat, SetKey, Standstill
 
 SET_NAMES = {
     Phase.IDENTIFY: "point {}",
@@ -18,6 +19,7 @@ SET_NAMES = {
     Phase.AFTER: "held-out point {}, after",
 }
 COMPUTATIONS = {
+    "assess noise": "evaluating the noise",
     "lend": "loading a provisional geometry",
     "take back": "restoring the controller's geometry",
     "identify": "identifying the geometry",
@@ -63,6 +65,8 @@ def set_name(key: SetKey) -> str:
 def activity(event: events.Event) -> str | None:
     """A few words on what the run does from this event on; nothing where that does not change."""
     match event:
+        case events.StepBegun(step=Standstill() | Repeat() as step):
+            return f"{set_name(step.at)}, measuring the noise"
         case events.StepBegun(step=Move() as step):
             return f"{set_name(step.at)}, orientation {step.orientation}{_forecast_range(step)}"
         case events.StepBegun(step=Compute() as step):
@@ -91,7 +95,7 @@ def event_text(event: events.Event, state: RunState) -> str | None:
         case events.ProvisionalApplied() | events.ProvisionalReverted() | events.RolledBack():
             return CONFIG_CHANGES[event.kind]
         case _:
-            return _further_text(event)
+            return _finding_text(event) or _further_text(event)
 
 
 def _basis_or_verdict(event: events.RunStarted | events.ResultValidated) -> str | None:
@@ -103,11 +107,20 @@ def _basis_or_verdict(event: events.RunStarted | events.ResultValidated) -> str 
     return None if event.check is None else check_text(event.check)
 
 
-def _further_text(event: events.Event) -> str | None:
-    """What a start, a verdict, an interruption, a failure or a command reports."""
+def _finding_text(event: events.Event) -> str | None:
+    """What a start, the measured noise or a verdict reports."""
     match event:
         case events.RunStarted() | events.ResultValidated():
             return _basis_or_verdict(event)
+        case events.NoiseMeasured():
+            return measured_noise_text(event.noise)
+        case _:
+            return None
+
+
+def _further_text(event: events.Event) -> str | None:
+    """What an interruption, a failure or a command reports."""
+    match event:
         case events.ReferenceConfirmed():
             return f"{set_name(event.at)} continues: its reference is unchanged"
         case events.RecordDiscarded():

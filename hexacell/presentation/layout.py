@@ -12,3 +12,8 @@ def wrapped(text: str, *, indent: int = 0) -> str:
     return textwrap.fill(
         text, COLUMNS, subsequent_indent=" " * indent, break_long_words=False, break_on_hyphens=False
     )
+
+
+def duration(minutes: float) -> str:
+    """A duration, rounded to what is known of it."""
+    return f"{60.0 * minutes:.0f} seconds" if minutes < 1.5 else f"{minutes:.0f} minutes"

@@ -8,6 +8,7 @@ from drivers.interfaces import DeviceIdentity
 from hexacell.application.offline import PlanTrial
 from hexacell.campaign.decisions import Finished, Forecast, MeasurePose, StartPoint
 from hexacell.measurements.records import RecordId
+from hexacell.presentation.layout import duration
 
 
 def decision_text(decision: StartPoint | MeasurePose | Finished) -> str:
@@ -93,11 +94,6 @@ def plan_trial_lines(trial: PlanTrial) -> Iterator[str]:
                 f"Point {point}: {share:.0%} of the robots within the tolerances cannot reach it; "
                 "if yours is one of them, the run leaves it out or stops."
             )
-
-
-def duration(minutes: float) -> str:
-    """A duration, rounded to what is known of it."""
-    return f"{60.0 * minutes:.0f} seconds" if minutes < 1.5 else f"{minutes:.0f} minutes"
 
 
 def device_line(identity: DeviceIdentity) -> str:

@@ -7,6 +7,7 @@ from itertools import chain, repeat
 
 import numpy as np
 
+from hexacell.campaign.measured_noise import MeasuredNoise
 from hexacell.campaign.task_accuracy import Task
 from hexacell.cell.model import CellSettings
 from hexacell.experiment_design.decorrelation import DecorrelatingPose, decorrelating_poses
@@ -45,6 +46,7 @@ class Assessment:
         budget: what is not known of the errors at the reachable ones of these poses; none as above.
         accuracy: at these poses; none where the robot can reach none of them. Where the residuals
             are larger than the stated noise, the predicted error is as well.
+        measured_noise: at the start of the run that took the records; none where that is not known.
         possible_causes: of residuals that are too large, the largest share first.
     """
 
@@ -60,6 +62,7 @@ class Assessment:
     budget: UncertaintyBudget | None = None
     tolerance_violations: tuple[ToleranceViolation, ...] = ()
     possible_causes: tuple[PossibleCause, ...] = ()
+    measured_noise: MeasuredNoise | None = None
 
     @property
     def refused(self) -> bool:
@@ -85,8 +88,12 @@ def assess(
     robot: Robot,
     measurements: MeasurementSet,
     found: Identification,
+    measured_noise: MeasuredNoise | None = None,
 ) -> Assessment:
-    """Check an identification of some measurements, and predict the accuracy with it."""
+    """Check an identification of some measurements, and predict the accuracy with it.
+
+    ``measured_noise`` is what settings and robot contain already.
+    """
     left_out = {record for record, _ in found.left_out}
     belief = robot.belief(found)
     task = Task.of(settings, robot, belief)
@@ -104,6 +111,7 @@ def assess(
         budget=task.budget(found, belief, robot.effects),
         tolerance_violations=robot.tolerance_violations(found.estimate),
         possible_causes=possible_causes(found) if _is_doubtful(found) else (),
+        measured_noise=measured_noise,
     )
 
 

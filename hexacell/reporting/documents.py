@@ -27,6 +27,7 @@ def fit_document(assessed: Assessment) -> dict[str, Any]:
         "verdict": Verdict.NOT_EVALUATED.value,  # no held-out records
         "goodness": _goodness(found.goodness),
         "noise": _noise(assessed.noise),
+        "measured_noise": assessed.measured_noise and assessed.measured_noise.model_dump(mode="json"),
         "repeatability": _repeatability(assessed),
         "correlated": _correlated(assessed),
         "accuracy": _accuracy(assessed),

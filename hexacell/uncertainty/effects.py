@@ -31,12 +31,18 @@ class Occurrence(Enum):
     EVERY_STOP = "another at every stop"
     MEASURING = "while measuring only"
     AT_WORK = "at work only"
+    STOPS_AT_WORK = "another at every stop at work, in the noise while measuring"
     WITH_TOOL = "with the tool, which takes no part in measuring"
 
     @property
     def is_in_records(self) -> bool:
         """Whether it acts while measuring."""
-        return self not in {Occurrence.AT_WORK, Occurrence.WITH_TOOL}
+        return self in {Occurrence.CONSTANT, Occurrence.EVERY_STOP, Occurrence.MEASURING}
+
+    @property
+    def differs_at_stops(self) -> bool:
+        """Whether it is another one at every task pose."""
+        return self in {Occurrence.EVERY_STOP, Occurrence.STOPS_AT_WORK}
 
 
 @dataclass(frozen=True, eq=False)

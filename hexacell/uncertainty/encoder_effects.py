@@ -27,9 +27,13 @@ def encoder_scales(um_per_m: float, source: str = "") -> Effect:
     )
 
 
-def slider_repeatability(um: float, source: str = "") -> Effect:
-    """A slider's joint stops beside what its encoder shows, each time elsewhere: play, friction."""
-    return Effect("repeatability of a slider", um, "um", Occurrence.EVERY_STOP, _each_joint, source=source)
+def slider_repeatability(um: float, source: str = "", *, is_in_noise: bool = False) -> Effect:
+    """A slider's joint stops beside what its encoder shows, each time elsewhere: play, friction.
+
+    ``is_in_noise``: the noise of the records contains it.
+    """
+    occurrence = Occurrence.STOPS_AT_WORK if is_in_noise else Occurrence.EVERY_STOP
+    return Effect("repeatability of a slider", um, "um", occurrence, _each_joint, source=source)
 
 
 def _common_scale(placement: Placement) -> Array:

@@ -163,7 +163,7 @@ class Propagation:
         if effect.on_poses is None or effect.occurrence is Occurrence.MEASURING:
             return np.zeros((len(self.task), 6, 0))
         errors = effect.on_poses(self.task)
-        if effect.occurrence is Occurrence.EVERY_STOP:
+        if effect.occurrence.differs_at_stops:
             return each_alone(errors)
         return self.frames.remove_frame_motion(self.task.poses, errors, effect.on_poses(self.workspace))
 

@@ -13,6 +13,7 @@ from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.pose import Pose
 from hexacell.kinematics.rotations import Array
 from hexacell.measurements.records import MeasurementSet
+from procedures.calibration.noise_steps import NoiseSteps
 from procedures.calibration.set_steps import SetSteps, require_zero
 from procedures.run.state import RunState, record
 from procedures.run.steps import Compute, Expectation, Locate, Move, Phase, SetKey, Step
@@ -25,6 +26,7 @@ class IdentificationSteps:
     plan: Plan
     sets: SetSteps
     provisional: bool
+    noise: NoiseSteps
 
     def next_step(self, state: RunState) -> Step | None:
         """The next step; None if nothing more is to be measured."""
@@ -53,7 +55,8 @@ class IdentificationSteps:
         require_zero(state, key)
         if measured.reference_unverified:
             return self._at_or_to_reference(state, key)
-        if step := self.sets.at_pose(state, key):
+        measuring_noise = self.noise.next_step(state, key, self._ball(state, key))
+        if step := measuring_noise or self.sets.at_pose(state, key):
             return step
         if not measured.again:
             return None

@@ -16,6 +16,7 @@ from functools import cached_property
 import numpy as np
 
 from hexacell.campaign.check import Check, identified_before
+from hexacell.campaign.measured_noise import MeasuredNoise, with_measured_noise
 from hexacell.campaign.planner import Plan
 from hexacell.campaign.pose_list import PoseList
 from hexacell.campaign.teaching import WrittenGeometry, as_written
@@ -28,6 +29,7 @@ from hexacell.robot_model import Robot
 from hexacell.stated_effects import stated_effects
 from procedures.calibration.held_out_steps import HeldOutSteps
 from procedures.calibration.identification_steps import IdentificationSteps
+from procedures.calibration.noise_steps import NoiseSteps
 from procedures.calibration.set_steps import SetSteps
 from procedures.run import events
 from procedures.run.state import RunState
@@ -63,7 +65,8 @@ class _Measuring:
         self.robot = plan.robot
         self.plan = plan
         sets = SetSteps(plan.robot)
-        self.points = IdentificationSteps(plan, sets, plan.settings.identification.provisional)
+        noise = NoiseSteps(plan.settings.noise, sets)
+        self.points = IdentificationSteps(plan, sets, plan.settings.identification.provisional, noise)
         self.held_out = HeldOutSteps(plan.settings, sets, HELD_OUT_CANDIDATES)
 
 
@@ -75,6 +78,7 @@ class Calibration:
         listed: the poses to measure, if a file lists them.
         accepted: the result that the controller has, of which a check starts; none where that is the
             drawing.
+        measured_noise: what settings and robot contain of it; none before it is measured.
     """
 
     settings: CellSettings
@@ -82,6 +86,7 @@ class Calibration:
     mode: Mode
     listed: PoseList | None = None
     accepted: AcceptedResult | None = None
+    measured_noise: MeasuredNoise | None = None
 
     @property
     def plan(self) -> Plan:
@@ -108,12 +113,27 @@ class Calibration:
             CANDIDATES,
         )
 
+    def informed(self, state: RunState) -> Calibration:
+        """The same with the noise that the run has measured, if it has."""
+        if state.noise is None or self.measured_noise is not None:
+            return self
+        measured = state.noise.noise
+        if measured not in self._with_noise:
+            settings = with_measured_noise(self.settings, measured)
+            robot = self.robot.with_errors_of(settings)
+            informed = replace(self, settings=settings, robot=robot, measured_noise=measured)
+            self._with_noise[measured] = informed
+        return self._with_noise[measured]
+
     def next_step(self, state: RunState) -> Step | None:
         """The step to execute; None if the run is over.
 
         Raises:
             HexacellError: no step is possible.
         """
+        return self.informed(state)._next_step(state)
+
+    def _next_step(self, state: RunState) -> Step | None:
         if state.ended is not None:
             return None
         if state.config_write_pending:
@@ -128,7 +148,8 @@ class Calibration:
 
     def robot_of(self, state: RunState) -> Robot:
         """The robot with all geometries that commanded the records of the identification."""
-        return self._at_temperatures(self._identifying(state).robot, state)
+        informed = self.informed(state)
+        return informed._at_temperatures(informed._identifying(state).robot, state)
 
     def as_written(self, identified: Geometry) -> WrittenGeometry:
         """What the controller gets of a geometry in the frame convention."""
@@ -136,7 +157,8 @@ class Calibration:
 
     def written_robot(self, state: RunState) -> Robot:
         """The robot with the proposed geometry in its controller."""
-        return self._at_temperatures(self._commanded_by(self._written(state)).robot, state)
+        informed = self.informed(state)
+        return informed._at_temperatures(informed._commanded_by(informed._written(state)).robot, state)
 
     def _at_temperatures(self, robot: Robot, state: RunState) -> Robot:
         """The robot with the effects of the temperatures that were read while measuring."""
@@ -152,7 +174,7 @@ class Calibration:
         """
         if state.provisional is not None:
             return geometry_of(state.provisional, self.robot)
-        return self._at_start.points.estimate(state)
+        return self.informed(state)._at_start.points.estimate(state)
 
     def held_out_poses(self, identified: Identification) -> tuple[tuple[SixNumbers, ...], ...]:
         """See :meth:`HeldOutSteps.choose_poses`."""
@@ -217,6 +239,11 @@ class Calibration:
 
     def _calibrating(self, robot: Robot) -> Plan:
         return Plan(self.settings, robot, self.listed, CANDIDATES)
+
+    @cached_property
+    def _with_noise(self) -> dict[MeasuredNoise, Calibration]:
+        """By the noise that was measured, once in a run."""
+        return {}
 
     @cached_property
     def _with_provisional(self) -> dict[bool, _Measuring]:

@@ -76,6 +76,20 @@ async def settle(devices: Devices, timing: TimingSettings, clock: CellClock) -> 
         await clock.sleep(timing.interval_s)
 
 
+async def read_series(devices: Devices, timing: TimingSettings, clock: CellClock, count: int) -> Settled:
+    """``count`` readings one after the other, begun when the readings are settled.
+
+    Raises:
+        DeviceError: they did not settle, or a device cannot be read.
+    """
+    await settle(devices, timing, clock)
+    series: list[DeviceSnapshot] = []
+    while len(series) < count:
+        await clock.sleep(timing.interval_s)
+        series.append(await read_all(devices, clock))
+    return Settled(tuple(series))
+
+
 async def _look(
     devices: Devices, timing: TimingSettings, clock: CellClock, window: deque[DeviceSnapshot]
 ) -> list[str]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from hexacell.acceptance import gates
+from hexacell.campaign.noise_assessment import assess_noise
 from hexacell.cell.loader import Cell
 from hexacell.identification.estimator import identify
 from hexacell.measurements.csv_file import write_measurements
@@ -15,6 +16,7 @@ from hexacell.reporting.documents import fit_document
 from hexacell.reporting.result import IdentificationResult
 from hexacell.reporting.verification import HeldOut, outcome_line, verify
 from hexacell.runs.run_folder import RunFolder
+from procedures.calibration.noise_steps import noise_readings
 from procedures.calibration.workflow import Calibration, Mode
 from procedures.engine.config_transactions import ConfigTransactions
 from procedures.run import events
@@ -31,19 +33,28 @@ class Computations:
     config: ConfigTransactions
     folder: RunFolder
 
+    def assess_noise(self, state: RunState) -> events.NoiseMeasured:
+        """Evaluate what was read at the first reference."""
+        assert state.at_pose is not None  # noqa: S101 - decided only at the reference
+        key, _ = state.at_pose
+        readings = noise_readings(state.set(key), self.cell.settings.encoders)
+        return events.NoiseMeasured(at=key, noise=assess_noise(self.calibration.plan, readings))
+
     def identify(self, state: RunState) -> events.Identified:
         """Identify the geometry and choose the held-out poses; raises ``HexacellError``."""
         measurements = state.measurements()
         write_measurements(self.folder.measurements, measurements)
-        robot = self.calibration.robot_of(state)
+        calibration = self.calibration.informed(state)
+        robot = calibration.robot_of(state)
         identified = identify(robot.problem(measurements))
-        assessed = assess(self.cell.settings, robot, measurements, identified)
+        settings, noise = calibration.settings, calibration.measured_noise
+        assessed = assess(settings, robot, measurements, identified, noise)
         self.folder.write_result(fit_document(assessed))
         result = IdentificationResult.of(identified)
         return events.Identified(
             result=result,
-            held_out=self.calibration.held_out_poses(identified),
-            held_out_after=self.calibration.held_out_poses_after(identified),
+            held_out=calibration.held_out_poses(identified),
+            held_out_after=calibration.held_out_poses_after(identified),
         )
 
     def propose(self, state: RunState) -> events.Proposed:
@@ -69,18 +80,19 @@ class Computations:
         """Verify the written geometry, or state what a check found; raises ``HexacellError``."""
         if self.calibration.mode is Mode.CHECK:
             return self._judge_check(state)
-        robot = self.calibration.robot_of(state)
-        found = identify(robot.problem(state.measurements()))
-        written = self.calibration.written_robot(state)
-        verification = verify(self.cell.settings, written, found, _held_out(state))
+        calibration = self.calibration.informed(state)
+        found = identify(calibration.robot_of(state).problem(state.measurements()))
+        written = calibration.written_robot(state)
+        verification = verify(calibration.settings, written, found, _held_out(state))
         line = outcome_line(_identified(state), len(found.free), verification)
         return events.ResultValidated(verdict=verification.verdict, line=line, verification=verification)
 
     def _judge_check(self, state: RunState) -> events.ResultValidated:
         measurements = state.measurements()
         write_measurements(self.folder.measurements, measurements)
-        effects = self.calibration.robot_of(state).effects
-        found = check_result(self.calibration.check, measurements, self.calibration.accepted, effects)
+        calibration = self.calibration.informed(state)
+        effects = calibration.robot_of(state).effects
+        found = check_result(calibration.check, measurements, calibration.accepted, effects)
         return events.ResultValidated(verdict=found.verdict, line=check_line(found), check=found)
 
 

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -20,7 +22,7 @@ from hexacell.runs.run_folder import RunFolder
 from procedures.calibration.set_steps import check_reference, in_words
 from procedures.calibration.workflow import Calibration
 from procedures.devices.device_set import Devices, Thermometers, gather_errors
-from procedures.devices.settling import Settled, settle
+from procedures.devices.settling import DeviceSnapshot, Settled, read_series, settle
 from procedures.engine.computations import Computations
 from procedures.engine.config_transactions import ConfigTransactions
 from procedures.guards.guards import Guards
@@ -28,7 +30,19 @@ from procedures.run import events
 from procedures.run.cancellation import in_thread
 from procedures.run.questions import Operator, ask_placement
 from procedures.run.state import RunState
-from procedures.run.steps import CloseSet, Compute, Locate, Move, Phase, Place, Revisit, Sample, Step
+from procedures.run.steps import (
+    CloseSet,
+    Compute,
+    Locate,
+    Move,
+    Phase,
+    Place,
+    Repeat,
+    Revisit,
+    Sample,
+    Standstill,
+    Step,
+)
 from procedures.run.trips import GuardTripped
 
 
@@ -80,6 +94,10 @@ class StepExecutor:
                 return await self._revisit(step, state)
             case CloseSet():
                 return await self._close(step, state)
+            case Standstill():
+                return await self.read_standstill(step)
+            case Repeat():
+                return events.ReferenceRepeated(at=step.at, reading=await self.read())
             case Compute():
                 return await self._compute(step, state)
 
@@ -114,7 +132,7 @@ class StepExecutor:
 
     async def _sample(self, step: Sample, state: RunState) -> events.Event:
         try:
-            reading = await self.read()
+            reading = await self.read(1 if state.noise is None else state.noise.noise.windows)
         except HexacellError as error:
             if not consists_only_of(error, GaugeAtEnd):
                 raise
@@ -160,14 +178,33 @@ class StepExecutor:
             raise drifted
         return events.SetClosed(at=step.at, drift_mm=deviation_of(drift), reading=reading)
 
-    async def read(self) -> events.Reading:
-        """One settled reading of all devices; raises ``HexacellError``."""
+    async def read(self, windows: int = 1) -> events.Reading:
+        """The mean of some settled windows of all devices; raises ``HexacellError``."""
         timing = self.cell.settings.timing
-        settled = await self.guards.during_readings(lambda: settle(self.devices, timing, self.clock))
+        settled = [
+            await self.guards.during_readings(lambda: settle(self.devices, timing, self.clock))
+            for _ in range(windows)
+        ]
         return _reading(self.devices, settled, await self.thermometers.read())
+
+    async def read_standstill(self, step: Standstill) -> events.StandstillRead:
+        """A series of readings of all devices, once they are settled; raises ``HexacellError``."""
+        settings = self.cell.settings
+        count = settings.noise.standstill_readings
+        series = await self.guards.during_readings(
+            lambda: read_series(self.devices, settings.timing, self.clock, count)
+        )
+        return events.StandstillRead(
+            at=step.at,
+            gauges_mm=tuple(deviation_of(_on_axes(self.devices, row)) for row in series.gauges),
+            joints_mm=tuple(joints_of(row) for row in series.joints),
+            **_raw(series.window),
+        )
 
     async def _compute(self, step: Compute, state: RunState) -> events.Event:  # noqa: PLR0911
         match step.kind:
+            case "assess noise":
+                return await in_thread(self.computations.assess_noise, state)
             case "identify":
                 return await in_thread(self.computations.identify, state)
             case "propose":
@@ -187,18 +224,32 @@ class StepExecutor:
 
 
 def _reading(
-    devices: Devices, settled: Settled, temperatures: tuple[events.Temperature, ...]
+    devices: Devices, settled: Sequence[Settled], temperatures: tuple[events.Temperature, ...]
 ) -> events.Reading:
-    means, spreads = settled.gauges.mean(axis=0), np.ptp(settled.gauges, axis=0)
-    on_axes, spread = np.zeros(3), np.zeros(3)
-    for row, mounted in enumerate(devices.gauges):
-        on_axes[mounted.axis.index] = mounted.axis.coordinate(means[row])
-        spread[mounted.axis.index] = spreads[row]
+    """The mean of settled windows, with the largest range within one of them."""
+    gauges = np.concatenate([one.gauges for one in settled]).mean(axis=0)
+    joints = np.concatenate([one.joints for one in settled]).mean(axis=0)
+    spreads = np.max([np.ptp(one.gauges, axis=0) for one in settled], axis=0)
     return events.Reading(
-        gauges_mm=deviation_of(on_axes),
-        spread_mm=deviation_of(spread),
-        joints_mm=joints_of(settled.joints.mean(axis=0)),
-        answers=tuple(tuple(reading.raw for reading in one.gauges) for one in settled.window),
-        counts=tuple(one.encoders.counts for one in settled.window),
+        gauges_mm=deviation_of(_on_axes(devices, gauges)),
+        spread_mm=deviation_of(np.abs(_on_axes(devices, spreads))),
+        joints_mm=joints_of(joints),
         temperatures=temperatures,
+        **_raw([snapshot for one in settled for snapshot in one.window]),
     )
+
+
+def _on_axes(devices: Devices, values: Array) -> Array:
+    """Values (3,) of the gauges, in their order, along base x, y, z."""
+    on_axes = np.zeros(3)
+    for row, mounted in enumerate(devices.gauges):
+        on_axes[mounted.axis.index] = mounted.axis.coordinate(values[row])
+    return on_axes
+
+
+def _raw(snapshots: Sequence[DeviceSnapshot]) -> dict[str, Any]:
+    """The fields of raw readings."""
+    return {
+        "answers": tuple(tuple(reading.raw for reading in one.gauges) for one in snapshots),
+        "counts": tuple(one.encoders.counts for one in snapshots),
+    }

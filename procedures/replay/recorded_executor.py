@@ -27,7 +27,7 @@ from procedures.replay.comparison import TOLERANCE
 from procedures.run import events
 from procedures.run.questions import Question
 from procedures.run.state import RunState
-from procedures.run.steps import Move
+from procedures.run.steps import Move, Standstill
 
 PROTOCOL = "recorded"
 
@@ -160,13 +160,20 @@ class RecordedStepExecutor(StepExecutor):
         """No supervision."""
         return InactiveGuards(self.cell.settings, self.devices, self.clock, self.folder.path)
 
-    async def read(self) -> events.Reading:
+    async def read_standstill(self, step: Standstill) -> events.StandstillRead:
+        """The recorded series."""
+        outcome = self.recorded.outcome
+        if not isinstance(outcome, events.StandstillRead) or outcome.at != step.at:
+            raise DeviceError("the journal has no series", subject="the recorded devices")
+        return outcome
+
+    async def read(self, windows: int = 1) -> events.Reading:
         """The recorded reading; raises ``GaugeAtEnd`` where the recorded gauges did."""
         outcome = self.recorded.outcome
         if isinstance(outcome, events.RecordRejected) and outcome.reading is None:
             raise GaugeAtEnd(outcome.reason)
         reading, timing = self.recorded.reading, self.cell.settings.timing
         too_wide = max(reading.spread_mm) > timing.spread_gauge_mm + TOLERANCE
-        if too_wide or len(reading.counts) < timing.readings:
+        if too_wide or len(reading.counts) < windows * timing.readings:
             raise DeviceError("the recorded readings had not settled", subject="the recorded devices")
         return reading

@@ -209,6 +209,9 @@ OUTCOME_KINDS: dict[str, frozenset[str]] = {
     "sample": frozenset({"sampled", "refused"}),
     "revisit": frozenset({"confirmed", "voided"}),
     "close": frozenset({"closed"}),
+    "standstill": frozenset({"stood"}),
+    "repeat": frozenset({"repeated"}),
+    "assess noise": frozenset({"noise measured"}),
     "lend": frozenset({"lent"}),
     "take back": frozenset({"taken back"}),
     "identify": frozenset({"identified"}),
@@ -226,7 +229,7 @@ MEASURED_KINDS = frozenset({"confirmed", "voided", "closed"})
 CANCELLED = frozenset({"interrupted", "failed", "paused"})
 """Kinds of events that end a step without an outcome."""
 
-COMPUTED_STEPS = frozenset({"lend", "take back", "identify", "propose", "commit", "judge"})
+COMPUTED_STEPS = frozenset({"assess noise", "lend", "take back", "identify", "propose", "commit", "judge"})
 """Steps whose failure can be computed again, unless a device or the disk caused it."""
 
 

@@ -12,6 +12,7 @@ from pydantic import BeforeValidator, Field
 
 from drivers.interfaces import DeviceIdentity
 from hexacell.acceptance import AcceptanceGate
+from hexacell.campaign.measured_noise import MeasuredNoise
 from hexacell.campaign.teaching import TaskDisplacement
 from hexacell.cell.fields import Frozen, GeometryDocument
 from hexacell.cell.recovery import Action, FailureKind
@@ -141,6 +142,40 @@ class ReferenceConfirmed(Frozen):
     at: SetKey
     change_mm: ThreeNumbers
     reading: Reading | None = None
+
+
+class StandstillRead(Frozen):
+    """The devices were read again and again at a reference while nothing moved.
+
+    ``gauges_mm`` along base x, y, z and ``joints_mm`` have an entry for each reading, ``answers`` and
+    ``counts`` are the raw readings behind them.
+    """
+
+    kind: Literal["stood"] = "stood"
+    at: SetKey
+    gauges_mm: tuple[ThreeNumbers, ...]
+    joints_mm: tuple[SixNumbers, ...]
+    answers: tuple[tuple[str, ...], ...]
+    counts: tuple[tuple[int, ...], ...]
+
+
+class ReferenceRepeated(Frozen):
+    """The reference was left, visited again from another direction, and read."""
+
+    kind: Literal["repeated"] = "repeated"
+    at: SetKey
+    reading: Reading
+
+
+class NoiseMeasured(Frozen):
+    """The noise of gauges and encoders that the run counts with from now on.
+
+    If records are the mean of several windows from now on, the set's reference is recorded again.
+    """
+
+    kind: Literal["noise measured"] = "noise measured"
+    at: SetKey
+    noise: MeasuredNoise
 
 
 class SetClosed(Frozen):
@@ -328,6 +363,9 @@ Event = Annotated[
     | RecordRejected
     | RecordDiscarded
     | ReferenceConfirmed
+    | StandstillRead
+    | ReferenceRepeated
+    | NoiseMeasured
     | SetClosed
     | SetInvalidated
     | ProvisionalApplied

@@ -21,6 +21,8 @@ class SetState:
         samples: those that count, in the order taken; the first is the reference.
         again: orientations and poses of discarded records, which are taken again.
         reference_unverified: the gauges were unwatched; their zero must be verified at the reference.
+        standstill: readings at the reference without moving, and ``visits`` of it.
+        has_left: the robot has been at a waypoint since it was read last.
     """
 
     samples: tuple[events.RecordTaken, ...] = ()
@@ -29,6 +31,9 @@ class SetState:
     drift_mm: tuple[float, float, float] | None = None
     again: tuple[tuple[int, SixNumbers], ...] = ()
     reference_unverified: bool = False
+    standstill: events.StandstillRead | None = None
+    visits: tuple[events.ReferenceRepeated, ...] = ()
+    has_left: bool = False
 
     @property
     def closed(self) -> bool:
@@ -53,7 +58,11 @@ class SetState:
     def with_sample(self, sample: events.RecordTaken) -> SetState:
         """One more record."""
         again = tuple(pair for pair in self.again if pair[0] != sample.orientation)
-        return replace(self, samples=(*self.samples, sample), again=again)
+        return replace(self, samples=(*self.samples, sample), again=again, has_left=False)
+
+    def with_visit(self, visit: events.ReferenceRepeated) -> SetState:
+        """One more visit of the reference."""
+        return replace(self, visits=(*self.visits, visit), has_left=False)
 
     def with_rejection(self, orientation: int) -> SetState:
         """One more rejected record; its orientation is chosen again."""
@@ -74,6 +83,7 @@ class RunState:
 
     Attributes:
         sets: by key, invalidated ones left out.
+        noise: what was measured of it; none before that, or where the cell file does not ask for it.
         at_pose: the set and orientation of the pose that the robot is at; None if it is at none.
         target: the pose that it was last commanded to or located at.
         off_plan: it is at a pose of no set: it was located there, or is at a waypoint.
@@ -95,6 +105,7 @@ class RunState:
     path_from_reference: tuple[tuple[int, SixNumbers], ...] = ()
     position_unknown: bool = False
     invalidated: int = 0
+    noise: events.NoiseMeasured | None = None
     identified: events.Identified | None = None
     proposed: events.Proposed | None = None
     committed: events.Committed | None = None
@@ -192,6 +203,12 @@ def apply(state: RunState, event: events.Event) -> RunState:  # noqa: C901, PLR0
             return _with_set(state, event.at, state.set(event.at).without(event.orientation))
         case events.ReferenceConfirmed():
             return _with_set(state, event.at, replace(state.set(event.at), reference_unverified=False))
+        case events.StandstillRead():
+            return _with_set(state, event.at, replace(state.set(event.at), standstill=event))
+        case events.ReferenceRepeated():
+            return _with_set(state, event.at, state.set(event.at).with_visit(event))
+        case events.NoiseMeasured():
+            return _noise_measured(state, event)
         case events.SetClosed():
             return _with_set(state, event.at, replace(state.set(event.at), drift_mm=event.drift_mm))
         case events.SetInvalidated():
@@ -224,6 +241,8 @@ def apply(state: RunState, event: events.Event) -> RunState:  # noqa: C901, PLR0
 
 def _arrived(state: RunState, event: events.Arrived) -> RunState:
     is_waypoint = event.orientation == 0
+    if is_waypoint and event.at in state.sets:
+        state = _with_set(state, event.at, replace(state.set(event.at), has_left=True))
     at_pose = None if is_waypoint else (event.at, event.orientation)
     return replace(
         state,
@@ -233,6 +252,13 @@ def _arrived(state: RunState, event: events.Arrived) -> RunState:
         path_from_reference=_path(state, event),
         position_unknown=False,
     )
+
+
+def _noise_measured(state: RunState, event: events.NoiseMeasured) -> RunState:
+    """The reference is recorded again where later records are means of more windows."""
+    measured = state.set(event.at)
+    again = () if event.noise.windows > 1 else measured.samples
+    return _with_set(replace(state, noise=event), event.at, replace(measured, samples=again))
 
 
 def _rejected(state: RunState, event: events.RecordRejected) -> RunState:

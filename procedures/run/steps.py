@@ -119,10 +119,35 @@ class CloseSet(StepOfSet):
     kind: Literal["close"] = "close"
 
 
+class Standstill(StepOfSet):
+    """At a set's reference: read all devices again and again without moving, which shows their noise."""
+
+    kind: Literal["standstill"] = "standstill"
+
+
+class Repeat(StepOfSet):
+    """Back at a set's reference from another direction: read again, which shows how well it repeats."""
+
+    kind: Literal["repeat"] = "repeat"
+
+
 class Compute(BaseStep):
     """A step that moves nothing."""
 
-    kind: Literal["lend", "take back", "identify", "propose", "commit", "judge", "accept", "roll back"]
+    kind: Literal[
+        "assess noise",
+        "lend",
+        "take back",
+        "identify",
+        "propose",
+        "commit",
+        "judge",
+        "accept",
+        "roll back",
+    ]
 
 
-Step = Annotated[Locate | Move | Place | Sample | Revisit | CloseSet | Compute, Field(discriminator="kind")]
+Step = Annotated[
+    Locate | Move | Place | Sample | Revisit | CloseSet | Standstill | Repeat | Compute,
+    Field(discriminator="kind"),
+]

@@ -31,6 +31,8 @@ SMALL: dict[str, Any] = {
     "verification.orientations": HELD_OUT_ORIENTATIONS,
     "noise.encoder_mm": 0.001,
     "noise.gauge_mm": 0.001,
+    "noise.standstill_readings": 0,
+    "noise.revisits": 0,
     "acceptance.position_mm": 5.0,
     "acceptance.orientation_deg": 2.0,
     "timing.readings": 2,

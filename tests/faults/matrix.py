@@ -8,7 +8,19 @@ from collections.abc import Iterable
 from dataclasses import astuple, dataclass
 
 from procedures.run import events
-from procedures.run.steps import CloseSet, Compute, Locate, Move, Phase, Place, Revisit, Sample, Step
+from procedures.run.steps import (
+    CloseSet,
+    Compute,
+    Locate,
+    Move,
+    Phase,
+    Place,
+    Repeat,
+    Revisit,
+    Sample,
+    Standstill,
+    Step,
+)
 
 PROPERTY = "fault-matrix"
 STEPS = (
@@ -21,6 +33,7 @@ STEPS = (
     "to orientation",
     "sampling",
     "closing",
+    "measuring noise",
     "lending",
     "taking back",
     "identifying",
@@ -34,6 +47,7 @@ STEPS = (
 )
 """Kinds of steps, in the order of a run; held-out points are measured before and after the commit."""
 COMPUTING = {
+    "assess noise": "measuring noise",
     "lend": "lending",
     "take back": "taking back",
     "identify": "identifying",
@@ -83,8 +97,10 @@ def _name(step: Step) -> str:
             return _of_a_set(step)
 
 
-def _of_a_set(step: Move | Place | Sample | Revisit | CloseSet) -> str:
+def _of_a_set(step: Move | Place | Sample | Revisit | CloseSet | Standstill | Repeat) -> str:
     match step:
+        case Standstill() | Repeat():
+            return "measuring noise"
         case Move():
             return "to reference" if step.orientation == 1 else "to orientation"
         case Sample():
@@ -125,6 +141,7 @@ def _short(step: str) -> str:
         "to orientation": "move",
         "sampling": "sample",
         "closing": "close",
+        "measuring noise": "noise",
         "lending": "lend",
         "taking back": "take b",
         "identifying": "identf",

@@ -10,7 +10,10 @@ from hexacell.cell.uncertainty import UncertaintySettings
 from hexacell.stated_effects import stated_effects
 from hexacell.uncertainty.effects import Occurrence
 
-CONSTANTS = {"grade", "sources", "rail_wave_short_mm", "rail_wave_long_mm", "leg_compliance_um_n"}
+CONSTANTS = {
+    *("grade", "sources", "rail_wave_short_mm", "rail_wave_long_mm", "leg_compliance_um_n"),
+    "slider_repeatability_acts",
+}
 
 
 @pytest.fixture(scope="module")

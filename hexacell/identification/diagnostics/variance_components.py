@@ -1,9 +1,9 @@
 """Variance components: the noise of the encoders and of the gauges, estimated from the residuals.
 
 A record's covariance is ``V = s1 Q1 + s2 Q2``: the variance s1 of the encoders, propagated through
-the machine, ``Q1 = Gq Gq^T``, and the variance s2 of the gauges, ``Q2 = I``. They are separable
-because Gq changes from pose to pose and differs in x, y and z. Restricted maximum likelihood
-(REML) requires for both
+the machine, ``Q1 = Gq Gq^T``, and the variance s2 of the gauges, ``Q2 = I``. Where encoders or gauges
+are not alike, the ratios of their noise are known. Both variances are separable because Gq changes from
+pose to pose and differs in x, y and z. Restricted maximum likelihood (REML) requires for both
 
     r^T W Qk W r = tr(P Qk),    P = W - W X C X^T W,
 
@@ -118,8 +118,9 @@ class _Equations:
         """At some variances (2,), mm^2, with the parameters refitted under them."""
         model = _refitted(found, variances)
         by_joints = found.prediction.by_joints
-        encoder = by_joints @ np.swapaxes(by_joints, -1, -2)
-        cofactors = (encoder, np.broadcast_to(np.eye(3), encoder.shape))
+        unit = replace(found.problem.noise, encoder_mm=1.0, gauge_mm=1.0)
+        encoder = unit.encoder_covariance(by_joints)
+        cofactors = (encoder, np.broadcast_to(unit.gauge_covariance, encoder.shape))
         scores = model.scores
         observed = [np.einsum("ni,nij,nj->", scores, cofactor, scores) for cofactor in cofactors]
         projected = model.weights - model.weights @ model.explained @ model.weights

@@ -17,7 +17,7 @@ from hexacell.kinematics.forward import ForwardResult
 from hexacell.kinematics.frame_derivatives import free_parameter_derivatives
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import Branch, Mechanism
-from hexacell.kinematics.parameters import ParameterSet, ParameterUnit
+from hexacell.kinematics.parameters import LEGS, ParameterSet, ParameterUnit
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array, Mask
 from hexacell.measurements.records import MeasurementSet
@@ -28,14 +28,53 @@ class Noise:
     """Standard deviations of the readings of a record and of the gauges' alignment and scale.
 
     Attributes:
+        encoder_mm: of an encoder; where they differ, the root mean square of all.
+        gauge_mm: likewise of a gauge.
         alignment: of each component of a station's small rotation against the base, rad; zero if exact.
         gauge_scale: of each gauge's relative scale error; zero if exact.
+        encoder_shares: of each encoder, in units of ``encoder_mm``; empty where all are alike.
+        gauge_shares: of each gauge, x, y, z, in units of ``gauge_mm``. Their axes count as those of the
+            frame convention, from which they differ by few degrees.
     """
 
     encoder_mm: float
     gauge_mm: float
     alignment: float = 0.0
     gauge_scale: float = 0.0
+    encoder_shares: tuple[float, ...] = ()
+    gauge_shares: tuple[float, ...] = ()
+
+    def with_devices(self, encoders_mm: Sequence[float], gauges_mm: Sequence[float]) -> Noise:
+        """The same with the noise of each encoder, and of the gauges x, y and z."""
+        encoder, gauge = (float(np.sqrt(np.mean(np.square(one)))) for one in (encoders_mm, gauges_mm))
+        return replace(
+            self,
+            encoder_mm=encoder,
+            gauge_mm=gauge,
+            encoder_shares=tuple(mm / encoder for mm in encoders_mm),
+            gauge_shares=tuple(mm / gauge for mm in gauges_mm),
+        )
+
+    @property
+    def encoders_mm(self) -> Array:
+        """Of each encoder (6,)."""
+        return self.encoder_mm * np.array(self.encoder_shares or (1.0,) * LEGS)
+
+    @property
+    def gauges_mm(self) -> Array:
+        """Of each gauge (3,), along x, y and z."""
+        return self.gauge_mm * np.array(self.gauge_shares or (1.0,) * 3)
+
+    def encoder_covariance(self, position_by_joints: Array) -> Array:
+        """Covariance (n, 3, 3), mm^2, of the ball's position by ``dP/dq`` (n, 3, 6)."""
+        scaled = position_by_joints * self.encoders_mm
+        covariance: Array = scaled @ np.swapaxes(scaled, -1, -2)
+        return covariance
+
+    @property
+    def gauge_covariance(self) -> Array:
+        """Covariance (3, 3), mm^2, of what the gauges show."""
+        return np.diag(self.gauges_mm**2)
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,7 +5,7 @@ A record predicts the ball's position P(p, q) by forward kinematics at the measu
 point, which the differences of eq. 5 remove, stays in it. The noise of the encoders reaches the residual
 through ``G = dP/dq``, so that, to first order, a record's covariance is
 
-    V = s_encoder^2 G G^T + s_gauge^2 I.
+    V = G diag(s_encoder^2) G^T + diag(s_gauge^2).
 
 Near a singularity the first term is large, and ordinary least squares (eq. 13) would weight such a record
 wrongly. The weight is the inverse of V (generalized least squares; Aitken 1936).
@@ -95,8 +95,8 @@ def is_singular(position_by_joints: Array) -> Mask:
 
 def record_covariance(position_by_joints: Array, noise: Noise) -> Array:
     """Covariance (n, 3, 3), mm^2, of records by ``dP/dq`` (n, 3, 6), from encoder and gauge noise."""
-    propagated = position_by_joints @ np.swapaxes(position_by_joints, -1, -2)
-    return noise.encoder_mm**2 * propagated + noise.gauge_mm**2 * np.eye(3)
+    covariance: Array = noise.encoder_covariance(position_by_joints) + noise.gauge_covariance
+    return covariance
 
 
 def record_weights(position_by_joints: Array, noise: Noise) -> Array:

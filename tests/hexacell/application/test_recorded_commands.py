@@ -11,7 +11,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from hexacell.application.offline import fit_measurements
-from hexacell.application.recorded_commands import commanding_geometries
+from hexacell.application.recorded_commands import commanding_geometries, noise_of_run
+from hexacell.campaign.measured_noise import InstrumentNoise, MeasuredNoise
 from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import Cell, load_cell
 from hexacell.controller_config.toml_format import NativeToml
@@ -23,6 +24,7 @@ from hexacell.measurements.records import MeasurementSet
 from hexacell.runs.run_folder import RunFolder
 from procedures.journal.journal import Journal
 from procedures.run import events
+from procedures.run.steps import Phase, SetKey
 
 ON_FLOOR = FrameTransform(
     base=Rotation.from_rotvec([-0.7, 0.0, 0.0]).as_matrix(),
@@ -82,6 +84,28 @@ def test_a_folder_without_a_run_tells_nothing(tmp_path):
     assert commanding_geometries(RunFolder(tmp_path), Hexaglide()) == ()
     RunFolder(tmp_path).journal.write_text("no journal\n")
     assert commanding_geometries(RunFolder(tmp_path), Hexaglide()) == ()
+
+
+def measured_noise(*gauges_mm: float) -> events.NoiseMeasured:
+    gauges = [InstrumentNoise(name="a gauge", stated_mm=0.01, record_mm=one) for one in gauges_mm]
+    encoder = InstrumentNoise(name="an encoder", stated_mm=0.01, record_mm=0.01)
+    noise = MeasuredNoise(gauges=tuple(gauges), encoders=(encoder,) * 6)
+    return events.NoiseMeasured(at=SetKey(phase=Phase.IDENTIFY, point=1), noise=noise)
+
+
+def test_records_in_a_run_folder_are_weighted_by_the_noise_that_the_run_measured(tmp_path, paper, visit):
+    cell, measured = load_cell(bundled_config("simulated-hexaglide")), visit(seed=2).measured(0.01, seed=1)
+    run = run_of(tmp_path, started(paper.nominal, paper), measured_noise(0.01, 0.04, 0.01))
+    told = noise_of_run(run)
+    assert told is not None
+    assessed = fit_measurements(cell, measured, run)
+    assert assessed.measured_noise == told
+    assert assessed.found.problem.noise.gauges_mm == pytest.approx([0.01, 0.04, 0.01])
+    alone = fit_measurements(cell, measured)
+    assert alone.measured_noise is None
+    assert alone.found.problem.noise.gauges_mm == pytest.approx([0.01, 0.01, 0.01])
+    assert assessed.found.goodness.ratio < alone.found.goodness.ratio
+    assert noise_of_run(RunFolder(tmp_path / "nothing")) is None
 
 
 def test_records_in_a_run_folder_are_fitted_after_the_controller_got_other_frames(

@@ -17,8 +17,8 @@ from hexacell.measurements.records import MeasurementSet
 
 KEYS = (
     "converged termination iterations records points residual_rms_mm chi2 dof geometry sigma covariance "
-    "undetermined outliers frame parameters findings verdict goodness noise repeatability correlated "
-    "accuracy uncertainty refused possible_causes beyond_tolerance"
+    "undetermined outliers frame parameters findings verdict goodness noise measured_noise repeatability "
+    "correlated accuracy uncertainty refused possible_causes beyond_tolerance"
 )
 
 

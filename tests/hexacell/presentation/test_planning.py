@@ -16,9 +16,9 @@ from hexacell.errors import ExitCode
 from hexacell.kinematics.pose import Pose
 from hexacell.measurements.csv_file import write_measurements
 from hexacell.measurements.records import MeasurementSet
+from hexacell.presentation.layout import duration
 from hexacell.presentation.planning import (
     decision_text,
-    duration,
     forecast_text,
     plan_trial_lines,
     run_forecast_line,

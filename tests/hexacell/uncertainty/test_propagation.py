@@ -188,6 +188,16 @@ def test_a_missed_stop_at_a_task_pose_is_not_taught_away(laboratory, propagation
     assert np.count_nonzero(direct) == len(laboratory.task) * 36
 
 
+def test_missed_stops_in_the_noise_of_the_records_act_at_work_alone(propagation) -> None:
+    everywhere, at_work = (
+        propagation.columns(slider_repeatability(1.0, is_in_noise=in_noise)) for in_noise in (False, True)
+    )
+    assert np.count_nonzero(everywhere.through)
+    assert at_work.through.shape[-1] == 0
+    np.testing.assert_array_equal(at_work.combined, everywhere.direct)
+    assert propagation.chi_square(slider_repeatability(1.0, is_in_noise=True)) == 0.0
+
+
 def test_a_machine_that_is_warmer_at_work_errs_as_its_lengths_say(laboratory, propagation) -> None:
     actual, kelvin = laboratory.paper.actual, 5.0
     warm = laboratory.changed(

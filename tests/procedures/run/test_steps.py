@@ -12,9 +12,16 @@ from pydantic import TypeAdapter, ValidationError
 
 from drivers.interfaces import DeviceIdentity
 from hexacell.acceptance import AcceptanceGate
+from hexacell.campaign.measured_noise import (
+    AveragingForecast,
+    InstrumentNoise,
+    MeasuredNoise,
+    RepeatedApproaches,
+)
 from hexacell.cell.fields import Frozen
 from hexacell.cell.recovery import Action, FailureKind
 from hexacell.decision import Verdict
+from hexacell.identification.diagnostics.approach_scatter import ScatterSource
 from hexacell.identification.solver.result import DataFaultKind
 from hexacell.reporting.result import OutlierRecord
 from hexacell.reporting.verification import JudgedError, ModelTest, Verification, VerifiedAccuracy
@@ -28,9 +35,11 @@ from procedures.run.steps import (
     Move,
     Phase,
     Place,
+    Repeat,
     Revisit,
     Sample,
     SetKey,
+    Standstill,
     Step,
 )
 from procedures.run.trips import Guard
@@ -50,6 +59,9 @@ P2 = SetKey(phase=Phase.IDENTIFY, point=2)
         (CloseSet(at=P2), "P2/close"),
         (Sample(at=SetKey(phase=Phase.BEFORE, point=1), orientation=2, pose=POSE), "before-V1/o02/sample"),
         (Move(at=SetKey(phase=Phase.AFTER, point=12), orientation=1, pose=POSE), "after-V12/o01/move"),
+        (Standstill(at=P2), "P2/standstill"),
+        (Repeat(at=P2), "P2/repeat"),
+        (Compute(kind="assess noise"), "assess noise"),
         (Compute(kind="identify"), "identify"),
         (Compute(kind="roll back"), "roll back"),
     ],
@@ -87,8 +99,13 @@ some_step: st.SearchStrategy[Any] = st.one_of(
     st.builds(Revisit, at=set_key),
     st.builds(CloseSet, at=set_key),
     st.builds(
-        Compute, kind=st.sampled_from(["identify", "propose", "commit", "judge", "accept", "roll back"])
+        Compute,
+        kind=st.sampled_from(
+            ["assess noise", "identify", "propose", "commit", "judge", "accept", "roll back"]
+        ),
     ),
+    st.builds(Standstill, at=set_key),
+    st.builds(Repeat, at=set_key),
 )
 reading = st.builds(
     events.Reading,
@@ -136,6 +153,36 @@ outlier = st.builds(
     gauges=st.lists(st.sampled_from("xyz"), max_size=3).map(tuple),
     off_mm=st.none() | three,
 )
+instrument = st.builds(
+    InstrumentNoise,
+    name=text,
+    reading_mm=st.none() | number,
+    degrees_of_freedom=count,
+    drift_mm=number,
+    stated_mm=number,
+    is_noisier=st.booleans(),
+    record_mm=number,
+)
+measured_noise = st.builds(
+    MeasuredNoise,
+    gauges=st.tuples(instrument, instrument, instrument),
+    encoders=st.lists(instrument, max_size=2).map(tuple),
+    approaches=st.none()
+    | st.builds(
+        RepeatedApproaches,
+        visits=count,
+        degrees_of_freedom=count,
+        ball_mm=number,
+        ratio=number,
+        source=st.none() | st.sampled_from(ScatterSource),
+        excess_mm=number,
+    ),
+    windows=count,
+    forecasts=st.lists(
+        st.builds(AveragingForecast, windows=count, error_mm=number, minutes=number), max_size=2
+    ).map(tuple),
+    encoders_part_mm=st.none() | number,
+)
 some_event: st.SearchStrategy[Any] = st.one_of(
     st.builds(
         events.RunStarted,
@@ -161,6 +208,16 @@ some_event: st.SearchStrategy[Any] = st.one_of(
     st.builds(events.RecordRejected, at=set_key, orientation=count, reason=text),
     st.builds(events.RecordDiscarded, at=set_key, orientation=count),
     st.builds(events.ReferenceConfirmed, at=set_key, change_mm=three),
+    st.builds(
+        events.StandstillRead,
+        at=set_key,
+        gauges_mm=st.lists(three, max_size=2).map(tuple),
+        joints_mm=st.lists(six, max_size=2).map(tuple),
+        answers=st.lists(st.tuples(text, text, text), max_size=2).map(tuple),
+        counts=st.lists(st.tuples(*[st.integers()] * 6), max_size=2).map(tuple),
+    ),
+    st.builds(events.ReferenceRepeated, at=set_key, reading=reading),
+    st.builds(events.NoiseMeasured, at=set_key, noise=measured_noise),
     st.builds(events.SetClosed, at=set_key, drift_mm=three),
     st.builds(events.SetInvalidated, at=set_key, reason=text),
     st.builds(
@@ -240,6 +297,6 @@ KINDS = (
     *("started", "begun", "arrived", "placed", "sampled", "refused", "closed", "voided", "identified"),
     *("lent", "taken back", "proposed", "committed", "judged", "rolled back", "interrupted", "ended"),
     *("located", "undone", "confirmed", "paused", "resumed", "failed", "declined", "tripped"),
-    "accepted",
+    *("accepted", "stood", "repeated", "noise measured"),
 )
 """Journals on disk say these words: they must never change."""

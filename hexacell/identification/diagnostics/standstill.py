@@ -1,0 +1,170 @@
+"""Noise of one instrument from a series of its readings while nothing moves.
+
+What a series shows is noise from reading to reading, and nothing else: errors that are the same as long as
+the robot stands (interpolation of an encoder, friction of a plunger, play) are not in it. The noise is
+therefore a lower limit of the scatter of a record.
+
+A drift is not noise. A line is fitted and subtracted; whether its slope is significant is a t-test. Single
+false readings are found by the generalized extreme studentized deviate test. The correlation of successive
+readings decides what the mean of several is worth: with correlation c they count as (1 - c) / (1 + c) of
+as many independent ones (first-order autoregression). A series that shows less scatter than the steps of
+the display has the standard deviation of rounding, step / sqrt(12).
+
+Sources: Rosner, Technometrics 25 (1983) 165-172; JCGM 100, F.2.2.1.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import chdtri, stdtr, stdtrit
+
+from hexacell.kinematics.rotations import Array, Mask
+
+SMALLEST_SERIES = 8
+"""Fewer readings are no series."""
+SIGNIFICANCE = 1e-3
+"""Probability of each test to find what is not there."""
+OUTLIER_SHARE = 0.1
+"""At most such a share of a series can be outliers."""
+OUTLIER_STEPS = 2.0
+"""Steps of the display within which no reading is an outlier."""
+CORRELATION_SIGMAS = 2.33
+"""A correlation below as many of its standard deviations is none (one-sided 1 %)."""
+LARGEST_CORRELATION = 0.95
+USUAL_STEP_MM = 1e-3
+"""Of the display of a dial indicator."""
+
+_DECIMALS = re.compile(r"\.(\d+)")
+
+
+@dataclass(frozen=True, slots=True)
+class ReadingNoise:
+    """Noise of single readings of one instrument.
+
+    Attributes:
+        sigma_mm: standard deviation of a reading about the line through the series, outliers left out.
+        degrees_of_freedom: of it.
+        drift_mm: change over the series, if it is significant; zero otherwise.
+        outliers: readings that were left out.
+        correlation: of successive readings, if it is significantly positive; zero otherwise.
+    """
+
+    sigma_mm: float
+    degrees_of_freedom: int
+    drift_mm: float
+    outliers: int
+    correlation: float
+
+    @property
+    def are_independent(self) -> bool:
+        """Whether successive readings are independent, as far as the series shows."""
+        return self.correlation == 0.0
+
+    def of_mean(self, readings: int) -> float:
+        """Standard deviation, mm, of the mean of successive readings."""
+        lags = np.arange(1, readings)
+        related = 2.0 * np.sum((1.0 - lags / readings) * self.correlation**lags)
+        return float(self.sigma_mm * np.sqrt((1.0 + related) / readings))
+
+    def exceeds(self, stated_mm: float, readings: int, significance: float = SIGNIFICANCE) -> bool:
+        """Whether the mean of successive readings is significantly noisier than stated (chi-square)."""
+        freedom = self.degrees_of_freedom * (1.0 - self.correlation) / (1.0 + self.correlation)
+        most = stated_mm**2 * float(chdtri(freedom, significance)) / freedom
+        return self.of_mean(readings) ** 2 > most
+
+
+def reading_noise(values: Array, step_mm: float) -> ReadingNoise:
+    """The noise of a series (n,), mm, of readings at equal intervals.
+
+    ``step_mm`` is that of the display.
+
+    Raises:
+        ValueError: the series has fewer than ``SMALLEST_SERIES`` readings.
+    """
+    if len(values) < SMALLEST_SERIES:
+        raise ValueError(f"{len(values)} readings are no series")
+    kept = _without_outliers(values, step_mm)
+    line = _Line.through(values, kept)
+    floor = step_mm / np.sqrt(12.0)
+    sigma = max(float(np.sqrt(line.squares / line.freedom)), floor)
+    correlation = _correlation(line.residuals[kept]) if sigma > floor else 0.0
+    slope_sigma = sigma * np.sqrt((1.0 + correlation) / (1.0 - correlation)) / line.lever
+    beyond = 2.0 * float(stdtr(line.freedom, -abs(line.slope) / slope_sigma))
+    drift = line.slope * (len(values) - 1) if beyond < SIGNIFICANCE else 0.0
+    outliers = len(values) - int(kept.sum())
+    return ReadingNoise(sigma, line.freedom, float(drift), outliers, correlation)
+
+
+def display_step(answers: Sequence[str]) -> float:
+    """The step of a display, mm, by the decimal digits of its answers; ``USUAL_STEP_MM`` without any."""
+    digits = [len(found[1]) for answer in answers if (found := _DECIMALS.search(answer))]
+    return 10.0 ** -max(digits) if digits else USUAL_STEP_MM
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Line:
+    """The straight line through some readings of a series.
+
+    Attributes:
+        slope: mm a reading.
+        residuals: (n,) of all readings.
+        influence: (n,) share of a reading in the line at its own place.
+        squares: sum of squares of the residuals of those that it goes through.
+        lever: root of the sum of squares of their places.
+    """
+
+    slope: float
+    residuals: Array
+    influence: Array
+    squares: float
+    freedom: int
+    lever: float
+
+    @classmethod
+    def through(cls, values: Array, kept: Mask) -> _Line:
+        places = np.arange(len(values)) - np.mean(np.flatnonzero(kept))
+        around = values - np.mean(values[kept])
+        lever = float(np.sum(places[kept] ** 2))
+        slope = float(places[kept] @ around[kept]) / lever
+        residuals = around - slope * places
+        influence = 1.0 / kept.sum() + places**2 / lever
+        squares = float(np.sum(residuals[kept] ** 2))
+        return cls(slope, residuals, influence, squares, int(kept.sum()) - 2, float(np.sqrt(lever)))
+
+
+def _without_outliers(values: Array, step_mm: float) -> Mask:
+    """The readings (n,) that are no outliers: of the most extreme ones, removed one by one."""
+    kept = found = np.ones(len(values), dtype=bool)
+    for _ in range(max(1, int(OUTLIER_SHARE * len(values)))):
+        line = _Line.through(values, kept)
+        worst = int(np.argmax(np.where(kept, np.abs(line.residuals), -1.0)))
+        off = float(abs(line.residuals[worst]))
+        is_outlier = off > OUTLIER_STEPS * step_mm and _is_extreme(line, worst, step_mm)
+        kept = kept & (np.arange(len(values)) != worst)
+        found = kept if is_outlier else found
+    return found
+
+
+def _is_extreme(line: _Line, row: int, step_mm: float) -> bool:
+    """Whether the reading with the largest residual is farther off than chance explains (Student's t)."""
+    share = 1.0 - line.influence[row]
+    others = line.squares - line.residuals[row] ** 2 / share
+    freedom = line.freedom - 1
+    variance = max(others / freedom, step_mm**2 / 12.0)
+    statistic = abs(line.residuals[row]) / np.sqrt(variance * share)
+    readings = line.freedom + 2
+    return bool(statistic > -stdtrit(freedom, 0.5 * SIGNIFICANCE / readings))
+
+
+def _correlation(residuals: Array) -> float:
+    """The correlation of successive residuals, with the bias of a fitted line corrected; zero if chance."""
+    count = len(residuals)
+    squares = float(residuals @ residuals)
+    correlation = float(residuals[1:] @ residuals[:-1]) / squares + 2.0 / count
+    if correlation < CORRELATION_SIGMAS / np.sqrt(count):
+        return 0.0
+    return min(correlation, LARGEST_CORRELATION)

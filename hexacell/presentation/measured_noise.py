@@ -1,0 +1,110 @@
+"""Text for the noise that a run measured at its start: what it is, what is wrong, and what to do."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from hexacell.campaign.averaging import worthwhile_windows
+from hexacell.campaign.measured_noise import (
+    AveragingForecast,
+    InstrumentNoise,
+    MeasuredNoise,
+    RepeatedApproaches,
+)
+from hexacell.identification.diagnostics.approach_scatter import ScatterSource
+from hexacell.presentation.layout import duration, wrapped
+
+UM = 1e3
+NOTEWORTHY_DRIFT = 1.0
+"""In units of the noise of a record: a smaller drift within seconds is not mentioned."""
+
+
+def measured_noise_text(measured: MeasuredNoise) -> str:
+    """What was measured, a sentence a line."""
+    lines = (*_summary(measured), *_warnings(measured), *_averaging(measured))
+    return "\n".join(wrapped(line, indent=2) for line in lines)
+
+
+def _summary(measured: MeasuredNoise) -> Iterator[str]:
+    yield f"noise                    {_of_each_kind(measured, 'record_mm')} a record"
+    if measured.gauges[0].reading_mm is not None:
+        yield f"  readings at rest: {_of_each_kind(measured, 'reading_mm')}"
+    approaches = measured.approaches
+    if approaches is not None and approaches.source is None:
+        yield (
+            f"  {approaches.visits} visits of one pose agree with what is stated for a record: they "
+            f"scatter {approaches.ratio:.1f} times as much"
+        )
+
+
+def _of_each_kind(measured: MeasuredNoise, figure: str) -> str:
+    """A figure of gauges and encoders, um; of several alike the range."""
+    return f"gauges {_range(measured.gauges, figure)}, encoders {_range(measured.encoders, figure)} um"
+
+
+def _range(instruments: Sequence[InstrumentNoise], figure: str) -> str:
+    values = sorted(UM * getattr(one, figure) for one in instruments)
+    first, last = f"{values[0]:.2g}", f"{values[-1]:.2g}"
+    return first if first == last else f"{first} to {last}"
+
+
+def _warnings(measured: MeasuredNoise) -> Iterator[str]:
+    for one in (*measured.gauges, *measured.encoders):
+        yield from _of_instrument(one)
+    if measured.approaches is not None and measured.approaches.source is not None:
+        yield _of_approaches(measured.approaches, measured.approaches.source)
+
+
+def _of_instrument(one: InstrumentNoise) -> Iterator[str]:
+    is_gauge = one.name.startswith("gauge")
+    if one.is_noisier and one.reading_mm is not None:
+        look = "a loose clamp, vibration or its cable" if is_gauge else "its cable, its head and vibration"
+        yield (
+            f"  {one.name}: its readings scatter by {UM * one.reading_mm:.3g} um without moving, more than "
+            f"the {UM * one.stated_mm:.3g} um stated for a record. The run counts with "
+            f"{UM * one.record_mm:.3g} um. Look at {look}; if that is how it is, state it in [noise]"
+        )
+    if abs(one.drift_mm) > NOTEWORTHY_DRIFT * one.stated_mm:
+        look = "let it warm up, and look whether its stand creeps" if is_gauge else "see whether it slides"
+        yield f"  {one.name}: it drifted by {UM * one.drift_mm:+.3g} um within the series: {look}"
+    if one.outliers:
+        what = "a reading was" if one.outliers == 1 else f"{one.outliers} readings were"
+        yield f"  {one.name}: {what} false, and left out. Look at its cable and contacts"
+
+
+def _of_approaches(found: RepeatedApproaches, source: ScatterSource) -> str:
+    size = f"{UM * found.excess_mm:.3g} um"
+    if source is ScatterSource.SLIDERS:
+        what = f"the sliders stop {size} beside what their encoders show"
+        look = "Look for play in guides and joints, and for friction"
+    else:
+        what = f"{source} shows {size} more or less at the same place"
+        look = "Look at its plunger, its plate and its clamp"
+    return (
+        f"  {found.visits} visits of one pose scatter {found.ratio:.1f} times as much as the stated noise "
+        f"explains: {what}. The run counts with that. {look}"
+    )
+
+
+def _averaging(measured: MeasuredNoise) -> Iterator[str]:
+    """What more readings a record would gain, or gain."""
+    if not measured.forecasts:
+        return
+    first, chosen = measured.forecasts[0], measured.windows
+    part = measured.encoders_part_mm
+    of_encoders = "" if part is None else f"the encoders contribute {part:.3f} of "
+    yield f"  {of_encoders}the {first.error_mm:.3f} mm expected at the task in the end (one sigma)"
+    by_windows = {one.windows: one for one in measured.forecasts}
+    possible = worthwhile_windows(measured.forecasts, max(by_windows))
+    if chosen > 1:
+        gain = _gain(by_windows[chosen])
+        yield f"  a record is the mean of {chosen} windows of readings, which gives {gain}"
+    if possible > chosen:
+        yield (
+            f"  {possible} windows of readings a record would give {_gain(by_windows[possible])}: "
+            f"averaged_windows = {possible} in [noise] allows it"
+        )
+
+
+def _gain(one: AveragingForecast) -> str:
+    return f"{one.error_mm:.3f} mm for {duration(one.minutes)} more"

@@ -1,0 +1,93 @@
+"""The steps that measure the noise, at the first reference: read at rest, leave and come back."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from hexacell.campaign.noise_assessment import NoiseReadings
+from hexacell.cell.devices import EncoderSettings
+from hexacell.cell.measuring import NoiseSettings
+from hexacell.identification.diagnostics.standstill import display_step
+from hexacell.kinematics.pose import Pose
+from hexacell.kinematics.rotations import Array
+from hexacell.motion.path_check import is_clear
+from procedures.calibration.set_steps import SetSteps, reference_pose
+from procedures.run.events import Reading
+from procedures.run.state import RunState, SetState
+from procedures.run.steps import Compute, Move, Repeat, SetKey, SixNumbers, Standstill, Step
+
+DISTANCE_SHARE = 0.3
+"""Of the gauges' travel: how far the robot leaves the reference, level as it is."""
+
+
+@dataclass(frozen=True, eq=False)
+class NoiseSteps:
+    """Decides on the steps of one robot's sets."""
+
+    settings: NoiseSettings
+    sets: SetSteps
+
+    def next_step(self, state: RunState, key: SetKey, ball: Array | None) -> Step | None:
+        """The next step at the open set; None if the noise is measured, or not to be.
+
+        ``ball`` (3,), mm, is where the ball was when the gauges were zeroed, if that is known.
+        """
+        measured = state.set(key)
+        is_asked = self.settings.standstill_readings or self.settings.revisits
+        if state.noise is not None or not is_asked or len(measured.samples) != 1:
+            return None
+        if state.at_pose != (key, 1):
+            return self.sets.to_reference(state, key, ball)
+        if measured.has_left:
+            return Repeat(at=key)
+        if self.settings.standstill_readings and measured.standstill is None:
+            return Standstill(at=key)
+        return self._leave(state, key, ball) or Compute(kind="assess noise")
+
+    def _leave(self, state: RunState, key: SetKey, ball: Array | None) -> Move | None:
+        """The move away from the reference before its next visit; none after the last one."""
+        done = len(state.set(key).visits)
+        if done >= self.settings.revisits:
+            return None
+        reference = reference_pose(state, key)
+        beside = [pose for pose in self._beside(reference) if self._is_clear(reference, pose, ball)]
+        if not beside:
+            return None
+        return Move(at=key, orientation=0, pose=beside[done % len(beside)])
+
+    def _beside(self, reference: SixNumbers) -> Iterable[SixNumbers]:
+        """Poses on all sides of the reference, each followed by the opposite one."""
+        x, y, z, a, b, c = reference
+        distance = DISTANCE_SHARE * self.sets.robot.limits.gauge_travel_mm
+        for dx, dy, dz in distance * np.concatenate([[row, -row] for row in np.eye(3)]):
+            yield (x + float(dx), y + float(dy), z + float(dz), a, b, c)
+
+    def _is_clear(self, reference: SixNumbers, pose: SixNumbers, ball: Array | None) -> bool:
+        """Whether the robot as it is known by now gets there and back within the limits."""
+        here, there = (self.sets.robot.from_commands([Pose(*one)]) for one in (reference, pose))
+        belief = self.sets.robot.belief()
+        return is_clear(belief, here, there, ball) and is_clear(belief, there, here, ball)
+
+
+def noise_readings(measured: SetState, encoders: EncoderSettings) -> NoiseReadings:
+    """What was read at the reference of a set."""
+    zero, series = measured.samples[0], measured.standstill
+    gauges = [] if series is None else series.gauges_mm
+    joints = [] if series is None else series.joints_mm
+    answers = zero.reading.answers if series is None else series.answers
+    steps = [display_step([one[gauge] for one in answers]) for gauge in range(3)]
+    visits = [zero.reading, *(visit.reading for visit in measured.visits)]
+    return NoiseReadings(
+        reference=Pose(*zero.pose),
+        series=np.concatenate([np.reshape(gauges, (-1, 3)), np.reshape(joints, (-1, 6))], axis=1),
+        steps=np.array([*steps, *(1e-6 * encoders.measuring_step_nm,) * 6]),
+        visits=np.array([_row(reading) for reading in visits]),
+        window_readings=len(zero.reading.counts),
+    )
+
+
+def _row(reading: Reading) -> tuple[float, ...]:
+    return (*reading.gauges_mm, *reading.joints_mm)

@@ -1,0 +1,52 @@
+"""``[noise]``: one figure for all instruments of a kind, or one each; how a run measures it."""
+
+from __future__ import annotations
+
+import pytest
+
+from hexacell.errors import FileError
+from hexacell.robot_model import noise_of
+
+STATED = "encoder_mm = 0.01\ngauge_mm = 0.01\n"
+
+
+@pytest.fixture
+def load_noise(load_changed):
+    return lambda lines: load_changed((STATED, lines)).settings
+
+
+def test_a_cell_measures_its_noise_unless_it_says_otherwise(load_noise) -> None:
+    noise = load_noise(STATED).noise
+    assert (noise.standstill_readings, noise.revisits) == (40, 6)
+    assert (noise.figures, noise.averaged_windows) == ("stated", 1)
+
+
+def test_one_figure_is_that_of_all_instruments_of_a_kind(load_noise) -> None:
+    noise = noise_of(load_noise("encoder_mm = 0.02\ngauge_mm = 0.005\n"))
+    assert noise.encoders_mm.tolist() == [0.02] * 6
+    assert noise.gauges_mm.tolist() == [0.005] * 3
+
+
+def test_each_instrument_may_have_its_own(load_noise) -> None:
+    noise = noise_of(load_noise("gauges_mm = [0.01, 0.03, 0.01]\nencoder_mm = 0.02\n"))
+    assert noise.gauges_mm.tolist() == pytest.approx([0.01, 0.03, 0.01])
+    assert noise.encoders_mm.tolist() == pytest.approx([0.02] * 6)
+
+
+@pytest.mark.parametrize(
+    ("line", "words"),
+    [
+        ("standstill_readings = 5", "5 standstill_readings are no series"),
+        ("standstill_readings = -1", "0 or more"),
+        ("averaged_windows = 0", "1 or more"),
+        ('figures = "guessed"', "'stated' or 'measured'"),
+        ("gauges_mm = [0.01, 0.0, 0.01]", "more than 0"),
+        ("encoders_mm = [0.01]", "6"),
+    ],
+)
+def test_mistakes_are_named_with_their_line(load_noise, line_with, line: str, words: str) -> None:
+    with pytest.raises(Exception, match=words) as refusal:
+        load_noise(f"{STATED}{line}\n")
+    errors = getattr(refusal.value, "errors", [refusal.value])
+    assert all(isinstance(error, FileError) for error in errors)
+    assert all(error.line >= line_with("[noise]") for error in errors)

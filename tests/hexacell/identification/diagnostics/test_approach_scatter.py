@@ -1,0 +1,89 @@
+"""Visits of one pose: what encoders see is no error, what nobody stated is found and named."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+import numpy as np
+import pytest
+
+from hexacell.identification.diagnostics.approach_scatter import ScatterSource, approach_scatter
+from hexacell.kinematics.pose import Pose, PoseBatch
+from hexacell.kinematics.sensitivity import position_sensitivity
+
+NOISE = 0.01
+VISITS = 7
+
+
+@pytest.fixture(scope="module")
+def by_joints(hexaglide, paper):
+    poses = PoseBatch.of([Pose(0.0, 0.0, 550.0)])
+    joints = hexaglide.inverse(paper.nominal, paper.branch, poses)
+    return position_sensitivity(hexaglide, paper.nominal, poses, joints)[1][0]
+
+
+@pytest.fixture
+def visit(by_joints):
+    """Visits of a machine whose stops differ by 20 um, with more that is not stated."""
+    random = np.random.default_rng(7)
+
+    def scatter(*, sliders=0.0, gauges=(0.0, 0.0, 0.0), stops=0.02, visits=VISITS, stated=NOISE):
+        seen = stops * random.standard_normal((visits, 6))
+        joints = seen + NOISE * random.standard_normal((visits, 6))
+        ball = (seen + sliders * random.standard_normal((visits, 6))) @ by_joints.T
+        shown = ball + np.hypot(NOISE, gauges) * random.standard_normal((visits, 3))
+        return approach_scatter(shown, joints, by_joints, np.full(6, stated), np.full(3, stated))
+
+    return scatter
+
+
+def test_stops_that_the_encoders_see_are_no_scatter(visit) -> None:
+    found = [visit() for _ in range(1000)]
+    assert np.mean([one.source is not None for one in found]) < 0.005
+    assert np.mean([one.chi_square / one.degrees_of_freedom for one in found]) == pytest.approx(
+        1.0, abs=0.03
+    )
+    assert {one.degrees_of_freedom for one in found} == {3 * (VISITS - 1)}
+    assert np.mean([one.ball_mm for one in found]) > 0.05  # the ball moved with them
+
+
+def test_the_upper_limit_of_the_noise_holds_in_95_percent(visit) -> None:
+    assert np.mean([visit().ratio_at_most >= 1.0 for _ in range(1000)]) == pytest.approx(0.95, abs=0.025)
+
+
+def test_play_of_the_sliders_is_found_with_its_size(visit) -> None:
+    found = [visit(sliders=0.05) for _ in range(200)]
+    named = Counter(one.source for one in found)
+    assert named[ScatterSource.SLIDERS] >= 190
+    sizes = [one.excess_mm for one in found if one.source is ScatterSource.SLIDERS]
+    assert np.median(sizes) == pytest.approx(0.05, rel=0.15)
+
+
+@pytest.mark.parametrize(
+    ("gauges", "source"),
+    [
+        ((0.2, 0.0, 0.0), ScatterSource.GAUGE_X),
+        ((0.0, 0.5, 0.0), ScatterSource.GAUGE_Y),
+        ((0.0, 0.0, 0.2), ScatterSource.GAUGE_Z),
+    ],
+)
+def test_a_gauge_that_does_not_repeat_is_named_with_its_size(visit, gauges, source) -> None:
+    found = [visit(gauges=gauges) for _ in range(100)]
+    named = [one for one in found if one.source is source]
+    assert len(named) >= 90
+    assert np.median([one.excess_mm for one in named]) == pytest.approx(max(gauges), rel=0.2)
+
+
+def test_a_gauge_is_rarely_blamed_for_the_sliders(visit) -> None:
+    found = Counter(visit(sliders=0.03).source for _ in range(500))
+    assert sum(found[source] for source in ScatterSource if source is not ScatterSource.SLIDERS) <= 10
+
+
+def test_less_scatter_than_stated_is_no_excess(visit) -> None:
+    found = visit(stated=10.0 * NOISE)
+    assert found.source is None
+    assert found.ratio_at_most < 0.3
+
+
+def test_two_visits_tell_nothing(visit) -> None:
+    assert visit(visits=2) is None

@@ -1,0 +1,260 @@
+"""At the first reference a run measures the noise, once however often it is stopped, and uses it."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import re
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from hexacell.application.calibration_run import calibration_of_run
+from hexacell.controller_config.write_back import Receipt
+from hexacell.errors import ExitCode, Interruption
+from hexacell.presentation.events import event_text
+from procedures.calibration.workflow import Mode
+from procedures.journal.journal import read_journal
+from procedures.replay.comparison import ReplayReport
+from procedures.replay.recorded_executor import RecordedStepExecutor
+from procedures.replay.replayer import Replayer
+from procedures.run import events
+from procedures.run.commands import Abort, Stop
+from procedures.run.state import RunState, fold
+from procedures.run.steps import Compute, Move, Phase, Repeat, SetKey, Standstill
+from tests.procedures.replay.test_replayer import numbered
+from tests.procedures.rig import MakeRig, Rig, new_rig
+from tests.procedures.runs.listening import happened, on
+from tests.small_cell import choose_among_few
+
+P1 = SetKey(phase=Phase.IDENTIFY, point=1)
+ASKED: dict[str, Any] = {"noise__standstill_readings": 16, "noise__revisits": 6}
+
+
+@pytest.fixture
+def asked(make_rig: MakeRig) -> Rig:
+    return make_rig(**ASKED)
+
+
+async def measure_noise(rig: Rig) -> events.NoiseMeasured:
+    """Run until the noise is measured, and the set has one record more than its reference."""
+
+    def listener(event: events.Event, state: RunState) -> None:
+        if state.noise is not None and len(state.set(P1).samples) == 2:
+            rig.engine.command(Stop())
+
+    with pytest.raises(Interruption):
+        await rig.run(listener)
+    (found,) = happened(rig, events.NoiseMeasured)
+    assert isinstance(found, events.NoiseMeasured)
+    return found
+
+
+def noisy(rig: Rig, gauge: int, sigma_mm: float) -> None:
+    """Have one gauge show white noise, reading by reading."""
+    random, shown = np.random.default_rng(8), rig.gauges[gauge].shown
+    rig.gauges[gauge].shown = lambda: shown() + sigma_mm * random.standard_normal()
+
+
+def steps_of(history: Sequence[events.Event]) -> list[Any]:
+    return [event.step for event in history if isinstance(event, events.StepBegun)]
+
+
+async def test_it_is_read_at_rest_left_in_all_directions_and_evaluated(asked: Rig) -> None:
+    await measure_noise(asked)
+    steps = steps_of(read_journal(asked.folder.journal))
+    (first,) = (place for place, step in enumerate(steps) if isinstance(step, Standstill))
+    (last,) = (place for place, step in enumerate(steps) if step == Compute(kind="assess noise"))
+    reference = np.array(steps[first - 1].pose)
+    between = steps[first + 1 : last]
+    away, back, again = between[0::3], between[1::3], between[2::3]
+    assert [type(step) for step in again] == [Repeat] * 6
+    assert {(type(step), step.orientation) for step in away} == {(Move, 0)}
+    assert {(type(step), step.orientation, step.pose) for step in back} == {(Move, 1, tuple(reference))}
+    moved = np.array([np.array(step.pose) - reference for step in away])
+    expected = np.concatenate([[[d, 0, 0], [-d, 0, 0]] for d in (1.5,)])
+    assert moved[:2, :3] == pytest.approx(expected)
+    assert np.linalg.norm(moved, axis=1) == pytest.approx(np.full(6, 1.5))
+    assert np.linalg.matrix_rank(moved) == 3
+
+
+async def test_the_quiet_simulation_is_as_noisy_as_stated(asked: Rig) -> None:
+    found = (await measure_noise(asked)).noise
+    assert not found.is_larger
+    assert {one.record_mm for one in (*found.gauges, *found.encoders)} == {0.0012}
+    readings = [one.reading_mm or 1.0 for one in (*found.gauges, *found.encoders)]
+    assert max(readings) < 0.0012
+    assert found.approaches is not None
+    assert found.approaches.visits == 7
+    assert 0.4 < found.approaches.ratio < 1.5
+
+
+async def test_a_noisy_gauge_is_named_and_weighted_down(asked: Rig) -> None:
+    noisy(asked, 1, 0.012)
+    found = await measure_noise(asked)
+    assert [one.name for one in found.noise.gauges if one.is_noisier] == ["gauge y"]
+    state = fold(read_journal(asked.folder.journal))
+    noise = asked.calibration.robot_of(state).noise
+    assert noise.gauges_mm[1] == pytest.approx(0.012 / np.sqrt(5.0), rel=0.6)
+    assert noise.gauges_mm[[0, 2]] == pytest.approx([0.0012, 0.0012])
+    assert asked.calibration.robot.noise.gauges_mm == pytest.approx(np.full(3, 0.0012))
+    text = event_text(found, state)
+    assert text is not None
+    assert re.search(r"gauge y: its readings scatter by [\d.]+ um without moving", text)
+    assert "state it in [noise]" in text
+
+
+async def test_a_drifting_gauge_is_named_and_is_no_noise(asked: Rig) -> None:
+    shown = asked.gauges[2].shown
+    asked.gauges[2].shown = lambda: shown() + 0.003 * asked.clock.now()
+    found = await measure_noise(asked)
+    (drifting,) = (one for one in found.noise.gauges if one.drift_mm)
+    assert drifting.name == "gauge z"
+    (series,) = happened(asked, events.StandstillRead)
+    assert drifting.drift_mm == pytest.approx(series.gauges_mm[-1][2] - series.gauges_mm[0][2], rel=0.2)
+    assert not drifting.is_noisier
+    text = event_text(found, RunState())
+    assert text is not None
+    assert "gauge z: it drifted by +" in text
+    assert "let it warm up" in " ".join(text.split())
+
+
+async def test_a_machine_with_play_is_told(make_rig: MakeRig) -> None:
+    """The sliders' joints stop elsewhere than their encoders show."""
+    rig = make_rig(**ASKED)
+    ball, shift = rig.physics.encoder_positions, np.zeros(6)
+    random = np.random.default_rng(9)
+    rig.bench.encoders.shown = lambda: [*(ball() + shift)]
+    moved = on_every(
+        events.Arrived, lambda: shift.__setitem__(slice(None), 0.03 * random.standard_normal(6))
+    )
+    with pytest.raises(Interruption):
+        await rig.run(moved, on(events.NoiseMeasured, lambda: rig.engine.command(Stop())))
+    (found,) = happened(rig, events.NoiseMeasured)
+    assert found.noise.approaches.source == "sliders"
+    assert found.noise.approaches.excess_mm == pytest.approx(0.03, rel=0.6)
+    text = event_text(found, RunState())
+    assert text is not None
+    assert "the sliders stop" in text
+    assert "Look for play" in " ".join(text.split())
+    informed = rig.calibration.informed(fold(read_journal(rig.folder.journal)))
+    assert informed.settings.uncertainty.slider_repeatability_um > 10.0
+
+
+def on_every(kind: type[Any], action: Any) -> Any:
+    def listener(event: events.Event, _: RunState) -> None:
+        if isinstance(event, kind):
+            action()
+
+    return listener
+
+
+AVERAGED = ASKED | {
+    "noise__averaged_windows": 4,
+    "simulation__gauges__flicker_mm": 0.01,
+    "simulation__encoders__flicker_mm": 0.01,
+    "noise__encoder_mm": 0.0045,
+    "noise__gauge_mm": 0.0045,
+}
+
+
+async def test_records_are_means_of_several_windows_where_that_is_allowed_and_pays(
+    make_rig: MakeRig,
+) -> None:
+    rig = make_rig(**AVERAGED)
+    found = await measure_noise(rig)
+    assert found.noise.windows == 4
+    single, zero, second = happened(rig, events.RecordTaken)[:3]
+    assert (single.orientation, zero.orientation, second.orientation) == (1, 1, 2)
+    assert zero.deviation_mm == (0.0, 0.0, 0.0)
+    assert len(zero.reading.counts) == len(second.reading.counts) == 4 * len(single.reading.counts)
+    state = fold(read_journal(rig.folder.journal))
+    assert state.set(P1).samples[:2] == (zero, second)
+    noise = rig.calibration.robot_of(state).noise
+    assert noise.encoder_mm < 0.85 * 0.0045
+
+
+async def test_a_check_measures_the_noise_too(make_rig: MakeRig) -> None:
+    rig = make_rig(Mode.CHECK, **ASKED)
+    assert not (await measure_noise(rig)).noise.is_larger
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> Rig:
+    """A whole run in which one gauge is noisier than stated."""
+    with pytest.MonkeyPatch.context() as patch:
+        choose_among_few(patch)
+        rig = new_rig(tmp_path_factory.mktemp("noise"), **ASKED)
+        noisy(rig, 0, 0.01)
+        asyncio.run(rig.run())
+    return rig
+
+
+def test_a_whole_run_with_a_noisy_gauge_passes(whole: Rig) -> None:
+    """Without the measured noise the residuals would be too large for what is stated."""
+    ended = read_journal(whole.folder.journal)[-1]
+    assert isinstance(ended, events.Ended)
+    assert ended.exit_code == ExitCode.DONE
+
+
+def test_the_result_has_the_measured_noise(whole: Rig) -> None:
+    (found,) = happened(whole, events.NoiseMeasured)
+    result = json.loads(whole.folder.result.read_text())
+    assert result["measured_noise"] == found.noise.model_dump(mode="json")
+
+
+def test_the_run_is_reproduced(whole: Rig, few_candidates: None, tmp_path: Path) -> None:
+    history = read_journal(whole.folder.journal)
+    started = history[0]
+    assert isinstance(started, events.RunStarted)
+    written = whole.config
+    whole.cell.config_path.write_bytes(Receipt.of(whole.folder.path).backup())
+    calibration = calibration_of_run(whole.cell, started)
+    executor = RecordedStepExecutor.of(whole.cell, calibration, type(whole.folder)(tmp_path))
+    report = ReplayReport(whole.folder.journal, "hexacell", len(history))
+    asyncio.run(Replayer(executor, report).replay(numbered(history)))
+    whole.cell.config_path.write_bytes(written)
+    assert report.differences == []
+    assert report.results > 60
+
+
+@pytest.mark.parametrize("command", [Abort(), None])
+async def test_interrupted_anywhere_it_is_measured_once(
+    make_rig: MakeRig, few_candidates: None, tmp_path: Path, command: Abort | None
+) -> None:
+    """After a stop, and after a death that leaves no word, at each event until the noise is measured."""
+    for number in range(2, 56, 3):
+        folder = tmp_path / f"{number}"
+        folder.mkdir()
+        rig = new_rig(folder, **ASKED)
+        await interrupted(rig, number, command)
+        await measure_noise(rig)
+        state = fold(read_journal(rig.folder.journal))
+        assert len(state.set(P1).samples) == 2
+        assert state.noise is not None
+        assert state.noise.noise.approaches is not None
+        assert state.noise.noise.approaches.visits == 7
+
+
+class PowerCut(BaseException):
+    """Nothing after it is written down."""
+
+
+async def interrupted(rig: Rig, number: int, command: Abort | None) -> None:
+    heard, kept = [0], [b""]
+
+    def listener(event: events.Event, _: RunState) -> None:
+        heard[0] += 1
+        if heard[0] == number and command is not None:
+            rig.engine.command(command)
+        elif heard[0] == number:
+            kept[0] = rig.folder.journal.read_bytes()
+            raise PowerCut
+
+    with pytest.raises((Interruption, PowerCut)):
+        await rig.run(listener)
+    if command is None:
+        rig.folder.journal.write_bytes(kept[0])

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 from hexacell.application.recorded_commands import commanding_geometries, noise_of_run
+from hexacell.campaign.averaging import WINDOWS, AveragingForecaster, mean_of_independent
 from hexacell.campaign.decisions import (
     CampaignState,
     Finished,
@@ -16,7 +17,7 @@ from hexacell.campaign.decisions import (
 )
 from hexacell.campaign.dry_run import DryRunResult, dry_run
 from hexacell.campaign.feasibility import unreachable_share
-from hexacell.campaign.measured_noise import with_measured_noise
+from hexacell.campaign.measured_noise import AveragingForecast, with_measured_noise
 from hexacell.campaign.planner import Plan
 from hexacell.campaign.pose_list import pose_list_of
 from hexacell.cell.loader import Cell
@@ -49,11 +50,15 @@ class PlanTrial:
     Attributes:
         unreachable: share of the robots within the tolerances that cannot reach a point, by point.
         target_mm: predicted error at which measuring ends, if the cell file states one.
+        averaging: what means of more readings would gain if all noise differed from reading to reading.
+        encoders_part_mm: what the encoders contribute to the first of these errors.
     """
 
     result: DryRunResult
     unreachable: Mapping[int, float]
     target_mm: float | None
+    averaging: tuple[AveragingForecast, ...] = ()
+    encoders_part_mm: float | None = None
 
 
 def fit_measurements(
@@ -98,7 +103,14 @@ def next_pose(cell: Cell, measurements: MeasurementSet, *, rejections: int = 0) 
 def try_plan(cell: Cell) -> PlanTrial:
     """Carry out a cell's plan on robots drawn within its tolerances; takes some seconds."""
     plan = _plan_of(cell)
-    return PlanTrial(dry_run(plan), unreachable_share(plan), cell.settings.identification.target_mm)
+    averaging, noise = AveragingForecaster(plan), plan.robot.noise
+    return PlanTrial(
+        dry_run(plan),
+        unreachable_share(plan),
+        cell.settings.identification.target_mm,
+        averaging.forecasts({windows: mean_of_independent(noise, windows) for windows in WINDOWS}),
+        averaging.encoders_part(noise),
+    )
 
 
 def _plan_of(cell: Cell) -> Plan:

@@ -57,6 +57,13 @@ def perfect_encoders(noise: Noise) -> Noise:
     return replace(noise, encoder_mm=PERFECT * noise.encoder_mm)
 
 
+def mean_of_independent(noise: Noise, windows: int) -> Noise:
+    """The noise of means of some windows, if all of it differs from reading to reading."""
+    return replace(
+        noise, encoder_mm=noise.encoder_mm / windows**0.5, gauge_mm=noise.gauge_mm / windows**0.5
+    )
+
+
 def worthwhile_windows(forecasts: tuple[AveragingForecast, ...], most: int) -> int:
     """How many windows to average: as many as pay, each number against the one before it."""
     best = 1

@@ -17,7 +17,9 @@ from hexacell.campaign.decisions import (
     MeasurePose,
     StartPoint,
 )
+from hexacell.campaign.held_out_forecast import predicted_verdicts
 from hexacell.campaign.planner import Plan
+from hexacell.campaign.verdict_forecast import VerdictForecast
 from hexacell.errors import HexacellError
 from hexacell.identification.problem.data_requirements import is_determined
 from hexacell.kinematics.geometry import Geometry
@@ -133,6 +135,7 @@ class DryRunResult:
         worst_sigma_mm: predicted error at the worst task pose afterwards; none without task poses.
         minutes: to measure, held-out poses included.
         expanded_mm: U of the largest error at the task poses, systematic effects included; none likewise.
+        verdicts: what a run will say of healthy machines; none likewise, or without held-out poses.
     """
 
     drawn: int
@@ -143,6 +146,7 @@ class DryRunResult:
     worst_sigma_mm: float | None
     minutes: float
     expanded_mm: float | None = None
+    verdicts: VerdictForecast | None = None
 
 
 def dry_run(plan: Plan, robots: int = ROBOTS) -> DryRunResult:
@@ -166,6 +170,7 @@ class _Outcome:
     campaign: VirtualCampaign
     forecast: Forecast | None
     budget: UncertaintyBudget | None
+    verdicts: VerdictForecast | None
 
 
 def _carry_out(plan: Plan, truth: Geometry, number: int) -> _Outcome | None:
@@ -181,7 +186,7 @@ def _carry_out(plan: Plan, truth: Geometry, number: int) -> _Outcome | None:
     if found is None or not is_determined(found.problem):
         return None
     budget = plan.task.budget(found, estimate.belief, plan.robot.effects)
-    return _Outcome(campaign, forecast, budget)
+    return _Outcome(campaign, forecast, budget, predicted_verdicts(plan, found, budget))
 
 
 def _summary(plan: Plan, tried: int, identified: list[_Outcome]) -> DryRunResult:
@@ -190,6 +195,7 @@ def _summary(plan: Plan, tried: int, identified: list[_Outcome]) -> DryRunResult
     points = round(median(outcome.campaign.state.begun_points for outcome in identified))
     records = round(median(len(outcome.campaign.measurements) for outcome in identified))
     errors = [outcome.forecast.now_mm for outcome in identified if outcome.forecast is not None]
+    verdicts = [outcome.verdicts for outcome in identified if outcome.verdicts is not None]
     expanded = [outcome.budget.expanded_mm for outcome in identified if outcome.budget is not None]
     held_out = plan.settings.verification
     straight = TimeModel.of(plan.settings, moves=1.0)
@@ -205,4 +211,5 @@ def _summary(plan: Plan, tried: int, identified: list[_Outcome]) -> DryRunResult
         worst_sigma_mm=median(errors) if errors else None,
         minutes=plan.budget.time_model.minutes(records, points) + before + after,
         expanded_mm=median(expanded) if expanded else None,
+        verdicts=VerdictForecast.mean(verdicts) if verdicts else None,
     )

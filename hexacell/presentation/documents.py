@@ -77,6 +77,8 @@ def preflight_document(devices: Sequence[DeviceIdentity], trial: PlanTrial) -> d
         "devices": [asdict(identity) for identity in devices],
         "expected": {
             **asdict(trial.result),
+            "averaging": [one.model_dump() for one in trial.averaging],
+            "encoders_part_mm": trial.encoders_part_mm,
             "lost": {str(point): share for point, share in trial.unreachable.items()},
         },
     }

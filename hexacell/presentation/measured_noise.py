@@ -106,5 +106,19 @@ def _averaging(measured: MeasuredNoise) -> Iterator[str]:
         )
 
 
+def averaging_lines(
+    forecasts: Sequence[AveragingForecast], encoders_part_mm: float | None
+) -> Iterator[str]:
+    """Before a run: what the encoders contribute, and what means of more readings may gain."""
+    if len(forecasts) < 2 or encoders_part_mm is None:
+        return
+    first, fourfold = forecasts[0], forecasts[min(2, len(forecasts) - 1)]
+    yield (
+        f"The noise of the encoders makes about {encoders_part_mm:.3f} of {first.error_mm:.3f} mm (one "
+        f"sigma). As far as noise differs from reading to reading, which a run measures, "
+        f"{fourfold.windows} windows of readings a record give {_gain(fourfold)}."
+    )
+
+
 def _gain(one: AveragingForecast) -> str:
     return f"{one.error_mm:.3f} mm for {duration(one.minutes)} more"

@@ -9,6 +9,8 @@ from hexacell.application.offline import PlanTrial
 from hexacell.campaign.decisions import Finished, Forecast, MeasurePose, StartPoint
 from hexacell.measurements.records import RecordId
 from hexacell.presentation.layout import duration
+from hexacell.presentation.measured_noise import averaging_lines
+from hexacell.presentation.verdict_forecast import verdict_forecast_lines
 
 
 def decision_text(decision: StartPoint | MeasurePose | Finished) -> str:
@@ -83,6 +85,9 @@ def plan_trial_lines(trial: PlanTrial) -> Iterator[str]:
                 f"The expanded uncertainty U of the largest error there will be about "
                 f"{result.expanded_mm:.3f} mm, with the systematic effects of [uncertainty]."
             )
+        if result.verdicts is not None:
+            yield from verdict_forecast_lines(result.verdicts)
+        yield from averaging_lines(trial.averaging, trial.encoders_part_mm)
         if target_mm is not None and result.worst_sigma_mm > target_mm:
             yield f"That is not the target of {target_mm:g} mm: allow more records, points or tilt."
     if 0 < result.robots < result.drawn:

@@ -74,9 +74,30 @@ def test_a_cell_that_cannot_be_calibrated_is_refused_with_the_reason(
     assert cell_folder.snapshot() == before
 
 
+WIDE = (
+    ("position_mm = 0.15 ", "position_mm = 20.0 "),
+    ("orientation_deg = 0.05 ", "orientation_deg = 5.0 "),
+)
+"""Limits that any robot of the cell passes."""
+
+
+@pytest.mark.usefixtures("one_robot")
+def test_limits_that_a_good_machine_fails_are_warned_of(typed_here: Any, cell_folder: Any) -> None:
+    cell_folder.edit(
+        ("orientations = 11", "orientations = 7"),
+        ("position_mm = 0.15 ", "position_mm = 0.05 "),
+        ('grade = "ideal"', 'grade = "ideal"\nload_n = 400.0\nleg_compliance_um_n = 0.1'),
+    )
+    outcome = typed_here("preflight", cell_folder.cell)
+    assert outcome.code == 0
+    said = re.sub(r"\s+", " ", outcome.out)
+    assert "That is too little: a good machine fails these limits. 95% would pass position_mm = " in said
+    assert "is the load at work (" in said
+
+
 @pytest.mark.usefixtures("one_robot")
 def test_the_predicted_accuracy_is_printed_before_any_motion(typed_here: Any, cell_folder: Any) -> None:
-    cell_folder.edit(("orientations = 11", "orientations = 7"))
+    cell_folder.edit(("orientations = 11", "orientations = 7"), *WIDE)
     before = cell_folder.snapshot()
     outcome = typed_here("preflight", cell_folder.cell, "--json")
     assert outcome.code == 0
@@ -88,7 +109,17 @@ def test_the_predicted_accuracy_is_printed_before_any_motion(typed_here: Any, ce
     assert 0.02 < expected["worst_sigma_mm"] < 1.0
     assert 1.0 < expected["minutes"] < 8.0
     assert all(0.0 <= share < 0.3 for share in expected["lost"].values())
+    verdicts = expected["verdicts"]
+    assert sum(verdicts["probabilities"].values()) == pytest.approx(1.0)
+    assert verdicts["limits"] == {"position_mm": 20.0, "orientation_deg": 5.0}
+    assert verdicts["probabilities"]["pass"] == pytest.approx(0.997, abs=0.001)
+    assert 0.02 < verdicts["passing"]["position_mm"] < 4.0
+    assert expected["averaging"][2]["windows"] == 4
+    assert 0.4 < expected["averaging"][2]["error_mm"] / expected["averaging"][0]["error_mm"] < 0.6
+    assert 0.0 < expected["encoders_part_mm"] < expected["averaging"][0]["error_mm"]
     said = re.sub(r"\s+", " ", outcome.err)
+    assert "A healthy machine of this cell passes with a probability of 99.7%." in said
+    assert "The noise of the encoders makes about 0." in said
     words = r"\d+ records at 5 points will give about 0\.\d{3} mm at the worst of your task poses"
     assert re.search(rf"{words} \(one sigma\), in about \d minutes\.", said)
     assert cell_folder.snapshot() == before

@@ -10,8 +10,11 @@ import pytest
 from hexacell.application.offline import PlanTrial
 from hexacell.campaign.decisions import Finished, Forecast, MeasurePose, StartPoint
 from hexacell.campaign.dry_run import DryRunResult
+from hexacell.campaign.measured_noise import AveragingForecast
+from hexacell.campaign.verdict_forecast import VerdictForecast
 from hexacell.cell.bundled import bundled_config
 from hexacell.cli.app import main
+from hexacell.decision import ErrorLimits, Verdict
 from hexacell.errors import ExitCode
 from hexacell.kinematics.pose import Pose
 from hexacell.measurements.csv_file import write_measurements
@@ -101,6 +104,25 @@ def test_the_expanded_uncertainty_is_stated_with_the_plan():
     assert second == (
         "The expanded uncertainty U of the largest error there will be about 0.066 mm, with the systematic "
         "effects of [uncertainty]."
+    )
+
+
+def test_the_verdicts_on_healthy_machines_and_the_part_of_the_encoders_are_told():
+    probabilities = dict.fromkeys(Verdict, 0.0) | {Verdict.PASS: 0.6, Verdict.CONDITIONAL_PASS: 0.4}
+    limits = ErrorLimits(0.15, 0.05)
+    verdicts = VerdictForecast(probabilities, limits, ErrorLimits(0.18, 0.02), "load at work", 0.05, 0.06)
+    told = lines(verdicts=verdicts)
+    assert told[1].startswith("A healthy machine of this cell passes with a probability of 60%")
+    assert "95% would pass position_mm = 0.18 in [acceptance]" in told[2]
+    forecasts = tuple(
+        AveragingForecast(windows=windows, error_mm=0.2 / windows**0.5, minutes=0.5 * windows)
+        for windows in (1, 2, 4)
+    )
+    trial = PlanTrial(DryRunResult(2, 2, 5, 55, 0, 0.02, 40.0), {}, None, forecasts, 0.17)
+    assert [*plan_trial_lines(trial)][-1] == (
+        "The noise of the encoders makes about 0.170 of 0.200 mm (one sigma). As far as noise differs "
+        "from reading to reading, which a run measures, 4 windows of readings a record give 0.100 mm for "
+        "2 minutes more."
     )
 
 

@@ -1,0 +1,82 @@
+"""What held-out records will add to an identification, and the verdict then, before they are measured."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from hexacell.campaign.planner import Plan
+from hexacell.campaign.verdict_forecast import VerdictForecast, forecast_verdicts, stated_errors
+from hexacell.decision import ErrorLimits
+from hexacell.errors import HexacellError, LimitError
+from hexacell.experiment_design import candidates
+from hexacell.experiment_design.validation_poses import select_validation_poses
+from hexacell.identification.diagnostics.model_tests import update
+from hexacell.identification.solver.result import Identification
+from hexacell.kinematics.pose import Pose, PoseBatch
+from hexacell.measurements.records import MeasurementSet, Record, deviation_of, joints_of
+from hexacell.robot_model import Robot
+from hexacell.uncertainty.budget import UncertaintyBudget
+
+CANDIDATES = 256
+"""Fewer than a run has: how wide the poses are hardly changes."""
+
+
+def predicted_verdicts(
+    plan: Plan, found: Identification, budget: UncertaintyBudget | None
+) -> VerdictForecast | None:
+    """What a run will say of healthy machines with this geometry; none where nothing can be said.
+
+    ``budget`` is that of the identification.
+    """
+    try:
+        updated = with_held_out_records(plan, found)
+    except HexacellError:
+        return None
+    after = plan.task.budget(updated, plan.robot.belief(updated), plan.robot.effects)
+    if budget is None or after is None or len(after.jacobian) != len(budget.jacobian):
+        return None
+    limits = plan.settings.acceptance
+    stated = stated_errors(found, updated, budget, after)
+    return forecast_verdicts(stated, after, ErrorLimits(limits.position_mm, limits.orientation_deg))
+
+
+def with_held_out_records(plan: Plan, found: Identification) -> Identification:
+    """The identification updated by the records that the held-out points will give if it is right.
+
+    They are those of the wide poses after the write-back. The small tilts that are measured before as well
+    add little. A point at which the robot takes too few poses adds nothing.
+
+    Raises:
+        LimitError: no point has enough of them.
+    """
+    robot = plan.robot.with_controller(plan.robot.for_controller(found.geometry))
+    records = tuple(_records(plan, robot, found))
+    if not records:
+        raise LimitError("the robot takes too few poses at each of the held-out points")
+    return update(found, robot.problem(MeasurementSet(records)))
+
+
+def _records(plan: Plan, robot: Robot, found: Identification) -> Iterator[Record]:
+    settings, belief = plan.settings.verification, robot.belief(found)
+    turns = candidates.orientations(CANDIDATES, belief.limits.tilt, settings.seed)
+    first = 1 + max(plan.points)
+    for point, position in enumerate(settings.points, start=first):
+        ball = robot.from_commands([Pose(*position)]).positions[0]
+        try:
+            poses = select_validation_poses(
+                belief, ball, settings.orientations, turns, found.poses.rotations
+            )
+        except LimitError:
+            continue
+        yield from _exact(robot, point, poses)
+
+
+def _exact(robot: Robot, point: int, poses: PoseBatch) -> Iterator[Record]:
+    """What a robot with exactly the controller's geometry, and without noise, shows at some poses."""
+    joints = robot.mechanism.inverse(robot.commanding, robot.branch, poses)
+    shown = (poses.positions - poses.positions[0]) @ robot.frames.base
+    for row, (joint_row, deviation) in enumerate(zip(joints, shown, strict=True)):
+        command = robot.to_command(poses.pose(row))
+        yield Record(point, row + 1, command, joints_of(np.asarray(joint_row)), deviation_of(deviation))

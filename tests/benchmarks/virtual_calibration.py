@@ -1,0 +1,85 @@
+"""A whole calibration of a virtual robot: measured as planned, identified, written, and verified."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from hexacell.campaign.dry_run import VirtualCampaign
+from hexacell.campaign.planner import Plan
+from hexacell.campaign.teaching import as_written
+from hexacell.cell.loader import Cell
+from hexacell.cell.model import CellSettings
+from hexacell.controller_config.interface import ControllerGeometry
+from hexacell.experiment_design import candidates
+from hexacell.experiment_design.validation_poses import select_validation_poses
+from hexacell.identification.estimator import identify
+from hexacell.identification.solver.result import Identification
+from hexacell.kinematics.geometry import Geometry
+from hexacell.kinematics.pose import Pose
+from hexacell.kinematics.rotations import Array
+from hexacell.measurements.records import MeasurementSet, Record
+from hexacell.reporting.verification import HeldOut, Verification, verify
+from hexacell.robot_model import Robot, make_robot
+from hexacell.virtual_robot import VirtualRobot, random_robot
+
+HELD_OUT_FROM = 100
+"""Points of the held-out records, which are of no other records."""
+
+CANDIDATES = 512
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class VirtualCalibration:
+    """A calibration; ``after`` is the robot with the result in its controller."""
+
+    found: Identification
+    after: Robot
+    verification: Verification
+    records: int
+
+
+def robot_that_reaches(cell: Cell, robot: Robot, random: np.random.Generator) -> Geometry:
+    """A geometry within the tolerances that can stand at all points as its controller sends it there."""
+    while True:
+        truth = random_robot(robot.mechanism, robot.drawing, robot.tolerances, random)
+        poses = robot.from_commands(Pose(*point) for point in cell.settings.identification.points)
+        if VirtualRobot(robot, truth).can_take(poses).all():
+            return truth
+
+
+def calibrate(cell: Cell, robot: Robot, truth: Geometry, random: np.random.Generator) -> VirtualCalibration:
+    """Measure, identify, write and verify.
+
+    Raises:
+        HexacellError: a run would end with this message.
+    """
+    virtual = VirtualRobot(robot, truth, random)
+    campaign = VirtualCampaign(Plan(cell.settings, robot, with_forecast=False), virtual)
+    campaign.carry_out()
+    found = identify(robot.problem(campaign.measurements))
+    written = as_written(cell.settings, robot, found.geometry).geometry
+    after = make_robot(cell.settings, ControllerGeometry(written, robot.branch), taught=written)
+    held_out = measured_held_out(cell.settings, found, after, VirtualRobot(after, truth, random))
+    verification = verify(cell.settings, after, found, held_out)
+    return VirtualCalibration(found, after, verification, len(campaign.measurements))
+
+
+def measured_held_out(
+    settings: CellSettings, found: Identification, robot: Robot, virtual: VirtualRobot
+) -> HeldOut:
+    """What the held-out poses give, chosen as a run does after the identification."""
+    belief, wanted = robot.belief(found), settings.verification
+    turns: Array = candidates.orientations(CANDIDATES, belief.limits.tilt, wanted.seed)
+    records: list[Record] = []
+    for number, point in enumerate(wanted.points, start=HELD_OUT_FROM):
+        position = robot.from_commands([Pose(*point)]).positions[0]
+        used = found.poses.rotations
+        poses = select_validation_poses(belief, position, wanted.orientations, turns, used)
+        virtual.zero_gauges()
+        for row in range(len(poses)):
+            virtual.place(robot.to_command(poses.pose(row)))
+            records.append(virtual.measure(number, row + 1))
+    deviations = [record.deviation for record in records if record.orientation > 1]
+    return HeldOut(MeasurementSet(tuple(records)), deviations, deviations)

@@ -49,7 +49,8 @@ class SimulatedCell(Closeable):
     ) -> None:
         clock = CellClock(settings.timing.clock_factor)
         home = Pose(*settings.identification.points[0])
-        self.physics = RobotPhysics(mechanism, simulation, clock, config_format.read(config), home)
+        commanding, fixture = config_format.read(config), settings.length_check
+        self.physics = RobotPhysics(mechanism, simulation, clock, commanding, home, fixture)
         self.machine = SimulatedMachine(mechanism, config_format, config, self.physics, clock, home)
         with ExitStack() as served:
             stop_file = _stop_file(settings, served)

@@ -13,11 +13,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from drivers.simulated.gauge_places import GaugePlaces
+from hexacell.cell.length_check import LengthCheckSettings
 from hexacell.cell.simulation import SimulationSettings
 from hexacell.clock import CellClock
 from hexacell.controller_config.interface import ControllerGeometry
 from hexacell.errors import ReachError
-from hexacell.kinematics import rotations
 from hexacell.kinematics.forward import continue_solution, forward_kinematics
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import Mechanism, inverse_kinematics
@@ -79,8 +80,10 @@ class RobotPhysics:
 
     Attributes:
         on_motion_start: called when a motion has started; must return quickly.
+        gauges: where they are.
 
-    It starts where a controller with the geometry ``commanding`` puts the sliders for ``home``.
+    It starts where a controller with the geometry ``commanding`` puts the sliders for ``home``. The sliders
+    go where the encoders show what is commanded. ``fixture`` has the seats of a length check, if any.
 
     Raises:
         ReachError: ``home`` is out of reach of that geometry or of the true one.
@@ -93,6 +96,7 @@ class RobotPhysics:
         clock: CellClock,
         commanding: ControllerGeometry,
         home: Pose,
+        fixture: LengthCheckSettings | None = None,
     ) -> None:
         self._truth = Geometry.of(mechanism.parameters, settings.geometry.model_dump())
         self._mechanism = mechanism
@@ -102,7 +106,9 @@ class RobotPhysics:
         self._random = np.random.default_rng(settings.seed)
         self._lock = threading.RLock()
         start = PoseBatch.of([home])
-        joints = inverse_kinematics(mechanism, commanding.geometry, commanding.branch, start)
+        self._shown_per_mm = 1.0 + 1e-6 * settings.encoders.common_scale_um_m
+        shown = inverse_kinematics(mechanism, commanding.geometry, commanding.branch, start)
+        joints = shown / self._shown_per_mm
         self._motion = Motion.stationary(joints[0])
         self._joints = joints[0]
         self._rows_passed = 0
@@ -115,17 +121,16 @@ class RobotPhysics:
                 action="Correct [simulation.geometry], or start at another point",
             )
         self._pose = first.poses
-        self._station = self._misplaced(self._pose.positions[0])
-        self._triad = self._misaligned()
+        self.gauges = GaugePlaces(settings, fixture, self._random, self._pose.positions[0])
         self._draw_noise()
 
     def start_motion(self, path: Array) -> Motion:
-        """Start a motion along a path (k, 6), mm, from the present positions; returns at once."""
+        """Start a motion from here along a path (k, 6), mm, as the encoders show it; returns at once."""
         motion = self._settings.motion
         with self._lock:
             distance = float(np.abs(np.diff(path, axis=0)).sum(axis=0).max())
             scatter = motion.repeatability_mm * self._random.standard_normal(6)
-            actual = path + np.linspace(0.0, 1.0, len(path))[:, None] * scatter
+            actual = path / self._shown_per_mm + np.linspace(0.0, 1.0, len(path))[:, None] * scatter
             actual[0] = self._motion.joints(self._update())
             duration = max(motion.minimum_s, distance / motion.speed_mm_s)
             self._motion, self._rows_passed = Motion(actual, self._clock.now(), duration), 0
@@ -155,13 +160,20 @@ class RobotPhysics:
         """The slider positions measured by the encoders (6,), mm."""
         with self._lock:
             flicker = self._settings.encoders.flicker_mm * self._random.standard_normal(6)
-            return self._motion.joints(self._clock.now()) + self._encoder_noise + flicker
+            shown = self._shown_per_mm * self._motion.joints(self._clock.now())
+            measured: Array = shown + self._encoder_noise + flicker
+            return measured
+
+    def true_joints(self) -> Array:
+        """Where the sliders are (6,), mm, whatever the encoders show."""
+        with self._lock:
+            return self._motion.joints(self._clock.now())
 
     def gauge_displacement(self, axis: str) -> float:
         """The ball's displacement along a gauge's axis from the middle of its travel, with noise, mm."""
         with self._lock:
             ball = self._ball()
-            displacement = self._triad @ (ball - self._station) + self._gauge_noise
+            displacement = self.gauges.triad @ (ball - self.gauges.station) + self._gauge_noise
             flicker = self._settings.gauges.flicker_mm * self._random.standard_normal()
             return float(displacement[AXES.index(axis)] + flicker)
 
@@ -170,8 +182,7 @@ class RobotPhysics:
         ball: Array = self._pose.positions[0]
         if now >= self._motion.end_s:
             ball = ball + self._ringing(now - self._motion.end_s)
-            if np.linalg.norm(ball - self._station) > self._settings.station_reach_mm:
-                self._station, self._triad = self._misplaced(ball), self._misaligned()
+            self.gauges.follow(ball)
         return ball
 
     def _draw_noise(self) -> None:
@@ -206,10 +217,3 @@ class RobotPhysics:
             motion.ringing_mm * decay * self._ringing_direction / np.linalg.norm(self._ringing_direction)
         )
         return ringing
-
-    def _misplaced(self, ball: Array) -> Array:
-        return ball + self._settings.gauges.placing_mm * self._random.standard_normal(3)
-
-    def _misaligned(self) -> Array:
-        tilt = np.radians(self._settings.gauges.misalignment_deg)
-        return rotations.from_vector(tilt * self._random.standard_normal(3))

@@ -45,6 +45,7 @@ class RunRequest:
     operator: Operator
     unattended: bool = False
     resume: bool = False
+    length_check: bool = False
 
 
 async def preflight(cell: Cell, mode: Mode, *, unattended: bool) -> tuple[DeviceIdentity, ...]:
@@ -83,7 +84,7 @@ async def calibrate(
         started = _resumed_start(request) if request.resume else None
         if started is None:
             _require_own_geometry(cell)
-            calibration = _new_calibration(cell, request.mode)
+            calibration = _new_calibration(cell, request.mode, length_check=request.length_check)
         else:
             calibration = calibration_of_run(cell, started)
         async with _checked_devices(cell, calibration, folder.path, request.unattended) as connected:
@@ -195,6 +196,7 @@ def run_started(
         pose_list=None if calibration.listed is None else read_text(calibration.listed.path),
         taught=None if robot.taught is None else robot.taught.document(),
         accepted=calibration.accepted,
+        length_check=calibration.length_check,
     )
 
 
@@ -231,10 +233,35 @@ def _resumed_start(request: RunRequest) -> events.RunStarted:
 def calibration_of_run(cell: Cell, started: events.RunStarted) -> Calibration:
     """The calibration or check that a run was begun for."""
     robot = robot_of_start(cell.settings, started.controller, started.branch, started.taught)
-    return Calibration(cell.settings, robot, Mode(started.mode), pose_list_of(cell), started.accepted)
+    return Calibration(
+        cell.settings,
+        robot,
+        Mode(started.mode),
+        pose_list_of(cell),
+        started.accepted,
+        length_check=started.length_check,
+    )
 
 
-def _new_calibration(cell: Cell, mode: Mode) -> Calibration:
-    """The calibration or check of a cell as it is now."""
-    accepted = last_accepted_result(cell) if mode is Mode.CHECK else None
-    return Calibration(cell.settings, robot_of(cell), mode, pose_list_of(cell), accepted)
+def _new_calibration(cell: Cell, mode: Mode, *, length_check: bool = False) -> Calibration:
+    """The calibration or check of a cell as it is now.
+
+    Raises:
+        UsageError: a length check has no fixture, or one of its own no calibrated machine.
+    """
+    if (length_check or mode is Mode.LENGTH) and cell.settings.length_check is None:
+        raise UsageError(
+            "a length check needs a fixture with two seats, and the cell file has none",
+            subject=cell.path,
+            action="Add [length_check] with first_seat, distance_mm and uncertainty_mm",
+        )
+    accepted = None if mode is Mode.OPTIMISE else last_accepted_result(cell)
+    if mode is Mode.LENGTH and accepted is None:
+        raise UsageError(
+            "no accepted result has this config: a length check needs a calibrated machine",
+            subject=cell.config_path,
+            action="Calibrate it with `hexacell run CELL --length-check`, which checks the scale as well",
+        )
+    return Calibration(
+        cell.settings, robot_of(cell), mode, pose_list_of(cell), accepted, length_check=length_check
+    )

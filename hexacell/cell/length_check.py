@@ -46,7 +46,7 @@ class LengthCheckSettings(Section):
         5, ge=1, le=25, description="of the platform with the ball in a seat's middle"
     )
     tilt_deg: Positive = Field(10.0, le=45, description="of all of them but the first, which is level")
-    placement: Literal["by-hand", "fixed"] = Field(
+    mounting: Literal["by-hand", "fixed"] = Field(
         "by-hand", description="fixed: no person is needed to mount the gauges in the seats"
     )
 

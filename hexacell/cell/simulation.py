@@ -6,7 +6,7 @@ from typing import Literal
 
 from pydantic import Field
 
-from hexacell.cell.fields import GeometrySettings, NotNegative, Positive, Section
+from hexacell.cell.fields import Finite, GeometrySettings, NotNegative, Positive, Section
 
 FaultKind = Literal[
     "emergency stop",
@@ -39,6 +39,9 @@ class SimulatedEncoders(Section):
     noise_mm: NotNegative = Field(0.01, description="drawn at every stop of the robot, 1 sigma")
     flicker_mm: NotNegative = Field(0.001, description="drawn at every sample, 1 sigma")
     latency_s: NotNegative = Field(0.001, description="between SYNC and the last answer")
+    common_scale_um_m: Finite = Field(
+        0.0, ge=-1e5, le=1e5, description="by how much all of them show more than the sliders move"
+    )
 
 
 class SimulatedMotion(Section):
@@ -49,6 +52,19 @@ class SimulatedMotion(Section):
     ringing_mm: NotNegative = Field(0.2, description="amplitude of the ball's oscillation on arrival")
     ringing_s: Positive = Field(0.15, description="time constant of its decay")
     repeatability_mm: NotNegative = Field(0.0, description="scatter of each slider's stop, 1 sigma")
+
+
+class SimulatedFixture(Section):
+    """How the simulated fixture of [length_check] is made, and how the gauges are mounted in it."""
+
+    distance_mm: Positive | None = Field(
+        None, description="true distance of its seats; by default as certified"
+    )
+    seating_mm: NotNegative = Field(0.0, description="where the gauges sit at each mounting, 1 sigma")
+    yaw_deg: Finite = Field(0.0, description="angle of the fixture to its stated direction, about base z")
+    turned_deg: Finite = Field(
+        0.0, description="of the gauges in the second seat about base z; 180: the wrong way round"
+    )
 
 
 class SimulatedFault(Section):
@@ -76,4 +92,5 @@ class SimulationSettings(Section):
     gauges: SimulatedGauges = SimulatedGauges()
     encoders: SimulatedEncoders = SimulatedEncoders()
     motion: SimulatedMotion = SimulatedMotion()
+    fixture: SimulatedFixture = SimulatedFixture()
     faults: tuple[SimulatedFault, ...] = Field((), description="faults and their times")

@@ -50,6 +50,7 @@ def make_parser() -> Parser:
     )
     _demo(commands)
     _run(commands)
+    _length(commands)
     _preflight(commands)
     _simulate(commands)
     _next(commands)
@@ -113,6 +114,21 @@ def _run(commands: Any) -> None:  # noqa: ANN401
         help="check: measure until the error is decided, change nothing (default if unattended); "
         "optimise: calibrate and write back (default otherwise)",
     )
+    parser.add_argument(
+        "--length-check",
+        action="store_true",
+        help="check the length scale before the verdict, with the fixture of [length_check]",
+    )
+    _add_json(parser)
+
+
+def _length(commands: Any) -> None:  # noqa: ANN401
+    parser = _command(
+        commands, "length", "check the scale of the encoders against a known length", "run.length"
+    )
+    _add_cell(parser)
+    parser.add_argument("--resume", metavar="RUN", help="resume an interrupted check: its folder or name")
+    parser.add_argument("--unattended", action="store_true", help="no person can mount the gauges")
     _add_json(parser)
 
 

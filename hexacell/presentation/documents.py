@@ -95,6 +95,7 @@ def run_document(
         "verdict": judged and judged.verdict.value,
         "verification": judged and judged.verification and judged.verification.model_dump(mode="json"),
         "check": judged and judged.check and judged.check.model_dump(mode="json"),
+        "length": judged and judged.length and judged.length.model_dump(mode="json"),
         "displacement": moved and moved.model_dump(mode="json"),
         "teaching": moved and teaching_sentence(moved),
         "run": str(request.folder.path),

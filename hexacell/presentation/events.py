@@ -6,6 +6,7 @@ import numpy as np
 
 from hexacell.campaign.decisions import Forecast
 from hexacell.presentation.layout import wrapped
+from hexacell.presentation.length import length_text
 from hexacell.presentation.measured_noise import measured_noise_text
 from hexacell.presentation.planning import run_forecast_line
 from hexacell.presentation.verification import check_start_text, check_text, verification_text
@@ -17,6 +18,7 @@ SET_NAMES = {
     Phase.IDENTIFY: "point {}",
     Phase.BEFORE: "held-out point {}, before",
     Phase.AFTER: "held-out point {}, after",
+    Phase.LENGTH: "length check, mounting {}",
 }
 COMPUTATIONS = {
     "assess noise": "evaluating the noise",
@@ -101,9 +103,11 @@ def event_text(event: events.Event, state: RunState) -> str | None:
 def _basis_or_verdict(event: events.RunStarted | events.ResultValidated) -> str | None:
     """What a check starts from, and the verdict of any run."""
     if isinstance(event, events.RunStarted):
-        return check_start_text(event.accepted) if event.mode == "check" else None
+        return None if event.mode == "optimise" else check_start_text(event.accepted)
     if event.verification is not None:
         return verification_text(event.verification)
+    if event.length is not None:
+        return length_text(event.length)
     return None if event.check is None else check_text(event.check)
 
 

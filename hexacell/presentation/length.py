@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 from hexacell.presentation.layout import wrapped
-from hexacell.reporting.length_result import LengthResult
+from hexacell.reporting.length_result import LengthResult, encoders_read
+from hexacell.reporting.length_statement import LengthStatement
+
+NAMED_SOURCES = 4
+"""So many of the sources of uncertainty are printed, the largest."""
 
 NOT_CHECKED = "The length scale is that of the encoders; it was not checked."
 
@@ -14,13 +18,23 @@ def scale_lines(length: LengthResult | None) -> list[str]:
         return [NOT_CHECKED]
     if not length.is_consistent:
         return []
-    checked = f"length scale: checked over {length.distance_mm:.3f} mm: {_encoders(length)}"
+    checked = f"length scale: checked over {length.distance_mm:.3f} mm: {encoders_read(length)}"
     return [checked, remedy(length)] if length.is_significant else [checked]
 
 
-def _encoders(length: LengthResult) -> str:
-    wrong_way = "long" if length.long_um_m >= 0.0 else "short"
-    return f"encoders read {abs(length.long_um_m):.0f} +- {length.expanded_um_m:.0f} um/m {wrong_way}"
+def length_text(stated: LengthStatement) -> str:
+    """A few lines: the verdict, the scale, what it does at the task, and what U consists of."""
+    result, error = stated.result, stated.error
+    lines = [f"verdict: {stated.verdict}"]
+    if not result.is_consistent:
+        return "\n".join([*lines, wrapped(f"  the length check says nothing: {result.reason}", indent=2)])
+    lines += [f"  {line}" for line in scale_lines(result)]
+    if error is not None:
+        size = f"{error.value:.3f} mm, U {error.expanded:.3f} (limit {error.limit:g})"
+        lines.append(f"  position error by that at the task poses: {size}")
+    largest = sorted(result.sources, key=lambda source: -source.um_m)[:NAMED_SOURCES]
+    named = ", ".join(f"{source.name} {source.um_m:.1f}" for source in largest)
+    return "\n".join([*lines, wrapped(f"  uncertainty, um/m, 1 sigma: {named}", indent=2)])
 
 
 def remedy(length: LengthResult) -> str:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from hexacell.application.calibration_run import RunRequest
 from hexacell.campaign.teaching import TaskDisplacement
+from hexacell.kinematics.pose import Pose
 from hexacell.presentation.layout import wrapped
 from hexacell.presentation.teaching import teaching_line, teaching_sentence
 from procedures.calibration.workflow import Mode
@@ -44,8 +45,9 @@ def resume_hint(request: RunRequest) -> str:
 
 def resume_command(request: RunRequest) -> str:
     """The shell command that resumes a run with a person at the terminal."""
+    command = "length" if request.mode is Mode.LENGTH else "run"
     mode = ["--mode", "check"] if request.mode is Mode.CHECK else []
-    words = ["hexacell", "run", str(request.cell.path), "--resume", str(request.folder.path), *mode]
+    words = ["hexacell", command, str(request.cell.path), "--resume", str(request.folder.path), *mode]
     return shlex.join(words)
 
 
@@ -58,6 +60,8 @@ def closing_lines(request: RunRequest, ended: events.Ended) -> tuple[str, ...]:
 def question_text(question: Question) -> str:
     """The question for a terminal that reads one line as the answer."""
     match question.subject:
+        case GaugePlacement(point=mounting, pose=pose, seat=int(seat)):
+            return _mounting_text(mounting, seat, pose)
         case GaugePlacement(point=point, pose=pose):
             return (
                 f"\nPoint {point}: the robot is at {pose}.\n"
@@ -73,6 +77,23 @@ def question_text(question: Question) -> str:
             return f"\n{line}.\n{_teaching(moved)}{keep}"
         case StepFailure(problem=problem):
             return f"\n{problem}\nHow to continue ({', '.join(question.choices)})? "
+
+
+def _mounting_text(mounting: int, seat: int, pose: Pose) -> str:
+    """Where the fixture and the gauges are wanted in a length check."""
+    where = f"\nLength check, mounting {mounting}: the robot holds the ball at {pose}.\n"
+    if mounting == 1:
+        return (
+            f"{where}Clamp the fixture with its first seat there, the second one in the stated direction.\n"
+            "Mount the gauges in the first seat around the ball, plungers in the middle of their\n"
+            "travel, and zero them.\n"
+            "Press Enter when they are mounted. "
+        )
+    return (
+        f"{where}Mount the gauges in seat {seat}, the same way round. Do not zero them, and leave the\n"
+        "fixture where it is.\n"
+        "Press Enter when they are mounted. "
+    )
 
 
 def _teaching(moved: TaskDisplacement | None) -> str:

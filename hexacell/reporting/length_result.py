@@ -10,6 +10,7 @@ import numpy as np
 from hexacell.cell.fields import Frozen
 from hexacell.cell.length_check import LengthCheckSettings
 from hexacell.cell.model import CellSettings
+from hexacell.identification.solver.chi_square import SMALLEST_PROBABILITY
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.rotations import Array
 from hexacell.measurements.records import MeasurementSet
@@ -21,9 +22,6 @@ from hexacell.uncertainty.length_records import LengthRecords, LengthStandard
 
 WRONG_WAY = 0.5
 """A gauge that follows the ball by less has another direction than it should have."""
-
-TELLING_SHARE = 0.5
-"""Of the largest residual: the return to the first seat explains a contradiction if it is off by more."""
 
 
 class LengthSource(Frozen):
@@ -142,20 +140,26 @@ def length_standard(fixture: LengthCheckSettings, celsius: float | None = None) 
     )
 
 
+def encoders_read(result: LengthResult) -> str:
+    """The scale of the encoders with U, in words."""
+    wrong_way = "long" if result.long_um_m >= 0.0 else "short"
+    size = f"{abs(result.long_um_m):.0f} +- {result.expanded_um_m:.0f} um/m"
+    return f"encoders read {size} {wrong_way}"
+
+
 def contradiction(check: LengthCheck) -> str:
     """Why the records of a check cannot be what it presupposes; empty if they can."""
     if wrong := _wrong_way(check.following()):
         return wrong
-    if check.agreement.is_explained:
-        return ""
-    closure = check.closure_mm
-    if np.abs(closure).max() > TELLING_SHARE * np.abs(check.residuals).max():
-        off = ", ".join(f"{axis} {value:+.3f}" for axis, value in zip("xyz", closure, strict=True))
+    if check.closure.probability < SMALLEST_PROBABILITY:
+        off = ", ".join(f"{axis} {mm:+.3f}" for axis, mm in zip("xyz", check.closure_mm, strict=True))
         return (
             f"back in the first seat the gauges are {off} mm off: they were zeroed in between, or the "
             "fixture or a gauge has moved"
         )
-    return f"its records are {check.agreement.ratio:.1f} times as far off as the stated noise explains"
+    if check.agreement.probability < SMALLEST_PROBABILITY:
+        return f"its records are {check.agreement.ratio:.1f} times as far off as all sources explain"
+    return ""
 
 
 def _wrong_way(following: Mapping[int, Array]) -> str:

@@ -30,7 +30,6 @@ import numpy as np
 from hexacell.identification.problem.problem import Noise
 from hexacell.identification.solver.chi_square import ChiSquareTest
 from hexacell.identification.solver.measurement_model import record_covariance
-from hexacell.kinematics.parameters import ParameterUnit
 from hexacell.kinematics.rotations import Array
 from hexacell.kinematics.sensitivity import position_sensitivity
 from hexacell.uncertainty.effects import Effect
@@ -96,7 +95,12 @@ class LengthCheck:
         )
         by_effect = (error for one in acting for error in errors_by_effect(records, one, shared[one.name]))
         errors = (geometry, *errors_by_gauges(records, standard, noise), *by_effect)
-        by_scale = shared_errors(records, jacobian, _with_scale(records, judged), common_encoder_scale(1.0))
+        by_scale = shared_errors(
+            records,
+            jacobian,
+            judged.with_scale(placement.mechanism, placement.geometry),
+            common_encoder_scale(1.0),
+        )
         noises = record_covariance(by_joints, noise)
         return cls(records, standard, jacobian, noises, errors, shared, by_scale)
 
@@ -139,11 +143,24 @@ class LengthCheck:
     @property
     def closure_mm(self) -> Array:
         """(3,) how far the first seat's place is, at its last mounting, from that at the first one."""
-        mountings = self.records.mountings
-        first = mountings == 1
-        last = mountings == mountings[self.records.seats == 0].max()
-        closure: Array = self.residuals[last].mean(axis=0) - self.residuals[first].mean(axis=0)
+        closure: Array = self._closing @ self.records.places
         return closure
+
+    @property
+    def closure(self) -> ChiSquareTest:
+        """Whether that is as small as its sources explain; errors of the geometry are the same in both."""
+        weights = np.kron(self._closing, np.eye(3))
+        covariance = weights @ self._covariance @ weights.T
+        return ChiSquareTest(float(self.closure_mm @ np.linalg.solve(covariance, self.closure_mm)), 3.0)
+
+    @property
+    def _closing(self) -> Array:
+        """(n,) weights of the records in the difference of the last and the first mounting."""
+        mountings = self.records.mountings
+        last = mountings == mountings[self.records.seats == 0].max()
+        first = mountings == 1
+        weights: Array = last / last.sum() - first / first.sum()
+        return weights
 
     def following(self) -> Mapping[int, Array]:
         """By mounting, how far each gauge (3,) followed the ball: 1 as far as it moved, -1 the other way.
@@ -245,19 +262,6 @@ class LengthCheck:
             columns = error.columns.reshape(size, -1)
             together = together + columns @ columns.T
         return together
-
-
-def _with_scale(records: LengthRecords, judged: JudgedGeometry) -> JudgedGeometry:
-    """The judged geometry; if nothing else is known, it took up all of the scale."""
-    if COMMON_SCALE in judged.parameter_columns:
-        return judged
-    placement = records.placement
-    convention = placement.mechanism.convention
-    parameters = placement.mechanism.parameters.parameters
-    is_length = [parameters[row].kind.unit is ParameterUnit.MM for row in convention.free_rows()]
-    smaller = -1e-6 * convention.free_parameters(placement.geometry) * is_length
-    columns = {**judged.parameter_columns, COMMON_SCALE: smaller[:, None]}
-    return JudgedGeometry(judged.covariance, columns)
 
 
 def _slope(moved: Array, shown: Array) -> Array:

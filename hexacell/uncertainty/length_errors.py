@@ -7,13 +7,17 @@ scale of each encoder. All others act on the records of the check alone.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from hexacell.identification.problem.problem import Noise
+from hexacell.kinematics.geometry import Geometry
+from hexacell.kinematics.mechanism import Mechanism
+from hexacell.kinematics.parameters import ParameterUnit
 from hexacell.kinematics.rotations import Array
 from hexacell.uncertainty.effects import Effect, Occurrence
+from hexacell.uncertainty.encoder_effects import COMMON_SCALE
 from hexacell.uncertainty.length_records import LengthRecords, LengthStandard
 from hexacell.uncertainty.propagation import each_alone
 from hexacell.uncertainty.record_effects import errors_of_records
@@ -30,6 +34,18 @@ class JudgedGeometry:
 
     covariance: Array
     parameter_columns: Mapping[str, Array]
+
+    def with_scale(self, mechanism: Mechanism, geometry: Geometry) -> JudgedGeometry:
+        """With what a common scale did to it: if nothing else is known, the geometry took up all of it."""
+        if COMMON_SCALE in self.parameter_columns:
+            return self
+        parameters = mechanism.parameters.parameters
+        rows = mechanism.convention.free_rows()
+        is_length = np.array([parameters[row].kind.unit is ParameterUnit.MM for row in rows])
+        smaller = -1e-6 * mechanism.convention.free_parameters(geometry) * is_length
+        return replace(
+            self, parameter_columns={**self.parameter_columns, COMMON_SCALE: smaller[:, np.newaxis]}
+        )
 
 
 @dataclass(frozen=True, slots=True, eq=False)

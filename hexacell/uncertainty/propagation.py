@@ -110,8 +110,8 @@ class Propagation:
         return cls(
             records=Placement(problem.mechanism, found.geometry, prediction.poses, problem.joints),
             readings=Readings(prediction.poses.rotations, problem.deviations, problem.gauges),
-            task=_placement(belief, task),
-            workspace=_placement(belief, workspace),
+            task=placement_of(belief, task),
+            workspace=placement_of(belief, workspace),
             gain=np.einsum("pq,nqa->pna", found.free_covariance, weighted),
             jacobian=error_jacobian(belief, task, workspace),
             frames=teachable_frames(belief, workspace),
@@ -168,7 +168,8 @@ class Propagation:
         return self.frames.remove_frame_motion(self.task.poses, errors, effect.on_poses(self.workspace))
 
 
-def _placement(belief: RobotBelief, poses: PoseBatch) -> Placement:
+def placement_of(belief: RobotBelief, poses: PoseBatch) -> Placement:
+    """The estimated robot at poses that it reaches."""
     joints = belief.mechanism.inverse(belief.estimate, belief.branch, poses)
     return Placement(belief.mechanism, belief.estimate, poses, joints)
 

@@ -7,10 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from hexacell.identification.belief import RobotBelief
+from hexacell.identification.diagnostics.pose_accuracy import error_jacobian, teachable_frames
+from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array
 from hexacell.uncertainty.effects import Effect, Occurrence
 from hexacell.uncertainty.encoder_effects import COMMON_SCALE, common_encoder_scale
-from hexacell.uncertainty.propagation import Propagation, TaskColumns
+from hexacell.uncertainty.propagation import Propagation, TaskColumns, placement_of
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -41,6 +44,23 @@ class ScaleObservation:
         if effect.occurrence is Occurrence.CONSTANT and len(shared) not in {0, causes}:
             raise ValueError(effect.name)
         return np.concatenate([shared, np.zeros(causes - len(shared))])
+
+
+def errors_by_scale(
+    belief: RobotBelief, task: PoseBatch, workspace: PoseBatch, parameter_columns: Mapping[str, Array]
+) -> Array:
+    """Errors (t, 6) at task poses by 1 um/m, mm and rad, through the geometry and directly.
+
+    ``parameter_columns`` has what that did to the free parameters (p, 1). Frames are fitted over the
+    workspace.
+    """
+    effect = common_encoder_scale(1.0)
+    through = -error_jacobian(belief, task, workspace) @ parameter_columns[COMMON_SCALE]
+    assert effect.on_poses is not None  # noqa: S101 - it moves the sliders
+    at_task, over = (effect.on_poses(placement_of(belief, poses)) for poses in (task, workspace))
+    direct = teachable_frames(belief, workspace).remove_frame_motion(task, at_task, over)
+    errors: Array = (through + direct)[..., 0]
+    return errors
 
 
 @dataclass(frozen=True, slots=True, eq=False)

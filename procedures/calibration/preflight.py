@@ -30,6 +30,9 @@ async def plan_failures(calibration: Calibration, *, unattended: bool) -> list[H
 
 def _plan_failures(calibration: Calibration, *, unattended: bool) -> Iterator[list[HexacellError]]:
     """What each piece of the work found."""
+    yield [*_length_failures(calibration, unattended=unattended)]
+    if calibration.mode is Mode.LENGTH:
+        return
     is_check = calibration.mode is Mode.CHECK
     failures = [*feasibility.reach_failures(calibration.plan)]
     failures += [] if is_check else _held_out_failures(calibration)
@@ -46,6 +49,18 @@ def _plan_failures(calibration: Calibration, *, unattended: bool) -> Iterator[li
                 action='Give every point fixed gauges and set placement = "fixed" in [stations]',
             )
         ]
+
+
+def _length_failures(calibration: Calibration, *, unattended: bool) -> Iterator[HexacellError]:
+    """What prevents a length check, if one is wanted: poses out of reach, nobody to mount the gauges."""
+    poses, fixture = calibration.length_poses, calibration.settings.length_check
+    for name, pose in poses:
+        yield from feasibility.pose_failures(calibration.plan, name, pose)
+    if poses and fixture is not None and unattended and fixture.mounting == "by-hand":
+        yield AnswerNeeded(
+            "unattended running is not possible: the gauges are mounted in the two seats by hand",
+            action='Run it attended, or set mounting = "fixed" in [length_check] if no person is needed',
+        )
 
 
 def _held_out_failures(calibration: Calibration) -> Iterator[HexacellError]:

@@ -3,8 +3,9 @@
 The points are measured (:mod:`~procedures.calibration.identification_steps`) and the geometry is
 identified. The held-out points are measured (:mod:`~procedures.calibration.held_out_steps`), the geometry
 is written to the controller, and the held-out points are measured again. A check measures points, until
-they decide, and nothing else (:mod:`~hexacell.campaign.check`). Nothing here uses hardware or files, so a
-run, its resumption and its replay decide alike.
+they decide, and nothing else (:mod:`~hexacell.campaign.check`). A length check, of its own or before the
+verdict on a calibration, measures two seats (:mod:`~procedures.calibration.length_steps`). Nothing here
+uses hardware or files, so a run, its resumption and its replay decide alike.
 """
 
 from __future__ import annotations
@@ -24,11 +25,13 @@ from hexacell.cell.model import CellSettings
 from hexacell.decision import ErrorLimits, Verdict
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.geometry import Geometry
+from hexacell.kinematics.pose import Pose
 from hexacell.reporting.result import AcceptedResult
 from hexacell.robot_model import Robot
 from hexacell.stated_effects import stated_effects
 from procedures.calibration.held_out_steps import HeldOutSteps
 from procedures.calibration.identification_steps import IdentificationSteps
+from procedures.calibration.length_steps import LengthSteps
 from procedures.calibration.noise_steps import NoiseSteps
 from procedures.calibration.set_steps import SetSteps
 from procedures.run import events
@@ -44,10 +47,17 @@ class Mode(StrEnum):
 
     OPTIMISE = "optimise"
     CHECK = "check"
+    LENGTH = "length"
 
 
-def expected_records(settings: CellSettings, mode: Mode, listed: PoseList | None = None) -> int:
+def expected_records(
+    settings: CellSettings, mode: Mode, listed: PoseList | None = None, *, length_check: bool = False
+) -> int:
     """The largest number of settled readings in a whole run, closings of sets included."""
+    fixture = settings.length_check
+    length = 0 if fixture is None else fixture.mountings * (fixture.orientations + 2)
+    if mode is Mode.LENGTH:
+        return length
     plan, held_out = settings.identification, settings.verification
     points = len(held_out.points)
     verification = points * (held_out.orientations + 1)
@@ -55,7 +65,8 @@ def expected_records(settings: CellSettings, mode: Mode, listed: PoseList | None
         return settings.check.budget_records + len(plan.points)
     records = len(plan.points) * plan.orientations if listed is None else len(listed)
     identification = min(records, plan.budget_records or records) + len(plan.points)
-    return identification + 2 * verification + points * (held_out.orientations - 1)
+    calibration = identification + 2 * verification + points * (held_out.orientations - 1)
+    return calibration + (length if length_check else 0)
 
 
 class _Measuring:
@@ -68,6 +79,8 @@ class _Measuring:
         noise = NoiseSteps(plan.settings.noise, sets)
         self.points = IdentificationSteps(plan, sets, plan.settings.identification.provisional, noise)
         self.held_out = HeldOutSteps(plan.settings, sets, HELD_OUT_CANDIDATES)
+        fixture = plan.settings.length_check
+        self.length = None if fixture is None else LengthSteps(fixture, sets)
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,8 +90,9 @@ class Calibration:
     Attributes:
         listed: the poses to measure, if a file lists them.
         accepted: the result that the controller has, of which a check starts; none where that is the
-            drawing.
+            drawing. A length check has one.
         measured_noise: what settings and robot contain of it; none before it is measured.
+        length_check: whether the length scale of a calibration is checked.
     """
 
     settings: CellSettings
@@ -87,6 +101,22 @@ class Calibration:
     listed: PoseList | None = None
     accepted: AcceptedResult | None = None
     measured_noise: MeasuredNoise | None = None
+    length_check: bool = False
+
+    @property
+    def length_poses(self) -> tuple[tuple[str, Pose], ...]:
+        """The poses of the length check with their names; none without one."""
+        steps = self._at_start.length
+        is_wanted = self.length_check or self.mode is Mode.LENGTH
+        return steps.planned_poses() if is_wanted and steps is not None else ()
+
+    @cached_property
+    def robot_checked(self) -> Robot:
+        """The robot as the accepted result left it, with its drift since, before a length check."""
+        assert self.accepted is not None  # noqa: S101 - without one no length check is begun
+        covariance, drift = np.array(self.accepted.covariance), self.settings.check.drift_per_parameter_mm
+        before = identified_before(self.robot, covariance, drift)
+        return replace(self.robot, known=before.prior(1.0))
 
     @property
     def plan(self) -> Plan:
@@ -139,6 +169,8 @@ class Calibration:
         if state.config_write_pending:
             return Compute(kind="take back")
         measuring = self._measuring(state)
+        if self.mode is Mode.LENGTH:
+            return None if state.judged else self._length_step(state) or Compute(kind="judge")
         if self.mode is Mode.CHECK:
             return None if state.judged else measuring.points.next_step(state) or Compute(kind="judge")
         if state.identified is None:
@@ -194,8 +226,14 @@ class Calibration:
             if state.committed is None:
                 return Compute(kind="commit")
             after = self._measuring(state).held_out.next_step(state, Phase.AFTER)
-            return after or Compute(kind="judge")
+            length = None if after or not self.length_check else self._length_step(state)
+            return after or length or Compute(kind="judge")
         return _after_verdict(state, state.judged)
+
+    def _length_step(self, state: RunState) -> Step | None:
+        """The next step of the length check; none when it is done."""
+        steps = self._measuring(state).length
+        return None if steps is None else steps.next_step(state)
 
     def _measuring(self, state: RunState) -> _Measuring:
         """The steps for the geometry that the controller has now, and for those that it had."""
@@ -235,7 +273,9 @@ class Calibration:
 
     @cached_property
     def _at_start(self) -> _Measuring:
-        return _Measuring(self.check.plan if self.mode is Mode.CHECK else self._calibrating(self.robot))
+        if self.mode is Mode.CHECK:
+            return _Measuring(self.check.plan)
+        return _Measuring(self._calibrating(self.robot_checked if self.mode is Mode.LENGTH else self.robot))
 
     def _calibrating(self, robot: Robot) -> Plan:
         return Plan(self.settings, robot, self.listed, CANDIDATES)

@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from statistics import fmean
 
 from hexacell.acceptance import gates
 from hexacell.campaign.noise_assessment import assess_noise
 from hexacell.cell.loader import Cell
+from hexacell.cell.model import CellSettings
 from hexacell.identification.estimator import identify
 from hexacell.measurements.csv_file import write_measurements
 from hexacell.measurements.records import MeasurementSet
 from hexacell.reporting.assessment import assess
 from hexacell.reporting.check_result import check_line, check_result
 from hexacell.reporting.documents import fit_document
+from hexacell.reporting.length_result import LengthMeasurements
+from hexacell.reporting.length_statement import length_line, length_statement
 from hexacell.reporting.result import IdentificationResult
 from hexacell.reporting.verification import HeldOut, outcome_line, verify
 from hexacell.runs.run_folder import RunFolder
@@ -80,10 +84,12 @@ class Computations:
         """Verify the written geometry, or state what a check found; raises ``HexacellError``."""
         if self.calibration.mode is Mode.CHECK:
             return self._judge_check(state)
+        if self.calibration.mode is Mode.LENGTH:
+            return self._judge_length(state)
         calibration = self.calibration.informed(state)
         found = identify(calibration.robot_of(state).problem(state.measurements()))
         written = calibration.written_robot(state)
-        verification = verify(calibration.settings, written, found, _held_out(state))
+        verification = verify(calibration.settings, written, found, _held_out(calibration.settings, state))
         line = outcome_line(_identified(state), len(found.free), verification)
         return events.ResultValidated(verdict=verification.verdict, line=line, verification=verification)
 
@@ -95,9 +101,32 @@ class Computations:
         found = check_result(calibration.check, measurements, calibration.accepted, effects)
         return events.ResultValidated(verdict=found.verdict, line=check_line(found), check=found)
 
+    def _judge_length(self, state: RunState) -> events.ResultValidated:
+        calibration = self.calibration
+        assert calibration.accepted is not None  # noqa: S101 - without one no length check is begun
+        measured = _length_measurements(self.cell.settings, state)
+        stated = length_statement(
+            self.cell.settings, calibration.robot_checked, calibration.accepted, measured
+        )
+        return events.ResultValidated(verdict=stated.verdict, line=length_line(stated), length=stated)
 
-def _held_out(state: RunState) -> HeldOut:
-    """What was measured at the held-out points, each phase at points of its own."""
+
+def _length_measurements(settings: CellSettings, state: RunState) -> LengthMeasurements:
+    """What was measured in the two seats, and the temperature of the fixture if a thermometer tells it."""
+    samples = state.samples(Phase.LENGTH)
+    named = settings.length_check and settings.length_check.thermometer
+    shown = [
+        one.celsius
+        for sample in samples
+        for one in sample.reading.temperatures
+        if one.name == named and one.celsius is not None
+    ]
+    records = MeasurementSet(tuple(record(sample) for sample in samples))
+    return LengthMeasurements(records, fmean(shown) if shown else None)
+
+
+def _held_out(settings: CellSettings, state: RunState) -> HeldOut:
+    """What was measured at the held-out points, each phase at points of its own, and in the two seats."""
     count = max(sample.at.point for sample in state.samples(Phase.IDENTIFY))
     records = []
     for phase in (Phase.BEFORE, Phase.AFTER):
@@ -109,6 +138,7 @@ def _held_out(state: RunState) -> HeldOut:
         before=state.held_out(Phase.BEFORE),
         after=state.held_out(Phase.AFTER),
         left_travel=bool(state.rejections(Phase.AFTER)),
+        length=_length_measurements(settings, state) if state.samples(Phase.LENGTH) else None,
     )
 
 

@@ -27,6 +27,9 @@ _KILLED = int(ExitCode.INTERRUPTED)
 _BEFORE_SAMPLING = (events.Located, events.Arrived, events.GaugesPlaced)
 """After these a record is still being taken; a pause waits for it."""
 
+WHOLE_SETS = frozenset({Phase.BEFORE, Phase.LENGTH})
+"""Phases whose poses must all be measured: a set with a rejected record is measured again."""
+
 
 class Engine:
     """One run, from the end of its journal to the end of the run.
@@ -114,7 +117,7 @@ class Engine:
             self.record(events.Interrupted(reason="the program ended unexpectedly", exit_code=_KILLED))
         for key in self.state.open_sets:
             measured = self.state.set(key)
-            if not measured.samples or (measured.rejections and key.phase is Phase.BEFORE):
+            if not measured.samples or (measured.rejections and key.phase in WHOLE_SETS):
                 self.record(events.SetInvalidated(at=key, reason="the run was interrupted in this set"))
 
     def record(self, event: events.Event) -> RunState:

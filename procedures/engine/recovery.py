@@ -189,7 +189,7 @@ class Recovery:
             known = state.started.devices if state.started else ()
             is_zero_lost = await reconnect(self.executor.devices, error, known)
         if is_zero_lost:
-            return _invalidated(state.open_sets, "a gauge was opened again, its zero is void")
+            return _invalidated(state.sets_with_zero, "a gauge was opened again, its zero is void")
         if failure.action is Action.REDO_SET:
             return _invalidated(_failed_sets(failure, state), failure.reason)
         return []

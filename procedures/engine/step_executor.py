@@ -19,6 +19,7 @@ from hexacell.kinematics.rotations import Array
 from hexacell.measurements.records import deviation_of, joints_of
 from hexacell.robot_model import config_format
 from hexacell.runs.run_folder import RunFolder
+from procedures.calibration.length_steps import seat_of
 from procedures.calibration.set_steps import check_reference, in_words
 from procedures.calibration.workflow import Calibration
 from procedures.devices.device_set import Devices, Thermometers, gather_errors
@@ -28,7 +29,7 @@ from procedures.engine.config_transactions import ConfigTransactions
 from procedures.guards.guards import Guards
 from procedures.run import events
 from procedures.run.cancellation import in_thread
-from procedures.run.questions import Operator, ask_placement
+from procedures.run.questions import Operator, Question, ask_mounting, ask_placement
 from procedures.run.state import RunState
 from procedures.run.steps import (
     CloseSet,
@@ -118,17 +119,24 @@ class StepExecutor:
         """Where the sliders (6,), mm, belong by the geometry that the controller has now."""
         robot = self.calibration.robot
         commanding = ControllerGeometry(robot.controller, robot.branch)
-        if is_provisional or step.at.phase is Phase.AFTER:
+        if is_provisional or step.at.phase in {Phase.AFTER, Phase.LENGTH}:
             commanding = config_format(self.cell.settings).read(self.cell.config_path)
         target = PoseBatch.of([step.target])
         joints: Array = robot.mechanism.inverse(commanding.geometry, commanding.branch, target)[0]
         return joints
 
     async def _place(self, step: Place) -> events.Event:
-        if self.cell.settings.stations.placement == "by-hand":
-            question = ask_placement(step.at.point, Pose(*step.pose))
+        if question := self._placement_question(step):
             await self.guards.at_standstill(lambda: self.operator.ask(question))
         return events.GaugesPlaced(at=step.at)
+
+    def _placement_question(self, step: Place) -> Question | None:
+        """What to ask a person; none where no person is needed."""
+        settings, pose = self.cell.settings, Pose(*step.pose)
+        if step.at.phase is Phase.LENGTH and settings.length_check is not None:
+            is_by_hand = settings.length_check.mounting == "by-hand"
+            return ask_mounting(step.at.point, seat_of(step.at), pose) if is_by_hand else None
+        return ask_placement(step.at.point, pose) if settings.stations.placement == "by-hand" else None
 
     async def _sample(self, step: Sample, state: RunState) -> events.Event:
         try:
@@ -137,8 +145,7 @@ class StepExecutor:
             if not consists_only_of(error, GaugeAtEnd):
                 raise
             return events.RecordRejected(at=step.at, orientation=step.orientation, reason=str(error))
-        samples = state.set(step.at).samples
-        zero = samples[0].reading if samples else reading
+        zero = state.zero(step.at) or reading
         deviation = np.subtract(reading.gauges_mm, zero.gauges_mm)
         travel = self.cell.settings.limits.gauge_travel_mm
         if np.abs(deviation).max() > travel:

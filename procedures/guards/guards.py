@@ -127,10 +127,10 @@ class Guards:
         )
 
     def _watched_gauges(self, step: Move, state: RunState) -> tuple[WatchedGauge, ...]:
-        samples = state.set(step.at).samples
-        if not samples:
+        zero = state.zero(step.at)
+        if zero is None or not state.set(step.at).samples:
             return ()
-        reference = samples[0].reading.gauges_mm
+        reference = zero.gauges_mm
         return tuple(
             WatchedGauge(self._devices, mounted, reference[mounted.axis.index])
             for mounted in self._devices.gauges
@@ -149,7 +149,7 @@ class WatchedGauge:
         self._reference_mm = reference_mm
 
     async def read_deviation(self) -> GaugeDeviation:
-        """The present deviation from the reference of the set."""
+        """The present deviation from the zero of the set."""
         reading = await self._devices.read_gauge_once(self._mounted.gauge)
         self.displayed.append(reading.raw)
         deviation_mm = self._mounted.axis.coordinate(reading.value_mm) - self._reference_mm

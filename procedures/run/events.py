@@ -19,6 +19,7 @@ from hexacell.cell.recovery import Action, FailureKind
 from hexacell.decision import Verdict
 from hexacell.kinematics.mechanism import Branch
 from hexacell.reporting.check_result import CheckResult
+from hexacell.reporting.length_statement import LengthStatement
 from hexacell.reporting.result import AcceptedResult, IdentificationResult
 from hexacell.reporting.verification import Verification
 from procedures.run.steps import SetKey, SixNumbers, Step, ThreeNumbers
@@ -29,15 +30,15 @@ class RunStarted(Frozen):
     """The first event of a run.
 
     ``taught`` is the geometry with which the robot was taught last, in frames of its own. Without it the
-    result is written in frames by the mechanism's convention. ``accepted`` is the result that a check
-    starts from, if there is one.
+    result is written in frames by the mechanism's convention. ``accepted`` is the result that a check or a
+    length check starts from, if there is one. ``length_check`` is whether a calibration has one.
     """
 
     kind: Literal["started"] = "started"
     software: str
     cell: str
     cell_text: str
-    mode: Literal["check", "optimise"]
+    mode: Literal["check", "optimise", "length"]
     config: str
     config_sha256: str
     controller: GeometryDocument
@@ -46,6 +47,7 @@ class RunStarted(Frozen):
     pose_list: str | None = None
     taught: GeometryDocument | None = None
     accepted: AcceptedResult | None = None
+    length_check: bool = False
 
 
 class StepBegun(Frozen):
@@ -255,9 +257,10 @@ def _present_name(verdict: object) -> object:
 
 
 class ResultValidated(Frozen):
-    """The verdict of the run, of a calibration by its ``verification``, of a check by its result ``check``.
+    """The verdict of the run.
 
-    Versions 1 and 2 have neither, checks of version 3 have no ``check``.
+    That of a calibration is by its ``verification``, of a check by its result ``check``, of a length check
+    of its own by ``length``. Versions 1 and 2 have none of them, checks of version 3 have no ``check``.
     """
 
     kind: Literal["judged"] = "judged"
@@ -265,6 +268,7 @@ class ResultValidated(Frozen):
     line: str
     verification: Verification | None = None
     check: CheckResult | None = None
+    length: LengthStatement | None = None
 
 
 class ResultAccepted(Frozen):

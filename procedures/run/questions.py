@@ -31,10 +31,14 @@ class QuestionKind(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class GaugePlacement:
-    """Where the gauges are wanted: a point, counted from 1, and the pose the robot holds there."""
+    """Where the gauges are wanted: a point, counted from 1, and the pose the robot holds there.
+
+    In a length check the point is the number of the mounting, and ``seat`` (1 or 2) that of the fixture.
+    """
 
     point: int
     pose: Pose
+    seat: int | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,6 +98,18 @@ def ask_placement(point: int, pose: Pose) -> Question:
         QuestionKind.PLACE_GAUGES,
         f"Put the gauges around the ball at point {point} ({pose}).",
         GaugePlacement(point, pose),
+        choices=(PLACED,),
+        default=PLACED,
+    )
+
+
+def ask_mounting(mounting: int, seat: int, pose: Pose) -> Question:
+    """Ask for the gauges to be mounted in a seat of the fixture; answered when they are."""
+    zero = "and zero them" if mounting == 1 else "without zeroing them"
+    return Question(
+        QuestionKind.PLACE_GAUGES,
+        f"Mount the gauges in seat {seat} of the fixture, around the ball ({pose}), {zero}.",
+        GaugePlacement(mounting, pose, seat),
         choices=(PLACED,),
         default=PLACED,
     )
@@ -193,6 +209,13 @@ class UnattendedOperator:
     async def ask(self, question: Question) -> str | None:
         """Raise ``AnswerNeeded``: what is needed, and how to run without it where that is possible."""
         match question.subject:
+            case GaugePlacement(pose=pose, seat=int(seat)):
+                raise AnswerNeeded(
+                    f"the gauges must be mounted in seat {seat} of the fixture ({pose}), but the run is "
+                    "unattended",
+                    action='Run it attended, or set mounting = "fixed" in [length_check] if no person is '
+                    "needed",
+                )
             case GaugePlacement(point=point, pose=pose):
                 raise AnswerNeeded(
                     f"the gauges must be put around the ball at point {point} ({pose}), but the run is "

@@ -137,6 +137,22 @@ class RunState:
         """One set; an empty one where nothing was measured yet."""
         return self.sets.get(key, SetState())
 
+    @property
+    def sets_with_zero(self) -> list[SetKey]:
+        """The sets that do not count if the gauges lost their zero.
+
+        Of a length check these are all: its mountings have the zero of the first one.
+        """
+        first = SetKey(phase=Phase.LENGTH, point=1)
+        is_checking = first in self.sets and self.judged is None
+        return [*self.open_sets, *([first] if is_checking and first not in self.open_sets else [])]
+
+    def zero(self, key: SetKey) -> events.Reading | None:
+        """The reading that the deviations of a set are measured from; none before it is taken."""
+        of_zero = SetKey(phase=Phase.LENGTH, point=1) if key.phase is Phase.LENGTH else key
+        samples = self.set(of_zero).samples
+        return samples[0].reading if samples else None
+
     def samples(self, phase: Phase) -> tuple[events.RecordTaken, ...]:
         """All records of a phase, in the order of their points."""
         keys = sorted((key for key in self.sets if key.phase is phase), key=lambda key: key.point)
@@ -212,8 +228,7 @@ def apply(state: RunState, event: events.Event) -> RunState:  # noqa: C901, PLR0
         case events.SetClosed():
             return _with_set(state, event.at, replace(state.set(event.at), drift_mm=event.drift_mm))
         case events.SetInvalidated():
-            kept = {key: value for key, value in state.sets.items() if key != event.at}
-            return replace(state, sets=kept, at_pose=None, invalidated=state.invalidated + 1)
+            return _invalidated(state, event.at)
         case events.Identified():
             return replace(state, identified=event)
         case events.Proposed():
@@ -267,6 +282,14 @@ def _rejected(state: RunState, event: events.RecordRejected) -> RunState:
     is_on_the_way = event.at.phase is Phase.AFTER and state.at_pose != (event.at, event.orientation)
     left = _without_position(state) if is_on_the_way else replace(state, at_pose=None)
     return _with_set(left, event.at, rejected)
+
+
+def _invalidated(state: RunState, at: SetKey) -> RunState:
+    """Without a set; a mounting of a length check whose zero is in doubt takes all of them with it."""
+    takes_all = at.phase is Phase.LENGTH and bool(state.set(at).samples)
+    lost = {key for key in state.sets if key == at or (takes_all and key.phase is Phase.LENGTH)}
+    kept = {key: value for key, value in state.sets.items() if key not in lost}
+    return replace(state, sets=kept, at_pose=None, invalidated=state.invalidated + 1)
 
 
 def _path(state: RunState, event: events.Arrived) -> tuple[tuple[int, SixNumbers], ...]:

@@ -21,10 +21,14 @@ class Phase(StrEnum):
     IDENTIFY = "P"
     BEFORE = "before-V"
     AFTER = "after-V"
+    LENGTH = "L"
 
 
 class SetKey(Frozen):
-    """The poses at one point, measured with gauges zeroed once; points count from 1."""
+    """The poses at one point, measured with gauges zeroed once; points count from 1.
+
+    In a length check a point is a mounting of the gauges; all have the zero of the first one.
+    """
 
     phase: Phase
     point: int

@@ -41,6 +41,7 @@ STEPS = (
     "proposing",
     "committing",
     "after",
+    "length",
     "judging",
     "rolling back",
     "ending",
@@ -57,6 +58,9 @@ COMPUTING = {
     "accept": "judging",
     "roll back": "rolling back",
 }
+
+
+OF_PHASES = {Phase.BEFORE: "held-out", Phase.AFTER: "after", Phase.LENGTH: "length"}
 
 
 @dataclass(frozen=True)
@@ -92,7 +96,7 @@ def _name(step: Step) -> str:
         case Compute():
             return COMPUTING[step.kind]
         case _ if step.at.phase is not Phase.IDENTIFY:
-            return "held-out" if step.at.phase is Phase.BEFORE else "after"
+            return OF_PHASES[step.at.phase]
         case _:
             return _of_a_set(step)
 

@@ -20,6 +20,7 @@ from hexacell.controller_config.toml_format import NativeToml
 from hexacell.errors import DeviceError, FileError, HexacellError
 from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS, Hexaglide
 from hexacell.kinematics.pose import Pose
+from hexacell.reporting.result import AcceptedResult
 from hexacell.robot_model import robot_of
 from hexacell.runs.run_folder import RunFolder
 from procedures.calibration.workflow import Calibration, Mode
@@ -42,6 +43,8 @@ class Rig:
     mode: Mode = Mode.OPTIMISE
     operator: Any = field(default_factory=Approver)
     engine: Any = None
+    accepted: AcceptedResult | None = None
+    length_check: bool = False
 
     def __post_init__(self) -> None:
         simulation = self.cell.settings.simulation
@@ -51,14 +54,25 @@ class Rig:
         home, config = Pose(*self.cell.settings.identification.points[0]), self.cell.config_path
         config_format = NativeToml(HEXAGLIDE_PARAMETERS)
         self.physics: RobotPhysics = RobotPhysics(
-            Hexaglide(), simulation, self.clock, config_format.read(config), home
+            Hexaglide(),
+            simulation,
+            self.clock,
+            config_format.read(config),
+            home,
+            self.cell.settings.length_check,
         )
         self.machine = SimulatedMachine(Hexaglide(), config_format, config, self.physics, self.clock, home)
         for gauge in bench.gauges:
             gauge.shown = partial(self.physics.gauge_displacement, gauge.name)
         bench.encoders.shown = lambda: list(self.physics.encoder_positions())
         bench.controller.machine = self.machine
-        self.calibration = Calibration(self.cell.settings, robot_of(self.cell), self.mode)
+        self.calibration = Calibration(
+            self.cell.settings,
+            robot_of(self.cell),
+            self.mode,
+            accepted=self.accepted,
+            length_check=self.length_check,
+        )
         self.performer = StepExecutor(
             self.cell, self.calibration, bench.devices, self.clock, self.operator, self.folder
         )
@@ -93,7 +107,15 @@ class Rig:
 MakeRig = Callable[..., Rig]
 
 
-def new_rig(folder: Path, mode: Mode = Mode.OPTIMISE, operator: Any = None, **changes: Any) -> Rig:
+def new_rig(
+    folder: Path,
+    mode: Mode = Mode.OPTIMISE,
+    operator: Any = None,
+    accepted: AcceptedResult | None = None,
+    *,
+    length_check: bool = False,
+    **changes: Any,
+) -> Rig:
     source = load_cell(bundled_config("simulated-hexaglide"))
     changes = (
         SMALL
@@ -103,7 +125,8 @@ def new_rig(folder: Path, mode: Mode = Mode.OPTIMISE, operator: Any = None, **ch
     path = folder / "cell.toml"
     path.write_text(dump(changed(source.settings, changes)))
     shutil.copy(source.config_path, folder)
-    return Rig(load_cell(path), RunFolder(folder / "run"), mode, operator or Approver())
+    run, person = RunFolder(folder / "run"), operator or Approver()
+    return Rig(load_cell(path), run, mode, person, accepted=accepted, length_check=length_check)
 
 
 @dataclass(frozen=True)

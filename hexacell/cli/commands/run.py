@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+from dataclasses import replace
 
 from hexacell.application.calibration_run import RunRequest, calibrate, is_unverified
 from hexacell.application.demo import prepare_demo
@@ -13,7 +14,7 @@ from hexacell.cli.console import Console
 from hexacell.cli.progress import RunProgress
 from hexacell.cli.signal_commands import SignalCommands
 from hexacell.cli.terminal import HELP, KeyboardCommands, TerminalOperator, is_interactive
-from hexacell.errors import ExitCode, HexacellError
+from hexacell.errors import ExitCode, HexacellError, UsageError
 from hexacell.presentation.documents import run_document
 from hexacell.presentation.run import UNVERIFIED, clock_notice, closing_lines, demo_opening, resume_hint
 from hexacell.runs.run_folder import find_run, new_run
@@ -27,18 +28,33 @@ from procedures.run.state import fold
 
 def main(options: argparse.Namespace) -> ExitCode:
     """Calibrate a cell, or check it."""
+    mode = _mode(options)
+    if mode is Mode.CHECK and options.length_check:
+        raise UsageError(
+            "a check does not check the length scale", action="Use `hexacell length`, or --mode optimise"
+        )
     console = Console(options.json)
+    request = _request(options, console, mode)
+    return _run_to_end(replace(request, length_check=options.length_check), console)
+
+
+def length(options: argparse.Namespace) -> ExitCode:
+    """Check the scale of the encoders of a calibrated cell."""
+    console = Console(options.json)
+    return _run_to_end(_request(options, console, Mode.LENGTH), console)
+
+
+def _request(options: argparse.Namespace, console: Console, mode: Mode) -> RunRequest:
     cell = load_cell(options.cell)
     attended = is_interactive() and not options.unattended
-    request = RunRequest(
+    return RunRequest(
         cell=cell,
         folder=find_run(cell, options.resume) if options.resume else new_run(cell),
-        mode=_mode(options),
+        mode=mode,
         operator=TerminalOperator(console) if attended else UnattendedOperator(),
         unattended=not attended,
         resume=options.resume is not None,
     )
-    return _run_to_end(request, console)
 
 
 def demo(options: argparse.Namespace) -> ExitCode:
@@ -77,7 +93,10 @@ def execute_run(request: RunRequest, console: Console) -> events.Ended:
         HexacellError: it could not begin, could not continue, or was stopped.
     """
     listed = pose_list_of(request.cell)
-    progress = RunProgress(console, expected_records(request.cell.settings, request.mode, listed))
+    expected = expected_records(
+        request.cell.settings, request.mode, listed, length_check=request.length_check
+    )
+    progress = RunProgress(console, expected)
     signals = SignalCommands(console)
     try:
         with progress.bar:

@@ -182,13 +182,25 @@ def test_the_ball_oscillates_on_arrival_and_the_oscillation_decays(make_twin) ->
 
 
 def _placing(one: Any, other: Any) -> Any:
-    return other.physics._station - one.physics._station
+    return other.physics.gauges.station - one.physics.gauges.station
 
 
 def test_sliders_do_not_oscillate(make_twin) -> None:
     twin = make_twin(motion__ringing_mm=0.5)
     twin.machine.move(POSES[0])
     assert twin.physics.encoder_positions() == pytest.approx(twin.joints_for(POSES[0]), abs=1e-9)
+
+
+def test_encoders_that_are_long_show_what_is_commanded_and_the_sliders_move_less(make_twin) -> None:
+    twin = make_twin(encoders__common_scale_um_m=1000.0)
+    twin.machine.move(POSES[0])
+    shown = twin.joints_for(POSES[0])
+    assert twin.physics.encoder_positions() == pytest.approx(shown, abs=1e-9)
+    true = make_twin()
+    true.machine.move(POSES[0])
+    closed = true.physics.encoder_positions()
+    assert closed == pytest.approx(shown, abs=1e-9)
+    assert twin.physics.true_joints() == pytest.approx(shown / 1.001, abs=1e-9)
 
 
 def test_slider_stops_scatter_by_the_repeatability(make_twin) -> None:

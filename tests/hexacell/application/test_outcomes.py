@@ -198,7 +198,7 @@ async def test_a_gauge_moved_away_while_measuring_gives_rejected_records(make_si
     site = make_site(acceptance__drift_mm=0.05)
 
     def push() -> None:
-        site.simulated.physics._station += np.array([0.0, 8.0, 0.0])
+        site.simulated.physics.gauges.station += np.array([0.0, 8.0, 0.0])
 
     with pytest.raises((LimitError, DeviceError)):
         await site.calibrate(at(events.RecordTaken, push))

@@ -118,7 +118,7 @@ async def test_devices_that_open_but_cannot_be_read_are_reported(make_site, monk
 
 async def test_gauges_away_from_the_ball_are_no_preflight_failure(make_site) -> None:
     site = make_site()
-    site.simulated.physics._station += np.array([9.0, -9.0, 0.0])
+    site.simulated.physics.gauges.station += np.array([9.0, -9.0, 0.0])
     assert len(await check(site)) == 10
 
 

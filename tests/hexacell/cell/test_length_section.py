@@ -41,7 +41,7 @@ def test_what_is_not_said_is_assumed_as_of_a_shop(load_fixture) -> None:
     assert fixture.second_seat == pytest.approx((150.012, 0.0, 500.0))
     assert (fixture.parallel_mrad, fixture.height_mm, fixture.seating_um) == (0.1, 50.0, 5.0)
     assert (fixture.temperature_sigma_k, fixture.expansion_um_m_k) == (1.0, 11.5)
-    assert (fixture.mountings, fixture.placement) == (3, "by-hand")
+    assert (fixture.mountings, fixture.mounting) == (3, "by-hand")
     assert "distance_mm = 300.012  # line" in describe(load_fixture())
 
 
@@ -65,7 +65,7 @@ def test_a_direction_is_one_whatever_its_length(load_fixture) -> None:
         ("0.002\n", "0.002\nrepeats = 0\n", "must be 1 or more"),
         ("0.002\n", "0.002\norientations = 26\n", "must be 25 or less"),
         ("0.002\n", "0.002\ntilt_deg = 60.0\n", "must be 45 or less"),
-        ("0.002\n", '0.002\nplacement = "robot"\n', "must be 'by-hand' or 'fixed'"),
+        ("0.002\n", '0.002\nmounting = "robot"\n', "must be 'by-hand' or 'fixed'"),
         ("0.002\n", "0.002\nseat_mm = 1.0\n", "unknown key 'seat_mm' in [length_check]"),
         ("0.002\n", '0.002\nthermometer = "room"\n', "the cell has no thermometer 'room'"),
     ],

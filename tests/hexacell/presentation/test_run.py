@@ -36,7 +36,8 @@ def test_the_resume_command_parses_to_the_same_request(request_of, mode):
     options = make_parser().parse_args(arguments)
     assert program == "hexacell"
     assert (options.cell, options.resume) == (request.cell.path, str(request.folder.path))
-    assert options.mode == ("check" if mode is Mode.CHECK else None)
+    assert options.target == ("run.length" if mode is Mode.LENGTH else "run.main")
+    assert getattr(options, "mode", None) == ("check" if mode is Mode.CHECK else None)
     assert resume_hint(request).splitlines()[1].strip() == resume_command(request)
 
 

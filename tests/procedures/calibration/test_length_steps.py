@@ -1,0 +1,290 @@
+"""A length check of a calibrated machine on fake devices, and what may go wrong between the seats."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from datetime import UTC, datetime
+from functools import partial
+from typing import Any
+
+import numpy as np
+import pytest
+
+from hexacell.cell.bundled import bundled_config
+from hexacell.cell.loader import load_cell
+from hexacell.decision import Verdict
+from hexacell.errors import AnswerNeeded, HexacellError
+from hexacell.kinematics.pose import Pose
+from hexacell.reporting.length_statement import LengthStatement
+from hexacell.reporting.result import AcceptedResult
+from procedures.calibration.length_steps import BESIDE_MM
+from procedures.calibration.preflight import plan_failures
+from procedures.calibration.workflow import Mode, expected_records
+from procedures.journal.journal import read_journal
+from procedures.run import events
+from procedures.run.commands import MeasureAgain
+from procedures.run.questions import GaugePlacement, Question, UnattendedOperator, ask_mounting
+from procedures.run.state import RunState, fold
+from procedures.run.steps import Move, Phase, SetKey
+from tests.procedures.fakes import Approver
+from tests.procedures.rig import Rig
+
+RECORDS = 6
+MOUNTINGS = [SetKey(phase=Phase.LENGTH, point=number) for number in (1, 2, 3)]
+HERE = Pose(150.0, 0.0, 500.0)
+ACCEPTED = AcceptedResult(
+    run="runs/before",
+    at=datetime(2026, 11, 20, tzinfo=UTC),
+    covariance=tuple(map(tuple, (1e-5 * np.eye(42)).tolist())),
+)
+
+
+@pytest.fixture
+def make_length_rig(make_rig):
+    """A machine that is as its controller has it, by encoders that are ``long_um_m`` long."""
+    drawn = load_cell(bundled_config("simulated-hexaglide")).settings.robot.nominal
+
+    def make(operator: Any = None, long_um_m: float = 0.0, **changes: Any) -> Rig:
+        shown_per_mm = 1.0 + 1e-6 * long_um_m
+        true = {kind: (np.array(values) / shown_per_mm).tolist() for kind, values in drawn}
+        changes |= {
+            "simulation__geometry": type(drawn).model_validate(true),
+            "simulation__encoders__common_scale_um_m": long_um_m,
+        }
+        rig: Rig = make_rig(Mode.LENGTH, operator, ACCEPTED, **changes)
+        return rig
+
+    return make
+
+
+async def stated(rig: Rig, *listeners: Any) -> LengthStatement:
+    await rig.run(*listeners)
+    found: LengthStatement = rig.engine.state.judged.length
+    return found
+
+
+def recorder(told: list[Any]) -> Any:
+    def record(event: events.Event, _: RunState) -> None:
+        told.append(event)
+
+    return record
+
+
+def placed_at(event: Any, *mountings: int) -> bool:
+    return isinstance(event, events.GaugesPlaced) and event.at.point in mountings
+
+
+def less(shown: Callable[[], float], off: float) -> float:
+    return shown() - off
+
+
+def zero_gauges(rig: Rig) -> None:
+    """A person presses the zero keys."""
+    for gauge in rig.gauges:
+        gauge.shown = partial(less, gauge.shown, gauge.shown())
+
+
+async def test_true_encoders_pass_and_nothing_is_written(make_length_rig) -> None:
+    rig = make_length_rig()
+    before = rig.config
+    found = await stated(rig)
+    assert found.verdict is Verdict.PASS
+    assert abs(found.result.long_um_m) <= found.result.expanded_um_m < 30.0
+    assert found.error is not None
+    assert found.error.value + found.error.expanded < 0.02
+    assert rig.config == before
+    assert "reload" not in rig.controller.log
+
+
+@pytest.mark.parametrize("long_um_m", [1000.0, -400.0])
+async def test_a_scale_of_all_encoders_is_found(make_length_rig, long_um_m: float) -> None:
+    rig = make_length_rig(long_um_m=long_um_m)
+    found = await stated(rig)
+    assert found.result.long_um_m == pytest.approx(long_um_m, abs=found.result.expanded_um_m)
+    assert found.result.is_significant
+    assert found.error is not None
+    assert found.error.value == pytest.approx(1.9e-4 * abs(long_um_m), rel=0.3)
+    assert found.verdict is Verdict.PASS  # of this cell, whose limit is 5 mm
+
+
+async def test_the_mountings_and_their_poses(make_length_rig) -> None:
+    rig = make_length_rig()
+    told: list[Any] = []
+    await rig.run(recorder(told))
+    samples = [event for event in told if isinstance(event, events.RecordTaken)]
+    assert [event.at for event in told if isinstance(event, events.SetClosed)] == MOUNTINGS
+    assert [(s.at, s.orientation) for s in samples] == [
+        (key, number) for key in MOUNTINGS for number in range(1, RECORDS + 1)
+    ]
+    first, second = (np.array([s.pose for s in samples if s.at == key]) for key in MOUNTINGS[:2])
+    assert first[0] == pytest.approx([-150.0, 0.0, 500.0, 0.0, 0.0, 0.0])
+    assert first[1, :3] - first[0, :3] == pytest.approx(BESIDE_MM)
+    assert np.hypot(first[2:, 3], first[2:, 4]) == pytest.approx(10.0)
+    # In the second seat the record beside its middle comes first, and the rest where the gauges show zero.
+    assert second[0, :3] == pytest.approx(np.array([150.0, 0.0, 500.0]) + BESIDE_MM)
+    middle = [s.deviation_mm for s in samples if s.at == MOUNTINGS[1] and s.orientation > 1]
+    assert np.abs(middle).max() < 0.02
+    assert expected_records(rig.cell.settings, Mode.LENGTH) == len(samples) + len(MOUNTINGS)
+
+
+async def test_a_fixture_beside_its_direction_is_found_by_the_first_reading(make_length_rig) -> None:
+    """Half a degree: the second seat is 2.6 mm off, and the ball goes there."""
+    rig = make_length_rig(simulation__fixture__yaw_deg=0.5)
+    found = await stated(rig)
+    assert found.verdict is Verdict.PASS
+    assert abs(found.result.long_um_m) <= found.result.expanded_um_m
+    samples = rig.engine.state.set(MOUNTINGS[1]).samples
+    assert np.abs(samples[0].deviation_mm).max() > 2.0
+    assert np.abs([sample.deviation_mm for sample in samples[1:]]).max() < 0.1
+
+
+async def test_another_distance_than_certified_looks_like_a_scale(make_length_rig) -> None:
+    found = await stated(make_length_rig(simulation__fixture__distance_mm=299.97))
+    assert found.result.long_um_m == pytest.approx(-100.0, abs=found.result.expanded_um_m)
+
+
+async def test_more_mountings_lessen_what_the_seating_does(make_length_rig) -> None:
+    once = await stated(make_length_rig(length_check__seating_um=4.0))
+    rig = make_length_rig(length_check__seating_um=4.0, length_check__repeats=3)
+    rig.folder.journal.unlink()
+    often = await stated(rig)
+    seating = [
+        {s.name: s.um_m for s in one.result.sources}["seating of the gauges"] for one in (once, often)
+    ]
+    assert seating[1] < 0.7 * seating[0]
+    assert len(rig.engine.state.sets) == 7
+
+
+async def test_gauges_the_wrong_way_round_in_the_second_seat_are_told(make_length_rig) -> None:
+    found = await stated(make_length_rig(simulation__fixture__turned_deg=180.0))
+    assert found.verdict is Verdict.NOT_EVALUATED
+    assert "at mounting 2 gauge x and y run against the ball" in found.result.reason
+    assert "the wrong way round in their seat" in found.result.reason
+
+
+@pytest.mark.parametrize("when", [(2,), (3,), (2, 3)])
+async def test_gauges_that_are_zeroed_between_the_seats_are_told(make_length_rig, when) -> None:
+    """Also at every mounting, out of habit: then each first reading is zero."""
+    rig = make_length_rig()
+
+    def press(event: Any, _: RunState) -> None:
+        if placed_at(event, *when):
+            zero_gauges(rig)
+
+    found = await stated(rig, press)
+    assert found.verdict is Verdict.NOT_EVALUATED
+    assert "they were zeroed in between" in found.result.reason
+
+
+async def test_a_ball_outside_the_travel_in_the_second_seat_is_told_with_what_to_check(
+    make_length_rig,
+) -> None:
+    rig = make_length_rig(simulation__fixture__yaw_deg=2.0)
+    with pytest.raises(HexacellError, match="L2: the ball left the gauges' travel in seat 2") as failure:
+        await rig.run()
+    assert "Check first_seat, direction and distance_mm in [length_check]" in str(failure.value)
+    assert rig.engine.state.set(MOUNTINGS[0]).closed
+
+
+class LeavesBefore(Approver):
+    """A person who goes home before a mounting."""
+
+    def __init__(self, mounting: int) -> None:
+        super().__init__()
+        self.mounting: int | None = mounting
+
+    async def ask(self, question: Question) -> str | None:
+        match question.subject:
+            case GaugePlacement(point=point, seat=int()) if point == self.mounting:
+                raise AnswerNeeded("nobody is there")
+        return await super().ask(question)
+
+
+@pytest.mark.parametrize("mounting", [2, 3])
+async def test_a_check_resumed_between_the_seats_goes_on_there(make_length_rig, mounting: int) -> None:
+    person = LeavesBefore(mounting)
+    rig = make_length_rig(person, length_check__mounting="by-hand")
+    with pytest.raises(AnswerNeeded):
+        await rig.run()
+    person.mounting = None
+    found = await stated(rig)
+    assert found.verdict is Verdict.PASS
+    assert person.placed == [1, 2, 3]
+
+
+async def test_a_mounting_that_is_measured_again_takes_all_with_it(make_length_rig) -> None:
+    """The others have the zero of the first, which is in doubt."""
+    rig = make_length_rig()
+    asked: list[Any] = []
+
+    def again(event: Any, _: RunState) -> None:
+        if isinstance(event, events.RecordTaken) and event.at == MOUNTINGS[1] and not asked:
+            asked.append(event)
+            rig.engine.command(MeasureAgain(MOUNTINGS[1]))
+
+    found = await stated(rig, again)
+    assert found.verdict is Verdict.PASS
+    placed = [event.at.point for event in rig_events(rig) if isinstance(event, events.GaugesPlaced)]
+    assert placed == [1, 2, 1, 2, 3]
+
+
+def rig_events(rig: Rig) -> Any:
+    return read_journal(rig.folder.journal)
+
+
+def test_a_mounting_without_a_record_is_voided_alone(story) -> None:
+    first, second = story(Phase.LENGTH, 1), story(Phase.LENGTH, 2)
+    begun = [*first.whole(2), second.arrived(), second.placed(), second.voided()]
+    assert list(fold(begun).sets) == [MOUNTINGS[0]]
+    measured = [*first.whole(2), second.arrived(), second.placed(), second.sampled(), second.voided()]
+    assert fold(measured).sets == {}
+
+
+def test_the_first_mounting_has_the_zero_of_all(story) -> None:
+    first, second = story(Phase.LENGTH, 1), story(Phase.LENGTH, 2)
+    state = fold([*first.whole(2), *second.whole(2)])
+    assert state.zero(MOUNTINGS[1]) == state.set(MOUNTINGS[0]).samples[0].reading
+    assert state.open_sets == []
+    assert state.sets_with_zero == [MOUNTINGS[0]]
+
+
+async def test_nobody_mounts_the_gauges_of_an_unattended_check(make_length_rig) -> None:
+    calibration = make_length_rig(length_check__mounting="by-hand").calibration
+    (failure,) = await plan_failures(calibration, unattended=True)
+    assert "mounted in the two seats by hand" in str(failure)
+    assert await plan_failures(calibration, unattended=False) == []
+    assert await plan_failures(make_length_rig().calibration, unattended=True) == []
+
+
+async def test_a_seat_out_of_reach_is_told_before_anything_moves(make_length_rig) -> None:
+    calibration = make_length_rig(length_check__first_seat=(-500.0, 0.0, 500.0)).calibration
+    failures = await plan_failures(calibration, unattended=True)
+    assert failures
+    assert all("length check, seat " in str(failure) for failure in failures)
+
+
+async def test_an_unattended_operator_says_which_seat(make_length_rig) -> None:
+    question = ask_mounting(2, 2, HERE)
+    with pytest.raises(AnswerNeeded, match="mounted in seat 2 of the fixture"):
+        await UnattendedOperator().ask(question)
+    assert "without zeroing them" in question.text
+    assert "and zero them" in ask_mounting(1, 1, HERE).text
+
+
+async def test_a_run_checks_the_scale_before_its_verdict(make_rig) -> None:
+    """1e-3 of all encoders: without the check the run passes, and errs by 0.2 mm."""
+    changes = {
+        "simulation__encoders__common_scale_um_m": 1000.0,
+        "acceptance__position_mm": 0.12,
+        "acceptance__orientation_deg": 0.2,
+    }
+    rig = make_rig(length_check=True, **changes)
+    told: list[Any] = []
+    await rig.run(recorder(told))
+    steps = [event.step for event in told if isinstance(event, events.StepBegun)]
+    moves = [step.at.phase for step in steps if isinstance(step, Move)]
+    assert moves.index(Phase.LENGTH) > max(n for n, phase in enumerate(moves) if phase is Phase.AFTER)
+    accuracy = rig.engine.state.judged.verification.accuracy
+    assert accuracy.length.long_um_m == pytest.approx(1000.0, abs=accuracy.length.expanded_um_m)
+    assert accuracy.position.value > 0.12
+    assert rig.engine.state.judged.verdict is not Verdict.PASS

@@ -20,7 +20,7 @@ from hexacell.campaign.decisions import (
 from hexacell.campaign.held_out_forecast import predicted_verdicts
 from hexacell.campaign.planner import Plan
 from hexacell.campaign.verdict_forecast import VerdictForecast
-from hexacell.errors import HexacellError
+from hexacell.errors import HexacellError, ReachError
 from hexacell.identification.problem.data_requirements import is_determined
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.pose import Pose
@@ -93,7 +93,12 @@ class VirtualCampaign:
         self.virtual_robot.place(start.pose)
 
     def _go_to_pose(self, measure: MeasurePose) -> None:
-        self.virtual_robot.place(measure.pose)
+        """Go there at once, or on the planned way where a singularity lies between the two geometries."""
+        try:
+            self.virtual_robot.place(measure.pose)
+        except ReachError:
+            for pose in (*measure.via, measure.pose):
+                self.virtual_robot.move(pose)
 
     def _return_to(self, reference: Pose) -> None:
         """Go back to the reference of the present point."""

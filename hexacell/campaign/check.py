@@ -74,6 +74,7 @@ class Check:
             self.candidates,
             estimator=self._by_drawing if drifting is None else drifting,
             goal=self,
+            earlier=self.earlier,
         )
 
     def reached(self, measurements: MeasurementSet) -> str | None:

@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from math import hypot
 from typing import Literal
 
 from hexacell.cell.fields import Frozen
 from hexacell.kinematics.pose import Pose
 from hexacell.measurements.records import Deviation, Joints, MeasurementSet
+
+COVERAGE_FACTOR = 2.0
+"""Of the expanded uncertainty U: about 95 %."""
 
 
 @dataclass(frozen=True)
@@ -47,6 +51,8 @@ class Forecast(Frozen):
         next_mm: with the proposed record.
         end_mm: once everything that is still planned is measured.
         records: that are still planned, the proposed one included, and the ``minutes`` they will take.
+        systematic_mm: standard uncertainty by the systematic effects there, at the end; none where it is
+            not known.
     """
 
     now_mm: float
@@ -54,6 +60,11 @@ class Forecast(Frozen):
     end_mm: float
     records: int
     minutes: float
+    systematic_mm: float | None = None
+
+    def expanded_mm(self, error_mm: float) -> float | None:
+        """U (k = 2) for one of the predicted errors; none where the systematic effects are not known."""
+        return None if self.systematic_mm is None else COVERAGE_FACTOR * hypot(error_mm, self.systematic_mm)
 
     @property
     def gain_mm(self) -> float:

@@ -56,12 +56,14 @@ class Forecaster:
     Attributes:
         sizes: how many records each point gets at most.
         planned_sets: gives a set of poses at each point, which represent those not selected yet.
+        systematic_mm: gives the standard uncertainty by the systematic effects at the end, if it is known.
     """
 
     sizes: Mapping[int, int]
     budget: Budget
     task: Task
     planned_sets: Callable[[], Sequence[PoseBatch]]
+    systematic_mm: Callable[[], float | None] = lambda: None
 
     def worst_error(self, belief: RobotBelief) -> float | None:
         """The error at the worst task pose now, 1 sigma, mm; none without task poses."""
@@ -92,6 +94,7 @@ class Forecaster:
             end_mm=after if selected and records == 1 else min(end, after),
             records=records,
             minutes=self.budget.time_model.minutes(records, begun_later),
+            systematic_mm=self.systematic_mm(),
         )
 
     def planned(self, state: CampaignState) -> dict[int, int]:

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-import numpy as np
-
+from hexacell.campaign.exact_records import exact_records
 from hexacell.campaign.planner import Plan
 from hexacell.campaign.verdict_forecast import VerdictForecast, forecast_verdicts, stated_errors
 from hexacell.decision import ErrorLimits
@@ -14,8 +13,8 @@ from hexacell.experiment_design import candidates
 from hexacell.experiment_design.validation_poses import select_validation_poses
 from hexacell.identification.diagnostics.model_tests import update
 from hexacell.identification.solver.result import Identification
-from hexacell.kinematics.pose import Pose, PoseBatch
-from hexacell.measurements.records import MeasurementSet, Record, deviation_of, joints_of
+from hexacell.kinematics.pose import Pose
+from hexacell.measurements.records import MeasurementSet, Record
 from hexacell.robot_model import Robot
 from hexacell.uncertainty.budget import UncertaintyBudget
 
@@ -70,13 +69,4 @@ def _records(plan: Plan, robot: Robot, found: Identification) -> Iterator[Record
             )
         except LimitError:
             continue
-        yield from _exact(robot, point, poses)
-
-
-def _exact(robot: Robot, point: int, poses: PoseBatch) -> Iterator[Record]:
-    """What a robot with exactly the controller's geometry, and without noise, shows at some poses."""
-    joints = robot.mechanism.inverse(robot.commanding, robot.branch, poses)
-    shown = (poses.positions - poses.positions[0]) @ robot.frames.base
-    for row, (joint_row, deviation) in enumerate(zip(joints, shown, strict=True)):
-        command = robot.to_command(poses.pose(row))
-        yield Record(point, row + 1, command, joints_of(np.asarray(joint_row)), deviation_of(deviation))
+        yield from exact_records(robot, point, poses)

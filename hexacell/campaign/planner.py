@@ -7,7 +7,8 @@ or nothing is left that is worth measuring.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -23,6 +24,7 @@ from hexacell.campaign.decisions import (
     StartPoint,
 )
 from hexacell.campaign.forecast import Forecaster, select_sets
+from hexacell.campaign.planned_uncertainty import planned_systematic_mm
 from hexacell.campaign.pose_chooser import PoseChooser
 from hexacell.campaign.pose_list import PoseList
 from hexacell.campaign.recursive_estimator import OnlineEstimate, OnlineEstimator, RecordEstimator
@@ -34,6 +36,7 @@ from hexacell.experiment_design.candidates import ReachableTargets
 from hexacell.experiment_design.travel_monte_carlo import orientation_sigma
 from hexacell.identification.belief import RobotBelief
 from hexacell.kinematics.pose import Pose, PoseBatch
+from hexacell.kinematics.rotations import Array
 from hexacell.measurements.records import deviation_of, joints_of
 from hexacell.motion.path_check import is_clear
 from hexacell.robot_model import Robot
@@ -54,6 +57,7 @@ class Plan:
         with_forecast: whether to forecast for every record what it gains at the task poses.
         estimator: of the robot from the records; none for the usual one.
         goal: what the records are for; none to identify the geometry as well as the settings ask for.
+        earlier: what the systematic effects did to an earlier result that is the prior, by their names.
     """
 
     settings: CellSettings
@@ -63,6 +67,7 @@ class Plan:
     with_forecast: bool = True
     estimator: RecordEstimator | None = None
     goal: Goal | None = None
+    earlier: Mapping[str, Array] = field(default_factory=dict)
 
     def decide(self, state: CampaignState) -> Decision:
         """What to do now.
@@ -150,7 +155,14 @@ class Plan:
     def forecaster(self) -> Forecaster:
         """Forecasts what further records gain."""
         sizes = {point: self.records_at(point) for point in self.points}
-        return Forecaster(sizes, self.budget, self.task, lambda: self.planned_sets)
+        return Forecaster(
+            sizes, self.budget, self.task, lambda: self.planned_sets, lambda: self.systematic_mm
+        )
+
+    @cached_property
+    def systematic_mm(self) -> float | None:
+        """Standard uncertainty by the systematic effects at the end; none where it is not known."""
+        return planned_systematic_mm(self.robot, self.task, self.planned_sets, self.earlier)
 
     @cached_property
     def _estimator(self) -> RecordEstimator:

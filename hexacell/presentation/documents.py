@@ -19,12 +19,14 @@ def next_document(proposed: NextPose) -> dict[str, Any]:
     """What ``next --json`` prints."""
     decision, forecast = proposed.decision, proposed.forecast
     now = None if forecast is None else forecast.now_mm
+    expanded = None if forecast is None else forecast.expanded_mm(forecast.now_mm)
     left_out = [list(record) for record in proposed.left_out]
     if isinstance(decision, Finished):
         return {
             "done": True,
             "reason": decision.reason,
             "present_worst_sigma_mm": now,
+            "present_expanded_mm": expanded,
             "left_out": left_out,
         }
     return {
@@ -35,6 +37,7 @@ def next_document(proposed: NextPose) -> dict[str, Any]:
         "pose": asdict(decision.pose),
         "joint_targets": list(decision.joints),
         "present_worst_sigma_mm": now,
+        "present_expanded_mm": expanded,
         "predicted_worst_sigma_mm": None if forecast is None else forecast.next_mm,
         "going_on": None if forecast is None else _remainder(forecast),
     }
@@ -66,6 +69,7 @@ def _remainder(forecast: Forecast) -> dict[str, Any]:
         "records": forecast.records,
         "minutes": forecast.minutes,
         "worst_sigma_mm": forecast.end_mm,
+        "expanded_mm": forecast.expanded_mm(forecast.end_mm),
         "gain_mm": forecast.gain_mm,
     }
 

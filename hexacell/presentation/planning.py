@@ -37,12 +37,20 @@ def forecast_text(forecast: Forecast | None) -> str:
     if forecast is None:
         return "The robot can take none of the task poses, so no accuracy is predicted."
     now = f"Predicted error at the worst task pose {forecast.now_mm:.3f} mm (one sigma)"
+    now += _expanded(forecast, forecast.now_mm, " mm with the systematic effects")
     if not forecast.records:
         return f"{now}."
+    then = _expanded(forecast, forecast.end_mm, " mm then")
     return (
-        f"{now}; continuing gains {forecast.gain_mm:.3f} mm in {forecast.records} records, about "
+        f"{now}; continuing gains {forecast.gain_mm:.3f} mm{then} in {forecast.records} records, about "
         f"{duration(forecast.minutes)}."
     )
+
+
+def _expanded(forecast: Forecast, error_mm: float, unit: str = "") -> str:
+    """U for one of the predicted errors; empty where it is not known."""
+    expanded = forecast.expanded_mm(error_mm)
+    return "" if expanded is None else f", U {expanded:.3f}{unit}"
 
 
 def left_out_text(records: Sequence[RecordId]) -> str:
@@ -54,14 +62,14 @@ def left_out_text(records: Sequence[RecordId]) -> str:
 
 
 def run_forecast_line(forecast: Forecast) -> str:
-    """The predicted error after the record that was forecast, and what the remaining records gain."""
-    line = f"  predicted error at the task {forecast.next_mm:.3f} mm"
+    """The predicted error after the record that was forecast, and at the end, each with its U."""
+    now = f"{forecast.next_mm:.3f} mm{_expanded(forecast, forecast.next_mm)}"
+    line = f"  predicted error at the task {now}"
     left = forecast.records - 1
     if left < 1:
         return line
-    gain = forecast.next_mm - forecast.end_mm
     minutes = duration(forecast.minutes * left / forecast.records)
-    return f"{line}; continuing gains {gain:.3f} mm in {minutes}"
+    return f"{line}; in {minutes} {forecast.end_mm:.3f}{_expanded(forecast, forecast.end_mm)}"
 
 
 def plan_trial_lines(trial: PlanTrial) -> Iterator[str]:

@@ -127,6 +127,8 @@ def test_a_campaign_by_next_ends_with_all_points_measured(typed_here, short_cell
         assert reach.max() <= TRAVEL_MM
         assert one["predicted_worst_sigma_mm"] <= one["present_worst_sigma_mm"]
         assert one["going_on"]["gain_mm"] >= 0.0
+        assert one["present_expanded_mm"] == pytest.approx(2.0 * one["present_worst_sigma_mm"])
+        assert one["going_on"]["expanded_mm"] == pytest.approx(2.0 * one["going_on"]["worst_sigma_mm"])
     assert [one["going_on"]["records"] for one in asked] == list(range(14, 0, -1))
     assert end["done"] is True
     assert end["reason"] == "all 2 points are measured"

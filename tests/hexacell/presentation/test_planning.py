@@ -59,6 +59,20 @@ def test_the_text_of_a_forecast():
     assert "none of the task poses" in forecast_text(None)
 
 
+def test_a_forecast_states_u_where_the_systematic_effects_are_known():
+    known = FORECAST.model_copy(update={"systematic_mm": 0.08})
+    assert known.expanded_mm(0.06) == pytest.approx(0.2)
+    assert FORECAST.expanded_mm(0.06) is None
+    text = forecast_text(known)
+    assert "0.310 mm (one sigma), U 0.640 mm with the systematic effects;" in text
+    assert text.endswith("continuing gains 0.250 mm, U 0.200 mm then in 24 records, about 12 minutes.")
+    line = run_forecast_line(known)
+    assert line == "  predicted error at the task 0.290 mm, U 0.602; in 12 minutes 0.060, U 0.200"
+    assert len(line) <= 80
+    last = known.model_copy(update={"records": 1})
+    assert run_forecast_line(last) == "  predicted error at the task 0.290 mm, U 0.602"
+
+
 @pytest.mark.parametrize(
     ("minutes", "text"),
     [(0.4, "24 seconds"), (1.4, "84 seconds"), (1.6, "2 minutes"), (61.2, "61 minutes")],
@@ -69,7 +83,7 @@ def test_durations_are_rounded_to_seconds_or_minutes(minutes, text):
 
 def test_a_run_states_what_the_remaining_records_gain():
     line = run_forecast_line(RUN_FORECAST)
-    assert line == "  predicted error at the task 0.290 mm; continuing gains 0.230 mm in 12 minutes"
+    assert line == "  predicted error at the task 0.290 mm; in 12 minutes 0.060"
     last = RUN_FORECAST.model_copy(update={"records": 1})
     assert run_forecast_line(last) == "  predicted error at the task 0.290 mm"
 

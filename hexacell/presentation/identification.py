@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from hexacell.decision import Verdict
+from hexacell.identification.diagnostics.model_tests import contradicted_points
 from hexacell.identification.diagnostics.pose_accuracy import PoseErrors
 from hexacell.identification.diagnostics.repeatability import Repeatability
 from hexacell.identification.diagnostics.variance_components import NoiseLevel, NoiseLevels
@@ -29,6 +30,7 @@ def identification_report(assessed: Assessment) -> str:
         _data_and_termination(found),
         parameter_table(found, assessed.drawing),
         residual_line(found),
+        points_line(assessed),
         noise_table(assessed.noise),
         repeatability_lines(assessed.repeatability),
         correlation_lines(pair_sentences(assessed), len(assessed.correlated)),
@@ -43,6 +45,16 @@ def verdict_line(assessed: Assessment) -> str:
     if budget is None or assessed.refused:
         return wrapped(sentence)
     return wrapped(f"{sentence} U at the task poses is {budget.expanded_mm:.3f} mm.")
+
+
+def points_line(assessed: Assessment) -> str:
+    """Whether the records of each point agree with what the others predict."""
+    if not assessed.points:
+        return "Each point by the others: not evaluated, they do not determine the geometry."
+    wrong = [str(one.point) for one in contradicted_points(assessed.points)]
+    agreeing = f"{len(assessed.points) - len(wrong)} of {len(assessed.points)} agree"
+    left = f", not point {', '.join(wrong)}" if wrong else ""
+    return f"Each point by the others: {agreeing}{left}."
 
 
 def accuracy_table(assessed: Assessment) -> str:

@@ -12,6 +12,7 @@ from hexacell.campaign.task_accuracy import Task
 from hexacell.cell.model import CellSettings
 from hexacell.experiment_design.decorrelation import DecorrelatingPose, decorrelating_poses
 from hexacell.identification.diagnostics.correlations import CorrelatedPair, strongly_correlated
+from hexacell.identification.diagnostics.model_tests import PointPrediction, leave_one_point_out
 from hexacell.identification.diagnostics.pose_accuracy import Accuracy, predicted_accuracy
 from hexacell.identification.diagnostics.repeatability import Repeatability, repeatability
 from hexacell.identification.diagnostics.tolerance_check import ToleranceViolation
@@ -46,6 +47,7 @@ class Assessment:
         budget: what is not known of the errors at the reachable ones of these poses; none as above.
         accuracy: at these poses; none where the robot can reach none of them. Where the residuals
             are larger than the stated noise, the predicted error is as well.
+        points: each point's records predicted by the others, where those determine the geometry.
         measured_noise: at the start of the run that took the records; none where that is not known.
         possible_causes: of residuals that are too large, the largest share first.
     """
@@ -63,6 +65,7 @@ class Assessment:
     tolerance_violations: tuple[ToleranceViolation, ...] = ()
     possible_causes: tuple[PossibleCause, ...] = ()
     measured_noise: MeasuredNoise | None = None
+    points: tuple[PointPrediction, ...] = ()
 
     @property
     def refused(self) -> bool:
@@ -112,6 +115,7 @@ def assess(
         tolerance_violations=robot.tolerance_violations(found.estimate),
         possible_causes=possible_causes(found) if _is_doubtful(found) else (),
         measured_noise=measured_noise,
+        points=leave_one_point_out(found) if found.converged else (),
     )
 
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from hexacell.decision import Verdict
 from hexacell.experiment_design.decorrelation import DecorrelatingPose
+from hexacell.identification.diagnostics.model_tests import contradicted_points
 from hexacell.identification.diagnostics.pose_accuracy import PoseErrors
 from hexacell.identification.diagnostics.variance_components import NoiseLevels
 from hexacell.identification.solver.chi_square import ChiSquareTest
@@ -26,6 +27,7 @@ def fit_document(assessed: Assessment) -> dict[str, Any]:
         "findings": list(findings(assessed)),
         "verdict": Verdict.NOT_EVALUATED.value,  # no held-out records
         "goodness": _goodness(found.goodness),
+        "points_predicted": _points(assessed),
         "noise": _noise(assessed.noise),
         "measured_noise": assessed.measured_noise and assessed.measured_noise.model_dump(mode="json"),
         "repeatability": _repeatability(assessed),
@@ -45,6 +47,19 @@ def _goodness(goodness: ChiSquareTest) -> dict[str, Any]:
         "noise_ratio": goodness.ratio,
         "agreement": goodness.agreement.value,
     }
+
+
+def _points(assessed: Assessment) -> list[dict[str, Any]]:
+    contradicted = {one.point for one in contradicted_points(assessed.points)}
+    return [
+        {
+            "point": one.point,
+            "probability": one.test.probability,
+            "noise_ratio": one.test.ratio,
+            "agrees": one.point not in contradicted,
+        }
+        for one in assessed.points
+    ]
 
 
 def _noise(noise: NoiseLevels | None) -> dict[str, Any] | None:

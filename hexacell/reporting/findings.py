@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from hexacell.identification.diagnostics.model_tests import PointPrediction, contradicted_points
 from hexacell.identification.diagnostics.tolerance_check import ToleranceViolation
 from hexacell.identification.diagnostics.variance_components import NoiseLevel, NoiseLevels
 from hexacell.identification.solver.chi_square import ChiSquareTest, ChiSquareVerdict
@@ -97,7 +98,23 @@ def _verdict(assessed: Assessment) -> str:
         return _contradicted(found.goodness)
     if found.undetermined:
         return f"Incomplete: {_undetermined(found)} not determined by these data."
-    return _residual_verdict(found.goodness)
+    return _point_verdict(assessed) or _residual_verdict(found.goodness)
+
+
+def _point_verdict(assessed: Assessment) -> str:
+    """That records which agree with the noise together contradict each other by points."""
+    contradicted = contradicted_points(assessed.points)
+    if not contradicted or assessed.found.goodness.agreement is ChiSquareVerdict.TOO_LARGE:
+        return ""
+    return f"Doubtful: {_contradicted_by_others(contradicted)}"
+
+
+def _contradicted_by_others(points: Sequence[PointPrediction]) -> str:
+    worst = max(points, key=lambda one: one.test.ratio)
+    return (
+        f"the records of point {worst.point} are {worst.test.ratio:.1f} times as far as the stated noise "
+        "explains from what the other points predict, so the model does not hold."
+    )
 
 
 def _beyond_tolerance(violations: Sequence[ToleranceViolation], convention: FrameConvention) -> str:

@@ -13,13 +13,14 @@ Influence in Regression, 1982 (deletion).
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from hexacell.identification.problem.data_requirements import is_determined
 from hexacell.identification.problem.problem import Problem
-from hexacell.identification.solver.chi_square import ChiSquareTest
+from hexacell.identification.solver.chi_square import SMALLEST_PROBABILITY, ChiSquareTest
 from hexacell.identification.solver.levenberg_marquardt import FINE
 from hexacell.identification.solver.linear_costs import LinearCosts
 from hexacell.identification.solver.result import Identification
@@ -60,6 +61,11 @@ def leave_one_point_out(found: Identification) -> tuple[PointPrediction, ...]:
         for point, rows in each
         if is_determined(found.problem.subset(~rows))
     )
+
+
+def contradicted_points(points: Sequence[PointPrediction]) -> tuple[PointPrediction, ...]:
+    """Those whose records the others contradict; by chance any of them in 0.1 % of all cases."""
+    return tuple(one for one in points if one.test.probability < SMALLEST_PROBABILITY / len(points))
 
 
 def _prediction_test(costs: LinearCosts, rows: Mask) -> ChiSquareTest:

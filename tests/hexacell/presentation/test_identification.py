@@ -17,8 +17,8 @@ from hexacell.measurements.records import MeasurementSet
 
 KEYS = (
     "converged termination iterations records points residual_rms_mm chi2 dof geometry sigma covariance "
-    "undetermined outliers frame parameters findings verdict goodness noise measured_noise repeatability "
-    "correlated accuracy uncertainty refused possible_causes beyond_tolerance"
+    "undetermined outliers frame parameters findings verdict goodness points_predicted noise "
+    "measured_noise repeatability correlated accuracy uncertainty refused possible_causes beyond_tolerance"
 )
 
 
@@ -95,6 +95,28 @@ def test_json_is_one_document_with_the_keys_programs_rely_on(fit, clean):
     captured = fit(clean, "--json")
     document = json.loads(captured.out)
     assert list(document) == KEYS.split()
+
+
+def test_a_point_that_the_others_contradict_makes_a_fit_doubtful(clean, fit):
+    """The gauges of point 2 show 0.6 % too much; all records together still agree with the noise."""
+    records = [
+        replace(
+            record, deviation=tuple((1.006 if record.point == 2 else 1.0) * mm for mm in record.deviation)
+        )
+        for record in clean.records
+    ]
+    said = " ".join(fit(MeasurementSet(tuple(records))).out.split())
+    assert "Each point by the others: 4 of 5 agree, not point 2." in said
+    assert said.startswith("Doubtful: the records of point 2 are 1.7 times as far as the stated noise")
+    assert "The residuals agree with the stated noise." in said
+    assert "Each point by the others: 5 of 5 agree." in fit(clean).out
+    (second,) = (
+        one
+        for one in json.loads(fit(MeasurementSet(tuple(records)), "--json").out)["points_predicted"]
+        if not one["agrees"]
+    )
+    assert second["point"] == 2
+    assert second["probability"] < 2e-4
 
 
 def test_a_fit_gives_no_verdict_on_the_robot_but_the_uncertainty_of_one(clean, fit):

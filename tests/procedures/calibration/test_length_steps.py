@@ -200,16 +200,42 @@ class LeavesBefore(Approver):
         return await super().ask(question)
 
 
+def killed(rig: Rig) -> None:
+    """The journal of a run that had no time to note its end."""
+    lines = rig.folder.journal.read_bytes().splitlines(keepends=True)
+    assert b'"kind":"interrupted"' in lines[-1]
+    rig.folder.journal.write_bytes(b"".join(lines[:-1]))
+
+
+@pytest.mark.parametrize("is_killed", [False, True])
 @pytest.mark.parametrize("mounting", [2, 3])
-async def test_a_check_resumed_between_the_seats_goes_on_there(make_length_rig, mounting: int) -> None:
+async def test_a_check_resumed_between_the_seats_goes_on_there(
+    make_length_rig, mounting: int, is_killed: bool
+) -> None:
     person = LeavesBefore(mounting)
     rig = make_length_rig(person, length_check__mounting="by-hand")
     with pytest.raises(AnswerNeeded):
         await rig.run()
+    if is_killed:
+        killed(rig)
     person.mounting = None
     found = await stated(rig)
     assert found.verdict is Verdict.PASS
     assert person.placed == [1, 2, 3]
+
+
+async def test_a_check_whose_gauges_lost_their_zero_meanwhile_says_so(make_length_rig) -> None:
+    """Switched off between the seats, with nobody who noticed."""
+    person = LeavesBefore(2)
+    rig = make_length_rig(person, length_check__mounting="by-hand")
+    with pytest.raises(AnswerNeeded):
+        await rig.run()
+    person.mounting = None
+    for gauge in rig.gauges:
+        gauge.shown = partial(less, gauge.shown, 0.3)
+    found = await stated(rig)
+    assert found.verdict is Verdict.NOT_EVALUATED
+    assert "they were zeroed in between" in found.result.reason
 
 
 async def test_a_mounting_that_is_measured_again_takes_all_with_it(make_length_rig) -> None:

@@ -13,6 +13,7 @@ from hexacell.controller_config.write_back import Receipt
 from hexacell.decision import Verdict
 from hexacell.errors import HexacellError
 from hexacell.identification.estimator import identify
+from hexacell.reporting.length_result import LengthResult, with_measured_scale
 from hexacell.reporting.result import AcceptedResult
 from hexacell.robot_model import robot_of_start
 from hexacell.runs.run_folder import RunFolder, runs_folder
@@ -88,7 +89,15 @@ def _result(cell: Cell, accepted: _AcceptedRun) -> AcceptedResult:
         at=accepted.at,
         covariance=accepted.identified.result.covariance,
         effects=_effects(cell, accepted.state),
+        length=_length(accepted.state),
     )
+
+
+def _length(state: RunState) -> LengthResult | None:
+    """What the length check of a run found."""
+    verification = None if state.judged is None else state.judged.verification
+    accuracy = None if verification is None else verification.accuracy
+    return None if accuracy is None else accuracy.length
 
 
 def _effects(cell: Cell, state: RunState) -> dict[str, tuple[tuple[float, ...], ...]]:
@@ -98,7 +107,7 @@ def _effects(cell: Cell, state: RunState) -> dict[str, tuple[tuple[float, ...], 
     settings, started = cell.settings, state.started
     start = robot_of_start(settings, started.controller, started.branch, started.taught)
     robot = Calibration(settings, start, Mode.OPTIMISE).robot_of(state)
-    effects = [one for one in robot.effects if one.size]
+    effects = [one for one in with_measured_scale(robot.effects, _length(state)) if one.size]
     if not effects:
         return {}
     found = identify(robot.problem(state.measurements()))

@@ -67,12 +67,14 @@ class ErrorEstimate:
         difference: (p,) of the estimate from the controller's geometry.
         covariance: of the estimate (p, p).
         systematic: (t, 6, k) effects that the covariance does not contain.
+        known: (t, 6) errors by effects that were measured before.
     """
 
     jacobian: Array
     difference: Array
     covariance: Array
     systematic: Array
+    known: Array
 
     @classmethod
     def of(
@@ -95,14 +97,16 @@ class ErrorEstimate:
         acting = [effect for effect in effects if effect.size]
         found = estimate.identification
         budget = task.budget(found, belief, acting, earlier) if found is not None and acting else None
-        none = np.zeros((*jacobian.shape[:2], 0))
-        systematic = none if budget is None else budget.not_in_covariance
-        return cls(jacobian, belief.free - commanding, belief.covariance, systematic)
+        shape = jacobian.shape[:2]
+        systematic = np.zeros((*shape, 0)) if budget is None else budget.not_in_covariance
+        known = np.zeros(shape) if budget is None else budget.known
+        return cls(jacobian, belief.free - commanding, belief.covariance, systematic, known)
 
     @property
     def errors(self) -> TaskErrors:
         """The errors with their uncertainty."""
-        return TaskErrors.of(self.jacobian, self.difference, self.covariance, self.systematic)
+        unknown = TaskErrors.of(self.jacobian, self.difference, self.covariance, self.systematic)
+        return replace(unknown, estimated=unknown.estimated + self.known)
 
     def after(self, information: Array) -> ErrorEstimate:
         """The same after records that add information (p, p) and confirm the estimate."""

@@ -22,6 +22,13 @@ def scale_lines(length: LengthResult | None) -> list[str]:
     return [checked, remedy(length)] if length.is_significant else [checked]
 
 
+def earlier_scale_line(length: LengthResult | None) -> str:
+    """What a check knows of the length scale, by the run of the result that it started from."""
+    if length is None or not length.is_consistent:
+        return NOT_CHECKED
+    return f"length scale: as checked in that run: {encoders_read(length)}"
+
+
 def length_text(stated: LengthStatement) -> str:
     """A few lines: the verdict, the scale, what it does at the task, and what U consists of."""
     result, error = stated.result, stated.error

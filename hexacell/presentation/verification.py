@@ -6,7 +6,7 @@ from pathlib import Path
 
 from hexacell.decision import Verdict
 from hexacell.presentation.layout import wrapped
-from hexacell.presentation.length import scale_lines
+from hexacell.presentation.length import earlier_scale_line, scale_lines
 from hexacell.reporting.check_result import CheckResult
 from hexacell.reporting.result import AcceptedResult
 from hexacell.reporting.verification import JudgedError, Verification, VerifiedAccuracy
@@ -34,7 +34,7 @@ def check_text(found: CheckResult) -> str:
     if not found.is_consistent:
         lines.append("  the residuals are larger than the stated noise explains: the model does not hold")
     if found.accuracy is not None:
-        lines += [f"  {line}" for line in scale_lines(found.accuracy.length)]
+        lines.append(f"  {earlier_scale_line(found.accuracy.length)}")
     return "\n".join(lines)
 
 

@@ -14,6 +14,7 @@ from hexacell.cell.fields import Frozen
 from hexacell.decision import Verdict
 from hexacell.identification.diagnostics.tolerance_check import SIGNIFICANT_SIGMAS
 from hexacell.measurements.records import MeasurementSet
+from hexacell.reporting.length_result import LengthResult
 from hexacell.reporting.result import AcceptedResult
 from hexacell.reporting.verification import JudgedError, VerifiedAccuracy, outcome_of
 from hexacell.uncertainty.effects import Effect
@@ -84,7 +85,7 @@ def check_result(
         verdict=stated.verdict,
         records=records,
         points=points,
-        accuracy=_accuracy(check, stated),
+        accuracy=_accuracy(check, stated, None if earlier is None else earlier.length),
         is_consistent=stated.is_consistent,
         further_records=stated.further_records,
         earlier_run=earlier and earlier.run,
@@ -112,7 +113,7 @@ def _reason(result: CheckResult) -> str:
     return f"about {result.further_records} more records would decide"
 
 
-def _accuracy(check: Check, stated: CheckStatement) -> VerifiedAccuracy:
+def _accuracy(check: Check, stated: CheckStatement, length: LengthResult | None) -> VerifiedAccuracy:
     task = check.plan.task.reachable(stated.estimate.belief)
     return VerifiedAccuracy(
         position=JudgedError.of(stated.position, check.limits.position_mm),
@@ -120,6 +121,7 @@ def _accuracy(check: Check, stated: CheckStatement) -> VerifiedAccuracy:
         poses=len(task.poses),
         task_named=bool(check.settings.task.poses),
         worst=check.robot.to_command(task.poses.pose(stated.errors.worst)).as_tuple(),
+        length=length,
     )
 
 

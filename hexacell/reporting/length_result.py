@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from hexacell.kinematics.rotations import Array
 from hexacell.measurements.records import MeasurementSet
 from hexacell.robot_model import Robot
 from hexacell.uncertainty.effects import Effect
+from hexacell.uncertainty.encoder_effects import COMMON_SCALE
 from hexacell.uncertainty.length_check import COVERAGE_FACTOR, LengthCheck
 from hexacell.uncertainty.length_errors import JudgedGeometry
 from hexacell.uncertainty.length_records import LengthRecords, LengthStandard
@@ -85,6 +86,20 @@ class LengthResult(Frozen):
     def factor(self) -> float:
         """What the scale factor of all encoders must be multiplied by."""
         return 1.0 / (1.0 + 1e-6 * self.long_um_m)
+
+
+def with_measured_scale(effects: Iterable[Effect], length: LengthResult | None) -> tuple[Effect, ...]:
+    """Effects as a length check before left them known; ``length`` is its result, if there was one.
+
+    Only where the check says more than the cell file does the scale have its value and its uncertainty.
+    """
+    if length is None or not length.replaces_stated:
+        return tuple(effects)
+    sigma, value = length.expanded_um_m / COVERAGE_FACTOR, -length.long_um_m
+    return tuple(
+        replace(one, size=sigma, value=value, source="length check") if one.name == COMMON_SCALE else one
+        for one in effects
+    )
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -24,6 +24,7 @@ from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.parameters import ParameterSet
 from hexacell.kinematics.rotations import Array
 from hexacell.measurements.records import Deviation, RecordId
+from hexacell.reporting.length_result import LengthResult
 
 
 class OutlierRecord(Frozen):
@@ -134,12 +135,14 @@ class AcceptedResult(Frozen):
         covariance: of the parameters, mm^2, in the mechanism's frame convention.
         effects: what one unit of each cause of a systematic effect did to the free parameters: by the
             name of the effect, a row a cause.
+        length: what the length check of its run found; none without one.
     """
 
     run: str
     at: datetime
     covariance: tuple[tuple[float, ...], ...]
     effects: dict[str, tuple[tuple[float, ...], ...]] = Field(default_factory=dict)
+    length: LengthResult | None = None
 
     @property
     def parameter_columns(self) -> dict[str, Array]:

@@ -73,7 +73,7 @@ class UncertaintyBudget:
         jacobian: (t, 6, p) of the errors by the free parameters.
         noise: (t, 6, p) errors by the noise of the readings, mm and rad, one standard deviation a column.
         lines: the systematic effects.
-        known: (t, 6) errors that a measurement of an effect tells, mm and rad.
+        known: (t, 6) errors that measurements of effects tell, mm and rad.
     """
 
     jacobian: Array
@@ -113,13 +113,14 @@ class UncertaintyBudget:
         visible = telling / (HARMLESS_ERROR * _largest(noise)) ** 2
         lines = (_line(propagation, effect, visible, measured) for effect in effects)
         acting = tuple(line for line in lines if line.columns.shape[-1])
-        return cls(propagation.jacobian, noise, acting, measured.known)
+        known = measured.known + _known(propagation, effects)
+        return cls(propagation.jacobian, noise, acting, known)
 
     def errors_of(self, difference: Array) -> TaskErrors:
         """The errors of a geometry whose free parameters differ by (p,) from the estimate.
 
-        They are estimated from the difference, and from the scale if a length check measured it; what is
-        not known of them is that of the estimate.
+        They are estimated from the difference, and from effects that were measured, as the scale in a
+        length check; what is not known of them is that of the estimate.
         """
         return TaskErrors(self.known - self.jacobian @ difference, self._all)
 
@@ -182,6 +183,15 @@ class UncertaintyBudget:
     @cached_property
     def _all(self) -> Array:
         return np.concatenate([self.noise, self.systematic], axis=-1)
+
+
+def _known(propagation: Propagation, effects: Iterable[Effect]) -> Array:
+    """Errors (t, 6) by the values of effects that were measured before."""
+    known = np.zeros(propagation.jacobian.shape[:2])
+    for effect in effects:
+        if effect.value:
+            known = known + effect.value * propagation.columns(effect).combined.sum(axis=-1)
+    return known
 
 
 def _measured(effect: Effect, scale: ScaleObservation | None) -> Effect:

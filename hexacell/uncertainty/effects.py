@@ -116,6 +116,7 @@ class Effect:
         on_readings: likewise errors (n, 3, k), mm, of the deviations that the gauges measure.
         is_estimated: the estimator has these causes as nuisance parameters of this size, so that the
             covariance of its result contains them.
+        value: best estimate of each cause, where it was measured; ``size`` is what is not known of that.
     """
 
     name: str
@@ -126,3 +127,4 @@ class Effect:
     on_readings: Callable[[Readings], Array] | None = None
     source: str = ""
     is_estimated: bool = False
+    value: float = 0.0

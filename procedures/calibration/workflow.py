@@ -26,6 +26,7 @@ from hexacell.decision import ErrorLimits, Verdict
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.pose import Pose
+from hexacell.reporting.length_result import with_measured_scale
 from hexacell.reporting.result import AcceptedResult
 from hexacell.robot_model import Robot
 from hexacell.stated_effects import stated_effects
@@ -127,18 +128,18 @@ class Calibration:
     def check(self) -> Check:
         """The check of the robot as it is now."""
         limits, wanted, accepted = self.settings.acceptance, self.settings.check, self.accepted
-        before = None
+        before, robot = None, self._at_temperatures(self.robot)
         if accepted is not None:
             covariance = np.array(accepted.covariance)
-            before = identified_before(self.robot, covariance, wanted.drift_per_parameter_mm)
+            before = identified_before(robot, covariance, wanted.drift_per_parameter_mm)
         return Check(
             self.settings,
-            self.robot,
+            robot,
             before,
             ErrorLimits(limits.position_mm, limits.orientation_deg),
             wanted.budget_records,
             self.listed,
-            self.robot.effects,
+            robot.effects,
             {} if accepted is None else accepted.parameter_columns,
             CANDIDATES,
         )
@@ -181,7 +182,7 @@ class Calibration:
     def robot_of(self, state: RunState) -> Robot:
         """The robot with all geometries that commanded the records of the identification."""
         informed = self.informed(state)
-        return informed._at_temperatures(informed._identifying(state).robot, state)
+        return informed._at_temperatures(informed._identifying(state).robot, state.temperature_range_k)
 
     def as_written(self, identified: Geometry) -> WrittenGeometry:
         """What the controller gets of a geometry in the frame convention."""
@@ -190,11 +191,15 @@ class Calibration:
     def written_robot(self, state: RunState) -> Robot:
         """The robot with the proposed geometry in its controller."""
         informed = self.informed(state)
-        return informed._at_temperatures(informed._commanded_by(informed._written(state)).robot, state)
+        return informed._at_temperatures(
+            informed._commanded_by(informed._written(state)).robot, state.temperature_range_k
+        )
 
-    def _at_temperatures(self, robot: Robot, state: RunState) -> Robot:
-        """The robot with the effects of the temperatures that were read while measuring."""
-        return replace(robot, effects=stated_effects(self.settings, state.temperature_range_k))
+    def _at_temperatures(self, robot: Robot, range_k: float | None = None) -> Robot:
+        """The robot with the effects of temperatures read while measuring, and a scale measured before."""
+        effects = stated_effects(self.settings, range_k)
+        length = None if self.accepted is None else self.accepted.length
+        return replace(robot, effects=with_measured_scale(effects, length))
 
     def provisional_geometry(self, state: RunState) -> Geometry:
         """The estimate by now, or the provisional geometry that the run applied before an interruption.

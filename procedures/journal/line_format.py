@@ -20,7 +20,7 @@ from hexacell.cell.fields import first_mistake
 from hexacell.errors import FileError
 from procedures.run.events import Event
 
-VERSION = 7
+VERSION = 8
 """What this program writes; it reads this and all before. Version 1 had neither version nor ``s``, and
 versions 1 and 2 no verification; checks of version 3 measured held-out points; up to version 5 no noise was
 measured. So a run of them was decided by other rules. Versions up to 6 had no length check."""

@@ -172,6 +172,19 @@ def test_what_an_effect_did_to_the_earlier_result_is_not_averaged_away(unchanged
     assert shared.position.expanded != pytest.approx(alone.position.expanded, rel=1e-3)
 
 
+def test_an_effect_that_was_measured_before_has_its_value_in_the_errors(unchanged) -> None:
+    """A common scale of 1e-3: the robot errs by that, whatever the records say."""
+    check, state = unchanged
+    plain = said(check, state.measurements)
+    scale = common_encoder_scale(1e-3)
+    known = replace(check, effects=(replace(scale, value=1000.0),))
+    stated = said(known, state.measurements)
+    (line,) = known.plan.task.budget(stated.estimate.identification, stated.estimate.belief, [scale]).lines
+    assert plain.position.value < 0.03
+    assert stated.position.value == pytest.approx(1000.0 * line.per_unit_mm, abs=0.05)
+    assert stated.position.expanded == pytest.approx(plain.position.expanded, rel=0.3)
+
+
 def test_settings_of_a_check_leave_the_calibration_s_targets_out(make_plan) -> None:
     settings = make_plan(identification__points=TWO_POINTS, identification__target_mm=0.5).settings
     plan = check_settings(settings, 40).identification

@@ -25,7 +25,7 @@ def at_one_pose(error: tuple[float, float, float] = (0.0, 0.0, 0.0), sigma: floa
     """Three parameters that are the position error itself, with isotropic uncertainty."""
     jacobian = np.zeros((1, 6, 3))
     jacobian[0, :3] = np.eye(3)
-    return ErrorEstimate(jacobian, np.array(error), sigma**2 * np.eye(3), NONE)
+    return ErrorEstimate(jacobian, np.array(error), sigma**2 * np.eye(3), NONE, np.zeros((1, 6)))
 
 
 def verdict(likeliest: ErrorEstimate, guarded: ErrorEstimate) -> Verdict:

@@ -7,9 +7,10 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, field_validator
 
-from hexacell.cell.fields import Positive, Section, SixNumbers, broken_rule
+from hexacell.cell.fields import Name, Positive, Section, SixNumbers, Text, broken_rule
 
 NodeId = Annotated[int, Field(ge=1, le=127)]
+Unsigned = Annotated[int, Field(ge=0, le=2**32 - 1)]
 Direction = Literal[1, -1]
 
 
@@ -40,15 +41,15 @@ class GaugeAxis:
 class GaugeSettings(Section):
     """One dial indicator."""
 
-    name: str = Field(min_length=1, description="its name on screens and in reports")
+    name: Name = Field(description="its name on screens and in reports")
     axis: Literal["x", "y", "z"] = Field(description="base axis along which its plunger moves")
     sign: Literal[1, -1] = Field(1, description="1: the reading grows when the ball moves along +axis")
-    protocol: str = Field(description="sylvac, mux10, cdi, or one that a plug-in adds")
-    port: str | None = Field(None, description="device path or pyserial URL; gauges may share one")
+    protocol: Text = Field(description="sylvac, mux10, cdi, or one that a plug-in adds")
+    port: Text | None = Field(None, description="device path or pyserial URL; gauges may share one")
     serial: dict[str, Any] = Field(
         default_factory=dict, description="passed to pyserial; overrides the protocol's defaults"
     )
-    channel: int = Field(1, ge=1, description="input of a multiplexer")
+    channel: int = Field(1, ge=1, le=99, description="input of a multiplexer")
     timeout_s: Positive = Field(0.5, description="longest wait for an answer")
     travel_mm: Positive = Field(12.5, description="the instrument's own measuring range")
 
@@ -61,7 +62,7 @@ class GaugeSettings(Section):
 class EncoderSettings(Section):
     """The bank of six slider encoders."""
 
-    protocol: str = Field("cia406", description="cia406, or one that a plug-in adds")
+    protocol: Text = Field("cia406", description="cia406, or one that a plug-in adds")
     bus: dict[str, Any] | None = Field(None, description="passed to python-can's Bus")
     nodes: tuple[NodeId, NodeId, NodeId, NodeId, NodeId, NodeId] = Field(
         (1, 2, 3, 4, 5, 6), description="CANopen node ids of legs 1 to 6, each from 1 to 127"
@@ -74,7 +75,7 @@ class EncoderSettings(Section):
     offset_mm: SixNumbers = Field(
         (0.0, 0.0, 0.0, 0.0, 0.0, 0.0), description="joint variable at count 0, mm"
     )
-    serial_numbers: tuple[int, int, int, int, int, int] | None = Field(
+    serial_numbers: tuple[Unsigned, Unsigned, Unsigned, Unsigned, Unsigned, Unsigned] | None = Field(
         None, description="object 1018h:4 of each node; another device is refused"
     )
     timeout_s: Positive = Field(0.5, description="longest wait for a complete round or an SDO answer")
@@ -91,19 +92,19 @@ class EncoderSettings(Section):
 class ControllerSettings(Section):
     """The robot's controller and the file with its geometry."""
 
-    protocol: str = Field("linuxcncrsh", description="linuxcncrsh, or one that a plug-in adds")
-    host: str = Field("127.0.0.1", description="its network name or address")
+    protocol: Text = Field("linuxcncrsh", description="linuxcncrsh, or one that a plug-in adds")
+    host: Text = Field("127.0.0.1", description="its network name or address")
     port: int | None = Field(None, ge=1, le=65535, description="TCP port")
-    connect_password: str = Field("EMC", description="linuxcncrsh: sent on connecting")
-    enable_password: str = Field("EMCTOO", description="linuxcncrsh: sent to enable commands")
-    config: str = Field(description="the file with its geometry, relative to the cell file")
-    config_format: str = Field("toml", description="toml, or one that a plug-in adds")
-    taught: str | None = Field(
+    connect_password: Text = Field("EMC", description="linuxcncrsh: sent on connecting")
+    enable_password: Text = Field("EMCTOO", description="linuxcncrsh: sent to enable commands")
+    config: Text = Field(description="the file with its geometry, relative to the cell file")
+    config_format: Text = Field("toml", description="toml, or one that a plug-in adds")
+    taught: Text | None = Field(
         None,
         description="copy of config from when points and frames were taught last, relative to the cell "
         "file; without it, the config that runs when a run begins",
     )
-    reload_command: tuple[str, ...] = Field(
+    reload_command: tuple[Text, ...] = Field(
         (), description="run with the machine off, so that the controller reads its config again"
     )
     move_timeout_s: Positive = Field(60.0, description="longest wait for one move")
@@ -114,9 +115,9 @@ class ControllerSettings(Section):
 class ThermometerSettings(Section):
     """A thermometer at the machine or in the room; its readings are kept with every record."""
 
-    name: str = Field(min_length=1, description="where it is: room, rails, platform")
-    protocol: str = Field("sysfs", description="sysfs, or one that a plug-in adds")
-    path: str = Field(
+    name: Name = Field(description="where it is: room, rails, platform")
+    protocol: Text = Field("sysfs", description="sysfs, or one that a plug-in adds")
+    path: Text = Field(
         min_length=1,
         description="sysfs: the file with the temperature in millidegrees, such as "
         "/sys/bus/w1/devices/28-.../temperature",

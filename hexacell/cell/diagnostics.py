@@ -95,10 +95,13 @@ _EXPECTED = {
     "dict_type": "a table: {{ key = value }}",
     "model_type": "a section",
     "literal_error": "{expected}",
-    "greater_than": "more than {gt:g}",
-    "greater_than_equal": "{ge:g} or more",
-    "less_than": "less than {lt:g}",
-    "less_than_equal": "{le:g} or less",
+    "out_of_range": "{expected}",
+    "string_too_long": "text of {max_length} letters or fewer",
+    "int_parsing_size": "a whole number with fewer digits",
+    "greater_than": "more than {gt:.12g}",
+    "greater_than_equal": "{ge:.12g} or more",
+    "less_than": "less than {lt:.12g}",
+    "less_than_equal": "{le:.12g} or less",
     "too_short": "a list of {min_length} items or more",
 }
 

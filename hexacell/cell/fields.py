@@ -4,14 +4,88 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
 from pydantic_core import PydanticCustomError
 
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+LARGEST_NUMBER = 1e6
+"""Of any number in a cell file or a measurement file: a kilometre, eleven days."""
+
+SMALLEST_NUMBER = 1e-9
+"""Of one that must not be zero: a millionth of a nanometre."""
+
+LARGEST_SEED = 2**32 - 1
+LONGEST_TEXT = 1000
+LONGEST_NAME = 64
+SIGNS_OF_NAMES = " ._-+()#"
+
+
+def broken_rule(problem: str, action: str) -> PydanticCustomError:
+    """The error that a validator raises: the problem and the next action."""
+    return PydanticCustomError("broken_rule", "{problem}", {"problem": problem, "action": action})
+
+
+def _outside(expected: str) -> PydanticCustomError:
+    return PydanticCustomError("out_of_range", "must be {expected}", {"expected": expected})
+
+
+def _in_range(value: float) -> float:
+    if not abs(value) <= LARGEST_NUMBER:
+        raise _outside(f"a number within +-{LARGEST_NUMBER:g}")
+    return value
+
+
+def _positive(value: float) -> float:
+    if not SMALLEST_NUMBER <= value <= LARGEST_NUMBER:
+        raise _outside(f"more than 0: from {SMALLEST_NUMBER:g} to {LARGEST_NUMBER:g}")
+    return value
+
+
+def _not_negative(value: float) -> float:
+    if value and not SMALLEST_NUMBER <= value <= LARGEST_NUMBER:
+        raise _outside(f"0 or more: 0, or from {SMALLEST_NUMBER:g} to {LARGEST_NUMBER:g}")
+    return value
+
+
+def _printable(text: str) -> str:
+    if not text.isprintable():
+        raise _outside("text without control characters")
+    return text
+
+
+def _a_name(name: str) -> str:
+    """A name is that of a folder too, and stands in the lines of a report."""
+    if name != name.strip() or name.startswith(".") or not all(map(_may_be_in_a_name, name)):
+        raise _outside(
+            "a name of letters, digits, spaces and . _ - + ( ) #, no dot first, no space at its ends"
+        )
+    return name
+
+
+def _may_be_in_a_name(sign: str) -> bool:
+    return sign.isalnum() or sign in SIGNS_OF_NAMES
+
+
 Finite = Annotated[float, Field(allow_inf_nan=False)]
-Point = tuple[Finite, Finite, Finite]
-SixNumbers = tuple[Finite, Finite, Finite, Finite, Finite, Finite]
+InRange = Annotated[
+    float,
+    Field(allow_inf_nan=False, json_schema_extra={"minimum": -LARGEST_NUMBER, "maximum": LARGEST_NUMBER}),
+    AfterValidator(_in_range),
+]
+Positive = Annotated[
+    float,
+    Field(allow_inf_nan=False, json_schema_extra={"minimum": SMALLEST_NUMBER, "maximum": LARGEST_NUMBER}),
+    AfterValidator(_positive),
+]
+NotNegative = Annotated[
+    float,
+    Field(allow_inf_nan=False, json_schema_extra={"minimum": 0.0, "maximum": LARGEST_NUMBER}),
+    AfterValidator(_not_negative),
+]
+Text = Annotated[str, Field(max_length=LONGEST_TEXT), AfterValidator(_printable)]
+Name = Annotated[str, Field(min_length=1, max_length=LONGEST_NAME), AfterValidator(_a_name)]
+Seed = Annotated[int, Field(ge=0, le=LARGEST_SEED)]
+Point = tuple[InRange, InRange, InRange]
+SixNumbers = tuple[InRange, InRange, InRange, InRange, InRange, InRange]
 
 
 class Frozen(BaseModel):
@@ -26,11 +100,6 @@ class Section(Frozen):
 
 class GeometrySettings(Section):
     """One value a parameter of the mechanism, under the symbols of the kinds that the mechanism has."""
-
-
-def broken_rule(problem: str, action: str) -> PydanticCustomError:
-    """The error that a validator raises: the problem and the next action."""
-    return PydanticCustomError("broken_rule", "{problem}", {"problem": problem, "action": action})
 
 
 def first_mistake(refusal: ValidationError, whole: str) -> str:

@@ -7,7 +7,7 @@ from typing import Annotated, Literal, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from hexacell.cell.fields import Finite, NotNegative, Point, Positive, Section, broken_rule
+from hexacell.cell.fields import InRange, NotNegative, Point, Positive, Section, Text, broken_rule
 
 MicrometresPerMetreKelvin = Annotated[float, Field(ge=0, le=100, allow_inf_nan=False)]
 COARSEST_SHARE = 1e-3
@@ -32,9 +32,9 @@ class LengthCheckSettings(Section):
     seating_um: NotNegative = Field(
         5.0, le=1000, description="where the gauges sit in a seat, from one mounting to the next, 1 sigma"
     )
-    certified_at_c: Finite = Field(20.0, description="temperature that the certificate holds for, deg C")
-    temperature_c: Finite = Field(20.0, description="of the fixture, deg C, where no thermometer tells it")
-    thermometer: str | None = Field(
+    certified_at_c: InRange = Field(20.0, description="temperature that the certificate holds for, deg C")
+    temperature_c: InRange = Field(20.0, description="of the fixture, deg C, where no thermometer tells it")
+    thermometer: Text | None = Field(
         None, description="name of the one that tells the fixture's temperature"
     )
     temperature_sigma_k: NotNegative = Field(1.0, le=50, description="of that temperature, 1 sigma")

@@ -23,6 +23,9 @@ from hexacell.storage.atomic_files import read_text
 from hexacell.storage.toml_document import TomlDocument, table_header
 from hexacell.storage.toml_locations import KeyPath
 
+LARGEST_FILE_BYTES = 500_000
+"""Of a cell file, which usually has less than ten thousand."""
+
 Remark = Callable[[KeyPath], str | None]
 """The comment behind the value at a path, if any."""
 
@@ -58,7 +61,7 @@ def load_cell(path: Path) -> Cell:
         FileError: it cannot be read, is no TOML, or has one mistake.
         SeveralErrors: it has more than one; each of ``errors`` is a FileError with its line.
     """
-    document = TomlDocument.parse(read_text(path), path)
+    document = TomlDocument.parse(read_text(path, LARGEST_FILE_BYTES), path)
     return Cell(path, _checked(document, path), document)
 
 

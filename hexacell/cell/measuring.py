@@ -6,7 +6,20 @@ from typing import Literal, Self
 
 from pydantic import Field, model_validator
 
-from hexacell.cell.fields import Finite, NotNegative, Point, Positive, Section, SixNumbers, broken_rule
+from hexacell.cell.fields import (
+    InRange,
+    NotNegative,
+    Point,
+    Positive,
+    Section,
+    Seed,
+    SixNumbers,
+    Text,
+    broken_rule,
+)
+
+MOST_POINTS, MOST_POSES, MOST_RECORDS = 100, 1000, 10_000
+"""More would take longer than any machine stays as it is."""
 
 
 class StationSettings(Section):
@@ -23,9 +36,13 @@ class StationSettings(Section):
 class IdentificationSettings(Section):
     """Where the geometry is measured."""
 
-    points: tuple[Point, ...] = Field(min_length=2, description="ball positions, mm, in this order")
-    orientations: int = Field(11, ge=2, description="records at each point, its reference included")
-    seed: int = Field(1, ge=0, description="random seed of the candidate orientations")
+    points: tuple[Point, ...] = Field(
+        min_length=2, max_length=MOST_POINTS, description="ball positions, mm, in this order"
+    )
+    orientations: int = Field(
+        11, ge=2, le=MOST_POSES, description="records at each point, its reference included"
+    )
+    seed: Seed = Field(1, description="random seed of the candidate orientations")
     criterion: Literal["task", "parameters", "information"] = Field(
         "information",
         description="what a pose reduces: the error at the task poses or of all parameters; or bits gained",
@@ -36,7 +53,9 @@ class IdentificationSettings(Section):
     least_gain_mm: NotNegative = Field(
         0.0, description="done when no record would lower that error by more"
     )
-    budget_records: int | None = Field(None, ge=2, description="most records, references included")
+    budget_records: int | None = Field(
+        None, ge=2, le=MOST_RECORDS, description="most records, references included"
+    )
     budget_minutes: Positive | None = Field(None, description="longest estimated time")
     minutes_per_station: NotNegative = Field(5.0, description="time to place the gauges at a point by hand")
     seconds_per_record: Positive | None = Field(
@@ -45,7 +64,7 @@ class IdentificationSettings(Section):
     choose_points: bool = Field(
         False, description="true: visit the points with the largest gain per time, not all in order"
     )
-    poses: str | None = Field(
+    poses: Text | None = Field(
         None, description="CSV file with the poses to visit (point,orientation,x,y,z,a,b,c)"
     )
     provisional: bool = Field(
@@ -62,9 +81,13 @@ class IdentificationSettings(Section):
 class VerificationSettings(Section):
     """Where the result is validated: poses that are not in the fit."""
 
-    points: tuple[Point, ...] = Field(min_length=1, description="ball positions, mm")
-    orientations: int = Field(6, ge=2, description="poses at each point, its reference included")
-    seed: int = Field(2, ge=0, description="random seed of the held-out orientations")
+    points: tuple[Point, ...] = Field(
+        min_length=1, max_length=MOST_POINTS, description="ball positions, mm"
+    )
+    orientations: int = Field(
+        6, ge=2, le=MOST_POSES, description="poses at each point, its reference included"
+    )
+    seed: Seed = Field(2, description="random seed of the held-out orientations")
 
 
 class AcceptanceSettings(Section):
@@ -99,13 +122,13 @@ class CheckSettings(Section):
     drift_per_parameter_mm: Positive = Field(
         0.02, description="what each parameter may have drifted since, 1 sigma"
     )
-    budget_records: int = Field(40, ge=4, description="most records, references included")
+    budget_records: int = Field(40, ge=4, le=MOST_RECORDS, description="most records, references included")
 
 
 class TaskSettings(Section):
     """The robot's task: poses for which its accuracy is predicted, and the frames that can be taught."""
 
-    poses: tuple[SixNumbers, ...] = Field((), description="x y z a b c, mm and deg")
+    poses: tuple[SixNumbers, ...] = Field((), max_length=MOST_POSES, description="x y z a b c, mm and deg")
     work_frame: Literal["", "x", "y", "z", "xy", "xz", "yz", "xyz"] = Field(
         "xyz",
         description="base axes about which the controller can turn a work frame; it can always shift it. "
@@ -118,7 +141,7 @@ class TimingSettings(Section):
 
     window_s: Positive = Field(0.6, description="span of readings that must agree")
     interval_s: Positive = Field(0.1, description="time between readings")
-    readings: int = Field(5, ge=2, description="smallest number of readings in the window")
+    readings: int = Field(5, ge=2, le=1000, description="smallest number of readings in the window")
     spread_gauge_mm: Positive = Field(0.06, description="largest range of one gauge in the window")
     spread_encoder_mm: Positive = Field(0.06, description="largest range of one slider in the window")
     give_up_s: Positive = Field(20.0, description="longest wait for settled readings")
@@ -148,9 +171,14 @@ class NoiseSettings(Section):
         "measures replaces them where it is less, too",
     )
     standstill_readings: int = Field(
-        40, ge=0, description="at the first point, without moving, for the noise of readings; 0: none"
+        40,
+        ge=0,
+        le=1000,
+        description="at the first point, without moving, for the noise of readings; 0: none",
     )
-    revisits: int = Field(6, ge=0, description="of the first reference, from different directions; 0: none")
+    revisits: int = Field(
+        6, ge=0, le=100, description="of the first reference, from different directions; 0: none"
+    )
     averaged_windows: int = Field(
         1, ge=1, le=16, description="most settled windows that a record may be the mean of, if it pays"
     )
@@ -170,8 +198,8 @@ class LimitSettings(Section):
 
     gauge_travel_mm: Positive = Field(5.0, description="largest deviation from the zeroed reference")
     tilt_deg: Positive = Field(45.0, le=80, description="largest tilt of the platform")
-    joint_min_mm: Finite = Field(-1000.0, description="smallest joint variable of any leg")
-    joint_max_mm: Finite = Field(1000.0, description="largest joint variable of any leg")
+    joint_min_mm: InRange = Field(-1000.0, description="smallest joint variable of any leg")
+    joint_max_mm: InRange = Field(1000.0, description="largest joint variable of any leg")
     singularity_margin: Positive = Field(
         0.03, description="smallest singular value of the dimensionless pose Jacobian"
     )
@@ -186,10 +214,10 @@ class LimitSettings(Section):
 class GuardSettings(Section):
     """When motion is stopped; more limits are in [limits] and [acceptance]."""
 
-    stop_file: str | None = Field(
+    stop_file: Text | None = Field(
         None, description="while this file exists the robot does not move; relative to the cell file"
     )
-    stop_port: str | None = Field(
+    stop_port: Text | None = Field(
         None, description="serial port of a stop contact, closed while motion is allowed"
     )
     stop_contact: Literal["dsr", "cts"] = Field(

@@ -9,7 +9,16 @@ from pydantic import Field, ValidationError, create_model, field_validator, mode
 from pydantic_core import InitErrorDetails
 
 from hexacell.cell.devices import ControllerSettings, EncoderSettings, GaugeSettings, ThermometerSettings
-from hexacell.cell.fields import Finite, GeometrySettings, NotNegative, Positive, Section, broken_rule
+from hexacell.cell.fields import (
+    GeometrySettings,
+    InRange,
+    Name,
+    NotNegative,
+    Positive,
+    Section,
+    Text,
+    broken_rule,
+)
 from hexacell.cell.length_check import LengthCheckSettings
 from hexacell.cell.measuring import (
     AcceptanceSettings,
@@ -31,6 +40,7 @@ from hexacell.kinematics.parameters import ParameterKind, ParameterSet
 from hexacell.plugins import Group, load
 
 DEFAULT_MECHANISM = "hexaglide"
+MOST_THERMOMETERS = 100
 
 SectionType = TypeVar("SectionType", bound=Section)
 
@@ -42,7 +52,7 @@ class ToleranceSettings(Section):
 class RobotSettings(Section):
     """The mechanism and its drawing."""
 
-    mechanism: str = Field(DEFAULT_MECHANISM, description="hexaglide, or one that a plug-in adds")
+    mechanism: Text = Field(DEFAULT_MECHANISM, description="hexaglide, or one that a plug-in adds")
     nominal: GeometrySettings = Field(description="the drawing; identification starts from it")
 
 
@@ -50,12 +60,12 @@ class CellSettings(Section):
     """A whole cell file."""
 
     version: Literal[1] = Field(1, description="of this file's format")
-    name: str = Field(min_length=1, description="of the cell, on screens and in reports")
+    name: Name = Field(description="of the cell, on screens and in reports")
     robot: RobotSettings
     controller: ControllerSettings
     gauges: tuple[GaugeSettings, GaugeSettings, GaugeSettings]
     encoders: EncoderSettings
-    thermometers: tuple[ThermometerSettings, ...] = ()
+    thermometers: tuple[ThermometerSettings, ...] = Field((), max_length=MOST_THERMOMETERS)
     stations: StationSettings = StationSettings()
     tolerances: ToleranceSettings = ToleranceSettings()
     noise: NoiseSettings = NoiseSettings()
@@ -162,7 +172,7 @@ def cell_model(mechanism: str) -> type[CellSettings]:
 def geometry_settings(parameters: ParameterSet) -> type[GeometrySettings]:
     """The section for a geometry of these parameters."""
     fields: dict[str, Any] = {
-        kind.symbol: (_array_type(kind.shape), Field(description=kind.meaning)) for kind in parameters.kinds
+        kind.symbol: (_array_type(kind), Field(description=kind.meaning)) for kind in parameters.kinds
     }
     return _derived(GeometrySettings, **fields)
 
@@ -183,9 +193,9 @@ def _tolerance_field(kind: ParameterKind) -> Any:  # noqa: ANN401 - what pydanti
     return Field(default, description=kind.tolerance_meaning)
 
 
-def _array_type(shape: tuple[int, ...]) -> Any:  # noqa: ANN401 - a type made here
-    made: Any = Finite
-    for length in reversed(shape):
+def _array_type(kind: ParameterKind) -> Any:  # noqa: ANN401 - a type made here
+    made: Any = Positive if kind.is_positive else InRange
+    for length in reversed(kind.shape):
         made = tuple.__class_getitem__((made,) * length)
     return made
 

@@ -6,7 +6,7 @@ from typing import Literal
 
 from pydantic import Field
 
-from hexacell.cell.fields import Finite, GeometrySettings, NotNegative, Positive, Section
+from hexacell.cell.fields import GeometrySettings, InRange, NotNegative, Positive, Section, Seed, Text
 
 FaultKind = Literal[
     "emergency stop",
@@ -27,7 +27,9 @@ class SimulatedGauges(Section):
     noise_mm: NotNegative = Field(0.01, description="drawn at every stop of the robot, 1 sigma")
     flicker_mm: NotNegative = Field(0.001, description="drawn at every reading, 1 sigma")
     latency_s: NotNegative = Field(0.02, description="between request and answer")
-    baudrate: int | None = Field(None, ge=300, description="line speed; by default the protocol's")
+    baudrate: int | None = Field(
+        None, ge=300, le=10_000_000, description="line speed; by default the protocol's"
+    )
     transport: Literal["pty", "socket"] = Field("pty", description="how the gauges' lines are simulated")
     misalignment_deg: NotNegative = Field(0.0, description="of the triad at each station, 1 sigma")
     placing_mm: NotNegative = Field(0.4, description="how far from mid-travel they are placed, 1 sigma")
@@ -39,7 +41,7 @@ class SimulatedEncoders(Section):
     noise_mm: NotNegative = Field(0.01, description="drawn at every stop of the robot, 1 sigma")
     flicker_mm: NotNegative = Field(0.001, description="drawn at every sample, 1 sigma")
     latency_s: NotNegative = Field(0.001, description="between SYNC and the last answer")
-    common_scale_um_m: Finite = Field(
+    common_scale_um_m: InRange = Field(
         0.0, ge=-1e5, le=1e5, description="by how much all of them show more than the sliders move"
     )
 
@@ -61,8 +63,8 @@ class SimulatedFixture(Section):
         None, description="true distance of its seats; by default as certified"
     )
     seating_mm: NotNegative = Field(0.0, description="where the gauges sit at each mounting, 1 sigma")
-    yaw_deg: Finite = Field(0.0, description="angle of the fixture to its stated direction, about base z")
-    turned_deg: Finite = Field(
+    yaw_deg: InRange = Field(0.0, description="angle of the fixture to its stated direction, about base z")
+    turned_deg: InRange = Field(
         0.0, description="of the gauges in the second seat about base z; 180: the wrong way round"
     )
 
@@ -71,11 +73,11 @@ class SimulatedFault(Section):
     """A fault that begins at a given time and may end."""
 
     kind: FaultKind = Field(description="kind of fault")
-    device: str = Field(
+    device: Text = Field(
         "", description="a gauge's name, encoder 1 to encoder 6, or controller; empty where there is one"
     )
     at_move: int | None = Field(
-        None, ge=1, description="during this move, counted from 1; without it, from the start"
+        None, ge=1, le=1_000_000, description="during this move, counted from 1; without it, from the start"
     )
     after_s: NotNegative = Field(0.0, description="delay after that, in cell time")
     lasts_s: Positive | None = Field(None, description="its duration; without it, permanent")
@@ -85,7 +87,7 @@ class SimulationSettings(Section):
     """The simulation of a cell."""
 
     geometry: GeometrySettings = Field(description="the true geometry, known to the simulation only")
-    seed: int = Field(1, ge=0, description="random seed of the simulation")
+    seed: Seed = Field(1, description="random seed of the simulation")
     station_reach_mm: Positive = Field(
         30.0, description="at rest farther than this from the gauges, the gauges are moved to the ball"
     )
@@ -93,4 +95,4 @@ class SimulationSettings(Section):
     encoders: SimulatedEncoders = SimulatedEncoders()
     motion: SimulatedMotion = SimulatedMotion()
     fixture: SimulatedFixture = SimulatedFixture()
-    faults: tuple[SimulatedFault, ...] = Field((), description="faults and their times")
+    faults: tuple[SimulatedFault, ...] = Field((), max_length=1000, description="faults and their times")

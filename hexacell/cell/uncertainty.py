@@ -7,7 +7,7 @@ from typing import Any, Literal, Self, get_args
 
 from pydantic import Field, model_validator
 
-from hexacell.cell.fields import NotNegative, Positive, Section, broken_rule
+from hexacell.cell.fields import NotNegative, Positive, Section, Text, broken_rule
 
 Grade = Literal["precision", "ordinary", "ideal"]
 
@@ -79,7 +79,7 @@ class UncertaintySettings(Section):
     expansion_legs_um_m_k: NotNegative = Field(23.0, description="of the legs")
     load_n: NotNegative = Field(20.0, description="force on the tool at work, in each direction")
     leg_compliance_um_n: NotNegative = Field(0.03, description="of a leg with its joints")
-    sources: dict[str, str] = Field({}, description="where a size comes from, by its key")
+    sources: dict[str, Text] = Field({}, description="where a size comes from, by its key")
 
     @model_validator(mode="before")
     @classmethod

@@ -12,7 +12,6 @@ character.
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,6 +19,7 @@ from typing import Any, cast
 
 import numpy as np
 
+from hexacell.cell.fields import LARGEST_NUMBER
 from hexacell.controller_config.interface import ControllerGeometry
 from hexacell.errors import FileError
 from hexacell.kinematics.geometry import Geometry
@@ -144,8 +144,8 @@ class _Content:
         value = self.document.value(path)
         if isinstance(value, bool) or not isinstance(value, int | float):
             raise self._mismatch(path, "a number")
-        if not abs(value) <= sys.float_info.max:  # NaN too, and integers of hundreds of digits
-            raise self._mismatch(path, "a finite number")
+        if not abs(value) <= LARGEST_NUMBER:  # NaN too, and integers of hundreds of digits
+            raise self._mismatch(path, f"a finite number within +-{LARGEST_NUMBER:g}")
         return float(value)
 
     def _mismatch(self, path: KeyPath, expected: str) -> FileError:

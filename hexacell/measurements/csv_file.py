@@ -14,16 +14,20 @@ from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
+from hexacell.cell.fields import LARGEST_NUMBER
 from hexacell.errors import FileError
 from hexacell.kinematics.pose import Pose
 from hexacell.measurements.records import MeasurementSet, Record, RecordId
 from hexacell.storage.atomic_files import read_text, write_atomically
+from hexacell.storage.toml_document import shortened
 
 COUNTS = ("point", "orientation")
 NUMBERS = (*"xyzabc", "q1", "q2", "q3", "q4", "q5", "q6", "dx", "dy", "dz")
 HEADER = (*COUNTS, *NUMBERS)
 POSE_HEADER = HEADER[:8]
 LARGEST_COUNT = 1_000_000
+MOST_RECORDS = 10_000
+LARGEST_FILE_BYTES = 5_000_000
 
 
 def read_measurements(path: Path, *, allow_partial: bool = False) -> MeasurementSet:
@@ -36,7 +40,7 @@ def read_measurements(path: Path, *, allow_partial: bool = False) -> Measurement
         FileError: the file cannot be read, a column is missing, a cell is no number, a record occurs
             twice, or there are too few; with the line.
     """
-    text = read_text(path)
+    text = read_text(path, LARGEST_FILE_BYTES)
     if allow_partial and not text.strip():
         return MeasurementSet(())
     records = _records(path, text, HEADER)
@@ -47,7 +51,7 @@ def read_measurements(path: Path, *, allow_partial: bool = False) -> Measurement
 
 def read_poses(path: Path) -> list[tuple[int, int, Pose]]:
     """Read line, point and pose of each row; only the columns of the poses are required."""
-    records = _records(path, read_text(path), POSE_HEADER).values()
+    records = _records(path, read_text(path, LARGEST_FILE_BYTES), POSE_HEADER).values()
     return [(line, record.point, record.pose) for line, record in records]
 
 
@@ -81,6 +85,13 @@ def _records(path: Path, text: str, wanted: tuple[str, ...]) -> dict[RecordId, t
         if record.id in found:
             raise _duplicate(path, record.id, found[record.id][0], line)
         found[record.id] = (line, record)
+        if len(found) > MOST_RECORDS:
+            raise FileError(
+                f"there are more than {MOST_RECORDS} records",
+                subject=path,
+                line=line,
+                action="Split the file; some 60 records identify a robot",
+            )
     return found
 
 
@@ -137,10 +148,12 @@ def _number(path: Path, line: int, name: str, cell: str) -> float:
     except ValueError:
         number = math.nan
     # Python accepts underscores in numbers; a CSV file must not have them.
-    if "_" not in cell and (1 <= number <= LARGEST_COUNT if is_count else math.isfinite(number)):
+    if "_" not in cell and (1 <= number <= LARGEST_COUNT if is_count else abs(number) <= LARGEST_NUMBER):
         return number
-    expected = "a whole number from 1" if is_count else "a finite number"
-    found = f'"{cell}"' if cell.strip() else "empty"
+    expected = "a finite number" if math.isnan(number) else f"a finite number within +-{LARGEST_NUMBER:g}"
+    if is_count:
+        expected = f"a whole number from 1 to {LARGEST_COUNT}"
+    found = f'"{shortened(cell)}"' if cell.strip() else "empty"
     problem = f"{name} is {found}, but must be {expected}"
     raise FileError(problem, subject=path, line=line, action="Correct this cell")
 

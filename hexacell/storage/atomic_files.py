@@ -67,9 +67,17 @@ def read_if_present(path: Path) -> bytes | None:
     return read_bytes(path)
 
 
-def read_text(path: Path) -> str:
-    """The content of a UTF-8 file, with its line ends but no byte order mark."""
-    return decode_utf8(read_bytes(path), path).removeprefix(BYTE_ORDER_MARK)
+def read_text(path: Path, largest_bytes: int | None = None) -> str:
+    """The content of a UTF-8 file, with its line ends but no byte order mark.
+
+    Raises:
+        FileError: it cannot be read, is no text, or is larger than ``largest_bytes``.
+    """
+    data = read_bytes(path)
+    if largest_bytes is not None and len(data) > largest_bytes:
+        size = f"{len(data) / 1e6:.1f} MB, and at most {largest_bytes / 1e6:g} MB are read"
+        raise FileError(f"is too large: {size}", subject=path, action="Name another file, or split it")
+    return decode_utf8(data, path).removeprefix(BYTE_ORDER_MARK)
 
 
 def decode_utf8(data: bytes, path: Path) -> str:

@@ -100,9 +100,9 @@ def _description(value: object) -> str:
         case bool():
             return str(value).lower()
         case str():
-            return f'the text "{_shortened(value)}"'
+            return f'the text "{shortened(value)}"'
         case int() | float():
-            return _shortened(repr(value))
+            return shortened(repr(value))
         case list():
             return f"a list of {len(value)} item{'' if len(value) == 1 else 's'}"
         case dict():
@@ -111,7 +111,8 @@ def _description(value: object) -> str:
             return "a date or a time"
 
 
-def _shortened(text: str) -> str:
+def shortened(text: str) -> str:
+    """A text to be quoted in a line of a message."""
     return text if len(text) <= _LONGEST_QUOTE else f"{text[:_LONGEST_QUOTE]}..."
 
 

@@ -163,6 +163,25 @@ MISTAKES = [
     ),
     ("  [0.0, 155.0, 0.0],", "  [0.0, inf, 0],", "row 3, number 2 is inf, but must be a finite number"),
     ('protocol = "cdi"', 'protocol = "cdi"\nserial = 3', "is 3, but must be a table"),
+    ("  [0.0, 155.0, 0.0],", "  [0.0, 1e308, 0],", "number 2 is 1e.308, but must be a number within"),
+    ("  [0.0, 155.0, 0.0],", "  [0.0, 9223372036854775807, 0],", "but must be a number within"),
+    ("encoder_mm = 0.01", "encoder_mm = 1e-320", "but must be more than 0: from 1e-09 to 1e.06"),
+    ("gauge_scale = 0.0", "gauge_scale = 1e-320", "but must be 0 or more: 0, or from 1e-09 to 1e.06"),
+    ("l = [590.0,", "l = [-590.0,", "'l' in .robot.nominal., number 1 is -590.0, but must be more than 0"),
+    ("orientations = 11", "orientations = 1000000000000000000000000", "but must be 1000 or less"),
+    (
+        "[simulation]\nseed = 1",
+        "[simulation]\nseed = 9223372036854775807",
+        "but must be 4294967295 or less",
+    ),
+    ('name = "simulated-hexaglide"', 'name = "../../.."', "but must be a name of letters, digits"),
+    ('name = "simulated-hexaglide"', 'name = ".."', "but must be a name of letters, digits"),
+    ('name = "simulated-hexaglide"', 'name = "a/b"', "but must be a name of letters, digits"),
+    ('name = "simulated-hexaglide"', 'name = " a"', "but must be a name of letters, digits"),
+    ('name = "simulated-hexaglide"', 'name = "a\\u001b[2J"', "but must be a name of letters, digits"),
+    ('name = "simulated-hexaglide"', f'name = "{5000 * "a"}"', "but must be text of 64 letters or fewer"),
+    ('name = "z"', 'name = "z\\n"', "but must be a name of letters, digits"),
+    ('config = "', 'config = "a\\u0000', "but must be text without control characters"),
 ]
 
 

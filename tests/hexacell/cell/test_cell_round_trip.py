@@ -11,10 +11,12 @@ from hexacell.cell import devices, measuring, model, simulation
 from hexacell.cell.loader import describe, dump, schema
 
 finite = st.floats(allow_nan=False, allow_infinity=False)
-positive = st.floats(min_value=0, exclude_min=True, allow_infinity=False)
+numbers = st.floats(-1e6, 1e6)
+positive = st.floats(1e-9, 1e6)
 texts = st.text(st.characters(codec="utf-8", exclude_characters="\0"), min_size=1, max_size=12)
-points = st.tuples(finite, finite, finite)
-six = st.tuples(*[finite] * 6)
+printable = st.text(st.characters(categories=["L", "N", "P", "S"]), min_size=1, max_size=12)
+points = st.tuples(numbers, numbers, numbers)
+six = st.tuples(*[numbers] * 6)
 signs = st.sampled_from([1, -1])
 scalars = st.one_of(st.booleans(), st.integers(), finite, texts)
 anything = st.recursive(
@@ -28,7 +30,7 @@ geometries = st.builds(
     ROBOT.model_fields["nominal"].annotation,
     S=st.tuples(*[points] * 6),
     B=st.tuples(*[points] * 6),
-    l=six,
+    l=st.tuples(*[positive] * 6),
 )
 
 
@@ -40,7 +42,7 @@ def _gauges(axes: tuple[str, ...]) -> st.SearchStrategy[tuple[Any, ...]]:
                 name=st.just(f"gauge {axis}"),
                 axis=st.just(axis),
                 sign=signs,
-                protocol=texts,
+                protocol=printable,
                 port=st.just(f"/dev/{axis}") if place else st.none() | st.just("loop://"),
                 serial=tables,
                 channel=st.integers(1, 99),
@@ -53,13 +55,13 @@ def _gauges(axes: tuple[str, ...]) -> st.SearchStrategy[tuple[Any, ...]]:
 
 cells = st.builds(
     MODEL,
-    name=texts,
-    robot=st.builds(ROBOT, mechanism=texts, nominal=geometries),
+    name=st.text(st.characters(categories=["L", "Nd"]), min_size=1, max_size=12),
+    robot=st.builds(ROBOT, mechanism=printable, nominal=geometries),
     controller=st.builds(
         devices.ControllerSettings,
-        config=texts,
+        config=printable,
         port=st.none() | st.integers(1, 65535),
-        reload_command=st.lists(texts, max_size=3).map(tuple),
+        reload_command=st.lists(printable, max_size=3).map(tuple),
     ),
     gauges=st.permutations("xyz").flatmap(lambda axes: _gauges(tuple(axes))),
     encoders=st.builds(
@@ -71,11 +73,11 @@ cells = st.builds(
         offset_mm=six,
         serial_numbers=st.none() | st.tuples(*[st.integers(0, 2**32 - 1)] * 6),
     ),
-    limits=st.builds(measuring.LimitSettings, tilt_deg=st.floats(1e-300, 80)),
+    limits=st.builds(measuring.LimitSettings, tilt_deg=st.floats(1e-9, 80)),
     identification=st.builds(
         measuring.IdentificationSettings,
         points=st.lists(points, min_size=2, max_size=4).map(tuple),
-        orientations=st.integers(2, 10**30),
+        orientations=st.integers(2, 1000),
     ),
     verification=st.builds(
         measuring.VerificationSettings, points=st.lists(points, min_size=1, max_size=2).map(tuple)

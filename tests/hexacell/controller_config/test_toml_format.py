@@ -243,6 +243,7 @@ ROW = "[ 1.0, 1.0, 1.0 ]"
         ("l = [ 1.0", "l = [ 2020-01-01", 4, "is a date or a time, but must be a number"),
         ("B = [ [ 1.0", "B = [ [ nan", 3, "row 1, number 1 is nan, but must be a finite number"),
         ("B = [ [ 1.0", "B = [ [ -inf", 3, "is -inf, but must be a finite number"),
+        ("B = [ [ 1.0", "B = [ [ 1e308", 3, "but must be a finite number within +-1e+06"),
         ("B = [ [ 1.0", f"B = [ [ 1{'0' * 400}", 3, "but must be a finite number"),
         ("l = [ 1.0, 1.0", "l = [ 1.0, -1.0", 4, "leg 2 length is -1.0 mm"),
         ("l = [ 1.0, 1.0, 1.0", "l = [ 1.0, 1.0, 0", 4, "leg 3 length is 0.0 mm"),

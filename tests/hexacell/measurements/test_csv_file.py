@@ -21,7 +21,7 @@ NUMBERS = "0,0,550,0,0,0,-489.7,-485.2,-476.4,476.4,485.2,489.7,0,0,0"
 ROWS = [f"1,1,{NUMBERS}", f"1,2,{NUMBERS}", f"4,1,{NUMBERS}", f"4,2,{NUMBERS}"]
 GOOD = "\n".join([HEADER, *ROWS]) + "\n"
 
-finite = st.floats(allow_nan=False, allow_infinity=False)
+finite = st.floats(-1e6, 1e6)
 counts = st.integers(1, 1_000_000)
 records = st.builds(
     Record,
@@ -125,6 +125,8 @@ MISTAKES = [
     (ROWS[1], ROWS[1].replace("550", "nan"), 'z is "nan", but must be a finite number', 3),
     (ROWS[1], ROWS[1].replace("550", "-Infinity"), 'z is "-Infinity", but must be a finite number', 3),
     (ROWS[1], ROWS[1].replace("550", "1e999"), 'z is "1e999", but must be a finite number', 3),
+    (ROWS[1], ROWS[1].replace("550", "1e308"), "must be a finite number within .-1e.06", 3),
+    (ROWS[1], ROWS[1].replace("550", "1" * 24), "must be a finite number within .-1e.06", 3),
     (ROWS[1], ROWS[1].replace("550", "5_50"), 'z is "5_50", but must be a finite number', 3),
     (ROWS[1], ROWS[1].replace("550", "high"), 'z is "high", but must be a finite number', 3),
     (ROWS[1], ROWS[1].replace("489.7,0", "489.7,"), "dx is empty, but must be a finite number", 3),
@@ -166,6 +168,18 @@ def test_absent_file_is_refused(tmp_path):
 @pytest.mark.parametrize("text", ["", "\n", "\ufeff", HEADER, HEADER + "\n"])
 def test_an_empty_file_is_a_valid_partial_file(read, text):
     assert read(text, allow_partial=True) == MeasurementSet(())
+
+
+def test_more_records_than_can_be_identified_are_refused(read):
+    rows = (f"1,{number},{NUMBERS}\n" for number in range(1, 10_002))
+    with pytest.raises(FileError, match="more than 10000 records") as caught:
+        read(f"{HEADER}\n{''.join(rows)}")
+    assert caught.value.line == 10_002
+
+
+def test_a_file_that_is_far_too_large_is_not_read(read):
+    with pytest.raises(FileError, match=r"is too large: 6.0 MB, and at most 5 MB are read"):
+        read(GOOD + 6_000_000 * "\n")
 
 
 def test_a_point_just_opened_may_have_one_row(read):

@@ -170,8 +170,8 @@ MISTAKES = [
     ("l = [590.0,", "l = [-590.0,", "'l' in .robot.nominal., number 1 is -590.0, but must be more than 0"),
     ("orientations = 11", "orientations = 1000000000000000000000000", "but must be 1000 or less"),
     (
-        "[simulation]\nseed = 1",
-        "[simulation]\nseed = 9223372036854775807",
+        "seed = 1  # the",
+        "seed = 9223372036854775807  # the",
         "but must be 4294967295 or less",
     ),
     ('name = "simulated-hexaglide"', 'name = "../../.."', "but must be a name of letters, digits"),

@@ -232,4 +232,6 @@ class GuardSettings(Section):
     following_mm: Positive = Field(
         1.0, description="largest difference of a slider from its commanded position"
     )
-    free_disk_mb: NotNegative = Field(50.0, description="least free space for the run folder, MB")
+    free_disk_mb: float = Field(
+        50.0, ge=0, le=1e12, allow_inf_nan=False, description="least free space for the run folder, MB"
+    )

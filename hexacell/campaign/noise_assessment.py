@@ -20,12 +20,7 @@ import numpy as np
 from hexacell.campaign.averaging import WINDOWS, AveragingForecaster, worthwhile_windows
 from hexacell.campaign.measured_noise import InstrumentNoise, MeasuredNoise, RepeatedApproaches
 from hexacell.campaign.planner import Plan
-from hexacell.identification.diagnostics.approach_scatter import (
-    GAUGES,
-    ApproachScatter,
-    ScatterSource,
-    approach_scatter,
-)
+from hexacell.identification.diagnostics.approach_scatter import ApproachScatter, approach_scatter
 from hexacell.identification.diagnostics.standstill import SIGNIFICANCE, ReadingNoise, reading_noise
 from hexacell.identification.problem.problem import Noise
 from hexacell.kinematics.pose import Pose
@@ -143,12 +138,9 @@ class _NoiseAssessment:
 
     def _with_excess(self, sigma: Array, scatter: ApproachScatter | None) -> Array:
         """Noise (9,) with what does not repeat."""
-        excess = np.zeros(INSTRUMENTS)
-        if scatter is not None and scatter.source is ScatterSource.SLIDERS:
-            excess[3:] = scatter.excess_mm
-        elif scatter is not None and scatter.source is not None:
-            excess[GAUGES.index(scatter.source)] = scatter.excess_mm
-        return np.hypot(sigma, excess)
+        if scatter is None or scatter.source is None:
+            return sigma
+        return np.asarray(np.hypot(sigma, scatter.excess_mm * scatter.source.instruments))
 
     def _noise(self, sigma: Array) -> Noise:
         return self.plan.robot.noise.with_devices(sigma[3:].tolist(), sigma[:3].tolist())

@@ -7,7 +7,7 @@ import numpy as np
 from hexacell.campaign.decisions import Forecast
 from hexacell.presentation.layout import wrapped
 from hexacell.presentation.length import length_text
-from hexacell.presentation.measured_noise import measured_noise_text
+from hexacell.presentation.measured_noise import noise_and_averaging_text
 from hexacell.presentation.planning import run_forecast_line
 from hexacell.presentation.verification import check_start_text, check_text, verification_text
 from procedures.run import events
@@ -117,7 +117,7 @@ def _finding_text(event: events.Event) -> str | None:
         case events.RunStarted() | events.ResultValidated():
             return _basis_or_verdict(event)
         case events.NoiseMeasured():
-            return measured_noise_text(event.noise)
+            return noise_and_averaging_text(event.noise)
         case _:
             return None
 

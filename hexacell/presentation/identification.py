@@ -12,6 +12,7 @@ from hexacell.identification.diagnostics.variance_components import NoiseLevel, 
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.geometry import Geometry
 from hexacell.presentation.layout import wrapped
+from hexacell.presentation.measured_noise import measured_noise_text
 from hexacell.presentation.uncertainty import budget_table
 from hexacell.reporting.assessment import Assessment
 from hexacell.reporting.findings import findings, noise_sentence, pair_sentences, residual_sentence
@@ -32,6 +33,7 @@ def identification_report(assessed: Assessment) -> str:
         residual_line(found),
         points_line(assessed),
         noise_table(assessed.noise),
+        "" if assessed.measured_noise is None else measured_noise_text(assessed.measured_noise),
         repeatability_lines(assessed.repeatability),
         correlation_lines(pair_sentences(assessed), len(assessed.correlated)),
     )

@@ -20,8 +20,16 @@ NOTEWORTHY_DRIFT = 1.0
 
 
 def measured_noise_text(measured: MeasuredNoise) -> str:
-    """What was measured, a sentence a line."""
-    lines = (*_summary(measured), *_warnings(measured), *_averaging(measured))
+    """What was measured, and what is wrong, a sentence a line."""
+    return _paragraphs([*_summary(measured), *_warnings(measured)])
+
+
+def noise_and_averaging_text(measured: MeasuredNoise) -> str:
+    """The same, and what means of more readings gain."""
+    return _paragraphs([*_summary(measured), *_warnings(measured), *_averaging(measured)])
+
+
+def _paragraphs(lines: Sequence[str]) -> str:
     return "\n".join(wrapped(line, indent=2) for line in lines)
 
 
@@ -77,6 +85,9 @@ def _of_approaches(found: RepeatedApproaches, source: ScatterSource) -> str:
     if source is ScatterSource.SLIDERS:
         what = f"the sliders stop {size} beside what their encoders show"
         look = "Look for play in guides and joints, and for friction"
+    elif source is ScatterSource.ENCODERS or source.startswith("encoder"):
+        what = f"{source}: {size} beside where the sliders are, though the ball is at its place"
+        look = "Look at reading heads, scales and cables"
     else:
         what = f"{source} shows {size} more or less at the same place"
         look = "Look at its plunger, its plate and its clamp"

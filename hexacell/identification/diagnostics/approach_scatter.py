@@ -6,13 +6,20 @@ see of the ball's motion is no error of the model. The rest is, for each visit l
     r = d - G q,      G = dP/dq,      covariance  G diag(s_q^2) G^T + diag(s_d^2)
 
 with the noise of encoders and gauges that is stated for a record. Whether there is more is a chi-square
-test. If so, one variance more is estimated by restricted maximum likelihood, for each of four sources:
-stops of the sliders that their encoders do not see (play, friction), which act like noise of the encoders,
-or a gauge that does not repeat. A gauge is named where it is ten times as likely as the sliders.
+test. Where it comes from, ball and sliders tell together. With stops s of the sliders that differ from
+visit to visit, play p between their encoders and joints, and errors e and g of encoders and gauges,
+
+    q = s + e,      d = G (s + p) + g,
+
+so that play moves the ball and not the encoders, an error of the encoders the encoders and not the ball,
+and an error of one gauge that gauge alone. For each source one variance more is estimated by restricted
+maximum likelihood, with that of the stops. The likeliest source is named; a single instrument only where
+it is ten times as likely as all sliders or all encoders.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -21,27 +28,45 @@ from scipy.optimize import minimize_scalar
 from scipy.special import chdtrc, chdtri
 
 from hexacell.identification.diagnostics.standstill import SIGNIFICANCE
+from hexacell.kinematics.parameters import LEGS
 from hexacell.kinematics.rotations import Array
 
 FEWEST_VISITS = 3
 """Fewer visits, the first one included, tell nothing."""
 CONFIDENCE = 0.95
-GAUGE_ODDS = 10.0
-"""How many times as likely as the sliders a gauge must be to be named."""
+INSTRUMENT_ODDS = 10.0
+"""How many times as likely as all sliders or encoders a single instrument must be to be named."""
 LARGEST_EXCESS = 1e3
-"""Times the stated noise up to which a source is sought."""
+"""Times the stated noise up to which sizes are sought."""
+ROUGH = 1e-2
+"""Accuracy of the logarithms of what is estimated."""
 
 
 class ScatterSource(StrEnum):
     """What does not repeat."""
 
     SLIDERS = "sliders"
+    ENCODERS = "encoders"
     GAUGE_X = "gauge x"
     GAUGE_Y = "gauge y"
     GAUGE_Z = "gauge z"
+    ENCODER_1 = "encoder 1"
+    ENCODER_2 = "encoder 2"
+    ENCODER_3 = "encoder 3"
+    ENCODER_4 = "encoder 4"
+    ENCODER_5 = "encoder 5"
+    ENCODER_6 = "encoder 6"
+
+    @property
+    def instruments(self) -> Array:
+        """Which of gauges x, y, z and the encoders of legs 1 to 6 it is noise of: (9,), 1 or 0."""
+        if self in TOGETHER:
+            return np.repeat([0.0, 1.0], [3, LEGS])
+        return np.asarray(np.eye(3 + LEGS)[ALONE.index(self)])
 
 
-GAUGES = (ScatterSource.GAUGE_X, ScatterSource.GAUGE_Y, ScatterSource.GAUGE_Z)
+TOGETHER = (ScatterSource.SLIDERS, ScatterSource.ENCODERS)
+ALONE = tuple(source for source in ScatterSource if source not in TOGETHER)
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,7 +79,8 @@ class ApproachScatter:
         ball_mm: how far the ball is from its mean, as the gauges see it (root mean square distance).
         chi_square: of what the encoders do not explain, under the stated noise.
         source: what does not repeat; none where the stated noise explains everything.
-        excess_mm: one standard deviation of it beside the stated noise, of a slider or of that gauge.
+        excess_mm: one standard deviation of it beside the stated noise, of each slider or encoder or of
+            the instrument.
     """
 
     visits: int
@@ -89,54 +115,90 @@ def approach_scatter(
     """
     if len(deviations) < FEWEST_VISITS:
         return None
-    visits = _Visits.of(deviations, joints @ by_joints.T)
-    stated = (by_joints * encoders_mm**2) @ by_joints.T + np.diag(gauges_mm**2)
-    freedom, chi_square = 3 * visits.freedom, visits.chi_square(stated)
+    shown = np.concatenate([deviations, joints], axis=1)
+    visits = _Visits.of(shown, by_joints, np.diag(np.concatenate([gauges_mm, encoders_mm]) ** 2))
+    freedom, chi_square = 3 * visits.freedom, visits.unexplained()
     found = ApproachScatter(len(deviations), freedom, visits.ball_mm, chi_square)
     if float(chdtrc(freedom, chi_square)) >= SIGNIFICANCE:
         return found
-    sources = {ScatterSource.SLIDERS: by_joints @ by_joints.T}
-    sources |= {source: np.diag(row) for source, row in zip(GAUGES, np.eye(3), strict=True)}
-    excesses = {source: _excess(visits, stated, added) for source, added in sources.items()}
-    source = max(GAUGES, key=lambda one: excesses[one][0])
-    if excesses[source][0] < excesses[ScatterSource.SLIDERS][0] + np.log(GAUGE_ODDS):
-        source = ScatterSource.SLIDERS
+    excesses = {source: visits.excess(source) for source in ScatterSource}
+    source = _named(excesses)
     return ApproachScatter(
         len(deviations), freedom, visits.ball_mm, chi_square, source, excesses[source][1]
     )
 
 
+def _named(excesses: Mapping[ScatterSource, tuple[float, float]]) -> ScatterSource:
+    """The source to name, by the log likelihoods of all."""
+    together = max(TOGETHER, key=lambda one: excesses[one][0])
+    alone = max(ALONE, key=lambda one: excesses[one][0])
+    is_proven = excesses[alone][0] >= excesses[together][0] + np.log(INSTRUMENT_ODDS)
+    return alone if is_proven else together
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class _Visits:
-    """Products (3, 3), mm^2, of what the encoders do not explain, less its mean, summed over the visits."""
+    """Visits of one pose.
+
+    Attributes:
+        products: (9, 9), mm^2, of ball and sliders less their means, summed over the visits.
+        motion: (9, 6) of ball and encoders by the stops of the sliders.
+        stated: (9, 9) covariance of the instruments.
+    """
 
     products: Array
+    motion: Array
+    stated: Array
     freedom: int
-    ball_mm: float
 
     @classmethod
-    def of(cls, deviations: Array, explained: Array) -> _Visits:
-        around = deviations - deviations.mean(axis=0)
-        rest = around - (explained - explained.mean(axis=0))
-        freedom = len(deviations) - 1
-        return cls(rest.T @ rest, freedom, float(np.sqrt(np.sum(around**2) / freedom)))
+    def of(cls, shown: Array, by_joints: Array, stated: Array) -> _Visits:
+        around = shown - shown.mean(axis=0)
+        motion = np.concatenate([by_joints, np.eye(LEGS)])
+        return cls(around.T @ around, motion, stated, len(shown) - 1)
 
-    def chi_square(self, covariance: Array) -> float:
-        return float(np.trace(np.linalg.solve(covariance, self.products)))
+    @property
+    def ball_mm(self) -> float:
+        return float(np.sqrt(np.trace(self.products[:3, :3]) / self.freedom))
 
-    def log_likelihood(self, covariance: Array) -> float:
+    def unexplained(self) -> float:
+        """Chi-square of what the encoders do not explain, which no stop of the sliders changes."""
+        rest = np.concatenate([np.eye(3), -self.motion[:3]], axis=1)
+        covariance, products = rest @ self.stated @ rest.T, rest @ self.products @ rest.T
+        return float(np.trace(np.linalg.solve(covariance, products)))
+
+    def excess(self, source: ScatterSource) -> tuple[float, float]:
+        """The largest log likelihood with one more variance, and its standard deviation, mm."""
+        added = np.diag(source.instruments)
+        if source is ScatterSource.SLIDERS:
+            moved = np.concatenate([self.motion[:3], np.zeros((LEGS, LEGS))])
+            added = moved @ moved.T
+        unit = float(np.sqrt(np.diag(self.stated)[source.instruments > 0.0].mean()))
+
+        def loss(log_size: float) -> float:
+            return -self._best_stops(self.stated + (unit * np.exp(log_size)) ** 2 * added, unit)
+
+        best, least = _minimum(loss)
+        return -least, unit * float(np.exp(best))
+
+    def _best_stops(self, covariance: Array, unit: float) -> float:
+        """The log likelihood with the likeliest scatter of the sliders' stops."""
+        stops = self.motion @ self.motion.T
+
+        def loss(log_size: float) -> float:
+            return -self._log_likelihood(covariance + (unit * np.exp(log_size)) ** 2 * stops)
+
+        return -_minimum(loss)[1]
+
+    def _log_likelihood(self, covariance: Array) -> float:
         """Restricted, but for a constant."""
         log_det = float(np.linalg.slogdet(covariance)[1])
-        return -0.5 * (self.freedom * log_det + self.chi_square(covariance))
+        chi_square = float(np.trace(np.linalg.solve(covariance, self.products)))
+        return -0.5 * (self.freedom * log_det + chi_square)
 
 
-def _excess(visits: _Visits, stated: Array, added: Array) -> tuple[float, float]:
-    """The largest log likelihood with one more variance, and its standard deviation, mm."""
-    unit = float(np.sqrt(np.trace(stated) / np.trace(added)))
-
-    def loss(log_size: float) -> float:
-        return -visits.log_likelihood(stated + (unit * np.exp(log_size)) ** 2 * added)
-
+def _minimum(loss: Callable[[float], float]) -> tuple[float, float]:
+    """Where a function of the logarithm of a size is least, and its value there."""
     bound = float(np.log(LARGEST_EXCESS))
-    best = minimize_scalar(loss, bounds=(-bound, bound), method="bounded")
-    return -float(best.fun), unit * float(np.exp(best.x))
+    best = minimize_scalar(loss, bounds=(-bound, bound), method="bounded", options={"xatol": ROUGH})
+    return float(best.x), float(best.fun)

@@ -21,6 +21,7 @@ from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import FrameTransform
 from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS, Hexaglide
 from hexacell.measurements.records import MeasurementSet
+from hexacell.presentation.identification import identification_report
 from hexacell.runs.run_folder import RunFolder
 from procedures.journal.journal import Journal
 from procedures.run import events
@@ -100,9 +101,11 @@ def test_records_in_a_run_folder_are_weighted_by_the_noise_that_the_run_measured
     assert told is not None
     assessed = fit_measurements(cell, measured, run)
     assert assessed.measured_noise == told
+    assert "noise                    gauges 10 to 40, encoders 10 um" in identification_report(assessed)
     assert assessed.found.problem.noise.gauges_mm == pytest.approx([0.01, 0.04, 0.01])
     alone = fit_measurements(cell, measured)
     assert alone.measured_noise is None
+    assert "noise                    gauges" not in identification_report(alone)
     assert alone.found.problem.noise.gauges_mm == pytest.approx([0.01, 0.01, 0.01])
     assert assessed.found.goodness.ratio < alone.found.goodness.ratio
     assert noise_of_run(RunFolder(tmp_path / "nothing")) is None

@@ -13,7 +13,7 @@ from hexacell.campaign.measured_noise import (
     RepeatedApproaches,
 )
 from hexacell.identification.diagnostics.approach_scatter import ScatterSource
-from hexacell.presentation.measured_noise import measured_noise_text
+from hexacell.presentation.measured_noise import measured_noise_text, noise_and_averaging_text
 
 
 def instrument(name: str, **more: Any) -> InstrumentNoise:
@@ -29,7 +29,7 @@ def measured(*changed: InstrumentNoise, **more: Any) -> MeasuredNoise:
 
 
 def said(noise: MeasuredNoise) -> str:
-    return " ".join(measured_noise_text(noise).split())
+    return " ".join(noise_and_averaging_text(noise).split())
 
 
 def visits(ratio: float, source: ScatterSource | None = None, excess_mm: float = 0.0) -> RepeatedApproaches:
@@ -93,6 +93,8 @@ def test_false_readings_are_told() -> None:
     ("source", "what", "action"),
     [
         (ScatterSource.SLIDERS, "the sliders stop 49 um beside what their encoders show", "Look for play"),
+        (ScatterSource.ENCODERS, "encoders: 49 um beside where the sliders are", "reading heads"),
+        (ScatterSource.ENCODER_3, "encoder 3: 49 um beside where the sliders are", "reading heads"),
         (ScatterSource.GAUGE_Z, "gauge z shows 49 um more or less at the same place", "its plunger"),
     ],
 )
@@ -129,3 +131,10 @@ def test_means_that_are_taken_are_told_with_their_gain() -> None:
 def test_means_that_gain_nothing_are_not_proposed() -> None:
     text = said(measured(forecasts=forecasts(0.2, 0.199, 0.198), encoders_part_mm=0.17))
     assert "windows" not in text
+
+
+def test_where_the_run_is_over_the_averaging_is_not_told() -> None:
+    told = measured(forecasts=forecasts(0.2, 0.15, 0.12), encoders_part_mm=0.17)
+    assert "expected at the task" in noise_and_averaging_text(told)
+    assert noise_and_averaging_text(told).startswith(measured_noise_text(told))
+    assert "expected at the task" not in measured_noise_text(told)

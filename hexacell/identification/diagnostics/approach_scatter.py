@@ -19,11 +19,12 @@ it is ten times as likely as all sliders or all encoders.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 
 import numpy as np
+from scipy.linalg import eigh
 from scipy.optimize import minimize_scalar
 from scipy.special import chdtrc, chdtri
 
@@ -39,7 +40,9 @@ INSTRUMENT_ODDS = 10.0
 LARGEST_EXCESS = 1e3
 """Times the stated noise up to which sizes are sought."""
 ROUGH = 1e-2
-"""Accuracy of the logarithms of what is estimated."""
+"""Accuracy of the logarithm of the excess."""
+STOP_SIZES = 100
+"""Sizes of the scatter of the stops that are tried, evenly spaced by their logarithms."""
 
 
 class ScatterSource(StrEnum):
@@ -178,27 +181,20 @@ class _Visits:
         def loss(log_size: float) -> float:
             return -self._best_stops(self.stated + (unit * np.exp(log_size)) ** 2 * added, unit)
 
-        best, least = _minimum(loss)
-        return -least, unit * float(np.exp(best))
+        bound = float(np.log(LARGEST_EXCESS))
+        best = minimize_scalar(loss, bounds=(-bound, bound), method="bounded", options={"xatol": ROUGH})
+        return -float(best.fun), unit * float(np.exp(best.x))
 
     def _best_stops(self, covariance: Array, unit: float) -> float:
-        """The log likelihood with the likeliest scatter of the sliders' stops."""
-        stops = self.motion @ self.motion.T
+        """The restricted log likelihood, but for a constant, with the likeliest scatter of the stops.
 
-        def loss(log_size: float) -> float:
-            return -self._log_likelihood(covariance + (unit * np.exp(log_size)) ** 2 * stops)
-
-        return -_minimum(loss)[1]
-
-    def _log_likelihood(self, covariance: Array) -> float:
-        """Restricted, but for a constant."""
-        log_det = float(np.linalg.slogdet(covariance)[1])
-        chi_square = float(np.trace(np.linalg.solve(covariance, self.products)))
-        return -0.5 * (self.freedom * log_det + chi_square)
-
-
-def _minimum(loss: Callable[[float], float]) -> tuple[float, float]:
-    """Where a function of the logarithm of a size is least, and its value there."""
-    bound = float(np.log(LARGEST_EXCESS))
-    best = minimize_scalar(loss, bounds=(-bound, bound), method="bounded", options={"xatol": ROUGH})
-    return float(best.x), float(best.fun)
+        In the coordinates in which both covariances are diagonal it is a sum.
+        """
+        shares, axes = eigh(self.motion @ self.motion.T, covariance)
+        squares = np.einsum("ij,ik,kj->j", axes, self.products, axes)
+        bound = np.log(LARGEST_EXCESS)
+        sizes = (unit * np.exp(np.linspace(-bound, bound, STOP_SIZES))) ** 2
+        variances = 1.0 + sizes[:, None] * np.maximum(shares, 0.0)
+        log_dets = np.linalg.slogdet(covariance)[1] + np.log(variances).sum(axis=1)
+        chi_squares = (squares / variances).sum(axis=1)
+        return float(np.max(-0.5 * (self.freedom * log_dets + chi_squares)))

@@ -38,6 +38,11 @@ COST_FACTOR = 2.0
 RECORDS_FACTOR = 1.5
 """By how much cost or records have grown since a search in vain when the next one is made."""
 
+SAME_MINIMUM = 6
+"""Starts of half of a search that end in one minimum: another one would be found by some of them."""
+
+SAME_COST = 0.01
+
 TRIAL = replace(COARSE, iterations=20, searches=12)
 """As many iterations as true records need; where others need more, they are in vain."""
 
@@ -109,12 +114,21 @@ def _without_false_records(found: Identification) -> ChainedEstimate | None:
 
 
 def _best(problem: Problem, found: Identification) -> Identification:
-    """The estimate with most records and lowest cost from any start, or the first plausible one."""
-    others = _from_other_starts(problem)
-    while not _is_plausible(problem, found) and (other := next(others, None)):
+    """The estimate with most records and lowest cost from any start, or the first plausible one.
+
+    The same minimum from enough starts is the only one.
+    """
+    others, again = _from_other_starts(problem), 0
+    while again < SAME_MINIMUM and not _is_plausible(problem, found) and (other := next(others, None)):
+        again += _is_same_minimum(found, other)
         is_better = (other.records, -cost(other)) > (found.records, -cost(found))
         found = other if is_better else found
     return found if found.converged else _continued(problem, found)
+
+
+def _is_same_minimum(found: Identification, other: Identification) -> bool:
+    is_near = abs(cost(other) - cost(found)) <= SAME_COST * cost(found)
+    return other.records == found.records and is_near
 
 
 def _is_plausible(problem: Problem, found: Identification) -> bool:

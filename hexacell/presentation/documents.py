@@ -13,6 +13,7 @@ from hexacell.campaign.decisions import Finished, Forecast, MeasurePose, StartPo
 from hexacell.presentation.teaching import teaching_sentence
 from procedures.replay.comparison import ReplayReport
 from procedures.run import events
+from procedures.run.state import RunState
 
 
 def next_document(proposed: NextPose) -> dict[str, Any]:
@@ -88,10 +89,9 @@ def preflight_document(devices: Sequence[DeviceIdentity], trial: PlanTrial) -> d
     }
 
 
-def run_document(
-    request: RunRequest, ended: events.Ended, judged: events.ResultValidated | None
-) -> dict[str, Any]:
+def run_document(request: RunRequest, ended: events.Ended, state: RunState) -> dict[str, Any]:
     """What ``run --json`` and ``demo --json`` print."""
+    judged, noise = state.judged, state.noise
     measurements, moved = request.folder.measurements, ended.displacement
     return {
         "exit_code": ended.exit_code,
@@ -100,6 +100,7 @@ def run_document(
         "verification": judged and judged.verification and judged.verification.model_dump(mode="json"),
         "check": judged and judged.check and judged.check.model_dump(mode="json"),
         "length": judged and judged.length and judged.length.model_dump(mode="json"),
+        "measured_noise": noise and noise.noise.model_dump(mode="json"),
         "displacement": moved and moved.model_dump(mode="json"),
         "teaching": moved and teaching_sentence(moved),
         "run": str(request.folder.path),

@@ -15,6 +15,8 @@ from hexacell.identification.diagnostics.approach_scatter import ScatterSource
 from hexacell.presentation.layout import duration, wrapped
 
 UM = 1e3
+WHOLE_UM = 9.95
+"""From here on sizes are told in whole micrometres."""
 NOTEWORTHY_DRIFT = 1.0
 """In units of the noise of a record: a smaller drift within seconds is not mentioned."""
 
@@ -51,9 +53,15 @@ def _of_each_kind(measured: MeasuredNoise, figure: str) -> str:
 
 
 def _range(instruments: Sequence[InstrumentNoise], figure: str) -> str:
-    values = sorted(UM * getattr(one, figure) for one in instruments)
-    first, last = f"{values[0]:.2g}", f"{values[-1]:.2g}"
+    values = sorted(getattr(one, figure) for one in instruments)
+    first, last = _um(values[0]), _um(values[-1])
     return first if first == last else f"{first} to {last}"
+
+
+def _um(size_mm: float) -> str:
+    """A size in um, to two digits where it is below 10."""
+    size = UM * size_mm
+    return f"{size:.2g}" if size < WHOLE_UM else f"{size:.0f}"
 
 
 def _warnings(measured: MeasuredNoise) -> Iterator[str]:
@@ -68,20 +76,20 @@ def _of_instrument(one: InstrumentNoise) -> Iterator[str]:
     if one.is_noisier and one.reading_mm is not None:
         look = "a loose clamp, vibration or its cable" if is_gauge else "its cable, its head and vibration"
         yield (
-            f"  {one.name}: its readings scatter by {UM * one.reading_mm:.3g} um without moving, more than "
-            f"the {UM * one.stated_mm:.3g} um stated for a record. The run counts with "
-            f"{UM * one.record_mm:.3g} um. Look at {look}; if that is how it is, state it in [noise]"
+            f"  {one.name}: its readings scatter by {_um(one.reading_mm)} um without moving, more than "
+            f"the {_um(one.stated_mm)} um stated for a record. The run counts with "
+            f"{_um(one.record_mm)} um. Look at {look}; if that is how it is, state it in [noise]"
         )
     if abs(one.drift_mm) > NOTEWORTHY_DRIFT * one.stated_mm:
         look = "let it warm up, and look whether its stand creeps" if is_gauge else "see whether it slides"
-        yield f"  {one.name}: it drifted by {UM * one.drift_mm:+.3g} um within the series: {look}"
+        yield f"  {one.name}: it drifted by {UM * one.drift_mm:+.0f} um within the series: {look}"
     if one.outliers:
         what = "a reading was" if one.outliers == 1 else f"{one.outliers} readings were"
         yield f"  {one.name}: {what} false, and left out. Look at its cable and contacts"
 
 
 def _of_approaches(found: RepeatedApproaches, source: ScatterSource) -> str:
-    size = f"{UM * found.excess_mm:.3g} um"
+    size = f"{_um(found.excess_mm)} um"
     if source is ScatterSource.SLIDERS:
         what = f"the sliders stop {size} beside what their encoders show"
         look = "Look for play in guides and joints, and for friction"

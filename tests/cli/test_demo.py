@@ -100,6 +100,22 @@ def test_the_demo_says_in_one_line_what_must_be_taught_anew(demo):
     assert document["displacement"]["poses"] == 6
 
 
+def test_the_demo_measures_its_noise_and_says_so(demo):
+    """Its readings scatter by 1 um while nothing moves, and its records by the stated 10."""
+    (measured,) = (event.noise for event in demo.events() if isinstance(event, events.NoiseMeasured))
+    assert demo.outcome.document["measured_noise"] == measured.model_dump(mode="json")
+    readings = [one.reading_mm for one in (*measured.gauges, *measured.encoders)]
+    assert readings == pytest.approx([0.001] * 9, rel=0.5)
+    assert measured.approaches is not None
+    assert measured.approaches.visits == 7
+    result = json.loads((demo.run / "result.json").read_text())
+    assert result["measured_noise"] == demo.outcome.document["measured_noise"]
+    said = demo.outcome.err
+    assert re.search(r"^noise                    gauges 1\d?", said, flags=re.MULTILINE)
+    assert "readings at rest: gauges 0." in said or "readings at rest: gauges 1" in said
+    assert "expected at the task in the end" in " ".join(said.split())
+
+
 def test_the_mean_deviation_falls_by_more_than_99_percent(demo):
     before, after = distances(demo, "before-V"), distances(demo, "after-V")
     assert len(before) == len(after) == 3 * 5

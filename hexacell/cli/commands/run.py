@@ -77,8 +77,8 @@ def _run_to_end(request: RunRequest, console: Console) -> ExitCode:
     if factor != 1.0:
         console.print(clock_notice(factor))
     ended = execute_run(request, console)
-    judged = fold(read_journal(request.folder.journal)).judged
-    console.document(run_document(request, ended, judged))
+    state = fold(read_journal(request.folder.journal))
+    console.document(run_document(request, ended, state))
     for line in closing_lines(request, ended):
         console.print(line)
     return ExitCode(ended.exit_code)

@@ -54,6 +54,12 @@ def test_the_ranges_of_unlike_instruments_are_told() -> None:
     assert "readings at rest: gauges 1 to 4, encoders 1 um" in text
 
 
+def test_large_noise_is_told_in_whole_micrometres() -> None:
+    text = said(measured(instrument("gauge y", reading_mm=0.1234, record_mm=1.5)))
+    assert "gauges 10 to 1500, encoders 10 um a record" in text
+    assert "readings at rest: gauges 1 to 123, encoders 1 um" in text
+
+
 def test_without_a_series_no_readings_at_rest_are_told() -> None:
     text = said(measured(instrument("gauge x", reading_mm=None)))
     assert "at rest" not in text

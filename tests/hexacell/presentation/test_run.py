@@ -18,6 +18,7 @@ from hexacell.runs.run_folder import RunFolder
 from procedures.calibration.workflow import Mode
 from procedures.run import events
 from procedures.run.questions import UnattendedOperator
+from procedures.run.state import RunState
 
 
 @pytest.fixture
@@ -55,7 +56,7 @@ def test_one_line_before_the_result_says_what_must_be_taught_anew(request_of):
     _, teaching, line = closing_lines(request, ended)
     assert teaching == teaching_line(moved)
     assert line == "all well"
-    document = run_document(request, ended, None)
+    document = run_document(request, ended, RunState())
     assert document["displacement"] == {
         "position_mm": 8.25,
         "orientation_deg": 3.0,
@@ -63,5 +64,5 @@ def test_one_line_before_the_result_says_what_must_be_taught_anew(request_of):
         "is_within_limits": False,
     }
     assert document["teaching"] == teaching_sentence(moved)
-    untouched = run_document(request, events.Ended(exit_code=0, line="all well"), None)
-    assert untouched["displacement"] is untouched["teaching"] is None
+    untouched = run_document(request, events.Ended(exit_code=0, line="all well"), RunState())
+    assert untouched["displacement"] is untouched["teaching"] is untouched["measured_noise"] is None

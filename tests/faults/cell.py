@@ -56,6 +56,9 @@ NEVER_GOOD_ENOUGH: dict[str, Any] = {
 PROVISIONAL: dict[str, Any] = {"identification.provisional": True}
 """The controller is lent a geometry after the first point, which is taken back after the last."""
 
+MEASURED: dict[str, Any] = {"noise.standstill_readings": 8, "noise.revisits": 2}
+"""The noise is measured at the first reference."""
+
 
 @dataclass(frozen=True)
 class Site:

@@ -20,7 +20,7 @@ from hexacell.runs.run_folder import RunFolder
 from procedures.engine.config_transactions import PROVISIONAL_FOLDER
 from procedures.journal.journal import read_journal
 from procedures.run import events
-from tests.faults.cell import NEVER_GOOD_ENOUGH, PROVISIONAL, Site, make_site
+from tests.faults.cell import MEASURED, NEVER_GOOD_ENOUGH, PROVISIONAL, Site, make_site
 from tests.faults.driver import UNEXPECTED, Order
 from tests.faults.interception import Call
 from tests.faults.matrix import PROPERTY, Case
@@ -182,10 +182,23 @@ def lent(program: Program, session_ground: Path) -> Whole:
     return found
 
 
+@pytest.fixture(scope="session")
+def noise_measured(program: Program, session_ground: Path) -> Whole:
+    """A run that measures the noise at its first reference."""
+    found = whole(program, session_ground / "noise", MEASURED)
+    assert found.ended.code == 0, found.ended.words
+    return found
+
+
 @pytest.fixture
 def whole_with(request: pytest.FixtureRequest) -> Callable[[str], Whole]:
     """The undisturbed run to compare with where a kind of step is broken: not every run has each."""
-    others = {"rolling back": "rolled_back", "lending": "lent", "taking back": "lent"}
+    others = {
+        "rolling back": "rolled_back",
+        "lending": "lent",
+        "taking back": "lent",
+        "measuring noise": "noise_measured",
+    }
 
     def find(step: str) -> Whole:
         found: Whole = request.getfixturevalue(others.get(step, "undisturbed"))

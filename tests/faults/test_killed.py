@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 
+from procedures.run import events
 from tests.faults.killing import KILLED, after, finish, history_of, places, within
 from tests.faults.matrix import step_of
 from tests.faults.promises import require_identical
@@ -102,3 +103,44 @@ def test_a_provisional_geometry_is_reverted_after_a_kill_at_any_record(
             outcome = finish(program, site)
             require_identical(site, lent.site)
             case("killed after a record, lending", step, outcome)
+
+
+def noise_records(whole: Any) -> range:
+    """The records from the first reference's to that of the measured noise."""
+    (last,) = (
+        number
+        for number, event in enumerate(whole.history, start=1)
+        if isinstance(event, events.NoiseMeasured)
+    )
+    return range(places(whole.history)["measuring noise"] - 1, last + 1)
+
+
+@pytest.fixture
+def kill_while_measuring_noise(
+    program: Any, new_site: Any, noise_measured: Any, case: Any
+) -> Callable[[int], None]:
+    def broken(records: int) -> None:
+        site = new_site(*noise_measured.changes)
+        assert program.run(site, **after(records)).code == KILLED
+        step = step_of(history_of(site))
+        outcome = finish(program, site)
+        require_identical(site, noise_measured.site)
+        case("killed after a record", step, outcome)
+
+    return broken
+
+
+def test_a_run_killed_while_it_measures_the_noise_is_resumed(
+    noise_measured: Any, kill_while_measuring_noise: Any
+) -> None:
+    records = noise_records(noise_measured)
+    kill_while_measuring_noise(records[len(records) // 2])
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(3600)
+def test_a_run_killed_after_any_record_of_the_noise_is_resumed(
+    noise_measured: Any, kill_while_measuring_noise: Any
+) -> None:
+    for records in noise_records(noise_measured):
+        kill_while_measuring_noise(records)

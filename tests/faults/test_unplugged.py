@@ -68,6 +68,10 @@ def test_a_gauge_plugged_in_again_while_measuring_is_recovered(puller: Puller) -
     assert puller.pull("gauge y", "sampling", back=True) == "done, recovered"
 
 
+def test_a_gauge_plugged_in_again_while_the_noise_is_measured_is_recovered(puller: Puller) -> None:
+    assert puller.pull("gauge y", "measuring noise", back=True) == "done, recovered"
+
+
 def test_a_controller_left_unplugged_ends_the_run_with_the_old_config(puller: Puller) -> None:
     assert puller.pull("controller", "to orientation", back=False) == "exit 3, old config, resumed"
 

@@ -34,6 +34,13 @@ class TimeModel:
         return points * self.point_minutes + (records + points) * self.record_seconds / 60.0
 
 
+def noise_minutes(settings: CellSettings) -> float:
+    """To measure the noise at the first reference: readings at rest, then leaving it and coming back."""
+    noise, timing = settings.noise, settings.timing
+    visit_s = 2.0 * timing.move_s + timing.window_s
+    return (noise.standstill_readings * timing.interval_s + noise.revisits * visit_s) / 60.0
+
+
 def _usual_moves(settings: CellSettings) -> float:
     if settings.identification.poses is not None:
         return 1.0

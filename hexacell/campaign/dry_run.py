@@ -7,7 +7,7 @@ from statistics import median
 
 import numpy as np
 
-from hexacell.campaign.budget import TimeModel
+from hexacell.campaign.budget import TimeModel, noise_minutes
 from hexacell.campaign.decisions import (
     CampaignState,
     Decision,
@@ -138,7 +138,7 @@ class DryRunResult:
         points: measured, and how many ``records`` there.
         outside: records at which the ball left the gauges' travel, over all robots.
         worst_sigma_mm: predicted error at the worst task pose afterwards; none without task poses.
-        minutes: to measure, held-out poses included.
+        minutes: to measure, noise and held-out poses included.
         expanded_mm: U of the largest error at the task poses, systematic effects included; none likewise.
         verdicts: what a run will say of healthy machines; none likewise, or without held-out poses.
     """
@@ -214,7 +214,10 @@ def _summary(plan: Plan, tried: int, identified: list[_Outcome]) -> DryRunResult
         records=records,
         outside=sum(outcome.campaign.outside for outcome in identified),
         worst_sigma_mm=median(errors) if errors else None,
-        minutes=plan.budget.time_model.minutes(records, points) + before + after,
+        minutes=noise_minutes(plan.settings)
+        + plan.budget.time_model.minutes(records, points)
+        + before
+        + after,
         expanded_mm=median(expanded) if expanded else None,
         verdicts=VerdictForecast.mean(verdicts) if verdicts else None,
     )

@@ -84,9 +84,9 @@ def _mounting_text(mounting: int, seat: int, pose: Pose) -> str:
     where = f"\nLength check, mounting {mounting}: the robot holds the ball at {pose}.\n"
     if mounting == 1:
         return (
-            f"{where}Clamp the fixture with its first seat there, the second one in the stated direction.\n"
-            "Mount the gauges in the first seat around the ball, plungers in the middle of their\n"
-            "travel, and zero them.\n"
+            f"{where}Clamp the fixture with its first seat there, the second in the stated direction.\n"
+            "Mount the gauges in the first seat around the ball, plungers in the middle of\n"
+            "their travel, and zero them.\n"
             "Press Enter when they are mounted. "
         )
     return (

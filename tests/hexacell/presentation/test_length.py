@@ -26,7 +26,7 @@ SOURCES = tuple(
 ERROR = JudgedError(value=0.19, expanded=0.004, limit=0.15, verdict=Verdict.FAIL)
 
 
-def result(long_um_m: float = 12.0, reason: str = "") -> LengthResult:
+def length_of(long_um_m: float = 12.0, reason: str = "") -> LengthResult:
     return LengthResult(
         distance_mm=300.0,
         length_mm=300.0036,
@@ -51,24 +51,26 @@ def stated(found: LengthResult, verdict: Verdict = Verdict.PASS) -> LengthStatem
     ],
 )
 def test_a_scale_within_its_uncertainty_is_one_line(long_um_m: float, said: str) -> None:
-    assert scale_lines(result(long_um_m)) == [said]
+    assert scale_lines(length_of(long_um_m)) == [said]
 
 
 @pytest.mark.parametrize(("long_um_m", "factor"), [(1000.0, "0.999001"), (-1000.0, "1.001001")])
 def test_a_significant_scale_has_its_remedy(long_um_m: float, factor: str) -> None:
-    said = " ".join(" ".join(scale_lines(result(long_um_m))).split())
+    said = " ".join(" ".join(scale_lines(length_of(long_um_m))).split())
     assert f"multiply the scale factor of all encoders by {factor}, at the drives" in said
 
 
 def test_what_was_not_checked_is_said_and_what_says_nothing_is_left_out() -> None:
     assert scale_lines(None) == [NOT_CHECKED] == [earlier_scale_line(None)]
-    assert scale_lines(result(reason="the fixture moved")) == []
-    assert earlier_scale_line(result(reason="the fixture moved")) == NOT_CHECKED
-    assert earlier_scale_line(result()).endswith("as checked in that run: encoders read 12 +- 20 um/m long")
+    assert scale_lines(length_of(reason="the fixture moved")) == []
+    assert earlier_scale_line(length_of(reason="the fixture moved")) == NOT_CHECKED
+    assert earlier_scale_line(length_of()).endswith(
+        "as checked in that run: encoders read 12 +- 20 um/m long"
+    )
 
 
 def test_a_length_check_of_its_own_says_what_the_scale_does_and_its_largest_sources() -> None:
-    lines = length_text(stated(result(1000.0), Verdict.FAIL)).splitlines()
+    lines = length_text(stated(length_of(1000.0), Verdict.FAIL)).splitlines()
     assert lines[0] == "verdict: fail"
     assert "  position error by that at the task poses: 0.190 mm, U 0.004 (limit 0.15)" in lines
     assert " ".join(" ".join(lines).split()).endswith(
@@ -78,7 +80,7 @@ def test_a_length_check_of_its_own_says_what_the_scale_does_and_its_largest_sour
 
 
 def test_a_check_that_contradicts_itself_says_why() -> None:
-    found = stated(result(1000.0, "the gauges were zeroed"), Verdict.NOT_EVALUATED)
+    found = stated(length_of(1000.0, "the gauges were zeroed"), Verdict.NOT_EVALUATED)
     assert length_text(found).splitlines() == [
         "verdict: not evaluated",
         "  the length check says nothing: the gauges were zeroed",
@@ -87,7 +89,7 @@ def test_a_check_that_contradicts_itself_says_why() -> None:
 
 
 def test_the_outcome_in_one_line() -> None:
-    assert length_line(stated(result(1000.0), Verdict.FAIL)) == (
+    assert length_line(stated(length_of(1000.0), Verdict.FAIL)) == (
         "length check over 300.000 mm: encoders read 1000 +- 20 um/m long; position error by that "
         "0.190 +- 0.004 mm (limit 0.15): fail"
     )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from datetime import UTC, datetime
 from functools import partial
 from typing import Any
@@ -10,7 +11,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from drivers.interfaces import DeviceIdentity, TemperatureReading
 from hexacell.cell.bundled import bundled_config
+from hexacell.cell.devices import ThermometerSettings
 from hexacell.cell.loader import load_cell
 from hexacell.decision import Verdict
 from hexacell.errors import AnswerNeeded, HexacellError
@@ -20,6 +23,7 @@ from hexacell.reporting.result import AcceptedResult
 from procedures.calibration.length_steps import BESIDE_MM
 from procedures.calibration.preflight import plan_failures
 from procedures.calibration.workflow import Mode, expected_records
+from procedures.devices.device_set import Thermometers
 from procedures.journal.journal import read_journal
 from procedures.run import events
 from procedures.run.commands import MeasureAgain
@@ -141,6 +145,35 @@ async def test_a_fixture_beside_its_direction_is_found_by_the_first_reading(make
 async def test_another_distance_than_certified_looks_like_a_scale(make_length_rig) -> None:
     found = await stated(make_length_rig(simulation__fixture__distance_mm=299.97))
     assert found.result.long_um_m == pytest.approx(-100.0, abs=found.result.expanded_um_m)
+
+
+class WarmFixture:
+    """A thermometer on the fixture."""
+
+    name = "fixture"
+
+    async def open(self) -> DeviceIdentity:
+        return DeviceIdentity("thermometer fixture", "fake", "a thermometer")
+
+    async def read(self) -> TemperatureReading:
+        return TemperatureReading(24.0, "24000")
+
+    async def close(self) -> None:
+        pass
+
+
+async def test_a_warm_fixture_is_longer_by_its_expansion(make_length_rig) -> None:
+    """4 K of steel are 46 um/m: the true distance of the seats is that of the warm fixture."""
+    longer = 300.0 * (1.0 + 4 * 11.5e-6)
+    rig = make_length_rig(
+        thermometers=(ThermometerSettings(name="fixture", path="/nowhere"),),
+        length_check__thermometer="fixture",
+        simulation__fixture__distance_mm=longer,
+    )
+    rig.performer = replace(rig.performer, thermometers=Thermometers([WarmFixture()]))
+    found = await stated(rig)
+    assert found.result.distance_mm == pytest.approx(longer)
+    assert abs(found.result.long_um_m) <= found.result.expanded_um_m < 40.0
 
 
 async def test_more_mountings_lessen_what_the_seating_does(make_length_rig) -> None:

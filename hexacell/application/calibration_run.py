@@ -227,6 +227,11 @@ def _resumed_start(request: RunRequest) -> events.RunStarted:
         raise UsageError(
             f"the run was begun in the mode {state.started.mode}", action="Resume it in that mode"
         )
+    if request.length_check and not state.started.length_check:
+        raise UsageError(
+            "the run was begun without a length check",
+            action="Resume it without --length-check, and check the length with `hexacell length`",
+        )
     return state.started
 
 

@@ -117,7 +117,8 @@ def _run(commands: Any) -> None:  # noqa: ANN401
     parser.add_argument(
         "--length-check",
         action="store_true",
-        help="check the length scale before the verdict, with the fixture of [length_check]",
+        help="check the length scale before the verdict, with the fixture of [length_check]; a resumed run "
+        "has it if it was begun with it",
     )
     _add_json(parser)
 

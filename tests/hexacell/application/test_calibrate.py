@@ -196,6 +196,13 @@ async def test_a_run_is_resumed_in_its_mode(make_site, finished) -> None:
         await site.calibrate(resume=True, mode=Mode.CHECK)
 
 
+async def test_a_run_gets_no_length_check_when_it_is_resumed(make_site, finished) -> None:
+    site = make_site()
+    site.write(finished.until(events.RecordTaken), finished)
+    with pytest.raises(UsageError, match="begun without a length check"):
+        await site.calibrate(resume=True, length_check=True)
+
+
 async def test_a_damaged_journal_is_not_resumed(make_site, finished) -> None:
     site = make_site()
     site.write(finished.until(events.RecordTaken), finished)

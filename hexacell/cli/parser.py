@@ -106,7 +106,7 @@ def _demo(commands: Any) -> None:  # noqa: ANN401
 def _run(commands: Any) -> None:  # noqa: ANN401
     parser = _command(commands, "run", "measure, identify, propose, write back and verify")
     _add_cell(parser)
-    parser.add_argument("--resume", metavar="RUN", help="resume an interrupted run: its folder or name")
+    _add_resume(parser, "run")
     parser.add_argument("--unattended", action="store_true", help="no person can place gauges or approve")
     parser.add_argument(
         "--mode",
@@ -123,12 +123,22 @@ def _run(commands: Any) -> None:  # noqa: ANN401
     _add_json(parser)
 
 
+def _add_resume(parser: argparse.ArgumentParser, what: str) -> None:
+    parser.add_argument(
+        "--resume",
+        metavar="RUN",
+        nargs="?",
+        const="latest",
+        help=f"resume an interrupted {what}: its folder or name (default: the latest one)",
+    )
+
+
 def _length(commands: Any) -> None:  # noqa: ANN401
     parser = _command(
         commands, "length", "check the scale of the encoders against a known length", "run.length"
     )
     _add_cell(parser)
-    parser.add_argument("--resume", metavar="RUN", help="resume an interrupted check: its folder or name")
+    _add_resume(parser, "check")
     parser.add_argument("--unattended", action="store_true", help="no person can mount the gauges")
     _add_json(parser)
 

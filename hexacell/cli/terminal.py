@@ -10,10 +10,11 @@ from typing import Any, TextIO, TypeVar
 
 from hexacell.cli.console import Console
 from hexacell.errors import AnswerNeeded
-from hexacell.presentation.run import matching_choice, question_text, repeated_text
+from hexacell.presentation.answers import request_text, typed_answer
+from hexacell.presentation.run import question_text
 from procedures.run import events
 from procedures.run.commands import Abort, Command, CommandQueue, MeasureAgain, Pause, Resume, Undo
-from procedures.run.questions import Question, QuestionKind
+from procedures.run.questions import Question
 from procedures.run.state import RunState
 from procedures.run.steps import SetKey
 
@@ -64,6 +65,10 @@ class KeyboardCommands:
         if not line:  # end of input, which would be reported again and again
             asyncio.get_running_loop().remove_reader(self._terminal)
             return
+        self.take(line)
+
+    def take(self, line: str) -> None:
+        """Put the command that a line means into the queue; where it means none, say which there are."""
         make = self._commands().get(line.strip())
         if make is not None:
             self._queue.put(make())
@@ -86,12 +91,14 @@ class TerminalOperator:
     """Asks the person at stdin.
 
     Attributes:
+        type_command: called with a line that is no answer to the question.
         before_question: called before a question is shown.
         after_question: called once it is answered or given up.
     """
 
     def __init__(self, console: Console) -> None:
         self._console = console
+        self.type_command: Callable[[str], None] = lambda _: None
         self.before_question: Callable[[], None] = lambda: None
         self.after_question: Callable[[], None] = lambda: None
 
@@ -104,13 +111,10 @@ class TerminalOperator:
         text = question_text(question)
         while True:
             typed = await self._answer(text)
-            if question.kind in {QuestionKind.APPROVE_CHANGE, QuestionKind.KEEP_RESULT}:
-                return APPROVER if typed.strip().lower() == question.consent.lower() else None
-            if question.default is not None:
-                return question.default
-            if (chosen := matching_choice(typed, question)) is not None:
-                return chosen
-            text = repeated_text(question)
+            if (answer := typed_answer(typed, question, APPROVER)) is not None:
+                return answer.value
+            self.type_command(typed)
+            text = request_text(question)
 
     async def _answer(self, question: str) -> str:
         self.before_question()

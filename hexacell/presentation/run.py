@@ -8,8 +8,10 @@ from pathlib import Path
 from hexacell.application.calibration_run import RunRequest
 from hexacell.campaign.teaching import TaskDisplacement
 from hexacell.kinematics.pose import Pose
+from hexacell.presentation.answers import request_text
 from hexacell.presentation.layout import wrapped
 from hexacell.presentation.teaching import teaching_line, teaching_sentence
+from hexacell.reporting.result import ExpectedImprovement
 from procedures.calibration.workflow import Mode
 from procedures.replay.comparison import Aspect, Difference, ReplayReport
 from procedures.run import events
@@ -61,19 +63,20 @@ def question_text(question: Question) -> str:
     """The question for a terminal that reads one line as the answer."""
     match question.subject:
         case GaugePlacement(point=mounting, pose=pose, seat=int(seat)):
-            return _mounting_text(mounting, seat, pose)
-        case GaugePlacement(point=point, pose=pose):
+            return _mounting_text(mounting, seat, pose) + request_text(question)
+        case GaugePlacement(station=station, pose=pose):
             return (
-                f"\nPoint {point}: the robot is at {pose}.\n"
+                f"\n{station[0].upper()}{station[1:]}: the robot is at {pose}.\n"
                 "Put the three gauges around the ball, plungers in the middle of their travel.\n"
-                "Press Enter when they are in place. "
+                f"{request_text(question)}"
             )
-        case PendingChange(gates=gates, diff=diff, displacement=moved):
+        case PendingChange(gates=gates, diff=diff, displacement=moved, improvement=improvement):
             outcomes = "".join(f"{'ok' if gate.passed else 'NO'}  {gate.sentence}\n" for gate in gates)
-            write = f"{_teaching(moved)}Write this into the controller's config? {_consent(question)}"
-            return f"\n{diff}\n{outcomes}{write}"
+            expected = "" if improvement is None else f"{wrapped(_expected(improvement), indent=4)}\n"
+            write = f"{_teaching(moved)}Write this into the controller's config? {request_text(question)}"
+            return f"\n{diff}\n{outcomes}{expected}{write}"
         case WrittenResult(line=line, displacement=moved):
-            keep = f"The new geometry is in the controller's config. Keep it? {_consent(question)}"
+            keep = f"The new geometry is in the controller's config. Keep it? {request_text(question)}"
             return f"\n{line}.\n{_teaching(moved)}{keep}"
         case StepFailure(problem=problem):
             return f"\n{problem}\nHow to continue ({', '.join(question.choices)})? "
@@ -87,37 +90,24 @@ def _mounting_text(mounting: int, seat: int, pose: Pose) -> str:
             f"{where}Clamp the fixture with its first seat there, the second in the stated direction.\n"
             "Mount the gauges in the first seat around the ball, plungers in the middle of\n"
             "their travel, and zero them.\n"
-            "Press Enter when they are mounted. "
         )
     return (
         f"{where}Mount the gauges in seat {seat}, the same way round. Do not zero them, and leave the\n"
         "fixture where it is.\n"
-        "Press Enter when they are mounted. "
+    )
+
+
+def _expected(improvement: ExpectedImprovement) -> str:
+    """What the change is for."""
+    return (
+        f"Largest position error at the task poses: {improvement.now_mm:.3g} mm with the config of now, "
+        f"0 +- {improvement.expanded_mm:.2g} mm with this one."
     )
 
 
 def _teaching(moved: TaskDisplacement | None) -> str:
     """What must be taught anew, in lines of its own."""
     return "" if moved is None else f"{wrapped(teaching_sentence(moved), indent=4)}\n"
-
-
-def _consent(question: Question) -> str:
-    """What to type; the name of the cell where more than a yes is asked for."""
-    if question.consent == "yes":
-        return "Type yes: "
-    return f"Type the cell's name, {question.consent}, to take the responsibility: "
-
-
-def repeated_text(question: Question) -> str:
-    """The text after an invalid answer."""
-    return f"Type one of {', '.join(question.choices)}: "
-
-
-def matching_choice(typed: str, question: Question) -> str | None:
-    """The only choice that begins with the line typed; a space may stand for a hyphen."""
-    answer = typed.strip().lower().replace(" ", "-")
-    found = [choice for choice in question.choices if answer and choice.startswith(answer)]
-    return found[0] if len(found) == 1 else None
 
 
 def replay_report(replayed: ReplayReport) -> str:

@@ -23,6 +23,7 @@ from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.pose import Pose
 from hexacell.measurements.records import MeasurementSet
+from hexacell.reporting.result import ExpectedImprovement
 from hexacell.robot_model import Robot
 from hexacell.uncertainty.budget import UncertaintyBudget
 from hexacell.uncertainty.possible_causes import PossibleCause, possible_causes
@@ -77,6 +78,15 @@ class Assessment:
     def is_usable(self) -> bool:
         """Whether the solver converged and nothing refuses the geometry."""
         return self.found.converged and not self.refused
+
+    @property
+    def improvement(self) -> ExpectedImprovement | None:
+        """What the identified geometry is good for; none where the robot can reach no task pose."""
+        if self.accuracy is None or self.budget is None:
+            return None
+        return ExpectedImprovement(
+            now_mm=self.accuracy.before.position_largest_mm, expanded_mm=self.budget.expanded_mm
+        )
 
     @property
     def does_not_repeat(self) -> bool:

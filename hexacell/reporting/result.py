@@ -126,6 +126,18 @@ class IdentificationResult(Frozen):
         return Geometry.of(parameters, self.geometry)
 
 
+class ExpectedImprovement(Frozen):
+    """The largest position error over the task poses, mm.
+
+    Attributes:
+        now_mm: of the controller's geometry, as the identification has it.
+        expanded_mm: U of the identified geometry.
+    """
+
+    now_mm: float
+    expanded_mm: float
+
+
 class AcceptedResult(Frozen):
     """A result whose geometry the controller has: it passed, or a person kept it.
 

@@ -59,6 +59,7 @@ class Computations:
             result=result,
             held_out=calibration.held_out_poses(identified),
             held_out_after=calibration.held_out_poses_after(identified),
+            improvement=assessed.improvement,
         )
 
     def propose(self, state: RunState) -> events.Proposed:

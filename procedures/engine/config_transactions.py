@@ -99,8 +99,11 @@ class ConfigTransactions:
         if automatic and all(gate.passed for gate in conditions):
             return "the cell file: within its limits"
         displacement = proposed.displacement if proposed else None
-        cell = self.cell.settings.name
-        name = await self.operator.ask(ask_approval(conditions, change.diff, displacement, cell=cell))
+        improvement = state.identified.improvement if state.identified else None
+        question = ask_approval(
+            conditions, change.diff, displacement, improvement, cell=self.cell.settings.name
+        )
+        name = await self.operator.ask(question)
         if name is None:
             raise LimitError("the new geometry was declined; nothing was applied")
         return name

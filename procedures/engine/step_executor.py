@@ -136,7 +136,7 @@ class StepExecutor:
         if step.at.phase is Phase.LENGTH and settings.length_check is not None:
             is_by_hand = settings.length_check.mounting == "by-hand"
             return ask_mounting(step.at.point, seat_of(step.at), pose) if is_by_hand else None
-        return ask_placement(step.at.point, pose) if settings.stations.placement == "by-hand" else None
+        return ask_placement(step.at, pose) if settings.stations.placement == "by-hand" else None
 
     async def _sample(self, step: Sample, state: RunState) -> events.Event:
         try:

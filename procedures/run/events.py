@@ -20,7 +20,7 @@ from hexacell.decision import Verdict
 from hexacell.kinematics.mechanism import Branch
 from hexacell.reporting.check_result import CheckResult
 from hexacell.reporting.length_statement import LengthStatement
-from hexacell.reporting.result import AcceptedResult, IdentificationResult
+from hexacell.reporting.result import AcceptedResult, ExpectedImprovement, IdentificationResult
 from hexacell.reporting.verification import Verification
 from procedures.run.steps import SetKey, SixNumbers, Step, ThreeNumbers
 from procedures.run.trips import Guard, Trip
@@ -223,13 +223,15 @@ class Identified(Frozen):
     """The geometry was identified, and the held-out poses were chosen.
 
     ``held_out`` are measured at each point before and after, ``held_out_after`` only after: the robot
-    cannot take them safely before it is calibrated.
+    cannot take them safely before it is calibrated. ``improvement`` is none where the robot can reach none
+    of the task poses.
     """
 
     kind: Literal["identified"] = "identified"
     result: IdentificationResult
     held_out: tuple[tuple[SixNumbers, ...], ...]
     held_out_after: tuple[tuple[SixNumbers, ...], ...] = ()
+    improvement: ExpectedImprovement | None = None
 
 
 class Proposed(Frozen):

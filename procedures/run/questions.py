@@ -13,8 +13,10 @@ from hexacell.campaign.teaching import TaskDisplacement
 from hexacell.cell.recovery import Action
 from hexacell.errors import AnswerNeeded
 from hexacell.kinematics.pose import Pose
+from hexacell.reporting.result import ExpectedImprovement
 from hexacell.reporting.verification import Verification
 from procedures.run.cancellation import cancel_and_wait
+from procedures.run.steps import SetKey
 
 PLACED = "placed"
 """The one answer to a request to place the gauges."""
@@ -33,11 +35,13 @@ class QuestionKind(StrEnum):
 class GaugePlacement:
     """Where the gauges are wanted: a point, counted from 1, and the pose the robot holds there.
 
-    In a length check the point is the number of the mounting, and ``seat`` (1 or 2) that of the fixture.
+    ``station`` is the point in words. In a length check the point is the number of the mounting, and
+    ``seat`` (1 or 2) that of the fixture.
     """
 
     point: int
     pose: Pose
+    station: str
     seat: int | None = None
 
 
@@ -45,12 +49,14 @@ class GaugePlacement:
 class PendingChange:
     """A change of the controller's config: its acceptance gates, and the text change as a diff.
 
-    ``displacement`` is how far it moves taught points; none if that is not known.
+    ``displacement`` is how far it moves taught points, ``improvement`` what it is for; none if that is not
+    known.
     """
 
     gates: tuple[AcceptanceGate, ...]
     diff: str
     displacement: TaskDisplacement | None = None
+    improvement: ExpectedImprovement | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,12 +98,12 @@ class Question:
     consent: str = "yes"
 
 
-def ask_placement(point: int, pose: Pose) -> Question:
+def ask_placement(at: SetKey, pose: Pose) -> Question:
     """Ask for the gauges to be placed around the ball; answered when they are."""
     return Question(
         QuestionKind.PLACE_GAUGES,
-        f"Put the gauges around the ball at point {point} ({pose}).",
-        GaugePlacement(point, pose),
+        f"Put the gauges around the ball at {at.station} ({pose}).",
+        GaugePlacement(at.point, pose, at.station),
         choices=(PLACED,),
         default=PLACED,
     )
@@ -109,7 +115,7 @@ def ask_mounting(mounting: int, seat: int, pose: Pose) -> Question:
     return Question(
         QuestionKind.PLACE_GAUGES,
         f"Mount the gauges in seat {seat} of the fixture, around the ball ({pose}), {zero}.",
-        GaugePlacement(mounting, pose, seat),
+        GaugePlacement(mounting, pose, f"mounting {mounting}", seat),
         choices=(PLACED,),
         default=PLACED,
     )
@@ -119,6 +125,7 @@ def ask_approval(
     gates: Sequence[AcceptanceGate],
     diff: str,
     displacement: TaskDisplacement | None = None,
+    improvement: ExpectedImprovement | None = None,
     *,
     cell: str,
 ) -> Question:
@@ -127,7 +134,7 @@ def ask_approval(
     return Question(
         QuestionKind.APPROVE_CHANGE,
         f"Write this into the controller's config?\n{diff}",
-        PendingChange(tuple(gates), diff, displacement),
+        PendingChange(tuple(gates), diff, displacement, improvement),
         consent=cell if is_grave else "yes",
     )
 
@@ -216,9 +223,9 @@ class UnattendedOperator:
                     action='Run it attended, or set mounting = "fixed" in [length_check] if no person is '
                     "needed",
                 )
-            case GaugePlacement(point=point, pose=pose):
+            case GaugePlacement(station=station, pose=pose):
                 raise AnswerNeeded(
-                    f"the gauges must be put around the ball at point {point} ({pose}), but the run is "
+                    f"the gauges must be put around the ball at {station} ({pose}), but the run is "
                     "unattended",
                     action='Run it attended, or use fixed stations (placement = "fixed" in [stations])',
                 )

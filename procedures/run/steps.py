@@ -36,6 +36,16 @@ class SetKey(Frozen):
     def __str__(self) -> str:
         return f"{self.phase.value}{self.point}"
 
+    @property
+    def station(self) -> str:
+        """The same in words: where the gauges stand, and for what."""
+        match self.phase:
+            case Phase.BEFORE:
+                return f"held-out point {self.point}"
+            case Phase.AFTER:
+                return f"held-out point {self.point} with the new geometry"
+        return f"point {self.point}"
+
 
 class Expectation(Frozen):
     """What the gauges should show (mm, base x y z), one sigma, and what is learnt (nat)."""

@@ -188,11 +188,11 @@ class TestAPersonAtTheTerminal:
         fast_cell.edit(ASK)
         run = fast_cell.rewound(demo.run, before="propose")
         process = start_at(terminal, start, "run", fast_cell.cell, "--resume", run)
-        question = terminal.read_until("Write this into the controller's config? Type yes: ")
+        question = terminal.read_until("Write this into the controller's config? Type yes or no: ")
         return process, question, fast_cell
 
     @pytest.mark.parametrize(
-        ("typed", "code"), [("yes\n", 1), ("simulated-hexaglide\n", 0)], ids=["yes", "the cell's name"]
+        ("typed", "code"), [("no\n", 1), ("simulated-hexaglide\n", 0)], ids=["no", "the cell's name"]
     )
     def test_a_geometry_beyond_the_tolerance_needs_the_cell_s_name(
         self, fast_cell, demo, start, terminal, typed, code
@@ -200,9 +200,11 @@ class TestAPersonAtTheTerminal:
         fast_cell.edit(("l_mm = 7.0", "l_mm = 2.0"))
         run = fast_cell.rewound(demo.run, before="propose")
         process = start_at(terminal, start, "run", fast_cell.cell, "--resume", run)
-        asked = terminal.read_until("to take the responsibility: ")
+        asked = terminal.read_until("to take the responsibility, or no: ")
         assert "NO  Beyond the drawing's tolerance: " in asked
         assert "Type the cell's name, simulated-hexaglide" in asked
+        terminal.type("yes\n")
+        terminal.read_until("to take the responsibility, or no: ")
         terminal.type(typed)
         assert ended(process, terminal) == code
         before = (demo.run / "config-before").read_bytes()
@@ -219,9 +221,11 @@ class TestAPersonAtTheTerminal:
         assert "approved by a person at the terminal" in process.out
         assert process.out.splitlines()[-1].endswith(": pass")
 
-    def test_an_answer_other_than_yes_declines(self, waiting, terminal, demo):
+    def test_only_no_declines_and_all_else_asks_again(self, waiting, terminal, demo):
         process, _, cell = waiting
-        terminal.type("y\n")
+        terminal.type("perhaps\n")
+        terminal.read_until("Type yes or no: ")
+        terminal.type("n\n")
         assert ended(process, terminal) == 1
         assert "declined; nothing was applied" in terminal.shown
         assert cell.controller.read_bytes() == (demo.run / "config-before").read_bytes()
@@ -242,16 +246,18 @@ class TestAPersonAtTheTerminal:
     def test_moves_the_gauges_from_point_to_point(self, quick_cell, start, terminal):
         quick_cell.edit(BY_HAND)
         process = start_at(terminal, start, "run", quick_cell.cell, "--mode", "check")
-        terminal.read_until("Press Enter when they are in place. ")
+        terminal.read_until("Press Enter when they are in place, or type a to abort: ")
         terminal.type("\n\n")  # an Enter too many must not answer the next question
-        second = terminal.read_until("Press Enter when they are in place. ")
+        second = terminal.read_until("Press Enter when they are in place, or type a to abort: ")
         assert "Point 2: the robot is at X0.000 Y-200.000 Z550.000" in second
         [run] = quick_cell.runs()
         placed = [e for e in read_journal(run / "journal.jsonl") if isinstance(e, events.GaugesPlaced)]
         assert len(placed) == 1
-        terminal.type("x\n")  # an answer as good as Enter; where no question is open, no letter known
+        terminal.type("yes\n")  # no answer, and no letter known
+        terminal.read_until("Press Enter when they are in place, or type a to abort: ")
+        terminal.type("\n")
         assert ended(process, terminal) == 1
-        assert process.out.count("Letters, each with Enter") == 1, "the second question was still open"
+        assert process.out.count("Letters, each with Enter") == 2, "at the beginning, and at the question"
         assert ": fail" in process.out
         assert "/45" in terminal.shown  # the bar
         assert re.search(r"point 1  +\d+ records", process.out), "not swallowed by the bar's terminal"
@@ -259,7 +265,7 @@ class TestAPersonAtTheTerminal:
     def test_pauses_undoes_and_resumes_by_letters(self, quick_cell, start, terminal):
         quick_cell.edit(BY_HAND)
         process = start_at(terminal, start, "run", quick_cell.cell, "--mode", "check")
-        terminal.read_until("Press Enter when they are in place. ")
+        terminal.read_until("Press Enter when they are in place, or type a to abort: ")
         terminal.type("\n")
         terminal.type("p\n")
         process.wait_for("paused\n", lambda: process.out)
@@ -268,7 +274,7 @@ class TestAPersonAtTheTerminal:
         assert process.out.count("Letters, each with Enter") == 2, (
             "at the beginning, and for what means none"
         )
-        terminal.read_until("Press Enter when they are in place. ")
+        terminal.read_until("Press Enter when they are in place, or type a to abort: ")
         process.popen.send_signal(signal.SIGTERM)
         assert ended(process, terminal) == 130
         [run] = quick_cell.runs()
@@ -279,13 +285,13 @@ class TestAPersonAtTheTerminal:
     def test_is_asked_how_to_go_on_after_a_fault(self, quick_cell, start, terminal):
         quick_cell.edit(BY_HAND, ("[acceptance]", "[acceptance]\ndrift_mm = 0.00001"))
         process = start_at(terminal, start, "run", quick_cell.cell, "--mode", "check")
-        terminal.read_until("Press Enter when they are in place. ")
+        terminal.read_until("Press Enter when they are in place, or type a to abort: ")
         terminal.type("\n")
         terminal.read_until("How to continue (retry, measure-again, redo-set, abort)? ")
         terminal.type("re\n")
         terminal.read_until("Type one of retry, measure-again, redo-set, abort: ")
         terminal.type("redo\n")
-        terminal.read_until("Press Enter when they are in place. ")
+        terminal.read_until("Press Enter when they are in place, or type a to abort: ")
         terminal.type("\n")
         terminal.read_until("How to continue (retry, measure-again, redo-set, abort)? ")
         terminal.type("abort\n")

@@ -153,8 +153,12 @@ def test_a_killed_run_can_be_resumed(start, typed_here, good_cell):
     process.popen.kill()
     process.popen.wait()
     [run] = good_cell.runs()
-    resumed = typed_here("run", good_cell.cell, "--resume", run, "--unattended")
+    resumed = typed_here("run", good_cell.cell, "--unattended", "--resume")
     assert resumed.code == 0, resumed.err
+    assert good_cell.runs() == [run], "the latest interrupted one"
+    again = typed_here("run", good_cell.cell, "--unattended", "--resume", "latest")
+    assert again.code == 2
+    assert "no run of this cell was interrupted" in again.err
 
 
 def test_a_closed_output_does_not_stop_the_run(start, good_cell):

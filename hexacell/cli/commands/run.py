@@ -8,6 +8,7 @@ from dataclasses import replace
 
 from hexacell.application.calibration_run import RunRequest, calibrate, is_unverified
 from hexacell.application.demo import prepare_demo
+from hexacell.application.interrupted_runs import run_to_resume
 from hexacell.campaign.pose_list import pose_list_of
 from hexacell.cell.loader import load_cell
 from hexacell.cli.console import Console
@@ -17,7 +18,7 @@ from hexacell.cli.terminal import HELP, KeyboardCommands, TerminalOperator, is_i
 from hexacell.errors import ExitCode, HexacellError, UsageError
 from hexacell.presentation.documents import run_document
 from hexacell.presentation.run import UNVERIFIED, clock_notice, closing_lines, demo_opening, resume_hint
-from hexacell.runs.run_folder import find_run, new_run
+from hexacell.runs.run_folder import new_run
 from procedures.calibration.workflow import Mode, expected_records
 from procedures.journal.journal import read_journal
 from procedures.run import events
@@ -49,7 +50,7 @@ def _request(options: argparse.Namespace, console: Console, mode: Mode) -> RunRe
     attended = is_interactive() and not options.unattended
     return RunRequest(
         cell=cell,
-        folder=find_run(cell, options.resume) if options.resume else new_run(cell),
+        folder=run_to_resume(cell, options.resume) if options.resume else new_run(cell),
         mode=mode,
         operator=TerminalOperator(console) if attended else UnattendedOperator(),
         unattended=not attended,
@@ -117,5 +118,6 @@ async def _calibrate(
         return await calibrate(request, [progress], queue)
     keys = KeyboardCommands(console, queue, sys.stdin)
     request.operator.before_question, request.operator.after_question = progress.hide, keys.listen
+    request.operator.type_command = keys.take
     console.print(HELP)
     return await keys.listen_during(calibrate(request, [progress, keys], queue))

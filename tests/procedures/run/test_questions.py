@@ -12,6 +12,7 @@ from hexacell.errors import AnswerNeeded, ExitCode
 from hexacell.kinematics.pose import Pose
 from procedures.run.questions import (
     GaugePlacement,
+    Question,
     QuestionBroker,
     QuestionKind,
     UnattendedOperator,
@@ -19,12 +20,17 @@ from procedures.run.questions import (
     ask_placement,
     ask_recovery,
 )
+from procedures.run.steps import Phase, SetKey
 from tests.procedures.fakes import SilentOperator
+
+
+def placement_at(point: int) -> Question:
+    return ask_placement(SetKey(phase=Phase.IDENTIFY, point=point), Pose(1.0, 2.0, 3.0))
 
 
 async def test_an_unattended_run_places_no_gauges() -> None:
     with pytest.raises(AnswerNeeded, match=r"point 3 \(X1\.000 .*fixed stations") as refusal:
-        await UnattendedOperator().ask(ask_placement(3, Pose(1.0, 2.0, 3.0)))
+        await UnattendedOperator().ask(placement_at(3))
     assert refusal.value.exit_code is ExitCode.ANSWER_NEEDED
 
 
@@ -68,10 +74,10 @@ async def test_only_a_choice_of_the_question_is_an_answer() -> None:
 
 async def test_an_empty_answer_is_the_default() -> None:
     broker = QuestionBroker(SilentOperator())
-    asking = asyncio.create_task(broker.ask(ask_placement(2, Pose(1.0, 2.0, 3.0))))
+    asking = asyncio.create_task(broker.ask(placement_at(2)))
     await asyncio.sleep(0)
     assert broker.open
-    assert broker.open.subject == GaugePlacement(2, Pose(1.0, 2.0, 3.0))
+    assert broker.open.subject == GaugePlacement(2, Pose(1.0, 2.0, 3.0), "point 2")
     assert broker.answer(None)
     assert await asking == "placed"
 

@@ -18,6 +18,7 @@ class ExitCode(IntEnum):
     ANSWER_NEEDED = 4
     BUSY = 5
     WRITE_BACK_UNDONE = 6
+    FAULT = 70
     INTERRUPTED = 130
 
 

@@ -7,7 +7,8 @@ import sys
 from collections.abc import Sequence
 from importlib import import_module
 
-from hexacell.cli.console import Console
+from hexacell.cli.console import Console, lost_output
+from hexacell.cli.fault_report import fault_line
 from hexacell.cli.parser import make_parser
 from hexacell.cli.signals import stop_signals_as_sigint
 from hexacell.errors import ExitCode, HexacellError
@@ -27,15 +28,22 @@ def main(arguments: Sequence[str] | None = None) -> int:
         with stop_signals_as_sigint():
             options = parser.parse_args(typed)
             module, _, command = options.target.partition(".")
-            return int(getattr(import_module(f"hexacell.cli.commands.{module}"), command)(options))
+            code = getattr(import_module(f"hexacell.cli.commands.{module}"), command)(options)
+            return _unless_output_is_lost(int(code), console)
     except KeyboardInterrupt:
         return _failed("interrupted", ExitCode.INTERRUPTED, console)
     except HexacellError as error:
         return _failed(str(error), error.exit_code, console)
     except Exception as error:
-        # A bug: Python prints the traceback, and a reader of JSON still gets a document.
-        console.document({"error": repr(error), "exit_code": int(ExitCode.OUT_OF_LIMITS)})
-        raise
+        return _failed(fault_line(error, typed), ExitCode.FAULT, console)
+
+
+def _unless_output_is_lost(code: int, console: Console) -> int:
+    """The code of a command, which is not done if nobody can read its output."""
+    if code or (lost := lost_output()) is None:
+        return code
+    console.error(f"hexacell: the output could not be written: {lost.strerror}")
+    return int(ExitCode.USAGE)
 
 
 def _failed(message: str, code: ExitCode, console: Console) -> int:

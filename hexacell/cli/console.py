@@ -37,10 +37,32 @@ def _write(stream: TextIO | None, text: str) -> None:
     if stream is None:  # closed before the program began
         return
     try:
-        stream.write(text)
+        stream.write(_writable(text, stream))
         stream.flush()
     except BrokenPipeError:
-        # Python flushes the rest of the buffer when it ends, which must not fail again.
-        null = os.open(os.devnull, os.O_WRONLY)
-        os.dup2(null, stream.fileno())
-        os.close(null)
+        _discard_rest(stream)
+    except OSError as error:
+        # A run goes on without its output; the command as a whole is not done.
+        _lost.append(error)
+        _discard_rest(stream)
+
+
+def lost_output() -> OSError | None:
+    """Why output of this process could not be written, as to a full disk; none if all could be."""
+    return _lost[0] if _lost else None
+
+
+_lost: list[OSError] = []
+
+
+def _writable(text: str, stream: TextIO) -> str:
+    """The text as the stream's encoding can have it: a locale may know no letter beyond ASCII."""
+    encoding = stream.encoding or "utf-8"
+    return text.encode(encoding, "backslashreplace").decode(encoding)
+
+
+def _discard_rest(stream: TextIO) -> None:
+    """Python flushes the rest of the buffer when it ends, which must not fail again."""
+    null = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(null, stream.fileno())
+    os.close(null)

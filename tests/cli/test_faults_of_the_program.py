@@ -1,0 +1,90 @@
+"""What a person sees where the program fails, or its output cannot be written."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import stat
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from hexacell.cli import app
+from hexacell.cli.commands import cell as commands
+from tests.signals import terminal_signals
+
+
+@pytest.fixture
+def failing(monkeypatch, tmp_path):
+    """A command that fails in an unforeseen way; its reports are in a folder of their own."""
+
+    def fail(*_):
+        raise ValueError("first line\nsecond line")
+
+    monkeypatch.setattr(commands, "schema", fail)
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    return ["cell", "schema"]
+
+
+def test_a_fault_is_one_line_with_a_report_and_a_code_of_its_own(failing, capsys):
+    assert app.main(failing) == 70
+    captured = capsys.readouterr()
+    told = re.fullmatch(
+        r"hexacell: this is a fault of the program: ValueError: first line second line\. "
+        r"Please report it with (\S+)\n",
+        captured.err,
+    )
+    assert told, captured.err
+    report = Path(told[1])
+    assert "hexacell cell schema\n" in report.read_text()
+    assert 'raise ValueError("first line' in report.read_text()
+    assert stat.S_IMODE(report.stat().st_mode) == 0o600
+    assert captured.out == ""
+
+
+def test_a_fault_gives_a_document_too(failing, capsys):
+    assert app.main([*failing, "--json"]) == 70
+    document = json.loads(capsys.readouterr().out)
+    assert document["exit_code"] == 70
+    assert "this is a fault of the program" in document["error"]
+
+
+def test_a_report_that_cannot_be_written_is_told(failing, monkeypatch, capsys):
+    monkeypatch.setattr("tempfile.tempdir", "/nonexistent")
+    assert app.main(failing) == 70
+    assert "No report could be written: No such file" in capsys.readouterr().err
+
+
+def hexacell(*arguments, stdout, **environment):
+    with terminal_signals():
+        return subprocess.run(
+            [sys.executable, "-m", "hexacell", *map(str, arguments)],
+            stdout=stdout,
+            stderr=subprocess.PIPE,
+            text=True,
+            env={**os.environ, **environment},
+            check=False,
+        )
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="this system has no full device")
+@pytest.mark.parametrize("arguments", [["cell", "schema"], ["cell", "schema", "--json"]], ids=" ".join)
+def test_output_to_a_full_disk_is_an_error_and_no_traceback(arguments):
+    with Path("/dev/full").open("w") as full:
+        ended = hexacell(*arguments, stdout=full)
+    assert ended.returncode == 2
+    assert ended.stderr == "hexacell: the output could not be written: No space left on device\n"
+
+
+def test_letters_that_the_locale_does_not_know_are_escaped(cell_folder):
+    cell_folder.edit(('name = "simulated-hexaglide"', 'name = "Prüfstand"'))
+    ended = hexacell(
+        "cell", "validate", cell_folder.cell, "--json", stdout=subprocess.PIPE, PYTHONIOENCODING="ascii"
+    )
+    assert ended.returncode == 0, ended.stderr
+    shown = hexacell("cell", "show", cell_folder.cell, stdout=subprocess.PIPE, PYTHONIOENCODING="ascii")
+    assert shown.returncode == 0, shown.stderr
+    assert r"Pr\xfcfstand" in shown.stdout

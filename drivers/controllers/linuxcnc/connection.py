@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import os
+import re
 import time
 from collections import deque
 from collections.abc import Callable
@@ -230,9 +231,15 @@ class Connection:
     def _record(self, direction: TrafficDirection, data: bytes) -> None:
         if self._recorder is None or not data:
             return
-        for password in (self._address.connect_password, self._address.enable_password):
-            data = data.replace(f" {password}".encode(), b" ***")  # traces are handed to others
+        data = without_passwords(data, self._address)  # traces are handed to others
         self._recorder(TraceEntry(time.time(), self._address.name, direction, data))
+
+
+def without_passwords(data: bytes, address: Address) -> bytes:
+    """Traffic with every password masked as a whole, also where one begins with the other."""
+    for password in (address.connect_password, address.enable_password):
+        data = re.sub(rb"(?<= )" + re.escape(password.encode()) + rb"(?![^\s])", b"***", data)
+    return data
 
 
 async def _connect(

@@ -8,8 +8,9 @@ import socket
 import pytest
 
 from drivers.controllers.errors import ConnectionLost, ResponseTimeout
+from drivers.controllers.linuxcnc.connection import without_passwords
 from drivers.controllers.linuxcnc.controller import LinuxcncrshController
-from drivers.controllers.linuxcnc.settings import Timeouts
+from drivers.controllers.linuxcnc.settings import Address, Timeouts
 from drivers.interfaces import DeviceIdentity
 from drivers.wire_trace import WireTrace
 from hexacell.cell.devices import ControllerSettings
@@ -206,6 +207,19 @@ async def test_closing_during_opening_ends_the_opening(play):
     greeted.set()
     with pytest.raises(DeviceError, match="is not connected"):
         await opening
+
+
+@pytest.mark.parametrize(
+    ("shown", "masked"),
+    [
+        (b"set enable EMCTOO\r\n", b"set enable ***\r\n"),
+        (b"hello EMC hexacell 1.0\r\n", b"hello *** hexacell 1.0\r\n"),
+        (b"set enable EMCTOO", b"set enable ***"),
+        (b"HELLO ACK EMCNETSVR 1.1\r\n", b"HELLO ACK EMCNETSVR 1.1\r\n"),
+    ],
+)
+def test_a_password_that_begins_with_the_other_is_masked_whole(shown, masked):
+    assert without_passwords(shown, Address("controller", 5007, "EMC", "EMCTOO")) == masked
 
 
 async def test_passwords_stay_out_of_the_trace(play):

@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, field_validator
 
-from hexacell.cell.fields import Name, Positive, Section, SixNumbers, Text, broken_rule
+from hexacell.cell.fields import Name, Positive, Section, SixInRange, Text, broken_rule
 
 NodeId = Annotated[int, Field(ge=1, le=127)]
 Unsigned = Annotated[int, Field(ge=0, le=2**32 - 1)]
@@ -72,7 +72,7 @@ class EncoderSettings(Section):
     direction: tuple[Direction, Direction, Direction, Direction, Direction, Direction] = Field(
         (1, 1, 1, 1, 1, 1), description="1: counts grow along the rail's +x, -1: against it"
     )
-    offset_mm: SixNumbers = Field(
+    offset_mm: SixInRange = Field(
         (0.0, 0.0, 0.0, 0.0, 0.0, 0.0), description="joint variable at count 0, mm"
     )
     serial_numbers: tuple[Unsigned, Unsigned, Unsigned, Unsigned, Unsigned, Unsigned] | None = Field(

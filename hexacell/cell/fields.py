@@ -84,8 +84,10 @@ NotNegative = Annotated[
 Text = Annotated[str, Field(max_length=LONGEST_TEXT), AfterValidator(_printable)]
 Name = Annotated[str, Field(min_length=1, max_length=LONGEST_NAME), AfterValidator(_a_name)]
 Seed = Annotated[int, Field(ge=0, le=LARGEST_SEED)]
-Point = tuple[InRange, InRange, InRange]
-SixNumbers = tuple[InRange, InRange, InRange, InRange, InRange, InRange]
+Point = tuple[Finite, Finite, Finite]
+SixNumbers = tuple[Finite, Finite, Finite, Finite, Finite, Finite]
+PointInRange = tuple[InRange, InRange, InRange]
+SixInRange = tuple[InRange, InRange, InRange, InRange, InRange, InRange]
 
 
 class Frozen(BaseModel):

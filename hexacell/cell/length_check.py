@@ -7,7 +7,7 @@ from typing import Annotated, Literal, Self
 import numpy as np
 from pydantic import Field, model_validator
 
-from hexacell.cell.fields import InRange, NotNegative, Point, Positive, Section, Text, broken_rule
+from hexacell.cell.fields import InRange, NotNegative, PointInRange, Positive, Section, Text, broken_rule
 
 MicrometresPerMetreKelvin = Annotated[float, Field(ge=0, le=100, allow_inf_nan=False)]
 COARSEST_SHARE = 1e-3
@@ -17,8 +17,10 @@ COARSEST_SHARE = 1e-3
 class LengthCheckSettings(Section):
     """A fixture with two parallel seats for the gauges, a certified distance apart."""
 
-    first_seat: Point = Field(description="where the ball is measured in the first seat, mm, in the base")
-    direction: Point = Field(
+    first_seat: PointInRange = Field(
+        description="where the ball is measured in the first seat, mm, in the base"
+    )
+    direction: PointInRange = Field(
         (1.0, 0.0, 0.0), description="from the first seat to the second; along the rails is best"
     )
     distance_mm: float = Field(ge=20, le=5000, description="of the two places of the ball, as certified")

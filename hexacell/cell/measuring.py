@@ -9,11 +9,11 @@ from pydantic import Field, model_validator
 from hexacell.cell.fields import (
     InRange,
     NotNegative,
-    Point,
+    PointInRange,
     Positive,
     Section,
     Seed,
-    SixNumbers,
+    SixInRange,
     Text,
     broken_rule,
 )
@@ -36,7 +36,7 @@ class StationSettings(Section):
 class IdentificationSettings(Section):
     """Where the geometry is measured."""
 
-    points: tuple[Point, ...] = Field(
+    points: tuple[PointInRange, ...] = Field(
         min_length=2, max_length=MOST_POINTS, description="ball positions, mm, in this order"
     )
     orientations: int = Field(
@@ -81,7 +81,7 @@ class IdentificationSettings(Section):
 class VerificationSettings(Section):
     """Where the result is validated: poses that are not in the fit."""
 
-    points: tuple[Point, ...] = Field(
+    points: tuple[PointInRange, ...] = Field(
         min_length=1, max_length=MOST_POINTS, description="ball positions, mm"
     )
     orientations: int = Field(
@@ -128,7 +128,7 @@ class CheckSettings(Section):
 class TaskSettings(Section):
     """The robot's task: poses for which its accuracy is predicted, and the frames that can be taught."""
 
-    poses: tuple[SixNumbers, ...] = Field((), max_length=MOST_POSES, description="x y z a b c, mm and deg")
+    poses: tuple[SixInRange, ...] = Field((), max_length=MOST_POSES, description="x y z a b c, mm and deg")
     work_frame: Literal["", "x", "y", "z", "xy", "xz", "yz", "xyz"] = Field(
         "xyz",
         description="base axes about which the controller can turn a work frame; it can always shift it. "

@@ -272,7 +272,7 @@ def _final_code(state: RunState) -> ExitCode:
 
 
 def _exit_code(error: BaseException) -> ExitCode:
-    """The code to leave with; an error of the program itself counts as no result."""
+    """The code to leave with."""
     if isinstance(error, HexacellError):
         return error.exit_code
-    return ExitCode.OUT_OF_LIMITS if isinstance(error, Exception) else ExitCode.INTERRUPTED
+    return ExitCode.FAULT if isinstance(error, Exception) else ExitCode.INTERRUPTED

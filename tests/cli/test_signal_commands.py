@@ -6,12 +6,10 @@ import asyncio
 import os
 import signal
 from collections.abc import Iterator
-from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
-from hexacell.cli import app
 from hexacell.cli.console import Console
 from hexacell.cli.signal_commands import ENDING_SIGNALS, SignalCommands
 from hexacell.errors import Interruption
@@ -149,14 +147,3 @@ def test_an_ignored_signal_stays_ignored(signals) -> None:
         assert signal.getsignal(INT) is signal.SIG_IGN
     finally:
         signal.signal(INT, former)
-
-
-def test_a_bug_gives_a_document_and_a_traceback(monkeypatch, capsys) -> None:
-    def mistake(_: Any) -> Any:
-        raise ZeroDivisionError("division by zero")
-
-    monkeypatch.setattr(app, "import_module", lambda _: SimpleNamespace(demo=mistake))
-    with pytest.raises(ZeroDivisionError):
-        app.main(["demo", "--json"])
-    document = capsys.readouterr().out
-    assert document == '{"error": "ZeroDivisionError(\'division by zero\')", "exit_code": 1}\n'

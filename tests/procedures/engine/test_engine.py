@@ -197,7 +197,7 @@ async def test_a_programming_error_stops_motion_too(script, journal, bench) -> N
     with pytest.raises(ZeroDivisionError):
         await Engine(script, journal).run()
     assert bench.controller.log == ["prepare", "stop"]
-    assert journal.events[-1] == events.Interrupted(reason="division by zero", exit_code=1)
+    assert journal.events[-1] == events.Interrupted(reason="division by zero", exit_code=70)
 
 
 async def test_an_error_while_deciding_stops_motion_too(script, journal, bench) -> None:

@@ -115,7 +115,7 @@ def verify(settings: CellSettings, robot: Robot, found: Identification, held_out
     """Verify an identified geometry that commands ``robot`` now, in the frames in which it was written.
 
     Raises:
-        IdentifiabilityError: no geometry fits the held-out records, or those of the length check are of
+        IdentifiabilityError: no geometry fits any held-out record, or those of the length check are of
             other poses.
     """
     before, after = DeviationStatistics.of(held_out.before), DeviationStatistics.of(held_out.after)

@@ -18,6 +18,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from hexacell.errors import IdentifiabilityError
 from hexacell.identification.problem.data_requirements import is_determined
 from hexacell.identification.problem.problem import Problem
 from hexacell.identification.solver.chi_square import SMALLEST_PROBABILITY, ChiSquareTest
@@ -37,11 +38,20 @@ class PointPrediction:
 
 
 def update(found: Identification, further: Problem) -> Identification:
-    """The estimate by the records of an identification and further ones, at other points."""
+    """The estimate by the records of an identification and further ones, at other points.
+
+    Raises:
+        IdentifiabilityError: no geometry fits any of the further records; they would prove nothing.
+    """
     solved = further.solve_poses(found.free)
     used = found.problem.starting_at(found.free, found.poses, np.ones(found.records, dtype=bool))
     both = used.joined(further.starting_at(found.free, solved.poses, solved.found))
     kept, solution = solve_around_singularities(both, found.active_prior, FINE)
+    if not np.isin(kept.labels[:, 0], further.labels[:, 0]).any():
+        raise IdentifiabilityError(
+            "no geometry near the identified one has a pose at any held-out record",
+            action="Check that the joint variables are those of these poses",
+        )
     return replace(found, problem=kept, solution=solution)
 
 

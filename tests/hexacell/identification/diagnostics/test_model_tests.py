@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from hexacell.errors import IdentifiabilityError
 from hexacell.identification.diagnostics.model_tests import leave_one_point_out, prediction_test, update
 from hexacell.identification.estimator import identify
 from hexacell.identification.problem.problem import Noise
@@ -66,6 +67,15 @@ def test_further_records_of_a_machine_that_has_changed_do_not_agree(visit, measu
     bent = type(paper.actual).of(paper.actual.parameters, {**paper.actual.document(), "l": lengths})
     changed = visit(bent, points=3, orientations=6, seed=7)
     assert held_out_test(found, further(make_problem, changed, 3)).probability < 1e-3
+
+
+def test_held_out_records_at_which_no_geometry_has_a_pose_prove_nothing(measured, make_problem):
+    """They are refused: a test without any record could not fail."""
+    found = identify(make_problem(measured[0].measured(NOISE_MM, 1)))
+    problem = further(make_problem, measured[1], 2)
+    unreachable = replace(problem, joints=problem.joints + np.array([900.0, 0.0, 0.0, 0.0, 0.0, -900.0]))
+    with pytest.raises(IdentifiabilityError, match="has a pose at any held-out record"):
+        update(found, unreachable)
 
 
 def test_every_point_is_predicted_by_the_others(identified):

@@ -120,8 +120,11 @@ def _best(problem: Problem, found: Identification) -> Identification:
     """
     others, again = _from_other_starts(problem), 0
     while again < SAME_MINIMUM and not _is_plausible(problem, found) and (other := next(others, None)):
-        again += _is_same_minimum(found, other)
         is_better = (other.records, -cost(other)) > (found.records, -cost(found))
+        if _is_same_minimum(found, other):
+            again += 1
+        elif is_better:
+            again = 0
         found = other if is_better else found
     return found if found.converged else _continued(problem, found)
 

@@ -9,9 +9,7 @@ from typing import Literal
 from hexacell.cell.fields import Frozen
 from hexacell.kinematics.pose import Pose
 from hexacell.measurements.records import Deviation, Joints, MeasurementSet
-
-COVERAGE_FACTOR = 2.0
-"""Of the expanded uncertainty U: about 95 %."""
+from hexacell.uncertainty.statement import COVERAGE_FACTOR
 
 
 @dataclass(frozen=True)

@@ -17,9 +17,10 @@ from hexacell.measurements.records import MeasurementSet
 from hexacell.robot_model import Robot
 from hexacell.uncertainty.effects import Effect
 from hexacell.uncertainty.encoder_effects import COMMON_SCALE
-from hexacell.uncertainty.length_check import COVERAGE_FACTOR, LengthCheck
+from hexacell.uncertainty.length_check import LengthCheck
 from hexacell.uncertainty.length_errors import JudgedGeometry
 from hexacell.uncertainty.length_records import LengthRecords, LengthStandard
+from hexacell.uncertainty.statement import COVERAGE_FACTOR
 
 WRONG_WAY = 0.5
 """A gauge that follows the ball by less has another direction than it should have."""

@@ -16,10 +16,9 @@ from hexacell.reporting.length_result import LengthMeasurements, LengthResult, e
 from hexacell.reporting.result import AcceptedResult
 from hexacell.reporting.verification import JudgedError
 from hexacell.robot_model import Robot
-from hexacell.uncertainty.length_check import COVERAGE_FACTOR
 from hexacell.uncertainty.length_errors import JudgedGeometry
 from hexacell.uncertainty.scale_observation import errors_by_scale
-from hexacell.uncertainty.statement import TaskErrors
+from hexacell.uncertainty.statement import COVERAGE_FACTOR, TaskErrors
 
 
 class LengthStatement(Frozen):

@@ -43,10 +43,7 @@ from hexacell.uncertainty.length_errors import (
 )
 from hexacell.uncertainty.length_records import LengthRecords, LengthStandard
 from hexacell.uncertainty.scale_observation import ScaleObservation
-from hexacell.uncertainty.statement import covariance_factor
-
-COVERAGE_FACTOR = 2.0
-"""k of the expanded uncertainty (JCGM 100)."""
+from hexacell.uncertainty.statement import COVERAGE_FACTOR, covariance_factor
 
 HARDLY_MM2 = 0.01
 """A sum of squared displacements below tells nothing of the direction of a gauge."""

@@ -21,6 +21,9 @@ SEED = 20_100_101
 COVERAGE = 0.95
 """Probability that the stated value is wrong by no more than U."""
 
+COVERAGE_FACTOR = 2.0
+"""k of the expanded uncertainty of a single value (JCGM 100): about 95 %."""
+
 
 @dataclass(frozen=True, slots=True)
 class LargestError:

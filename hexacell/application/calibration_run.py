@@ -186,7 +186,7 @@ def run_started(
     return events.RunStarted(
         software=f"hexacell {__version__}",
         cell=cell.settings.name,
-        cell_text=cell.text,
+        cell_text=cell.text_without_secrets,
         mode=calibration.mode.value,
         config=str(cell.config_path),
         config_sha256=fingerprint(cell.config_path),
@@ -218,7 +218,7 @@ def _resumed_start(request: RunRequest) -> events.RunStarted:
             subject=request.folder.path,
             action="Finish it with that version, or begin a new run",
         )
-    if state.started.cell_text != request.cell.text:
+    if state.started.cell_text not in {request.cell.text_without_secrets, request.cell.text}:
         raise UsageError(
             f"{request.cell.path} has changed since the run began",
             action="Undo the change, or begin a new run",

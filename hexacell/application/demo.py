@@ -11,6 +11,7 @@ from hexacell.application.calibration_run import RunRequest
 from hexacell.application.device_setup import device_addresses
 from hexacell.cell.bundled import CONTROLLER, bundled_config
 from hexacell.cell.loader import Cell, dump, load_cell
+from hexacell.cell.passwords import password_path
 from hexacell.errors import FileError, UsageError
 from hexacell.runs.run_folder import RunFolder
 from hexacell.storage.atomic_files import create_folder_durably, os_error_to_file_error, write_atomically
@@ -46,6 +47,8 @@ def served_cell(cell: Cell) -> Iterator[str]:
         paths = {"config": str(cell.config_path.resolve())}
         if settings.controller.taught is not None:
             paths["taught"] = str(cell.taught_path.resolve())
+        if (passwords := password_path(settings.controller, cell.path.parent)) is not None:
+            paths["password_file"] = str(passwords.resolve())
         controller = settings.controller.model_copy(update=paths)
         yield dump(settings.model_copy(update={"controller": controller}))
 

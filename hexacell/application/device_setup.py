@@ -13,6 +13,7 @@ from drivers.stop_input import stop_input_of
 from drivers.wire_trace import WireTrace
 from hexacell.cell.loader import Cell
 from hexacell.cell.model import CellSettings
+from hexacell.cell.passwords import with_passwords
 from hexacell.clock import CellClock
 from hexacell.errors import HexacellError
 from hexacell.kinematics.mechanism import Mechanism
@@ -28,10 +29,10 @@ def device_addresses(cell: Cell, *, other_processes: bool = False) -> Iterator[C
     """The cell's settings with an address for every device; within this context a simulated cell runs.
 
     Raises:
-        HexacellError: a protocol has no driver, or the simulation cannot start.
+        HexacellError: a protocol has no driver, a password cannot be read, or the simulation cannot start.
     """
-    settings = cell.settings
-    require_drivers(settings)
+    require_drivers(cell.settings)
+    settings = with_passwords(cell.settings, cell.path.parent)
     if settings.simulation is None:
         yield settings
         return

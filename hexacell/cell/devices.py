@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, field_validator
+from pydantic import Field, SecretStr, field_validator
 
-from hexacell.cell.fields import Name, Positive, Section, SixInRange, Text, broken_rule
+from hexacell.cell.fields import Name, Password, Positive, Section, SixInRange, Text, broken_rule
 
 NodeId = Annotated[int, Field(ge=1, le=127)]
 Unsigned = Annotated[int, Field(ge=0, le=2**32 - 1)]
@@ -95,8 +95,19 @@ class ControllerSettings(Section):
     protocol: Text = Field("linuxcncrsh", description="linuxcncrsh, or one that a plug-in adds")
     host: Text = Field("127.0.0.1", description="its network name or address")
     port: int | None = Field(None, ge=1, le=65535, description="TCP port")
-    connect_password: Text = Field("EMC", description="linuxcncrsh: sent on connecting")
-    enable_password: Text = Field("EMCTOO", description="linuxcncrsh: sent to enable commands")
+    connect_password: Password = Field(
+        SecretStr("EMC"), description="linuxcncrsh: sent on connecting; better in password_file"
+    )
+    enable_password: Password = Field(
+        SecretStr("EMCTOO"), description="linuxcncrsh: sent to enable commands; better in password_file"
+    )
+    password_file: Text | None = Field(
+        None,
+        min_length=1,
+        description="TOML file with connect_password and enable_password, relative to the cell file, which "
+        "others must not be able to read. HEXACELL_CONNECT_PASSWORD and HEXACELL_ENABLE_PASSWORD in the "
+        "environment take precedence",
+    )
     config: Text = Field(description="the file with its geometry, relative to the cell file")
     config_format: Text = Field("toml", description="toml, or one that a plug-in adds")
     taught: Text | None = Field(

@@ -4,8 +4,18 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    ConfigDict,
+    Field,
+    PlainSerializer,
+    SecretStr,
+    ValidationError,
+)
 from pydantic_core import PydanticCustomError
+
+from hexacell.storage.secrets import MASK
 
 LARGEST_NUMBER = 1e6
 """Of any number in a cell file or a measurement file: a kilometre, eleven days."""
@@ -52,6 +62,13 @@ def _printable(text: str) -> str:
     return text
 
 
+def _a_password(secret: SecretStr) -> SecretStr:
+    password = secret.get_secret_value()
+    if len(password) > LONGEST_TEXT or not password.isprintable():
+        raise _outside(f"text of {LONGEST_TEXT} letters or fewer, without control characters")
+    return secret
+
+
 def _a_name(name: str) -> str:
     """A name is that of a folder too, and stands in the lines of a report."""
     if name != name.strip() or name.startswith(".") or not all(map(_may_be_in_a_name, name)):
@@ -83,6 +100,10 @@ NotNegative = Annotated[
 ]
 Text = Annotated[str, Field(max_length=LONGEST_TEXT), AfterValidator(_printable)]
 Name = Annotated[str, Field(min_length=1, max_length=LONGEST_NAME), AfterValidator(_a_name)]
+Password = Annotated[
+    SecretStr, AfterValidator(_a_password), PlainSerializer(lambda _: MASK, return_type=str)
+]
+"""Nothing that is printed or kept shows it."""
 Seed = Annotated[int, Field(ge=0, le=LARGEST_SEED)]
 Point = tuple[Finite, Finite, Finite]
 SixNumbers = tuple[Finite, Finite, Finite, Finite, Finite, Finite]

@@ -9,10 +9,10 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import tomlkit
-from pydantic import ValidationError
+from pydantic import SecretStr, ValidationError
 
 from hexacell.cell.diagnostics import Diagnosis, ModelLookup
 from hexacell.cell.fields import Section
@@ -20,11 +20,14 @@ from hexacell.cell.model import DEFAULT_MECHANISM, CellSettings, cell_model
 from hexacell.errors import joined
 from hexacell.plugins import Group, names
 from hexacell.storage.atomic_files import read_text
-from hexacell.storage.toml_document import TomlDocument, table_header
+from hexacell.storage.secrets import MASK, without_secrets
+from hexacell.storage.toml_document import TomlDocument, is_secret, table_header
 from hexacell.storage.toml_locations import KeyPath
 
 LARGEST_FILE_BYTES = 500_000
 """Of a cell file, which usually has less than ten thousand."""
+
+SectionType = TypeVar("SectionType", bound=Section)
 
 Remark = Callable[[KeyPath], str | None]
 """The comment behind the value at a path, if any."""
@@ -42,6 +45,11 @@ class Cell:
     def text(self) -> str:
         """The whole file, without a byte order mark."""
         return self.document.text
+
+    @property
+    def text_without_secrets(self) -> str:
+        """The same with every password masked: what is kept with a run."""
+        return without_secrets(self.text)
 
     @property
     def config_path(self) -> Path:
@@ -68,12 +76,18 @@ def load_cell(path: Path) -> Cell:
 def describe(cell: Cell) -> str:
     """The cell file with every default filled in; behind each value its line in the file, or ``default``.
 
-    The text is itself a cell file with equal settings.
+    The text is itself a cell file with equal settings; passwords are not in it.
     """
     document = cell.document
     return dump(
         cell.settings, lambda key: f"line {document.line_of(key)}" if key in document.spans else "default"
     )
+
+
+def settings_document(cell: Cell) -> dict[str, Any]:
+    """The settings as a JSON document, every default filled in and every secret masked."""
+    found: dict[str, Any] = _masked(cell.settings.model_dump(mode="json"))
+    return found
 
 
 def schema() -> dict[str, Any]:
@@ -82,7 +96,16 @@ def schema() -> dict[str, Any]:
 
 
 def _checked(document: TomlDocument, path: Path) -> CellSettings:
-    model = cell_model(_mechanism(document))
+    return validated(document, cell_model(_mechanism(document)), path)
+
+
+def validated(document: TomlDocument, model: type[SectionType], path: Path) -> SectionType:
+    """The values of a document by the model of its file.
+
+    Raises:
+        FileError: there is one mistake.
+        SeveralErrors: there is more than one.
+    """
     diagnosis = Diagnosis(document, ModelLookup(model))
     errors = diagnosis.unsupported_values()
     try:
@@ -104,7 +127,7 @@ def _mechanism(document: TomlDocument) -> str:
 
 
 def dump(settings: Section, remark: Remark = lambda _: None) -> str:
-    """The settings as TOML, defaults included, each number in full; a value of None is left out."""
+    """The settings as TOML with defaults, each number in full; without passwords and values of None."""
     return "\n".join(_section(settings, (), remark)).lstrip("\n") + "\n"
 
 
@@ -130,6 +153,8 @@ def _section(section: Section, path: KeyPath, remark: Remark) -> Iterator[str]:
 def _setting(name: str, value: object, comment: str | None) -> list[str]:
     if value is None:
         return [f"# {name} is not set"] if comment else []
+    if isinstance(value, SecretStr):
+        return [f"# {name} is not shown"] if comment else []
     return [f"{name} = {_value(value)}" + (f"  # {comment}" if comment else "")]
 
 
@@ -138,6 +163,21 @@ def _value(value: object) -> str:
         return "[\n" + "".join(f"  {_value(row)},\n" for row in value) + "]"
     if isinstance(value, dict):
         table = tomlkit.inline_table()
-        table.update(value)
+        table.update(_masked(value))
         return table.as_string()
     return tomlkit.item(value).as_string()
+
+
+def _masked(value: Any) -> Any:  # noqa: ANN401 - what JSON and TOML can hold
+    """A value of a cell file without the secrets in its tables, which may be those of a plug-in."""
+    if isinstance(value, list):
+        return [_masked(item) for item in value]
+    if not isinstance(value, dict):
+        return value
+    return {
+        key: _masked(inner) if not _is_secret_text(key, inner) else MASK for key, inner in value.items()
+    }
+
+
+def _is_secret_text(key: str, value: object) -> bool:
+    return is_secret((key,)) and not isinstance(value, dict | list | None)

@@ -23,6 +23,10 @@ class Console:
         """An error message, on stderr."""
         _write(sys.stderr, text + "\n")
 
+    def warn(self, text: str) -> None:
+        """Something that a person should change, on stderr; the command goes on."""
+        self.error(f"hexacell: warning: {text}")
+
     def prompt(self, text: str) -> None:
         """A question, on stderr and without a line feed; the answer is typed on the same line."""
         _write(sys.stderr, text)

@@ -207,6 +207,12 @@ def _replay(commands: Any) -> None:  # noqa: ANN401
         metavar="T",
         help="allowed difference of a number, relative above 1 (default: 1e-9)",
     )
+    parser.add_argument(
+        "--export",
+        type=Path,
+        metavar="FOLDER",
+        help="replay nothing; copy the run folder there with every password masked, to be given to others",
+    )
     _add_json(parser)
 
 

@@ -28,9 +28,9 @@ class JsonRecord(Frozen):
         """The record as a JSON file's content."""
         return self.model_dump_json(indent=2).encode() + b"\n"
 
-    def save(self, path: Path) -> None:
-        """Write the record atomically; raises ``FileError``."""
-        atomic_files.write_atomically(path, self.to_json())
+    def save(self, path: Path, like: Path | None = None) -> None:
+        """Write the record atomically, for those who can read ``like``; raises ``FileError``."""
+        atomic_files.write_atomically(path, self.to_json(), like=like)
 
     @classmethod
     def load(cls, path: Path) -> Self:

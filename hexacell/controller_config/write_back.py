@@ -123,7 +123,7 @@ def _back_up(receipt: Receipt, before: bytes, after: bytes) -> None:
             action="Use another folder for each write-back",
         )
     for name, data in ((BEFORE, before), (AFTER, after), (RECEIPT, receipt.to_json())):
-        atomic_files.write_atomically(folder / name, data)
+        atomic_files.write_atomically(folder / name, data, like=receipt.path)
     receipt.backup()
 
 
@@ -177,7 +177,9 @@ def _keep_foreign_version(receipt: Receipt, found: bytes | None) -> None:
         return
     with suppress(FileError):
         atomic_files.write_atomically(
-            receipt.backup_folder / f"config-found-{atomic_files.sha256(found)[:12]}", found
+            receipt.backup_folder / f"config-found-{atomic_files.sha256(found)[:12]}",
+            found,
+            like=receipt.path,
         )
 
 

@@ -50,7 +50,7 @@ class RunFolder:
         return _unused(self.wire)
 
     def create(self, cell: Cell) -> None:
-        """Make the folder and keep the cell file's text in it.
+        """Make the folder and keep the cell file's text, without its passwords, in it.
 
         Raises:
             UsageError: it holds a run already.
@@ -61,7 +61,7 @@ class RunFolder:
                 "this folder holds a run already", subject=self.path, action="Resume it, or name another"
             )
         create_folder_durably(self.path)
-        write_atomically(self.path / "cell.toml", cell.text.encode())
+        write_atomically(self.path / "cell.toml", cell.text_without_secrets.encode())
 
     def write_result(self, document: dict[str, Any]) -> None:
         """Keep an identification; raises ``FileError``."""

@@ -22,6 +22,9 @@ from pathlib import Path
 
 from hexacell.errors import FileError
 
+NOT_FOR_OTHERS = 0o002
+"""What no file or folder that the program makes is: writable by everybody, whatever the umask."""
+
 BYTE_ORDER_MARK = "\ufeff"
 
 _REASONS: dict[int, tuple[str, str]] = {
@@ -90,12 +93,15 @@ def decode_utf8(data: bytes, path: Path) -> str:
         raise FileError("the file is not UTF-8 text", subject=path, line=line, action=action) from error
 
 
-def write_atomically(path: Path, data: bytes, *, expected: bytes | None = None) -> None:
+def write_atomically(
+    path: Path, data: bytes, *, expected: bytes | None = None, like: Path | None = None
+) -> None:
     """Replace the content of ``path``, or create it, in one step that survives a power cut.
 
     A symbolic link is kept; the file it points to is replaced. Mode, owner and extended attributes (with
     access control lists) are kept; where the owner cannot be kept, nothing is written. If ``expected`` is
-    given, the file must hold exactly that just before it is replaced.
+    given, the file must hold exactly that just before it is replaced. A new file has the permissions of
+    ``like``, if that is given, but is never writable by everybody.
 
     Raises:
         FileError: the file is unchanged, and no temporary file is left. Only if the message says that the
@@ -104,7 +110,7 @@ def write_atomically(path: Path, data: bytes, *, expected: bytes | None = None) 
     try:
         target = _resolved(path)
         with _temporary_beside(target) as temporary:
-            _write_like(target, temporary, data)
+            _write_like(target, temporary, data, _new_mode(like))
             _require_content(target, expected)
             os.replace(temporary, target)  # noqa: PTH105 - named as the system call it is
     except OSError as error:
@@ -132,7 +138,8 @@ def create_folder_durably(folder: Path) -> None:
     """Create ``folder`` and its missing parents, synced to the disk."""
     try:
         absent = [parent for parent in (folder, *folder.parents) if not parent.exists()]
-        folder.mkdir(parents=True, exist_ok=True)
+        for parent in absent[::-1] or [folder]:
+            parent.mkdir(mode=0o777 & ~NOT_FOR_OTHERS, exist_ok=True)
         # Each folder is a name in its parent: if one name is lost, all below it is lost too.
         for created in absent or [folder]:
             sync_folder(created.parent)
@@ -182,10 +189,15 @@ def _temporary_beside(target: Path) -> Iterator[Path]:
             temporary.unlink(missing_ok=True)
 
 
-def _write_like(target: Path, temporary: Path, data: bytes) -> None:
+def _new_mode(like: Path | None) -> int:
+    mode = 0o666 if like is None else stat.S_IMODE(like.stat().st_mode)
+    return mode & 0o666 & ~NOT_FOR_OTHERS
+
+
+def _write_like(target: Path, temporary: Path, data: bytes, new_mode: int) -> None:
     status = _status(target)
     # Who may not read the old file must not read the new one, not even while it is written.
-    mode = 0o666 if status is None else 0o600
+    mode = new_mode if status is None else 0o600
     with open(temporary, "xb", opener=partial(os.open, mode=mode)) as stream:
         stream.write(data)
         stream.flush()

@@ -15,6 +15,9 @@ the second process.
 The kernel releases the lock when the process ends, however it ends, so there are no stale locks. The file
 stays: if it were deleted, two processes could hold two files of the same name. Its content names the
 holder, for people only.
+
+Only the user who made the file may write it, whatever the umask is. All others open it for reading, which
+is enough to lock it; they cannot leave their name in it, so a name counts only while its process lives.
 """
 
 from __future__ import annotations
@@ -33,8 +36,10 @@ from hexacell.errors import CellBusy, FileError
 from hexacell.storage import atomic_files
 
 _LONGEST_NOTE = 4096
+_MODE = 0o644
 # O_NOFOLLOW: in a shared folder a link must not turn the holder's note into a write to another file.
-_FLAGS = os.O_RDWR | os.O_NOFOLLOW
+# O_NONBLOCK: a pipe in the place of the file would be waited for.
+_FLAGS = os.O_NOFOLLOW | os.O_NONBLOCK
 
 
 @contextmanager
@@ -68,25 +73,28 @@ def lock_path(config: Path) -> Path:
 
 def _open(path: Path) -> int:
     try:
-        with suppress(FileExistsError):
-            return _create(path)
-        return os.open(path, _FLAGS)
+        descriptor = _created_or_opened(path)
     except OSError as error:
         raise _cannot_open(path, error) from error
-
-
-def _create(path: Path) -> int:
-    descriptor = os.open(path, _FLAGS | os.O_CREAT | os.O_EXCL, 0o666)
-    # Other users of the cell must be able to open it, whatever this process's umask is.
+    # Whatever this process's umask is; earlier versions made files that everybody may write.
     with suppress(OSError):
-        os.fchmod(descriptor, 0o666)
+        os.fchmod(descriptor, _MODE)
     return descriptor
+
+
+def _created_or_opened(path: Path) -> int:
+    with suppress(FileExistsError):
+        return os.open(path, _FLAGS | os.O_RDWR | os.O_CREAT | os.O_EXCL, _MODE)
+    try:
+        return os.open(path, _FLAGS | os.O_RDWR)
+    except PermissionError:
+        return os.open(path, _FLAGS | os.O_RDONLY)
 
 
 def _cannot_open(path: Path, error: OSError) -> FileError:
     plain = atomic_files.os_error_to_file_error("the cell's lock file cannot be opened", path, error)
     if isinstance(error, PermissionError):
-        plain.action = "Have the owner of the folder create it once, empty, with mode 666"
+        plain.action = "Have the owner of the folder create it once, empty, with mode 644"
     return plain
 
 
@@ -121,10 +129,24 @@ def _this_process() -> str:
 def _holder(descriptor: int) -> str:
     """The holder in a few words, by its note."""
     try:
-        line = os.pread(descriptor, _LONGEST_NOTE, 0).splitlines()[0]
-        return "process {pid} of {user} on {host} since {since}".format(**json.loads(line))
-    except (OSError, LookupError, TypeError, ValueError):
+        note = json.loads(os.pread(descriptor, _LONGEST_NOTE, 0).splitlines()[0])
+        words = "process {pid} of {user} on {host} since {since}".format(**note)
+        return words if _is_alive(note) else "another process"
+    except (OSError, LookupError, TypeError, ValueError, OverflowError):
         return "another process"
+
+
+def _is_alive(note: dict[str, object]) -> bool:
+    """Whether the process that left a note may still hold the cell; nobody knows of other computers'."""
+    if note["host"] != socket.gethostname():
+        return True
+    try:
+        os.kill(int(str(note["pid"])), 0)
+    except ProcessLookupError:
+        return False
+    except PermissionError:
+        return True
+    return True
 
 
 def _user() -> str:

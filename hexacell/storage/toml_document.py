@@ -15,7 +15,11 @@ from hexacell.errors import FileError
 from hexacell.storage.atomic_files import BYTE_ORDER_MARK
 from hexacell.storage.toml_locations import KeyPath, locate
 
+SECRET_WORDS = "password|passwd|passphrase|secret|token|api_?key"  # noqa: S105 - names of keys
+"""Keys that end so are followed by something that no message and no copy of a file shows."""
+
 _LONGEST_QUOTE = 40
+_SECRET_KEY = re.compile(rf"(?:^|.*[^a-z])(?:{SECRET_WORDS})", re.IGNORECASE)
 _POSITION = re.compile(r" \(at (?:line (?P<line>\d+), column \d+|end of document)\)$")
 
 
@@ -69,7 +73,9 @@ class TomlDocument:
         return FileError(problem, subject=self.source, line=self.line_of(path), action=action)
 
     def mismatch(self, path: KeyPath, expected: str) -> str:
-        """What is at ``path`` and what must be there, as the problem of an error."""
+        """What is at ``path`` and what must be there, as the problem of an error; a secret is not shown."""
+        if is_secret(path):
+            return f"{self.place(path)} must be {expected}"
         return f"{self.place(path)} is {_description(self.value(path))}, but must be {expected}"
 
     def place(self, path: KeyPath) -> str:
@@ -80,6 +86,12 @@ class TomlDocument:
             item = "row" if isinstance(self.value(path[: depth + 1]), list) else "number"
             words += f", {item} {int(path[depth]) + 1}"
         return words
+
+
+def is_secret(path: KeyPath) -> bool:
+    """Whether the value at a path is one that nobody but the user may read."""
+    names = [key for key in path if isinstance(key, str)]
+    return bool(names) and _SECRET_KEY.fullmatch(names[-1]) is not None
 
 
 def table_header(path: KeyPath) -> str:

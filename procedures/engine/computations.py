@@ -76,7 +76,9 @@ class Computations:
             before=commanding,
         )
         written = self.calibration.as_written(identified.geometry)
-        self.config.change_to(written.geometry, state).save(self.folder.proposal)
+        self.config.change_to(written.geometry, state).save(
+            self.folder.proposal, like=self.config.cell.config_path
+        )
         return events.Proposed(
             gates=conditions, written=written.geometry.document(), displacement=written.displacement
         )

@@ -28,6 +28,9 @@ LONGEST_LINE = 16 << 20
 """Bytes; no event comes near it. A file without line ends must not fill the memory."""
 
 
+_APPENDING = os.O_RDWR | os.O_CREAT | os.O_APPEND | os.O_NONBLOCK
+
+
 def read_journal(path: Path) -> tuple[Event, ...]:
     """All events of a journal.
 
@@ -67,7 +70,7 @@ class Journal:
     def __init__(self, path: Path) -> None:
         self.path = path
         try:
-            self._descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_APPEND | os.O_NONBLOCK, 0o666)
+            self._descriptor = os.open(path, _APPENDING, 0o666 & ~atomic_files.NOT_FOR_OTHERS)
         except OSError as error:
             raise self._cannot_open(error) from error
         try:

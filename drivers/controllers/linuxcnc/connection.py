@@ -119,7 +119,7 @@ class Connection:
             raise DeviceError(
                 "refuses the enable password",
                 subject=self._address.name,
-                action="Set controller.enable_password to linuxcncrsh's own (--enablepw)",
+                action="Set enable_password in the password_file to linuxcncrsh's own (--enablepw)",
             )
 
     async def close(self) -> None:
@@ -159,7 +159,7 @@ class Connection:
                 raise DeviceError(
                     "refuses the connect password",
                     subject=self._address.name,
-                    action="Set controller.connect_password to linuxcncrsh's own (--connectpw)",
+                    action="Set connect_password in the password_file to linuxcncrsh's own (--connectpw)",
                 )
         raise self._not_linuxcncrsh(line)
 

@@ -28,7 +28,8 @@ class Address:
         """
         if settings.port is None:
             raise UsageError("the cell file names no controller port", action="Set controller.port")
-        return cls(settings.host, settings.port, settings.connect_password, settings.enable_password)
+        connect, enable = settings.connect_password, settings.enable_password
+        return cls(settings.host, settings.port, connect.get_secret_value(), enable.get_secret_value())
 
     @property
     def name(self) -> str:

@@ -116,7 +116,7 @@ def _set_teleop(session: ClientSession, on: bool) -> None:
 
 
 def _enable(session: ClientSession, argument: str) -> bool:
-    if argument == session.settings.enable_password:
+    if argument == session.settings.enable_password.get_secret_value():
         session.state.commander = session
         return True
     if argument.upper() == "OFF":

@@ -143,7 +143,8 @@ class _Client:
                 raise ConnectionCut
 
     def _hello(self, password: str, name_and_version: str) -> None:
-        if password == self._session.settings.connect_password and len(name_and_version.split()) >= 2:
+        expected = self._session.settings.connect_password.get_secret_value()
+        if password == expected and len(name_and_version.split()) >= 2:
             self._session.greeted = True
             self._write(f"HELLO ACK {SERVER}\r\n".encode())
         else:

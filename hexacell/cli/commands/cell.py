@@ -6,7 +6,9 @@ import argparse
 import json
 
 from hexacell.application.device_setup import require_drivers
-from hexacell.cell.loader import describe, load_cell, schema
+from hexacell.cell.loader import describe, schema, settings_document
+from hexacell.cell.passwords import with_passwords
+from hexacell.cli.cell_argument import cell_at, cell_with_devices_at
 from hexacell.cli.console import Console
 from hexacell.errors import ExitCode
 from hexacell.robot_model import robot_of
@@ -20,14 +22,16 @@ def main(options: argparse.Namespace) -> ExitCode:
         if not options.json:
             console.print(json.dumps(schema(), indent=2))
         return ExitCode.DONE
-    cell = load_cell(options.cell)
+    read = cell_at if options.action == "show" else cell_with_devices_at
+    cell = read(options.cell, console)
     if options.action == "show":
-        console.document(cell.settings.model_dump(mode="json"))
+        console.document(settings_document(cell))
         if not options.json:
             console.print(describe(cell).rstrip("\n"))
         return ExitCode.DONE
     robot_of(cell)
     require_drivers(cell.settings)
+    with_passwords(cell.settings, cell.path.parent)
     console.document({"valid": True, "name": cell.settings.name})
     console.print(f"{options.cell}: valid, and so is its controller config {cell.config_path}")
     return ExitCode.DONE

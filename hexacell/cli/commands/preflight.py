@@ -7,7 +7,7 @@ import asyncio
 
 from hexacell.application.calibration_run import preflight
 from hexacell.application.offline import try_plan
-from hexacell.cell.loader import load_cell
+from hexacell.cli.cell_argument import cell_with_devices_at
 from hexacell.cli.console import Console
 from hexacell.errors import ExitCode
 from hexacell.presentation.documents import preflight_document
@@ -19,7 +19,7 @@ from procedures.calibration.workflow import Mode
 def main(options: argparse.Namespace) -> ExitCode:
     """Report every failure at once, move nothing; then predict what the plan gives."""
     console = Console(options.json)
-    cell = load_cell(options.cell)
+    cell = cell_with_devices_at(options.cell, console)
     devices = asyncio.run(preflight(cell, Mode.OPTIMISE, unattended=options.unattended))
     for line in preflight_lines(devices):
         console.print(wrapped(line, indent=6))

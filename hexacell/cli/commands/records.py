@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 
 from hexacell.application.offline import fit_measurements, next_pose
-from hexacell.cell.loader import load_cell
+from hexacell.cli.cell_argument import cell_at
 from hexacell.cli.console import Console
 from hexacell.errors import ExitCode
 from hexacell.measurements.csv_file import read_measurements
@@ -20,7 +20,7 @@ from hexacell.runs.run_folder import RunFolder
 def fit(options: argparse.Namespace) -> ExitCode:
     """Identify the geometry and report all that is known of the result."""
     console = Console(options.json)
-    cell = load_cell(options.cell)
+    cell = cell_at(options.cell, console)
     folder = RunFolder(options.measurements.parent)
     assessed = fit_measurements(cell, read_measurements(options.measurements), folder)
     console.document(fit_document(assessed))
@@ -32,7 +32,7 @@ def fit(options: argparse.Namespace) -> ExitCode:
 def propose_next(options: argparse.Namespace) -> ExitCode:
     """Propose the pose worth measuring next, for controllers that hexacell does not drive."""
     console = Console(options.json)
-    cell = load_cell(options.cell)
+    cell = cell_at(options.cell, console)
     measurements = read_measurements(options.measurements, allow_partial=True)
     proposed = next_pose(cell, measurements, rejections=options.refused)
     console.document(next_document(proposed))

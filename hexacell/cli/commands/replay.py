@@ -6,6 +6,7 @@ import argparse
 import asyncio
 
 from hexacell.application.replay_run import replay
+from hexacell.application.run_export import export_run
 from hexacell.cli.console import Console
 from hexacell.errors import ExitCode, UsageError
 from hexacell.presentation.documents import replay_document
@@ -15,8 +16,10 @@ from procedures.replay.replayer import Scope
 
 
 def main(options: argparse.Namespace) -> ExitCode:
-    """Replay, and report what differs from the recording."""
+    """Replay, and report what differs from the recording; or export the run, and replay nothing."""
     console = Console(options.json)
+    if options.export is not None:
+        return _export(options, console)
     tolerance = TOLERANCE if options.tolerance is None else options.tolerance
     if not 0.0 <= tolerance < float("inf"):
         raise UsageError(f"--tolerance {tolerance:g} is no tolerance", action="Give a number from 0")
@@ -24,3 +27,10 @@ def main(options: argparse.Namespace) -> ExitCode:
     console.document(replay_document(replayed))
     console.print(replay_report(replayed))
     return ExitCode.DONE if replayed.is_same else ExitCode.OUT_OF_LIMITS
+
+
+def _export(options: argparse.Namespace, console: Console) -> ExitCode:
+    names = export_run(options.run, options.export)
+    console.document({"exported": str(options.export), "files": list(names)})
+    console.print(f"{options.export}: {len(names)} files of the run, every password masked")
+    return ExitCode.DONE

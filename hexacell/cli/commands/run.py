@@ -10,7 +10,7 @@ from hexacell.application.calibration_run import RunRequest, calibrate, is_unver
 from hexacell.application.demo import prepare_demo
 from hexacell.application.interrupted_runs import run_to_resume
 from hexacell.campaign.pose_list import pose_list_of
-from hexacell.cell.loader import load_cell
+from hexacell.cli.cell_argument import cell_with_devices_at
 from hexacell.cli.console import Console
 from hexacell.cli.progress import RunProgress
 from hexacell.cli.signal_commands import SignalCommands
@@ -46,7 +46,7 @@ def length(options: argparse.Namespace) -> ExitCode:
 
 
 def _request(options: argparse.Namespace, console: Console, mode: Mode) -> RunRequest:
-    cell = load_cell(options.cell)
+    cell = cell_with_devices_at(options.cell, console)
     attended = is_interactive() and not options.unattended
     return RunRequest(
         cell=cell,

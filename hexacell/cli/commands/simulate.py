@@ -9,14 +9,16 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 from hexacell.application.demo import served_cell
-from hexacell.cell.loader import load_cell
+from hexacell.cli.cell_argument import cell_at
+from hexacell.cli.console import Console
 from hexacell.errors import ExitCode
 from hexacell.storage.atomic_files import write_atomically
 
 
 def main(options: argparse.Namespace) -> ExitCode:
     """Serve until interrupted; stdout gets a cell file with the addresses of the served devices."""
-    cell = load_cell(options.cell)
+    console = Console()
+    cell = cell_at(options.cell, console)
     with _blocked_signals() as stops, served_cell(cell) as text:
         if options.output is None:
             print(text, flush=True)

@@ -10,6 +10,7 @@ from contextlib import asynccontextmanager
 from typing import Any
 
 import pytest
+from pydantic import SecretStr
 
 from drivers.controllers.errors import MotionInterrupted, MoveRefused
 from drivers.controllers.linuxcnc.controller import LinuxcncrshController
@@ -169,11 +170,12 @@ def _geometry(values: Any) -> Any:
 
 async def test_the_passwords_of_the_cell_file_are_required(bundled_cell) -> None:
     settings = quick(bundled_cell.settings)
-    own = settings.controller.model_copy(update={"connect_password": "sesame", "enable_password": "open"})
+    passwords = {"connect_password": SecretStr("sesame"), "enable_password": SecretStr("open")}
+    own = settings.controller.model_copy(update=passwords)
     with serve(bundled_cell, settings.model_copy(update={"controller": own})) as cell:
         async with drivers(cell.settings) as (_, _, controller):
             await controller.prepare()
-        wrong = cell.settings.controller.model_copy(update={"connect_password": "EMC"})
+        wrong = cell.settings.controller.model_copy(update={"connect_password": SecretStr("EMC")})
         stranger = LinuxcncrshController(wrong)
         with pytest.raises(HexacellError, match="password"):
             await stranger.open()

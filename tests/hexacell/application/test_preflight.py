@@ -6,6 +6,7 @@ import asyncio
 
 import numpy as np
 import pytest
+from pydantic import SecretStr
 
 from hexacell.application.calibration_run import preflight
 from hexacell.campaign import feasibility
@@ -55,7 +56,8 @@ async def test_every_failure_is_reported_at_once(make_site) -> None:
     site.simulated.gauges.indicators["x"].inch = True
     site.simulated.gauges.indicators["z"].held_mm = 1.0
     site.simulated.faults.inject("unplugged", "encoder 4")
-    controller = site.simulated.settings.controller.model_copy(update={"connect_password": "WRONG"})
+    wrong = {"connect_password": SecretStr("WRONG")}
+    controller = site.simulated.settings.controller.model_copy(update=wrong)
     site.simulated.settings = site.simulated.settings.model_copy(update={"controller": controller})
     before = site.simulated.machine.joints()
     with pytest.raises(SeveralErrors) as refusal:

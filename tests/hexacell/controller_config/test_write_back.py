@@ -1,5 +1,6 @@
 import os
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -239,7 +240,7 @@ def test_a_full_disk_leaves_the_config_alone(
 ) -> None:
     write = atomic_files.write_atomically
 
-    def full(path: Path, data: bytes, **options: bytes) -> None:
+    def full(path: Path, data: bytes, **options: Any) -> None:
         if path == config:
             raise FileError("cannot be written and is unchanged: the disk is full", subject=path)
         write(path, data, **options)

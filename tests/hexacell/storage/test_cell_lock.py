@@ -144,14 +144,76 @@ def test_the_lock_file_stays_and_is_empty_when_the_cell_is_free(config: Path) ->
     assert path.stat().st_ino == inode
 
 
-def test_other_users_can_open_the_lock_file_whatever_the_umask(config: Path) -> None:
-    old = os.umask(0o077)
+@pytest.mark.parametrize("umask", [0o077, 0])
+def test_all_users_can_open_the_lock_file_and_only_its_maker_can_write_it(config: Path, umask: int) -> None:
+    old = os.umask(umask)
     try:
         with cell_lock(config):
             pass
     finally:
         os.umask(old)
-    assert stat.S_IMODE(lock_path(config).stat().st_mode) == 0o666
+    assert stat.S_IMODE(lock_path(config).stat().st_mode) == 0o644
+
+
+def test_a_lock_file_of_an_earlier_version_is_closed_to_others(config: Path) -> None:
+    lock_path(config).touch()
+    lock_path(config).chmod(0o666)
+    with cell_lock(config):
+        pass
+    assert stat.S_IMODE(lock_path(config).stat().st_mode) == 0o644
+
+
+@contextmanager
+def read_only(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """The lock file belongs to another user, who alone may write it."""
+    open_file = os.open
+
+    def denied(path: Path, flags: int, *mode: int) -> int:
+        if flags & os.O_CREAT:
+            raise FileExistsError(17, "File exists")
+        if flags & os.O_RDWR:
+            raise PermissionError(13, "Permission denied")
+        return open_file(path, flags, *mode)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(os, "open", denied)
+        yield
+
+
+def test_a_user_who_may_only_read_the_lock_file_excludes_others(
+    config: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The technician made it, and the scheduler is another user."""
+    lock_path(config).touch(mode=0o644)
+    with read_only(monkeypatch), cell_lock(config):
+        assert is_busy(config)
+    assert not is_busy(config)
+    with another_process(config), read_only(monkeypatch):
+        assert is_busy(config)
+
+
+def test_the_name_of_a_process_that_has_died_is_not_given(
+    config: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with another_process(config) as process:
+        process.kill()
+        process.wait()
+    assert str(process.pid) in lock_path(config).read_text()
+    with (
+        read_only(monkeypatch),
+        cell_lock(config),
+        pytest.raises(CellBusy, match="in use by another process"),
+        cell_lock(config),
+    ):
+        pass
+
+
+def test_a_pipe_in_place_of_the_lock_file_is_not_waited_for(
+    config: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    os.mkfifo(lock_path(config))
+    with read_only(monkeypatch), cell_lock(config):
+        assert is_busy(config)
 
 
 @pytest.mark.parametrize("note", ["", "rubbish", "[1]", '{"pid": 1}', "\x00\xff" * 5000])
@@ -196,7 +258,7 @@ def test_a_lock_file_that_may_not_be_opened_is_reported(
         raise PermissionError(13, "Permission denied")
 
     monkeypatch.setattr(os, "open", denied)
-    with pytest.raises(FileError, match=r"permission denied.*mode 666"), cell_lock(config):
+    with pytest.raises(FileError, match=r"permission denied.*mode 644"), cell_lock(config):
         pass
 
 

@@ -1,0 +1,108 @@
+"""Passwords of the controller: from the environment, a file of their own, or the cell file.
+
+A cell file is copied, shown and kept with every run, so a password should not be in it. The first of these
+that has one counts.
+"""
+
+from __future__ import annotations
+
+import os
+import stat
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+from pydantic import SecretStr
+
+from hexacell.cell.devices import ControllerSettings
+from hexacell.cell.fields import LONGEST_TEXT, Password, Section
+from hexacell.cell.loader import Cell, validated
+from hexacell.cell.model import CellSettings
+from hexacell.errors import FileError, UsageError
+from hexacell.storage.atomic_files import os_error_to_file_error, read_text
+from hexacell.storage.secrets import clear_secrets
+from hexacell.storage.toml_document import TomlDocument
+
+VARIABLES = {
+    "connect_password": "HEXACELL_CONNECT_PASSWORD",
+    "enable_password": "HEXACELL_ENABLE_PASSWORD",
+}
+"""The environment variable of each password."""
+
+LARGEST_FILE_BYTES = 10_000
+
+
+class PasswordFile(Section):
+    """The content of a ``password_file``."""
+
+    connect_password: Password | None = None
+    enable_password: Password | None = None
+
+
+def with_passwords(
+    settings: CellSettings, folder: Path, environment: Mapping[str, str] = os.environ
+) -> CellSettings:
+    """The settings with the controller's passwords; ``folder`` has the cell file.
+
+    Raises:
+        FileError: the password file cannot be read, is none, or others can read or change it.
+        UsageError: a variable of the environment has control characters or is too long.
+    """
+    controller = settings.controller
+    found = {**_in_file(controller, folder), **_in_environment(environment)}
+    if not found:
+        return settings
+    return settings.model_copy(update={"controller": controller.model_copy(update=found)})
+
+
+def password_warnings(cell: Cell) -> Iterator[str]:
+    """Passwords that others may read: in the cell file, or in a file that a group can read."""
+    lines = sorted({cell.document.line_of(path) or 1 for path in clear_secrets(cell.document)})
+    if lines:
+        which = ", ".join(map(str, lines))
+        yield (
+            f"{cell.path}:{which}: a password stands here in clear. Move connect_password and "
+            'enable_password to a file of mode 600, name it with password_file = "..." in [controller], '
+            f"or set {' and '.join(VARIABLES.values())}"
+        )
+    path = password_path(cell.settings.controller, cell.path.parent)
+    if path is not None and path.exists() and path.stat().st_mode & stat.S_IRGRP:
+        yield f"{path}: its whole group can read the passwords in it. If not all should, use chmod 600"
+
+
+def password_path(controller: ControllerSettings, folder: Path) -> Path | None:
+    """The password file that a cell file names; ``folder`` has the cell file."""
+    return None if controller.password_file is None else folder / controller.password_file
+
+
+def _in_file(controller: ControllerSettings, folder: Path) -> dict[str, SecretStr]:
+    path = password_path(controller, folder)
+    if path is None:
+        return {}
+    _require_private(path)
+    document = TomlDocument.parse(read_text(path, LARGEST_FILE_BYTES), path)
+    content = validated(document, PasswordFile, path)
+    return {name: value for name, value in content if value is not None}
+
+
+def _require_private(path: Path) -> None:
+    try:
+        mode = path.stat().st_mode
+    except OSError as error:
+        raise os_error_to_file_error("the passwords cannot be read", path, error) from error
+    if mode & (stat.S_IRWXO | stat.S_IWGRP):
+        raise FileError(
+            f"others can read or change the passwords in it (mode {stat.S_IMODE(mode):o})",
+            subject=path,
+            action=f"Use chmod 600 {path}, and change the passwords if somebody may have read them",
+        )
+
+
+def _in_environment(environment: Mapping[str, str]) -> dict[str, SecretStr]:
+    given = {name: environment.get(variable, "") for name, variable in VARIABLES.items()}
+    for name, value in given.items():
+        if len(value) > LONGEST_TEXT or not value.isprintable():
+            raise UsageError(
+                f"the variable {VARIABLES[name]} is too long or has control characters",
+                action="Correct it",
+            )
+    return {name: SecretStr(value) for name, value in given.items() if value}

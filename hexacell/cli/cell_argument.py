@@ -1,0 +1,26 @@
+"""The cell file that a command is given, with warnings about it on stderr."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from hexacell.application.security_warnings import exposure_warnings
+from hexacell.cell.loader import Cell, load_cell
+from hexacell.cell.passwords import password_warnings
+from hexacell.cli.console import Console
+
+
+def cell_at(path: Path, console: Console) -> Cell:
+    """The cell; raises ``FileError`` or ``SeveralErrors`` as ``load_cell`` does."""
+    cell = load_cell(path)
+    for warning in password_warnings(cell):
+        console.warn(warning)
+    return cell
+
+
+def cell_with_devices_at(path: Path, console: Console) -> Cell:
+    """The same for a command that is about the cell's devices."""
+    cell = cell_at(path, console)
+    for warning in exposure_warnings(cell):
+        console.warn(warning)
+    return cell

@@ -1,0 +1,122 @@
+"""Passwords reach no file of a run and no screen; files of runs belong to their user."""
+
+from __future__ import annotations
+
+import os
+import stat
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from procedures.journal.journal import read_journal
+
+CLEAR = ("[controller]\n", '[controller]\nconnect_password = "hunter2"\nenable_password = "hunter3"\n')
+
+
+@pytest.fixture
+def open_umask() -> Iterator[None]:
+    """Every file that is made is writable by everybody unless the program sees to it."""
+    old = os.umask(0)
+    yield
+    os.umask(old)
+
+
+def files_below(folder: Path) -> list[Path]:
+    return [path for path in folder.rglob("*") if path.is_file()]
+
+
+def test_a_run_keeps_no_password_can_be_resumed_and_its_files_are_its_users(
+    typed_here, quick_cell, few_candidates, open_umask
+):
+    quick_cell.edit(CLEAR)
+    own = {quick_cell.cell, quick_cell.controller}
+    outcome = typed_here("run", quick_cell.cell, "--mode", "optimise", "--unattended")
+    assert outcome.code in {0, 1}, outcome.err
+    assert "a password stands here in clear" in outcome.err
+    [run] = quick_cell.runs()
+    made = [path for path in [*files_below(quick_cell.path), run, run.parent] if path not in own]
+    assert len(made) > 8
+    assert [path for path in made if path.stat().st_mode & stat.S_IWOTH] == []
+    assert [path for path in files_below(run) if b"hunter" in path.read_bytes()] == []
+    assert "hunter" not in outcome.out + outcome.err
+
+    if (run / "config-before").exists():
+        quick_cell.controller.write_bytes((run / "config-before").read_bytes())
+    rewound = quick_cell.rewound(run, "P1/close")
+    first, *others = (rewound / "journal.jsonl").read_bytes().splitlines(keepends=True)
+    assert b"hunter2" in first, "as an earlier version kept it"
+    masked = (run / "journal.jsonl").read_bytes().splitlines(keepends=True)[0]
+    (rewound / "journal.jsonl").write_bytes(b"".join([masked, *others]))
+    quick_cell.edit(("hunter2", "changed"))
+    resumed = typed_here(
+        "run", quick_cell.cell, "--mode", "optimise", "--unattended", "--resume", rewound.name
+    )
+    assert resumed.code in {0, 1}, resumed.err
+    assert read_journal(rewound / "journal.jsonl")[-1].kind == "ended"
+
+
+def test_show_and_validate_warn_and_show_no_password(typed_here, cell_folder):
+    cell_folder.edit(CLEAR)
+    for command in (["show"], ["show", "--json"], ["validate"]):
+        outcome = typed_here("cell", *command, cell_folder.cell)
+        assert outcome.code == 0
+        assert outcome.err.startswith(f"hexacell: warning: {cell_folder.cell}:")
+        assert "hunter" not in outcome.out + outcome.err
+
+
+def test_validate_refuses_passwords_that_others_can_read(typed_here, cell_folder):
+    cell_folder.edit(("[controller]\n", '[controller]\npassword_file = "passwords.toml"\n'))
+    (cell_folder.path / "passwords.toml").write_text('enable_password = "hunter2"\n')
+    (cell_folder.path / "passwords.toml").chmod(0o644)
+    outcome = typed_here("cell", "validate", cell_folder.cell)
+    assert outcome.code == 2
+    assert "passwords.toml: others can read or change the passwords in it (mode 644)" in outcome.err
+
+
+def test_export_is_told_and_refuses_to_write_over_something(typed_here, demo, tmp_path):
+    outcome = typed_here("replay", demo.run, "--export", tmp_path / "copy", "--json")
+    assert outcome.code == 0
+    assert "journal.jsonl" in outcome.document["files"]
+    assert "every password masked" in outcome.err
+    outcome = typed_here("replay", demo.run, "--export", tmp_path / "copy")
+    assert outcome.code == 2
+    assert "something is there already" in outcome.err
+
+
+def real(cell_folder, host: str) -> None:
+    """The same cell with devices that are not simulated."""
+    text = cell_folder.cell.read_text()
+    text = text[: text.index("[simulation]")]
+    for protocol in ("sylvac", "mux10", "cdi"):
+        text = text.replace(
+            f'protocol = "{protocol}"', f'protocol = "{protocol}"\nport = "/dev/{protocol}"'
+        )
+    text = text.replace("[encoders]", '[encoders]\nbus = { interface = "virtual", token = "hunter2" }')
+    cell_folder.cell.write_text(text.replace("[controller]", f'[controller]\nport = 5007\nhost = "{host}"'))
+
+
+def test_a_controller_across_the_network_is_warned_of(typed_here, cell_folder):
+    real(cell_folder, "192.168.1.7")
+    outcome = typed_here("cell", "validate", cell_folder.cell)
+    assert outcome.code == 0
+    assert (
+        "warning: controller 192.168.1.7:5007: passwords and commands go there over the network"
+        in outcome.err
+    )
+    shown = typed_here("cell", "show", cell_folder.cell).out
+    assert 'token = "***"' in shown
+    assert "hunter" not in shown
+
+
+@pytest.mark.parametrize("is_open", [True, False])
+def test_a_local_controller_that_the_network_can_reach_is_warned_of(
+    typed_here, cell_folder, monkeypatch, is_open
+):
+    monkeypatch.setattr(
+        "hexacell.application.security_warnings.accepts_from_network", lambda port: is_open and port == 5007
+    )
+    real(cell_folder, "127.0.0.1")
+    outcome = typed_here("cell", "validate", cell_folder.cell)
+    assert outcome.code == 0
+    assert ("it accepts connections from the network too" in outcome.err) is is_open

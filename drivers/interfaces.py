@@ -57,6 +57,19 @@ class ControllerStatus:
 
 
 @dataclass(frozen=True, slots=True)
+class ReportedPosition:
+    """Where a controller has the robot.
+
+    Attributes:
+        pose: by its own forward kinematics.
+        joints_mm: its six joint variables; none where its protocol does not tell them.
+    """
+
+    pose: Pose
+    joints_mm: tuple[float, ...] | None = None
+
+
+@dataclass(frozen=True, slots=True)
 class TemperatureReading:
     """A temperature, deg C, and the raw answer."""
 
@@ -120,8 +133,8 @@ class Controller(Device[DeviceIdentity], Protocol):
         """Move to ``pose``; returns on arrival, not on acknowledgement."""
         ...
 
-    async def pose(self) -> Pose:
-        """The actual pose by the controller's own kinematics."""
+    async def position(self) -> ReportedPosition | None:
+        """Where it has the robot now; none before it is homed, when nobody knows."""
         ...
 
     async def status(self) -> ControllerStatus:

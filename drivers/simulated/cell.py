@@ -61,7 +61,7 @@ class SimulatedCell(Closeable):
                 adapter = served.enter_context(SlcanServer(self.encoders.channel, PtyLine("slcan")))
                 bus = adapter.bus_settings
             self.controller = served.enter_context(SimulatedController(self.machine, settings.controller))
-            self.faults = CellFaults(self.gauges, self.encoders, self.controller, stop_file)
+            self.faults = CellFaults(self.gauges, self.encoders, self.controller, self.machine, stop_file)
             self.schedule = served.enter_context(FaultSchedule(self.faults, clock, simulation.faults))
             self.physics.on_motion_start = self.schedule.on_motion_start
             self._served = served.pop_all()

@@ -11,6 +11,7 @@ from pathlib import Path
 from drivers.simulated.encoders.bank import SimulatedEncoderBank
 from drivers.simulated.gauges.bank import SimulatedGaugeBank
 from drivers.simulated.linuxcnc.server import SimulatedController
+from drivers.simulated.robot import SimulatedMachine
 from drivers.simulated.served_device import Closeable, Switch
 from hexacell.cell.simulation import FaultKind, SimulatedFault
 from hexacell.clock import CellClock
@@ -25,6 +26,7 @@ class CellFaults:
         gauges: SimulatedGaugeBank,
         encoders: SimulatedEncoderBank,
         controller: SimulatedController,
+        machine: SimulatedMachine,
         stop_file: Path,
     ) -> None:
         of_cell: dict[FaultKind, Switch] = {
@@ -35,6 +37,8 @@ class CellFaults:
         of_controller: dict[FaultKind, Switch] = {
             "unplugged": controller.set_unplugged,
             "silent": controller.set_silent,
+            "forward kinematics": machine.set_failing_forward,
+            "old config": machine.set_keeping_geometry,
         }
         self._switches: dict[str, Mapping[FaultKind, Switch]] = {
             **{name: gauges.faults(name) for name in gauges.indicators},

@@ -24,7 +24,12 @@ LINE_STEPS = 24
 
 
 class SimulatedMachine:
-    """The machine behind a controller that reads its geometry whenever it is switched on."""
+    """The machine behind a controller that reads its geometry whenever it is switched on.
+
+    Attributes:
+        fails_forward: its forward kinematics fails: the pose that it reports is that of its home.
+        keeps_geometry: it does not read its geometry again.
+    """
 
     def __init__(
         self,
@@ -41,7 +46,10 @@ class SimulatedMachine:
         self._physics = physics
         self._clock = clock
         self._geometry = config_format.read(config)
+        self._home = home
         self._line = PoseBatch.of([home, home])
+        self.fails_forward = False
+        self.keeps_geometry = False
         self._lock = threading.Lock()
         self._stop_count = 0
         self._stopped = threading.Event()
@@ -53,7 +61,9 @@ class SimulatedMachine:
             KinematicsFailure: a pose on the line is out of reach.
         """
         stop_count = self._stop_count
-        line = interpolate_line(PoseBatch.of([self.pose()]), PoseBatch.of([pose]), LINE_STEPS)
+        with self._lock:
+            here = self._pose_now()
+        line = interpolate_line(here, PoseBatch.of([pose]), LINE_STEPS)
         joints = self._joints(line)
         if np.isnan(joints).any():
             raise KinematicsFailure("Linear move on line 0 fails kinematicsInverse")
@@ -73,13 +83,22 @@ class SimulatedMachine:
             self._stopped.set()
 
     def pose(self) -> Pose:
-        """The pose by the controller's geometry."""
+        """The pose by the controller's geometry, or of its home where its forward kinematics fails."""
         with self._lock:
-            return self._pose_now().pose(0)
+            return self._home if self.fails_forward else self._pose_now().pose(0)
 
     def joints(self) -> tuple[float, ...]:
         """The commanded slider positions (6,), mm."""
-        return tuple(float(value) for value in self._joints(PoseBatch.of([self.pose()]))[0])
+        with self._lock:
+            return tuple(float(value) for value in self._joints(self._pose_now())[0])
+
+    def set_failing_forward(self, *, on: bool) -> None:
+        """Let the forward kinematics fail, or no more."""
+        self.fails_forward = on
+
+    def set_keeping_geometry(self, *, on: bool) -> None:
+        """Let it ignore its config when it is switched on, or no more."""
+        self.keeps_geometry = on
 
     def switch_on(self) -> None:
         """Read the geometry again; the sliders stay, so the controller's pose changes.
@@ -87,6 +106,8 @@ class SimulatedMachine:
         Raises:
             FileError: the config cannot be read, or its geometry has no pose at the slider positions.
         """
+        if self.keeps_geometry:
+            return
         with self._lock:
             here = self._pose_now()
             joints = self._joints(here)

@@ -14,12 +14,19 @@ from hexacell.application.device_setup import Connected, device_addresses, open_
 from hexacell.campaign.pose_list import pose_list_of
 from hexacell.cell.loader import Cell
 from hexacell.controller_config.change import fingerprint
+from hexacell.controller_config.current import CurrentConfig
 from hexacell.errors import FileError, HexacellError, UsageError, flatten_errors
-from hexacell.robot_model import robot_of, robot_of_start
+from hexacell.robot_model import config_format, robot_of, robot_of_start
 from hexacell.runs.run_folder import RunFolder, runs_folder
 from hexacell.storage.atomic_files import read_text, remove_stale_temporaries, write_atomically
 from hexacell.storage.cell_lock import cell_lock
-from procedures.calibration.preflight import device_failures, plan_failures, raise_all, start_failures
+from procedures.calibration.preflight import (
+    device_failures,
+    plan_failures,
+    position_failures,
+    raise_all,
+    start_failures,
+)
 from procedures.calibration.workflow import Calibration, Mode
 from procedures.devices.live_values import LiveValues
 from procedures.devices.reconnection import require_known
@@ -27,6 +34,7 @@ from procedures.engine.config_transactions import holds_provisional
 from procedures.engine.engine import Engine, Listener
 from procedures.engine.recovery import RecoveryPolicy
 from procedures.engine.step_executor import StepExecutor
+from procedures.guards.position_check import PositionCheck
 from procedures.journal.journal import Journal, read_journal, read_version
 from procedures.journal.line_format import RULES_SINCE
 from procedures.run import events
@@ -57,6 +65,7 @@ async def preflight(cell: Cell, mode: Mode, *, unattended: bool) -> tuple[Device
     calibration = _new_calibration(cell, mode)
     with cell_lock(cell.config_path):
         async with _checked_devices(cell, calibration, runs_folder(cell), unattended) as connected:
+            raise_all(await _position_failures(cell, connected))
             return connected.identities
 
 
@@ -89,6 +98,8 @@ async def calibrate(
             calibration = calibration_of_run(cell, started)
         async with _checked_devices(cell, calibration, folder.path, request.unattended) as connected:
             require_known(connected.identities, started.devices if started else ())
+            if started is None:  # a resumed run may have to finish a change of the config first
+                raise_all(await _position_failures(cell, connected))
             devices = connected.devices if live is None else replace(connected.devices, live=live)
             return await _run(request, calibration, replace(connected, devices=devices), listeners, queue)
 
@@ -117,6 +128,13 @@ async def _checked_devices(
         if not failures:
             raise
         raise_all([*failures, *(one for one in flatten_errors(error) if one not in failures)])
+
+
+async def _position_failures(cell: Cell, connected: Connected) -> list[HexacellError]:
+    """See :func:`~procedures.calibration.preflight.position_failures`."""
+    config = CurrentConfig(cell.config_path, config_format(cell.settings))
+    check = PositionCheck(connected.settings, connected.devices, connected.clock, config)
+    return await position_failures(check)
 
 
 def is_unverified(folder: RunFolder) -> bool:

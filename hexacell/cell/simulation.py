@@ -18,6 +18,8 @@ FaultKind = Literal[
     "off its plate",
     "frozen",
     "alarm",
+    "forward kinematics",
+    "old config",
 ]
 
 

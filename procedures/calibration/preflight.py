@@ -13,6 +13,7 @@ from hexacell.kinematics.pose import Pose
 from procedures.calibration.workflow import Calibration, Mode
 from procedures.devices.device_set import Devices, gather_errors
 from procedures.guards import rules
+from procedures.guards.position_check import PositionCheck
 from procedures.run.cancellation import in_thread
 
 
@@ -89,6 +90,18 @@ async def start_failures(devices: Devices, folder: Path, free_disk_mb: float) ->
         rules.low_disk_space(folder, free_disk_mb),
     ]
     return [trip.as_error() for trip in trips if trip is not None]
+
+
+async def position_failures(check: PositionCheck) -> list[HexacellError]:
+    """That controller and encoders do not agree on where the robot is: the controller runs another config.
+
+    Before the controller is homed nobody knows; then this is checked before the first move.
+    """
+    try:
+        found = await check.read()
+    except HexacellError as error:
+        return flatten_errors(error)
+    return [] if found.reports is None or found.trip is None else [found.trip.as_error()]
 
 
 def raise_all(failures: list[HexacellError]) -> None:

@@ -126,9 +126,9 @@ class ConfigTransactions:
         """Reload the restored config; whether the controller is known to have its old geometry."""
         try:
             await self.devices.controller.reload()
+            return (await self.guards.position.read()).trip is None
         except HexacellError:
             return False
-        return True
 
     async def revert_provisional(self, state: RunState) -> events.ProvisionalReverted:
         """Give the controller the geometry of before the provisional one."""

@@ -51,6 +51,7 @@ KINDS: Mapping[type[HexacellError], FailureKind] = {
 OF_GUARDS: Mapping[Guard, FailureKind] = {
     Guard.CONTROLLER: FailureKind.CONTROLLER,
     Guard.FOLLOWING: FailureKind.CONTROLLER,
+    Guard.POSITION: FailureKind.CONTROLLER,
     Guard.GAUGE_END: FailureKind.GAUGE_AT_END,
     Guard.PLATE: FailureKind.GAUGE_AT_END,
     Guard.ENCODERS: FailureKind.ENCODER_SILENT,

@@ -12,7 +12,7 @@ import numpy as np
 from drivers.errors import GaugeAtEnd
 from hexacell.cell.loader import Cell
 from hexacell.clock import CellClock
-from hexacell.controller_config.interface import ControllerGeometry
+from hexacell.controller_config.current import CurrentConfig
 from hexacell.errors import HexacellError, consists_only_of
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.rotations import Array
@@ -62,7 +62,12 @@ class StepExecutor:
     @cached_property
     def guards(self) -> Guards:
         """What stops the robot; a guard that tripped stays latched as long as this exists."""
-        return Guards(self.cell.settings, self.devices, self.clock, self.folder.path)
+        return Guards(self.cell.settings, self.devices, self.clock, self.folder.path, self.current_config)
+
+    @cached_property
+    def current_config(self) -> CurrentConfig:
+        """The config that the controller is to run."""
+        return CurrentConfig(self.cell.config_path, config_format(self.cell.settings))
 
     @cached_property
     def config(self) -> ConfigTransactions:
@@ -84,7 +89,7 @@ class StepExecutor:
         """Do one step; raises ``HexacellError``."""
         match step:
             case Locate():
-                return events.Located(pose=(await self.devices.controller.pose()).as_tuple())
+                return await self.locate()
             case Move():
                 return await self._move(step, state)
             case Place():
@@ -102,11 +107,18 @@ class StepExecutor:
             case Compute():
                 return await self._compute(step, state)
 
+    async def locate(self) -> events.Located:
+        """Where the robot is; raises ``GuardTripped`` if controller and encoders do not agree on that."""
+        found = await self.guards.locate()
+        return events.Located(
+            pose=found.pose.as_tuple(),
+            joints_mm=None if found.joints is None else joints_of(found.joints),
+            encoders_mm=joints_of(found.encoders),
+        )
+
     async def _move(self, step: Move, state: RunState) -> events.Event:
         try:
-            await self.guards.move(
-                step, state, lambda: self._commanded(step, is_provisional=state.provisional_active)
-            )
+            await self.guards.move(step, state, lambda: self._commanded(step))
         except GuardTripped as tripped:
             if step.at.phase is not Phase.AFTER or not tripped.trip.is_about_the_ball:
                 raise
@@ -115,14 +127,11 @@ class StepExecutor:
             return events.RecordRejected(at=step.at, orientation=step.orientation, reason=str(tripped))
         return events.Arrived(at=step.at, orientation=step.orientation, pose=step.pose)
 
-    def _commanded(self, step: Move, *, is_provisional: bool) -> Array:
+    def _commanded(self, step: Move) -> Array:
         """Where the sliders (6,), mm, belong by the geometry that the controller has now."""
-        robot = self.calibration.robot
-        commanding = ControllerGeometry(robot.controller, robot.branch)
-        if is_provisional or step.at.phase in {Phase.AFTER, Phase.LENGTH}:
-            commanding = config_format(self.cell.settings).read(self.cell.config_path)
-        target = PoseBatch.of([step.target])
-        joints: Array = robot.mechanism.inverse(commanding.geometry, commanding.branch, target)[0]
+        commanding, target = self.current_config.geometry(), PoseBatch.of([step.target])
+        mechanism = self.calibration.robot.mechanism
+        joints: Array = mechanism.inverse(commanding.geometry, commanding.branch, target)[0]
         return joints
 
     async def _place(self, step: Place) -> events.Event:

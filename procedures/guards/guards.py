@@ -17,14 +17,18 @@ from typing import TypeVar
 
 import numpy as np
 
+from drivers.controllers.errors import MotionInterrupted
 from drivers.interfaces import EncoderSample
 from drivers.stop_input import SUBJECT as STOP_LINE
 from hexacell.cell.model import CellSettings
 from hexacell.clock import CellClock
+from hexacell.controller_config.current import CurrentConfig
+from hexacell.kinematics.position_agreement import PositionReports, PositionSource
 from hexacell.kinematics.rotations import Array
 from procedures.devices.device_set import Devices, MountedGauge
 from procedures.guards import rules
 from procedures.guards.polling import DevicePoller, GaugeDeviation, LineActivity, PolledDevices
+from procedures.guards.position_check import PositionCheck
 from procedures.guards.rules import GuardLimits
 from procedures.guards.supervision import MotionSupervisor, Supervised
 from procedures.run.state import RunState
@@ -47,7 +51,15 @@ class Guards:
     end of a move.
     """
 
-    def __init__(self, settings: CellSettings, devices: Devices, clock: CellClock, folder: Path) -> None:
+    def __init__(
+        self,
+        settings: CellSettings,
+        devices: Devices,
+        clock: CellClock,
+        folder: Path,
+        config: CurrentConfig,
+    ) -> None:
+        self.position = PositionCheck(settings, devices, clock, config)
         self._settings = settings
         self._devices = devices
         self.supervisor = MotionSupervisor(devices.controller, clock, folder, settings.guards.free_disk_mb)
@@ -63,15 +75,25 @@ class Guards:
         """Move to the target of a step; ``commanded`` gives the slider positions (6,), mm, at its pose."""
         gauges = self._watched_gauges(step, state)
         pollers = self._pollers(controller=True, gauges=gauges)
-        reached = await self.supervisor.supervise(
-            lambda: self._go(step), pollers, self._limits(), STOP_GRACE_S
-        )
-        limit = self._settings.guards.following_mm
-        trip = rules.following_error(
-            await asyncio.to_thread(commanded), np.array(reached.positions_mm), limit
-        )
+        try:
+            reached = await self.supervisor.supervise(
+                lambda: self._go(step), pollers, self._limits(), STOP_GRACE_S
+            )
+        except MotionInterrupted:
+            # Where the forward kinematics failed, the robot is not where this error says that it stopped.
+            await self.locate()
+            raise
+        trip = await self._arrival_trip(await asyncio.to_thread(commanded), reached)
         if trip := trip or _stuck_gauge(step, state, gauges):
             raise await self.supervisor.stop(trip)
+
+    async def locate(self) -> PositionReports:
+        """Where the robot is, which controller and encoders agree on; nothing moves."""
+        found = await self.position.read()
+        if found.reports is None or found.trip is not None:
+            assert found.trip is not None  # noqa: S101 - without reports there is a reason
+            raise await self.supervisor.stop(found.trip)
+        return found.reports
 
     async def at_standstill(self, action: Supervised[Result]) -> Result:
         """Run an action during which the robot must stay at standstill."""
@@ -84,15 +106,23 @@ class Guards:
         return await self.supervisor.supervise(action, pollers, self._limits())
 
     async def reload(self) -> None:
-        """Make the controller reload its config."""
+        """Make the controller reload its config, and make sure that it did."""
         await self.supervisor.supervise(
             self._devices.controller.reload, self._pollers(), self._limits(), STOP_GRACE_S
         )
+        await self.locate()
 
     def drift(self, point: str, drift_mm: ThreeNumbers) -> GuardTripped | None:
         """The error to raise if the reference of a set drifted too far; not latched, as nothing moved."""
         trip = rules.reference_drift(point, drift_mm, self._settings.acceptance.drift_mm)
         return None if trip is None else trip.as_error()
+
+    async def _arrival_trip(self, commanded: Array, reached: EncoderSample) -> Trip | None:
+        """A slider is not where it was commanded (6,), mm, or the controller is wrong about where it is."""
+        limit = self._settings.guards.following_mm
+        following = rules.following_error(commanded, np.array(reached.positions_mm), limit)
+        found = await self.position.read(reached)
+        return following if following and found.odd is PositionSource.ENCODERS else found.trip or following
 
     async def _go(self, step: Move) -> EncoderSample:
         await self._devices.controller.move(step.target)

@@ -11,7 +11,7 @@ from functools import cached_property
 from typing import Self, TypeVar
 
 from drivers.errors import GaugeAtEnd
-from drivers.interfaces import ControllerStatus, DeviceIdentity, EncoderSample
+from drivers.interfaces import ControllerStatus, DeviceIdentity, EncoderSample, ReportedPosition
 from hexacell.cell.loader import Cell
 from hexacell.clock import CellClock
 from hexacell.errors import AnswerNeeded, DeviceError
@@ -84,12 +84,9 @@ class RecordedController:
     async def move(self, pose: Pose) -> None:
         """Nothing to do."""
 
-    async def pose(self) -> Pose:
-        """The pose in the outcome."""
-        pose = getattr(self.recorded.outcome, "pose", None)
-        if pose is None:
-            raise DeviceError("the journal has no pose for this step", subject="controller")
-        return Pose(*pose)
+    async def position(self) -> ReportedPosition | None:
+        """Nothing is asked of it: see :meth:`RecordedStepExecutor.locate`."""
+        return None
 
     async def status(self) -> ControllerStatus:
         """Enabled."""
@@ -158,7 +155,15 @@ class RecordedStepExecutor(StepExecutor):
     @cached_property
     def guards(self) -> Guards:
         """No supervision."""
-        return InactiveGuards(self.cell.settings, self.devices, self.clock, self.folder.path)
+        folder, config = self.folder.path, self.current_config
+        return InactiveGuards(self.cell.settings, self.devices, self.clock, folder, config)
+
+    async def locate(self) -> events.Located:
+        """The recorded position, which was checked then."""
+        outcome = self.recorded.outcome
+        if not isinstance(outcome, events.Located):
+            raise DeviceError("the journal has no position for this step", subject="controller")
+        return outcome
 
     async def read_standstill(self, step: Standstill) -> events.StandstillRead:
         """The recorded series."""

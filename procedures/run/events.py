@@ -67,10 +67,15 @@ class Arrived(Frozen):
 
 
 class Located(Frozen):
-    """The controller reported its pose, after it had been unknown."""
+    """Controller and encoders agree on where the robot is, after that had been unknown.
+
+    Up to version 8 only the ``pose`` was read.
+    """
 
     kind: Literal["located"] = "located"
     pose: SixNumbers
+    joints_mm: SixNumbers | None = None
+    encoders_mm: SixNumbers | None = None
 
 
 class GaugesPlaced(Frozen):

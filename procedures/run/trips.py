@@ -20,6 +20,7 @@ class Guard(StrEnum):
     STALE = "stale device"
     ENCODERS = "encoders"
     DRIFT = "drift"
+    POSITION = "position"
     DISK = "disk"
 
 

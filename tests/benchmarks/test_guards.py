@@ -26,6 +26,7 @@ from hexacell.cell.loader import Cell, load_cell
 from hexacell.cell.measuring import GuardSettings
 from hexacell.cell.simulation import FaultKind, SimulatedFault
 from hexacell.clock import CellClock
+from hexacell.controller_config.current import CurrentConfig
 from hexacell.controller_config.toml_format import NativeToml
 from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS, Hexaglide
 from procedures.devices.device_set import Devices
@@ -112,7 +113,8 @@ async def watched(folder: Path, protocol: str) -> AsyncIterator[Watched]:
         devices = devices_of(simulated.settings, links, WireTrace(), folder)
         try:
             await devices.open()
-            guards = Guards(simulated.settings, devices, CellClock(), folder)
+            config = CurrentConfig(cell.config_path, NativeToml(HEXAGLIDE_PARAMETERS))
+            guards = Guards(simulated.settings, devices, CellClock(), folder, config)
             await guards.prepare()
             yield Watched(simulated, devices, guards, await reference(devices))
         finally:

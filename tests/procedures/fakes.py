@@ -8,7 +8,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 from drivers.errors import GaugeAtEnd
-from drivers.interfaces import ControllerStatus, DeviceIdentity, EncoderSample, GaugeReading
+from drivers.interfaces import (
+    ControllerStatus,
+    DeviceIdentity,
+    EncoderSample,
+    GaugeReading,
+    ReportedPosition,
+)
 from drivers.simulated.robot import SimulatedMachine
 from hexacell.acceptance import AcceptanceGate
 from hexacell.cell.devices import GaugeAxis
@@ -132,9 +138,8 @@ class FakeController(Fake):
         if self.machine:
             self.machine.move(pose)
 
-    async def pose(self) -> Pose:
-        self._do("pose")
-        return self.machine.pose() if self.machine else Pose(0.0, 0.0, 0.0)
+    async def position(self) -> ReportedPosition | None:
+        return ReportedPosition(self.machine.pose(), self.machine.joints()) if self.machine else None
 
     async def status(self) -> ControllerStatus:
         return self.now

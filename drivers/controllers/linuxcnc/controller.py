@@ -19,7 +19,7 @@ from drivers.controllers.linuxcnc.commands import ControllerCommands
 from drivers.controllers.linuxcnc.protocol import pose_difference, rapid_move
 from drivers.controllers.linuxcnc.session import Session
 from drivers.controllers.linuxcnc.settings import Address, Timeouts, loop_time
-from drivers.interfaces import ControllerStatus, DeviceIdentity
+from drivers.interfaces import ControllerStatus, DeviceIdentity, ReportedPosition
 from drivers.wire_trace import TraceRecorder
 from hexacell.cell.devices import ControllerSettings
 from hexacell.errors import DeviceError
@@ -101,6 +101,14 @@ class LinuxcncrshController:
                 raise self._stopped_before_moving()
             await self._execute(commands, block, pose, stops)
             await self._verify_arrival(commands, pose, stops)
+
+    async def position(self) -> ReportedPosition | None:
+        """Actual pose and joints; none before all joints are homed, when both may be those of home."""
+        async with self._order:
+            commands = await self._session.synchronized()
+            if not await commands.all_homed():
+                return None
+            return ReportedPosition(await commands.pose(), await commands.joints())
 
     async def pose(self) -> Pose:
         """The actual pose by the controller's own kinematics, mm and deg."""

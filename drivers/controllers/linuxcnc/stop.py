@@ -6,14 +6,13 @@ import asyncio
 
 from drivers.controllers.linuxcnc.commands import ControllerCommands
 from drivers.controllers.linuxcnc.connection import Connection
-from drivers.controllers.linuxcnc.protocol import pose_difference
 from drivers.controllers.linuxcnc.settings import Address, Timeouts
 from drivers.wire_trace import TraceRecorder
 from hexacell.errors import DeviceError
 
 _ATTEMPTS = 3
-_EQUAL_POSES = 3
-"""Successive poses that must agree before the machine is considered at standstill."""
+_EQUAL_POSITIONS = 3
+"""Successive joint positions that must agree before the machine is considered at standstill."""
 
 _QUICK_TIMEOUT_S = 0.3
 """Longest wait for a response over an existing connection; then a new one is opened."""
@@ -26,7 +25,7 @@ async def stop_in_place(
     recorder: TraceRecorder | None = None,
     ready: Connection | None = None,
 ) -> None:
-    """Send abort until successive poses agree within ``tolerance_mm``.
+    """Send abort until successive joint positions agree within ``tolerance_mm``.
 
     A ``ready`` connection saves the time to open one; it is closed afterwards.
 
@@ -88,10 +87,12 @@ async def _abort_until_still(commands: ControllerCommands, timeouts: Timeouts, t
 
 
 async def _is_at_standstill(commands: ControllerCommands, poll_s: float, tolerance_mm: float) -> bool:
-    first = await commands.pose()
-    for _ in range(_EQUAL_POSES - 1):
+    # Joints, and not the pose: where the forward kinematics fails, that stands still while they move.
+    first = await commands.joints()
+    for _ in range(_EQUAL_POSITIONS - 1):
         await asyncio.sleep(poll_s)
-        if max(pose_difference(first, await commands.pose())) > tolerance_mm:
+        now = await commands.joints()
+        if max(abs(new - old) for new, old in zip(now, first, strict=True)) > tolerance_mm:
             return False
     return True
 

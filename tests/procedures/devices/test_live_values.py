@@ -75,7 +75,8 @@ async def test_values_polled_by_the_guards_are_published(make_rig) -> None:
     live = LiveValues(rig.clock.now)
     rig.folder.path.mkdir()
     devices = replace(rig.bench.devices, live=live)
-    guards = Guards(rig.cell.settings, devices, rig.clock, rig.folder.path)
+    config = rig.performer.current_config
+    guards = Guards(rig.cell.settings, devices, rig.clock, rig.folder.path, config)
     await guards.at_standstill(lambda: asyncio.sleep(0))
     assert live.encoders.value is not None
     assert live.controller.value == ControllerStatus(estop=False, enabled=True)

@@ -69,7 +69,7 @@ async def test_an_unattended_run_with_gauges_placed_by_hand_ends(make_rig) -> No
     with pytest.raises(AnswerNeeded):
         await rig.run()
     assert happened(rig, events.Interrupted)[-1].exit_code == ExitCode.ANSWER_NEEDED
-    assert [entry.split()[0] for entry in rig.controller.log] == ["prepare", "pose", "move", "stop"]
+    assert [entry.split()[0] for entry in rig.controller.log] == ["prepare", "move", "stop"]
 
 
 async def test_too_few_records_to_identify_are_reported_and_nothing_is_written(make_rig) -> None:

@@ -21,9 +21,12 @@ from tests.procedures.runs.listening import (
     with_tiny_deviations_before,
 )
 
+CLEARLY_WORSE: dict[str, Any] = {"simulation__gauges__noise_mm": 0.01}
+"""Deviations that are significant whatever noise is drawn."""
+
 
 async def test_a_result_worse_than_before_is_rolled_back_bit_for_bit(recording, replayed) -> None:
-    rig = replayed(with_tiny_deviations_before(recording.until(events.Proposed)))
+    rig = replayed(with_tiny_deviations_before(recording.until(events.Proposed)), **CLEARLY_WORSE)
     ended = await rig.run()
     assert ended.exit_code == ExitCode.OUT_OF_LIMITS
     assert ended.line.endswith("(worse than before); rolled back, the controller has its old config")
@@ -160,7 +163,7 @@ async def test_a_config_edited_during_the_run_is_not_overwritten(recording, repl
 
 
 async def test_a_rollback_does_not_overwrite_an_edited_config(recording, replayed) -> None:
-    rig = replayed(with_tiny_deviations_before(recording.until(events.Proposed)))
+    rig = replayed(with_tiny_deviations_before(recording.until(events.Proposed)), **CLEARLY_WORSE)
     edited: list[bytes] = []
     edit = on(events.ResultValidated, lambda: edited.append(somebody_edits(rig)))
     with pytest.raises(FileError, match="changed since it was written"):
@@ -169,7 +172,7 @@ async def test_a_rollback_does_not_overwrite_an_edited_config(recording, replaye
 
 
 async def test_an_interrupted_rollback_is_finished_on_resuming(recording, replayed) -> None:
-    rig = replayed(with_tiny_deviations_before(recording.until(events.Proposed)))
+    rig = replayed(with_tiny_deviations_before(recording.until(events.Proposed)), **CLEARLY_WORSE)
     broken = DeviceError("does not come back", subject="controller")
     fault = on(events.ResultValidated, lambda: rig.controller.failures.update(reload=broken))
     with pytest.raises(DeviceError, match="does not come back"):

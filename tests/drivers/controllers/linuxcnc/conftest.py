@@ -50,11 +50,11 @@ OPENING: list[Exchange] = [
     ("set set_wait done", b"SET SET_WAIT ACK\n\r"),
     ("get inifile", b"INIFILE /home/operator/machine.ini\r\n"),
 ]
-AT_REST = b"ABS_ACT_POS 0.000000 0.000000 0.000000 0.000000 -0.000000 0.000000\r\n"
+AT_REST = b"JOINT_POS 0.000000 0.000000 0.000000 0.000000 -0.000000 0.000000\r\n"
 STOPPING: list[Exchange] = [
     *GREETING,
     ("set abort", b"SET ABORT ACK\n\r"),
-    *[("get abs_act_pos", AT_REST)] * 3,
+    *[("get joint_pos", AT_REST)] * 3,
 ]
 
 

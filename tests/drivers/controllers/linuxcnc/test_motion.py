@@ -152,3 +152,23 @@ async def test_a_controller_lost_during_a_move_makes_the_error_ask_for_the_emerg
         DeviceError, match=r"could not be stopped: it closed the connection\. Press the emer"
     ):
         await driver.move(TARGET)
+
+
+async def test_the_position_is_pose_and_joints_of_a_homed_machine(play):
+    driver = await play.opened(
+        [
+            ("get joint_homed", b"JOINT_HOMED YES YES YES YES YES YES\r\n"),
+            ("get abs_act_pos", HALF_WAY),
+            ("get joint_pos", b"JOINT_POS 1 2 3 4 5 6\r\n"),
+        ]
+    )
+    found = await driver.position()
+    assert found is not None
+    assert found.pose == Pose(5.0, 10.0, 555.0, 2.5, -2.0, 1.5)
+    assert found.joints_mm == (1.0, 2.0, 3.0, 4.0, 5.0, 6.0)
+
+
+async def test_before_a_joint_is_homed_there_is_no_position(play):
+    """After a restart the first answers may be those of home."""
+    driver = await play.opened([("get joint_homed", b"JOINT_HOMED YES YES NO YES YES YES\r\n")])
+    assert await driver.position() is None

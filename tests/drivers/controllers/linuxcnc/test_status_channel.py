@@ -145,7 +145,7 @@ async def test_the_status_is_read_during_a_move(play) -> None:
 
 async def test_stopping_uses_the_status_connection(play) -> None:
     stopping = [("set enable EMCTOO", b"SET ENABLE ACK\n\r"), ("set abort", b"SET ABORT ACK\n\r")]
-    still = [("get abs_act_pos", play.AT_REST)] * 3
+    still = [("get joint_pos", play.AT_REST)] * 3
     driver = await play.opened([], [*GREETING, *asked(), *stopping, *still])
     await driver.status()
     await driver.stop()
@@ -184,7 +184,7 @@ async def test_reading_the_status_after_closing_is_an_error(play) -> None:
 
 async def test_the_status_is_not_read_during_a_stop(play) -> None:
     at_rest = play.Pause()
-    stopping = [*play.STOPPING[:-1], ("get abs_act_pos", at_rest, play.AT_REST)]
+    stopping = [*play.STOPPING[:-1], ("get joint_pos", at_rest, play.AT_REST)]
     driver = await play.opened([], stopping, [*GREETING, *asked()])
     stop = asyncio.create_task(driver.stop())
     await asyncio.sleep(0)
@@ -233,10 +233,13 @@ async def test_queries_wait_until_an_exclusive_turn_ends() -> None:
     assert said == ["opened", "question"]
 
 
+AT_HOME = b"ABS_ACT_POS 0.000000 0.000000 0.000000 0.000000 0.000000 0.000000\r\n"
+
+
 async def test_a_stop_during_a_move_is_reported_by_the_move(play) -> None:
     """The move raises its own error; the guards need no second stop."""
     stopped = play.Pause()
-    main = [(BLOCK, stopped, b"SET MDI ACK\n\r"), ("get abs_act_pos", play.AT_REST)]
+    main = [(BLOCK, stopped, b"SET MDI ACK\n\r"), ("get abs_act_pos", AT_HOME)]
     driver = await play.opened(
         main,
         [
@@ -244,7 +247,7 @@ async def test_a_stop_during_a_move_is_reported_by_the_move(play) -> None:
             *asked(),
             ("set enable EMCTOO", b"SET ENABLE ACK\n\r"),
             ("set abort", b"SET ABORT ACK\n\r"),
-            *[("get abs_act_pos", play.AT_REST)] * 3,
+            *[("get joint_pos", play.AT_REST)] * 3,
         ],
     )
     await driver.status()
@@ -261,7 +264,7 @@ async def test_a_move_that_is_refused_because_a_stop_took_control_was_stopped(pl
     main = [(BLOCK, received, b"SET MDI NAK\n\r"), ("get enable", b"ENABLE OFF\r\n")]
     stopping = [("set enable EMCTOO", b"SET ENABLE ACK\n\r"), ("set abort", b"SET ABORT ACK\n\r")]
     driver = await play.opened(
-        main, [*GREETING, *asked(), *stopping, *[("get abs_act_pos", play.AT_REST)] * 3]
+        main, [*GREETING, *asked(), *stopping, *[("get joint_pos", play.AT_REST)] * 3]
     )
     await driver.status()
     moving = asyncio.create_task(driver.move(Pose(1.0, 2.0, 3.0)))

@@ -28,7 +28,7 @@ async def test_stopping_goes_over_a_second_connection_while_the_first_is_mute(pl
             (MDI, ACK),
             ("get abs_act_pos", ARRIVED),
         ],
-        [*play.GREETING, ("set abort", b"SET ABORT ACK\n\r"), *[("get abs_act_pos", HALF_WAY)] * 3],
+        [*play.GREETING, ("set abort", b"SET ABORT ACK\n\r"), *play.STOPPING[-3:]],
     )
     moving = asyncio.create_task(driver.move(TARGET))
     await aborted.reached.wait()
@@ -59,19 +59,19 @@ async def test_no_command_is_sent_on_one_connection_while_the_other_awaits_an_an
 
 
 async def test_the_abort_is_repeated_while_the_machine_still_moves(play):
-    moving = [b"ABS_ACT_POS %d 0 0 0 0 0\r\n" % n for n in range(1, 4)]
+    moving = [b"JOINT_POS %d 0 0 0 0 0\r\n" % n for n in range(1, 4)]
     driver = await play.opened(
         [],
         [
             *play.GREETING,
             ("set abort", b"SET ABORT ACK\n\r"),
-            ("get abs_act_pos", moving[0]),
-            ("get abs_act_pos", moving[1]),
+            ("get joint_pos", moving[0]),
+            ("get joint_pos", moving[1]),
             AGAIN_IN_CONTROL,
             ("set abort", b"SET ABORT ACK\n\r"),
-            ("get abs_act_pos", moving[2]),
-            ("get abs_act_pos", moving[2]),
-            ("get abs_act_pos", moving[2]),
+            ("get joint_pos", moving[2]),
+            ("get joint_pos", moving[2]),
+            ("get joint_pos", moving[2]),
         ],
     )
     await driver.stop()
@@ -79,7 +79,7 @@ async def test_the_abort_is_repeated_while_the_machine_still_moves(play):
 
 async def test_a_refused_abort_of_a_machine_at_rest_counts_as_stopped(play):
     driver = await play.opened(
-        [], [*play.GREETING, ("set abort", b"SET ABORT NAK\n\r"), *[("get abs_act_pos", play.AT_REST)] * 3]
+        [], [*play.GREETING, ("set abort", b"SET ABORT NAK\n\r"), *[("get joint_pos", play.AT_REST)] * 3]
     )
     await driver.stop()
 
@@ -90,7 +90,7 @@ async def test_a_machine_that_keeps_moving_after_the_abort_is_reported(play):
     play.servers[0].afterwards = {
         "set enable EMCTOO": b"SET ENABLE ACK\n\r",
         "set abort": b"SET ABORT ACK\n\r",
-        "get abs_act_pos": [f"ABS_ACT_POS {n} 0 0 0 0 0\r\n".encode() for n in range(100_000)],
+        "get joint_pos": [f"JOINT_POS {n} 0 0 0 0 0\r\n".encode() for n in range(100_000)],
     }
     with pytest.raises(DeviceError, match=r"still moves 0\.6 s after .*Press the emergency stop"):
         await driver.stop()
@@ -154,3 +154,17 @@ async def test_a_move_that_waits_for_its_turn_is_not_begun_after_a_stop(play):
     with pytest.raises(MotionInterrupted, match="was stopped before it moved"):
         await moving
     await stopping
+
+
+async def test_a_pose_that_stands_still_is_no_standstill_of_the_machine(play):
+    """Where the forward kinematics fails, the pose is that of home, whatever the joints do."""
+    play.patience = play.IMPATIENT
+    driver = await play.opened([], play.GREETING)
+    play.servers[0].afterwards = {
+        "set enable EMCTOO": b"SET ENABLE ACK\n\r",
+        "set abort": b"SET ABORT ACK\n\r",
+        "get abs_act_pos": b"ABS_ACT_POS 0 0 550 0 0 0\r\n",
+        "get joint_pos": [f"JOINT_POS {n} 0 0 0 0 0\r\n".encode() for n in range(100_000)],
+    }
+    with pytest.raises(DeviceError, match="still moves"):
+        await driver.stop()

@@ -1,0 +1,106 @@
+"""A controller that is wrong about where the robot is: nothing moves, and the odd report is named."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+from drivers.controllers.linuxcnc.controller import LinuxcncrshController
+from hexacell.application.calibration_run import preflight
+from hexacell.application.device_setup import open_devices
+from hexacell.cell.loader import Cell
+from hexacell.errors import ExitCode, WriteBackUndone
+from procedures.calibration.workflow import Mode
+from procedures.run import events
+from procedures.run.trips import Guard, GuardTripped
+from tests.small_cell import changed
+
+
+def at_step(key: str, action: Any) -> Any:
+    """A listener that acts once, when a step begins."""
+    done: list[bool] = []
+
+    def listener(event: events.Event, _: object) -> None:
+        if isinstance(event, events.StepBegun) and event.step.key == key and not done:
+            done.append(True)
+            action()
+
+    return listener
+
+
+def edit(cell: Cell) -> None:
+    """A leg that is a tenth of a millimetre longer in the file."""
+    text = cell.config_path.read_text()
+    assert text.count("615.0") == 2
+    cell.config_path.write_text(text.replace("615.0", "615.1", 1))
+
+
+async def test_a_pose_of_home_after_a_failed_kinematics_is_not_believed(make_site) -> None:
+    """The move was carried out and the pose is that of home; no resumption moves on from there."""
+    site = make_site()
+    fail = at_step("P1/o04/move", lambda: site.simulated.faults.inject("forward kinematics", "controller"))
+    with pytest.raises(GuardTripped, match="forward kinematics failed") as tripped:
+        await site.calibrate(fail)
+    assert tripped.value.trip.guard is Guard.POSITION
+    assert tripped.value.exit_code is ExitCode.HARDWARE
+    moves = site.simulated.schedule.move_count
+    with pytest.raises(GuardTripped, match=r"reports the pose X100\.000 Y-100\.000 Z500\.000"):
+        await site.calibrate(resume=True)
+    assert site.simulated.schedule.move_count == moves, "nothing moved"
+    site.simulated.faults.clear("forward kinematics", "controller")
+    assert (await site.calibrate(resume=True)).exit_code == ExitCode.DONE
+    located = site.happened(events.Located)[-1]
+    assert located.joints_mm == pytest.approx(located.encoders_mm, abs=0.1)
+
+
+async def test_a_config_that_the_controller_does_not_run_is_found_before_the_first_move(make_site) -> None:
+    site = make_site()
+    site.simulated.faults.inject("old config", "controller")
+    edit(site.cell)
+    with pytest.raises(
+        GuardTripped, match=r"it runs another geometry than this file.* read .*again"
+    ) as odd:
+        await site.calibrate()
+    assert str(site.cell.config_path) in str(odd.value)
+    assert site.simulated.schedule.move_count == 0
+    assert [event.guard for event in site.happened(events.Tripped)] == [Guard.POSITION]
+
+
+async def homed(site: Any) -> Cell:
+    cell: Cell = site.order().cell
+    async with open_devices(cell.settings) as connected:
+        assert isinstance(connected.devices.controller, LinuxcncrshController)
+        assert await connected.devices.controller.position() is None, "it is not homed yet"
+        await connected.devices.controller.prepare()
+    return cell
+
+
+async def test_preflight_finds_it_once_the_controller_is_homed(make_site) -> None:
+    site = make_site()
+    cell = await homed(site)
+    await preflight(cell, Mode.OPTIMISE, unattended=True)
+    edit(cell)
+    with pytest.raises(GuardTripped, match="it runs another geometry than this file has"):
+        await preflight(cell, Mode.OPTIMISE, unattended=True)
+
+
+async def test_preflight_names_an_encoder_that_the_controller_contradicts(make_site) -> None:
+    site = make_site()
+    cell = await homed(site)
+    wrong = changed(cell.settings, {"encoders.offset_mm": (0.0, 0.0, 0.0, -12.0, 0.0, 0.0)})
+    cell = replace(cell, settings=wrong)
+    with pytest.raises(GuardTripped, match=r"encoder 4: shows slider 4 at .* where the controller's pose"):
+        await preflight(cell, Mode.OPTIMISE, unattended=True)
+
+
+async def test_a_controller_that_keeps_its_old_config_gets_the_file_back(finished, make_site) -> None:
+    site = make_site()
+    site.write(finished.until(events.Proposed), finished)
+    site.simulated.faults.inject("old config", "controller")
+    with pytest.raises(WriteBackUndone, match="it runs another geometry") as undone:
+        await site.calibrate(resume=True)
+    assert undone.value.exit_code is ExitCode.WRITE_BACK_UNDONE
+    assert site.config == finished.config_before
+    assert site.simulated.schedule.move_count == 0

@@ -9,6 +9,7 @@ those that a run reacts to in a way of their own are in :mod:`drivers.errors`.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from enum import StrEnum
 from typing import Protocol, TypeVar
 
 from hexacell.kinematics.pose import Pose
@@ -42,13 +43,33 @@ class EncoderSample:
     positions_mm: tuple[float, ...]
 
 
+class StartupAction(StrEnum):
+    """What makes a controller ready to move; done only where it is permitted.
+
+    The emergency stop that a controller starts in is told from one that came after it was started.
+    """
+
+    RESET_INITIAL_ESTOP = "reset-estop"
+    RESET_ESTOP = "reset-later-estop"
+    SWITCH_ON = "switch-on"
+    HOME = "home"
+
+
+StartupActions = frozenset[StartupAction]
+
+
 @dataclass(frozen=True, slots=True)
 class ControllerStatus:
-    """A controller's status: emergency stop, enabled, and its error messages."""
+    """A controller's status: emergency stop, enabled, and its error messages.
+
+    ``heartbeat`` changes whenever the sliders move, or more often, as long as the controller works;
+    empty where there is none. One that is frozen may still answer, but with the same.
+    """
 
     estop: bool
     enabled: bool
     error_messages: tuple[str, ...] = ()
+    heartbeat: str = ""
 
     @property
     def may_move(self) -> bool:
@@ -125,8 +146,12 @@ class EncoderBank(Device[tuple[DeviceIdentity, ...]], Protocol):
 class Controller(Device[DeviceIdentity], Protocol):
     """The robot's own controller."""
 
-    async def prepare(self) -> None:
-        """Make it ready to move: out of emergency stop, enabled, homed. May move the machine."""
+    async def prepare(self, permitted: StartupActions) -> None:
+        """Make it ready to move: out of emergency stop, enabled, homed. May move the machine.
+
+        Raises:
+            drivers.controllers.errors.StartupNotPermitted: it needs an action that is not permitted.
+        """
         ...
 
     async def move(self, pose: Pose) -> None:
@@ -145,8 +170,14 @@ class Controller(Device[DeviceIdentity], Protocol):
         """Stop the motion in place, at once, also during ``move``."""
         ...
 
-    async def reload(self) -> None:
-        """Make it reload its config; sliders must not move."""
+    async def reload(self, permitted: StartupActions) -> None:
+        """Make it reload its config; sliders must not move. Afterwards it is as ``prepare`` leaves it.
+
+        It is switched off and on for that, without permission where it was on before.
+
+        Raises:
+            drivers.controllers.errors.StartupNotPermitted: as ``prepare``, which may then complete it.
+        """
         ...
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from drivers.interfaces import StartupAction
 from hexacell.errors import DeviceError
 
 
@@ -10,7 +11,27 @@ class ConnectionLost(DeviceError):
 
 
 class ResponseTimeout(ConnectionLost):
-    """No response in time; it may still come."""
+    """The connection is open, but there is no response in time: the controller is frozen."""
+
+
+class ControllerFrozen(ResponseTimeout):
+    """It answers, but always the same, although the sliders move: the part that controls them stands."""
+
+
+class StartupNotPermitted(DeviceError):
+    """The controller is not ready, and what it needs is not permitted; nothing was done."""
+
+    def __init__(self, action: StartupAction, subject: str) -> None:
+        self.needed = action
+        super().__init__(_UNREADY[action], subject=subject)
+
+
+_UNREADY = {
+    StartupAction.RESET_INITIAL_ESTOP: "is in emergency stop since it was started",
+    StartupAction.RESET_ESTOP: "is in emergency stop",
+    StartupAction.SWITCH_ON: "is switched off",
+    StartupAction.HOME: "is not homed",
+}
 
 
 class CommandRefused(DeviceError):

@@ -70,7 +70,11 @@ class SimulatedCell(Closeable):
                 "gauges": self.gauges.gauges,
                 "encoders": settings.encoders.model_copy(update={"bus": bus}),
                 "controller": settings.controller.model_copy(
-                    update={"host": "127.0.0.1", "port": self.controller.port}
+                    update={
+                        "host": "127.0.0.1",
+                        "port": self.controller.port,
+                        "startup": simulation.startup,
+                    }
                 ),
                 "guards": settings.guards.model_copy(update={"stop_file": str(stop_file)}),
                 "simulation": None,

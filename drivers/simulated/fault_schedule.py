@@ -39,6 +39,7 @@ class CellFaults:
             "silent": controller.set_silent,
             "forward kinematics": machine.set_failing_forward,
             "old config": machine.set_keeping_geometry,
+            "frozen": controller.set_frozen,
         }
         self._switches: dict[str, Mapping[FaultKind, Switch]] = {
             **{name: gauges.faults(name) for name in gauges.indicators},

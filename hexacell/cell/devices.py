@@ -12,6 +12,8 @@ from hexacell.cell.fields import Name, Password, Positive, Section, SixInRange, 
 NodeId = Annotated[int, Field(ge=1, le=127)]
 Unsigned = Annotated[int, Field(ge=0, le=2**32 - 1)]
 Direction = Literal[1, -1]
+StartupWord = Literal["reset-estop", "switch-on", "home"]
+STARTUP_WORDS: tuple[StartupWord, ...] = ("reset-estop", "switch-on", "home")
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,6 +119,12 @@ class ControllerSettings(Section):
     )
     reload_command: tuple[Text, ...] = Field(
         (), description="run with the machine off, so that the controller reads its config again"
+    )
+    startup: tuple[StartupWord, ...] = Field(
+        (),
+        max_length=len(STARTUP_WORDS),
+        description="what the program may do by itself to make it ready, a person is asked about the rest: "
+        "reset-estop (the emergency stop that it starts in, before a run begins), switch-on, home",
     )
     move_timeout_s: Positive = Field(60.0, description="longest wait for one move")
     position_tolerance_mm: Positive = Field(0.01, description="arrival: largest position difference")

@@ -6,6 +6,7 @@ from typing import Literal
 
 from pydantic import Field
 
+from hexacell.cell.devices import STARTUP_WORDS, StartupWord
 from hexacell.cell.fields import GeometrySettings, InRange, NotNegative, Positive, Section, Seed, Text
 
 FaultKind = Literal[
@@ -90,6 +91,12 @@ class SimulationSettings(Section):
 
     geometry: GeometrySettings = Field(description="the true geometry, known to the simulation only")
     seed: Seed = Field(1, description="random seed of the simulation")
+    startup: tuple[StartupWord, ...] = Field(
+        STARTUP_WORDS,
+        max_length=len(STARTUP_WORDS),
+        description="of the simulated controller, in place of controller.startup: it starts in emergency "
+        "stop, switched off and not homed",
+    )
     station_reach_mm: Positive = Field(
         30.0, description="at rest farther than this from the gauges, the gauges are moved to the ball"
     )

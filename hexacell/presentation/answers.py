@@ -27,7 +27,7 @@ def typed_answer(typed: str, question: Question, person: str) -> TypedAnswer | N
             return None if line else TypedAnswer(PLACED)
         case QuestionKind.APPROVE_CHANGE | QuestionKind.KEEP_RESULT:
             return _consent_in(line.lower(), question.consent.lower(), person)
-        case QuestionKind.CHOOSE_RECOVERY:
+        case QuestionKind.CHOOSE_RECOVERY | QuestionKind.START_UP:
             chosen = matching_choice(line, question)
             return None if chosen is None else TypedAnswer(chosen)
 
@@ -52,6 +52,6 @@ def request_text(question: Question) -> str:
             return "Press Enter when they are in place, or type a to abort: "
         case QuestionKind.CHOOSE_RECOVERY:
             return f"Type one of {', '.join(question.choices)}: "
-    if question.consent == YES[0]:
+    if question.kind is QuestionKind.START_UP or question.consent == YES[0]:
         return "Type yes or no: "
     return f"Type the cell's name, {question.consent}, to take the responsibility, or no: "

@@ -15,7 +15,14 @@ from hexacell.reporting.result import ExpectedImprovement
 from procedures.calibration.workflow import Mode
 from procedures.replay.comparison import Aspect, Difference, ReplayReport
 from procedures.run import events
-from procedures.run.questions import GaugePlacement, PendingChange, Question, StepFailure, WrittenResult
+from procedures.run.questions import (
+    GaugePlacement,
+    PendingChange,
+    Question,
+    StepFailure,
+    UnreadyController,
+    WrittenResult,
+)
 
 UNVERIFIED = (
     "The controller's config holds the new geometry, which is not verified yet: resuming "
@@ -78,6 +85,8 @@ def question_text(question: Question) -> str:
         case WrittenResult(line=line, displacement=moved):
             keep = f"The new geometry is in the controller's config. Keep it? {request_text(question)}"
             return f"\n{line}.\n{_teaching(moved)}{keep}"
+        case UnreadyController(problem=problem, request=request):
+            return f"\n{wrapped(f'{problem}. {request}')}\n{request_text(question)}"
         case StepFailure(problem=problem):
             return f"\n{problem}\nHow to continue ({', '.join(question.choices)})? "
 

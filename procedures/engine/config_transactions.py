@@ -31,12 +31,13 @@ from hexacell.robot_model import config_format
 from hexacell.runs.run_folder import RunFolder
 from procedures.calibration.workflow import Calibration, geometry_of
 from procedures.devices.device_set import Devices
-from procedures.guards.guards import Guards
+from procedures.engine.startup import Startup
 from procedures.run import events
 from procedures.run.cancellation import in_thread
 from procedures.run.questions import Operator, ask_acceptance, ask_approval
 from procedures.run.state import RunState
 from procedures.run.steps import Compute
+from procedures.run.trips import may_still_move
 
 PROVISIONAL_FOLDER = "lent"
 TAKE_BACK = Compute(kind="take back")
@@ -54,7 +55,7 @@ class ConfigTransactions:
 
     cell: Cell
     calibration: Calibration
-    guards: Guards
+    startup: Startup
     devices: Devices
     folder: RunFolder
     operator: Operator
@@ -113,7 +114,7 @@ class ConfigTransactions:
     ) -> None:
         receipt = await in_thread(commit, change, backup)
         try:
-            await self.guards.reload()
+            await self.startup.reload()
         except HexacellError as error:
             await in_thread(rollback, receipt)
             raise WriteBackUndone(
@@ -125,8 +126,8 @@ class ConfigTransactions:
     async def _reads_again(self) -> bool:
         """Reload the restored config; whether the controller is known to have its old geometry."""
         try:
-            await self.devices.controller.reload()
-            return (await self.guards.position.read()).trip is None
+            await self.devices.controller.reload(self.startup.stated)
+            return (await self.startup.guards.position.read()).trip is None
         except HexacellError:
             return False
 
@@ -136,7 +137,7 @@ class ConfigTransactions:
         if written:
             await in_thread(rollback, Receipt.of(self._provisional_backup))
         try:
-            await self.guards.reload()
+            await self.startup.reload()
         except HexacellError:
             # Far from level, the slider positions may belong to no pose of the old geometry. The file
             # must not differ from what the controller has until it can be reloaded.
@@ -163,7 +164,7 @@ class ConfigTransactions:
     async def revert_result(self) -> events.RolledBack:
         """Give the controller the geometry of before the run."""
         await in_thread(rollback, Receipt.of(self.folder.path))
-        await self.guards.reload()
+        await self.startup.reload()
         return events.RolledBack()
 
     @property
@@ -190,6 +191,14 @@ class Reversal:
     step: Compute
     failure: str
     is_recorded: bool = True
+
+    def undone(self, error: BaseException) -> BaseException:
+        """The error to report once it is reverted: of a written result, that it was undone, and why."""
+        if self.step != ROLL_BACK or not isinstance(error, HexacellError) or may_still_move(error):
+            return error
+        return WriteBackUndone(
+            f"the new geometry was written and could not be verified; the old config is back. {error}"
+        )
 
 
 def revert_unrecorded(event: events.Event, state: RunState) -> Reversal | None:

@@ -19,7 +19,7 @@ from procedures.run.commands import Command, CommandQueue
 from procedures.run.questions import Question, QuestionBroker, UnattendedOperator
 from procedures.run.state import RunState, apply, fold
 from procedures.run.steps import Phase, Step
-from procedures.run.trips import GuardTripped
+from procedures.run.trips import GuardTripped, RobotNotStopped, may_still_move
 
 Listener = Callable[[events.Event, RunState], None]
 
@@ -90,6 +90,8 @@ class Engine:
 
         Raises:
             Interruption: a command ended the run early.
+            WriteBackUndone: a written geometry could not be verified; the config is as before.
+            RobotNotStopped: it ended early, and the robot could not be stopped.
             HexacellError: a step failed, and the policy ends the run.
         """
         self._commands.set_flags(begun=True)
@@ -98,8 +100,10 @@ class Engine:
                 while await self._advance():
                     pass
         except BaseException as error:
-            await self._unwind(error)
-            raise
+            raised = await self._unwind(error)
+            if raised is error:
+                raise
+            raise raised from error
         finally:
             self._commands.set_flags(ended=True)
         ended = _ending(self.state)
@@ -129,14 +133,14 @@ class Engine:
             listener(event, self.state)
         return self.state
 
-    async def _halt(self) -> bool:
-        """Stop motion in place; whether it is certain that the robot has stopped."""
+    async def _halt(self) -> HexacellError | None:
+        """Stop motion in place; why it is not certain that the robot has stopped, if it is not."""
         self._is_prepared = False
         try:
             await shielded(self._executor.devices.controller.stop())
-        except HexacellError:
-            return False
-        return True
+        except HexacellError as error:
+            return error
+        return None
 
     async def _advance(self) -> bool:
         """Decide on a step and execute it; False if none is left."""
@@ -158,7 +162,7 @@ class Engine:
 
     async def _prepare(self) -> None:
         if not self._is_prepared:
-            await self._commands.run_cancellable(self._executor.prepare())
+            await self._commands.run_cancellable(self._executor.prepare(self.state))
             self._is_prepared = True
 
     async def _decide(self) -> Step | None:
@@ -173,8 +177,8 @@ class Engine:
                 await self._revert(reversal, error)
             raise
 
-    async def _revert(self, reversal: Reversal, cause: BaseException) -> None:
-        """Revert a transaction, whatever is cancelled meanwhile.
+    async def _revert(self, reversal: Reversal, cause: BaseException) -> bool:
+        """Revert a transaction, whatever is cancelled meanwhile; whether it is reverted.
 
         Raises:
             SeveralErrors: the cause, and why it cannot be reverted, where that must be reported.
@@ -189,20 +193,38 @@ class Engine:
         except HexacellError as error:
             if reversal.failure and isinstance(cause, HexacellError):
                 raise SeveralErrors(reversal.failure, [cause, error]) from cause
+            return False
+        return True
 
-    async def _unwind(self, error: BaseException) -> None:
-        """End a run early: stop the robot, revert what may not stay, journal the interruption."""
-        reason = str(error) or type(error).__name__
+    async def _unwind(self, error: BaseException) -> BaseException:
+        """End a run early: stop the robot, revert what may not stay, journal the interruption.
+
+        Gives the error to raise.
+        """
+        raised = error
         try:
-            await self._halt()
+            stop_failure = await self._halt()
             if isinstance(error, GuardTripped):
                 with suppress(HexacellError):
                     self.record(events.Tripped.of(error.trip))
-            if reversal := revert_at_end(self.state, error):
-                await self._revert(reversal, error)
+            raised = await self._reverted(error)
+            if stop_failure and isinstance(raised, HexacellError) and not may_still_move(raised):
+                raised = RobotNotStopped(stop_failure, raised)
         finally:
+            reason = str(raised) or type(raised).__name__
             with suppress(HexacellError):
-                self.record(events.Interrupted(reason=reason, exit_code=int(_exit_code(error))))
+                self.record(events.Interrupted(reason=reason, exit_code=int(_exit_code(raised))))
+        return raised
+
+    async def _reverted(self, error: BaseException) -> BaseException:
+        """Revert what may not stay after an error; gives the error to raise."""
+        if (reversal := revert_at_end(self.state, error)) is None:
+            return error
+        try:
+            is_reverted = await self._revert(reversal, error)
+        except SeveralErrors as both:
+            return both
+        return reversal.undone(error) if is_reverted else error
 
     async def _obey_commands(self) -> None:
         """Between two steps: obey the commands that waited for the end of a step."""

@@ -23,7 +23,7 @@ from procedures.run import events
 from procedures.run.questions import QuestionBroker, ask_recovery
 from procedures.run.state import RunState
 from procedures.run.steps import Compute, SetKey, Step, StepOfSet
-from procedures.run.trips import Guard, GuardTripped, causes_of
+from procedures.run.trips import Guard, GuardTripped, RobotNotStopped, causes_of, may_still_move
 
 KINDS: Mapping[type[HexacellError], FailureKind] = {
     device.GaugeSilent: FailureKind.GAUGE_SILENT,
@@ -49,6 +49,7 @@ KINDS: Mapping[type[HexacellError], FailureKind] = {
 """The nearest class that an error belongs to decides; any other is final."""
 
 OF_GUARDS: Mapping[Guard, FailureKind] = {
+    Guard.EMERGENCY_STOP: FailureKind.CONTROLLER,
     Guard.CONTROLLER: FailureKind.CONTROLLER,
     Guard.FOLLOWING: FailureKind.CONTROLLER,
     Guard.POSITION: FailureKind.CONTROLLER,
@@ -123,7 +124,7 @@ class Recovery:
     """Recovers from the failures of one run.
 
     Attributes:
-        halt: stops motion in place; whether it is certain that the robot has stopped.
+        halt: stops motion in place; why it is not certain that the robot has stopped, if it is not.
         record: journals an event and gives the state after it.
     """
 
@@ -131,7 +132,7 @@ class Recovery:
     commands: CommandLoop
     broker: QuestionBroker
     policy: RecoveryPolicy
-    halt: Callable[[], Awaitable[bool]]
+    halt: Callable[[], Awaitable[HexacellError | None]]
     record: Callable[[events.Event], RunState]
 
     async def recover(self, error: HexacellError, step: Step | None, state: RunState) -> None:
@@ -144,14 +145,13 @@ class Recovery:
             self.commands.set_flags(fault=str(error))
             if failure.action is Action.ABORT:
                 raise error
-            if not await self.halt() and failure.action is not Action.ASK:
-                raise error  # without a person nothing is tried while the robot may still move
+            if stop_failure := await self.halt():
+                if failure.action is not Action.ASK:
+                    raise error  # without a person nothing is tried while the robot may still move
+                failure = failure.model_copy(update={"reason": _unstopped(stop_failure, error)})
             if (decided := await self._decide(failure)) is None:
                 raise error
-            if isinstance(error, GuardTripped):
-                self.record(events.Tripped.of(error.trip))
-            state = self.record(decided)
-            self.commands.set_flags(fault=None)
+            state = self._recorded(decided, error)
             try:
                 for event in await self.commands.run_cancellable(self._prepare(error, decided, state)):
                     state = self.record(event)
@@ -161,6 +161,13 @@ class Recovery:
                 error = another
             else:
                 return
+
+    def _recorded(self, decided: events.Failed, error: HexacellError) -> RunState:
+        if isinstance(error, GuardTripped):
+            self.record(events.Tripped.of(error.trip))
+        state = self.record(decided)
+        self.commands.set_flags(fault=None)
+        return state
 
     async def _decide(self, failure: events.Failed) -> events.Failed | None:
         """The failure with the action to take, chosen by a person if need be; None to end the run."""
@@ -194,6 +201,10 @@ class Recovery:
         if failure.action is Action.REDO_SET:
             return _invalidated(_failed_sets(failure, state), failure.reason)
         return []
+
+
+def _unstopped(stop_failure: HexacellError, error: HexacellError) -> str:
+    return str(error if may_still_move(error) else RobotNotStopped(stop_failure, error))
 
 
 def _invalidated(keys: Sequence[SetKey], reason: str) -> list[events.SetInvalidated]:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from drivers.errors import GaugeAtEnd
+from drivers.interfaces import StartupAction
 from hexacell.cell.loader import Cell
 from hexacell.clock import CellClock
 from hexacell.controller_config.current import CurrentConfig
@@ -26,6 +27,7 @@ from procedures.devices.device_set import Devices, Thermometers, gather_errors
 from procedures.devices.settling import DeviceSnapshot, Settled, read_series, settle
 from procedures.engine.computations import Computations
 from procedures.engine.config_transactions import ConfigTransactions
+from procedures.engine.startup import Startup
 from procedures.guards.guards import Guards
 from procedures.run import events
 from procedures.run.cancellation import in_thread
@@ -70,10 +72,16 @@ class StepExecutor:
         return CurrentConfig(self.cell.config_path, config_format(self.cell.settings))
 
     @cached_property
+    def startup(self) -> Startup:
+        """What makes the controller ready to move."""
+        stated = frozenset(StartupAction(word) for word in self.cell.settings.controller.startup)
+        return Startup(self.devices.controller, self.guards, self.operator, stated)
+
+    @cached_property
     def config(self) -> ConfigTransactions:
         """What changes the controller's config."""
         return ConfigTransactions(
-            self.cell, self.calibration, self.guards, self.devices, self.folder, self.operator
+            self.cell, self.calibration, self.startup, self.devices, self.folder, self.operator
         )
 
     @cached_property
@@ -81,9 +89,9 @@ class StepExecutor:
         """What is computed."""
         return Computations(self.cell, self.calibration, self.config, self.folder)
 
-    async def prepare(self) -> None:
+    async def prepare(self, state: RunState) -> None:
         """Make the controller ready to move; raises ``HexacellError``."""
-        await self.guards.prepare()
+        await self.startup.prepare(state)
 
     async def perform(self, step: Step, state: RunState) -> events.Event:  # noqa: PLR0911 - a case a step
         """Do one step; raises ``HexacellError``."""

@@ -27,6 +27,7 @@ from hexacell.kinematics.position_agreement import PositionReports, PositionSour
 from hexacell.kinematics.rotations import Array
 from procedures.devices.device_set import Devices, MountedGauge
 from procedures.guards import rules
+from procedures.guards.heartbeat import WatchedController
 from procedures.guards.polling import DevicePoller, GaugeDeviation, LineActivity, PolledDevices
 from procedures.guards.position_check import PositionCheck
 from procedures.guards.rules import GuardLimits
@@ -62,14 +63,13 @@ class Guards:
         self.position = PositionCheck(settings, devices, clock, config)
         self._settings = settings
         self._devices = devices
+        self._clock = clock
         self.supervisor = MotionSupervisor(devices.controller, clock, folder, settings.guards.free_disk_mb)
 
-    async def prepare(self) -> None:
-        """Make the controller ready to move; releases the latch."""
+    async def prepare(self, order: Supervised[None]) -> None:
+        """Run the order that makes the controller ready to move; releases the latch."""
         self.supervisor.clear()
-        await self.supervisor.supervise(
-            self._devices.controller.prepare, self._pollers(), self._limits(), STOP_GRACE_S
-        )
+        await self.while_not_ready(order)
 
     async def move(self, step: Move, state: RunState, commanded: Callable[[], Array]) -> None:
         """Move to the target of a step; ``commanded`` gives the slider positions (6,), mm, at its pose."""
@@ -105,11 +105,12 @@ class Guards:
         pollers = self._pollers(controller=True, encoders=False)
         return await self.supervisor.supervise(action, pollers, self._limits())
 
-    async def reload(self) -> None:
-        """Make the controller reload its config, and make sure that it did."""
-        await self.supervisor.supervise(
-            self._devices.controller.reload, self._pollers(), self._limits(), STOP_GRACE_S
-        )
+    async def while_not_ready(self, order: Supervised[None]) -> None:
+        """Run an order during which the controller is switched off, on, or homed: its driver watches it."""
+        await self.supervisor.supervise(order, self._pollers(), self._limits(), STOP_GRACE_S)
+
+    async def require_reloaded(self) -> None:
+        """Make sure that the controller runs the geometry of its config."""
         await self.locate()
 
     def drift(self, point: str, drift_mm: ThreeNumbers) -> GuardTripped | None:
@@ -144,9 +145,15 @@ class Guards:
         return PolledDevices(
             gauges=self._gauge_pollers(gauges),
             encoders=DevicePoller("encoders", devices.read_encoders) if encoders else None,
-            controller=DevicePoller("controller", devices.controller_status) if controller else None,
+            controller=DevicePoller("controller", self._watched_controller().status)
+            if controller
+            else None,
             stop_input=DevicePoller(STOP_LINE, devices.stop_reason),
         )
+
+    def _watched_controller(self) -> WatchedController:
+        guards = self._settings.guards
+        return WatchedController(self._devices, self._clock, guards.following_mm, guards.stale_s)
 
     def _gauge_pollers(self, gauges: tuple[WatchedGauge, ...]) -> tuple[DevicePoller[GaugeDeviation], ...]:
         """One poller a gauge; gauges behind one multiplexer share a port and so a line."""

@@ -14,6 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
+from drivers.controllers.errors import ControllerFrozen
 from drivers.errors import GaugeAtEnd
 from drivers.stop_input import SUBJECT as STOP_LINE
 from hexacell.kinematics.rotations import Array
@@ -64,13 +65,22 @@ def controller_not_ready(devices: PolledDevices, _limits: GuardLimits) -> Trip |
         return None
     status = report.value
     messages = "; ".join(status.error_messages)
+    said = f": {messages}" if messages else ""
+    if status.estop:
+        action = "Find out why, release it and reset it at the controller, then resume"
+        return Trip(Guard.EMERGENCY_STOP, report.device, f"is in emergency stop{said}", action)
     if "following error" in messages.lower():
         action = "Look for what blocks that leg, then switch on and resume"
         return Trip(Guard.FOLLOWING, report.device, f"switched itself off: {messages}", action)
-    problem = "is in emergency stop" if status.estop else "was switched off"
-    release = "release the emergency stop" if status.estop else "see to it"
-    action = f"Find out why, {release}, then resume"
-    return Trip(Guard.CONTROLLER, report.device, f"{problem}: {messages}" if messages else problem, action)
+    action = "Find out why, see to it, then resume"
+    return Trip(Guard.CONTROLLER, report.device, f"was switched off{said}", action)
+
+
+def controller_frozen(devices: PolledDevices, _limits: GuardLimits) -> Trip | None:
+    """The controller answers, but always the same, although the sliders move."""
+    report = devices.controller
+    is_frozen = report is not None and isinstance(report.error, ControllerFrozen)
+    return _fault_trip(Guard.STALE, report) if report is not None and is_frozen else None
 
 
 def encoder_fault(devices: PolledDevices, _limits: GuardLimits) -> Trip | None:
@@ -106,12 +116,10 @@ def device_silent(devices: PolledDevices, limits: GuardLimits) -> Trip | None:
     """A device is silent for longer than allowed."""
     for report in devices.all():
         if report.line.silent_s > limits.stale_s:
-            return Trip(
-                Guard.STALE,
-                report.device,
-                f"has not answered for {report.line.silent_s:.2g} s while it was needed",
-                "Check its cable and supply, then resume",
-            )
+            problem = f"has not answered for {report.line.silent_s:.2g} s while it was needed"
+            if report is devices.controller:  # one that was ended has closed its connection
+                problem += ", although its connection is open: it is frozen, or its cable is out"
+            return Trip(Guard.STALE, report.device, problem, "Check its cable and supply, then resume")
     return None
 
 
@@ -145,6 +153,7 @@ def unexpected_motion(devices: PolledDevices, limits: GuardLimits) -> Trip | Non
 RULES: tuple[Rule, ...] = (
     stop_requested,
     controller_not_ready,
+    controller_frozen,
     encoder_fault,
     gauge_at_end,
     ball_off_gauge,

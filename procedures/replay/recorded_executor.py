@@ -11,7 +11,13 @@ from functools import cached_property
 from typing import Self, TypeVar
 
 from drivers.errors import GaugeAtEnd
-from drivers.interfaces import ControllerStatus, DeviceIdentity, EncoderSample, ReportedPosition
+from drivers.interfaces import (
+    ControllerStatus,
+    DeviceIdentity,
+    EncoderSample,
+    ReportedPosition,
+    StartupActions,
+)
 from hexacell.cell.loader import Cell
 from hexacell.clock import CellClock
 from hexacell.errors import AnswerNeeded, DeviceError
@@ -78,7 +84,7 @@ class RecordedController:
         """Nothing to connect."""
         return DeviceIdentity("controller", PROTOCOL, "a controller in a journal")
 
-    async def prepare(self) -> None:
+    async def prepare(self, permitted: StartupActions) -> None:
         """Nothing to do."""
 
     async def move(self, pose: Pose) -> None:
@@ -95,7 +101,7 @@ class RecordedController:
     async def stop(self) -> None:
         """Nothing to do."""
 
-    async def reload(self) -> None:
+    async def reload(self, permitted: StartupActions) -> None:
         """Nothing to do."""
 
     async def close(self) -> None:
@@ -123,8 +129,9 @@ class RecordedOperator:
 class InactiveGuards(Guards):
     """Guards without supervision; the drift of a reference, which needs no device, is still evaluated."""
 
-    async def prepare(self) -> None:
+    async def prepare(self, order: Supervised[None]) -> None:
         """Nothing to do."""
+        del order
 
     async def move(self, step: Move, state: RunState, commanded: Callable[[], Array]) -> None:
         """Nothing to do."""
@@ -134,7 +141,11 @@ class InactiveGuards(Guards):
         """Run it."""
         return await action()
 
-    async def reload(self) -> None:
+    async def while_not_ready(self, order: Supervised[None]) -> None:
+        """Nothing to do."""
+        del order
+
+    async def require_reloaded(self) -> None:
         """Nothing to do."""
 
 

@@ -307,6 +307,11 @@ class Tripped(Frozen):
     @classmethod
     def of(cls, trip: Trip) -> Self:
         """The event of a trip."""
+        if trip.stop_failure:
+            problem = f"the robot could not be stopped: {trip.stop_failure}. Before that: {trip.problem}"
+            return cls(
+                guard=trip.guard, device=trip.device, problem=problem, action="Press the emergency stop"
+            )
         return cls(guard=trip.guard, device=trip.device, problem=trip.problem, action=trip.action)
 
 

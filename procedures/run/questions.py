@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Protocol
 
+from drivers.interfaces import StartupAction
 from hexacell.acceptance import AcceptanceGate
 from hexacell.campaign.teaching import TaskDisplacement
 from hexacell.cell.recovery import Action
@@ -21,6 +22,9 @@ from procedures.run.steps import SetKey
 PLACED = "placed"
 """The one answer to a request to place the gauges."""
 
+YES, NO = "yes", "no"
+"""The answers to whether the controller may be made ready, or is."""
+
 
 class QuestionKind(StrEnum):
     """What is asked."""
@@ -29,6 +33,7 @@ class QuestionKind(StrEnum):
     APPROVE_CHANGE = "approve"
     CHOOSE_RECOVERY = "decide"
     KEEP_RESULT = "keep"
+    START_UP = "start up"
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,6 +84,18 @@ class WrittenResult:
 
 
 @dataclass(frozen=True, slots=True)
+class UnreadyController:
+    """Why the controller cannot move, and what a person is to permit, or to do at the controller.
+
+    ``word`` is what the cell file may state in ``controller.startup`` to permit it; none if it cannot.
+    """
+
+    problem: str
+    request: str
+    word: str | None
+
+
+@dataclass(frozen=True, slots=True)
 class Question:
     """One question to a person. An answer is a text, or None.
 
@@ -92,7 +109,7 @@ class Question:
 
     kind: QuestionKind
     text: str
-    subject: GaugePlacement | PendingChange | StepFailure | WrittenResult
+    subject: GaugePlacement | PendingChange | StepFailure | WrittenResult | UnreadyController
     choices: tuple[str, ...] = ()
     default: str | None = None
     consent: str = "yes"
@@ -158,6 +175,26 @@ def ask_recovery(problem: str, choices: Sequence[Action]) -> Question:
         StepFailure(problem),
         choices=tuple(choice.value for choice in choices),
     )
+
+
+def ask_startup(needed: StartupAction, problem: str, *, is_theirs: bool) -> Question:
+    """Ask whether the controller may be made ready; where that is a person's, whether it is."""
+    request = _AT_THE_CONTROLLER if is_theirs else _STARTUP_REQUESTS[needed]
+    is_permitted_by_file = not is_theirs and needed is not StartupAction.RESET_ESTOP
+    subject = UnreadyController(problem, request, needed.value if is_permitted_by_file else None)
+    return Question(QuestionKind.START_UP, f"{problem}. {request}", subject, choices=(YES, NO))
+
+
+_AT_THE_CONTROLLER = (
+    "Find out why, release the emergency stop and reset it at the controller; this program does not. "
+    "Is it reset?"
+)
+_STARTUP_REQUESTS = {
+    StartupAction.RESET_INITIAL_ESTOP: "Reset the emergency stop?",
+    StartupAction.RESET_ESTOP: "Is it released, and may the robot move? Reset the emergency stop?",
+    StartupAction.SWITCH_ON: "Is nobody within its reach? Switch the machine on?",
+    StartupAction.HOME: "Is its way free? Home it, which moves the machine?",
+}
 
 
 class Operator(Protocol):
@@ -236,5 +273,16 @@ class UnattendedOperator:
                 )
             case WrittenResult(line=line):
                 raise AnswerNeeded(f"{line}: a person must decide whether the new geometry stays")
+            case UnreadyController(problem=problem, word=None):
+                raise AnswerNeeded(
+                    f"{problem}, and the run is unattended",
+                    action="Find out why, release it and reset it at the controller, then begin or resume",
+                )
+            case UnreadyController(problem=problem, word=word):
+                raise AnswerNeeded(
+                    f"{problem}, and the run is unattended",
+                    action=f'Add "{word}" to startup in [controller] if the program may do that by itself, '
+                    "do it at the controller, or run it attended",
+                )
             case StepFailure(problem=problem):
                 raise AnswerNeeded(f"{problem} A person must choose: {', '.join(question.choices)}")

@@ -11,6 +11,7 @@ from hexacell.kinematics.pose import Pose
 from hexacell.measurements.records import MeasurementSet, Record
 from procedures.run import events
 from procedures.run.steps import Compute, Move, Phase, SetKey, SixNumbers, Step, StepOfSet
+from procedures.run.trips import Guard
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,6 +95,7 @@ class RunState:
         rolling_back: the old geometry is being put back.
         provisional: the provisional geometry that the controller was given last.
         provisional_active: the controller has it now.
+        is_in_estop: the controller came into emergency stop, and has not moved since.
         config_write_pending: it is being applied or reverted, and how far that got is unknown.
     """
 
@@ -117,6 +119,7 @@ class RunState:
     provisional_active: bool = False
     config_write_pending: bool = False
     failures: dict[tuple[FailureKind, str], int] = field(default_factory=dict)
+    is_in_estop: bool = False
     ended: events.Ended | None = None
 
     @property
@@ -244,6 +247,8 @@ def apply(state: RunState, event: events.Event) -> RunState:  # noqa: C901, PLR0
             return _rolled_back(_without_position(replace(state, rolling_back=False)))
         case events.Paused(at_once=True):
             return _unverified(_without_position(state))
+        case events.Tripped(guard=Guard.EMERGENCY_STOP):
+            return replace(state, is_in_estop=True)
         case events.Failed():
             return _failed(_without_position(state), event)
         case events.Interrupted():
@@ -266,6 +271,7 @@ def _arrived(state: RunState, event: events.Arrived) -> RunState:
         target=event.pose,
         path_from_reference=_path(state, event),
         position_unknown=False,
+        is_in_estop=False,
     )
 
 

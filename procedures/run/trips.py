@@ -5,13 +5,21 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
-from hexacell.errors import DeviceError, ExitCode, HexacellError, LimitError, flatten_errors
+from hexacell.errors import (
+    DeviceError,
+    ExitCode,
+    HexacellError,
+    LimitError,
+    SeveralErrors,
+    flatten_errors,
+)
 
 
 class Guard(StrEnum):
     """What is watched; the values are journalled."""
 
     STOP_LINE = "stop line"
+    EMERGENCY_STOP = "emergency stop"
     CONTROLLER = "controller"
     FOLLOWING = "following"
     GAUGE_END = "gauge at its end"
@@ -28,7 +36,8 @@ class Guard(StrEnum):
 class Trip:
     """One guard, the device it tripped on, the fact as a sentence part, and the next action.
 
-    ``causes`` are what devices said of themselves, where that is what it tripped on.
+    ``causes`` are what devices said of themselves, where that is what it tripped on. ``stop_failure`` is
+    why the robot could not be stopped; empty where it was.
     """
 
     guard: Guard
@@ -36,6 +45,7 @@ class Trip:
     problem: str
     action: str
     causes: tuple[HexacellError, ...] = field(default=(), compare=False)
+    stop_failure: str = ""
 
     @property
     def is_about_the_ball(self) -> bool:
@@ -48,11 +58,7 @@ class Trip:
 
     def unstopped(self, reason: str) -> Trip:
         """The same where the robot could not be stopped: then that comes first."""
-        return replace(
-            self,
-            problem=f"{self.problem}, and the robot could not be stopped: {reason}",
-            action="Press the emergency stop",
-        )
+        return replace(self, stop_failure=reason)
 
 
 class GuardTripped(DeviceError):
@@ -63,6 +69,36 @@ class GuardTripped(DeviceError):
     def __init__(self, trip: Trip) -> None:
         self.trip = trip
         super().__init__(trip.problem, subject=trip.device, action=trip.action)
+
+    def __str__(self) -> str:
+        text = super().__str__()
+        return (
+            _MAY_STILL_MOVE.format(f"{self.trip.stop_failure}\n{text}") if self.trip.stop_failure else text
+        )
+
+
+class RobotNotStopped(SeveralErrors):
+    """The robot may still move: it could not be stopped after an error, which comes second."""
+
+    exit_code = ExitCode.HARDWARE
+
+    def __init__(self, stop_failure: HexacellError, error: HexacellError) -> None:
+        super().__init__("the robot may still move", [stop_failure, *flatten_errors(error)])
+        self.exit_code = ExitCode.HARDWARE
+
+    def __str__(self) -> str:
+        stop_failure, *others = self.errors
+        return _MAY_STILL_MOVE.format("\n".join(map(str, (stop_failure, *others))))
+
+
+def may_still_move(error: BaseException) -> bool:
+    """Whether an error says that the robot could not be stopped."""
+    if isinstance(error, GuardTripped):
+        return bool(error.trip.stop_failure)
+    return isinstance(error, RobotNotStopped)
+
+
+_MAY_STILL_MOVE = "PRESS THE EMERGENCY STOP. The robot could not be stopped and may still move: {}"
 
 
 class DriftTripped(GuardTripped, LimitError):

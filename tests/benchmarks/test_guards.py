@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from drivers.interfaces import StartupAction
 from drivers.serial.shared_port import SharedSerialPorts
 from drivers.simulated.cell import SimulatedCell
 from drivers.wire_trace import WireTrace
@@ -46,7 +47,7 @@ ATTEMPTS = 5
 
 EVENTS: list[tuple[FaultKind, str, set[Guard]]] = [
     ("stop line", "", {Guard.STOP_LINE}),
-    ("emergency stop", "controller", {Guard.CONTROLLER}),
+    ("emergency stop", "controller", {Guard.EMERGENCY_STOP}),
     ("following error", "controller", {Guard.FOLLOWING}),
     ("at its end", "x", {Guard.GAUGE_END}),
     ("off its plate", "z", {Guard.PLATE, Guard.GAUGE_END}),
@@ -115,7 +116,7 @@ async def watched(folder: Path, protocol: str) -> AsyncIterator[Watched]:
             await devices.open()
             config = CurrentConfig(cell.config_path, NativeToml(HEXAGLIDE_PARAMETERS))
             guards = Guards(simulated.settings, devices, CellClock(), folder, config)
-            await guards.prepare()
+            await guards.prepare(lambda: devices.controller.prepare(frozenset(StartupAction)))
             yield Watched(simulated, devices, guards, await reference(devices))
         finally:
             await devices.close()

@@ -230,3 +230,21 @@ def test_the_output_of_a_run_agrees_with_its_journal(demo):
     ended = history(demo.run)[-1]
     assert isinstance(ended, events.Ended)
     assert json.loads(demo.outcome.out)["line"] == ended.line
+
+
+LOST = """
+[[simulation.faults]]
+kind = "unplugged"
+device = "controller"
+at_move = 2
+"""
+
+
+def test_a_robot_that_could_not_be_stopped_is_the_first_thing_said(typed_here, good_cell):
+    """What was measured, and how to go on, comes after it."""
+    good_cell.cell.write_text(good_cell.cell.read_text() + LOST)
+    outcome = typed_here("run", good_cell.cell, "--unattended", "--json")
+    assert outcome.code == 3
+    said = outcome.err
+    assert said.index("PRESS THE EMERGENCY STOP. The robot could not be") < said.index("Stopped; what was")
+    assert outcome.document["error"].startswith("PRESS THE EMERGENCY STOP")

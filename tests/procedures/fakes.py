@@ -7,6 +7,7 @@ import threading
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
+from drivers.controllers.errors import StartupNotPermitted
 from drivers.errors import GaugeAtEnd
 from drivers.interfaces import (
     ControllerStatus,
@@ -14,6 +15,8 @@ from drivers.interfaces import (
     EncoderSample,
     GaugeReading,
     ReportedPosition,
+    StartupAction,
+    StartupActions,
 )
 from drivers.simulated.robot import SimulatedMachine
 from hexacell.acceptance import AcceptanceGate
@@ -24,7 +27,14 @@ from hexacell.errors import HexacellError
 from hexacell.kinematics.pose import Pose
 from hexacell.reporting.verification import Verification
 from procedures.devices.device_set import Devices, MountedGauge
-from procedures.run.questions import GaugePlacement, PendingChange, Question, StepFailure, WrittenResult
+from procedures.run.questions import (
+    GaugePlacement,
+    PendingChange,
+    Question,
+    StepFailure,
+    UnreadyController,
+    WrittenResult,
+)
 
 HALF_TRAVEL_MM = 6.25
 
@@ -121,6 +131,7 @@ class FakeController(Fake):
         self.log: list[str] = []
         self.failures: dict[str, BaseException] = {}
         self.now = ControllerStatus(estop=False, enabled=True)
+        self.needed: list[StartupAction] = []
 
     def _do(self, order: str, target: str = "") -> None:
         self.log.append(f"{order} {target}".strip())
@@ -130,8 +141,15 @@ class FakeController(Fake):
     async def open(self) -> DeviceIdentity:
         return self._answering("controller")[0]
 
-    async def prepare(self) -> None:
+    async def prepare(self, permitted: StartupActions) -> None:
         self._do("prepare")
+        self._start_up(permitted)
+
+    def _start_up(self, permitted: StartupActions) -> None:
+        for needed in [action for action in self.needed if action not in permitted]:
+            raise StartupNotPermitted(needed, "controller")
+        self.log += [action.value for action in self.needed]
+        self.needed = []
 
     async def move(self, pose: Pose) -> None:
         self._do("move", str(pose))
@@ -147,8 +165,9 @@ class FakeController(Fake):
     async def stop(self) -> None:
         self._do("stop")
 
-    async def reload(self) -> None:
+    async def reload(self, permitted: StartupActions) -> None:
         self._do("reload")
+        self._start_up(permitted)
         if self.machine:
             self.machine.switch_on()
 
@@ -162,6 +181,7 @@ class Approver:
         self.asked: list[tuple[Sequence[AcceptanceGate], str]] = []
         self.problems: list[str] = []
         self.decisions: list[Action] = []
+        self.startup: list[str] = []
         self.verifications: list[Verification] = []
 
     async def ask(self, question: Question) -> str | None:
@@ -178,6 +198,9 @@ class Approver:
             case StepFailure(problem=problem):
                 self.problems.append(problem)
                 return self.decisions.pop(0) if self.decisions else Action.ABORT
+            case UnreadyController(problem=problem, request=request):
+                self.problems.append(f"{problem}. {request}")
+                return self.startup.pop(0)
 
 
 class SilentOperator:

@@ -145,9 +145,9 @@ class Connection:
             if self._buffer.rest:
                 raise self._not_linuxcncrsh(self._buffer.rest) from None
             raise ResponseTimeout(
-                "accepts the connection but does not respond",
+                "is frozen: it accepts the connection but does not respond",
                 subject=self._address.name,
-                action="Check that linuxcncrsh listens there, and restart LinuxCNC if it hangs",
+                action="Check that linuxcncrsh listens there, and restart LinuxCNC",
             ) from None
         return line
 
@@ -203,9 +203,9 @@ class Connection:
                 return Response(accepted=False, explanations=tuple(remarks))
             asked = " ".join(command.split()[:2])  # no passwords in messages
             raise ResponseTimeout(
-                f"did not answer '{asked}' within {timeout_s:g} s",
+                f"is frozen: it is connected, but did not answer '{asked}' within {timeout_s:g} s",
                 subject=self._address.name,
-                action="Check that LinuxCNC still runs",
+                action="Restart LinuxCNC, and find out why",
             ) from None
         return Response(answer.accepted, answer.text, tuple(remarks))
 
@@ -224,7 +224,9 @@ class Connection:
         self._record(TrafficDirection.RECEIVED, data)
         if not data:
             raise ConnectionLost(
-                "closed the connection", subject=self._address.name, action="Check that LinuxCNC still runs"
+                "closed the connection: it was ended or restarted",
+                subject=self._address.name,
+                action="Start LinuxCNC if it does not run",
             )
         return data
 

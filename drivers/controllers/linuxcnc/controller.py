@@ -13,13 +13,20 @@ from drivers.controllers.errors import (
     MotionInterrupted,
     MoveRefused,
     ResponseTimeout,
+    StartupNotPermitted,
 )
 from drivers.controllers.linuxcnc import startup
 from drivers.controllers.linuxcnc.commands import ControllerCommands
 from drivers.controllers.linuxcnc.protocol import pose_difference, rapid_move
 from drivers.controllers.linuxcnc.session import Session
 from drivers.controllers.linuxcnc.settings import Address, Timeouts, loop_time
-from drivers.interfaces import ControllerStatus, DeviceIdentity, ReportedPosition
+from drivers.interfaces import (
+    ControllerStatus,
+    DeviceIdentity,
+    ReportedPosition,
+    StartupAction,
+    StartupActions,
+)
 from drivers.wire_trace import TraceRecorder
 from hexacell.cell.devices import ControllerSettings
 from hexacell.errors import DeviceError
@@ -49,6 +56,7 @@ class LinuxcncrshController:
         self._timeouts = timeouts
         self._session = Session(address, timeouts, trace)
         self._order = asyncio.Lock()
+        self._joints_before_reload: tuple[float, ...] | None = None
 
     async def open(self) -> DeviceIdentity:
         """Connect and take control; nothing moves.
@@ -65,10 +73,11 @@ class LinuxcncrshController:
                 description=", ".join(filter(None, (commands.connection.server, config))),
             )
 
-    async def prepare(self) -> None:
+    async def prepare(self, permitted: StartupActions) -> None:
         """Leave emergency stop, switch on, home, enter MDI mode. May move the machine.
 
         Raises:
+            StartupNotPermitted: It needs one of these that is not permitted.
             MotionInterrupted: ``stop`` was called during it.
             DeviceError: A step has no effect, or units, offsets or modal codes change coordinates.
         """
@@ -76,11 +85,7 @@ class LinuxcncrshController:
         async with self._order:
             commands = await self._session.in_control()
             await startup.acknowledge_on_completion(commands)
-            await startup.leave_emergency_stop(commands, self._timeouts)
-            await startup.switch_machine(commands, self._timeouts, on=True)
-            self._session.machine_is_enabled()
-            await self._home_if_needed(commands, stops)
-            await startup.enter_mdi_mode(commands, self._timeouts)
+            await self._make_ready(commands, permitted, stops)
             await startup.check_coordinate_system(commands)
 
     async def move(self, pose: Pose) -> None:
@@ -134,37 +139,59 @@ class LinuxcncrshController:
         """
         await self._session.stop(self._settings.position_tolerance_mm)
 
-    async def reload(self) -> None:
+    async def reload(self, permitted: StartupActions) -> None:
         """Reload its config while it is switched off; sliders must not move.
 
         Raises:
+            StartupNotPermitted: It was restarted, or came into emergency stop, and needs more than to be
+                switched on again.
             DeviceError: The command failed, the machine does not come back, or a joint moved.
         """
         stops = self._session.stop_count
         async with self._order:
             commands = await self._session.synchronized()
-            before = await commands.joints()
-            await startup.switch_machine(commands, self._timeouts, on=False)
+            await self._switch_off(commands)
             if command := self._settings.reload_command:
                 await reload_command.run(command, self._name, self._timeouts.reload)
-            again = await self._session.reconnect()
-            if again is not commands:  # a restarted LinuxCNC is in emergency stop
-                await startup.leave_emergency_stop(again, self._timeouts)
-            await startup.switch_machine(again, self._timeouts, on=True)
-            if not await self._home_if_needed(again, stops):
-                self._require_unmoved(before, await again.joints())
-            await startup.enter_mdi_mode(again, self._timeouts)
+            await self._make_ready(await self._session.reconnect(), permitted, stops)
 
     async def close(self) -> None:
         """Close all connections; closing twice is harmless."""
         await self._session.close()
 
-    async def _home_if_needed(self, commands: ControllerCommands, stops: int) -> bool:
-        if await commands.all_homed():
-            return False
-        limit_s, poll_s = self._settings.move_timeout_s, self._timeouts.poll
-        await startup.home_joints(commands, limit_s, poll_s, lambda: self._was_stopped_since(stops))
-        return True
+    async def _switch_off(self, commands: ControllerCommands) -> None:
+        if await commands.is_on("machine"):
+            self._joints_before_reload = await commands.joints()
+        await startup.switch_machine(commands, self._timeouts, on=False)
+
+    async def _make_ready(
+        self, commands: ControllerCommands, permitted: StartupActions, stops: int
+    ) -> None:
+        if self._joints_before_reload is not None:  # then it was on, and this driver switched it off
+            permitted |= {StartupAction.SWITCH_ON}
+        while (action := await startup.next_action(commands)) is not None:
+            if action is StartupAction.RESET_ESTOP:
+                self._joints_before_reload = None  # somebody else switched it off
+            if action not in permitted:
+                raise StartupNotPermitted(action, self._name)
+            permitted -= {action}  # what is needed again was undone by somebody
+            await self._start_up(commands, action, stops)
+        self._session.machine_is_enabled()
+        if self._joints_before_reload is not None:
+            self._require_unmoved(self._joints_before_reload, await commands.joints())
+            self._joints_before_reload = None
+        await startup.enter_mdi_mode(commands, self._timeouts)
+
+    async def _start_up(self, commands: ControllerCommands, action: StartupAction, stops: int) -> None:
+        match action:
+            case StartupAction.SWITCH_ON:
+                await startup.switch_machine(commands, self._timeouts, on=True)
+            case StartupAction.HOME:
+                self._joints_before_reload = None  # they may move
+                limit_s, poll_s = self._settings.move_timeout_s, self._timeouts.poll
+                await startup.home_joints(commands, limit_s, poll_s, lambda: self._was_stopped_since(stops))
+            case _:
+                await startup.leave_emergency_stop(commands, self._timeouts)
 
     def _rapid_move(self, pose: Pose) -> str:
         try:

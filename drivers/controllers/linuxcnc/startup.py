@@ -13,6 +13,7 @@ from drivers.controllers.errors import CommandRefused, MotionInterrupted
 from drivers.controllers.linuxcnc.commands import ControllerCommands
 from drivers.controllers.linuxcnc.protocol import parse_positions
 from drivers.controllers.linuxcnc.settings import Timeouts, loop_time
+from drivers.interfaces import StartupAction
 from hexacell.errors import DeviceError
 
 Stopped = Callable[[], bool]
@@ -32,14 +33,25 @@ async def acknowledge_on_completion(commands: ControllerCommands) -> None:
         await commands.set("wait_mode done")
 
 
+async def next_action(commands: ControllerCommands) -> StartupAction | None:
+    """What it needs next before it can move; none if nothing.
+
+    LinuxCNC starts in emergency stop and not homed. A later emergency stop leaves the joints homed.
+    """
+    if await commands.is_on("estop"):
+        is_later = await commands.all_homed()
+        return StartupAction.RESET_ESTOP if is_later else StartupAction.RESET_INITIAL_ESTOP
+    if not await commands.is_on("machine"):
+        return StartupAction.SWITCH_ON
+    return None if await commands.all_homed() else StartupAction.HOME
+
+
 async def leave_emergency_stop(commands: ControllerCommands, timeouts: Timeouts) -> None:
-    """Reset the emergency stop if it is on.
+    """Reset the emergency stop.
 
     Raises:
         DeviceError: It stays on, for example because a switch is still pressed.
     """
-    if not await commands.is_on("estop"):
-        return
     await commands.set("estop off")
     if not await _becomes_true(lambda: _is(commands, "estop", on=False), timeouts):
         raise DeviceError(

@@ -86,14 +86,16 @@ class StatusConnection:
     async def _read(self, commands: ControllerCommands) -> ControllerStatus:
         known = len(self._messages.for_status)
         estop, enabled = await commands.is_on("estop"), await commands.is_on("machine")
+        heartbeat = await commands.get("joint_pos")
         if enabled and not estop:
             self._was_enabled = True
             # An order may have read the message of a machine that was disabled since it answered.
             del self._messages.for_status[:known]
         elif self._was_enabled:
             await commands.read_errors()
-            return ControllerStatus(estop, enabled, tuple(self._messages.for_status))
-        return ControllerStatus(estop, enabled)
+            messages = tuple(self._messages.for_status)
+            return ControllerStatus(estop, enabled, messages, heartbeat)
+        return ControllerStatus(estop, enabled, heartbeat=heartbeat)
 
     async def _connect(self) -> ControllerCommands:
         async with self._arbiter.exclusive():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from dataclasses import replace
 
 from drivers.controllers.linuxcnc.commands import ControllerCommands
 from drivers.controllers.linuxcnc.connection import Connection
@@ -27,11 +28,13 @@ async def stop_in_place(
 ) -> None:
     """Send abort until successive joint positions agree within ``tolerance_mm``.
 
-    A ``ready`` connection saves the time to open one; it is closed afterwards.
+    A ``ready`` connection saves the time to open one; it is closed afterwards. A server that does not
+    answer is given up earlier than one whose machine still moves, so that the error tells which.
 
     Raises:
         DeviceError: It cannot be reached, or it still moves after ``timeouts.stop``.
     """
+    timeouts = replace(timeouts, answer=min(timeouts.answer, timeouts.stop / (_ATTEMPTS + 1)))
     try:
         async with asyncio.timeout(timeouts.stop):
             if ready is None or not await _stopped_over(ready, address, timeouts, tolerance_mm):

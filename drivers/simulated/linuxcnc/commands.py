@@ -65,6 +65,10 @@ GET_COMMANDS: dict[str, Callable[[ClientSession], str]] = {
 }
 
 
+OF_SERVER = frozenset({"ECHO", "VERBOSE", "ENABLE", "SET_WAIT"})
+"""What the server answers by itself, whatever the controller does."""
+
+
 class Permission(IntEnum):
     """Which client may send a command."""
 

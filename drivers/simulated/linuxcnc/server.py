@@ -10,10 +10,16 @@ import re
 import socket
 import socketserver
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 
-from drivers.simulated.linuxcnc.commands import GET_COMMANDS, SET_COMMANDS, ClientSession, Permission
+from drivers.simulated.linuxcnc.commands import (
+    GET_COMMANDS,
+    OF_SERVER,
+    SET_COMMANDS,
+    ClientSession,
+    Permission,
+)
 from drivers.simulated.linuxcnc.state import ConnectionCut, ControllerState, Machine
 from drivers.simulated.served_device import Closeable
 from hexacell.cell.devices import ControllerSettings
@@ -54,6 +60,13 @@ class SimulatedController(Closeable):
         """Lose every line without a response, or no more."""
         self._server.silent = on
 
+    def set_frozen(self, *, on: bool) -> None:
+        """Answer every query as it would be answered now and carry out nothing, or work again.
+
+        The machine continues. Of LinuxCNC, this is what a stopped milltask does.
+        """
+        self._server.frozen_answers = _answers_now(self._server) if on else None
+
     def close(self) -> None:
         """Stop the machine, cut all connections and end all threads; closing twice is harmless."""
         self._server.shutdown()
@@ -71,6 +84,7 @@ class _Server(socketserver.ThreadingTCPServer):
         self.settings = settings
         self.unplugged = False
         self.silent = False
+        self.frozen_answers: Mapping[str, str] | None = None
         self._connections: set[socket.socket] = set()
         super().__init__((HOST, 0), _Handler)
 
@@ -96,12 +110,18 @@ class _Server(socketserver.ThreadingTCPServer):
                 connection.shutdown(socket.SHUT_RDWR)
 
 
+def _answers_now(server: _Server) -> Mapping[str, str]:
+    """The answers to queries for the machine's state, by their names."""
+    anybody = ClientSession(server.state, server.settings)
+    return {what: get(anybody) for what, get in GET_COMMANDS.items() if what not in OF_SERVER}
+
+
 class _Handler(socketserver.BaseRequestHandler):
     server: _Server
     request: socket.socket
 
     def handle(self) -> None:
-        client = _Client(ClientSession(self.server.state, self.server.settings), self.request.sendall)
+        client = _Client(self.server, self.request.sendall)
         with suppress(OSError, ConnectionCut):
             while data := self.request.recv(_CHUNK):
                 if not self.server.silent:
@@ -111,8 +131,10 @@ class _Handler(socketserver.BaseRequestHandler):
 class _Client:
     """The lines and responses of one connection; ``write`` sends bytes back over it."""
 
-    def __init__(self, session: ClientSession, write: Callable[[bytes], None]) -> None:
-        self._session = session
+    def __init__(self, server: _Server, write: Callable[[bytes], None]) -> None:
+        self._server = server
+        self._session = ClientSession(server.state, server.settings)
+        self._is_waiting = False
         self._write = write
         self._rest = b""
 
@@ -132,6 +154,8 @@ class _Client:
 
     def _execute(self, line: str) -> None:
         verb, what, argument = (*line.split(maxsplit=2), "", "", "")[:3]
+        if self._is_stuck(verb.upper(), what.upper()):
+            return
         match verb.upper():
             case "HELLO":
                 self._hello(what, argument)
@@ -141,6 +165,13 @@ class _Client:
                 self._set(what.upper(), argument.strip())
             case "QUIT":
                 raise ConnectionCut
+
+    def _is_stuck(self, verb: str, what: str) -> bool:
+        """Whether the server waits for a frozen controller with this command, or with an earlier one."""
+        is_frozen = self._server.frozen_answers is not None
+        is_for_machine = verb == "SET" and what in SET_COMMANDS and what not in OF_SERVER
+        self._is_waiting = is_frozen and (self._is_waiting or is_for_machine)
+        return self._is_waiting
 
     def _hello(self, password: str, name_and_version: str) -> None:
         expected = self._session.settings.connect_password.get_secret_value()
@@ -154,9 +185,13 @@ class _Client:
         if not what:
             self._write(b"GET NAK\r\n")
         elif what in GET_COMMANDS:
-            self._write(f"{what} {GET_COMMANDS[what](self._session)}\r\n".encode())
+            self._write(f"{what} {self._answer(what)}\r\n".encode())
         else:
             self._write(f"GET {what} NAK\r\n\r\n".encode())
+
+    def _answer(self, what: str) -> str:
+        frozen = self._server.frozen_answers or {}
+        return frozen[what] if what in frozen else GET_COMMANDS[what](self._session)
 
     def _set(self, what: str, argument: str) -> None:
         if not self._session.greeted:

@@ -25,6 +25,7 @@ from procedures.run import events
 from procedures.run.commands import CommandQueue
 from procedures.run.questions import UnattendedOperator
 from procedures.run.state import fold
+from procedures.run.trips import may_still_move
 
 
 def main(options: argparse.Namespace) -> ExitCode:
@@ -102,7 +103,9 @@ def execute_run(request: RunRequest, console: Console) -> events.Ended:
     try:
         with progress.bar:
             return signals.run(_calibrate(request, console, progress, signals.queue))
-    except HexacellError:
+    except HexacellError as error:
+        if may_still_move(error):  # before anything else is said
+            console.error(str(error).partition("\n")[0])
         if progress.has_started:
             console.print(resume_hint(request))
         if (progress.has_started or request.resume) and is_unverified(request.folder):

@@ -18,6 +18,7 @@ from drivers.encoders.cia406 import Cia406Bank
 from drivers.gauges.cdi import CdiGauge
 from drivers.gauges.mux10 import Mux10Gauge
 from drivers.gauges.sylvac import SylvacGauge
+from drivers.interfaces import StartupAction
 from drivers.serial.shared_port import SharedSerialPorts
 from drivers.simulated.cell import SimulatedCell
 from hexacell.cell.model import CellSettings
@@ -27,6 +28,7 @@ from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS, Hexag
 from hexacell.kinematics.pose import Pose
 from tests.waiting import until
 
+ALL = frozenset(StartupAction)
 DRIVERS: dict[str, Any] = {"sylvac": SylvacGauge, "mux10": Mux10Gauge, "cdi": CdiGauge}
 
 
@@ -80,7 +82,7 @@ async def test_every_device_answers_and_the_robot_moves(bundled_cell) -> None:
     target = Pose(3.0, -2.0, 548.0, 1.0, 0.0, 0.0)
     with serve(bundled_cell) as cell:
         async with drivers(cell.settings) as (gauges, encoders, controller):
-            await controller.prepare()
+            await controller.prepare(ALL)
             before = (await encoders.read()).positions_mm
             await controller.move(target)
             after = (await encoders.read()).positions_mm
@@ -95,7 +97,7 @@ async def test_every_device_answers_and_the_robot_moves(bundled_cell) -> None:
 async def test_a_target_out_of_reach_is_refused(bundled_cell) -> None:
     with serve(bundled_cell) as cell:
         async with drivers(cell.settings) as (_, encoders, controller):
-            await controller.prepare()
+            await controller.prepare(ALL)
             before = (await encoders.read()).positions_mm
             with pytest.raises(MoveRefused, match="kinematicsInverse"):
                 await controller.move(Pose(0.0, 0.0, 2000.0))
@@ -105,7 +107,7 @@ async def test_a_target_out_of_reach_is_refused(bundled_cell) -> None:
 async def test_a_cancelled_move_stops_the_robot_in_place(bundled_cell) -> None:
     with serve(bundled_cell, slow(bundled_cell.settings)) as cell:
         async with drivers(cell.settings) as (_, _, controller):
-            await controller.prepare()
+            await controller.prepare(ALL)
             moving = asyncio.create_task(controller.move(Pose(0.0, -100.0, 550.0)))
             await under_way(cell)
             moving.cancel()
@@ -121,7 +123,7 @@ async def test_a_cancelled_move_stops_the_robot_in_place(bundled_cell) -> None:
 async def test_a_stop_during_a_move_is_reported(bundled_cell) -> None:
     with serve(bundled_cell, slow(bundled_cell.settings)) as cell:
         async with drivers(cell.settings) as (_, _, controller):
-            await controller.prepare()
+            await controller.prepare(ALL)
             moving = asyncio.create_task(controller.move(Pose(0.0, -100.0, 550.0)))
             await under_way(cell)
             await controller.stop()
@@ -149,7 +151,7 @@ async def test_gauges_count_in_the_direction_of_their_mounting(
 async def test_reloading_reads_the_config_and_moves_nothing(bundled_cell) -> None:
     with serve(bundled_cell) as cell:
         async with drivers(cell.settings) as (_, _, controller):
-            await controller.prepare()
+            await controller.prepare(ALL)
             sliders, believed = cell.machine.joints(), await controller.pose()
             config, values = (
                 bundled_cell.config_path,
@@ -158,7 +160,7 @@ async def test_reloading_reads_the_config_and_moves_nothing(bundled_cell) -> Non
             config.write_text(
                 NativeToml(HEXAGLIDE_PARAMETERS).rewrite(config.read_text(), _geometry(values))
             )
-            await controller.reload()
+            await controller.reload(ALL)
             assert cell.machine.joints() == pytest.approx(sliders, abs=1e-6)
             assert (await controller.pose()).position != pytest.approx(believed.position, abs=0.5)
 
@@ -174,7 +176,7 @@ async def test_the_passwords_of_the_cell_file_are_required(bundled_cell) -> None
     own = settings.controller.model_copy(update=passwords)
     with serve(bundled_cell, settings.model_copy(update={"controller": own})) as cell:
         async with drivers(cell.settings) as (_, _, controller):
-            await controller.prepare()
+            await controller.prepare(ALL)
         wrong = cell.settings.controller.model_copy(update={"connect_password": SecretStr("EMC")})
         stranger = LinuxcncrshController(wrong)
         with pytest.raises(HexacellError, match="password"):

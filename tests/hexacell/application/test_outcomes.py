@@ -193,6 +193,33 @@ async def test_an_emergency_stop_during_a_move_stops_the_run(make_site) -> None:
     assert arrived in ([1], [1, 2]), "the move in which it struck may just have ended"
 
 
+async def test_an_emergency_stop_during_a_run_is_not_reset_on_resuming(make_site) -> None:
+    site = make_site()
+
+    def stop_in_the_next_move() -> None:
+        schedule = site.simulated.schedule
+        schedule.schedule(SimulatedFault(kind="emergency stop", at_move=schedule.move_count + 1))
+
+    with pytest.raises(DeviceError):
+        await site.calibrate(at(events.RecordTaken, stop_in_the_next_move))
+    with pytest.raises(AnswerNeeded, match=r"is in emergency stop, .* reset it at the controller"):
+        await site.calibrate(resume=True)
+    assert site.simulated.controller.state.estop
+    assert not site.simulated.controller.state.enabled
+
+
+async def test_unattended_a_controller_is_not_homed_without_the_word_of_the_cell_file(make_site) -> None:
+    site = make_site(simulation__startup=("reset-estop", "switch-on"))
+    with pytest.raises(
+        AnswerNeeded, match=r'is not homed, .*Add "home" to startup in \[controller\]'
+    ) as no:
+        await site.calibrate()
+    assert no.value.exit_code is ExitCode.ANSWER_NEEDED
+    assert site.simulated.controller.state.enabled
+    assert not site.simulated.controller.state.homed
+    assert site.simulated.schedule.move_count == 0
+
+
 async def test_a_gauge_moved_away_while_measuring_gives_rejected_records(make_site) -> None:
     """Its plunger is at an end: the record is rejected, the run continues, and the drift ends the run."""
     site = make_site(acceptance__drift_mm=0.05)

@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 
 from drivers.controllers.linuxcnc.controller import LinuxcncrshController
+from drivers.interfaces import StartupAction
 from hexacell.application.calibration_run import preflight
 from hexacell.application.device_setup import open_devices
 from hexacell.cell.loader import Cell
@@ -73,7 +74,7 @@ async def homed(site: Any) -> Cell:
     async with open_devices(cell.settings) as connected:
         assert isinstance(connected.devices.controller, LinuxcncrshController)
         assert await connected.devices.controller.position() is None, "it is not homed yet"
-        await connected.devices.controller.prepare()
+        await connected.devices.controller.prepare(frozenset(StartupAction))
     return cell
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from drivers.interfaces import StartupAction
 from hexacell.acceptance import AcceptanceGate
 from hexacell.campaign.teaching import TaskDisplacement
 from hexacell.cell.recovery import Action
@@ -14,7 +15,16 @@ from hexacell.presentation.run import question_text
 from hexacell.presentation.teaching import teaching_sentence
 from hexacell.reporting.result import ExpectedImprovement
 from hexacell.reporting.verification import Verification
-from procedures.run.questions import Question, ask_acceptance, ask_approval, ask_placement, ask_recovery
+from procedures.run.questions import (
+    NO,
+    YES,
+    Question,
+    ask_acceptance,
+    ask_approval,
+    ask_placement,
+    ask_recovery,
+    ask_startup,
+)
 from procedures.run.steps import Phase, SetKey
 
 CHOICES = (Action.RETRY, Action.MEASURE_AGAIN, Action.REDO_SET, Action.ABORT)
@@ -115,3 +125,14 @@ def test_what_a_question_offers_is_an_answer(question: Question, typed: str, ans
 )
 def test_nothing_else_is_an_answer(question: Question, typed: str) -> None:
     assert typed_answer(typed, question, "somebody") is None
+
+
+def test_the_controller_is_made_ready_on_an_explicit_yes_only() -> None:
+    question = ask_startup(StartupAction.HOME, "controller: is not homed", is_theirs=False)
+    assert question_text(question) == (
+        "\ncontroller: is not homed. Is its way free? Home it, which moves the machine?\nType yes or no: "
+    )
+    for typed, answer in (("y", YES), ("Yes", YES), ("n", NO), ("no", NO)):
+        assert typed_answer(typed, question, "a person") == TypedAnswer(answer)
+    for typed in ("", "a", "m", "home", "yes please"):
+        assert typed_answer(typed, question, "a person") is None

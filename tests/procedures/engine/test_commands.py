@@ -49,8 +49,9 @@ class Script:
         kind = Sample if state.at_pose == (P1, orientation) else Move
         return kind(at=P1, orientation=orientation, pose=pose(orientation))
 
-    async def prepare(self) -> None:
-        await self.devices.controller.prepare()
+    async def prepare(self, state: RunState) -> None:
+        del state
+        await self.devices.controller.prepare(frozenset())
 
     async def perform(self, step: Any, state: RunState) -> events.Event:
         self.begun.append(step.key)

@@ -18,6 +18,7 @@ from hexacell.errors import (
     ExitCode,
     FileError,
     HexacellError,
+    Interruption,
     LimitError,
     SeveralErrors,
     WriteBackUndone,
@@ -27,6 +28,7 @@ from procedures.journal.journal import Journal, read_journal
 from procedures.run import events
 from procedures.run.state import RunState, fold
 from procedures.run.steps import Move, Phase, SetKey, Step
+from procedures.run.trips import RobotNotStopped
 from tests.procedures.rig import failure_without_record
 
 P1 = SetKey(phase=Phase.IDENTIFY, point=1)
@@ -50,8 +52,9 @@ class Script:
         assert isinstance(state, RunState)
         return self.steps[len(self.done)] if len(self.done) < len(self.steps) else None
 
-    async def prepare(self) -> None:
-        await self.devices.controller.prepare()
+    async def prepare(self, state: RunState) -> None:
+        del state
+        await self.devices.controller.prepare(frozenset())
 
     async def perform(self, step: Any, state: RunState) -> events.Event:
         if self.failure and len(self.done) == 1:
@@ -220,12 +223,27 @@ async def test_a_controller_that_cannot_be_prepared_ends_the_run_at_once(script,
     assert [event.kind for event in journal.events] == ["interrupted"]
 
 
-async def test_if_stopping_fails_too_the_first_error_is_raised(script, journal, bench) -> None:
+async def test_if_stopping_fails_too_that_is_said_first(script, journal, bench) -> None:
     script.failure = DeviceError("does not answer", subject="gauge x")
     bench.controller.failures["stop"] = DeviceError("connection lost", subject="controller")
-    with pytest.raises(DeviceError, match="gauge x"):
+    with pytest.raises(RobotNotStopped) as failure:
         await Engine(script, journal).run()
-    assert isinstance(journal.events[-1], events.Interrupted)
+    first, then = str(failure.value).splitlines()
+    assert first.startswith("PRESS THE EMERGENCY STOP. The robot could not be stopped and may still move: ")
+    assert first.endswith("controller: connection lost")
+    assert then == "gauge x: does not answer"
+    assert failure.value.exit_code is ExitCode.HARDWARE
+    assert journal.events[-1] == events.Interrupted(reason=str(failure.value), exit_code=3)
+
+
+async def test_an_interruption_with_a_stop_that_fails_is_a_failure_of_the_hardware(
+    script, journal, bench
+) -> None:
+    script.failure = Interruption("aborted")
+    bench.controller.failures["stop"] = DeviceError("connection lost", subject="controller")
+    with pytest.raises(RobotNotStopped, match=r"^PRESS THE EMERGENCY STOP") as failure:
+        await Engine(script, journal).run()
+    assert failure.value.exit_code is ExitCode.HARDWARE
 
 
 async def test_a_full_disk_stops_motion(script, journal, bench, path, monkeypatch) -> None:

@@ -356,15 +356,17 @@ class TestANewGeometryThatCannotBeVerified:
 
     @pytest.mark.parametrize("policy", [GIVE_UP, UNATTENDED])
     async def test_is_rolled_back(self, rig, recording, policy: RecoveryPolicy) -> None:
-        with pytest.raises(DriftTripped):
+        with pytest.raises(WriteBackUndone, match=r"could not be verified; .* back\. after-V2: ") as undone:
             await rig.run(self.slip(rig), policy=policy)
+        assert undone.value.exit_code is ExitCode.WRITE_BACK_UNDONE
         assert rig.config == recording.config_before
         assert rig.controller.log.count("reload") == 2
         last = read_journal(rig.folder.journal)[-2:]
         assert [event.kind for event in last] == ["rolled back", "interrupted"]
+        assert last[1] == events.Interrupted(reason=str(undone.value), exit_code=6)
 
     async def test_can_be_written_again_by_resuming(self, rig, recording) -> None:
-        with pytest.raises(DriftTripped):
+        with pytest.raises(WriteBackUndone):
             await rig.run(self.slip(rig))
         assert (await rig.run()).exit_code == ExitCode.DONE
         assert rig.config == recording.config_after

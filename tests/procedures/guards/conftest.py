@@ -17,7 +17,7 @@ import pytest
 
 from drivers.controllers.errors import MotionInterrupted
 from drivers.errors import GaugeSilent, WrongSetting
-from drivers.interfaces import ControllerStatus, EncoderSample, GaugeReading
+from drivers.interfaces import ControllerStatus, EncoderSample, GaugeReading, StartupActions
 from hexacell.cell.measuring import GuardSettings
 from hexacell.errors import DeviceError
 from procedures.run import events
@@ -116,11 +116,13 @@ class Scene:
         self.controller._do("stop")
         self.rig.machine.stop()
 
-    async def prepare(self) -> None:
+    async def prepare(self, permitted: StartupActions) -> None:
+        del permitted
         self.controller._do("prepare")
         await self.rig.clock.sleep(0.5)
 
-    async def reload(self) -> None:
+    async def reload(self, permitted: StartupActions) -> None:
+        del permitted
         self.controller._do("reload")
         await self.rig.clock.sleep(1.0)
         self.rig.machine.switch_on()

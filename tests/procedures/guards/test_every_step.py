@@ -43,8 +43,7 @@ async def before(scene: Any, *steps: Any, then: Any) -> Step:
 
 
 async def prepare(scene: Any) -> Step:
-    prepared: Step = scene.rig.performer.prepare
-    return prepared
+    return lambda: scene.rig.performer.prepare(scene.state)
 
 
 async def move_to_a_reference(scene: Any) -> Step:
@@ -112,7 +111,7 @@ MOVING = (prepare, *OUTSIDE, *WITHIN, place, reload)
 LAGS = "joint 3 following error"
 FAULTS = (
     Fault("stop line", Guard.STOP_LINE, lambda s: setattr(s, "forbidden", "stop exists"), STEPS),
-    Fault("estop", Guard.CONTROLLER, lambda s: s.switch_off(estop=True), STANDING_ON),
+    Fault("estop", Guard.EMERGENCY_STOP, lambda s: s.switch_off(estop=True), STANDING_ON),
     Fault("switched off", Guard.CONTROLLER, lambda s: s.switch_off(), STANDING_ON),
     Fault("following error", Guard.FOLLOWING, lambda s: s.switch_off(LAGS), STANDING_ON),
     Fault("silent controller", Guard.STALE, lambda s: s.silent.add("controller"), STANDING_ON),

@@ -90,8 +90,8 @@ def test_the_stop_line_gives_its_reason() -> None:
 @pytest.mark.parametrize(
     ("heard", "guard", "words"),
     [
-        (status(estop=True, enabled=False), Guard.CONTROLLER, "is in emergency stop"),
-        (status(estop=True, enabled=True), Guard.CONTROLLER, "is in emergency stop"),
+        (status(estop=True, enabled=False), Guard.EMERGENCY_STOP, "is in emergency stop"),
+        (status(estop=True, enabled=True), Guard.EMERGENCY_STOP, "is in emergency stop"),
         (status(enabled=False), Guard.CONTROLLER, "was switched off"),
         (status("drive 2 too hot", enabled=False), Guard.CONTROLLER, "was switched off: drive 2 too hot"),
         (status("joint 3 following error", enabled=False), Guard.FOLLOWING, "joint 3 following error"),
@@ -193,7 +193,7 @@ def test_the_trip_of_a_cause_precedes_those_of_its_effects() -> None:
     for key in ("stop_input", "controller", "encoders", "gauges"):
         order.append(tripped(**everything).guard)
         everything[key] = getattr(WELL, key)
-    assert order == [Guard.STOP_LINE, Guard.CONTROLLER, Guard.ENCODERS, Guard.GAUGE_END]
+    assert order == [Guard.STOP_LINE, Guard.EMERGENCY_STOP, Guard.ENCODERS, Guard.GAUGE_END]
     assert rules.first_trip(PolledDevices(**everything), LIMITS) is None
 
 
@@ -245,12 +245,19 @@ def test_the_disk_must_have_room(monkeypatch, free: int, trips: bool) -> None:
     assert (rules.low_disk_space(Path("/runs"), 50.0) is not None) is trips
 
 
-def test_a_trip_without_a_stop_asks_for_the_emergency_stop() -> None:
+def test_a_trip_without_a_stop_asks_for_the_emergency_stop_first() -> None:
     trip = Trip(Guard.STALE, "controller", "has not answered", "Check its cable").unstopped("no way to it")
     error = trip.as_error()
     assert isinstance(error, GuardTripped)
     assert error.exit_code is ExitCode.HARDWARE
-    assert str(error).endswith("could not be stopped: no way to it. Press the emergency stop")
+    first, then = str(error).splitlines()
+    assert first == (
+        "PRESS THE EMERGENCY STOP. The robot could not be stopped and may still move: no way to it"
+    )
+    assert then == "controller: has not answered. Check its cable"
+    told = events.Tripped.of(error.trip)
+    assert told.problem == "the robot could not be stopped: no way to it. Before that: has not answered"
+    assert told.action == "Press the emergency stop"
 
 
 def test_a_trip_read_from_the_journal_is_unchanged() -> None:

@@ -41,7 +41,7 @@ async def reference(scene: Any) -> Any:
 
 async def test_two_complete_sets_trip_no_guard(scene) -> None:
     stage = scene()
-    await stage.rig.performer.prepare()
+    await stage.rig.performer.prepare(stage.state)
     for at in (P1, P2):
         for orientation in (1, 2, 3):
             await stage.do(move(orientation, at))
@@ -103,11 +103,11 @@ async def test_a_trip_stays_latched_until_it_is_cleared(scene) -> None:
 async def test_prepare_clears_the_latch_and_evaluates_the_guards_again(scene) -> None:
     stage = await reference(scene())
     stage.forbidden = "the button is pressed"
-    for action in (lambda: stage.do(move(2)), stage.rig.performer.prepare):
+    for action in (lambda: stage.do(move(2)), lambda: stage.rig.performer.prepare(stage.state)):
         with pytest.raises(GuardTripped, match="the button"):
             await action()
     stage.forbidden = None
-    await stage.rig.performer.prepare()
+    await stage.rig.performer.prepare(stage.state)
     await stage.do(move(2))
 
 
@@ -122,7 +122,7 @@ async def test_a_robot_that_cannot_be_stopped_is_reported(scene) -> None:
     await stage.rig.clock.sleep(0.3)
     stage.forbidden = "the button is pressed"
     with pytest.raises(
-        GuardTripped, match=r"the button .*could not be stopped: .*Press the emergency stop"
+        GuardTripped, match=r"^PRESS THE EMERGENCY STOP\. .*does not answer\nstop line: .*the button"
     ):
         await moving
 

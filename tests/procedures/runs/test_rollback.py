@@ -126,7 +126,7 @@ async def test_a_controller_that_cannot_reload_the_old_config_is_reported(
 ) -> None:
     rig = replayed(recording.until(events.Proposed))
 
-    async def broken() -> None:
+    async def broken(_: object) -> None:
         raise DeviceError("connection lost", subject="controller")
 
     monkeypatch.setattr(rig.controller, "reload", broken)

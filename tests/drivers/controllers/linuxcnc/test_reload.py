@@ -6,13 +6,17 @@ import sys
 
 import pytest
 
-from drivers.controllers.errors import ConnectionLost
+from drivers.controllers.errors import ConnectionLost, StartupNotPermitted
+from drivers.interfaces import StartupAction
 from hexacell.errors import DeviceError
 
+RESTARTED = frozenset({StartupAction.RESET_INITIAL_ESTOP, StartupAction.HOME})
+"""What the cell file permits; to be switched on again needs no permission."""
 BEFORE = ("get joint_pos", b"JOINT_POS -461.827519 1.0 2.0 3.0 4.0 5.0\r\n")
 AFTER = ("get joint_pos", b"JOINT_POS -461.827512 1.0 2.0 3.0 4.0 5.0\r\n")
-OFF = [("set machine off", b"SET MACHINE ACK\n\r"), ("get machine", b"MACHINE OFF\r\n")]
-ON = [("set machine on", b"SET MACHINE ACK\n\r"), ("get machine", b"MACHINE ON\r\n")]
+NO_ESTOP = ("get estop", b"ESTOP OFF\r\n")
+IS_ON = ("get machine", b"MACHINE ON\r\n")
+IS_OFF = ("get machine", b"MACHINE OFF\r\n")
 HOMED = ("get joint_homed", b"JOINT_HOMED YES YES YES YES YES YES\r\n")
 NOT_HOMED = ("get joint_homed", b"JOINT_HOMED NO NO NO NO NO NO\r\n")
 HOMING = [
@@ -23,7 +27,12 @@ HOMING = [
     ("set home -1", b"SET HOME ACK\n\r"),
     NOT_HOMED,
     HOMED,
+    NO_ESTOP,
+    IS_ON,
+    HOMED,
 ]
+OFF = [("set machine off", b"SET MACHINE ACK\n\r"), IS_OFF]
+ON = [NO_ESTOP, IS_OFF, ("set machine on", b"SET MACHINE ACK\n\r"), IS_ON, NO_ESTOP, IS_ON]
 MDI = [("set mode mdi", b"SET MODE ACK\n\r"), ("get mode", b"MODE MDI\r\n")]
 
 
@@ -32,31 +41,33 @@ def python(program: str) -> tuple[str, ...]:
 
 
 async def test_without_a_command_the_machine_goes_off_and_on(play):
-    driver = await play.opened([BEFORE, *OFF, *ON, HOMED, AFTER, *MDI])
-    await driver.reload()
+    driver = await play.opened([IS_ON, BEFORE, *OFF, *ON, HOMED, AFTER, *MDI])
+    await driver.reload(RESTARTED)
 
 
 async def test_the_command_runs_while_the_machine_is_off(play, tmp_path):
     ran = tmp_path / "ran"
     driver = await play.opened(
-        [BEFORE, *OFF, *ON, HOMED, AFTER, *MDI],
+        [IS_ON, BEFORE, *OFF, *ON, HOMED, AFTER, *MDI],
         reload_command=python(f"open({str(ran)!r}, 'w').close()"),
     )
-    await driver.reload()
+    await driver.reload(RESTARTED)
     assert ran.exists()
 
 
 async def test_a_machine_that_does_not_go_off_is_not_reloaded(play, tmp_path):
     play.patience = play.IMPATIENT
     ran = tmp_path / "ran"
-    driver = await play.opened([BEFORE, OFF[0]], reload_command=python(f"open({str(ran)!r}, 'w').close()"))
+    driver = await play.opened(
+        [IS_ON, BEFORE, OFF[0]], reload_command=python(f"open({str(ran)!r}, 'w').close()")
+    )
     play.servers[0].afterwards = {
         "get machine": b"MACHINE ON\r\n",
         "get error": b"ERROR OK\r\n",
         "get estop": b"ESTOP OFF\r\n",
     }
     with pytest.raises(DeviceError, match="does not switch off"):
-        await driver.reload()
+        await driver.reload(RESTARTED)
     assert not ran.exists()
 
 
@@ -71,42 +82,70 @@ async def test_a_machine_that_does_not_go_off_is_not_reloaded(play, tmp_path):
     ],
 )
 async def test_a_command_that_fails_leaves_the_machine_off(play, program, problem):
-    driver = await play.opened([BEFORE, *OFF], reload_command=python(program))
+    driver = await play.opened([IS_ON, BEFORE, *OFF], reload_command=python(program))
     with pytest.raises(DeviceError, match=problem) as caught:
-        await driver.reload()
+        await driver.reload(RESTARTED)
     assert "the machine is off" in str(caught.value)
 
 
 async def test_a_joint_that_moved_is_an_error(play):
     moved = ("get joint_pos", b"JOINT_POS -461.827512 1.0 2.0 9.8 4.0 5.0\r\n")
-    driver = await play.opened([BEFORE, *OFF, *ON, HOMED, moved])
+    driver = await play.opened([IS_ON, BEFORE, *OFF, *ON, HOMED, moved])
     with pytest.raises(DeviceError, match=r"moved joint 4 by 6\.800 mm while it read its config again"):
-        await driver.reload()
+        await driver.reload(RESTARTED)
 
 
 async def test_unhomed_joints_are_homed_after_the_reload_without_comparing_positions(play):
-    driver = await play.opened([BEFORE, *OFF, *ON, *HOMING, *MDI])
-    await driver.reload()
+    driver = await play.opened([IS_ON, BEFORE, *OFF, *ON, *HOMING, *MDI])
+    await driver.reload(RESTARTED)
 
 
 async def test_an_emergency_stop_meanwhile_is_not_reset(play):
     play.patience = play.IMPATIENT
-    driver = await play.opened([BEFORE, *OFF, ON[0]])
-    play.servers[0].afterwards = {
-        "get machine": b"MACHINE OFF\r\n",
-        "get error": b"ERROR OK\r\n",
-        "get estop": b"ESTOP ON\r\n",
-    }
-    with pytest.raises(DeviceError, match="does not switch on: it is in emergency stop"):
-        await driver.reload()
+    driver = await play.opened([IS_ON, BEFORE, *OFF, ("get estop", b"ESTOP ON\r\n"), HOMED])
+    with pytest.raises(StartupNotPermitted, match="is in emergency stop"):
+        await driver.reload(RESTARTED)
+
+
+async def test_after_an_emergency_stop_meanwhile_the_machine_is_not_switched_on_without_permission(play):
+    driver = await play.opened(
+        [
+            *[IS_ON, BEFORE, *OFF, ("get estop", b"ESTOP ON\r\n"), HOMED],
+            ("set enable EMCTOO", b"SET ENABLE ACK\n\r"),
+            ("get error", b"ERROR OK\r\n"),
+            ("set set_wait done", b"SET SET_WAIT ACK\n\r"),
+            *[NO_ESTOP, IS_OFF],
+        ]
+    )
+    with pytest.raises(StartupNotPermitted, match="is in emergency stop"):
+        await driver.reload(RESTARTED)
+    with pytest.raises(StartupNotPermitted, match="is switched off"):
+        await driver.prepare(RESTARTED)
+
+
+async def test_a_machine_that_was_off_is_not_switched_on_without_permission(play):
+    driver = await play.opened([IS_OFF, *OFF, NO_ESTOP, IS_OFF])
+    with pytest.raises(StartupNotPermitted, match="is switched off"):
+        await driver.reload(RESTARTED)
+
+
+async def test_a_restarted_controller_is_left_in_emergency_stop_without_permission(play):
+    driver = await play.opened(
+        [IS_ON, BEFORE, OFF[0], (*IS_OFF, play.HANG_UP)],
+        [*play.OPENING[:-1], ("get estop", b"ESTOP ON\r\n"), NOT_HOMED],
+        reload_command=python("pass"),
+    )
+    with pytest.raises(StartupNotPermitted, match="since it was started"):
+        await driver.reload(frozenset({StartupAction.HOME}))
 
 
 async def test_a_reload_command_that_restarts_the_controller_is_followed_by_reconnection(play):
     driver = await play.opened(
-        [BEFORE, OFF[0], (*OFF[1], play.HANG_UP)],
+        [IS_ON, BEFORE, OFF[0], (*OFF[1], play.HANG_UP)],
         [
             *play.OPENING[:-1],
             ("get estop", b"ESTOP ON\r\n"),
+            NOT_HOMED,
             ("set estop off", b"SET ESTOP ACK\n\r"),
             ("get estop", b"ESTOP OFF\r\n"),
             *ON,
@@ -115,25 +154,25 @@ async def test_a_reload_command_that_restarts_the_controller_is_followed_by_reco
         ],
         reload_command=python("pass"),
     )
-    await driver.reload()
+    await driver.reload(RESTARTED)
 
 
 async def test_connecting_is_repeated_until_the_restarted_controller_answers(play):
     driver = await play.opened(
-        [BEFORE, OFF[0], (*OFF[1], play.HANG_UP)],
+        [IS_ON, BEFORE, OFF[0], (*OFF[1], play.HANG_UP)],
         [("hello EMC hexacell 1.0", play.HANG_UP)],
-        [*play.OPENING[:-1], ("get estop", b"ESTOP OFF\r\n"), *ON, HOMED, AFTER, *MDI],
+        [*play.OPENING[:-1], *ON, HOMED, AFTER, *MDI],
         reload_command=python("pass"),
     )
-    await driver.reload()
+    await driver.reload(RESTARTED)
 
 
 async def test_a_controller_that_does_not_restart_is_reported(play):
     play.patience = play.IMPATIENT
     driver = await play.opened(
-        [BEFORE, OFF[0], (*OFF[1], play.HANG_UP)],
+        [IS_ON, BEFORE, OFF[0], (*OFF[1], play.HANG_UP)],
         reload_command=python("pass"),
     )
     play.servers[0].stop_listening()
     with pytest.raises(ConnectionLost, match="cannot be reached: Connection refused"):
-        await driver.reload()
+        await driver.reload(RESTARTED)

@@ -6,9 +6,11 @@ import asyncio
 
 import pytest
 
-from drivers.controllers.errors import CommandRefused, MotionInterrupted
+from drivers.controllers.errors import CommandRefused, MotionInterrupted, StartupNotPermitted
+from drivers.interfaces import StartupAction
 from hexacell.errors import DeviceError
 
+ALL = frozenset(StartupAction)
 NO_ERROR = ("get error", b"ERROR OK\r\n")
 TAKING_CONTROL = [
     ("set enable EMCTOO", b"SET ENABLE ACK\n\r"),
@@ -16,15 +18,16 @@ TAKING_CONTROL = [
     NO_ERROR,
     ("set set_wait done", b"SET SET_WAIT ACK\n\r"),
 ]
-FROM_ESTOP = [
-    ("get estop", b"ESTOP ON\r\n"),
-    ("set estop off", b"SET ESTOP ACK\n\r"),
-    ("get estop", b"ESTOP OFF\r\n"),
-]
+IN_ESTOP = [("get estop", b"ESTOP ON\r\n")]
 NO_ESTOP = [("get estop", b"ESTOP OFF\r\n")]
-SWITCHING_ON = [("set machine on", b"SET MACHINE ACK\n\r"), ("get machine", b"MACHINE ON\r\n")]
+OFF = [*NO_ESTOP, ("get machine", b"MACHINE OFF\r\n")]
+ON = [("get machine", b"MACHINE ON\r\n")]
 HOMED = [("get joint_homed", b"JOINT_HOMED YES YES YES YES YES YES\r\n")]
 NOT_HOMED = [("get joint_homed", b"JOINT_HOMED YES YES NO YES YES YES\r\n")]
+RESETTING = [*IN_ESTOP, *NOT_HOMED, ("set estop off", b"SET ESTOP ACK\n\r"), *NO_ESTOP]
+SWITCHING_ON = [*OFF, ("set machine on", b"SET MACHINE ACK\n\r"), *ON]
+ON_NOT_HOMED = [*NO_ESTOP, *ON, *NOT_HOMED]
+READY = [*NO_ESTOP, *ON, *HOMED]
 IN_JOINT_MODE = [
     ("set mode manual", b"SET MODE ACK\n\r"),
     ("get teleop_enable", b"TELEOP_ENABLE NO\r\n"),
@@ -35,64 +38,65 @@ MDI = [("set mode mdi", b"SET MODE ACK\n\r"), ("get mode", b"MODE MDI\r\n")]
 UNITS = ("get user_linear_units", b"USER_LINEAR_UNITS MM\r\n")
 CODES = ("get program_codes", b"PROGRAM_CODES G80 G17 G40 G21 G90 G94 G54 G49 G92.2 F0 S0\r\n")
 OFFSETS = ("get pos_offset", b"POS_OFFSET 0.000000 0.000000 -0.000000 0.000000 0.000000 0.000000\r\n")
-UNTIL_HOMED = [*TAKING_CONTROL, *NO_ESTOP, *SWITCHING_ON]
-UNTIL_MDI = [*UNTIL_HOMED, *HOMED, *MDI]
+UNTIL_HOMED = [*TAKING_CONTROL, *SWITCHING_ON]
+UNTIL_MDI = [*UNTIL_HOMED, *READY, *MDI]
 
 
 async def test_prepare_releases_the_emergency_stop_switches_on_and_homes(play):
     driver = await play.opened(
         [
             *TAKING_CONTROL,
-            *FROM_ESTOP,
+            *RESETTING,
             *SWITCHING_ON,
-            *NOT_HOMED,
+            *ON_NOT_HOMED,
             *IN_JOINT_MODE,
             *HOMING,
+            *READY,
             *MDI,
             UNITS,
             CODES,
             OFFSETS,
         ]
     )
-    await driver.prepare()
+    await driver.prepare(ALL)
 
 
 async def test_prepare_changes_no_state_that_is_already_right(play):
-    driver = await play.opened([*UNTIL_MDI, UNITS, CODES, OFFSETS])
-    await driver.prepare()
+    driver = await play.opened([*TAKING_CONTROL, *READY, *MDI, UNITS, CODES, OFFSETS])
+    await driver.prepare(ALL)
 
 
 async def test_homing_leaves_teleoperation_first(play):
     driver = await play.opened(
         [
             *UNTIL_HOMED,
-            *NOT_HOMED,
+            *ON_NOT_HOMED,
             ("set mode manual", b"SET MODE ACK\n\r"),
             ("get teleop_enable", b"TELEOP_ENABLE YES\r\n"),
             ("set teleop_enable off", b"SET TELEOP_ENABLE ACK\n\r"),
             NO_ERROR,
             *HOMING,
+            *READY,
             *MDI,
             UNITS,
             CODES,
             OFFSETS,
         ]
     )
-    await driver.prepare()
+    await driver.prepare(ALL)
 
 
 async def test_prepare_waits_until_each_state_is_reached(play):
     driver = await play.opened(
         [
             *TAKING_CONTROL,
-            ("get estop", b"ESTOP ON\r\n"),
-            ("set estop off", b"SET ESTOP ACK\n\r"),
-            *FROM_ESTOP[:1],
+            *RESETTING[:-1],
+            *IN_ESTOP,
             *NO_ESTOP,
-            SWITCHING_ON[0],
-            ("get machine", b"MACHINE OFF\r\n"),
-            SWITCHING_ON[1],
-            *HOMED,
+            *SWITCHING_ON[:-1],
+            OFF[-1],
+            *ON,
+            *READY,
             MDI[0],
             ("get mode", b"MODE MANUAL\r\n"),
             MDI[1],
@@ -101,7 +105,7 @@ async def test_prepare_waits_until_each_state_is_reached(play):
             OFFSETS,
         ]
     )
-    await driver.prepare()
+    await driver.prepare(ALL)
 
 
 async def test_prepare_accepts_a_server_without_the_optional_queries(play):
@@ -111,19 +115,19 @@ async def test_prepare_accepts_a_server_without_the_optional_queries(play):
         ("get pos_offset", b"GET NAK\r\n"),
     ]
     driver = await play.opened([*UNTIL_MDI, *(ask for question in unknown for ask in (question,) * 2)])
-    await driver.prepare()
+    await driver.prepare(ALL)
 
 
 @pytest.mark.parametrize(
     ("conversation", "states", "problem"),
     [
         (
-            [*TAKING_CONTROL, ("get estop", b"ESTOP ON\r\n"), ("set estop off", b"SET ESTOP ACK\n\r")],
+            [*TAKING_CONTROL, *RESETTING[:-1]],
             {"get estop": b"ESTOP ON\r\n", "get error": b"ERROR OK\r\n"},
             "stays in emergency stop: it is in emergency stop. Release",
         ),
         (
-            [*TAKING_CONTROL, *NO_ESTOP, ("set machine on", b"SET MACHINE ACK\n\r")],
+            [*TAKING_CONTROL, *SWITCHING_ON[:-1]],
             {
                 "get machine": b"MACHINE OFF\r\n",
                 "get estop": b"ESTOP OFF\r\n",
@@ -132,7 +136,7 @@ async def test_prepare_accepts_a_server_without_the_optional_queries(play):
             "does not switch on: it is switched off",
         ),
         (
-            [*UNTIL_HOMED, *HOMED, ("set mode mdi", b"SET MODE ACK\n\r")],
+            [*UNTIL_HOMED, *READY, ("set mode mdi", b"SET MODE ACK\n\r")],
             {
                 "get mode": b"MODE MANUAL\r\n",
                 "get estop": b"ESTOP OFF\r\n",
@@ -142,7 +146,7 @@ async def test_prepare_accepts_a_server_without_the_optional_queries(play):
             "does not enter MDI mode: it is on, and gives no reason",
         ),
         (
-            [*UNTIL_HOMED, *NOT_HOMED, *IN_JOINT_MODE, ("set home -1", b"SET HOME ACK\n\r")],
+            [*UNTIL_HOMED, *ON_NOT_HOMED, *IN_JOINT_MODE, HOMING[0]],
             {
                 "get joint_homed": b"JOINT_HOMED NO NO NO NO NO NO\r\n",
                 "get error": [b"ERROR home switch of joint 2 not found\r\n", b"ERROR OK\r\n"],
@@ -156,7 +160,7 @@ async def test_an_acknowledged_command_without_effect_is_reported(play, conversa
     driver = await play.opened(conversation, move_timeout_s=0.2)
     play.servers[0].afterwards = states
     with pytest.raises(DeviceError, match=problem) as caught:
-        await driver.prepare()
+        await driver.prepare(ALL)
     assert caught.value.subject == f"controller 127.0.0.1:{play.servers[0].port}"
 
 
@@ -188,14 +192,14 @@ async def test_an_acknowledged_command_without_effect_is_reported(play, conversa
 async def test_settings_that_falsify_coordinates_are_refused(play, conversation, problem):
     driver = await play.opened([*UNTIL_MDI, *conversation])
     with pytest.raises(DeviceError, match=problem):
-        await driver.prepare()
+        await driver.prepare(ALL)
 
 
 async def test_a_refusal_quotes_the_controllers_error_messages(play):
     driver = await play.opened(
         [
             *TAKING_CONTROL,
-            *NO_ESTOP,
+            *OFF,
             ("set machine on", b"SET MACHINE NAK\n\r"),
             ("get enable", b"ENABLE ON\r\n"),
             *[("get error", f"ERROR drive {n} is cold\r\n".encode()) for n in (1, 2, 3, 4, 5, 5)],
@@ -203,7 +207,7 @@ async def test_a_refusal_quotes_the_controllers_error_messages(play):
         ]
     )
     with pytest.raises(CommandRefused) as caught:
-        await driver.prepare()
+        await driver.prepare(ALL)
     four = "drive 1 is cold; drive 2 is cold; drive 3 is cold; drive 4 is cold"
     assert caught.value.problem == f"refuses 'set machine on': {four}; and 1 more"
 
@@ -212,7 +216,7 @@ async def test_the_explanations_of_2_10_come_with_the_refusal(play):
     driver = await play.opened(
         [
             *TAKING_CONTROL,
-            *NO_ESTOP,
+            *OFF,
             ("set machine on", b"error: Waiting for 'SET MACHINE ON' failed\r\nSET MACHINE NAK\r\n"),
             ("get enable", b"ENABLE ON\r\n"),
             NO_ERROR,
@@ -221,7 +225,7 @@ async def test_the_explanations_of_2_10_come_with_the_refusal(play):
     with pytest.raises(
         CommandRefused, match="refuses 'set machine on': Waiting for 'SET MACHINE ON' failed"
     ):
-        await driver.prepare()
+        await driver.prepare(ALL)
 
 
 async def test_a_refusal_of_2_10_without_a_nak(play):
@@ -238,7 +242,7 @@ async def test_a_refusal_of_2_10_without_a_nak(play):
         ]
     )
     with pytest.raises(CommandRefused, match="while SET MDI command is still active"):
-        await driver.prepare()
+        await driver.prepare(ALL)
 
 
 async def test_a_stop_during_prepare_prevents_homing(play):
@@ -246,14 +250,14 @@ async def test_a_stop_during_prepare_prevents_homing(play):
     driver = await play.opened(
         [
             *UNTIL_HOMED,
-            *NOT_HOMED,
+            *ON_NOT_HOMED,
             IN_JOINT_MODE[0],
             ("get teleop_enable", stopped, b"TELEOP_ENABLE NO\r\n"),
             NO_ERROR,
         ],
         play.STOPPING,
     )
-    preparing = asyncio.create_task(driver.prepare())
+    preparing = asyncio.create_task(driver.prepare(ALL))
     await stopped.reached.wait()
     await driver.stop()
     stopped.set()
@@ -271,3 +275,30 @@ async def test_too_few_joint_positions_are_refused(play):
     driver = await play.opened([("get joint_pos", b"JOINT_POS 1.0 2.0 3.0\r\n")])
     with pytest.raises(DeviceError, match="where six positions belong"):
         await driver.joint_positions()
+
+
+ESTOP_AT_START = [*IN_ESTOP, *NOT_HOMED]
+LATER_ESTOP = [*IN_ESTOP, *HOMED]
+
+
+@pytest.mark.parametrize(
+    ("state", "needed", "problem"),
+    [
+        (ESTOP_AT_START, StartupAction.RESET_INITIAL_ESTOP, "is in emergency stop since it was started"),
+        (LATER_ESTOP, StartupAction.RESET_ESTOP, "is in emergency stop$"),
+        (OFF, StartupAction.SWITCH_ON, "is switched off"),
+        (ON_NOT_HOMED, StartupAction.HOME, "is not homed"),
+    ],
+)
+async def test_what_is_not_permitted_is_not_done(play, state, needed, problem):
+    """The script has no ``set estop off``, ``set machine on`` or ``set home``: sending one would fail."""
+    driver = await play.opened([*TAKING_CONTROL, *state])
+    with pytest.raises(StartupNotPermitted, match=problem) as refusal:
+        await driver.prepare(ALL - {needed})
+    assert refusal.value.needed is needed
+
+
+async def test_an_emergency_stop_that_returns_is_not_reset_again(play):
+    driver = await play.opened([*TAKING_CONTROL, *RESETTING, *ESTOP_AT_START])
+    with pytest.raises(StartupNotPermitted, match="is in emergency stop since it was started"):
+        await driver.prepare(ALL)

@@ -8,7 +8,7 @@ import pytest
 
 from drivers.controllers.errors import MotionInterrupted, MoveRefused
 from drivers.controllers.linuxcnc.send_arbiter import PARSED_S, SendArbiter
-from drivers.interfaces import ControllerStatus
+from drivers.interfaces import ControllerStatus, StartupAction
 from hexacell.errors import DeviceError
 from hexacell.kinematics.pose import Pose
 
@@ -20,14 +20,18 @@ GREETING = [
 """Whoever only looks on does not take control."""
 
 
+JOINTS = "1.000000 2.000000 3.000000 4.000000 5.000000 6.000000"
+
+
 def asked(*, estop: str = "OFF", machine: str = "ON") -> list[tuple[str, bytes]]:
     return [
         ("get estop", f"ESTOP {estop}\r\n".encode()),
         ("get machine", f"MACHINE {machine}\r\n".encode()),
+        ("get joint_pos", f"JOINT_POS {JOINTS}\r\n".encode()),
     ]
 
 
-ON = ControllerStatus(estop=False, enabled=True)
+ON = ControllerStatus(estop=False, enabled=True, heartbeat=JOINTS)
 ERROR_OK = ("get error", b"ERROR OK\r\n")
 
 
@@ -45,7 +49,7 @@ async def test_error_messages_are_read_when_the_machine_switches_off(play) -> No
     assert await driver.status() == ON
     for _ in range(2):
         status = await driver.status()
-        assert status == ControllerStatus(False, False, ("joint 3 following error",))
+        assert status == ControllerStatus(False, False, ("joint 3 following error",), JOINTS)
         assert not status.may_move
 
 
@@ -111,7 +115,10 @@ async def test_error_messages_are_read_if_the_machine_switches_off_between_prepa
         ERROR_OK,
         ("set set_wait done", b"SET SET_WAIT ACK\n\r"),
         ("get estop", b"ESTOP OFF\r\n"),
+        ("get machine", b"MACHINE OFF\r\n"),
         ("set machine on", b"SET MACHINE ACK\n\r"),
+        ("get machine", b"MACHINE ON\r\n"),
+        ("get estop", b"ESTOP OFF\r\n"),
         ("get machine", b"MACHINE ON\r\n"),
         ("get joint_homed", b"JOINT_HOMED YES YES YES YES YES YES\r\n"),
         ("set mode mdi", b"SET MODE ACK\n\r"),
@@ -121,13 +128,13 @@ async def test_error_messages_are_read_if_the_machine_switches_off_between_prepa
         ("get pos_offset", b"POS_OFFSET 0.0 0.0 0.0 0.0 0.0 0.0\r\n"),
     ]
     driver = await play.opened(preparation, [*GREETING, *asked(machine="OFF"), FAULT, ERROR_OK])
-    await driver.prepare()
+    await driver.prepare(frozenset({StartupAction.SWITCH_ON}))
     assert (await driver.status()).error_messages == ("joint 3 following error",)
 
 
 async def test_error_messages_are_not_read_if_the_machine_was_never_on(play) -> None:
     driver = await play.opened([], [*GREETING, *asked(estop="ON", machine="OFF")])
-    assert await driver.status() == ControllerStatus(estop=True, enabled=False)
+    assert await driver.status() == ControllerStatus(estop=True, enabled=False, heartbeat=JOINTS)
 
 
 async def test_the_status_is_read_during_a_move(play) -> None:

@@ -6,12 +6,20 @@ import asyncio
 
 import pytest
 
-from drivers.controllers.errors import ConnectionLost, MotionInterrupted, MoveRefused, ResponseTimeout
+from drivers.controllers.errors import (
+    ConnectionLost,
+    MotionInterrupted,
+    MoveRefused,
+    ResponseTimeout,
+    StartupNotPermitted,
+)
 from drivers.controllers.linuxcnc.settings import Timeouts
+from drivers.interfaces import StartupAction
 from drivers.simulated.linuxcnc.state import WaitMode
 from hexacell.errors import DeviceError
 from hexacell.kinematics.pose import Pose
 
+ALL = frozenset(StartupAction)
 TARGET = Pose(100.0, -200.0, 550.0, 12.5, -3.0, 8.0)
 HOME = Pose(0.0, 0.0, 0.0)
 LONG_S = 30.0  # slow enough to be stopped on the way, quick enough to be seen moving
@@ -22,7 +30,7 @@ async def ready(driver):
     """A driver that has prepared the machine."""
     made = driver()
     await made.open()
-    await made.prepare()
+    await made.prepare(ALL)
     yield made
     await made.close()
 
@@ -41,12 +49,12 @@ async def test_from_emergency_stop_to_a_pose(driver, machine):
     try:
         assert (await controller.open()).description == "EMCNETSVR 1.1, machine.ini"
         assert machine.events == []
-        await controller.prepare()
+        await controller.prepare(ALL)
         assert machine.events == ["on", "home"]
         await controller.move(TARGET)
         assert await controller.pose() == TARGET
         assert await controller.joint_positions() == TARGET.as_tuple()
-        await controller.prepare()
+        await controller.prepare(ALL)
         assert machine.events == ["on", "home", "move"]
     finally:
         await controller.close()
@@ -113,7 +121,7 @@ async def test_a_cancelled_move_stops_the_machine_and_the_next_one_is_executed(r
 async def test_a_move_that_takes_too_long(driver, machine):
     controller = driver(move_timeout_s=1.0)
     await controller.open()
-    await controller.prepare()
+    await controller.prepare(ALL)
     machine.duration_s = LONG_S
     with pytest.raises(MotionInterrupted, match=r"still moving after 1 s"):
         await controller.move(TARGET)
@@ -126,13 +134,13 @@ async def test_stopping_while_homing(driver, machine):
     machine.duration_s = LONG_S
     controller = driver()
     await controller.open()
-    preparing = asyncio.create_task(controller.prepare())
+    preparing = asyncio.create_task(controller.prepare(ALL))
     await asyncio.to_thread(machine.wait_for, "home")
     await controller.stop()
     with pytest.raises(MotionInterrupted, match="was stopped before it was ready"):
         await preparing
     machine.duration_s = 0.01
-    await controller.prepare()
+    await controller.prepare(ALL)
     await controller.move(TARGET)
     await controller.close()
 
@@ -142,7 +150,7 @@ async def test_an_unreachable_pose_while_another_client_waits_for_no_completion(
     simulated.state.wait_mode = WaitMode.RECEIVED
     with pytest.raises(MotionInterrupted, match="fails kinematicsInverse"):
         await ready.move(Pose(0.0, 0.0, 5000.0))
-    await ready.prepare()
+    await ready.prepare(ALL)
     with pytest.raises(MoveRefused):
         await ready.move(Pose(0.0, 0.0, 5000.0))
 
@@ -152,7 +160,7 @@ async def test_another_client_takes_control_and_gives_it_back(ready, driver):
     await other.open()
     with pytest.raises(MoveRefused, match="another client has taken control"):
         await ready.move(TARGET)
-    await ready.prepare()
+    await ready.prepare(ALL)
     await ready.move(TARGET)
     await other.close()
 
@@ -160,7 +168,7 @@ async def test_another_client_takes_control_and_gives_it_back(ready, driver):
 async def test_reloading_reads_the_config_and_moves_no_slider(ready, machine):
     await ready.move(TARGET)
     machine.config = 2.5
-    await ready.reload()
+    await ready.reload(ALL)
     assert await ready.joint_positions() == TARGET.as_tuple()
     assert (await ready.pose()).x == TARGET.x - 2.5
     await ready.move(TARGET)
@@ -170,13 +178,13 @@ async def test_reloading_reads_the_config_and_moves_no_slider(ready, machine):
 async def test_a_config_that_cannot_be_used(ready, machine):
     machine.config = None
     with pytest.raises(DeviceError, match=r"does not switch on: machine\.ini: has no geometry"):
-        await ready.reload()
+        await ready.reload(ALL)
 
 
 async def test_a_slider_that_jumps_when_the_machine_is_switched_on(ready, machine):
     machine.jump_mm = 6.8
     with pytest.raises(DeviceError, match=r"moved joint 1 by 6\.800 mm"):
-        await ready.reload()
+        await ready.reload(ALL)
 
 
 async def test_a_silent_controller(driver, simulated):
@@ -227,7 +235,10 @@ async def test_an_emergency_stop_during_a_move(ready, simulated, machine):
     with pytest.raises(MotionInterrupted, match="it is in emergency stop"):
         await moving
     machine.duration_s = 0.01
-    await ready.prepare()
+    with pytest.raises(StartupNotPermitted, match=r"is in emergency stop$"):
+        await ready.prepare(ALL - {StartupAction.RESET_ESTOP})
+    assert simulated.state.estop
+    await ready.prepare(ALL)
     await ready.move(TARGET)
 
 
@@ -237,3 +248,40 @@ async def test_a_controller_that_is_closed(ready, simulated):
         await ready.pose()
     with pytest.raises(DeviceError, match="could not be stopped: it cannot be reached"):
         await ready.stop()
+
+
+async def test_a_frozen_controller_and_one_that_was_ended_are_told_apart(driver, simulated) -> None:
+    hasty = driver(Timeouts(connect=0.5, answer=0.2, stop=1.0))
+    await hasty.open()
+    await hasty.prepare(ALL)
+    before = await hasty.status()
+    simulated.set_frozen(on=True)
+    assert await hasty.status() == before, "its server still answers"
+    with pytest.raises(DeviceError, match="not be stopped: it is frozen: it is connected, but did not"):
+        await hasty.stop()
+    simulated.set_frozen(on=False)
+    await hasty.stop()
+    simulated.set_silent(on=True)
+    with pytest.raises(DeviceError, match="not be stopped: it is frozen: it accepts the connection but"):
+        await hasty.stop()
+    simulated.set_unplugged(on=True)
+    with pytest.raises(DeviceError, match="could not be stopped: it closed the connection: it was ended"):
+        await hasty.stop()
+    await asyncio.to_thread(simulated.close)
+    with pytest.raises(DeviceError, match="could not be stopped: it cannot be reached: Connection refused"):
+        await hasty.stop()
+    await hasty.close()
+
+
+async def test_a_controller_that_works_again_executes_what_it_is_told(ready, simulated) -> None:
+    simulated.set_frozen(on=True)
+    simulated.set_frozen(on=False)
+    await ready.move(TARGET)
+    assert await ready.pose() == TARGET
+
+
+async def test_the_heartbeat_changes_with_the_position(ready) -> None:
+    before = (await ready.status()).heartbeat
+    assert (await ready.status()).heartbeat == before
+    await ready.move(TARGET)
+    assert (await ready.status()).heartbeat not in {before, ""}

@@ -15,10 +15,11 @@ from hexacell.cell.loader import Cell
 from hexacell.cell.model import CellSettings
 from hexacell.cell.passwords import with_passwords
 from hexacell.clock import CellClock
-from hexacell.errors import HexacellError
+from hexacell.errors import FileError, HexacellError
 from hexacell.kinematics.mechanism import Mechanism
 from hexacell.plugins import Group, load
 from hexacell.robot_model import config_format
+from hexacell.storage.toml_locations import KeyPath
 from procedures.calibration.preflight import raise_all
 from procedures.devices.device_set import Devices, MountedGauge, Thermometers
 from procedures.run.cancellation import shielded
@@ -31,7 +32,7 @@ def device_addresses(cell: Cell, *, other_processes: bool = False) -> Iterator[C
     Raises:
         HexacellError: a protocol has no driver, a password cannot be read, or the simulation cannot start.
     """
-    require_drivers(cell.settings)
+    require_drivers(cell)
     settings = with_passwords(cell.settings, cell.path.parent)
     if settings.simulation is None:
         yield settings
@@ -51,25 +52,33 @@ def device_addresses(cell: Cell, *, other_processes: bool = False) -> Iterator[C
         yield simulated.settings
 
 
-def require_drivers(settings: CellSettings) -> None:
-    """Make sure that every device's protocol is known.
+def require_drivers(cell: Cell) -> None:
+    """Make sure that the mechanism, the format of the config and every device's protocol are known.
 
     Raises:
-        UsageError: one is not; the message names the most similar one.
+        FileError: one is not; the message has its line and names the most similar one.
         SeveralErrors: more than one.
     """
-    protocols = {(Group.GAUGES, gauge.protocol) for gauge in settings.gauges} | {
-        *((Group.THERMOMETERS, thermometer.protocol) for thermometer in settings.thermometers),
-        (Group.ENCODERS, settings.encoders.protocol),
-        (Group.CONTROLLERS, settings.controller.protocol),
-    }
     failures: list[HexacellError] = []
-    for group, protocol in sorted(protocols, key=lambda one: (one[0].value, one[1])):
+    for path, group, name in sorted(_plugins(cell.settings), key=lambda one: one[1].value):
         try:
-            load(group, protocol)
+            load(group, name)
         except HexacellError as error:
-            failures.append(error)
+            line = cell.document.line_of(path)
+            failures.append(FileError(error.problem, subject=cell.path, line=line, action=error.action))
     raise_all(failures)
+
+
+def _plugins(settings: CellSettings) -> Iterator[tuple[KeyPath, Group, str]]:
+    """Every name of a plug-in, and where it is in the cell file."""
+    for n, gauge in enumerate(settings.gauges):
+        yield ("gauges", n, "protocol"), Group.GAUGES, gauge.protocol
+    for n, thermometer in enumerate(settings.thermometers):
+        yield ("thermometers", n, "protocol"), Group.THERMOMETERS, thermometer.protocol
+    yield ("encoders", "protocol"), Group.ENCODERS, settings.encoders.protocol
+    yield ("controller", "protocol"), Group.CONTROLLERS, settings.controller.protocol
+    yield ("controller", "config_format"), Group.CONFIG_FORMATS, settings.controller.config_format
+    yield ("robot", "mechanism"), Group.MECHANISMS, settings.robot.mechanism
 
 
 @dataclass(frozen=True)

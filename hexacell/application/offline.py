@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 from hexacell.application.recorded_commands import commanding_geometries, noise_of_run
+from hexacell.application.stated_poses import require_points
 from hexacell.campaign.averaging import WINDOWS, AveragingForecaster, mean_of_independent
 from hexacell.campaign.decisions import (
     CampaignState,
@@ -27,6 +28,9 @@ from hexacell.measurements.records import MeasurementSet, RecordId
 from hexacell.reporting.assessment import Assessment, assess
 from hexacell.robot_model import robot_of
 from hexacell.runs.run_folder import RunFolder
+
+MOST_RECORDS_BEFORE_NEXT = 500
+"""The estimate is made again record by record, as in a run."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -91,9 +95,16 @@ def next_pose(cell: Cell, measurements: MeasurementSet, *, rejections: int = 0) 
     ``rejections`` counts the poses at the present point that could not be measured.
 
     Raises:
-        HexacellError: the records do not belong to this cell, or no geometry fits them.
+        HexacellError: a point is out of reach, the records do not belong to this cell, or no geometry fits
+            them.
     """
-    plan = _plan_of(cell)
+    if len(measurements) > MOST_RECORDS_BEFORE_NEXT:
+        raise UsageError(
+            f"there are {len(measurements)} records; a next pose is found for {MOST_RECORDS_BEFORE_NEXT}",
+            action="Use `hexacell fit`; some 60 records identify a robot",
+        )
+    plan = plan_of(cell)
+    require_points(cell, plan)
     state = _state_of_records(plan, measurements, rejections)
     decision = _decide(plan, state)
     forecast = decision.forecast if isinstance(decision, MeasurePose) else plan.forecast(state)
@@ -102,7 +113,7 @@ def next_pose(cell: Cell, measurements: MeasurementSet, *, rejections: int = 0) 
 
 def try_plan(cell: Cell) -> PlanTrial:
     """Carry out a cell's plan on robots drawn within its tolerances; takes some seconds."""
-    plan = _plan_of(cell)
+    plan = plan_of(cell)
     averaging, noise = AveragingForecaster(plan), plan.robot.noise
     return PlanTrial(
         dry_run(plan),
@@ -113,7 +124,8 @@ def try_plan(cell: Cell) -> PlanTrial:
     )
 
 
-def _plan_of(cell: Cell) -> Plan:
+def plan_of(cell: Cell) -> Plan:
+    """The plan of a cell; raises ``FileError`` if its config or its list of poses cannot be read."""
     return Plan(cell.settings, robot_of(cell), pose_list_of(cell))
 
 

@@ -102,6 +102,7 @@ _EXPECTED = {
     "greater_than_equal": "{ge:.12g} or more",
     "less_than": "less than {lt:.12g}",
     "less_than_equal": "{le:.12g} or less",
+    "too_long": "a list of {max_length} items or fewer",
     "too_short": "a list of {min_length} items or more",
 }
 
@@ -110,15 +111,18 @@ Errors = dict[KeyPath, FileError]
 
 @dataclass(frozen=True, slots=True)
 class Diagnosis:
-    """What is wrong with a document by the model of the cell file."""
+    """What is wrong with a document by the model of the cell file; at most ``limit`` mistakes of a kind."""
 
     document: TomlDocument
     model: ModelLookup
+    limit: int
 
     def unsupported_values(self) -> Errors:
         """Values that TOML allows and a cell file does not: NaN, infinities, dates and times."""
         errors: Errors = {}
         for path in self.document.spans:
+            if len(errors) == self.limit:
+                break
             value = self.document.value(path)
             if isinstance(value, float) and not math.isfinite(value):
                 errors[path] = self._mismatch(path, "a finite number")
@@ -129,7 +133,7 @@ class Diagnosis:
     def explain_refusal(self, refusal: ValidationError) -> Errors:
         """One error for every place that the model refuses."""
         errors: Errors = {}
-        for detail in refusal.errors(include_url=False):
+        for detail in refusal.errors(include_url=False)[: self.limit]:
             path, kind = detail["loc"], detail["type"]
             if kind == "missing" and isinstance(path[-1], int):
                 path, kind = path[:-1], "too_few"

@@ -27,6 +27,9 @@ from hexacell.storage.toml_locations import KeyPath
 LARGEST_FILE_BYTES = 500_000
 """Of a cell file, which usually has less than ten thousand."""
 
+MOST_TOLD = 20
+"""More mistakes than these nobody reads at once."""
+
 SectionType = TypeVar("SectionType", bound=Section)
 
 Remark = Callable[[KeyPath], str | None]
@@ -106,7 +109,7 @@ def validated(document: TomlDocument, model: type[SectionType], path: Path) -> S
         FileError: there is one mistake.
         SeveralErrors: there is more than one.
     """
-    diagnosis = Diagnosis(document, ModelLookup(model))
+    diagnosis = Diagnosis(document, ModelLookup(model), MOST_TOLD)
     errors = diagnosis.unsupported_values()
     try:
         # As JSON, because strict validation then accepts arrays as tuples.
@@ -115,7 +118,8 @@ def validated(document: TomlDocument, model: type[SectionType], path: Path) -> S
         errors |= diagnosis.explain_refusal(refusal)
     if errors:
         in_order = sorted(errors.values(), key=lambda error: error.line or 0)
-        raise joined(f"{path} has {len(errors)} mistakes", in_order)
+        count = f"{len(errors)} mistakes" if len(errors) < MOST_TOLD else "many mistakes; among them"
+        raise joined(f"{path} has {count}", in_order[:MOST_TOLD])
     return settings
 
 

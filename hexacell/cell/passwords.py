@@ -65,8 +65,16 @@ def password_warnings(cell: Cell) -> Iterator[str]:
             f"or set {' and '.join(VARIABLES.values())}"
         )
     path = password_path(cell.settings.controller, cell.path.parent)
-    if path is not None and path.exists() and path.stat().st_mode & stat.S_IRGRP:
+    if path is not None and _mode(path) & stat.S_IRGRP:
         yield f"{path}: its whole group can read the passwords in it. If not all should, use chmod 600"
+
+
+def _mode(path: Path) -> int:
+    """The permissions of a file; none if it cannot be found, which is told where it is read."""
+    try:
+        return path.stat().st_mode
+    except (OSError, ValueError):
+        return 0
 
 
 def password_path(controller: ControllerSettings, folder: Path) -> Path | None:

@@ -39,7 +39,8 @@ class NativeToml:
 
     def read(self, path: Path) -> ControllerGeometry:
         """The geometry and the branch in the file; raises ``FileError`` with file and line."""
-        content = _Content(TomlDocument.parse(atomic_files.read_text(path), path), self._parameters)
+        text = atomic_files.read_text(path, LARGEST_FILE_BYTES)
+        content = _Content(TomlDocument.parse(text, path), self._parameters)
         return ControllerGeometry(content.geometry(), content.branch())
 
     def rewrite(self, text: str, geometry: Geometry) -> str:
@@ -160,3 +161,7 @@ def _needed(kind: ParameterKind) -> str:
     """``S (six rows of 3 numbers, mm)``."""
     values = f"six rows of {len(kind.components)} numbers" if kind.components else "six numbers"
     return f"{kind.symbol} ({', '.join(filter(None, (values, kind.unit)))})"
+
+
+LARGEST_FILE_BYTES = 1_000_000
+"""Of a config, which usually has a few thousand."""

@@ -26,7 +26,9 @@ NUMBERS = (*"xyzabc", "q1", "q2", "q3", "q4", "q5", "q6", "dx", "dy", "dz")
 HEADER = (*COUNTS, *NUMBERS)
 POSE_HEADER = HEADER[:8]
 LARGEST_COUNT = 1_000_000
-MOST_RECORDS = 10_000
+MOST_RECORDS = 2000
+"""An identification from so many takes a quarter of a minute."""
+
 LARGEST_FILE_BYTES = 5_000_000
 
 

@@ -7,6 +7,7 @@ from itertools import chain, repeat
 
 import numpy as np
 
+from hexacell.campaign.feasibility import UNDETERMINED_SHARE
 from hexacell.campaign.measured_noise import MeasuredNoise
 from hexacell.campaign.task_accuracy import Task
 from hexacell.cell.model import CellSettings
@@ -76,8 +77,15 @@ class Assessment:
 
     @property
     def is_usable(self) -> bool:
-        """Whether the solver converged and nothing refuses the geometry."""
-        return self.found.converged and not self.refused
+        """Whether the solver converged, nothing refuses the geometry, and the data determine most of it."""
+        return self.found.converged and not self.refused and not self.determines_too_little
+
+    @property
+    def determines_too_little(self) -> bool:
+        """Whether so many parameters are as uncertain as drawn that the geometry is hardly a result."""
+        free = self.found.problem.mechanism.convention.free_names()
+        unknown = set(self.found.undetermined) & set(free)
+        return len(unknown) > UNDETERMINED_SHARE * len(free)
 
     @property
     def improvement(self) -> ExpectedImprovement | None:

@@ -97,8 +97,15 @@ def _verdict(assessed: Assessment) -> str:
     if assessed.refused:
         return _contradicted(found.goodness)
     if found.undetermined:
-        return f"Incomplete: {_undetermined(found)} not determined by these data."
+        return _incomplete(assessed)
     return _point_verdict(assessed) or _residual_verdict(found.goodness)
+
+
+def _incomplete(assessed: Assessment) -> str:
+    what = f"{_undetermined(assessed.found)} not determined by these data"
+    if not assessed.determines_too_little:
+        return f"Incomplete: {what}."
+    return f"Not usable: {what}. Measure at more points, and in more orientations with larger tilts."
 
 
 def _point_verdict(assessed: Assessment) -> str:

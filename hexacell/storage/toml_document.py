@@ -19,6 +19,8 @@ SECRET_WORDS = "password|passwd|passphrase|secret|token|api_?key"  # noqa: S105 
 """Keys that end so are followed by something that no message and no copy of a file shows."""
 
 _LONGEST_QUOTE = 40
+# Python's own parser takes hours for a key of a hundred thousand parts.
+_ENDLESS_KEY = re.compile(r"""(?<![\w-])(?:(?:[\w-]+|"[^"\n]*"|'[^'\n]*')[ \t]*\.[ \t]*){100}""")
 _SECRET_KEY = re.compile(rf"(?:^|.*[^a-z])(?:{SECRET_WORDS})", re.IGNORECASE)
 _POSITION = re.compile(r" \(at (?:line (?P<line>\d+), column \d+|end of document)\)$")
 
@@ -38,6 +40,9 @@ class TomlDocument:
     @classmethod
     def parse(cls, text: str, source: Path | None = None) -> Self:
         """The document in ``text``; raises ``FileError`` with the line where it is no TOML."""
+        if (found := _ENDLESS_KEY.search(text)) is not None:
+            line = text.count("\n", 0, found.start()) + 1
+            raise FileError("a key has too many parts", subject=source, line=line, action="Shorten it")
         with _file_errors(text, source):
             return cls(text, tomllib.loads(text.removeprefix(BYTE_ORDER_MARK)), locate(text), source)
 

@@ -222,3 +222,69 @@ def test_a_real_cell_cannot_be_simulated(typed_here, cell_folder):
     outcome = typed_here("simulate", cell_folder.cell)
     assert (outcome.code, outcome.out) == (2, "")
     assert f"{cell_folder.cell}: there is no [simulation] in it" in outcome.err
+
+
+OUT_OF_REACH = {
+    "identification point": (
+        ("[0.0, -200.0, 550.0]", "[0.0, -200.0, 5500.0]"),
+        "identification point 2: leg 1 ",
+    ),
+    "verification point": (("[100.0, 100.0, 550.0]", "[0.0, 0.0, 5500.0]"), "verification point 2: leg 1"),
+    "task pose": (("poses = [", "poses = [[0.0, 0.0, 5500.0, 0.0, 0.0, 0.0],"), "task pose 1: leg 1 "),
+    "tilt of a task pose": (("poses = [", "poses = [[0.0, 0.0, 550.0, 60.0, 0.0, 0.0],"), "task pose 1: "),
+}
+
+
+@pytest.mark.parametrize("place", OUT_OF_REACH)
+def test_a_pose_that_the_robot_cannot_take_is_refused_with_its_line(typed_here, cell_folder, place):
+    (old, new), words = OUT_OF_REACH[place]
+    text = cell_folder.cell.read_text()
+    assert old in text
+    cell_folder.cell.write_text(text.replace(old, new, 1))
+    line = line_of(cell_folder.cell.read_text(), "5500.0" if "5500.0" in new else "60.0, 0.0, 0.0]")
+    outcome = typed_here("cell", "validate", cell_folder.cell)
+    assert outcome.code == 2
+    assert f"{cell_folder.cell}:{line}: {words}" in outcome.err
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        (
+            'protocol = "sylvac"',
+            'protocol = "sylvak"',
+            "there is no gauge protocol 'sylvak'. Did you mean 'sylvac'?",
+        ),
+        ('protocol = "cia406"', 'protocol = "can"', "there is no encoder protocol 'can'"),
+        ('protocol = "linuxcncrsh"', 'protocol = "x"', "there is no controller protocol 'x'"),
+        ('config_format = "toml"', 'config_format = "ini"', "there is no config format 'ini'"),
+        ("[robot]", '[robot]\nmechanism = "delta"', "there is no mechanism 'delta'"),
+    ],
+)
+def test_a_name_without_a_driver_is_refused_with_its_line(typed_here, cell_folder, old, new, words):
+    text = cell_folder.cell.read_text()
+    if new.startswith("[robot]"):
+        text = "\n".join(line for line in text.splitlines() if not line.startswith("mechanism"))
+    assert old in text
+    cell_folder.cell.write_text(text.replace(old, new, 1))
+    line = line_of(cell_folder.cell.read_text(), new.splitlines()[-1])
+    outcome = typed_here("cell", "validate", cell_folder.cell)
+    assert outcome.code == 2
+    assert f"{cell_folder.cell}:{line}: {words}" in outcome.err
+
+
+def test_of_ten_thousands_of_mistakes_some_are_told(typed_here, cell_folder):
+    text = cell_folder.cell.read_text()
+    cell_folder.cell.write_text("".join(f"a{n} = 1\n" for n in range(30_000)) + text)
+    outcome = typed_here("cell", "validate", cell_folder.cell)
+    assert outcome.code == 2
+    assert "has many mistakes; among them:" in outcome.err
+    assert len(outcome.err.splitlines()) == 21
+
+
+def test_a_key_of_ten_thousands_of_parts_is_refused(typed_here, cell_folder):
+    with cell_folder.cell.open("a") as cell:
+        cell.write("\n" + ".".join("a" * 100_000) + " = 1\n")
+    outcome = typed_here("cell", "validate", cell_folder.cell)
+    assert outcome.code == 2
+    assert "a key has too many parts. Shorten it" in outcome.err

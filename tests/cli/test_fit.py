@@ -174,3 +174,22 @@ def test_further_columns_another_order_and_windows_line_ends_are_accepted(
     outcome = typed_here("fit", demo.cell, "--measurements", "m.csv", "--json")
     assert outcome.code == 0
     assert outcome.document["geometry"] == json.loads((demo.run / "result.json").read_text())["geometry"]
+
+
+def test_records_that_determine_nothing_are_no_result(typed_here, cell_folder, tmp_path, records):
+    """Their noise is as large as the tolerances."""
+    cell_folder.edit(("encoder_mm = 0.01\ngauge_mm = 0.01", "encoder_mm = 50.0\ngauge_mm = 50.0"))
+    (tmp_path / "m.csv").write_text("\n".join(records))
+    outcome = fit(typed_here, cell_folder)
+    assert outcome.code == 1, outcome.err
+    text = " ".join(outcome.out.split())
+    assert "Not usable: 35 of 35 parameters are not determined by these data." in text
+
+
+def test_many_records_are_told_before_they_are_used(typed_here, demo, tmp_path, records):
+    more = [f"{2 * n + 10}{row[1:]}" for n in range(5) for row in records[1:12]]
+    (tmp_path / "m.csv").write_text("\n".join([*records, *more]))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("hexacell.cli.commands.records.MANY_RECORDS", 100)
+        outcome = typed_here("fit", demo.cell, "--measurements", "m.csv")
+    assert "records: this takes some 2 seconds\n" in outcome.err

@@ -232,3 +232,20 @@ def test_an_invalid_count_of_refusals(typed_here, cell_folder, number):
     outcome = typed_here("next", cell_folder.cell, "--measurements", "m.csv", "--refused", number)
     assert outcome.code == 2
     assert "--refused" in outcome.err
+
+
+def test_a_point_out_of_reach_is_refused_with_its_line(typed_here, cell_folder, tmp_path):
+    cell_folder.edit(("[0.0, 0.0, 550.0]", "[0.0, 0.0, 5500.0]"))
+    (tmp_path / "m.csv").touch()
+    outcome = typed_here("next", cell_folder.cell, "--measurements", "m.csv")
+    line = cell_folder.cell.read_text().split("5500.0")[0].count("\n") + 1
+    assert outcome.code == 2
+    assert f"{cell_folder.cell}:{line}: identification point 1: leg 1 cannot reach" in outcome.err
+
+
+def test_more_records_than_a_campaign_has_are_refused(typed_here, cell_folder, tmp_path):
+    rows = (f"1,{n}," + ",".join(["0"] * 15) for n in range(1, 502))
+    (tmp_path / "m.csv").write_text("\n".join([",".join(HEADER), *rows]))
+    outcome = typed_here("next", cell_folder.cell, "--measurements", "m.csv")
+    assert outcome.code == 2
+    assert "there are 501 records; a next pose is found for 500" in outcome.err

@@ -6,12 +6,13 @@ import argparse
 import json
 
 from hexacell.application.device_setup import require_drivers
+from hexacell.application.offline import plan_of
+from hexacell.application.stated_poses import require_stated_poses
 from hexacell.cell.loader import describe, schema, settings_document
 from hexacell.cell.passwords import with_passwords
 from hexacell.cli.cell_argument import cell_at, cell_with_devices_at
 from hexacell.cli.console import Console
 from hexacell.errors import ExitCode
-from hexacell.robot_model import robot_of
 
 
 def main(options: argparse.Namespace) -> ExitCode:
@@ -29,9 +30,9 @@ def main(options: argparse.Namespace) -> ExitCode:
         if not options.json:
             console.print(describe(cell).rstrip("\n"))
         return ExitCode.DONE
-    robot_of(cell)
-    require_drivers(cell.settings)
+    require_drivers(cell)
     with_passwords(cell.settings, cell.path.parent)
+    require_stated_poses(cell, plan_of(cell))
     console.document({"valid": True, "name": cell.settings.name})
     console.print(f"{options.cell}: valid, and so is its controller config {cell.config_path}")
     return ExitCode.DONE

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import argparse
 
-from hexacell.application.offline import fit_measurements, next_pose
+from hexacell.application.offline import MOST_RECORDS_BEFORE_NEXT, fit_measurements, next_pose
 from hexacell.cli.cell_argument import cell_at
 from hexacell.cli.console import Console
 from hexacell.errors import ExitCode
 from hexacell.measurements.csv_file import read_measurements
+from hexacell.measurements.records import MeasurementSet
 from hexacell.presentation.documents import next_document
 from hexacell.presentation.identification import identification_report
 from hexacell.presentation.layout import wrapped
@@ -16,13 +17,17 @@ from hexacell.presentation.planning import decision_text, forecast_text, left_ou
 from hexacell.reporting.documents import fit_document
 from hexacell.runs.run_folder import RunFolder
 
+MANY_RECORDS = 200
+
 
 def fit(options: argparse.Namespace) -> ExitCode:
     """Identify the geometry and report all that is known of the result."""
     console = Console(options.json)
     cell = cell_at(options.cell, console)
     folder = RunFolder(options.measurements.parent)
-    assessed = fit_measurements(cell, read_measurements(options.measurements), folder)
+    measurements = read_measurements(options.measurements)
+    _tell_size(console, measurements)
+    assessed = fit_measurements(cell, measurements, folder)
     console.document(fit_document(assessed))
     if not options.json:
         console.print(identification_report(assessed))
@@ -34,6 +39,8 @@ def propose_next(options: argparse.Namespace) -> ExitCode:
     console = Console(options.json)
     cell = cell_at(options.cell, console)
     measurements = read_measurements(options.measurements, allow_partial=True)
+    if len(measurements) <= MOST_RECORDS_BEFORE_NEXT:
+        _tell_size(console, measurements)
     proposed = next_pose(cell, measurements, rejections=options.refused)
     console.document(next_document(proposed))
     if not options.json:
@@ -45,3 +52,9 @@ def propose_next(options: argparse.Namespace) -> ExitCode:
         for line in filter(None, lines):
             console.print(wrapped(line))
     return ExitCode.DONE
+
+
+def _tell_size(console: Console, measurements: MeasurementSet) -> None:
+    """What takes more than a few seconds says so before it begins."""
+    if len(measurements) > MANY_RECORDS:
+        console.error(f"{len(measurements)} records: this takes some {len(measurements) // 50} seconds")

@@ -11,7 +11,7 @@ from hexacell.application.calibration_run import preflight
 from hexacell.application.device_setup import require_drivers
 from hexacell.application.replay_run import replay
 from hexacell.cell.devices import ThermometerSettings
-from hexacell.errors import UsageError
+from hexacell.errors import FileError
 from procedures.calibration.workflow import Mode
 from procedures.replay.replayer import Scope
 from procedures.run import events
@@ -51,5 +51,5 @@ async def test_preflight_names_the_thermometers_that_answer(make_site, tmp_path)
 
 def test_a_protocol_without_a_driver_is_refused(make_cell, tmp_path) -> None:
     strange = in_the_room(tmp_path).model_copy(update={"protocol": "sysfz"})
-    with pytest.raises(UsageError, match=r"no thermometer protocol 'sysfz'. Did you mean 'sysfs'\?"):
-        require_drivers(make_cell(thermometers=(strange,)).settings)
+    with pytest.raises(FileError, match=r"no thermometer protocol 'sysfz'. Did you mean 'sysfs'\?"):
+        require_drivers(make_cell(thermometers=(strange,)))

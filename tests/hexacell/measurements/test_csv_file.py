@@ -171,10 +171,10 @@ def test_an_empty_file_is_a_valid_partial_file(read, text):
 
 
 def test_more_records_than_can_be_identified_are_refused(read):
-    rows = (f"1,{number},{NUMBERS}\n" for number in range(1, 10_002))
-    with pytest.raises(FileError, match="more than 10000 records") as caught:
+    rows = (f"1,{number},{NUMBERS}\n" for number in range(1, 2002))
+    with pytest.raises(FileError, match="more than 2000 records") as caught:
         read(f"{HEADER}\n{''.join(rows)}")
-    assert caught.value.line == 10_002
+    assert caught.value.line == 2002
 
 
 def test_a_file_that_is_far_too_large_is_not_read(read):
@@ -213,10 +213,8 @@ def test_damaged_files_give_plain_errors_or_sound_records(read, edits):
     assert (measurements.labels >= 1).all()
 
 
-def test_ten_thousand_rows_are_read_fast(read, csv_path):
-    rows = [
-        Record(n // 20 + 1, n % 20 + 1, Pose(0, 0, n / 7), (n / 3,) * 6, (0,) * 3) for n in range(10_000)
-    ]
+def test_as_many_rows_as_there_may_be_are_read(read, csv_path):
+    rows = [Record(n // 20 + 1, n % 20 + 1, Pose(0, 0, n / 7), (n / 3,) * 6, (0,) * 3) for n in range(2000)]
     measurements = MeasurementSet(tuple(rows))
     write_measurements(csv_path, measurements)
     assert read_measurements(csv_path) == measurements

@@ -120,16 +120,20 @@ def test_more_noise_increases_the_predicted_error(visit, assessed_of, good):
     assert ratio == pytest.approx(loud.found.goodness.ratio, rel=0.1)
 
 
-def test_undetermined_parameters_make_a_result_incomplete(visit, assessed_of):
+def test_data_that_determine_few_parameters_give_no_result(visit, assessed_of):
     assessed = assessed_of(visit(points=2, orientations=9, degrees=3.0).measured(0.01))
     verdict = findings(assessed)[0]
-    assert verdict.startswith("Incomplete: ")
-    assert "of 35 parameters are not determined by these data" in verdict
+    assert verdict.startswith("Not usable: ")
+    assert "of 35 parameters are not determined by these data. Measure at more points" in verdict
+    assert assessed.found.converged
+    assert not assessed.refused
+    assert not assessed.is_usable
 
 
 def test_a_few_undetermined_parameters_are_named(good, monkeypatch):
     monkeypatch.setattr(type(good.found), "undetermined", ("B2z", "B3z", "B5z", "l3"))
-    assert "B2/B3/B5 z, leg 3 length are not determined" in findings(good)[0]
+    assert findings(good)[0].startswith("Incomplete: B2/B3/B5 z, leg 3 length are not determined")
+    assert good.is_usable
 
 
 def test_a_solver_that_did_not_converge_gives_no_result(good):

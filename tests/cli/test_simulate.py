@@ -124,7 +124,9 @@ def test_simulate_ends_while_a_run_is_connected(served, start):
     assert simulation.stopped(signal.SIGTERM).code == 0
     stopped = run.ended()
     assert stopped.code == 3
-    assert re.search(r"hexacell: (gauge|encoder|controller|gauges) ", stopped.err)
+    assert re.search(r"^(hexacell: )?(gauge|encoder|controller|gauges) ", stopped.err, re.MULTILINE)
+    if "controller" in stopped.err:
+        assert stopped.err.startswith("PRESS THE EMERGENCY STOP"), "it is gone, and cannot stop the robot"
     assert f"--resume {printed.parent / 'runs'}" in stopped.out
 
 

@@ -17,7 +17,7 @@ from hexacell.runs.run_folder import RunFolder
 from hexacell.storage import atomic_files
 from hexacell.storage.secrets import MASK, clear_secrets, with_lines_masked, without_secrets
 from hexacell.storage.toml_document import TomlDocument
-from procedures.engine.config_transactions import PROVISIONAL_FOLDER
+from procedures.engine.config_edits import PROVISIONAL_FOLDER
 from procedures.journal.journal import read_entries
 from procedures.journal.line_format import with_event
 from procedures.run.events import RunStarted

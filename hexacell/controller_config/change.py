@@ -116,7 +116,7 @@ def require_fingerprint(path: Path, data: bytes, expected: str) -> None:
         raise FileError(
             "the config changed since the run began; the new geometry does not belong to it",
             subject=path,
-            action="Nothing was written: run again",
+            action="Nothing was written: undo the edit and retry, or run again",
         )
 
 

@@ -31,6 +31,7 @@ from hexacell.robot_model import config_format
 from hexacell.runs.run_folder import RunFolder
 from procedures.calibration.workflow import Calibration, geometry_of
 from procedures.devices.device_set import Devices
+from procedures.engine.config_edits import PROVISIONAL_FOLDER, edited
 from procedures.engine.startup import Startup
 from procedures.run import events
 from procedures.run.cancellation import in_thread
@@ -39,7 +40,6 @@ from procedures.run.state import RunState
 from procedures.run.steps import Compute
 from procedures.run.trips import may_still_move
 
-PROVISIONAL_FOLDER = "lent"
 TAKE_BACK = Compute(kind="take back")
 ROLL_BACK = Compute(kind="roll back")
 
@@ -136,6 +136,8 @@ class ConfigTransactions:
         written = holds_provisional(self.folder, self.cell.config_path)
         if written:
             await in_thread(rollback, Receipt.of(self._provisional_backup))
+        elif state.started and fingerprint(self.cell.config_path) != state.started.config_sha256:
+            raise edited(self.cell.config_path)
         try:
             await self.startup.reload()
         except HexacellError:

@@ -26,6 +26,7 @@ from procedures.calibration.workflow import Calibration
 from procedures.devices.device_set import Devices, Thermometers, gather_errors
 from procedures.devices.settling import DeviceSnapshot, Settled, read_series, settle
 from procedures.engine.computations import Computations
+from procedures.engine.config_edits import ConfigEdits
 from procedures.engine.config_transactions import ConfigTransactions
 from procedures.engine.startup import Startup
 from procedures.guards.guards import Guards
@@ -47,6 +48,9 @@ from procedures.run.steps import (
     Step,
 )
 from procedures.run.trips import GuardTripped
+
+RobotStep = Locate | Move | Place | Sample | Revisit | CloseSet | Standstill | Repeat
+"""A step for which the robot must be where its config has it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,12 +93,28 @@ class StepExecutor:
         """What is computed."""
         return Computations(self.cell, self.calibration, self.config, self.folder)
 
+    @cached_property
+    def edits(self) -> ConfigEdits:
+        """Whether somebody edited the config."""
+        return ConfigEdits(self.cell.config_path, self.folder)
+
     async def prepare(self, state: RunState) -> None:
-        """Make the controller ready to move; raises ``HexacellError``."""
+        """Make the controller, whose config nobody edited, ready to move; raises ``HexacellError``."""
+        await self.require_unedited_config(state)
         await self.startup.prepare(state)
 
-    async def perform(self, step: Step, state: RunState) -> events.Event:  # noqa: PLR0911 - a case a step
+    async def require_unedited_config(self, state: RunState) -> None:
+        """See :meth:`ConfigEdits.require_none`."""
+        await in_thread(self.edits.require_none, state)
+
+    async def perform(self, step: Step, state: RunState) -> events.Event:
         """Do one step; raises ``HexacellError``."""
+        if isinstance(step, Compute):
+            return await self._compute(step, state)
+        await self.require_unedited_config(state)
+        return await self._use_robot(step, state)
+
+    async def _use_robot(self, step: RobotStep, state: RunState) -> events.Event:  # noqa: PLR0911
         match step:
             case Locate():
                 return await self.locate()
@@ -112,8 +132,6 @@ class StepExecutor:
                 return await self.read_standstill(step)
             case Repeat():
                 return events.ReferenceRepeated(at=step.at, reading=await self.read())
-            case Compute():
-                return await self._compute(step, state)
 
     async def locate(self) -> events.Located:
         """Where the robot is; raises ``GuardTripped`` if controller and encoders do not agree on that."""

@@ -169,6 +169,9 @@ class RecordedStepExecutor(StepExecutor):
         folder, config = self.folder.path, self.current_config
         return InactiveGuards(self.cell.settings, self.devices, self.clock, folder, config)
 
+    async def require_unedited_config(self, state: RunState) -> None:
+        """The config is that of the replay."""
+
     async def locate(self) -> events.Located:
         """The recorded position, which was checked then."""
         outcome = self.recorded.outcome

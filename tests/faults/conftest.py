@@ -17,7 +17,7 @@ import pytest
 
 from hexacell.controller_config.write_back import AFTER
 from hexacell.runs.run_folder import RunFolder
-from procedures.engine.config_transactions import PROVISIONAL_FOLDER
+from procedures.engine.config_edits import PROVISIONAL_FOLDER
 from procedures.journal.journal import read_journal
 from procedures.run import events
 from tests.faults.cell import MEASURED, NEVER_GOOD_ENOUGH, PROVISIONAL, Site, make_site

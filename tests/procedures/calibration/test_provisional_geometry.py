@@ -154,7 +154,7 @@ async def test_a_run_resumes_after_a_power_cut_with_the_provisional_geometry_wri
 
     kept: list[bytes] = []
 
-    async def dies() -> None:
+    async def dies(permitted: object) -> None:
         kept.extend([rig.folder.journal.read_bytes(), rig.config])
         raise PowerCut
 

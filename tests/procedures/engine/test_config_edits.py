@@ -1,0 +1,104 @@
+"""A config edited during a run is noticed before the next move; once that is undone, the run goes on."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from hexacell.cell.recovery import Action, FailureKind
+from hexacell.errors import ExitCode, FileError, HexacellError
+from procedures.engine.recovery import RecoveryPolicy
+from procedures.run import events
+from procedures.run.questions import UnattendedOperator
+from procedures.run.steps import Move
+from tests.procedures.runs.listening import happened, on
+
+
+def attended(rig: Any) -> RecoveryPolicy:
+    return RecoveryPolicy.of(rig.cell.settings.recovery, attended=True)
+
+
+class Undoer:
+    """A person who undoes the edit when the run asks, and retries; before that in vain."""
+
+    def __init__(self) -> None:
+        self.problems: list[str] = []
+        self.undo: Any = None
+
+    async def ask(self, question: Any) -> str | None:
+        if question.kind.value != "decide":
+            return question.default or "a tester"
+        self.problems.append(question.text)
+        if len(self.problems) == 2:
+            self.undo()
+        return Action.RETRY.value
+
+
+def edits(rig: Any, kind: type[Any], count: int) -> Any:
+    """A listener that changes the seventh line of the config at an event."""
+    path = rig.cell.config_path
+    lines = path.read_bytes().split(b"\n")
+
+    def edit() -> None:
+        path.write_bytes(b"\n".join([*lines[:6], b"# " + lines[6], *lines[7:]]))
+
+    return on(kind, edit, count)
+
+
+async def test_an_edit_is_noticed_before_the_next_move_and_the_file_and_line_are_named(make_rig) -> None:
+    rig = make_rig()
+    with pytest.raises(FileError, match="Undo the edit and retry") as noticed:
+        await rig.run(edits(rig, events.RecordTaken, 3))
+    assert str(noticed.value).startswith(
+        f"{rig.cell.config_path}:7: the config changed since the run began"
+    )
+    assert noticed.value.exit_code is ExitCode.USAGE
+    taken = happened(rig, events.RecordTaken)
+    assert len(taken) == 3
+    assert len([entry for entry in rig.controller.log if entry.startswith("move")]) == 3
+
+
+async def test_a_person_undoes_the_edit_and_retries(recording, replayed) -> None:
+    person = Undoer()
+    rig = replayed(recording.until(events.SetClosed), operator=person)
+    before = rig.config
+    person.undo = lambda: rig.cell.config_path.write_bytes(before)
+    ended = await rig.run(edits(rig, events.RecordTaken, 3), policy=attended(rig))
+    assert ended.exit_code == ExitCode.DONE
+    assert len(person.problems) == 2, "it was asked again while the edit was there"
+    assert all(str(rig.cell.config_path) in problem for problem in person.problems)
+    failures = happened(rig, events.Failed)
+    assert [failure.failure for failure in failures] == [FailureKind.FILE] * 2
+    assert isinstance(failures[0].step, Move)
+
+
+async def test_an_unattended_run_ends_and_is_resumed_once_the_edit_is_undone(recording, replayed) -> None:
+    rig = replayed(recording.until(events.SetClosed), operator=UnattendedOperator())
+    before = rig.config
+    policy = RecoveryPolicy.of(rig.cell.settings.recovery, attended=False)
+    with pytest.raises(FileError, match="Undo the edit"):
+        await rig.run(edits(rig, events.RecordTaken, 2), policy=policy)
+    log = list(rig.controller.log)
+    with pytest.raises(FileError, match="Undo the edit"):
+        await rig.run(policy=policy)
+    assert rig.controller.log[len(log) :] == ["stop"], "not even prepared"
+    rig.cell.config_path.write_bytes(before)
+    rig.operator.name = None
+    assert (await rig.run(policy=policy)).exit_code == ExitCode.DONE
+
+
+async def test_an_edit_of_the_written_config_is_noticed_too(recording, replayed) -> None:
+    rig = replayed(recording.until(events.Committed))
+    with pytest.raises(HexacellError, match="Undo the edit and retry"):
+        await rig.run(edits(rig, events.Located, 1))
+    assert not happened(rig, events.ResultValidated)
+
+
+async def test_an_edited_provisional_config_is_not_loaded_in_place_of_the_old_one(
+    recording, replayed
+) -> None:
+    rig = replayed(recording.until(events.SetClosed), identification__provisional=True)
+    with pytest.raises(FileError, match="Undo the edit and retry"):
+        await rig.run(edits(rig, events.SetClosed, 1))
+    assert rig.controller.log.count("reload") == 1, "the provisional geometry alone was loaded"

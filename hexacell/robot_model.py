@@ -15,6 +15,7 @@ from hexacell.controller_config.interface import ConfigFormat, ControllerGeometr
 from hexacell.errors import FileError, ReachError
 from hexacell.identification.belief import Limits, RobotBelief
 from hexacell.identification.diagnostics.tolerance_check import ToleranceViolation, tolerance_violations
+from hexacell.identification.gauge_travel import GaugeTravel
 from hexacell.identification.problem.commanded_poses import CommandingGeometry
 from hexacell.identification.problem.problem import Noise, Prior, Problem, Tolerances, build_problem
 from hexacell.identification.solver.result import GeometryEstimate, Identification
@@ -220,6 +221,17 @@ def noise_of(settings: CellSettings) -> Noise:
     return noise.with_devices(stated.encoders_mm or encoders, stated.gauges_mm or gauges)
 
 
+def gauge_travel_of(settings: CellSettings) -> GaugeTravel:
+    """The travels of a cell's gauges."""
+    x, y, z = sorted(settings.gauges, key=lambda gauge: gauge.axis)
+    return GaugeTravel(
+        settings.limits.gauge_travel_mm,
+        (x.travel_mm / 2.0, y.travel_mm / 2.0, z.travel_mm / 2.0),
+        (x.middle_coordinate_mm, y.middle_coordinate_mm, z.middle_coordinate_mm),
+        settings.stations.mounting_mm,
+    )
+
+
 def make_robot(
     settings: CellSettings, controller: ControllerGeometry, *, taught: Geometry | None = None
 ) -> Robot:
@@ -242,6 +254,7 @@ def make_robot(
             limits.joint_max_mm,
             limits.singularity_margin,
             frames,
+            gauge_travel_of(settings),
         ),
         frames=frames,
         taught=taught,

@@ -18,6 +18,7 @@ SMALL: dict[str, Any] = {
     "verification.orientations": 3,
     "noise.encoder_mm": 0.0012,
     "noise.gauge_mm": 0.0012,
+    "stations.trial_mm": 0.0,
     "noise.standstill_readings": 0,
     "noise.revisits": 0,
     "acceptance.position_mm": 5.0,

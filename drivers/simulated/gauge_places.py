@@ -49,9 +49,10 @@ class GaugePlaces:
     def _place_by_hand(self, ball: Array) -> None:
         """The fixture is put where the gauges are in its first seat."""
         gauges, random = self._settings.gauges, self._random
-        self.station = ball + gauges.placing_mm * random.standard_normal(3)
+        placed = gauges.placing_mm * random.standard_normal(3)
         tilt = np.radians(gauges.misalignment_deg)
         self.triad = rotations.from_vector(tilt * random.standard_normal(3))
+        self.station = ball + placed - self.triad.T @ np.array(gauges.off_middle_mm)
         self._first = self.station, self.triad
         self._seat = FIRST if self._seat_at(ball) == FIRST else None
 

@@ -22,6 +22,8 @@ class CampaignState:
         done: points that are not to be measured any more.
         present: the pose last commanded, in the controller's frames; none if it is not known.
         rejections: records of the present point that could not be taken.
+        zero_mm: what the gauges showed along base x, y, z when they were zeroed there; none if that
+            is not known.
     """
 
     measurements: MeasurementSet = field(default_factory=lambda: MeasurementSet(()))
@@ -29,6 +31,7 @@ class CampaignState:
     done: frozenset[int] = frozenset()
     present: Pose | None = None
     rejections: int = 0
+    zero_mm: Deviation | None = None
 
     def records_at(self, point: int) -> int:
         """How many records a point has."""

@@ -111,7 +111,7 @@ class VirtualCampaign:
         record = self.virtual_robot.measure(decision.point, decision.orientation)
         deviation = float(np.abs(record.deviation).max())
         self.largest_mm = max(self.largest_mm, deviation)
-        if deviation > self.plan.robot.limits.gauge_travel_mm:
+        if not self.plan.robot.limits.room.holds(np.array(record.deviation)):
             self.outside += 1
             self.state = replace(state, present=decision.pose, rejections=state.rejections + 1)
             return

@@ -205,7 +205,7 @@ class Plan:
 
     def _next_pose(self, state: CampaignState, point: int) -> MeasurePose:
         estimate = self.estimate(state)
-        belief = estimate.belief
+        belief = estimate.belief.zeroed_at(state.zero_mm)
         selected, via = self.chooser.choose(belief, estimate.gauge_zero(point), state)
         base, record = self.robot.frames.base.T, selected.record
         covariance = base @ np.diag(record.sigma[0] ** 2) @ base.T

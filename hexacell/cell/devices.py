@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, SecretStr, field_validator
 
-from hexacell.cell.fields import Name, Password, Positive, Section, SixInRange, Text, broken_rule
+from hexacell.cell.fields import InRange, Name, Password, Positive, Section, SixInRange, Text, broken_rule
 
 NodeId = Annotated[int, Field(ge=1, le=127)]
 Unsigned = Annotated[int, Field(ge=0, le=2**32 - 1)]
@@ -54,11 +54,21 @@ class GaugeSettings(Section):
     channel: int = Field(1, ge=1, le=99, description="input of a multiplexer")
     timeout_s: Positive = Field(0.5, description="longest wait for an answer")
     travel_mm: Positive = Field(12.5, description="the instrument's own measuring range")
+    middle_mm: InRange | None = Field(
+        None,
+        description="what it shows in the middle of its travel; without it, its display does not tell "
+        "where its plunger stands",
+    )
 
     @property
     def mounting(self) -> GaugeAxis:
         """The axis and sign as one value."""
         return GaugeAxis("xyz".index(self.axis), self.sign)
+
+    @property
+    def middle_coordinate_mm(self) -> float | None:
+        """The coordinate along its base axis that it shows in the middle of its travel, if known."""
+        return None if self.middle_mm is None else self.mounting.coordinate(self.middle_mm)
 
 
 class EncoderSettings(Section):

@@ -31,6 +31,12 @@ class StationSettings(Section):
     placement: Literal["by-hand", "fixed"] = Field(
         "by-hand", description="fixed: the gauges need no placing"
     )
+    trial_mm: NotNegative = Field(
+        1.0, description="small moves by which gauges are tried once they were placed or connected; 0: none"
+    )
+    mounting_mm: NotNegative = Field(
+        1.0, description="how far from the middle of its travel a plunger may stand when it is zeroed"
+    )
 
 
 class IdentificationSettings(Section):
@@ -196,7 +202,10 @@ class NoiseSettings(Section):
 class LimitSettings(Section):
     """Limits of every commanded pose."""
 
-    gauge_travel_mm: Positive = Field(5.0, description="largest deviation from the zeroed reference")
+    gauge_travel_mm: Positive = Field(
+        5.0,
+        description="how far the ball may go from the middle of the plates, and from the gauges' zero",
+    )
     tilt_deg: Positive = Field(45.0, le=80, description="largest tilt of the platform")
     joint_min_mm: InRange = Field(-1000.0, description="smallest joint variable of any leg")
     joint_max_mm: InRange = Field(1000.0, description="largest joint variable of any leg")

@@ -99,6 +99,27 @@ class CellSettings(Section):
             raise broken_rule("two gauges have the same port and channel", "Correct one of them")
         return gauges
 
+    @model_validator(mode="after")
+    def _plungers_may_move(self) -> Self:
+        """Each gauge is refused at its own place, which gives the error its line."""
+        plate, mounting = self.limits.gauge_travel_mm, self.stations.mounting_mm
+        refusals = [
+            InitErrorDetails(
+                type=broken_rule(
+                    f"mounting_mm = {mounting:g} leaves the plunger no room to move: it has "
+                    f"{min(plate, gauge.travel_mm / 2):g} mm on either side of the middle",
+                    "Lower mounting_mm in [stations], or correct travel_mm",
+                ),
+                loc=("gauges", n, "travel_mm"),
+                input=gauge.travel_mm,
+            )
+            for n, gauge in enumerate(self.gauges)
+            if min(plate, gauge.travel_mm / 2) <= mounting
+        ]
+        if refusals:
+            raise ValidationError.from_exception_data(self.name, refusals)
+        return self
+
     @field_validator("thermometers")
     @classmethod
     def _thermometers_differ(

@@ -31,6 +31,7 @@ class FailureKind(StrEnum):
     GAUGE_SILENT = "gauge_silent"
     GAUGE_SETTING = "gauge_setting"
     GAUGE_AT_END = "gauge_at_end"
+    MOUNTING = "mounting"
     UNSETTLED = "unsettled"
     ZERO_VOID = "zero_void"
     ENCODER_SILENT = "encoder_silent"
@@ -78,6 +79,7 @@ class AttendedRecovery(Escalations):
     gauge_silent: Escalation = Field(_ASK, description="no answer, or an invalid one")
     gauge_setting: Escalation = Field(_ASK, description="inches, hold, a wrong mode, a low battery")
     gauge_at_end: Escalation = Field(_ASK, description="a plunger at an end of its travel at a reference")
+    mounting: Escalation = Field(_ASK, description="gauges are not mounted as they must be")
     unsettled: Escalation = Field(_ASK, description="the readings did not settle")
     zero_void: Escalation = Field(_ASK, description="a gauge was switched off or set differently")
     encoder_silent: Escalation = Field(_ASK, description="a round of positions was not complete")
@@ -100,6 +102,7 @@ class UnattendedRecovery(Escalations):
     gauge_at_end: Escalation = Field(
         ("redo-set", "abort"), description="a plunger at an end at a reference"
     )
+    mounting: Escalation = Field(_ABORT, description="gauges are not mounted as they must be")
     unsettled: Escalation = Field(
         ("retry", "measure-again", "redo-set", "abort"), description="the readings did not settle"
     )

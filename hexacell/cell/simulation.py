@@ -17,6 +17,7 @@ FaultKind = Literal[
     "silent",
     "at its end",
     "off its plate",
+    "off its middle",
     "frozen",
     "alarm",
     "forward kinematics",
@@ -35,7 +36,10 @@ class SimulatedGauges(Section):
     )
     transport: Literal["pty", "socket"] = Field("pty", description="how the gauges' lines are simulated")
     misalignment_deg: NotNegative = Field(0.0, description="of the triad at each station, 1 sigma")
-    placing_mm: NotNegative = Field(0.4, description="how far from mid-travel they are placed, 1 sigma")
+    placing_mm: NotNegative = Field(0.25, description="how far from mid-travel they are placed, 1 sigma")
+    off_middle_mm: tuple[InRange, InRange, InRange] = Field(
+        (0.0, 0.0, 0.0), description="how far along x, y, z beside that the ball is from mid-travel, always"
+    )
 
 
 class SimulatedEncoders(Section):

@@ -85,7 +85,8 @@ def _trials(belief: RobotBelief, found: Identification) -> Iterator[_Trial]:
         if not len(targets):
             continue
         records = predict_records(belief, zero, targets)
-        inside = SAFETY_SIGMAS * records.sigma.max(axis=-1) <= TRAVEL_SHARE * belief.limits.gauge_travel_mm
+        spread = SAFETY_SIGMAS * records.sigma
+        inside = belief.limits.within_travel(np.zeros(3), spread, TRAVEL_SHARE, surely=True)
         factors = update_factors(belief.covariance, records.jacobian, records.covariance)
         for row in np.flatnonzero(inside).tolist():
             yield _Trial(point, targets.poses.rotations[row], commands[[row]], factors[row])

@@ -103,7 +103,7 @@ def select_from_list(
     belief = planner.belief
     targets, rows = outcomes_of(belief, commands)
     records = predict_records(belief, zero, targets)
-    inside = np.flatnonzero(records.within(TRAVEL_SHARE * belief.limits.gauge_travel_mm))[skipped:]
+    inside = np.flatnonzero(records.within(belief.limits, TRAVEL_SHARE))[skipped:]
     search = _PathSearch(TravelConstraint(belief, zero), planner)
     no_preference = np.full(len(inside), np.inf)
     selected = search.first_safe(records[inside], commands[rows[inside]], no_preference)
@@ -116,7 +116,7 @@ def select_from_list(
 
 def _ranking(belief: RobotBelief, records: PredictedRecords, gains: Array) -> Rows:
     """Rows of the records inside the travel by linear propagation, the best first."""
-    rows = np.flatnonzero(records.within(TRAVEL_SHARE * belief.limits.gauge_travel_mm))
+    rows = np.flatnonzero(records.within(belief.limits, TRAVEL_SHARE))
     return rows[np.argsort(-gains[rows], kind="stable")][:MOST_CANDIDATES]
 
 

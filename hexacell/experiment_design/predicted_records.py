@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from hexacell.errors import LimitError
 from hexacell.experiment_design.candidates import ReachableTargets, commands_for
 from hexacell.experiment_design.criteria import innovation_covariance
-from hexacell.identification.belief import RobotBelief
+from hexacell.identification.belief import Limits, RobotBelief
 from hexacell.identification.solver.measurement_model import record_covariance, record_weights
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.forward import assembly_mode
@@ -130,11 +130,9 @@ class PredictedRecords:
             self.sigma[rows],
         )
 
-    def within(self, distance_mm: float) -> Mask:
-        """Which deviations stay within a distance on every axis, with four sigma."""
-        farthest = np.abs(self.deviation) + SAFETY_SIGMAS * self.sigma
-        within: Mask = (farthest <= distance_mm).all(axis=-1)
-        return within
+    def within(self, limits: Limits, share: float) -> Mask:
+        """Which deviations stay within a share of the gauges' room, with four sigma."""
+        return limits.within_travel(self.deviation, SAFETY_SIGMAS * self.sigma, share)
 
 
 def predict_records(belief: RobotBelief, zero: GaugeZero, targets: ReachableTargets) -> PredictedRecords:

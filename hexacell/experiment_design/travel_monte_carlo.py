@@ -27,7 +27,7 @@ import numpy as np
 
 from hexacell.experiment_design.candidates import ReachableTargets
 from hexacell.experiment_design.predicted_records import GaugeZero, PredictedRecords, predict_records
-from hexacell.identification.belief import RobotBelief
+from hexacell.identification.belief import Limits, RobotBelief
 from hexacell.kinematics.forward import apply_twist, forward_kinematics
 from hexacell.kinematics.geometry import GeometryBatch
 from hexacell.kinematics.pose import PoseBatch
@@ -86,7 +86,7 @@ class TravelConstraint:
     def _holds_linearly(self, records: PredictedRecords) -> Mask:
         if self._is_uncertain:
             return np.zeros(len(records), dtype=bool)
-        return records.within(LINEAR_SHARE * self.belief.limits.gauge_travel_mm)
+        return records.within(self.belief.limits, LINEAR_SHARE)
 
     def _holds_for_samples(self, targets: ReachableTargets) -> Mask:
         """At which of n targets the constraint holds on the robots sampled from the belief."""
@@ -102,10 +102,9 @@ class TravelConstraint:
         sampled = _sample(belief, samples, joints, poses, sensitivity)
         if len(sampled.found) < FEWEST_SAMPLES:
             return np.zeros(len(targets), dtype=bool)
-        travel = belief.limits.gauge_travel_mm
         if is_uncertain:
-            return _nearly_all_within(sampled, UNCERTAIN_SHARE * travel)
-        return _all_within(sampled, travel / (1.0 + sigma / HALF_TRAVEL_SIGMA))
+            return _nearly_all_within(sampled, belief.limits, UNCERTAIN_SHARE)
+        return _all_within(sampled, belief.limits, 1.0 / (1.0 + sigma / HALF_TRAVEL_SIGMA))
 
     @cached_property
     def _is_uncertain(self) -> bool:
@@ -167,19 +166,19 @@ def _sample(
     return _SampledRobots(found[kept, 1:], positions[:, 1:] - positions[:, :1])
 
 
-def _nearly_all_within(sampled: _SampledRobots, distance_mm: float) -> Mask:
-    """At which targets all sampled robots but the worst stay within a distance."""
-    farthest = np.where(sampled.found, np.abs(sampled.deviations).max(axis=-1), np.inf)
-    within: Mask = np.sort(farthest, axis=0)[-2] <= distance_mm
+def _nearly_all_within(sampled: _SampledRobots, limits: Limits, share: float) -> Mask:
+    """At which targets all sampled robots but the worst stay within a share of the gauges' room."""
+    stay = sampled.found & limits.within_travel(sampled.deviations, share=share)
+    within: Mask = np.count_nonzero(~stay, axis=0) <= 1
     return within
 
 
-def _all_within(sampled: _SampledRobots, distance_mm: float) -> Mask:
-    """At which targets all sampled robots, and those that ``SIGMAS`` predict, stay within a distance."""
+def _all_within(sampled: _SampledRobots, limits: Limits, share: float) -> Mask:
+    """At which targets all sampled robots, and those that ``SIGMAS`` predict, stay within a share of it."""
     deviations = sampled.deviations
-    predicted = np.abs(deviations.mean(axis=0)) + SIGMAS * deviations.std(axis=0)
-    farthest = np.maximum(predicted, np.abs(deviations).max(axis=0)).max(axis=-1)
-    within: Mask = np.all(sampled.found, axis=0) & (farthest <= distance_mm)
+    predicted = limits.within_travel(deviations.mean(axis=0), SIGMAS * deviations.std(axis=0), share)
+    stay = sampled.found & limits.within_travel(deviations, share=share)
+    within: Mask = np.all(stay, axis=0) & predicted
     return within
 
 

@@ -63,8 +63,9 @@ def _stays_inside(belief: RobotBelief, actual: ActualPoses) -> Mask:
     covariance = innovation_covariance(belief.covariance, jacobian - jacobian[0], noise)
     sigma = np.sqrt(np.diagonal(covariance, axis1=-2, axis2=-1))
     deviation = actual.poses.positions - actual.poses.positions[0]
-    limit = TRAVEL_SHARE * belief.limits.gauge_travel_mm
-    inside: Mask = (np.abs(deviation) + SAFETY_SIGMAS * sigma <= limit).all(axis=-1) & actual.found
+    # They are chosen long before the gauges are placed there.
+    within = belief.limits.within_travel(deviation, SAFETY_SIGMAS * sigma, TRAVEL_SHARE, surely=True)
+    inside: Mask = within & actual.found
     inside[0] = actual.found[0]
     return inside
 

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
 
+from hexacell.identification.gauge_travel import GaugeRoom, GaugeTravel
 from hexacell.identification.problem.problem import Noise
 from hexacell.kinematics.commanded_motion import CommandedRobot
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import Branch, FrameTransform, Mechanism
 from hexacell.kinematics.pose import PoseBatch
-from hexacell.kinematics.rotations import Array
+from hexacell.kinematics.rotations import Array, Mask
 
 SAME_FRAMES = FrameTransform(np.eye(3), np.zeros(3), np.eye(3))
 
@@ -23,6 +24,8 @@ class Limits:
 
     Attributes:
         frames: from the frames of the commands, in which a level platform is level, to the convention's.
+        gauges: travels and plungers; without them the ball may go as far to all sides.
+        zeroed: the room of the gauges as they were zeroed; none where that is not known yet.
     """
 
     gauge_travel_mm: float
@@ -31,6 +34,36 @@ class Limits:
     joint_max_mm: float
     singularity_margin: float
     frames: FrameTransform = field(default=SAME_FRAMES, compare=False)
+    gauges: GaugeTravel | None = None
+    zeroed: GaugeRoom | None = None
+
+    @property
+    def room(self) -> GaugeRoom:
+        """How far the ball may go from the gauges' zero."""
+        if self.zeroed is not None:
+            return self.zeroed
+        return GaugeRoom.symmetric(self.gauge_travel_mm) if self.gauges is None else self.gauges.room()
+
+    @property
+    def sure_room(self) -> GaugeRoom:
+        """The same of any station that is mounted well enough."""
+        return self.room if self.gauges is None else self.gauges.sure_room
+
+    def within_travel(
+        self, deviations: Array, spread: Array | float = 0.0, share: float = 1.0, *, surely: bool = False
+    ) -> Mask:
+        """Which deviations (..., 3), mm, in the convention's frames stay within a share of the room.
+
+        With ``surely`` it is that of any station.
+        """
+        room = self.sure_room if surely else self.room
+        return room.holds(deviations @ self.frames.base, spread, share)
+
+    def zeroed_at(self, shown_mm: tuple[float, float, float] | None) -> Limits:
+        """The same once the gauges were zeroed where they show ``shown_mm`` along base x, y, z."""
+        if self.gauges is None or shown_mm is None:
+            return self
+        return replace(self, zeroed=self.gauges.room(shown_mm))
 
     def tilts(self, poses: PoseBatch) -> Array:
         """The tilts (n,), rad, of poses in the convention's frames."""
@@ -62,6 +95,10 @@ class RobotBelief:
     noise: Noise
     limits: Limits
     work_frame_turns: Array = field(default_factory=lambda: np.eye(3))
+
+    def zeroed_at(self, shown_mm: tuple[float, float, float] | None) -> RobotBelief:
+        """The same at gauges that were zeroed where they show ``shown_mm`` along base x, y, z."""
+        return self if shown_mm is None else replace(self, limits=self.limits.zeroed_at(shown_mm))
 
     @property
     def basis(self) -> Array:

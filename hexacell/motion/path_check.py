@@ -97,8 +97,8 @@ class LinesFrom:
         is_open[rows] = True
         is_inside = is_open.copy()
         if self.reference is not None:
-            distance = np.abs(actual.positions[:, rows] - self.reference).max(axis=(0, 2), initial=0.0)
-            is_inside[rows] = distance <= limits.gauge_travel_mm
+            deviations = actual.positions[:, rows] - self.reference
+            is_inside[rows] = limits.within_travel(deviations).all(axis=0)
         return CheckedLines(commands, joints, actual, is_open, is_inside)
 
     def _keeps_margin(

@@ -12,7 +12,7 @@ from hexacell.presentation.planning import run_forecast_line
 from hexacell.presentation.verification import check_start_text, check_text, verification_text
 from procedures.run import events
 from procedures.run.state import RunState
-from procedures.run.steps import Compute, Move, Phase, Repeat, SetKey, Standstill
+from procedures.run.steps import Compute, Move, Phase, Probe, Repeat, SetKey, Standstill, Try
 
 SET_NAMES = {
     Phase.IDENTIFY: "point {}",
@@ -69,6 +69,8 @@ def activity(event: events.Event) -> str | None:
     match event:
         case events.StepBegun(step=Standstill() | Repeat() as step):
             return f"{set_name(step.at)}, measuring the noise"
+        case events.StepBegun(step=Probe() | Try() as step):
+            return f"{set_name(step.at)}, trying the gauges"
         case events.StepBegun(step=Move() as step):
             return f"{set_name(step.at)}, orientation {step.orientation}{_forecast_range(step)}"
         case events.StepBegun(step=Compute() as step):

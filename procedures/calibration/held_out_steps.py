@@ -24,6 +24,7 @@ from procedures.calibration.set_steps import (
     reference_pose,
     require_zero,
 )
+from procedures.calibration.trial_steps import TrialSteps
 from procedures.run.state import RunState
 from procedures.run.steps import Compute, Locate, Move, Phase, SetKey, SixNumbers, Step
 
@@ -34,6 +35,7 @@ class HeldOutSteps:
 
     settings: CellSettings
     sets: SetSteps
+    trials: TrialSteps
     candidate_count: int
 
     def next_step(self, state: RunState, phase: Phase) -> Step | None:
@@ -96,6 +98,8 @@ class HeldOutSteps:
             raise TravelError(f"{key}: the ball left the gauges' travel at a held-out pose")
         if measured.reference_unverified:
             return self.sets.at_reference(state, key) or self._to_reference(state, key)
+        if measured.samples and (trial := self.trials.next_step(state, key, self._ball(state, key))):
+            return trial
         if len(measured.samples) < len(self._poses(state, key)[0]):
             return self.sets.at_pose(state, key) or self._to_next_pose(state, key)
         if step := self.sets.at_reference(state, key):

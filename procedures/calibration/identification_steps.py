@@ -15,6 +15,7 @@ from hexacell.kinematics.rotations import Array
 from hexacell.measurements.records import MeasurementSet
 from procedures.calibration.noise_steps import NoiseSteps
 from procedures.calibration.set_steps import SetSteps, require_zero
+from procedures.calibration.trial_steps import TrialSteps
 from procedures.run.state import RunState, record
 from procedures.run.steps import Compute, Expectation, Locate, Move, Phase, SetKey, Step
 
@@ -27,6 +28,7 @@ class IdentificationSteps:
     sets: SetSteps
     provisional: bool
     noise: NoiseSteps
+    trials: TrialSteps
 
     def next_step(self, state: RunState) -> Step | None:
         """The next step; None if nothing more is to be measured."""
@@ -55,6 +57,8 @@ class IdentificationSteps:
         require_zero(state, key)
         if measured.reference_unverified:
             return self._at_or_to_reference(state, key)
+        if trial := self.trials.next_step(state, key, self._ball(state, key)):
+            return trial
         measuring_noise = self.noise.next_step(state, key, self._ball(state, key))
         if step := measuring_noise or self.sets.at_pose(state, key):
             return step
@@ -103,7 +107,8 @@ class IdentificationSteps:
     def _estimated(self, state: RunState, key: SetKey) -> tuple[RobotBelief, GaugeZero]:
         """The belief by now and the gauges' zero under it; raises ``HexacellError`` if there is none."""
         estimate = self.plan.estimate(campaign_state(state, key))
-        return estimate.belief, estimate.gauge_zero(key.point)
+        belief = estimate.belief.zeroed_at(state.zero_shown(key))
+        return belief, estimate.gauge_zero(key.point)
 
 
 def open_set(state: RunState) -> SetKey | None:
@@ -128,6 +133,7 @@ def campaign_state(state: RunState, key: SetKey | None) -> CampaignState:
         done=frozenset(at.point for at, measured in sets.items() if measured.closed),
         present=None if key is None else _present_pose(state, key),
         rejections=0 if key is None else state.set(key).rejections,
+        zero_mm=None if key is None else state.zero_shown(key),
     )
 
 

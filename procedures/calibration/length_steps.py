@@ -16,6 +16,7 @@ from hexacell.cell.length_check import LengthCheckSettings
 from hexacell.kinematics.pose import Pose
 from hexacell.kinematics.rotations import Array
 from procedures.calibration.set_steps import SetSteps, TravelError, reference_pose
+from procedures.calibration.trial_steps import TrialSteps
 from procedures.run.state import RunState
 from procedures.run.steps import Locate, Move, Phase, SetKey, Step
 
@@ -34,6 +35,7 @@ class LengthSteps:
 
     fixture: LengthCheckSettings
     sets: SetSteps
+    trials: TrialSteps
 
     def next_step(self, state: RunState) -> Step | None:
         """The next step of the first mounting that is not closed; None if all are."""
@@ -68,6 +70,10 @@ class LengthSteps:
                 action="Check first_seat, direction and distance_mm in [length_check], and how the fixture "
                 "lies; then mount the gauges there again",
             )
+        if not measured.reference_unverified and (
+            trial := self.trials.next_step(state, key, self._zero(state, key))
+        ):
+            return trial
         orientation = measured.next_orientation
         if measured.reference_unverified or orientation > self._records:
             return self.sets.at_reference(state, key) or self.sets.to_reference(

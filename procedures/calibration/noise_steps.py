@@ -53,7 +53,7 @@ class NoiseSteps:
         if done >= self.settings.revisits:
             return None
         reference = reference_pose(state, key)
-        beside = [pose for pose in self._beside(reference) if self._is_clear(reference, pose, ball)]
+        beside = [pose for pose in self._beside(reference) if self._is_clear(state, key, pose, ball)]
         if not beside:
             return None
         return Move(at=key, orientation=0, pose=beside[done % len(beside)])
@@ -61,14 +61,15 @@ class NoiseSteps:
     def _beside(self, reference: SixNumbers) -> Iterable[SixNumbers]:
         """Poses on all sides of the reference, each followed by the opposite one."""
         x, y, z, a, b, c = reference
-        distance = DISTANCE_SHARE * self.sets.robot.limits.gauge_travel_mm
+        distance = DISTANCE_SHARE * self.sets.robot.limits.room.smallest_mm
         for dx, dy, dz in distance * np.concatenate([[row, -row] for row in np.eye(3)]):
             yield (x + float(dx), y + float(dy), z + float(dz), a, b, c)
 
-    def _is_clear(self, reference: SixNumbers, pose: SixNumbers, ball: Array | None) -> bool:
+    def _is_clear(self, state: RunState, key: SetKey, pose: SixNumbers, ball: Array | None) -> bool:
         """Whether the robot as it is known by now gets there and back within the limits."""
+        reference = reference_pose(state, key)
         here, there = (self.sets.robot.from_commands([Pose(*one)]) for one in (reference, pose))
-        belief = self.sets.robot.belief()
+        belief = self.sets.robot.belief().zeroed_at(state.zero_shown(key))
         return is_clear(belief, here, there, ball) and is_clear(belief, there, here, ball)
 
 

@@ -50,7 +50,7 @@ class RunPathPlanner:
             return goal
         via = self._intermediate(state, goal)
         start, end = self._command(state.target), self._command(goal.pose)
-        belief = self._belief(state)
+        belief = self._belief(state).zeroed_at(state.zero_shown(goal.at))
         if reference is not None and not _is_inside(belief, start, reference):
             reference = None
         route = find_route(belief, start, end, [self._command(pose) for _, pose in via], reference)
@@ -123,7 +123,7 @@ class RunPathPlanner:
 
 def _is_inside(belief: RobotBelief, command: PoseBatch, reference: Array) -> bool:
     ball = ball_position(belief, command)
-    return ball is not None and bool(np.abs(ball - reference).max() <= belief.limits.gauge_travel_mm)
+    return ball is not None and bool(belief.limits.within_travel(ball - reference))
 
 
 def _level(pose: SixNumbers) -> SixNumbers:

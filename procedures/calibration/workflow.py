@@ -35,6 +35,7 @@ from procedures.calibration.identification_steps import IdentificationSteps
 from procedures.calibration.length_steps import LengthSteps
 from procedures.calibration.noise_steps import NoiseSteps
 from procedures.calibration.set_steps import SetSteps
+from procedures.calibration.trial_steps import TrialSteps
 from procedures.run import events
 from procedures.run.state import RunState
 from procedures.run.steps import Compute, Phase, SixNumbers, Step
@@ -77,11 +78,14 @@ class _Measuring:
         self.robot = plan.robot
         self.plan = plan
         sets = SetSteps(plan.robot)
+        trials = TrialSteps(plan.settings.stations.trial_mm, sets)
         noise = NoiseSteps(plan.settings.noise, sets)
-        self.points = IdentificationSteps(plan, sets, plan.settings.identification.provisional, noise)
-        self.held_out = HeldOutSteps(plan.settings, sets, HELD_OUT_CANDIDATES)
+        self.points = IdentificationSteps(
+            plan, sets, plan.settings.identification.provisional, noise, trials
+        )
+        self.held_out = HeldOutSteps(plan.settings, sets, trials, HELD_OUT_CANDIDATES)
         fixture = plan.settings.length_check
-        self.length = None if fixture is None else LengthSteps(fixture, sets)
+        self.length = None if fixture is None else LengthSteps(fixture, sets, trials)
 
 
 @dataclass(frozen=True, eq=False)

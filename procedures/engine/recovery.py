@@ -13,6 +13,7 @@ from drivers import errors as device
 from drivers.controllers import errors as controller
 from hexacell.cell.recovery import Action, Escalations, FailureKind, RecoverySettings
 from hexacell.errors import AnswerNeeded, DeviceError, FileError, HexacellError, Interruption
+from procedures.calibration.mounting import MountingError
 from procedures.calibration.path_planning import NoSafePath
 from procedures.calibration.set_steps import TravelError
 from procedures.devices.reconnection import reconnect
@@ -41,6 +42,7 @@ KINDS: Mapping[type[HexacellError], FailureKind] = {
     controller.MotionInterrupted: FailureKind.CONTROLLER,
     device.PortLost: FailureKind.LINK_LOST,
     NeverSettled: FailureKind.UNSETTLED,
+    MountingError: FailureKind.MOUNTING,
     TravelError: FailureKind.GAUGE_AT_END,
     NoSafePath: FailureKind.NO_WAY,
     FileError: FailureKind.FILE,
@@ -113,7 +115,12 @@ def failed(
 
 
 def choices(failure: events.Failed) -> tuple[Action, ...]:
-    """What a person may choose; where no set is being measured there is none to redo."""
+    """What a person may choose; where no set is being measured there is none to redo.
+
+    Gauges that are mounted otherwise have another zero, so that their set begins again.
+    """
+    if failure.failure is FailureKind.MOUNTING:
+        return Action.REDO_SET, Action.ABORT
     if isinstance(failure.step, Compute):
         return Action.RETRY, Action.ABORT
     return Action.RETRY, Action.MEASURE_AGAIN, Action.REDO_SET, Action.ABORT

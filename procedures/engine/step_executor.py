@@ -18,9 +18,10 @@ from hexacell.errors import HexacellError, consists_only_of
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.rotations import Array
 from hexacell.measurements.records import deviation_of, joints_of
-from hexacell.robot_model import config_format
+from hexacell.robot_model import config_format, gauge_travel_of
 from hexacell.runs.run_folder import RunFolder
 from procedures.calibration.length_steps import seat_of
+from procedures.calibration.mounting import require_response, require_room
 from procedures.calibration.set_steps import check_reference, in_words
 from procedures.calibration.workflow import Calibration
 from procedures.devices.device_set import Devices, Thermometers, gather_errors
@@ -41,11 +42,13 @@ from procedures.run.steps import (
     Move,
     Phase,
     Place,
+    Probe,
     Repeat,
     Revisit,
     Sample,
     Standstill,
     Step,
+    Try,
 )
 from procedures.run.trips import GuardTripped
 
@@ -114,7 +117,7 @@ class StepExecutor:
         await self.require_unedited_config(state)
         return await self._use_robot(step, state)
 
-    async def _use_robot(self, step: RobotStep, state: RunState) -> events.Event:  # noqa: PLR0911
+    async def _use_robot(self, step: RobotStep, state: RunState) -> events.Event:  # noqa: C901, PLR0911
         match step:
             case Locate():
                 return await self.locate()
@@ -132,6 +135,10 @@ class StepExecutor:
                 return await self.read_standstill(step)
             case Repeat():
                 return events.ReferenceRepeated(at=step.at, reading=await self.read())
+            case Probe():
+                return events.GaugesProbed(at=step.at, moved_mm=step.moved_mm, reading=await self.read())
+            case Try():
+                return self._try(step, state)
 
     async def locate(self) -> events.Located:
         """Where the robot is; raises ``GuardTripped`` if controller and encoders do not agree on that."""
@@ -182,9 +189,11 @@ class StepExecutor:
             return events.RecordRejected(at=step.at, orientation=step.orientation, reason=str(error))
         zero = state.zero(step.at) or reading
         deviation = np.subtract(reading.gauges_mm, zero.gauges_mm)
-        travel = self.cell.settings.limits.gauge_travel_mm
-        if np.abs(deviation).max() > travel:
-            reason = f"the ball is {in_words(deviation)} mm from its reference, farther than {travel:g} mm"
+        if state.zero(step.at) is None:
+            require_room(self.cell.settings, reading.gauges_mm)
+        room = gauge_travel_of(self.cell.settings).room(zero.gauges_mm)
+        if not room.holds(deviation):
+            reason = f"the ball is {in_words(deviation)} mm from its reference, farther than {room}"
             return events.RecordRejected(
                 at=step.at, orientation=step.orientation, reason=reason, reading=reading
             )
@@ -195,6 +204,14 @@ class StepExecutor:
             reading=reading,
             deviation_mm=deviation_of(deviation),
         )
+
+    def _try(self, step: Try, state: RunState) -> events.GaugesTried:
+        measured = state.set(step.at)
+        zero = np.array(measured.samples[0].reading.gauges_mm)
+        moved = np.array([probe.moved_mm for probe in measured.probes])
+        shown = np.array([probe.reading.gauges_mm for probe in measured.probes]) - zero
+        x, y, z = (deviation_of(row) for row in require_response(self.cell.settings, moved, shown))
+        return events.GaugesTried(at=step.at, response=(x, y, z))
 
     async def _revisit(self, step: Revisit, state: RunState) -> events.Event:
         try:

@@ -25,6 +25,7 @@ from hexacell.clock import CellClock
 from hexacell.controller_config.current import CurrentConfig
 from hexacell.kinematics.position_agreement import PositionReports, PositionSource
 from hexacell.kinematics.rotations import Array
+from hexacell.robot_model import gauge_travel_of
 from procedures.devices.device_set import Devices, MountedGauge
 from procedures.guards import rules
 from procedures.guards.heartbeat import WatchedController
@@ -75,9 +76,10 @@ class Guards:
         """Move to the target of a step; ``commanded`` gives the slider positions (6,), mm, at its pose."""
         gauges = self._watched_gauges(step, state)
         pollers = self._pollers(controller=True, gauges=gauges)
+        limits = self._limits(zero_mm=state.zero_shown(step.at))
         try:
             reached = await self.supervisor.supervise(
-                lambda: self._go(step), pollers, self._limits(), STOP_GRACE_S
+                lambda: self._go(step), pollers, limits, STOP_GRACE_S
             )
         except MotionInterrupted:
             # Where the forward kinematics failed, the robot is not where this error says that it stopped.
@@ -129,10 +131,10 @@ class Guards:
         await self._devices.controller.move(step.target)
         return await self._devices.read_encoders()
 
-    def _limits(self, rest_mm: float | None = None) -> GuardLimits:
+    def _limits(self, rest_mm: float | None = None, zero_mm: ThreeNumbers | None = None) -> GuardLimits:
         guards = self._settings.guards
-        plate_mm = self._settings.limits.gauge_travel_mm + guards.plate_margin_mm
-        return GuardLimits(guards.stale_s, plate_mm, rest_mm)
+        plate = gauge_travel_of(self._settings).room(zero_mm).widened(guards.plate_margin_mm)
+        return GuardLimits(guards.stale_s, plate, rest_mm)
 
     def _pollers(
         self,

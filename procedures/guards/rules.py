@@ -17,9 +17,10 @@ import numpy as np
 from drivers.controllers.errors import ControllerFrozen
 from drivers.errors import GaugeAtEnd
 from drivers.stop_input import SUBJECT as STOP_LINE
+from hexacell.identification.gauge_travel import GaugeRoom
 from hexacell.kinematics.rotations import Array
 from hexacell.storage import atomic_files
-from procedures.guards.polling import DevicePoller, PolledDevices
+from procedures.guards.polling import DevicePoller, GaugeDeviation, PolledDevices
 from procedures.run.trips import Guard, Trip
 
 MAX_GARBLED = 3
@@ -35,12 +36,12 @@ class GuardLimits:
 
     Attributes:
         stale_s: longest silence of a device, s of real time.
-        plate_mm: largest deviation from the set's reference along any axis.
+        plate: how far the ball may go from the set's reference.
         rest_mm: largest slider displacement at standstill; none while the robot moves.
     """
 
     stale_s: float
-    plate_mm: float
+    plate: GaugeRoom
     rest_mm: float | None = None
 
 
@@ -128,7 +129,7 @@ def ball_off_gauge(devices: PolledDevices, limits: GuardLimits) -> Trip | None:
     for gauge in devices.gauges:
         if gauge.value is None or gauge.first is None:
             continue
-        margin = max(limits.plate_mm, abs(gauge.first.deviation_mm))
+        margin = _margin(gauge.value, gauge.first.deviation_mm, limits.plate)
         if abs(gauge.value.deviation_mm) > margin:
             return Trip(
                 Guard.PLATE,
@@ -219,6 +220,12 @@ def low_disk_space(folder: Path, limit_mb: float) -> Trip | None:
         f"only {free_mb:.0f} MB are free where the run is kept, less than {limit_mb:g} MB",
         "Free some space, then resume",
     )
+
+
+def _margin(now: GaugeDeviation, first_mm: float, plate: GaugeRoom) -> float:
+    """How far the ball may be on its side of the reference; as far as it was at first in any case."""
+    side = plate.upper[now.axis] if now.deviation_mm > 0.0 else -plate.lower[now.axis]
+    return max(side, abs(first_mm))
 
 
 def _is_fault(report: DevicePoller[object]) -> bool:

@@ -211,6 +211,8 @@ OUTCOME_KINDS: dict[str, frozenset[str]] = {
     "close": frozenset({"closed"}),
     "standstill": frozenset({"stood"}),
     "repeat": frozenset({"repeated"}),
+    "probe": frozenset({"probed"}),
+    "try": frozenset({"tried"}),
     "assess noise": frozenset({"noise measured"}),
     "lend": frozenset({"lent"}),
     "take back": frozenset({"taken back"}),

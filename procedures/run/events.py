@@ -174,6 +174,26 @@ class ReferenceRepeated(Frozen):
     reading: Reading
 
 
+class GaugesProbed(Frozen):
+    """The ball was moved by a small known distance from a set's reference, and the gauges were read."""
+
+    kind: Literal["probed"] = "probed"
+    at: SetKey
+    moved_mm: ThreeNumbers
+    reading: Reading
+
+
+class GaugesTried(Frozen):
+    """The gauges of a set follow the ball, each on its axis, with its sign and scale.
+
+    ``response`` is what the gauges x, y, z showed per length of a move along x, y, z.
+    """
+
+    kind: Literal["tried"] = "tried"
+    at: SetKey
+    response: tuple[ThreeNumbers, ThreeNumbers, ThreeNumbers]
+
+
 class NoiseMeasured(Frozen):
     """The noise of gauges and encoders that the run counts with from now on.
 
@@ -381,6 +401,8 @@ Event = Annotated[
     | ReferenceConfirmed
     | StandstillRead
     | ReferenceRepeated
+    | GaugesProbed
+    | GaugesTried
     | NoiseMeasured
     | SetClosed
     | SetInvalidated

@@ -10,7 +10,16 @@ from hexacell.cell.recovery import Action, FailureKind
 from hexacell.kinematics.pose import Pose
 from hexacell.measurements.records import MeasurementSet, Record
 from procedures.run import events
-from procedures.run.steps import Compute, Move, Phase, SetKey, SixNumbers, Step, StepOfSet
+from procedures.run.steps import (
+    Compute,
+    Move,
+    Phase,
+    SetKey,
+    SixNumbers,
+    Step,
+    StepOfSet,
+    ThreeNumbers,
+)
 from procedures.run.trips import Guard
 
 
@@ -24,6 +33,8 @@ class SetState:
         reference_unverified: the gauges were unwatched; their zero must be verified at the reference.
         standstill: readings at the reference without moving, and ``visits`` of it.
         has_left: the robot has been at a waypoint since it was read last.
+        probes: readings beside the reference, which try the gauges; ``tried`` once they have passed, until
+            the gauges are unwatched.
     """
 
     samples: tuple[events.RecordTaken, ...] = ()
@@ -35,6 +46,8 @@ class SetState:
     standstill: events.StandstillRead | None = None
     visits: tuple[events.ReferenceRepeated, ...] = ()
     has_left: bool = False
+    probes: tuple[events.GaugesProbed, ...] = ()
+    tried: bool = False
 
     @property
     def closed(self) -> bool:
@@ -54,7 +67,9 @@ class SetState:
 
     def unverified(self) -> SetState:
         """The same after the gauges were unwatched; a closed set is not affected."""
-        return self if self.closed or not self.samples else replace(self, reference_unverified=True)
+        if self.closed or not self.samples:
+            return self
+        return replace(self, reference_unverified=True, probes=(), tried=False)
 
     def with_sample(self, sample: events.RecordTaken) -> SetState:
         """One more record."""
@@ -156,6 +171,11 @@ class RunState:
         samples = self.set(of_zero).samples
         return samples[0].reading if samples else None
 
+    def zero_shown(self, key: SetKey) -> ThreeNumbers | None:
+        """What a set's gauges showed, mm along base x, y, z, when they were zeroed; none before that."""
+        zero = self.zero(key)
+        return None if zero is None else zero.gauges_mm
+
     def samples(self, phase: Phase) -> tuple[events.RecordTaken, ...]:
         """All records of a phase, in the order of their points."""
         keys = sorted((key for key in self.sets if key.phase is phase), key=lambda key: key.point)
@@ -226,6 +246,11 @@ def apply(state: RunState, event: events.Event) -> RunState:  # noqa: C901, PLR0
             return _with_set(state, event.at, replace(state.set(event.at), standstill=event))
         case events.ReferenceRepeated():
             return _with_set(state, event.at, state.set(event.at).with_visit(event))
+        case events.GaugesProbed():
+            probes = (*state.set(event.at).probes, event)
+            return _with_set(state, event.at, replace(state.set(event.at), probes=probes))
+        case events.GaugesTried():
+            return _with_set(state, event.at, replace(state.set(event.at), tried=True, has_left=False))
         case events.NoiseMeasured():
             return _noise_measured(state, event)
         case events.SetClosed():

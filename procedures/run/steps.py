@@ -145,6 +145,19 @@ class Repeat(StepOfSet):
     kind: Literal["repeat"] = "repeat"
 
 
+class Probe(StepOfSet):
+    """Beside a set's reference, after a small known move of the ball: read the gauges."""
+
+    kind: Literal["probe"] = "probe"
+    moved_mm: ThreeNumbers
+
+
+class Try(StepOfSet):
+    """Back at a set's reference: judge whether the gauges followed the ball."""
+
+    kind: Literal["try"] = "try"
+
+
 class Compute(BaseStep):
     """A step that moves nothing."""
 
@@ -162,6 +175,6 @@ class Compute(BaseStep):
 
 
 Step = Annotated[
-    Locate | Move | Place | Sample | Revisit | CloseSet | Standstill | Repeat | Compute,
+    Locate | Move | Place | Sample | Revisit | CloseSet | Standstill | Repeat | Probe | Try | Compute,
     Field(discriminator="kind"),
 ]

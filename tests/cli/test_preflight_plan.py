@@ -23,7 +23,7 @@ def never_moves(monkeypatch: pytest.MonkeyPatch) -> None:
 
 IMPOSSIBLE: dict[str, tuple[tuple[tuple[str, str], ...], tuple[str, ...]]] = {
     "travel": (
-        (("gauge_travel_mm = 5.0", "gauge_travel_mm = 0.05"),),
+        (("gauge_travel_mm = 5.0", "gauge_travel_mm = 0.05"), ("mounting_mm = 1.0", "mounting_mm = 0.0")),
         ("identification point 1: no orientation surely keeps the ball inside", "gauge_travel_mm = 0.05"),
     ),
     "noise beyond the travel": (
@@ -193,6 +193,8 @@ def test_a_list_of_poses_that_can_be_measured(typed_here: Any, cell_folder: Any)
     """Gauges with a long travel can measure it even on an uncalibrated robot."""
     listed(cell_folder, lambda rows: rows)
     cell_folder.edit(("gauge_travel_mm = 5.0", "gauge_travel_mm = 60.0"))
+    for protocol in ("sylvac", "mux10", "cdi"):
+        cell_folder.edit((f'protocol = "{protocol}"', f'travel_mm = 130\nprotocol = "{protocol}"'))
     outcome = typed_here("preflight", cell_folder.cell, "--json")
     assert outcome.code == 0, outcome.err
     assert outcome.document["expected"]["records"] >= 40

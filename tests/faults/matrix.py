@@ -15,11 +15,13 @@ from procedures.run.steps import (
     Move,
     Phase,
     Place,
+    Probe,
     Repeat,
     Revisit,
     Sample,
     Standstill,
     Step,
+    Try,
 )
 
 PROPERTY = "fault-matrix"
@@ -30,6 +32,7 @@ STEPS = (
     "to reference",
     "placing",
     "zeroing",
+    "trying gauges",
     "to orientation",
     "sampling",
     "closing",
@@ -101,10 +104,14 @@ def _name(step: Step) -> str:
             return _of_a_set(step)
 
 
-def _of_a_set(step: Move | Place | Sample | Revisit | CloseSet | Standstill | Repeat) -> str:
+def _of_a_set(  # noqa: PLR0911 - a case a step
+    step: Move | Place | Sample | Revisit | CloseSet | Standstill | Repeat | Probe | Try,
+) -> str:
     match step:
         case Standstill() | Repeat():
             return "measuring noise"
+        case Probe() | Try():
+            return "trying gauges"
         case Move():
             return "to reference" if step.orientation == 1 else "to orientation"
         case Sample():
@@ -142,6 +149,7 @@ def _short(step: str) -> str:
         "to reference": "to ref",
         "placing": "place",
         "zeroing": "zero",
+        "trying gauges": "try",
         "to orientation": "move",
         "sampling": "sample",
         "closing": "close",

@@ -75,6 +75,7 @@ class SimulatedGaugeBank(Closeable):
             "silent": line.set_silent,
             "at its end": indicator.set_at_end,
             "off its plate": indicator.set_pushed,
+            "off its middle": indicator.set_off_middle,
             "frozen": indicator.set_frozen,
         }
 

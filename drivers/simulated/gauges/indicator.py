@@ -7,6 +7,7 @@ from math import copysign
 
 MM_PER_INCH = 25.4
 PUSH_MM = 6.0
+OFF_MIDDLE_MM = 3.8
 
 PlungerPosition = Callable[[], float]
 """The plunger position now, mm from the middle of its travel, with noise.
@@ -31,6 +32,7 @@ class Indicator:
         self._at_end = False
         self._jammed_mm: float | None = None
         self._pushed_mm = 0.0
+        self._off_middle_mm = 0.0
 
     def shown(self) -> float | None:
         """The number on the display, mm or inch; None with the plunger at an end of its travel."""
@@ -66,8 +68,13 @@ class Indicator:
         """Push the plunger farther than a ball on its plate could, or release it."""
         self._pushed_mm = -copysign(PUSH_MM, self._plunger()) if on else 0.0
 
+    def set_off_middle(self, *, on: bool) -> None:
+        """Clamp the instrument by its stem so far from where it belongs, or as it belongs."""
+        self._off_middle_mm = OFF_MIDDLE_MM if on else 0.0
+
     def _live_mm(self) -> float | None:
-        position = self._plunger() + self._pushed_mm if self._jammed_mm is None else self._jammed_mm
+        free = self._plunger() + self._off_middle_mm + self._pushed_mm
+        position = free if self._jammed_mm is None else self._jammed_mm
         if self._at_end or abs(position) > self._travel_mm / 2:
             return None
         return (-position if self.reversed else position) + self._offset_mm

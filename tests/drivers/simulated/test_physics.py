@@ -215,8 +215,8 @@ def test_slider_stops_scatter_by_the_repeatability(make_twin) -> None:
 
 def test_gauges_are_placed_near_the_ball(make_twin) -> None:
     placings = np.array([make_twin(seed=seed).seen() for seed in range(40)])
-    assert np.abs(placings).max() < 2.0
-    assert np.std(placings) == pytest.approx(0.4, rel=0.3)
+    assert np.abs(placings).max() < 1.0
+    assert np.std(placings) == pytest.approx(0.25, rel=0.3)
 
 
 def test_gauges_stay_while_the_ball_is_within_reach(make_twin) -> None:

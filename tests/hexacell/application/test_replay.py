@@ -75,6 +75,7 @@ async def test_a_run_that_followed_a_list_is_the_same_without_the_list(make_cell
     listed.write_text("\n".join(rows) + "\n")
     gauges = [gauge.model_copy(update={"travel_mm": 130.0}) for gauge in make_cell().settings.gauges]
     changes = {"gauges": tuple(gauges), "limits.gauge_travel_mm": 60.0, "identification.points": points}
+    changes["stations.mounting_mm"] = 30.0  # a gauge that slipped is zeroed where it is
     cell = make_cell(**changes, identification__poses=listed.name)
     with suppress(HexacellError):  # how well such a list calibrates is not under test
         await calibrate(order_of(cell, run))

@@ -122,6 +122,19 @@ def test_a_point_without_a_safe_pose_is_finished_with_the_reason(campaign, make_
     assert "inside the gauges' travel" in decision.reason
 
 
+def test_deviations_keep_to_the_room_that_the_zero_leaves(campaign, two_points):
+    """A gauge zeroed near an end of its travel has little room on that side, and no more on the other."""
+    state = campaign[4].state
+    for zero, lower, upper in (((4.6, 0.0, 0.0), -5.0, 0.4), ((-4.6, 0.0, 0.0), -0.4, 5.0)):
+        decision = two_points.decide(replace(state, zero_mm=zero))
+        assert isinstance(decision, MeasurePose)
+        spread = 4.0 * decision.sigma[0]
+        assert decision.deviation[0] - spread >= 0.9 * lower - 1e-9
+        assert decision.deviation[0] + spread <= 0.9 * upper + 1e-9
+    free = two_points.decide(state)
+    assert abs(free.deviation[0]) + 4.0 * free.sigma[0] > 0.9 * 0.4, "otherwise the sides decide nothing"
+
+
 def test_records_of_another_robot_are_refused(campaign, two_points):
     state = campaign[5].state
     strange = tuple(

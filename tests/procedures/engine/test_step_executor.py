@@ -44,7 +44,8 @@ class Station:
 
 @pytest.fixture
 def station(make_rig) -> Station:
-    return Station(make_rig(guards__following_mm=1e6))  # its sliders show what they are told to
+    """Its sliders show what they are told to, and its gauges may stand anywhere."""
+    return Station(make_rig(guards__following_mm=1e6, stations__mounting_mm=4.0))
 
 
 @pytest.fixture

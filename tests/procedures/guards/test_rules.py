@@ -13,13 +13,15 @@ from hypothesis import strategies as st
 from drivers.errors import GaugeAtEnd, GaugeSilent, WrongAnswer, ZeroVoid
 from drivers.interfaces import ControllerStatus, EncoderSample
 from hexacell.errors import DeviceError, ExitCode, LimitError
+from hexacell.identification.gauge_travel import GaugeRoom
 from procedures.guards import rules
 from procedures.guards.polling import DevicePoller, GaugeDeviation, LineActivity, PolledDevices
 from procedures.guards.rules import GuardLimits
 from procedures.run import events
 from procedures.run.trips import DriftTripped, Guard, GuardTripped, Trip
 
-LIMITS = GuardLimits(stale_s=0.12, plate_mm=5.5)
+PLATE = GaugeRoom.symmetric(5.5)
+LIMITS = GuardLimits(stale_s=0.12, plate=PLATE)
 AT_END = GaugeAtEnd("plunger at its end", subject="gauge x", action="Move the gauge or the ball")
 
 
@@ -126,6 +128,15 @@ def test_a_plunger_that_was_at_its_end_may_leave_it() -> None:
     assert rules.first_trip(PolledDevices((gauge(None, None, error=AT_END),)), LIMITS) is None
 
 
+def test_the_ball_may_go_as_far_as_each_side_has_room() -> None:
+    limits = GuardLimits(0.12, GaugeRoom((-5.0, -5.0, -5.0), (1.2, 5.0, 5.0)))
+    assert rules.first_trip(PolledDevices((gauge(-4.9, 0.0, 0),)), limits) is None
+    assert rules.first_trip(PolledDevices((gauge(4.9, 0.0, 1),)), limits) is None
+    trip = rules.first_trip(PolledDevices((gauge(1.3, 0.0, 0),)), limits)
+    assert trip is not None
+    assert "+1.30 mm from its reference along x, farther than 1.20 mm" in trip.problem
+
+
 @given(deviation=st.floats(-20.0, 20.0), first=st.floats(-20.0, 20.0), axis=st.sampled_from([0, 1, 2]))
 def test_a_ball_must_not_go_farther_than_allowed_nor_than_it_was(
     deviation: float, first: float, axis: int
@@ -145,7 +156,7 @@ def test_a_slider_that_moves_at_standstill_trips_the_following_guard(leg: int, w
     now[leg] += way
     snapshot = PolledDevices(encoders=sliders(tuple(now), (10.0,) * 6))
     assert rules.first_trip(snapshot, LIMITS) is None, "a robot that moves may"
-    trip = rules.first_trip(snapshot, GuardLimits(0.12, 5.5, rest_mm=1.0))
+    trip = rules.first_trip(snapshot, GuardLimits(0.12, PLATE, rest_mm=1.0))
     if abs(now[leg] - 10.0) > 1.0:
         assert trip is not None
         assert (trip.guard, trip.device) == (Guard.FOLLOWING, f"slider {leg + 1}")

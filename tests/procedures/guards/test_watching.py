@@ -11,6 +11,7 @@ import pytest
 from drivers.errors import GaugeAtEnd, WrongAnswer
 from drivers.interfaces import GaugeReading
 from hexacell.errors import DeviceError, HexacellError, LimitError
+from hexacell.identification.gauge_travel import GaugeRoom
 from procedures.guards.polling import DevicePoller, LineActivity, PolledDevices
 from procedures.guards.rules import GuardLimits
 from procedures.guards.supervision import GuardMonitor
@@ -19,6 +20,7 @@ from procedures.run import events
 from procedures.run.steps import CloseSet, Expectation, Move, Phase, Sample, SetKey
 from procedures.run.trips import Guard, GuardTripped
 
+LIMITS = GuardLimits(0.12, GaugeRoom.symmetric(5.5))
 P1 = SetKey(phase=Phase.IDENTIFY, point=1)
 P2 = SetKey(phase=Phase.IDENTIFY, point=2)
 
@@ -285,7 +287,7 @@ async def test_devices_on_a_shared_line_are_not_silent_while_it_answers(scene) -
         return "here"
 
     pollers = tuple(DevicePoller("it", queued, shared) for _ in range(5))
-    async with GuardMonitor(PolledDevices(gauges=pollers), GuardLimits(0.12, 5.5), clock) as monitor:  # type: ignore[arg-type]
+    async with GuardMonitor(PolledDevices(gauges=pollers), LIMITS, clock) as monitor:  # type: ignore[arg-type]
         await clock.sleep(2.0)
         assert monitor.trip is None, "one answer in 0.25 s each, but one in 0.05 s altogether"
 
@@ -299,7 +301,7 @@ async def test_a_delay_of_the_process_is_no_silence_of_its_devices(scene) -> Non
         return ""
 
     pollers = PolledDevices(stop_input=DevicePoller("stop line", slow))
-    async with GuardMonitor(pollers, GuardLimits(0.12, 5.5), clock) as monitor:
+    async with GuardMonitor(pollers, LIMITS, clock) as monitor:
         await clock.sleep(0.2)
         clock.time_s += 5.0
         await clock.sleep(0.2)

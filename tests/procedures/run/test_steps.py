@@ -35,12 +35,14 @@ from procedures.run.steps import (
     Move,
     Phase,
     Place,
+    Probe,
     Repeat,
     Revisit,
     Sample,
     SetKey,
     Standstill,
     Step,
+    Try,
 )
 from procedures.run.trips import Guard
 from tests.procedures.identified import an_identification
@@ -61,6 +63,8 @@ P2 = SetKey(phase=Phase.IDENTIFY, point=2)
         (Move(at=SetKey(phase=Phase.AFTER, point=12), orientation=1, pose=POSE), "after-V12/o01/move"),
         (Standstill(at=P2), "P2/standstill"),
         (Repeat(at=P2), "P2/repeat"),
+        (Probe(at=P2, moved_mm=(1.0, 0.0, 0.0)), "P2/probe"),
+        (Try(at=P2), "P2/try"),
         (Compute(kind="assess noise"), "assess noise"),
         (Compute(kind="identify"), "identify"),
         (Compute(kind="roll back"), "roll back"),
@@ -106,6 +110,8 @@ some_step: st.SearchStrategy[Any] = st.one_of(
     ),
     st.builds(Standstill, at=set_key),
     st.builds(Repeat, at=set_key),
+    st.builds(Probe, at=set_key, moved_mm=st.tuples(*[number] * 3)),
+    st.builds(Try, at=set_key),
 )
 reading = st.builds(
     events.Reading,
@@ -217,6 +223,8 @@ some_event: st.SearchStrategy[Any] = st.one_of(
         counts=st.lists(st.tuples(*[st.integers()] * 6), max_size=2).map(tuple),
     ),
     st.builds(events.ReferenceRepeated, at=set_key, reading=reading),
+    st.builds(events.GaugesProbed, at=set_key, moved_mm=st.tuples(*[number] * 3), reading=reading),
+    st.builds(events.GaugesTried, at=set_key, response=st.tuples(*[st.tuples(*[number] * 3)] * 3)),
     st.builds(events.NoiseMeasured, at=set_key, noise=measured_noise),
     st.builds(events.SetClosed, at=set_key, drift_mm=three),
     st.builds(events.SetInvalidated, at=set_key, reason=text),
@@ -297,6 +305,6 @@ KINDS = (
     *("started", "begun", "arrived", "placed", "sampled", "refused", "closed", "voided", "identified"),
     *("lent", "taken back", "proposed", "committed", "judged", "rolled back", "interrupted", "ended"),
     *("located", "undone", "confirmed", "paused", "resumed", "failed", "declined", "tripped"),
-    *("accepted", "stood", "repeated", "noise measured"),
+    *("accepted", "stood", "repeated", "probed", "tried", "noise measured"),
 )
 """Journals on disk say these words: they must never change."""

@@ -1,0 +1,111 @@
+"""How far the ball may go from where the gauges were zeroed, on either side of each gauge.
+
+A plunger has the same travel to both sides of its middle. Where it stood when the gauges were zeroed says
+how much of that is left on each side. Three gauges mounted together have the ball in the middle of their
+plates when all plungers are in the middle of their travels, so the same place tells how far the ball may go
+on the plates. Lengths are in mm, along base x, y, z.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from hexacell.kinematics.rotations import Array, Mask
+
+Three = tuple[float, float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class GaugeRoom:
+    """The deviations that gauges allow: from ``lower``, which is negative, to ``upper``."""
+
+    lower: Three
+    upper: Three
+
+    @classmethod
+    def symmetric(cls, distance_mm: float) -> GaugeRoom:
+        """The same distance on all sides."""
+        return cls((-distance_mm,) * 3, (distance_mm,) * 3)
+
+    def __str__(self) -> str:
+        """In words: what is left to both sides, along x, y and z where it differs."""
+        if self == GaugeRoom.symmetric(self.upper[0]):
+            return f"{self.upper[0]:g} mm"
+        sides = zip("xyz", self.lower, self.upper, strict=True)
+        return ", ".join(f"{axis} {lower:+.2f} to {upper:+.2f} mm" for axis, lower, upper in sides)
+
+    @property
+    def smallest_mm(self) -> float:
+        """What is left on the narrowest side."""
+        return min(*self.upper, *(-one for one in self.lower))
+
+    def holds(self, deviations: Array, spread: Array | float = 0.0, share: float = 1.0) -> Mask:
+        """Which deviations (..., 3), with a spread to both sides, stay within a share of the room."""
+        above = deviations + spread <= share * np.array(self.upper)
+        below = deviations - spread >= share * np.array(self.lower)
+        within: Mask = np.asarray((above & below).all(axis=-1))
+        return within
+
+    def widened(self, margin_mm: float) -> GaugeRoom:
+        """The same with a margin on all sides."""
+        x, y, z = (one - margin_mm for one in self.lower)
+        u, v, w = (one + margin_mm for one in self.upper)
+        return GaugeRoom((x, y, z), (u, v, w))
+
+
+@dataclass(frozen=True, slots=True)
+class GaugeTravel:
+    """The travels of the gauges x, y and z, and what is known of their plungers' places.
+
+    Attributes:
+        plate_mm: how far the ball may go from the middle of the plates, and from the gauges' zero.
+        half_mm: of each gauge half of its measuring range.
+        middle_mm: what each shows in the middle of its travel, along its base axis; none where its display
+            does not tell.
+        mounting_mm: how far from the middle a plunger may stand when the gauges are zeroed.
+    """
+
+    plate_mm: float
+    half_mm: Three
+    middle_mm: tuple[float | None, float | None, float | None]
+    mounting_mm: float
+
+    def places(self, shown_mm: Three) -> tuple[float | None, ...]:
+        """How far each plunger stands from the middle of its travel; none where nobody knows.
+
+        ``shown_mm`` is what the gauges show along their base axes.
+        """
+        pairs = zip(shown_mm, self.middle_mm, strict=True)
+        return tuple(None if middle is None else shown - middle for shown, middle in pairs)
+
+    def room(self, zero_mm: Three | None = None) -> GaugeRoom:
+        """The room of gauges that showed ``zero_mm`` when they were zeroed.
+
+        Before they are, gauges whose display tells their place are expected in the middle. The others may
+        be as far from it as ``mounting_mm``, wherever they are.
+        """
+        places = self.places((0.0, 0.0, 0.0) if zero_mm is None else zero_mm)
+        sides = [
+            self._sides(half, *self._known(place, is_zeroed=zero_mm is not None))
+            for half, place in zip(self.half_mm, places, strict=True)
+        ]
+        (a, b, c), (u, v, w) = zip(*sides, strict=True)
+        return GaugeRoom((a, b, c), (u, v, w))
+
+    @property
+    def sure_room(self) -> GaugeRoom:
+        """The room that every station has whose plungers stand no farther from the middle than allowed."""
+        x, y, z = (self._sides(half, -self.mounting_mm, self.mounting_mm)[1] for half in self.half_mm)
+        return GaugeRoom((-x, -y, -z), (x, y, z))
+
+    def _known(self, place: float | None, *, is_zeroed: bool) -> tuple[float, float]:
+        """From where to where the place of a plunger may be."""
+        if place is None:
+            return -self.mounting_mm, self.mounting_mm
+        return (place, place) if is_zeroed else (0.0, 0.0)
+
+    def _sides(self, half_mm: float, lowest: float, highest: float) -> tuple[float, float]:
+        reach = min(self.plate_mm, half_mm)
+        return max(-self.plate_mm, -reach - lowest), min(self.plate_mm, reach - highest)

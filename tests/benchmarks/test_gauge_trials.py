@@ -1,0 +1,93 @@
+"""Gauges are tried at every station: mistakes are named at the first one, healthy gauges never.
+
+Each run is the real procedure with a robot drawn within the tolerances, on devices without wires.
+``TRIALS`` in the environment says how many runs there are, with mistakes and without; a sample of both is
+in ``make test`` (``tests/procedures/runs/test_gauge_trial.py``). The time is that of the simulated cell.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import os
+from collections.abc import Iterator
+from itertools import cycle, islice
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from hexacell.errors import HexacellError
+from procedures.calibration.mounting import MountingError
+from procedures.journal.journal import read_journal
+from procedures.run import events
+from tests.procedures.rig import new_rig
+from tests.procedures.runs.gauge_mistakes import MISTAKES, drawn_robots, make_mistake
+from tests.small_cell import choose_among_few
+
+pytestmark = pytest.mark.benchmark
+
+TRIALS = int(os.environ.get("TRIALS", "100"))
+
+
+def rigs(folder: Path, seed: int) -> Iterator[Any]:
+    """Runs of drawn robots, with gauges and encoders as noisy as the bundled cell states."""
+    noise: dict[str, Any] = {f"simulation__{one}__noise_mm": 0.01 for one in ("gauges", "encoders")}
+    noise |= {"noise__gauge_mm": 0.01, "noise__encoder_mm": 0.01, "stations__trial_mm": 1.0}
+    first = new_rig(folder)
+    for number, geometry in enumerate(drawn_robots(first.cell.settings, seed)):
+        place = folder / str(number)
+        place.mkdir()
+        yield new_rig(place, simulation__geometry=geometry, **noise)
+
+
+def carried_out(rig: Any, *listeners: Any) -> tuple[str, list[events.Event]]:
+    """What ended a run early, if anything did, and its journal."""
+    try:
+        asyncio.run(rig.run(*listeners))
+    except MountingError as error:
+        return str(error), list(read_journal(rig.folder.journal))
+    except HexacellError:
+        pass  # so few records do not calibrate every robot
+    return "", list(read_journal(rig.folder.journal))
+
+
+def test_every_mistake_is_named_before_the_second_station(say, tmp_path, monkeypatch) -> None:
+    choose_among_few(monkeypatch)
+    named = right = 0
+    for rig, mistake in zip(islice(rigs(tmp_path, 21), TRIALS), cycle(MISTAKES), strict=False):
+        make_mistake(rig, mistake)
+        problem, history = carried_out(rig)
+        stations = {event.at for event in history if isinstance(event, events.RecordTaken)}
+        named += bool(problem) and len(stations) == 1
+        right += MISTAKES[mistake] in problem
+    say("mistakes named at the first station", f"{named} of {TRIALS}", "all")
+    say("of these by their right name", f"{right} of {TRIALS}", "0.99")
+    assert named == TRIALS
+    assert right >= 0.99 * TRIALS
+
+
+def test_no_healthy_gauge_is_blamed(say, tmp_path, monkeypatch) -> None:
+    choose_among_few(monkeypatch)
+    blamed, seconds = [], []
+    for rig in islice(rigs(tmp_path, 22), TRIALS):
+        begun_s = [0.0]
+
+        def timed(event: events.Event, _: object, rig=rig, begun_s=begun_s) -> None:
+            if isinstance(event, events.RecordTaken):
+                begun_s[0] = rig.clock.now()
+            if isinstance(event, events.GaugesTried):
+                seconds.append(rig.clock.now() - begun_s[0])
+
+        problem, _ = carried_out(rig, timed)
+        blamed += [problem] if problem else []
+    say("healthy runs in which a gauge is blamed", f"{len(blamed)} of {TRIALS}", "none")
+    say("stations at which gauges were tried in these", str(len(seconds)), "")
+    say(
+        "a trial takes, s of the cell's time: median, most",
+        f"{np.median(seconds):.1f}, {max(seconds):.1f}",
+        "median, most",
+    )
+    assert not blamed
+    assert len(seconds) >= 3 * TRIALS
+    assert np.median(seconds) < 10.0

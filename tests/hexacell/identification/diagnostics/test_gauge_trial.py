@@ -1,0 +1,93 @@
+"""Gauges judged by what they showed after small known moves, on robots drawn within their tolerances."""
+
+from __future__ import annotations
+
+from itertools import permutations, product
+
+import numpy as np
+import pytest
+
+from hexacell.cell.bundled import bundled_config
+from hexacell.cell.loader import load_cell
+from hexacell.identification.diagnostics.gauge_trial import (
+    GaugeMistake,
+    TrialFinding,
+    judge_response,
+    response_of,
+)
+from hexacell.kinematics import rotations
+from hexacell.kinematics.pose import Pose
+from hexacell.robot_model import robot_of
+from hexacell.virtual_robot import VirtualRobot, robots_within_tolerances
+
+DEAD, INCHES, REVERSED, EXCHANGED = GaugeMistake
+NOISE_MM = 0.014
+HAND_DEG = 2.0
+
+
+@pytest.fixture(scope="module")
+def responses() -> np.ndarray:
+    """(n, 3, 3) of drawn robots at the cell's points, by gauges off their axes, with noise."""
+    cell = load_cell(bundled_config("simulated-hexaglide"))
+    robot, random = robot_of(cell), np.random.default_rng(4)
+    found = []
+    for point in cell.settings.identification.points[:3]:
+        poses = [Pose(*point), *(Pose(*(np.array(point) + move)) for move in np.eye(3))]
+        commands = robot.from_commands(poses)
+        for truth in robots_within_tolerances(robot, 60, seed=11):
+            virtual = VirtualRobot(robot, truth)
+            if not virtual.can_take(commands).all():
+                continue
+            positions = virtual.actual_poses(commands).poses.positions
+            triad = rotations.from_vector(np.radians(HAND_DEG) * random.standard_normal(3))
+            shown = (positions[1:] - positions[0]) @ triad.T + NOISE_MM * random.standard_normal((3, 3))
+            found.append(response_of(np.eye(3), shown))
+    return np.array(found)
+
+
+def test_healthy_gauges_pass_on_every_robot(responses) -> None:
+    assert len(responses) > 150
+    assert np.abs(responses - np.eye(3)).max() > 0.5, "some robots go elsewhere"
+    assert not [judge_response(response) for response in responses if judge_response(response)]
+
+
+@pytest.mark.parametrize("pair", [(0, 1), (0, 2), (1, 2)])
+def test_exchanged_gauges_are_named_on_every_robot(responses, pair) -> None:
+    order = [0, 1, 2]
+    order[pair[0]], order[pair[1]] = pair[1], pair[0]
+    findings = [judge_response(response[order]) for response in responses]
+    assert all(findings)
+    # Where the ball goes at 45 degrees to its command, exchanged and reversed gauges show the same.
+    assert sum(found != (TrialFinding(EXCHANGED, pair),) for found in findings) <= 1
+
+
+@pytest.mark.parametrize("gauge", [0, 1, 2])
+@pytest.mark.parametrize(
+    ("factor", "mistake"), [(-1.0, REVERSED), (1.0 / 25.4, INCHES), (0.0, DEAD), (0.004, DEAD)]
+)
+def test_a_single_gauge_is_named_on_every_robot(responses, gauge, factor, mistake) -> None:
+    findings = []
+    for response in responses:
+        false = response.copy()
+        false[gauge] *= factor
+        findings.append(judge_response(false))
+    assert all(findings)
+    assert sum(found != (TrialFinding(mistake, (gauge,)),) for found in findings) <= 1
+
+
+def test_all_assignments_with_all_signs_are_told_apart() -> None:
+    for axes, signs in product(permutations(range(3)), product((1.0, -1.0), repeat=3)):
+        findings = judge_response(np.diag(signs) @ np.eye(3)[list(axes)])
+        named = {finding.mistake: finding.gauges for finding in findings}
+        assert named.get(EXCHANGED, ()) == tuple(n for n, axis in enumerate(axes) if n != axis)
+        assert named.get(REVERSED, ()) == tuple(n for n, sign in enumerate(signs) if sign < 0)
+
+
+def test_three_dead_gauges_are_all_named() -> None:
+    assert judge_response(np.zeros((3, 3))) == (TrialFinding(DEAD, (0, 1, 2)),)
+
+
+def test_the_response_is_by_gauge_and_axis_whatever_the_moves() -> None:
+    response = np.array([[1.0, 0.1, 0.0], [0.0, 0.9, 0.2], [0.3, 0.0, 1.1]])
+    moved = np.diag([1.0, -1.0, 0.5])
+    assert response_of(moved, moved @ response.T) == pytest.approx(response)

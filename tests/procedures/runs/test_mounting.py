@@ -1,0 +1,77 @@
+"""Gauges that are zeroed far from the middle of their travel: mounted again, or refused in words."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+
+from hexacell.cell.recovery import Action, FailureKind
+from hexacell.errors import ExitCode
+from procedures.calibration.mounting import MountingError
+from procedures.engine.recovery import RecoveryPolicy
+from procedures.run import events
+from tests.procedures.runs.listening import happened, on
+
+OFF_MM = 3.8
+
+
+def off_the_middle(gauge: Any, off_mm: float) -> Callable[[], None]:
+    """Clamp a gauge by its stem elsewhere; gives how to put it right."""
+    right = gauge.shown
+    gauge.shown = lambda: right() + off_mm
+
+    def correct() -> None:
+        gauge.shown = right
+
+    return correct
+
+
+async def test_without_a_person_a_gauge_off_its_middle_ends_the_run_in_words(make_rig) -> None:
+    rig = make_rig()
+    off_the_middle(rig.gauges[1], -OFF_MM)
+    with pytest.raises(MountingError, match=r"stands [34]\.\d mm from the middle of its travel") as refusal:
+        await rig.run()
+    assert refusal.value.exit_code is ExitCode.HARDWARE
+    assert refusal.value.subject == "gauge y"
+    assert "towards -y" in str(refusal.value)
+    assert not happened(rig, events.RecordTaken)
+
+
+async def test_a_person_is_told_how_to_move_the_gauge_and_the_set_begins_again(make_rig) -> None:
+    rig = make_rig(stations__placement="by-hand")
+    correct = off_the_middle(rig.gauges[0], OFF_MM)
+    rig.operator.decisions = [Action.REDO_SET]
+    policy = RecoveryPolicy.of(rig.cell.settings.recovery, attended=True)
+    ended = await rig.run(on(events.Failed, correct), policy=policy)
+    assert ended.exit_code == ExitCode.DONE
+    (problem,) = rig.operator.problems
+    assert "Move the gauge by " in problem
+    assert "along +x" in problem
+    assert rig.operator.placed[:3] == [1, 1, 2], "the gauges were placed again"
+    (failed,) = happened(rig, events.Failed)
+    assert failed.failure is FailureKind.MOUNTING
+
+
+async def test_a_gauge_that_does_not_tell_its_place_is_not_refused(make_rig) -> None:
+    rig = make_rig()
+    gauges = tuple(gauge.model_copy(update={"middle_mm": None}) for gauge in rig.cell.settings.gauges)
+    blind = make_rig(gauges=gauges, stations__mounting_mm=0.5)
+    off_the_middle(blind.gauges[1], -1.5)
+    ended = await blind.run()
+    assert ended.exit_code == ExitCode.DONE
+    sampled = [event for event in happened(blind, events.RecordTaken) if event.orientation > 1]
+    assert np.abs([event.deviation_mm for event in sampled]).max() <= 4.5
+
+
+async def test_no_record_leaves_the_room_of_gauges_zeroed_off_the_middle(make_rig) -> None:
+    rig = make_rig(simulation__gauges__placing_mm=0.0)
+    for gauge, off_mm in zip(rig.gauges, (0.9, -0.9, 0.9), strict=True):
+        off_the_middle(gauge, off_mm)
+    ended = await rig.run()
+    assert ended.exit_code == ExitCode.DONE
+    assert not happened(rig, events.RecordRejected)
+    for taken in happened(rig, events.RecordTaken):
+        assert np.abs(taken.reading.gauges_mm).max() <= 5.0, "beyond the plates"

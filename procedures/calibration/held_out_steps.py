@@ -91,10 +91,11 @@ class HeldOutSteps:
 
     def _in_set(self, state: RunState, key: SetKey) -> Step:
         measured = state.set(key)
-        if measured.rejections and key.phase is Phase.AFTER:
-            return self._back(state, key) or Compute(kind="judge")
         require_zero(state, key)
-        if measured.rejections:
+        if measured.rejections and key.phase is Phase.AFTER:
+            if step := self._after_rejection(state, key):
+                return step
+        elif measured.rejections:
             raise TravelError(f"{key}: the ball left the gauges' travel at a held-out pose")
         if measured.reference_unverified:
             return self.sets.at_reference(state, key) or self._to_reference(state, key)
@@ -119,6 +120,22 @@ class HeldOutSteps:
             return move
         return self.sets.paths.towards(state, move, self._ball(state, key))
 
+    def _after_rejection(self, state: RunState, key: SetKey) -> Step | None:
+        """What follows when the ball has left the travel with the new geometry; None if its pose is next.
+
+        A reading that could not be taken is no verdict: a gauge may have slipped. If the reference is as it
+        was, the pose is taken again, and the second time it is a verdict.
+        """
+        measured = state.set(key)
+        if measured.rejections > 1:
+            return self._back(state, key) or Compute(kind="judge")
+        if not measured.reference_unverified:
+            return None
+        try:
+            return self.sets.at_reference(state, key) or self._to_reference(state, key)
+        except LimitError:
+            return Compute(kind="judge")
+
     def _back(self, state: RunState, key: SetKey) -> Move | None:
         """The move to the reference after the ball has left the travel; none there, or where none is found.
 
@@ -126,7 +143,7 @@ class HeldOutSteps:
         may belong to no pose of the old geometry. One attempt is made.
         """
         measured = state.set(key)
-        if not measured.samples or measured.rejections > 1 or state.at_pose == (key, 1):
+        if not measured.samples or measured.rejections > 2 or state.at_pose == (key, 1):
             return None
         try:
             return self._to_reference(state, key)

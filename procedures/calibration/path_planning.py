@@ -21,6 +21,9 @@ from hexacell.robot_model import Robot
 from procedures.run.state import RunState
 from procedures.run.steps import Move, SetKey, SixNumbers
 
+ELSEWHERE = 3.0
+"""Of the gauges' room: at a ball that is farther from their zero they surely are not."""
+
 
 class NoSafePath(LimitError):
     """No checked straight line starts at the robot's position; nothing moved."""
@@ -39,6 +42,23 @@ class RunPathPlanner:
     def towards(self, state: RunState, goal: Move, reference: Array | None = None) -> Move:
         """The next move towards ``goal``: ``goal`` itself if the straight line to it is clear.
 
+        See :meth:`_next_move`. After an interruption the robot may be far from the set's gauges.
+
+        Raises:
+            NoSafePath: there is no path.
+        """
+        if state.target is None:
+            return goal
+        start = self._command(state.target)
+        belief = self._belief(state).zeroed_at(state.zero_shown(goal.at))
+        move = self._next_move(state, goal, belief, reference)
+        if reference is None or _is_inside(belief, start, reference, ELSEWHERE):
+            return move
+        return move.model_copy(update={"from_elsewhere": True})
+
+    def _next_move(self, state: RunState, goal: Move, belief: RobotBelief, reference: Array | None) -> Move:
+        """The next move towards ``goal`` from where the robot was commanded or located last.
+
         With gauges zeroed where the ball was at ``reference`` (3,), mm, the ball stays inside their
         travel on the path, unless it is outside already. Intermediate poses are level ones, poses that
         the set has visited, and waypoints.
@@ -46,11 +66,9 @@ class RunPathPlanner:
         Raises:
             NoSafePath: there is no path.
         """
-        if state.target is None:
-            return goal
+        assert state.target is not None  # noqa: S101 - otherwise there is nothing to plan from
         via = self._intermediate(state, goal)
         start, end = self._command(state.target), self._command(goal.pose)
-        belief = self._belief(state).zeroed_at(state.zero_shown(goal.at))
         if reference is not None and not _is_inside(belief, start, reference):
             reference = None
         route = find_route(belief, start, end, [self._command(pose) for _, pose in via], reference)
@@ -121,9 +139,9 @@ class RunPathPlanner:
             return self.robot.belief()
 
 
-def _is_inside(belief: RobotBelief, command: PoseBatch, reference: Array) -> bool:
+def _is_inside(belief: RobotBelief, command: PoseBatch, reference: Array, share: float = 1.0) -> bool:
     ball = ball_position(belief, command)
-    return ball is not None and bool(belief.limits.within_travel(ball - reference))
+    return ball is not None and bool(belief.limits.within_travel(ball - reference, share=share))
 
 
 def _level(pose: SixNumbers) -> SixNumbers:

@@ -140,7 +140,7 @@ def _held_out(settings: CellSettings, state: RunState) -> HeldOut:
         records=MeasurementSet(tuple(records)),
         before=state.held_out(Phase.BEFORE),
         after=state.held_out(Phase.AFTER),
-        left_travel=bool(state.rejections(Phase.AFTER)),
+        left_travel=state.left_travel(Phase.AFTER),
         length=_length_measurements(settings, state) if state.samples(Phase.LENGTH) else None,
     )
 

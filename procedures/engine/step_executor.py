@@ -153,9 +153,11 @@ class StepExecutor:
         try:
             await self.guards.move(step, state, lambda: self._commanded(step))
         except GuardTripped as tripped:
-            if step.at.phase is not Phase.AFTER or not tripped.trip.is_about_the_ball:
+            measured = state.set(step.at)
+            is_there = not measured.reference_unverified or measured.rejections > 0
+            if step.at.phase is not Phase.AFTER or not tripped.trip.is_about_the_ball or not is_there:
                 raise
-            # The new geometry takes the ball off its plate: that is a verdict, and it is rolled back.
+            # The new geometry takes the ball off its plate: the second time that is a verdict.
             self.guards.supervisor.clear()
             return events.RecordRejected(at=step.at, orientation=step.orientation, reason=str(tripped))
         return events.Arrived(at=step.at, orientation=step.orientation, pose=step.pose)

@@ -167,7 +167,7 @@ class Guards:
 
     def _watched_gauges(self, step: Move, state: RunState) -> tuple[WatchedGauge, ...]:
         zero = state.zero(step.at)
-        if zero is None or not state.set(step.at).samples:
+        if zero is None or not state.set(step.at).samples or step.from_elsewhere:
             return ()
         reference = zero.gauges_mm
         return tuple(

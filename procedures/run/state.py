@@ -195,9 +195,10 @@ class RunState:
                     shown.setdefault(temperature.name, []).append(temperature.celsius)
         return max((max(values) - min(values) for values in shown.values()), default=None)
 
-    def rejections(self, phase: Phase) -> int:
-        """How many records of a phase were rejected."""
-        return sum(value.rejections for key, value in self.sets.items() if key.phase is phase)
+    def left_travel(self, phase: Phase) -> bool:
+        """Whether the ball left the gauges' travel in a set of a phase that could not be completed."""
+        of_phase = [value for key, value in self.sets.items() if key.phase is phase]
+        return any(value.rejections and not value.closed for value in of_phase)
 
     def held_out(self, phase: Phase) -> list[tuple[float, float, float]]:
         """Deviations, mm, at the held-out poses that are measured before and after; no references."""
@@ -312,7 +313,9 @@ def _rejected(state: RunState, event: events.RecordRejected) -> RunState:
     rejected = state.set(event.at).with_rejection(event.orientation)
     is_on_the_way = event.at.phase is Phase.AFTER and state.at_pose != (event.at, event.orientation)
     left = _without_position(state) if is_on_the_way else replace(state, at_pose=None)
-    return _with_set(left, event.at, rejected)
+    # With the new geometry it may be a verdict, so it is verified first that the gauges are as they were.
+    is_verified = event.at.phase is not Phase.AFTER or rejected.rejections > 1
+    return _with_set(left, event.at, rejected if is_verified else rejected.unverified())
 
 
 def _invalidated(state: RunState, at: SetKey) -> RunState:

@@ -97,10 +97,14 @@ class Locate(BaseStep):
 
 
 class Move(StepAtPose):
-    """Send the robot to a pose. Orientation 0 is a waypoint, at which nothing is measured."""
+    """Send the robot to a pose. Orientation 0 is a waypoint, at which nothing is measured.
+
+    With ``from_elsewhere`` it comes from where the set's gauges are not, as to a set's first reference.
+    """
 
     kind: Literal["move"] = "move"
     expected: Expectation | None = None
+    from_elsewhere: bool = False
 
     @property
     def target(self) -> Pose:

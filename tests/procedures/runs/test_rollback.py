@@ -8,7 +8,7 @@ import pytest
 
 from drivers.errors import GaugeAtEnd
 from hexacell.decision import Verdict
-from hexacell.errors import DeviceError, ExitCode, FileError, WriteBackUndone
+from hexacell.errors import DeviceError, ExitCode, FileError, LimitError, WriteBackUndone
 from procedures.run import events
 from procedures.run.questions import UnattendedOperator
 from procedures.run.state import fold
@@ -96,8 +96,8 @@ def raise_(error: BaseException) -> None:
     raise error
 
 
-@pytest.mark.parametrize("key", ["after-V1/o01/sample", "after-V1/o02/sample", "after-V2/o03/sample"])
-async def test_a_ball_outside_the_travel_at_verification_causes_a_rollback(
+@pytest.mark.parametrize("key", ["after-V1/o02/sample", "after-V2/o03/sample"])
+async def test_a_ball_outside_the_travel_twice_at_verification_causes_a_rollback(
     recording, replayed, key: str
 ) -> None:
     rig = replayed(recording.until(events.Proposed))
@@ -107,6 +107,36 @@ async def test_a_ball_outside_the_travel_at_verification_causes_a_rollback(
     assert happened(rig, events.ResultValidated)[0].verdict is Verdict.FAIL
     assert happened(rig, events.RolledBack)
     assert rig.config == recording.config_before
+
+
+@pytest.mark.parametrize("key", ["after-V1/o02/sample", "after-V2/o03/sample"])
+async def test_a_reading_that_could_not_be_taken_once_is_taken_again(recording, replayed, key: str) -> None:
+    """The gauges show that their zero is as it was; the pose is measured then."""
+    rig = replayed(recording.until(events.Proposed))
+    at_ends = [GaugeAtEnd("is at an end of its travel", subject="gauge x")]
+
+    def once() -> None:
+        rig.gauges[0].failures.extend(at_ends)
+        at_ends.clear()
+
+    assert (await rig.run(before_sampling(key, once))).exit_code == ExitCode.DONE
+    (refused,) = happened(rig, events.RecordRejected)
+    assert f"{refused.at}/o{refused.orientation:02d}/sample" == key
+    assert [event.at for event in happened(rig, events.ReferenceConfirmed)] == [refused.at]
+    assert happened(rig, events.ResultValidated)[0].verdict is Verdict.PASS
+    assert rig.config == recording.config_after
+
+
+async def test_gauges_that_cannot_be_zeroed_are_no_verdict_on_the_new_geometry(recording, replayed) -> None:
+    rig = replayed(recording.until(events.Proposed))
+    at_end = GaugeAtEnd("is at an end of its travel", subject="gauge x")
+    fault = before_sampling("after-V1/o01/sample", lambda: rig.gauges[0].failures.append(at_end))
+    with pytest.raises(LimitError, match="cannot be zeroed"):
+        await rig.run(fault)
+    assert not happened(rig, events.ResultValidated)
+    assert rig.config == recording.config_before, "nothing unverified stays"
+    assert (await rig.run()).exit_code == ExitCode.DONE
+    assert rig.config == recording.config_after
 
 
 async def test_a_failed_reload_restores_the_config(recording, replayed) -> None:

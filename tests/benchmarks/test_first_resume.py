@@ -1,0 +1,108 @@
+"""A first resume must do: killed at random instants, runs of the bundled, noisy cell are resumed once.
+
+The program runs as it is installed, in processes of its own. ``KILLS`` in the environment says how many
+runs there are; the target is for 200. A sample on a small cell without noise is in ``make test``
+(``tests/faults/test_killed_at_random.py``).
+"""
+
+from __future__ import annotations
+
+import os
+import random
+import re
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections import Counter
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+from hexacell.cell.bundled import bundled_config
+from procedures.journal.journal import read_journal
+from tests.faults.matrix import step_of
+from tests.faults.test_killed_at_random import instants
+
+pytestmark = pytest.mark.benchmark
+
+KILLS = int(os.environ.get("KILLS", "10"))
+
+SOONER = 0.97
+"""A run that was over at its instant is killed sooner the next time."""
+
+
+@dataclass(frozen=True)
+class Ended:
+    """How a process ended, after how long, and what it said last."""
+
+    code: int
+    seconds: float
+    words: str
+
+    @property
+    def passed(self) -> bool:
+        return self.code == 0 and self.words.splitlines()[-1].endswith(": pass")
+
+
+def site(folder: Path, seed: int) -> Path:
+    """The bundled cell in a folder of its own, with noise of its own."""
+    folder.mkdir()
+    bundled = bundled_config("simulated-hexaglide")
+    shutil.copy(bundled.with_name("simulated-hexaglide.controller.toml"), folder)
+    text = re.sub(r"(?m)(?<=^\[simulation\]\nseed = )\d+", str(seed), bundled.read_text())
+    (folder / "cell.toml").write_text(text)
+    return folder / "cell.toml"
+
+
+def hexacell(cell: Path, *arguments: str, dies_after_s: float | None = None) -> Ended:
+    """``hexacell run`` to its end, or to the instant at which it is killed."""
+    words = [sys.executable, "-m", "hexacell", "run", str(cell), "--unattended", "--mode", "optimise"]
+    begun = time.monotonic()
+    with subprocess.Popen(
+        [*words, *arguments],
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+    ) as process:
+        try:
+            said, _ = process.communicate(timeout=dies_after_s)
+        except subprocess.TimeoutExpired:
+            process.send_signal(signal.SIGKILL)
+            said, _ = process.communicate()
+    return Ended(process.returncode, time.monotonic() - begun, said)
+
+
+def killed(folder: Path, seed: int, share: float, duration_s: float) -> tuple[Path, float]:
+    """A cell whose run was killed at a share of its duration, once it was begun and before it was over."""
+    while True:
+        shutil.rmtree(folder, ignore_errors=True)
+        cell = site(folder, seed)
+        ended = hexacell(cell, dies_after_s=share * duration_s)
+        if ended.code != -signal.SIGKILL:
+            duration_s = SOONER * min(duration_s, ended.seconds)
+        elif any(journal.read_bytes().count(b"\n") for journal in folder.glob("runs/*/*/journal.jsonl")):
+            return cell, duration_s
+        else:
+            share += 0.02
+
+
+def test_a_first_resume_ends_every_killed_run_with_a_pass(say, tmp_path) -> None:
+    chance = random.Random(9)
+    undisturbed = hexacell(site(tmp_path / "undisturbed", 1))
+    assert undisturbed.passed, undisturbed.words
+    duration_s, others, steps = undisturbed.seconds, [], Counter[str]()
+    for share in instants(KILLS):
+        cell, duration_s = killed(tmp_path / "cell", chance.randrange(10**6), share, duration_s)
+        [journal] = cell.parent.glob("runs/*/*/journal.jsonl")
+        step = step_of(read_journal(journal))
+        steps[step] += 1
+        resumed = hexacell(cell, "--resume", str(journal.parent))
+        if not resumed.passed:
+            others.append(f"{share:.3f}, {step}: {resumed.code}, {resumed.words.splitlines()[-1:]}")
+    say("killed runs that the first resume ends with a pass", f"{KILLS - len(others)} of {KILLS}", "all")
+    say("killed in", ", ".join(f"{step} {count}" for step, count in steps.most_common(6)), "")
+    assert not others, "\n".join(others)

@@ -78,9 +78,7 @@ class Guards:
         pollers = self._pollers(controller=True, gauges=gauges)
         limits = self._limits(zero_mm=state.zero_shown(step.at))
         try:
-            reached = await self.supervisor.supervise(
-                lambda: self._go(step), pollers, limits, STOP_GRACE_S
-            )
+            reached = await self.supervisor.supervise(lambda: self._go(step), pollers, limits, STOP_GRACE_S)
         except MotionInterrupted:
             # Where the forward kinematics failed, the robot is not where this error says that it stopped.
             await self.locate()

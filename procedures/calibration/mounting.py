@@ -17,25 +17,29 @@ from hexacell.kinematics.rotations import Array
 from hexacell.robot_model import gauge_travel_of
 from procedures.run.steps import ThreeNumbers
 
-MISTAKES: Mapping[GaugeMistake, tuple[str, str]] = {
+MISTAKES: Mapping[GaugeMistake, tuple[str, str, str]] = {
     GaugeMistake.DEAD: (
         "does not follow the ball",
-        "See whether its plunger touches the ball and is free, and whether its display changes",
+        "do not follow the ball",
+        "See whether the plunger touches the ball and is free, and whether the display changes",
     ),
     GaugeMistake.INCHES: (
         "seems to answer in inches",
-        "Press its in/mm key; if it answers in mm, see whether its plunger is free",
+        "seem to answer in inches",
+        "Press the in/mm key; if it answers in mm, see whether its plunger is free",
     ),
     GaugeMistake.EXCHANGED: (
         "answers on another axis",
-        "Exchange the cables, or correct port, channel or axis in the cell file and begin a new run",
+        "are exchanged",
+        "Exchange their cables, or correct port, channel or axis in the cell file and begin a new run",
     ),
     GaugeMistake.REVERSED: (
         "counts the wrong way",
-        "Change its counting direction, or correct its sign in the cell file and begin a new run",
+        "count the wrong way",
+        "Change the counting direction, or correct sign in the cell file and begin a new run",
     ),
 }
-"""What each mistake is called, and what to do."""
+"""What each mistake of one gauge and of several is called, and what to do."""
 
 
 class MountingError(DeviceError):
@@ -94,7 +98,8 @@ def require_response(settings: CellSettings, moved_mm: Array, shown_mm: Array) -
 def _mistake(finding: TrialFinding, gauges: Sequence[GaugeSettings], response: Array) -> MountingError:
     """What is wrong with some gauges, what they showed, and what to do."""
     named = [gauges[number] for number in finding.gauges]
-    problem, action = MISTAKES[finding.mistake]
+    of_one, of_several, action = MISTAKES[finding.mistake]
+    problem = of_several if len(named) > 1 else of_one
     shown = "; ".join(f"{gauges[n].name} showed {_numbers(response[n])}" for n in finding.gauges)
     return MountingError(
         f"{problem}: while the ball moved by 1 mm along x, y and z in turn, {shown} mm",

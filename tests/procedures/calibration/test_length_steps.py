@@ -347,3 +347,20 @@ async def test_a_run_checks_the_scale_before_its_verdict(make_rig) -> None:
     assert accuracy.length.long_um_m == pytest.approx(1000.0, abs=accuracy.length.expanded_um_m)
     assert accuracy.position.value > 0.12
     assert rig.engine.state.judged.verdict is not Verdict.PASS
+
+
+async def test_gauges_are_tried_at_every_mounting(make_length_rig) -> None:
+    rig = make_length_rig(stations__trial_mm=1.0)
+    found = await stated(rig)
+    assert found.verdict is Verdict.PASS
+    history = read_journal(rig.folder.journal)
+    assert [event.at for event in history if isinstance(event, events.GaugesTried)] == MOUNTINGS
+
+
+async def test_gauges_mounted_the_wrong_way_round_are_named_at_once(make_length_rig) -> None:
+    fixture = {"simulation__fixture__turned_deg": 180.0}
+    rig = make_length_rig(stations__trial_mm=1.0, **fixture)
+    with pytest.raises(HexacellError, match="gauges x, y: count the wrong way"):
+        await rig.run()
+    history = read_journal(rig.folder.journal)
+    assert {event.at for event in history if isinstance(event, events.RecordTaken)} == set(MOUNTINGS[:2])

@@ -217,6 +217,21 @@ async def test_a_move_that_begins_off_the_plate_may_lead_back_onto_it(scene) -> 
     await creeping
 
 
+@pytest.mark.parametrize("from_elsewhere", [False, True])
+async def test_gauges_are_not_monitored_on_the_return_from_elsewhere(scene, from_elsewhere: bool) -> None:
+    """There a gauge may show something, and be at its end on the way."""
+    stage = await reference(scene())
+    back = move(2).model_copy(update={"from_elsewhere": from_elsewhere})
+    moving = asyncio.ensure_future(stage.do(back))
+    await stage.rig.clock.sleep(0.3)
+    stage.at_end.add("x")
+    if from_elsewhere:
+        assert isinstance(await moving, events.Arrived)
+        return
+    with pytest.raises(GuardTripped, match="gauge x"):
+        await moving
+
+
 async def test_a_move_that_begins_at_the_end_of_a_plunger_may_lead_away_from_it(scene) -> None:
     stage = await reference(scene())
     stage.at_end.add("x")

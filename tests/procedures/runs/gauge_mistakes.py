@@ -21,7 +21,7 @@ MM_PER_INCH = 25.4
 PAIRS = (("x", "y"), ("x", "z"), ("y", "z"))
 
 MISTAKES = {
-    **{f"{a} and {b} exchanged": f"gauges {a}, {b}: answers on another axis" for a, b in PAIRS},
+    **{f"{a} and {b} exchanged": f"gauges {a}, {b}: are exchanged" for a, b in PAIRS},
     **{f"{axis} reversed": f"gauge {axis}: counts the wrong way" for axis in "xyz"},
     **{f"{axis} in inches": f"gauge {axis}: seems to answer in inches" for axis in "xyz"},
     **{f"{axis} dead": f"gauge {axis}: does not follow the ball" for axis in "xyz"},

@@ -44,8 +44,8 @@ async def test_a_person_puts_it_right_and_the_station_begins_again(make_rig) -> 
     ended = await rig.run(on(events.Failed, lambda: corrected(rig)), policy=policy)
     assert ended.exit_code == ExitCode.DONE
     (problem,) = rig.operator.problems
-    assert "gauges x, y: answers on another axis" in problem
-    assert "Exchange the cables" in problem
+    assert "gauges x, y: are exchanged" in problem
+    assert "Exchange their cables" in problem
     assert rig.operator.placed[:3] == [1, 1, 2]
 
 

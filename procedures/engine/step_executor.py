@@ -52,7 +52,7 @@ from procedures.run.steps import (
 )
 from procedures.run.trips import GuardTripped
 
-RobotStep = Locate | Move | Place | Sample | Revisit | CloseSet | Standstill | Repeat
+RobotStep = Locate | Move | Place | Sample | Revisit | CloseSet | Standstill | Repeat | Probe | Try
 """A step for which the robot must be where its config has it."""
 
 

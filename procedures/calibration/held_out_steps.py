@@ -128,7 +128,8 @@ class HeldOutSteps:
         """
         measured = state.set(key)
         if measured.rejections > 1:
-            return self._back(state, key) or Compute(kind="judge")
+            back = None if measured.reference_unverified else self._back(state, key)
+            return back or Compute(kind="judge")
         if not measured.reference_unverified:
             return None
         try:

@@ -70,6 +70,16 @@ def refused_at_a_pose(told_of: Any) -> list[events.Event]:
     return [*told_of.whole(1)[:3], told_of.arrived(2), told_of.refused()]
 
 
+def verified_after_a_refusal(told_of: Any) -> list[events.Event]:
+    """The same, back at the reference, where the gauges show what they did."""
+    return [*refused_at_a_pose(told_of), told_of.arrived(1), told_of.confirmed()]
+
+
+def refused_twice(told_of: Any) -> list[events.Event]:
+    """The same, and the ball is outside the travel at that pose again."""
+    return [*verified_after_a_refusal(told_of), told_of.arrived(2), told_of.refused()]
+
+
 Table = dict[str, tuple[Callable[[Any, Any], list[events.Event]], str | None]]
 TABLE: Table = {
     "nothing": (lambda s, t: [], "P1/o01/move"),
@@ -150,6 +160,18 @@ TABLE: Table = {
     ),
     "back at the reference afterwards": (
         lambda s, t: [*t["committed"], *refused_at_a_pose(s(Phase.AFTER)), s(Phase.AFTER).arrived(1)],
+        "after-V1/revisit",
+    ),
+    "taken again afterwards": (
+        lambda s, t: [*t["committed"], *verified_after_a_refusal(s(Phase.AFTER))],
+        "after-V1/o02/move",
+    ),
+    "refused twice afterwards": (
+        lambda s, t: [*t["committed"], *refused_twice(s(Phase.AFTER))],
+        "after-V1/o01/move",
+    ),
+    "back at the reference after two refusals": (
+        lambda s, t: [*t["committed"], *refused_twice(s(Phase.AFTER)), s(Phase.AFTER).arrived(1)],
         "judge",
     ),
     "refused again on the way back": (
@@ -159,10 +181,6 @@ TABLE: Table = {
             s(Phase.AFTER).refused(1),
             LOCATED,
         ],
-        "judge",
-    ),
-    "reference refused afterwards": (
-        lambda s, t: [*t["committed"], s(Phase.AFTER).arrived(), s(Phase.AFTER).refused(1)],
         "judge",
     ),
     "verified": (lambda s, t: t["after"], "judge"),
@@ -281,9 +299,10 @@ def test_held_out_poses_are_those_chosen_when_identified_before_and_after(make_r
             happened += [story(phase).sampled(orientation)]
 
 
-@pytest.mark.parametrize("phase", [Phase.IDENTIFY, Phase.BEFORE])
+@pytest.mark.parametrize("phase", [Phase.IDENTIFY, Phase.BEFORE, Phase.AFTER])
 def test_gauges_that_cannot_be_zeroed_end_the_run(make_rig, story, told, phase: Phase) -> None:
-    happened = [] if phase is Phase.IDENTIFY else told["identified"]
+    before = {Phase.IDENTIFY: None, Phase.BEFORE: "identified", Phase.AFTER: "committed"}[phase]
+    happened = [] if before is None else told[before]
     refused = [*happened, story(phase).arrived(), story(phase).placed(), story(phase).refused(1)]
     with pytest.raises(LimitError, match=f"{phase.value}1: the gauges cannot be zeroed"):
         make_rig().calibration.next_step(fold(refused))

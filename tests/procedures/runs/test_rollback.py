@@ -8,7 +8,7 @@ import pytest
 
 from drivers.errors import GaugeAtEnd
 from hexacell.decision import Verdict
-from hexacell.errors import DeviceError, ExitCode, FileError, LimitError, WriteBackUndone
+from hexacell.errors import DeviceError, ExitCode, FileError, WriteBackUndone
 from procedures.run import events
 from procedures.run.questions import UnattendedOperator
 from procedures.run.state import fold
@@ -131,7 +131,7 @@ async def test_gauges_that_cannot_be_zeroed_are_no_verdict_on_the_new_geometry(r
     rig = replayed(recording.until(events.Proposed))
     at_end = GaugeAtEnd("is at an end of its travel", subject="gauge x")
     fault = before_sampling("after-V1/o01/sample", lambda: rig.gauges[0].failures.append(at_end))
-    with pytest.raises(LimitError, match="cannot be zeroed"):
+    with pytest.raises(WriteBackUndone, match="cannot be zeroed"):
         await rig.run(fault)
     assert not happened(rig, events.ResultValidated)
     assert rig.config == recording.config_before, "nothing unverified stays"

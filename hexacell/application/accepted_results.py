@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
 
+from hexacell.application.journal_soundness import require_sound
 from hexacell.campaign.task_accuracy import Task
 from hexacell.cell.loader import Cell
 from hexacell.controller_config.change import fingerprint
@@ -20,7 +21,7 @@ from hexacell.runs.run_folder import RunFolder, runs_folder
 from procedures.calibration.workflow import Calibration, Mode
 from procedures.journal.journal import read_entries
 from procedures.run import events
-from procedures.run.state import RunState, fold
+from procedures.run.state import RunState
 
 
 def last_accepted_result(cell: Cell) -> AcceptedResult | None:
@@ -34,7 +35,7 @@ def last_accepted_result(cell: Cell) -> AcceptedResult | None:
     written = fingerprint(cell.config_path)
     folder = runs_folder(cell)
     paths = sorted(folder.iterdir()) if folder.is_dir() else []
-    found = (_accepted(path) for path in paths if _wrote(path, written))
+    found = (_accepted(cell, path) for path in paths if _wrote(path, written))
     newest = max((one for one in found if one is not None), key=lambda one: one.at, default=None)
     return None if newest is None else _result(cell, newest)
 
@@ -57,13 +58,15 @@ def _wrote(path: Path, sha256: str) -> bool:
         return False
 
 
-def _accepted(path: Path) -> _AcceptedRun | None:
+def _accepted(cell: Cell, path: Path) -> _AcceptedRun | None:
     """A run, if its result stayed in the controller."""
     try:
-        entries = read_entries(RunFolder(path).journal)
+        journal = RunFolder(path).journal
+        entries = read_entries(journal)
+        history = (entry.event for entry in entries)
+        state = require_sound(history, cell.settings, journal, follows_plan=False)
     except HexacellError:
         return None
-    state = fold(entry.event for entry in entries)
     if state.identified is None or not _is_accepted(state):
         return None
     return _AcceptedRun(path, entries[-1].at, state, state.identified)

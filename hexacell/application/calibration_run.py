@@ -11,6 +11,8 @@ from drivers.interfaces import DeviceIdentity
 from hexacell import __version__
 from hexacell.application.accepted_results import last_accepted_result
 from hexacell.application.device_setup import Connected, device_addresses, open_devices
+from hexacell.application.journal_soundness import require_sound
+from hexacell.application.run_ownership import require_own_run
 from hexacell.campaign.pose_list import pose_list_of
 from hexacell.cell.loader import Cell
 from hexacell.controller_config.change import fingerprint
@@ -223,9 +225,10 @@ def _resumed_start(request: RunRequest) -> events.RunStarted:
 
     Raises:
         UsageError: it is over, was begun by other rules, or the cell file has changed since it began.
-        FileError: its journal cannot be read.
+        FileError: its journal cannot be read, or its folder is not that of a run of this cell.
     """
-    state = fold(read_journal(request.folder.journal))
+    history = read_journal(request.folder.journal)
+    state = fold(history)
     if state.started is None:
         raise FileError("the journal is empty", subject=request.folder.journal, action="Begin a new run")
     if state.ended is not None:
@@ -250,6 +253,8 @@ def _resumed_start(request: RunRequest) -> events.RunStarted:
             "the run was begun without a length check",
             action="Resume it without --length-check, and check the length with `hexacell length`",
         )
+    require_sound(history, request.cell.settings, request.folder.journal)
+    require_own_run(request.cell, request.folder, state)
     return state.started
 
 

@@ -79,9 +79,9 @@ def fit_measurements(
     """
     robot = robot_of(cell)
     if folder is not None:
-        recorded = commanding_geometries(folder, robot.mechanism)
+        recorded = commanding_geometries(folder, cell.settings)
         robot = replace(robot, earlier=(*recorded, *robot.earlier))
-    settings, measured = cell.settings, None if folder is None else noise_of_run(folder)
+    settings, measured = cell.settings, None if folder is None else noise_of_run(folder, cell.settings)
     if measured is not None:
         settings = with_measured_noise(settings, measured)
         robot = robot.with_errors_of(settings)

@@ -2,30 +2,31 @@
 
 from __future__ import annotations
 
+from hexacell.application.journal_soundness import require_sound
 from hexacell.campaign.measured_noise import MeasuredNoise
+from hexacell.cell.model import CellSettings
 from hexacell.errors import HexacellError
 from hexacell.identification.problem.commanded_poses import CommandingGeometry
 from hexacell.kinematics.geometry import Geometry
-from hexacell.kinematics.mechanism import Mechanism
 from hexacell.runs.run_folder import RunFolder
 from procedures.journal.journal import read_journal
-from procedures.run.state import RunState, fold
+from procedures.run.state import RunState
 
 
-def noise_of_run(folder: RunFolder) -> MeasuredNoise | None:
+def noise_of_run(folder: RunFolder, settings: CellSettings) -> MeasuredNoise | None:
     """The noise that a run measured; none if it did not, or the folder is not that of a run."""
-    measured = _state_of(folder).noise
+    measured = _state_of(folder, settings).noise
     return None if measured is None else measured.noise
 
 
-def commanding_geometries(folder: RunFolder, mechanism: Mechanism) -> tuple[CommandingGeometry, ...]:
+def commanding_geometries(folder: RunFolder, settings: CellSettings) -> tuple[CommandingGeometry, ...]:
     """By the journal of a run: that of its controller, and a provisional one in the same frames.
 
     None if the folder is not that of a run of such a mechanism.
     """
-    state = _state_of(folder)
+    state, mechanism = _state_of(folder, settings), settings.mechanism
     started, parameters = state.started, mechanism.parameters
-    if started is None or set(started.controller) != set(parameters.shapes):
+    if started is None:
         return ()
     own = CommandingGeometry.of(mechanism, Geometry.of(parameters, started.controller))
     if state.provisional is None:
@@ -34,9 +35,10 @@ def commanding_geometries(folder: RunFolder, mechanism: Mechanism) -> tuple[Comm
     return own, CommandingGeometry(lent, own.frames)
 
 
-def _state_of(folder: RunFolder) -> RunState:
-    """A run as far as it got; empty if its journal cannot be read."""
+def _state_of(folder: RunFolder, settings: CellSettings) -> RunState:
+    """A run as far as it got; empty if its journal cannot be read, or be of such a machine."""
     try:
-        return fold(read_journal(folder.journal))
+        history = read_journal(folder.journal)
+        return require_sound(history, settings, folder.journal, follows_plan=False)
     except HexacellError:
         return RunState()

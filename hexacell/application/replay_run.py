@@ -8,6 +8,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from hexacell.application.calibration_run import calibration_of_run
+from hexacell.application.journal_soundness import require_sound
 from hexacell.cell.loader import Cell, dump, load_cell
 from hexacell.cell.measuring import IdentificationSettings
 from hexacell.cell.model import CellSettings, geometry_settings
@@ -17,7 +18,7 @@ from hexacell.errors import FileError, HexacellError, UsageError
 from hexacell.runs.run_folder import RunFolder
 from hexacell.storage import atomic_files
 from procedures.journal.journal import read_entries, read_version
-from procedures.journal.line_format import RULES_SINCE, Entry
+from procedures.journal.line_format import RESTORE, RULES_SINCE, Entry
 from procedures.replay.comparison import TOLERANCE, ReplayReport
 from procedures.replay.recorded_executor import RecordedStepExecutor
 from procedures.replay.replayer import Replayer, Scope
@@ -44,7 +45,7 @@ async def replay(run: Path, scope: Scope = Scope.ALL, tolerance: float = TOLERAN
     _require_rules(journal, scope)
     report = ReplayReport(journal, started.software, len(entries))
     with TemporaryDirectory(prefix="hexacell-replay-") as name:
-        executor, started = _set_up(Path(name), folder, started)
+        executor, started = _set_up(Path(name), folder, started, entries)
         replayer = Replayer(executor, report, scope, tolerance)
         await replayer.replay([replace(entries[0], event=started), *entries[1:]])
     return report
@@ -78,10 +79,11 @@ def _started(journal: Path, entries: Sequence[Entry]) -> RunStarted:
 
 
 def _set_up(
-    scratch: Path, folder: RunFolder, started: RunStarted
+    scratch: Path, folder: RunFolder, started: RunStarted, entries: Sequence[Entry]
 ) -> tuple[RecordedStepExecutor, RunStarted]:
     """The procedure with recorded devices, and the run's start with the config of the temporary folder."""
     cell = _cell(scratch, started, folder.journal)
+    require_sound((entry.event for entry in entries), cell.settings, folder.journal)
     text = _config_text(folder, started)
     settings = cell.settings.model_copy(
         update={
@@ -117,6 +119,12 @@ def _cell(scratch: Path, started: RunStarted, journal: Path) -> Cell:
 def _identification(cell: Cell, started: RunStarted) -> IdentificationSettings:
     """The plan; a list of poses is written to a file in the temporary folder."""
     plan = cell.settings.identification
+    if started.pose_list is None and plan.poses is not None:
+        raise FileError(
+            f"it names a list of poses, {plan.poses}, and does not have it",
+            subject="the journal",
+            action=RESTORE,
+        )
     if started.pose_list is None:
         return plan
     (cell.path.parent / POSES).write_text(started.pose_list, encoding="utf-8")

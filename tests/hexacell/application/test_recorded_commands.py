@@ -72,9 +72,8 @@ def started(controller: Geometry, paper) -> events.RunStarted:
 def test_they_are_those_of_the_journal_in_the_frames_of_the_run(tmp_path, paper):
     controller = Hexaglide().change_frames(paper.nominal, ON_FLOOR)
     lent = events.ProvisionalApplied(geometry=paper.calibrated.document(), folder="lent")
-    own, provisional = commanding_geometries(
-        run_of(tmp_path, started(controller, paper), lent), Hexaglide()
-    )
+    settings = load_cell(bundled_config("simulated-hexaglide")).settings
+    own, provisional = commanding_geometries(run_of(tmp_path, started(controller, paper), lent), settings)
     np.testing.assert_allclose(own.geometry.vector, paper.nominal.vector, atol=1e-9)
     np.testing.assert_array_equal(provisional.geometry.vector, paper.calibrated.vector)
     for one in (own, provisional):
@@ -82,9 +81,10 @@ def test_they_are_those_of_the_journal_in_the_frames_of_the_run(tmp_path, paper)
 
 
 def test_a_folder_without_a_run_tells_nothing(tmp_path):
-    assert commanding_geometries(RunFolder(tmp_path), Hexaglide()) == ()
+    settings = load_cell(bundled_config("simulated-hexaglide")).settings
+    assert commanding_geometries(RunFolder(tmp_path), settings) == ()
     RunFolder(tmp_path).journal.write_text("no journal\n")
-    assert commanding_geometries(RunFolder(tmp_path), Hexaglide()) == ()
+    assert commanding_geometries(RunFolder(tmp_path), settings) == ()
 
 
 def measured_noise(*gauges_mm: float) -> events.NoiseMeasured:
@@ -97,7 +97,7 @@ def measured_noise(*gauges_mm: float) -> events.NoiseMeasured:
 def test_records_in_a_run_folder_are_weighted_by_the_noise_that_the_run_measured(tmp_path, paper, visit):
     cell, measured = load_cell(bundled_config("simulated-hexaglide")), visit(seed=2).measured(0.01, seed=1)
     run = run_of(tmp_path, started(paper.nominal, paper), measured_noise(0.01, 0.04, 0.01))
-    told = noise_of_run(run)
+    told = noise_of_run(run, cell.settings)
     assert told is not None
     assessed = fit_measurements(cell, measured, run)
     assert assessed.measured_noise == told
@@ -108,7 +108,7 @@ def test_records_in_a_run_folder_are_weighted_by_the_noise_that_the_run_measured
     assert "noise                    gauges" not in identification_report(alone)
     assert alone.found.problem.noise.gauges_mm == pytest.approx([0.01, 0.01, 0.01])
     assert assessed.found.goodness.ratio < alone.found.goodness.ratio
-    assert noise_of_run(RunFolder(tmp_path / "nothing")) is None
+    assert noise_of_run(RunFolder(tmp_path / "nothing"), cell.settings) is None
 
 
 def test_records_in_a_run_folder_are_fitted_after_the_controller_got_other_frames(

@@ -1,0 +1,124 @@
+"""One command on mutated input, in this process, and what it may not do."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import json
+import shutil
+import tempfile
+import time
+import warnings
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from hexacell.cli.app import main
+
+CODES = frozenset({0, 1, 2, 3, 4, 5, 6, 130})
+"""The documented exit codes, without that of a fault of the program."""
+
+
+@dataclass(frozen=True)
+class Place:
+    """A folder with a cell in it, beside which there are things that no command may change."""
+
+    root: Path
+
+    @property
+    def cell(self) -> Path:
+        """The folder of the cell."""
+        return self.root / "cell"
+
+    @property
+    def temporary(self) -> Path:
+        """Where temporary files are made, of which none may stay."""
+        return self.root / "temporary"
+
+    @property
+    def own(self) -> tuple[Path, Path]:
+        """What a command may change."""
+        return self.cell, self.temporary
+
+    def refill(self, template: Path) -> None:
+        """Make the cell's folder a copy of another one."""
+        shutil.rmtree(self.root, ignore_errors=True)
+        (self.root / "outside").mkdir(parents=True)
+        (self.root / "outside" / "canary").write_text("nobody may change this")
+        self.temporary.mkdir()
+        shutil.copytree(template, self.cell, symlinks=True)
+
+
+@dataclass(frozen=True)
+class Attempt:
+    """A command, how it ended, and what is wrong with that."""
+
+    arguments: tuple[str, ...]
+    code: int
+    out: str
+    err: str
+    seconds: float
+    problems: tuple[str, ...] = field(default=())
+
+    def __str__(self) -> str:
+        return f"{' '.join(self.arguments)}: {'; '.join(self.problems)}\n{self.err[-2000:]}"
+
+
+def contents(folder: Path, but: Sequence[Path]) -> dict[Path, bytes | None]:
+    """Everything below a folder, but not what is below some of its parts."""
+    found: dict[Path, bytes | None] = {}
+    for path in folder.iterdir():
+        found[path] = path.read_bytes() if path.is_file() else None
+        if path.is_dir() and path not in but:
+            found |= contents(path, but)
+    return found
+
+
+@contextlib.contextmanager
+def _temporary_files_in(folder: Path) -> Iterator[None]:
+    before, tempfile.tempdir = tempfile.tempdir, str(folder)
+    try:
+        yield
+    finally:
+        tempfile.tempdir = before
+
+
+def attempt(arguments: Sequence[object], place: Place) -> Attempt:
+    """Run a command on the cell of a place."""
+    typed = tuple(map(str, arguments))
+    before = contents(place.root, place.own)
+    out, err = io.StringIO(), io.StringIO()
+    began = time.perf_counter()
+    with (
+        warnings.catch_warnings(record=True) as caught,
+        contextlib.redirect_stdout(out),
+        contextlib.redirect_stderr(err),
+        _temporary_files_in(place.temporary),
+    ):
+        warnings.simplefilter("always")
+        code = main(list(typed))
+    seconds = time.perf_counter() - began
+    problems = [
+        f"warning {one.category.__name__}: {one.message} ({one.filename}:{one.lineno})" for one in caught
+    ]
+    problems += _wrong_end(code, out.getvalue(), err.getvalue(), is_json="--json" in typed)
+    if contents(place.root, place.own) != before:
+        problems.append("something outside was changed")
+    for left in place.temporary.iterdir():
+        problems.append(f"left behind: {left.name}: {left.read_text() if left.is_file() else 'a folder'}")
+        left.unlink() if left.is_file() else shutil.rmtree(left)
+    return Attempt(typed, code, out.getvalue(), err.getvalue(), seconds, tuple(problems))
+
+
+def _wrong_end(code: int, out: str, err: str, *, is_json: bool) -> Iterator[str]:
+    if code not in CODES:
+        yield f"exit code {code}"
+    if "Traceback" in out + err:
+        yield "a traceback"
+    if code and not err.strip() and not out.strip():
+        yield "nothing was said"
+    if is_json:
+        try:
+            json.loads(out)
+        except ValueError:
+            yield "no JSON document"

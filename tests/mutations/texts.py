@@ -1,0 +1,185 @@
+"""Mutations of bytes and of TOML and CSV texts, as a careless or hostile hand makes them."""
+
+from __future__ import annotations
+
+import random
+import re
+from collections.abc import Callable, Sequence
+
+STRANGE_NUMBERS = (
+    "1e308", "-1e308", "1e-320", "5e-324", "nan", "inf", "-inf", "-0.0", "-0", "0", "0.0", "-1", "1", "2",
+    "9223372036854775807", "-9223372036854775808", "9223372036854775808", "123456789012345678901234",
+    "0.1234567890123456789012345", "1e6", "-1e6", "1000001", "999999.9", "1e-9", "1e9", "5500.0", "0x7f",
+    "1_000", "+5", "3.", ".5", "1e400", "07",
+)  # fmt: skip
+STRANGE_TEXTS = (
+    "", " ", "\\u0000", "../../outside", "/etc/passwd", "../outside/canary", "x" * 300, "é", "日本",
+    "\u202e",
+    "%s%n", "{0}", "${HOME}", "$(id)", "a\\nb", "\\t", "true", "1", "nan", ".", "..", "/dev/zero",
+    "/dev/stdin", "CON", "-rf", "--help", "\\ud800", "\U0001f916", "x" * 5000,
+)  # fmt: skip
+STRANGE_TOKENS = (
+    "true", "false", "[]", "{}", "[[]]", "[1, 2]", "{ a = 1 }", '""', "1979-05-27", "07:32:00",
+    "1979-05-27T07:32:00Z", "null", "[[[[1]]]]", '"1.0"', "[" * 60 + "]" * 60, "=", "#", '"', "'", ",",
+)  # fmt: skip
+STRANGE_BYTES = (
+    b"\0",
+    b"\xff",
+    b"\xfe\xff",
+    b"\xed\xa0\x80",
+    b"\x1b[2J",
+    b"\r",
+    b"\x0c",
+    b"\x85",
+    b"\xef\xbb\xbf",
+)
+
+_NUMBER = re.compile(r"(?<![\w.])[-+]?\d[\d_]*(?:\.\d+)?(?:[eE][-+]?\d+)?(?![\w.])")
+_VALUE = re.compile(r"(?m)(?<==)[ \t]*(\"[^\"\n]*\"|\[[^\n]*\]|[^\s#\[\"]+)")
+_TOKEN = re.compile(r"[A-Za-z_]\w*|[-+]?\d[\d.eE+-]*|[\[\]{}=,\"'#.]")
+
+Mutation = Callable[[bytes, random.Random], bytes]
+
+
+def flipped(data: bytes, draw: random.Random) -> bytes:
+    """A few bytes replaced."""
+    changed = bytearray(data)
+    for _ in range(draw.choice((1, 1, 1, 2, 8))):
+        if changed:
+            changed[draw.randrange(len(changed))] = draw.randrange(256)
+    return bytes(changed)
+
+
+def inserted(data: bytes, draw: random.Random) -> bytes:
+    """Bytes that belong in no text."""
+    place = draw.randrange(len(data) + 1)
+    return data[:place] + draw.choice(STRANGE_BYTES) + data[place:]
+
+
+def cut(data: bytes, draw: random.Random) -> bytes:
+    """The end, the beginning or a part lost."""
+    first, second = sorted(draw.randrange(len(data) + 1) for _ in range(2))
+    return draw.choice((data[:first], data[second:], data[:first] + data[second:]))
+
+
+def other_encoding(data: bytes, draw: random.Random) -> bytes:
+    """Other line ends, a byte order mark, another encoding."""
+    text = data.decode("utf-8", "replace")
+    return draw.choice(
+        (
+            data.replace(b"\n", b"\r\n"),
+            data.replace(b"\n", b"\r"),
+            b"\xef\xbb\xbf" + data,
+            b"\xef\xbb\xbf\xef\xbb\xbf" + data,
+            text.encode("utf-16"),
+            text.replace("\n", "\u2028").encode(),
+            data.rstrip(b"\n"),
+        )
+    )
+
+
+def other_lines(data: bytes, draw: random.Random) -> bytes:
+    """A line deleted, repeated, moved or exchanged with another."""
+    lines = data.splitlines(keepends=True)
+    if len(lines) < 2:
+        return data
+    first, second = draw.randrange(len(lines)), draw.randrange(len(lines))
+    match draw.randrange(4):
+        case 0:
+            del lines[first]
+        case 1:
+            lines.insert(second, lines[first])
+        case 2:
+            lines[first], lines[second] = lines[second], lines[first]
+        case 3:
+            lines[first:first] = [lines[second]] * draw.choice((2, 30, 1000))
+    return b"".join(lines)
+
+
+def other_number(data: bytes, draw: random.Random) -> bytes:
+    """A number replaced by a strange one."""
+    return _one_replaced(_NUMBER, data, draw, STRANGE_NUMBERS)
+
+
+def scaled_number(data: bytes, draw: random.Random) -> bytes:
+    """A number a thousand times too large, negative, or a little off."""
+    text = data.decode("utf-8", "replace")
+    found = list(_NUMBER.finditer(text))
+    if not found:
+        return data
+    one = draw.choice(found)
+    number = float(one[0].replace("_", "")) * draw.choice((-1.0, 1e3, 1e-3, 1.1, 0.0, 1e5)) + draw.choice(
+        (0, 0, 1)
+    )
+    token = f"{number:.0f}" if re.fullmatch(r"[-+]?\d+", one[0]) and draw.random() < 0.7 else repr(number)
+    return f"{text[: one.start()]}{token}{text[one.end() :]}".encode()
+
+
+def other_text(data: bytes, draw: random.Random) -> bytes:
+    """The content of a text in quotes replaced by a strange one."""
+    return _one_replaced(re.compile(r'(?<=")[^"\n]*(?=")'), data, draw, STRANGE_TEXTS)
+
+
+def other_type(data: bytes, draw: random.Random) -> bytes:
+    """The value of a key replaced by one of another type."""
+    return _one_replaced(_VALUE, data, draw, STRANGE_TOKENS + STRANGE_NUMBERS)
+
+
+def other_token(data: bytes, draw: random.Random) -> bytes:
+    """A word, a number or a sign deleted, repeated or replaced."""
+    text = data.decode("utf-8", "replace")
+    found = list(_TOKEN.finditer(text))
+    if not found:
+        return data
+    one, other = draw.choice(found), draw.choice(found)
+    token = draw.choice(
+        ("", one[0] * 2, other[0], one[0][::-1], one[0].upper(), draw.choice(STRANGE_TOKENS))
+    )
+    return f"{text[: one.start()]}{token}{text[one.end() :]}".encode()
+
+
+def _one_replaced(
+    pattern: re.Pattern[str], data: bytes, draw: random.Random, tokens: Sequence[str]
+) -> bytes:
+    text = data.decode("utf-8", "replace")
+    found = list(pattern.finditer(text))
+    if not found:
+        return data
+    one = draw.choice(found)
+    return f"{text[: one.start()]}{draw.choice(tokens)}{text[one.end() :]}".encode("utf-8", "surrogatepass")
+
+
+def other_cell(data: bytes, draw: random.Random) -> bytes:
+    """A cell of a CSV file replaced, a column lost or repeated."""
+    rows = [row.split(",") for row in data.decode("utf-8", "replace").splitlines()]
+    if not rows:
+        return data
+    row = draw.choice(rows)
+    place = draw.randrange(len(row))
+    match draw.randrange(5):
+        case 0:
+            for each in rows:
+                del each[min(place, len(each) - 1)]
+        case 1:
+            row.insert(place, draw.choice(STRANGE_NUMBERS))
+        case 2:
+            for each in rows[1:]:
+                each[min(place, len(each) - 1)] = draw.choice(STRANGE_NUMBERS)
+        case _:
+            row[place] = draw.choice((*STRANGE_NUMBERS, "", "a", '"', "1;2", "1,5", "٣"))
+    return "\n".join(",".join(each) for each in rows).encode()
+
+
+ANY: tuple[Mutation, ...] = (flipped, inserted, cut, other_encoding, other_lines)
+TOML: tuple[Mutation, ...] = (
+    *ANY, other_number, other_number, other_number, scaled_number, scaled_number, other_text, other_type,
+    other_type, other_token,
+)  # fmt: skip
+CSV: tuple[Mutation, ...] = (*ANY, other_number, scaled_number, other_cell, other_cell, other_lines)
+
+
+def mutated(data: bytes, mutations: Sequence[Mutation], draw: random.Random) -> bytes:
+    """The data after one mutation, now and then after a few."""
+    for _ in range(draw.choice((1, 1, 1, 1, 2, 3))):
+        data = draw.choice(mutations)(data, draw)
+    return data

@@ -1,0 +1,149 @@
+"""Trials: a kind of input is mutated, and a command is tried on it."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from tests.mutations.attempts import Attempt, Place, attempt
+from tests.mutations.journals import mutated_journal
+from tests.mutations.texts import ANY, CSV, TOML, mutated
+
+CELL, CONFIG, RECORDS = "cell.toml", "simulated-hexaglide.controller.toml", "m.csv"
+RUN = Path("runs") / "simulated-hexaglide" / "run"
+
+
+@dataclass(frozen=True)
+class Templates:
+    """Folders of sound cells.
+
+    Attributes:
+        plain: the bundled cell, with a measurement file.
+        small: a cell that is calibrated quickly, with a complete run.
+        interrupted: the same cell with runs that were interrupted late.
+    """
+
+    plain: Path
+    small: Path
+    interrupted: tuple[Path, ...]
+
+
+Trial = Callable[[Templates, Place, random.Random], Attempt]
+
+
+def _rewrite(path: Path, data: bytes) -> None:
+    path.write_bytes(data)
+
+
+def cell_file(templates: Templates, place: Place, draw: random.Random) -> Attempt:
+    """A cell file that is validated or shown."""
+    place.refill(draw.choice((templates.plain, templates.small)))
+    path = place.cell / CELL
+    _rewrite(path, mutated(path.read_bytes(), TOML, draw))
+    action = draw.choice((["validate"], ["validate", "--json"], ["show"], ["show", "--json"]))
+    return attempt(["cell", *action, path], place)
+
+
+def config(templates: Templates, place: Place, draw: random.Random) -> Attempt:
+    """A controller's config."""
+    place.refill(templates.plain)
+    path = place.cell / CONFIG
+    _rewrite(path, mutated(path.read_bytes(), TOML, draw))
+    return attempt(["cell", "validate", place.cell / CELL], place)
+
+
+def records(templates: Templates, place: Place, draw: random.Random) -> Attempt:
+    """A measurement file."""
+    place.refill(templates.small)
+    path = place.cell / RECORDS
+    _rewrite(path, mutated(path.read_bytes(), CSV, draw))
+    command = draw.choice(("fit", "fit", "next"))
+    return attempt([command, place.cell / CELL, "--measurements", path, "--json"], place)
+
+
+def cell_file_of_records(templates: Templates, place: Place, draw: random.Random) -> Attempt:
+    """A cell file with which records are identified."""
+    place.refill(templates.small)
+    path = place.cell / CELL
+    _rewrite(path, mutated(path.read_bytes(), TOML, draw))
+    command = draw.choice(("fit", "next"))
+    return attempt([command, path, "--measurements", place.cell / RECORDS], place)
+
+
+def journal_replayed(templates: Templates, place: Place, draw: random.Random) -> Attempt:
+    """A journal that is replayed."""
+    place.refill(templates.small)
+    path = place.cell / RUN / "journal.jsonl"
+    _rewrite(path, mutated_journal(path.read_bytes(), draw))
+    only = draw.choice(("identification", "identification", "identification", "results"))
+    return attempt(["replay", path.parent, "--only", only, "--json"], place)
+
+
+def journal_exported(templates: Templates, place: Place, draw: random.Random) -> Attempt:
+    """A run folder that is exported."""
+    place.refill(templates.small)
+    path = (
+        place.cell
+        / RUN
+        / draw.choice(("journal.jsonl", "proposal.json", "cell.toml", "wire", "config-before"))
+    )
+    _rewrite(path, mutated_file(path, draw))
+    return attempt(["replay", place.cell / RUN, "--export", place.cell / "copy"], place)
+
+
+def mutated_file(path: Path, draw: random.Random) -> bytes:
+    """A file of a run folder, mutated after its kind."""
+    if path.suffix == ".jsonl":
+        return mutated_journal(path.read_bytes(), draw)
+    return mutated(path.read_bytes(), TOML if path.suffix in {".toml", ".json"} else ANY, draw)
+
+
+def journal_beside_records(templates: Templates, place: Place, draw: random.Random) -> Attempt:
+    """A run folder whose records are identified again."""
+    place.refill(templates.small)
+    path = place.cell / RUN / "journal.jsonl"
+    _rewrite(path, mutated_journal(path.read_bytes(), draw))
+    return attempt(["fit", place.cell / CELL, "--measurements", path.with_name("measurements.csv")], place)
+
+
+def run_resumed(templates: Templates, place: Place, draw: random.Random) -> Attempt:
+    """A run that is resumed, with a mutated file in its folder."""
+    place.refill(draw.choice(templates.interrupted))
+    folder = place.cell / RUN
+    others = [path for path in sorted(folder.rglob("*")) if path.is_file() and path.name != "journal.jsonl"]
+    path = draw.choice(others) if draw.random() < 0.2 else folder / "journal.jsonl"
+    _rewrite(path, mutated_file(path, draw))
+    named = draw.choice(([], ["run"]))
+    command = ["run", place.cell / CELL, "--unattended", "--mode", "optimise", "--resume", *named]
+    return attempt(command, place)
+
+
+def run_checked(templates: Templates, place: Place, draw: random.Random) -> Attempt:
+    """A cell whose earlier runs were mutated, before it is checked; nothing is served."""
+    place.refill(templates.small)
+    path = place.cell / RUN / draw.choice(("journal.jsonl", "write-back.json"))
+    _rewrite(path, mutated_file(path, draw))
+    cell = place.cell / CELL
+    cell.write_text(cell.read_text().replace("tilt_deg = 45.0", "tilt_deg = 1e-6"))
+    return attempt(["run", cell, "--unattended", "--mode", "check"], place)
+
+
+SHARES: dict[Trial, int] = {
+    cell_file: 46,
+    config: 8,
+    records: 14,
+    cell_file_of_records: 6,
+    journal_replayed: 10,
+    journal_exported: 3,
+    journal_beside_records: 5,
+    run_resumed: 6,
+    run_checked: 2,
+}
+"""How many of a hundred trials are of which kind."""
+
+
+def drawn_trial(draw: random.Random) -> Trial:
+    """One of the kinds."""
+    return draw.choices(list(SHARES), weights=list(SHARES.values()))[0]

@@ -30,6 +30,9 @@ from hexacell.stated_effects import stated_effects
 from hexacell.uncertainty.effects import Effect
 from hexacell.uncertainty.record_effects import RecordEffects
 
+FARTHEST_DRAWING = 0.25
+"""Of the largest number of a config, that the drawing may be away from it."""
+
 
 @dataclass(frozen=True, eq=False)
 class Robot:
@@ -196,7 +199,30 @@ def robot_of(cell: Cell) -> Robot:
             subject=cell.taught_path,
             action="Copy the config there when you teach points and frames, or remove `taught`",
         )
-    return make_robot(cell.settings, controller, taught=taught.geometry)
+    robot = make_robot(cell.settings, controller, taught=taught.geometry)
+    _require_same_robot(cell, robot)
+    return robot
+
+
+def _require_same_robot(cell: Cell, robot: Robot) -> None:
+    """Refuse a drawing so far from the config that no calibration leads from one to the other.
+
+    Raises:
+        FileError: names the parameter that differs most.
+    """
+    drawn = robot.mechanism.normalize_frames(robot.drawing)[0].vector
+    commanding = robot.mechanism.normalize_frames(robot.controller)[0].vector
+    difference = np.abs(drawn - commanding)
+    worst = int(difference.argmax())
+    if difference[worst] > FARTHEST_DRAWING * np.abs(commanding).max():
+        name = robot.mechanism.convention.display_name(robot.mechanism.parameters.names[worst])
+        raise FileError(
+            f"the drawing is not of the robot in {cell.config_path}: {name} differs by "
+            f"{difference[worst]:.4g} once both are in the same frames",
+            subject=cell.path,
+            line=cell.document.line_of(("robot", "nominal")),
+            action="Correct [robot.nominal], or the config",
+        )
 
 
 def robot_of_start(

@@ -53,7 +53,8 @@ def require_sound(
         history: the events.
         settings: of the cell.
         journal: where they are kept.
-        follows_plan: the cell file is still as it was; otherwise its points may be others by now.
+        follows_plan: the whole run is used, and the cell file is as it was; otherwise only numbers are
+            used, and the points of the cell file may be others by now.
 
     Raises:
         FileError: an event cannot be of such a run; with its line.
@@ -83,7 +84,8 @@ class _Event:
 
     def problems(self) -> Iterator[str]:
         """What cannot be."""
-        yield from self._order()
+        if self.follows_plan:
+            yield from self._order()
         yield from self._place()
         yield from self._numbers()
         yield from self._content()

@@ -23,7 +23,7 @@ from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.robot_model import Robot, config_format, robot_of_start
 from hexacell.runs.run_folder import RunFolder
 from hexacell.storage import atomic_files
-from procedures.engine.config_transactions import PROVISIONAL_FOLDER
+from procedures.engine.config_edits import PROVISIONAL_FOLDER
 from procedures.journal.line_format import RESTORE
 from procedures.run import events
 from procedures.run.state import RunState

@@ -6,6 +6,7 @@ import asyncio
 import sys
 import termios
 from collections.abc import Callable, Coroutine
+from io import TextIOWrapper
 from typing import Any, TextIO, TypeVar
 
 from hexacell.cli.console import Console
@@ -98,6 +99,8 @@ class TerminalOperator:
 
     def __init__(self, console: Console) -> None:
         self._console = console
+        if isinstance(sys.stdin, TextIOWrapper):
+            sys.stdin.reconfigure(errors="replace")  # any key may be pressed, and is no answer then
         self.type_command: Callable[[str], None] = lambda _: None
         self.before_question: Callable[[], None] = lambda: None
         self.after_question: Callable[[], None] = lambda: None

@@ -28,7 +28,8 @@ LONGEST_LINE = 16 << 20
 """Bytes; no event comes near it. A file without line ends must not fill the memory."""
 
 
-_APPENDING = os.O_RDWR | os.O_CREAT | os.O_APPEND | os.O_NONBLOCK
+# A link would lead what is appended to another file.
+_APPENDING = os.O_RDWR | os.O_CREAT | os.O_APPEND | os.O_NONBLOCK | os.O_NOFOLLOW
 
 
 def read_journal(path: Path) -> tuple[Event, ...]:

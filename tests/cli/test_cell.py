@@ -288,3 +288,17 @@ def test_a_key_of_ten_thousands_of_parts_is_refused(typed_here, cell_folder):
     outcome = typed_here("cell", "validate", cell_folder.cell)
     assert outcome.code == 2
     assert "a key has too many parts. Shorten it" in outcome.err
+
+
+def test_a_drawing_of_another_machine_is_refused_with_its_line(typed_here, cell_folder):
+    text = cell_folder.cell.read_text()
+    old = "[0.0, -155.0, 0.0]"
+    assert old in text
+    cell_folder.cell.write_text(text.replace(old, "[0.0, -1e6, 0.0]", 1))
+    outcome = typed_here("cell", "validate", cell_folder.cell)
+    line = line_of(cell_folder.cell.read_text(), "[robot.nominal]")
+    assert outcome.code == 2
+    assert (
+        f"{cell_folder.cell}:{line}: the drawing is not of the robot in {cell_folder.controller}"
+        in outcome.err
+    )

@@ -5,9 +5,12 @@ from __future__ import annotations
 import contextlib
 import io
 import json
+import os
+import resource
 import shutil
+import subprocess
+import sys
 import tempfile
-import time
 import warnings
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
@@ -24,6 +27,7 @@ class Place:
     """A folder with a cell in it, beside which there are things that no command may change."""
 
     root: Path
+    as_process: bool = False
 
     @property
     def cell(self) -> Path:
@@ -40,13 +44,15 @@ class Place:
         """What a command may change."""
         return self.cell, self.temporary
 
-    def refill(self, template: Path) -> None:
-        """Make the cell's folder a copy of another one."""
+    def refill(self, template: Path, made_in: Path) -> None:
+        """Make the cell's folder a copy of another one, whose runs were made in a folder."""
         shutil.rmtree(self.root, ignore_errors=True)
         (self.root / "outside").mkdir(parents=True)
         (self.root / "outside" / "canary").write_text("nobody may change this")
         self.temporary.mkdir()
         shutil.copytree(template, self.cell, symlinks=True)
+        for path in self.cell.rglob("*.json"):
+            path.write_text(path.read_text().replace(str(made_in), str(self.cell)))
 
 
 @dataclass(frozen=True)
@@ -87,8 +93,44 @@ def attempt(arguments: Sequence[object], place: Place) -> Attempt:
     """Run a command on the cell of a place."""
     typed = tuple(map(str, arguments))
     before = contents(place.root, place.own)
+    began = _cpu_seconds()
+    code, out, err, problems = (_in_a_process if place.as_process else _in_this_process)(typed, place)
+    seconds = _cpu_seconds() - began
+    problems += _wrong_end(code, out, err, is_json="--json" in typed)
+    if contents(place.root, place.own) != before:
+        problems.append("something outside was changed")
+    for left in place.temporary.iterdir():
+        problems.append(f"left behind: {left.name}: {left.read_text() if left.is_file() else 'a folder'}")
+        left.unlink() if left.is_file() else shutil.rmtree(left)
+    return Attempt(typed, code, out, err, seconds, tuple(problems))
+
+
+def _cpu_seconds() -> float:
+    """Of this process and of those that it waited for: how busy the computer is else does not count."""
+    used = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
+    return sum(one.ru_utime + one.ru_stime for one in used)
+
+
+Ended = tuple[int, str, str, list[str]]
+"""Exit code, output, errors, and warnings."""
+
+
+def _in_a_process(typed: tuple[str, ...], place: Place) -> Ended:
+    ended = subprocess.run(
+        [sys.executable, "-m", "hexacell", *typed],
+        env={**os.environ, "TMPDIR": str(place.temporary)},
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        text=True,
+        errors="replace",
+        check=False,
+    )
+    warned = [f"warning: {line}" for line in ended.stderr.splitlines() if "Warning:" in line]
+    return ended.returncode, ended.stdout, ended.stderr, warned
+
+
+def _in_this_process(typed: tuple[str, ...], place: Place) -> Ended:
     out, err = io.StringIO(), io.StringIO()
-    began = time.perf_counter()
     with (
         warnings.catch_warnings(record=True) as caught,
         contextlib.redirect_stdout(out),
@@ -97,17 +139,8 @@ def attempt(arguments: Sequence[object], place: Place) -> Attempt:
     ):
         warnings.simplefilter("always")
         code = main(list(typed))
-    seconds = time.perf_counter() - began
-    problems = [
-        f"warning {one.category.__name__}: {one.message} ({one.filename}:{one.lineno})" for one in caught
-    ]
-    problems += _wrong_end(code, out.getvalue(), err.getvalue(), is_json="--json" in typed)
-    if contents(place.root, place.own) != before:
-        problems.append("something outside was changed")
-    for left in place.temporary.iterdir():
-        problems.append(f"left behind: {left.name}: {left.read_text() if left.is_file() else 'a folder'}")
-        left.unlink() if left.is_file() else shutil.rmtree(left)
-    return Attempt(typed, code, out.getvalue(), err.getvalue(), seconds, tuple(problems))
+    warned = [f"{one.category.__name__}: {one.message} ({one.filename}:{one.lineno})" for one in caught]
+    return code, out.getvalue(), err.getvalue(), warned
 
 
 def _wrong_end(code: int, out: str, err: str, *, is_json: bool) -> Iterator[str]:

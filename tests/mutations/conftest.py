@@ -2,85 +2,20 @@
 
 from __future__ import annotations
 
-import shutil
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import pytest
 
-from hexacell.campaign import feasibility
-from hexacell.cell.bundled import bundled_config
-from hexacell.cell.loader import dump, load_cell
-from hexacell.cli.app import main
-from procedures.journal.journal import read_entries
-from procedures.journal.line_format import encode
-from procedures.run import events
 from tests.mutations.attempts import Place
-from tests.mutations.trials import CELL, CONFIG, RECORDS, RUN, Templates
-from tests.small_cell import SMALL, changed, choose_among_few
-
-QUICK: dict[str, Any] = {
-    "timing.clock_factor": 500.0,
-    "timing.give_up_s": 500.0,
-    "encoders.timeout_s": 10.0,
-    "encoders.heartbeat_ms": 10_000,
-    "simulation.motion.ringing_mm": 0.05,
-}
-LATE = ("propose", "commit", "judge")
-
-
-@pytest.fixture(scope="session", autouse=True)
-def few_choices() -> Iterator[None]:
-    """Choose among few poses: what is chosen is not under test."""
-    with pytest.MonkeyPatch.context() as patch:
-        choose_among_few(patch)
-        patch.setattr(feasibility, "CANDIDATES", 8)
-        patch.setattr(feasibility, "ROBOTS", 4)
-        patch.setattr("hexacell.cli.commands.run.is_interactive", lambda: False)
-        yield
+from tests.mutations.sound_cells import few_choices, make_templates
+from tests.mutations.trials import Templates
 
 
 @pytest.fixture(scope="session")
-def templates(few_choices: None, tmp_path_factory: pytest.TempPathFactory) -> Templates:
-    folder = tmp_path_factory.mktemp("templates")
-    small = _small(folder / "small")
-    assert main(["run", str(small / CELL), "--unattended", "--mode", "optimise"]) in {0, 1}
-    [run] = (small / RUN).parent.iterdir()
-    run.rename(small / RUN)
-    shutil.copy(small / RUN / "measurements.csv", small / RECORDS)
-    plain = folder / "plain"
-    plain.mkdir()
-    source = bundled_config("simulated-hexaglide")
-    shutil.copy(source, plain / CELL)
-    shutil.copy(source.with_name(CONFIG), plain / CONFIG)
-    shutil.copy(small / RECORDS, plain / RECORDS)
-    return Templates(plain, small, tuple(_interrupted(small, folder / step, step) for step in LATE))
-
-
-def _small(folder: Path) -> Path:
-    folder.mkdir()
-    source = load_cell(bundled_config("simulated-hexaglide"))
-    patient = tuple(gauge.model_copy(update={"timeout_s": 10.0}) for gauge in source.settings.gauges)
-    (folder / CELL).write_text(dump(changed(source.settings, {"gauges": patient} | SMALL | QUICK)))
-    shutil.copy(source.config_path, folder / CONFIG)
-    return folder
-
-
-def _interrupted(small: Path, folder: Path, step: str) -> Path:
-    """The run as it was when a step was begun, and the config of then."""
-    shutil.copytree(small, folder)
-    entries = read_entries(folder / RUN / "journal.jsonl")
-    begun = [entry.event.step.key if isinstance(entry.event, events.StepBegun) else "" for entry in entries]
-    kept = entries[: begun.index(step)]
-    (folder / RUN / "journal.jsonl").write_bytes(b"".join(map(encode, kept)))
-    is_written = any(isinstance(entry.event, events.Committed) for entry in kept)
-    name = "config-after" if is_written else "config-before"
-    shutil.copy(folder / RUN / name, folder / CONFIG)
-    if not is_written:
-        for left in ("config-after", "config-before", "write-back.json"):
-            (folder / RUN / left).unlink()
-    return folder
+def templates(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Templates]:
+    with few_choices():
+        yield make_templates(tmp_path_factory.mktemp("templates"))
 
 
 @pytest.fixture

@@ -6,9 +6,9 @@ import random
 
 import pytest
 
-from tests.mutations.trials import SHARES
+from tests.mutations.kinds import SHARES
 
-EACH = 12
+EACH = 5
 """Trials of each kind."""
 
 

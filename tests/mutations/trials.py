@@ -39,7 +39,7 @@ def _rewrite(path: Path, data: bytes) -> None:
 
 def cell_file(templates: Templates, place: Place, draw: random.Random) -> Attempt:
     """A cell file that is validated or shown."""
-    place.refill(draw.choice((templates.plain, templates.small)))
+    place.refill(draw.choice((templates.plain, templates.small)), templates.small)
     path = place.cell / CELL
     _rewrite(path, mutated(path.read_bytes(), TOML, draw))
     action = draw.choice((["validate"], ["validate", "--json"], ["show"], ["show", "--json"]))
@@ -48,7 +48,7 @@ def cell_file(templates: Templates, place: Place, draw: random.Random) -> Attemp
 
 def config(templates: Templates, place: Place, draw: random.Random) -> Attempt:
     """A controller's config."""
-    place.refill(templates.plain)
+    place.refill(templates.plain, templates.small)
     path = place.cell / CONFIG
     _rewrite(path, mutated(path.read_bytes(), TOML, draw))
     return attempt(["cell", "validate", place.cell / CELL], place)
@@ -56,7 +56,7 @@ def config(templates: Templates, place: Place, draw: random.Random) -> Attempt:
 
 def records(templates: Templates, place: Place, draw: random.Random) -> Attempt:
     """A measurement file."""
-    place.refill(templates.small)
+    place.refill(templates.small, templates.small)
     path = place.cell / RECORDS
     _rewrite(path, mutated(path.read_bytes(), CSV, draw))
     command = draw.choice(("fit", "fit", "next"))
@@ -65,7 +65,7 @@ def records(templates: Templates, place: Place, draw: random.Random) -> Attempt:
 
 def cell_file_of_records(templates: Templates, place: Place, draw: random.Random) -> Attempt:
     """A cell file with which records are identified."""
-    place.refill(templates.small)
+    place.refill(templates.small, templates.small)
     path = place.cell / CELL
     _rewrite(path, mutated(path.read_bytes(), TOML, draw))
     command = draw.choice(("fit", "next"))
@@ -74,7 +74,7 @@ def cell_file_of_records(templates: Templates, place: Place, draw: random.Random
 
 def journal_replayed(templates: Templates, place: Place, draw: random.Random) -> Attempt:
     """A journal that is replayed."""
-    place.refill(templates.small)
+    place.refill(templates.small, templates.small)
     path = place.cell / RUN / "journal.jsonl"
     _rewrite(path, mutated_journal(path.read_bytes(), draw))
     only = draw.choice(("identification", "identification", "identification", "results"))
@@ -83,7 +83,7 @@ def journal_replayed(templates: Templates, place: Place, draw: random.Random) ->
 
 def journal_exported(templates: Templates, place: Place, draw: random.Random) -> Attempt:
     """A run folder that is exported."""
-    place.refill(templates.small)
+    place.refill(templates.small, templates.small)
     path = (
         place.cell
         / RUN
@@ -102,7 +102,7 @@ def mutated_file(path: Path, draw: random.Random) -> bytes:
 
 def journal_beside_records(templates: Templates, place: Place, draw: random.Random) -> Attempt:
     """A run folder whose records are identified again."""
-    place.refill(templates.small)
+    place.refill(templates.small, templates.small)
     path = place.cell / RUN / "journal.jsonl"
     _rewrite(path, mutated_journal(path.read_bytes(), draw))
     return attempt(["fit", place.cell / CELL, "--measurements", path.with_name("measurements.csv")], place)
@@ -110,7 +110,7 @@ def journal_beside_records(templates: Templates, place: Place, draw: random.Rand
 
 def run_resumed(templates: Templates, place: Place, draw: random.Random) -> Attempt:
     """A run that is resumed, with a mutated file in its folder."""
-    place.refill(draw.choice(templates.interrupted))
+    place.refill(draw.choice(templates.interrupted), templates.small)
     folder = place.cell / RUN
     others = [path for path in sorted(folder.rglob("*")) if path.is_file() and path.name != "journal.jsonl"]
     path = draw.choice(others) if draw.random() < 0.2 else folder / "journal.jsonl"
@@ -121,29 +121,11 @@ def run_resumed(templates: Templates, place: Place, draw: random.Random) -> Atte
 
 
 def run_checked(templates: Templates, place: Place, draw: random.Random) -> Attempt:
-    """A cell whose earlier runs were mutated, before it is checked; nothing is served."""
-    place.refill(templates.small)
+    """A cell out of its own reach whose earlier run was mutated: a check reads that, and ends."""
+    place.refill(templates.small, templates.small)
     path = place.cell / RUN / draw.choice(("journal.jsonl", "write-back.json"))
     _rewrite(path, mutated_file(path, draw))
     cell = place.cell / CELL
-    cell.write_text(cell.read_text().replace("tilt_deg = 45.0", "tilt_deg = 1e-6"))
+    text = cell.read_text()
+    cell.write_text(text.replace("[100.0, -100.0, 500.0]", "[100.0, -100.0, 5500.0]"))
     return attempt(["run", cell, "--unattended", "--mode", "check"], place)
-
-
-SHARES: dict[Trial, int] = {
-    cell_file: 46,
-    config: 8,
-    records: 14,
-    cell_file_of_records: 6,
-    journal_replayed: 10,
-    journal_exported: 3,
-    journal_beside_records: 5,
-    run_resumed: 6,
-    run_checked: 2,
-}
-"""How many of a hundred trials are of which kind."""
-
-
-def drawn_trial(draw: random.Random) -> Trial:
-    """One of the kinds."""
-    return draw.choices(list(SHARES), weights=list(SHARES.values()))[0]

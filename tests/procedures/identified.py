@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
 from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import load_cell
 from hexacell.identification.solver.levenberg_marquardt import Termination
@@ -24,7 +26,7 @@ def an_identification(**changes: Any) -> IdentificationResult:
         "dof": 11,
         "geometry": nominal,
         "sigma": nominal,
-        "covariance": ((1.0, 0.0), (0.0, 1.0)),
+        "covariance": np.eye(42).tolist(),
         "undetermined": (),
         "outliers": (),
         "frame": "as drawn",

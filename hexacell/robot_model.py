@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -23,6 +23,7 @@ from hexacell.kinematics.commanded_motion import CommandedRobot
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import Branch, FrameTransform, Mechanism, inverse_kinematics
 from hexacell.kinematics.pose import Pose, PoseBatch
+from hexacell.kinematics.refused_commands import RefusedCommands
 from hexacell.kinematics.sensitivity import singularity_margin
 from hexacell.measurements.records import MeasurementSet
 from hexacell.plugins import Group, load
@@ -53,6 +54,7 @@ class Robot:
             that the controller had before in the same run.
         work_frame: the axes of the controller's base frame about which a work frame can be taught.
         effects: systematic ones, as they are stated of the machine.
+        refused: commands that the controller refused in this run.
     """
 
     mechanism: Mechanism
@@ -70,6 +72,7 @@ class Robot:
     earlier: tuple[CommandingGeometry, ...] = ()
     work_frame: str = "xyz"
     effects: tuple[Effect, ...] = ()
+    refused: RefusedCommands = field(default_factory=RefusedCommands)
 
     @cached_property
     def commanding(self) -> Geometry:
@@ -122,6 +125,7 @@ class Robot:
             self.noise,
             self.limits,
             self.frames.base[:, ["xyz".index(axis) for axis in self.work_frame]].T,
+            self.refused,
         )
 
     def with_errors_of(self, settings: CellSettings) -> Robot:

@@ -46,5 +46,27 @@ class MoveRefused(CommandRefused):
     """The controller refused a target; nothing moved."""
 
 
+class PoseRefused(MoveRefused):
+    """The pose itself is refused: beyond a limit, or out of reach. The controller takes others.
+
+    Attributes:
+        axis: beyond whose limit it is, one of ``xyzabc``; none if the controller gave another reason.
+        is_highest: whether that is the axis' highest value, not its lowest.
+    """
+
+    def __init__(
+        self,
+        command: str,
+        reason: str,
+        *,
+        subject: str,
+        axis: str | None = None,
+        is_highest: bool = True,
+    ) -> None:
+        self.axis = axis
+        self.is_highest = is_highest
+        super().__init__(command, reason, subject=subject)
+
+
 class MotionInterrupted(DeviceError):
     """A motion ended, or was stopped, before its target."""

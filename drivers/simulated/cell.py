@@ -51,7 +51,10 @@ class SimulatedCell(Closeable):
         home = Pose(*settings.identification.points[0])
         commanding, fixture = config_format.read(config), settings.length_check
         self.physics = RobotPhysics(mechanism, simulation, clock, commanding, home, fixture)
-        self.machine = SimulatedMachine(mechanism, config_format, config, self.physics, clock, home)
+        soft_limits = simulation.soft_limits
+        self.machine = SimulatedMachine(
+            mechanism, config_format, config, self.physics, clock, home, soft_limits
+        )
         with ExitStack() as served:
             stop_file = _stop_file(settings, served)
             self.gauges = served.enter_context(_gauge_bank(settings, simulation, self.physics, clock))

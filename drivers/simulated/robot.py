@@ -7,8 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
-from drivers.simulated.linuxcnc.state import KinematicsFailure
+from drivers.simulated.linuxcnc.state import KinematicsFailure, SoftLimitExceeded
 from drivers.simulated.physics import RobotPhysics
+from hexacell.cell.simulation import SoftLimits
 from hexacell.clock import CellClock
 from hexacell.controller_config.interface import ConfigFormat, ControllerGeometry
 from hexacell.errors import FileError
@@ -39,7 +40,9 @@ class SimulatedMachine:
         physics: RobotPhysics,
         clock: CellClock,
         home: Pose,
+        soft_limits: SoftLimits | None = None,
     ) -> None:
+        self._soft_limits = soft_limits or SoftLimits()
         self._mechanism = mechanism
         self._format = config_format
         self._config = config
@@ -58,8 +61,10 @@ class SimulatedMachine:
         """Move straight to a pose; returns at the end or when stopped.
 
         Raises:
+            SoftLimitExceeded: it is beyond a soft limit.
             KinematicsFailure: a pose on the line is out of reach.
         """
+        self._require_soft_limits(pose)
         stop_count = self._stop_count
         with self._lock:
             here = self._pose_now()
@@ -74,6 +79,14 @@ class SimulatedMachine:
             self._line = line
             motion = self._physics.start_motion(joints)
         self._clock.wait(motion.duration_s, self._stopped)
+
+    def _require_soft_limits(self, pose: Pose) -> None:
+        limits = self._soft_limits
+        for axis, value, low, high in zip(
+            "XYZABC", pose.as_tuple(), limits.lowest, limits.highest, strict=True
+        ):
+            if not low <= value <= high:
+                raise SoftLimitExceeded(axis, is_highest=value > high)
 
     def stop(self) -> None:
         """Stop in place."""

@@ -7,7 +7,16 @@ from typing import Literal
 from pydantic import Field
 
 from hexacell.cell.devices import STARTUP_WORDS, StartupWord
-from hexacell.cell.fields import GeometrySettings, InRange, NotNegative, Positive, Section, Seed, Text
+from hexacell.cell.fields import (
+    GeometrySettings,
+    InRange,
+    NotNegative,
+    Positive,
+    Section,
+    Seed,
+    SixInRange,
+    Text,
+)
 
 FaultKind = Literal[
     "emergency stop",
@@ -63,6 +72,13 @@ class SimulatedMotion(Section):
     repeatability_mm: NotNegative = Field(0.0, description="scatter of each slider's stop, 1 sigma")
 
 
+class SoftLimits(Section):
+    """What the simulated controller may be commanded to; it refuses any other pose and does not move."""
+
+    lowest: SixInRange = Field((-1e6,) * 6, description="of x, y, z, mm, and a, b, c, deg")
+    highest: SixInRange = Field((1e6,) * 6, description="of x, y, z, mm, and a, b, c, deg")
+
+
 class SimulatedFixture(Section):
     """How the simulated fixture of [length_check] is made, and how the gauges are mounted in it."""
 
@@ -107,5 +123,6 @@ class SimulationSettings(Section):
     gauges: SimulatedGauges = SimulatedGauges()
     encoders: SimulatedEncoders = SimulatedEncoders()
     motion: SimulatedMotion = SimulatedMotion()
+    soft_limits: SoftLimits = SoftLimits()
     fixture: SimulatedFixture = SimulatedFixture()
     faults: tuple[SimulatedFault, ...] = Field((), max_length=1000, description="faults and their times")

@@ -13,6 +13,7 @@ from hexacell.kinematics.commanded_motion import CommandedRobot
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import Branch, FrameTransform, Mechanism
 from hexacell.kinematics.pose import PoseBatch
+from hexacell.kinematics.refused_commands import RefusedCommands
 from hexacell.kinematics.rotations import Array, Mask
 
 SAME_FRAMES = FrameTransform(np.eye(3), np.zeros(3), np.eye(3))
@@ -85,6 +86,7 @@ class RobotBelief:
         free: estimated free parameters (p,), mm.
         covariance: theirs (p, p), mm^2.
         work_frame_turns: axes (k, 3) about which a work frame can be taught.
+        refused: commands that the controller refused.
     """
 
     mechanism: Mechanism
@@ -95,6 +97,7 @@ class RobotBelief:
     noise: Noise
     limits: Limits
     work_frame_turns: Array = field(default_factory=lambda: np.eye(3))
+    refused: RefusedCommands = field(default_factory=RefusedCommands)
 
     def zeroed_at(self, shown_mm: tuple[float, float, float] | None) -> RobotBelief:
         """The same at gauges that were zeroed where they show ``shown_mm`` along base x, y, z."""
@@ -113,4 +116,5 @@ class RobotBelief:
     @cached_property
     def commanded(self) -> CommandedRobot:
         """The estimated robot under its controller."""
-        return CommandedRobot(self.mechanism, self.branch, self.controller, self.estimate)
+        geometries, refused = (self.controller, self.estimate), (self.refused, self.limits.frames)
+        return CommandedRobot(self.mechanism, self.branch, *geometries, *refused)

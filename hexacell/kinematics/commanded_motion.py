@@ -14,14 +14,15 @@ variables are fixed, and the geometry changes in stages from one to the other
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from hexacell.kinematics.forward import ForwardResult, continue_solution
 from hexacell.kinematics.geometry import Geometry
-from hexacell.kinematics.mechanism import Branch, Mechanism
+from hexacell.kinematics.mechanism import Branch, FrameTransform, Mechanism
 from hexacell.kinematics.pose import PoseBatch
+from hexacell.kinematics.refused_commands import RefusedCommands
 from hexacell.kinematics.rotations import Array, Mask
 
 COMMAND_STAGES = (3,)
@@ -51,16 +52,25 @@ class CommandedRobot:
     """A robot with the geometry ``actual`` under a controller that computes with ``commanding``.
 
     Both geometries and all poses are in one frame convention.
+
+    Attributes:
+        refused: commands that the controller refused; it computes no joint variables for them.
+        frames: from the frames of the commands to the convention's.
     """
 
     mechanism: Mechanism
     branch: Branch
     commanding: Geometry
     actual: Geometry
+    refused: RefusedCommands = field(default_factory=RefusedCommands)
+    frames: FrameTransform | None = None
 
     def joints(self, commands: PoseBatch) -> Array:
-        """Joint variables (n, 6), mm, that the controller computes; NaN if out of reach."""
-        return self.mechanism.inverse(self.commanding, self.branch, commands)
+        """Joint variables (n, 6), mm, that the controller computes; NaN if out of reach or refused."""
+        joints = self.mechanism.inverse(self.commanding, self.branch, commands)
+        if self.refused.commands:
+            joints[~self.refused.allow(commands, self.frames)] = np.nan
+        return joints
 
     def actual_poses(self, commands: PoseBatch) -> ActualPoses:
         """The actual poses of n commands."""

@@ -131,6 +131,8 @@ def _further_text(event: events.Event) -> str | None:
             return f"{set_name(event.at)} continues: its reference is unchanged"
         case events.RecordDiscarded():
             return f"{set_name(event.at)}, orientation {event.orientation} is measured again"
+        case events.PoseExcluded():
+            return f"{set_name(event.at)}, orientation {event.orientation}: {refusal_text(event)}"
         case events.Failed():
             reason = "\n".join(wrapped(line, indent=2) for line in event.reason.splitlines())
             return f"{reason}\n  attempt {event.attempt}: {event.action.value}"
@@ -138,6 +140,13 @@ def _further_text(event: events.Event) -> str | None:
             return f"{event.command}: {event.reason}"
         case _:
             return event.kind if isinstance(event, events.Paused | events.Resumed) else None
+
+
+def refusal_text(event: events.PoseExcluded) -> str:
+    """What follows from a pose that the controller refused."""
+    if event.orientation == 1:
+        return f"its reference is refused, the point is left out: {event.reason}"
+    return f"the controller refuses this pose, which is not commanded again: {event.reason}"
 
 
 def set_summary(closed: events.SetClosed, state: RunState) -> str:

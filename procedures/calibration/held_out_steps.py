@@ -42,7 +42,7 @@ class HeldOutSteps:
         """The next step of the first set that is not closed; None if all are."""
         for point in range(1, len(self.settings.verification.points) + 1):
             key = SetKey(phase=phase, point=point)
-            if not state.set(key).closed:
+            if not state.set(key).closed and not self._is_left(state, key):
                 return Locate() if state.position_unknown else self._in_set(state, key)
         return None
 
@@ -89,6 +89,11 @@ class HeldOutSteps:
             return common, len(common)
         return common + state.identified.held_out_after[key.point - 1], len(common)
 
+    def _is_left(self, state: RunState, key: SetKey) -> bool:
+        """Whether a point cannot be measured, because the controller refuses its reference."""
+        poses, _ = self._poses(state, key)
+        return not state.set(key).samples and not state.refused.allows(poses[0])
+
     def _in_set(self, state: RunState, key: SetKey) -> Step:
         measured = state.set(key)
         require_zero(state, key)
@@ -101,17 +106,24 @@ class HeldOutSteps:
             return self.sets.at_reference(state, key) or self._to_reference(state, key)
         if measured.samples and (trial := self.trials.next_step(state, key, self._ball(state, key))):
             return trial
-        if len(measured.samples) < len(self._poses(state, key)[0]):
-            return self.sets.at_pose(state, key) or self._to_next_pose(state, key)
+        if (orientation := self._next_orientation(state, key)) is not None:
+            here = self.sets.at_pose(state, key, orientation)
+            return here or self._to_pose(state, key, orientation)
         if step := self.sets.at_reference(state, key):
             return step
         # The poses were chosen with a safe straight line back from each of them.
         is_in_order = self.sets.paths.is_in_order(state, key)
         return reference_move(state, key) if is_in_order else self._to_reference(state, key)
 
-    def _to_next_pose(self, state: RunState, key: SetKey) -> Move:
+    def _next_orientation(self, state: RunState, key: SetKey) -> int | None:
+        """The lowest one without a record that the controller does not refuse; none if there is none."""
+        taken = {sample.orientation for sample in state.set(key).samples}
+        poses, _ = self._poses(state, key)
+        waiting = (number for number in range(1, len(poses) + 1) if number not in taken)
+        return next((number for number in waiting if state.refused.allows(poses[number - 1])), None)
+
+    def _to_pose(self, state: RunState, key: SetKey, orientation: int) -> Move:
         poses, common = self._poses(state, key)
-        orientation = state.set(key).next_orientation
         move = Move(at=key, orientation=orientation, pose=poses[orientation - 1])
         if orientation == 1:
             return self.sets.paths.towards(state, move)

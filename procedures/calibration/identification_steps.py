@@ -115,7 +115,7 @@ def open_set(state: RunState) -> SetKey | None:
     """The set of the identification that is being measured."""
     visited = [] if state.at_pose is None else [state.at_pose[0]]
     for key in [*state.open_sets, *visited]:
-        if key.phase is Phase.IDENTIFY and not state.set(key).closed:
+        if key.phase is Phase.IDENTIFY and not state.set(key).closed and not state.is_left(key):
             return key
     return None
 
@@ -130,11 +130,17 @@ def campaign_state(state: RunState, key: SetKey | None) -> CampaignState:
     return CampaignState(
         measurements=MeasurementSet(records),
         point=None if key is None else key.point,
-        done=frozenset(at.point for at, measured in sets.items() if measured.closed),
+        done=frozenset(at.point for at, measured in sets.items() if measured.closed) | _left_points(state),
         present=None if key is None else _present_pose(state, key),
         rejections=0 if key is None else state.set(key).rejections,
         zero_mm=None if key is None else state.zero_shown(key),
     )
+
+
+def _left_points(state: RunState) -> frozenset[int]:
+    """Points that cannot be measured, because the controller refuses their reference."""
+    keys = {refused.at for refused in state.excluded if refused.at.phase is Phase.IDENTIFY}
+    return frozenset(key.point for key in keys if state.is_left(key))
 
 
 def _present_pose(state: RunState, key: SetKey) -> Pose | None:

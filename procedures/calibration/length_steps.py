@@ -15,6 +15,7 @@ import numpy as np
 from hexacell.cell.length_check import LengthCheckSettings
 from hexacell.kinematics.pose import Pose
 from hexacell.kinematics.rotations import Array
+from procedures.calibration.path_planning import NoSafePath
 from procedures.calibration.set_steps import SetSteps, TravelError, reference_pose
 from procedures.calibration.trial_steps import TrialSteps
 from procedures.run.state import RunState
@@ -81,6 +82,11 @@ class LengthSteps:
             )
         pose = self._pose(key, orientation, self._off(state, key)).as_tuple()
         move = Move(at=key, orientation=orientation, pose=pose)
+        if not state.refused.allows(pose):
+            raise NoSafePath(
+                f"{key}: the controller refuses {move.target} in seat {seat_of(key)} of the fixture",
+                action="Lower tilt_deg in [length_check], or put the fixture elsewhere",
+            )
         here = self.sets.at_pose(state, key)
         return here or self.sets.paths.towards(state, move, self._zero(state, key))
 

@@ -11,7 +11,7 @@ from hexacell.errors import LimitError
 from hexacell.kinematics.rotations import Array
 from hexacell.measurements.records import deviation_of
 from hexacell.robot_model import Robot
-from procedures.calibration.path_planning import RunPathPlanner
+from procedures.calibration.path_planning import NoSafePath, RunPathPlanner
 from procedures.run import events
 from procedures.run.state import RunState
 from procedures.run.steps import (
@@ -41,9 +41,12 @@ class SetSteps:
         """How to get to a pose from wherever the robot is."""
         return RunPathPlanner(self.robot)
 
-    def at_pose(self, state: RunState, key: SetKey) -> Step | None:
-        """Place the gauges or sample, if the robot is at the pose of the set's next record."""
-        orientation = state.set(key).next_orientation
+    def at_pose(self, state: RunState, key: SetKey, orientation: int | None = None) -> Step | None:
+        """Place the gauges or sample, if the robot is at the pose of the set's next record.
+
+        That is the one of an ``orientation``, by default the lowest without a record.
+        """
+        orientation = orientation or state.set(key).next_orientation
         if state.at_pose != (key, orientation) or state.target is None:
             return None
         if orientation == 1 and not state.set(key).placed:
@@ -61,7 +64,13 @@ class SetSteps:
 
         ``ball`` (3,), mm, is where the ball was when the gauges were zeroed, if that is known.
         """
-        return self.paths.towards(state, reference_move(state, key), ball)
+        move = reference_move(state, key)
+        if not state.refused.allows(move.pose):
+            raise NoSafePath(
+                f"{key}: the controller refuses its reference {move.target}, to which it must return",
+                action="Widen the limits of the controller, then continue",
+            )
+        return self.paths.towards(state, move, ball)
 
 
 def reference_pose(state: RunState, key: SetKey) -> SixNumbers:

@@ -26,6 +26,7 @@ from hexacell.decision import ErrorLimits, Verdict
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.pose import Pose
+from hexacell.kinematics.refused_commands import RefusedCommands
 from hexacell.reporting.length_result import with_measured_scale
 from hexacell.reporting.result import AcceptedResult
 from hexacell.robot_model import Robot
@@ -149,7 +150,18 @@ class Calibration:
         )
 
     def informed(self, state: RunState) -> Calibration:
-        """The same with the noise that the run has measured, if it has."""
+        """The same with what the run has learnt: its noise, and poses that the controller refused."""
+        known = self._with_measured_noise(state)
+        return known if known.robot.refused == state.refused else known._without(state.refused)
+
+    def _without(self, refused: RefusedCommands) -> Calibration:
+        """The same for a controller that refused some poses."""
+        if refused not in self._with_refusals:
+            self._with_refusals.clear()  # a run only adds to them
+            self._with_refusals[refused] = replace(self, robot=replace(self.robot, refused=refused))
+        return self._with_refusals[refused]
+
+    def _with_measured_noise(self, state: RunState) -> Calibration:
         if state.noise is None or self.measured_noise is not None:
             return self
         measured = state.noise.noise
@@ -292,6 +304,11 @@ class Calibration:
     @cached_property
     def _with_noise(self) -> dict[MeasuredNoise, Calibration]:
         """By the noise that was measured, once in a run."""
+        return {}
+
+    @cached_property
+    def _with_refusals(self) -> dict[RefusedCommands, Calibration]:
+        """By the poses that the controller refused so far."""
         return {}
 
     @cached_property

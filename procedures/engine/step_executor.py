@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from drivers.controllers.errors import PoseRefused
 from drivers.errors import GaugeAtEnd
 from drivers.interfaces import StartupAction
 from hexacell.cell.loader import Cell
@@ -46,11 +47,15 @@ from procedures.run.steps import (
     Repeat,
     Revisit,
     Sample,
+    SixNumbers,
     Standstill,
     Step,
     Try,
 )
 from procedures.run.trips import GuardTripped
+
+MOST_REFUSALS = 40
+"""Of poses of one set by the controller; then its limits are to be looked at, by a person."""
 
 RobotStep = Locate | Move | Place | Sample | Revisit | CloseSet | Standstill | Repeat | Probe | Try
 """A step for which the robot must be where its config has it."""
@@ -152,6 +157,8 @@ class StepExecutor:
     async def _move(self, step: Move, state: RunState) -> events.Event:
         try:
             await self.guards.move(step, state, lambda: self._commanded(step))
+        except PoseRefused as refusal:
+            return await self._refused(step, state, refusal)
         except GuardTripped as tripped:
             measured = state.set(step.at)
             is_there = not measured.reference_unverified or measured.rejections > 0
@@ -161,6 +168,31 @@ class StepExecutor:
             self.guards.supervisor.clear()
             return events.RecordRejected(at=step.at, orientation=step.orientation, reason=str(tripped))
         return events.Arrived(at=step.at, orientation=step.orientation, pose=step.pose)
+
+    async def _refused(self, step: Move, state: RunState, refusal: PoseRefused) -> events.PoseExcluded:
+        """A refusal of the pose is no failure: the robot is where it was, and others may be possible."""
+        here = await self.guards.locate()
+        refusals = sum(one.at == step.at for one in state.excluded)
+        if refusals >= MOST_REFUSALS or not self._is_at(here.pose, state.target):
+            raise refusal
+        return events.PoseExcluded(
+            at=step.at,
+            orientation=step.orientation,
+            pose=step.pose,
+            reason=refusal.reason,
+            axis=refusal.axis,
+            is_highest=refusal.is_highest,
+        )
+
+    def _is_at(self, here: Pose, target: SixNumbers | None) -> bool:
+        """Whether a reported pose is the commanded one; each may be off by the tolerance of an arrival."""
+        if target is None:
+            return False
+        settings, there = self.cell.settings.controller, Pose(*target)
+        position = np.abs(here.position - there.position).max()
+        angle = np.degrees(np.abs(here.rotation - there.rotation).max())
+        is_near = position <= 2.0 * settings.position_tolerance_mm
+        return bool(is_near and angle <= 2.0 * settings.angle_tolerance_deg)
 
     def _commanded(self, step: Move) -> Array:
         """Where the sliders (6,), mm, belong by the geometry that the controller has now."""

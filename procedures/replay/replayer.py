@@ -228,7 +228,7 @@ OUTCOME_KINDS: dict[str, frozenset[str]] = {
 MEASURED_KINDS = frozenset({"confirmed", "voided", "closed"})
 """Kinds that can be computed again only from their reading; journals of version 1 have none."""
 
-CANCELLED = frozenset({"interrupted", "failed", "paused"})
+CANCELLED = frozenset({"excluded", "interrupted", "failed", "paused"})
 """Kinds of events that end a step without an outcome."""
 
 COMPUTED_STEPS = frozenset({"assess noise", "lend", "take back", "identify", "propose", "commit", "judge"})

@@ -66,6 +66,22 @@ class Arrived(Frozen):
     pose: SixNumbers
 
 
+class PoseExcluded(Frozen):
+    """The controller refused a pose and did not move; it is not commanded again in this run.
+
+    ``axis`` is the axis beyond whose limit it is, the highest or the lowest; then no pose is commanded that
+    is as far out. Without it the pose alone is left out.
+    """
+
+    kind: Literal["excluded"] = "excluded"
+    at: SetKey
+    orientation: int
+    pose: SixNumbers
+    reason: str
+    axis: Literal["x", "y", "z", "a", "b", "c"] | None = None
+    is_highest: bool = True
+
+
 class Located(Frozen):
     """Controller and encoders agree on where the robot is, after that had been unknown.
 
@@ -393,6 +409,7 @@ Event = Annotated[
     RunStarted
     | StepBegun
     | Arrived
+    | PoseExcluded
     | Located
     | GaugesPlaced
     | RecordTaken

@@ -8,6 +8,7 @@ from functools import reduce
 
 from hexacell.cell.recovery import Action, FailureKind
 from hexacell.kinematics.pose import Pose
+from hexacell.kinematics.refused_commands import RefusedCommand, RefusedCommands
 from hexacell.measurements.records import MeasurementSet, Record
 from procedures.run import events
 from procedures.run.steps import (
@@ -106,6 +107,7 @@ class RunState:
         path_from_reference: orientations and poses by which it came from the reference it was at last;
             0 where nothing is measured.
         position_unknown: the controller must be asked for the pose before the robot moves.
+        excluded: poses that the controller refused, in the order of the refusals.
         failures: how many, by kind and place, since the run was begun or resumed.
         rolling_back: the old geometry is being put back.
         provisional: the provisional geometry that the controller was given last.
@@ -133,6 +135,7 @@ class RunState:
     provisional: events.ProvisionalApplied | None = None
     provisional_active: bool = False
     config_write_pending: bool = False
+    excluded: tuple[events.PoseExcluded, ...] = ()
     failures: dict[tuple[FailureKind, str], int] = field(default_factory=dict)
     is_in_estop: bool = False
     ended: events.Ended | None = None
@@ -171,6 +174,18 @@ class RunState:
         samples = self.set(of_zero).samples
         return samples[0].reading if samples else None
 
+    @property
+    def refused(self) -> RefusedCommands:
+        """The same as what the limits of motion know of it."""
+        return RefusedCommands(
+            tuple(RefusedCommand(one.pose, one.axis, one.is_highest) for one in self.excluded)
+        )
+
+    def is_left(self, key: SetKey) -> bool:
+        """Whether a set cannot be measured, because its reference was refused."""
+        is_refused = any(one.at == key and one.orientation == 1 for one in self.excluded)
+        return is_refused and not self.set(key).samples
+
     def zero_shown(self, key: SetKey) -> ThreeNumbers | None:
         """What a set's gauges showed, mm along base x, y, z, when they were zeroed; none before that."""
         zero = self.zero(key)
@@ -207,6 +222,8 @@ class RunState:
     def _is_compared(self, sample: events.RecordTaken) -> bool:
         if sample.orientation == 1 or self.identified is None:
             return sample.orientation > 1
+        if not self.refused.allows(sample.pose):
+            return False  # it may have been refused in the other phase
         return sample.orientation <= len(self.identified.held_out[sample.at.point - 1])
 
 
@@ -233,6 +250,8 @@ def apply(state: RunState, event: events.Event) -> RunState:  # noqa: C901, PLR0
             return replace(state, at_pose=None, off_plan=True, target=event.pose, position_unknown=False)
         case events.Arrived():
             return _unverified(_arrived(state, event), but=event.at)
+        case events.PoseExcluded():
+            return _excluded(state, event)
         case events.GaugesPlaced():
             return _with_set(state, event.at, replace(state.set(event.at), placed=True))
         case events.RecordTaken():
@@ -299,6 +318,16 @@ def _arrived(state: RunState, event: events.Arrived) -> RunState:
         position_unknown=False,
         is_in_estop=False,
     )
+
+
+def _excluded(state: RunState, event: events.PoseExcluded) -> RunState:
+    """The robot is where it was; a record that was to be taken again there is chosen anew."""
+    left = replace(state, excluded=(*state.excluded, event))
+    if event.at not in state.sets:
+        return left
+    measured = state.set(event.at)
+    again = tuple(pair for pair in measured.again if pair[1] != event.pose)
+    return _with_set(left, event.at, replace(measured, again=again))
 
 
 def _noise_measured(state: RunState, event: events.NoiseMeasured) -> RunState:

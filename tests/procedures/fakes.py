@@ -7,7 +7,8 @@ import threading
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
-from drivers.controllers.errors import StartupNotPermitted
+from drivers.controllers.errors import PoseRefused, StartupNotPermitted
+from drivers.controllers.linuxcnc.protocol import parse_pose_refusal
 from drivers.errors import GaugeAtEnd
 from drivers.interfaces import (
     ControllerStatus,
@@ -18,6 +19,7 @@ from drivers.interfaces import (
     StartupAction,
     StartupActions,
 )
+from drivers.simulated.linuxcnc.state import SoftLimitExceeded
 from drivers.simulated.robot import SimulatedMachine
 from hexacell.acceptance import AcceptanceGate
 from hexacell.cell.devices import GaugeAxis
@@ -123,6 +125,19 @@ class FakeEncoders(Fake):
         return EncoderSample(tuple(round(1000 * value) for value in positions), positions)
 
 
+def refused(pose: Pose, message: str) -> PoseRefused:
+    """What the real driver makes of a message."""
+    reason = parse_pose_refusal(message)
+    assert reason is not None
+    return PoseRefused(
+        f"to move to {pose}",
+        message,
+        subject="controller",
+        axis=reason.axis,
+        is_highest=reason.is_highest,
+    )
+
+
 class FakeController(Fake):
     """A controller that writes down what it is asked and, given a machine, does it."""
 
@@ -154,7 +169,10 @@ class FakeController(Fake):
     async def move(self, pose: Pose) -> None:
         self._do("move", str(pose))
         if self.machine:
-            self.machine.move(pose)
+            try:
+                self.machine.move(pose)
+            except SoftLimitExceeded as refusal:
+                raise refused(pose, str(refusal)) from refusal
 
     async def position(self) -> ReportedPosition | None:
         return ReportedPosition(self.machine.pose(), self.machine.joints()) if self.machine else None

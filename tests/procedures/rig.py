@@ -61,7 +61,9 @@ class Rig:
             home,
             self.cell.settings.length_check,
         )
-        self.machine = SimulatedMachine(Hexaglide(), config_format, config, self.physics, self.clock, home)
+        self.machine = SimulatedMachine(
+            Hexaglide(), config_format, config, self.physics, self.clock, home, simulation.soft_limits
+        )
         for gauge in bench.gauges:
             gauge.shown = partial(self.physics.gauge_displacement, gauge.name)
         bench.encoders.shown = lambda: list(self.physics.encoder_positions())

@@ -40,6 +40,10 @@ class Story:
             at=self.key, orientation=orientation, reason="the ball left the travel"
         )
 
+    def excluded(self, orientation: int = 2, pose: SixNumbers | None = None) -> events.Event:
+        where = self.arrived(orientation, pose).model_dump(exclude={"kind"})
+        return events.PoseExcluded(**where, reason="would exceed joint 3's positive limit")
+
     def closed(self) -> events.Event:
         return events.SetClosed(at=self.key, drift_mm=NOTHING_IS_ZERO)
 

@@ -12,12 +12,13 @@ from drivers.controllers.errors import (
     ConnectionLost,
     MotionInterrupted,
     MoveRefused,
+    PoseRefused,
     ResponseTimeout,
     StartupNotPermitted,
 )
 from drivers.controllers.linuxcnc import startup
 from drivers.controllers.linuxcnc.commands import ControllerCommands
-from drivers.controllers.linuxcnc.protocol import pose_difference, rapid_move
+from drivers.controllers.linuxcnc.protocol import parse_pose_refusal, pose_difference, rapid_move
 from drivers.controllers.linuxcnc.session import Session
 from drivers.controllers.linuxcnc.settings import Address, Timeouts, loop_time
 from drivers.interfaces import (
@@ -94,7 +95,8 @@ class LinuxcncrshController:
         On cancellation and after ``move_timeout_s`` the machine is stopped.
 
         Raises:
-            MoveRefused: The pose is out of reach or limits, or the controller is not prepared.
+            PoseRefused: The pose is out of reach or limits.
+            MoveRefused: The controller is not prepared.
             MotionInterrupted: it stopped at another pose, which the message names.
             DeviceError: The connection broke.
         """
@@ -206,8 +208,7 @@ class LinuxcncrshController:
         except CommandRefused as refusal:
             if self._was_stopped_since(stops):  # the stop took control before the move was received
                 raise self._stopped_before_moving() from refusal
-            move = f"to move to {pose}"
-            raise MoveRefused(move, refusal.reason, subject=self._name, action=refusal.action) from refusal
+            raise self._move_refusal(pose, refusal.reason, refusal.action) from refusal
         except ResponseTimeout as overdue:
             await self.stop()
             problem = f"was still moving after {limit_s:g} s and was stopped"
@@ -221,6 +222,13 @@ class LinuxcncrshController:
                 await self.stop()
             raise
 
+    def _move_refusal(self, pose: Pose, reason: str, action: str | None) -> MoveRefused:
+        move = f"to move to {pose}"
+        if (found := parse_pose_refusal(reason)) is None:
+            return MoveRefused(move, reason, subject=self._name, action=action)
+        side = found.is_highest
+        return PoseRefused(move, reason, subject=self._name, axis=found.axis, is_highest=side)
+
     def _stopped_before_moving(self) -> MotionInterrupted:
         return MotionInterrupted("was stopped before it moved", subject=self._name)
 
@@ -230,6 +238,8 @@ class LinuxcncrshController:
             was_stopped = self._was_stopped_since(stops)
             if was_stopped or loop_time() > deadline:
                 reason = "it was stopped on request" if was_stopped else await commands.reason()
+                if not was_stopped and parse_pose_refusal(reason):  # acknowledged all the same
+                    raise self._move_refusal(target, reason, None)
                 raise MotionInterrupted(
                     f"stopped at {there} before reaching {target}: {reason}",
                     subject=self._name,

@@ -10,6 +10,7 @@ adds a blank line after some refusals; 2.10 ends all with CR LF and explains a r
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import dataclass
 
 from hexacell.kinematics.pose import Pose
@@ -21,6 +22,13 @@ _LEGS = 6
 _EXPLANATION = "error:"
 _RESPONSE_NAME = {"SET_WAIT": "WAIT_MODE"}
 _DECIMALS = 8
+_AXIS_LIMIT = re.compile(
+    r"would exceed (?P<axis>[XYZABC])'s (?P<side>positive|negative) limit", re.IGNORECASE
+)
+_UNREACHABLE = re.compile(
+    r"would exceed (?:joint \d+'s|limits)|fails kinematicsInverse|gave non-finite joint location",
+    re.IGNORECASE,
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,6 +42,14 @@ class Response:
     accepted: bool
     text: str = ""
     explanations: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class RefusalReason:
+    """What LinuxCNC's error message says of a pose that it refuses: ``axis`` is none or of ``xyzabc``."""
+
+    axis: str | None = None
+    is_highest: bool = True
 
 
 class LineBuffer:
@@ -118,6 +134,17 @@ def parse_positions(text: str) -> tuple[float, float, float, float, float, float
     if not all(math.isfinite(value) for value in (x, y, z, a, b, c)):
         raise ValueError(f"it reports {text!r}, which is no position")
     return x, y, z, a, b, c
+
+
+def parse_pose_refusal(reason: str) -> RefusalReason | None:
+    """Why a pose is refused; none if the messages say that something else prevents the move.
+
+    The messages are those of LinuxCNC's motion module (``command.c``): ``would exceed C's positive limit``,
+    ``would exceed joint 3's negative limit``, ``fails kinematicsInverse``.
+    """
+    if found := _AXIS_LIMIT.search(reason):
+        return RefusalReason(found["axis"].lower(), found["side"].lower() == "positive")
+    return RefusalReason() if _UNREACHABLE.search(reason) else None
 
 
 def parse_homed(text: str) -> tuple[bool, ...]:

@@ -46,6 +46,14 @@ class KinematicsFailure(Exception):
     """The target is out of reach of the controller's geometry."""
 
 
+class SoftLimitExceeded(Exception):
+    """The target is beyond a soft limit of an axis."""
+
+    def __init__(self, axis: str, *, is_highest: bool) -> None:
+        side = "positive" if is_highest else "negative"
+        super().__init__(f"Linear move on line 0 would exceed {axis}'s {side} limit")
+
+
 class Machine(Protocol):
     """The machine behind the controller, called from several threads.
 
@@ -56,6 +64,7 @@ class Machine(Protocol):
         """Move to ``pose``; returns when the motion has ended or was stopped.
 
         Raises:
+            SoftLimitExceeded: It is beyond a soft limit; nothing moves.
             KinematicsFailure: The geometry cannot reach it; nothing moves.
         """
         ...
@@ -197,6 +206,10 @@ class ControllerState:
     def _travel(self, target: Pose) -> bool:
         try:
             self.machine.move(target)
+        except SoftLimitExceeded as refusal:
+            self._errors.append(str(refusal))
+            self._errors.append("invalid params in linear command")
+            return False
         except KinematicsFailure:
             self._errors.append("Linear move on line 0 fails kinematicsInverse")
             self._errors.append("invalid params in linear command")

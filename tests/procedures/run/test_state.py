@@ -203,3 +203,24 @@ def test_a_located_robot_has_no_path_from_the_reference(story) -> None:
     assert trail_of(*there, events.Located(pose=STOP), s.arrived(4)) == []
     assert trail_of(*there, events.Located(pose=STOP), s.arrived(2)) == [1, 2]
     assert trail_of(*there, events.Located(pose=s.arrived(3).pose), s.arrived(4)) == [1, 2, 3, 4]
+
+
+def test_a_refused_pose_leaves_the_robot_where_it_was_and_is_not_taken_again(story) -> None:
+    told = story()
+    taken = [told.arrived(), told.sampled(), told.arrived(2), told.sampled(2), told.undone(2)]
+    (again,) = fold(taken).set(told.key).again
+    before = fold([*taken, told.arrived()])
+    after = apply(before, told.excluded(2, again[1]))
+    assert after.set(told.key).again == ()
+    assert (after.at_pose, after.target) == (before.at_pose, before.target)
+    assert not after.refused.allows(again[1])
+    assert before.target is not None
+    assert after.refused.allows(before.target)
+
+
+def test_a_set_whose_reference_is_refused_is_left_unless_it_has_records(story) -> None:
+    told = story()
+    refusal = told.excluded(1)
+    assert fold([refusal]).is_left(told.key)
+    assert not fold([told.excluded(2)]).is_left(told.key)
+    assert not fold([told.arrived(), told.sampled(), refusal]).is_left(told.key)

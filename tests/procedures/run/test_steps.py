@@ -206,7 +206,16 @@ some_event: st.SearchStrategy[Any] = st.one_of(
     ),
     st.builds(events.StepBegun, step=some_step),
     st.builds(events.Arrived, at=set_key, orientation=count, pose=six),
-    st.builds(events.Located, pose=six),
+    st.builds(events.Located, pose=six, joints_mm=st.none() | six, encoders_mm=st.none() | six),
+    st.builds(
+        events.PoseExcluded,
+        at=set_key,
+        orientation=count,
+        pose=six,
+        reason=text,
+        axis=st.none() | st.sampled_from("xyzabc"),
+        is_highest=st.booleans(),
+    ),
     st.builds(events.GaugesPlaced, at=set_key),
     st.builds(
         events.RecordTaken, at=set_key, orientation=count, pose=six, reading=reading, deviation_mm=three
@@ -305,6 +314,6 @@ KINDS = (
     *("started", "begun", "arrived", "placed", "sampled", "refused", "closed", "voided", "identified"),
     *("lent", "taken back", "proposed", "committed", "judged", "rolled back", "interrupted", "ended"),
     *("located", "undone", "confirmed", "paused", "resumed", "failed", "declined", "tripped"),
-    *("accepted", "stood", "repeated", "probed", "tried", "noise measured"),
+    *("accepted", "stood", "repeated", "probed", "tried", "noise measured", "excluded"),
 )
 """Journals on disk say these words: they must never change."""

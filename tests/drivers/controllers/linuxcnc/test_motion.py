@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from drivers.controllers.errors import ConnectionLost, MotionInterrupted, MoveRefused
+from drivers.controllers.errors import ConnectionLost, MotionInterrupted, MoveRefused, PoseRefused
 from hexacell.errors import DeviceError
 from hexacell.kinematics.pose import Pose
 from tests.drivers.controllers.linuxcnc.motion_dialogue import (
@@ -172,3 +172,52 @@ async def test_before_a_joint_is_homed_there_is_no_position(play):
     """After a restart the first answers may be those of home."""
     driver = await play.opened([("get joint_homed", b"JOINT_HOMED YES YES NO YES YES YES\r\n")])
     assert await driver.position() is None
+
+
+REFUSALS = [
+    ("Linear move on line 0 would exceed C's positive limit", "c", True),
+    ("Linear move on line 0 would exceed X's negative limit", "x", False),
+    ("Linear move on line 0 would exceed joint 3's positive limit", None, True),
+    ("Linear move on line 0 fails kinematicsInverse", None, True),
+]
+
+
+@pytest.mark.parametrize(("message", "axis", "is_highest"), REFUSALS)
+async def test_a_pose_beyond_a_limit_is_refused_as_a_pose(play, message, axis, is_highest):
+    refusal = [
+        (MDI, b"SET MDI NAK\n\r"),
+        ("get enable", b"ENABLE ON\r\n"),
+        ("get error", f"ERROR {message}\r\n".encode()),
+        ("get error", b"ERROR invalid params in linear command\r\n"),
+        NO_ERROR,
+    ]
+    driver = await play.opened([*refusal, (MDI, ACK), ("get abs_act_pos", ARRIVED)])
+    with pytest.raises(PoseRefused, match=message) as refused:
+        await driver.move(TARGET)
+    assert (refused.value.axis, refused.value.is_highest) == (axis, is_highest)
+    await driver.move(TARGET)
+
+
+async def test_a_refused_pose_whose_command_is_acknowledged_is_refused_all_the_same(play):
+    play.patience = play.IMPATIENT
+    driver = await play.opened([])
+    play.servers[0].afterwards = {
+        MDI: ACK,
+        "get abs_act_pos": HALF_WAY,
+        "get error": [b"ERROR Linear move on line 0 would exceed C's positive limit\r\n", NO_ERROR[1]],
+    }
+    with pytest.raises(PoseRefused, match="would exceed C's positive limit"):
+        await driver.move(TARGET)
+
+
+async def test_a_machine_that_is_not_homed_refuses_no_pose(play):
+    refusal = [
+        (MDI, b"SET MDI NAK\n\r"),
+        ("get enable", b"ENABLE ON\r\n"),
+        ("get error", b"ERROR Can't issue MDI command when not homed\r\n"),
+        NO_ERROR,
+    ]
+    driver = await play.opened(refusal)
+    with pytest.raises(MoveRefused, match="when not homed") as refused:
+        await driver.move(TARGET)
+    assert not isinstance(refused.value, PoseRefused)

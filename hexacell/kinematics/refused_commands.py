@@ -1,0 +1,72 @@
+"""Commands that a controller refused, and what that says about others.
+
+A command beyond the limit of an axis says that every command at least as far out along it is refused as
+well. Any other refusal concerns that command alone.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from hexacell.kinematics import rotations
+from hexacell.kinematics.mechanism import FrameTransform
+from hexacell.kinematics.pose import Pose, PoseBatch
+from hexacell.kinematics.rotations import Array, Mask
+
+AXES = "xyzabc"
+
+
+@dataclass(frozen=True, slots=True)
+class RefusedCommand:
+    """One command, in the controller's frames.
+
+    Attributes:
+        pose: x, y, z, a, b, c, mm and deg.
+        axis: the axis beyond whose limit it is, one of ``xyzabc``; none if another reason was given.
+        is_highest: whether that is the axis' highest value, not its lowest.
+    """
+
+    pose: tuple[float, float, float, float, float, float]
+    axis: str | None = None
+    is_highest: bool = True
+
+    def concerns(self, poses: PoseBatch) -> Mask:
+        """Which of n commands, in the controller's frames, are this one or at least as far out."""
+        concerned = np.asarray(poses.is_same(PoseBatch.of([Pose(*self.pose)])))
+        if self.axis is None:
+            return concerned
+        column, sign = AXES.index(self.axis), 1.0 if self.is_highest else -1.0
+        beyond = sign * (_six_numbers(poses)[:, column] - self.pose[column]) >= 0.0
+        return np.asarray(concerned | beyond)
+
+
+@dataclass(frozen=True, slots=True)
+class RefusedCommands:
+    """All of them; none at first."""
+
+    commands: tuple[RefusedCommand, ...] = ()
+
+    def allow(self, poses: PoseBatch, frames: FrameTransform | None = None) -> Mask:
+        """Which of n commands no refusal concerns.
+
+        They are in the controller's frames, or in those that ``frames`` leads to from there.
+        """
+        allowed = np.ones(len(poses), dtype=bool)
+        if not self.commands:
+            return allowed
+        commands = poses if frames is None else frames.inverse().poses(poses)
+        for refused in self.commands:
+            allowed &= ~refused.concerns(commands)
+        return allowed
+
+    def allows(self, pose: tuple[float, float, float, float, float, float]) -> bool:
+        """The same of a single command, in the controller's frames."""
+        return bool(self.allow(PoseBatch.of([Pose(*pose)]))[0])
+
+
+def _six_numbers(poses: PoseBatch) -> Array:
+    """x, y, z, mm, and a, b, c, deg, of n poses (n, 6), as a controller gets them."""
+    angles = np.degrees(rotations.to_angles(poses.rotations))
+    return np.concatenate([poses.positions, angles], axis=-1)

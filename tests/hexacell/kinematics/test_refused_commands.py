@@ -1,0 +1,53 @@
+"""What a refused command says about others: itself, and all that are as far out along its axis."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from hexacell.kinematics.pose import Pose, PoseBatch
+from hexacell.kinematics.refused_commands import RefusedCommand, RefusedCommands
+
+POSE = (10.0, -20.0, 550.0, 5.0, -12.0, 40.0)
+
+
+def moved(column: int, by: float) -> Pose:
+    numbers = np.array(POSE)
+    numbers[column] += by
+    return Pose(*numbers.tolist())
+
+
+def test_without_refusals_everything_is_allowed() -> None:
+    assert RefusedCommands().allow(PoseBatch.of([Pose(*POSE), Pose(0.0, 0.0, 0.0)])).all()
+
+
+def test_without_an_axis_the_command_itself_is_left_out_and_no_other() -> None:
+    refused = RefusedCommands((RefusedCommand(POSE),))
+    neighbours = [moved(column, 1e-3) for column in range(6)]
+    poses = PoseBatch.of([Pose(*POSE), *neighbours])
+    assert refused.allow(poses).tolist() == [False, *[True] * 6]
+    assert not refused.allows(POSE)
+
+
+@pytest.mark.parametrize("column", range(6))
+@pytest.mark.parametrize("is_highest", [True, False])
+def test_beyond_the_limit_of_an_axis_all_that_is_as_far_out_is_left_out(
+    column: int, is_highest: bool
+) -> None:
+    refused = RefusedCommands((RefusedCommand(POSE, "xyzabc"[column], is_highest),))
+    outward = 1.0 if is_highest else -1.0
+    assert not refused.allows(POSE)
+    assert not refused.allows(moved(column, 2.0 * outward).as_tuple())
+    assert refused.allows(moved(column, -0.01 * outward).as_tuple())
+    inward = np.array(moved(column, -0.01 * outward).as_tuple())
+    inward[(column + 1) % 6] += 3.0
+    assert refused.allows(Pose(*inward.tolist()).as_tuple()), "other axes are not concerned"
+
+
+def test_every_refusal_counts() -> None:
+    refused = RefusedCommands(
+        (RefusedCommand(POSE, "c", is_highest=True), RefusedCommand(POSE, "a", is_highest=False))
+    )
+    level = Pose(0.0, 0.0, 550.0, 6.0)
+    poses = PoseBatch.of([level, Pose(0.0, 0.0, 550.0, 4.0), Pose(0.0, 0.0, 550.0, 6.0, 0.0, 41.0)])
+    assert refused.allow(poses).tolist() == [True, False, False]

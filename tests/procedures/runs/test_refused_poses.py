@@ -1,0 +1,170 @@
+"""A controller that refuses poses: they are journalled, never sent again, and the run goes on."""
+
+from __future__ import annotations
+
+from collections import Counter
+from typing import Any
+
+import numpy as np
+import pytest
+
+from drivers.controllers.errors import PoseRefused
+from hexacell.cell.simulation import SoftLimits
+from hexacell.errors import ExitCode, IdentifiabilityError, Interruption
+from hexacell.kinematics.pose import Pose
+from procedures.engine import step_executor
+from procedures.run import events
+from procedures.run.commands import Abort
+from procedures.run.state import fold
+from procedures.run.steps import Phase
+from tests.procedures.fakes import refused
+from tests.procedures.runs.listening import happened, on
+
+WIDE = 1e6
+
+
+def limits(**axes: tuple[float, float]) -> dict[str, Any]:
+    """Soft limits of some axes."""
+    pairs = [axes.get(axis, (-WIDE, WIDE)) for axis in "xyzabc"]
+    return {
+        "simulation__soft_limits": SoftLimits(
+            lowest=tuple(low for low, _ in pairs), highest=tuple(high for _, high in pairs)
+        )
+    }
+
+
+def sent(rig: Any) -> Counter[str]:
+    return Counter(entry for entry in rig.controller.log if entry.startswith("move"))
+
+
+def excluded(rig: Any) -> list[events.PoseExcluded]:
+    return happened(rig, events.PoseExcluded)
+
+
+async def test_a_run_within_narrow_limits_of_the_controller_ends_well(make_rig) -> None:
+    rig = make_rig(**limits(a=(-9.0, 9.0), b=(-9.0, 9.0), c=(-14.0, 14.0)))
+    ended = await rig.run()
+    assert ended.exit_code == ExitCode.DONE, ended.line
+    refusals = excluded(rig)
+    assert refusals, "otherwise nothing is tested"
+    assert len(happened(rig, events.RecordTaken)) >= 18
+    for refusal in refusals:
+        assert sent(rig)[f"move {Pose(*refusal.pose)}"] == 1, "it was never sent again"
+        assert refusal.axis is not None
+        assert f"would exceed {refusal.axis.upper()}'s" in refusal.reason
+    assert len(refusals) < 40
+    assert not happened(rig, events.Failed)
+
+
+async def test_a_resumed_run_does_not_send_it_again(make_rig) -> None:
+    rig = make_rig(**limits(c=(-5.0, 5.0)))
+    abort = on(events.PoseExcluded, lambda: rig.engine.command(Abort()))
+    with pytest.raises(Interruption):
+        await rig.run(abort)
+    (refusal,) = excluded(rig)
+    enough = on(events.SetClosed, lambda: rig.engine.command(Abort()))
+    with pytest.raises(Interruption):
+        await rig.run(enough)
+    assert sent(rig)[f"move {Pose(*refusal.pose)}"] == 1
+    assert len(happened(rig, events.RecordTaken)) >= 9
+
+
+POINTS = ((100.0, -100.0, 500.0), (0.0, 150.0, 520.0), (-100.0, 100.0, 500.0))
+
+
+async def test_a_point_whose_reference_is_refused_is_left(make_rig) -> None:
+    rig = make_rig(**limits(y=(-120.0, 120.0)), identification__points=POINTS)
+    ended = await rig.run()
+    assert ended.exit_code == ExitCode.DONE, ended.line
+    (refusal,) = [one for one in excluded(rig) if one.orientation == 1]
+    assert (refusal.at.phase, refusal.at.point) == (Phase.IDENTIFY, 2)
+    keys = {taken.at for taken in happened(rig, events.RecordTaken)}
+    assert {key.point for key in keys if key.phase is Phase.IDENTIFY} == {1, 3}
+
+
+async def test_too_few_points_that_are_not_refused_are_said_in_words(make_rig) -> None:
+    rig = make_rig(**limits(x=(-50.0, 500.0)))
+    with pytest.raises(IdentifiabilityError, match="point"):
+        await rig.run()
+    (refusal,) = [one for one in excluded(rig) if one.orientation == 1]
+    assert (refusal.at.point, refusal.axis, refusal.is_highest) == (2, "x", False)
+
+
+async def test_a_refused_held_out_pose_is_left_out_before_and_after(recording, replayed) -> None:
+    history = recording.until(events.Identified)
+    identified = fold(history).identified
+    assert identified is not None
+    pose = identified.held_out[0][1]
+    column = int(np.argmax(np.abs(pose[3:]))) + 3
+    axis, value = "xyzabc"[column], pose[column]
+    bounds = (-WIDE, value - 1e-3) if value > 0 else (value + 1e-3, WIDE)
+    rig = replayed(history, **limits(**{axis: bounds}))
+    ended = await rig.run()
+    assert ended.exit_code == ExitCode.DONE, ended.line
+    assert pose in [refusal.pose for refusal in excluded(rig)]
+    assert sent(rig)[f"move {Pose(*pose)}"] == 1
+    taken = happened(rig, events.RecordTaken)
+    compared = [
+        {one.pose for one in taken if one.at.phase is phase and one.orientation <= 3}
+        for phase in (Phase.BEFORE, Phase.AFTER)
+    ]
+    assert compared[0] == compared[1], "the same poses are compared"
+
+
+async def test_a_held_out_point_whose_reference_is_refused_is_left(recording, replayed) -> None:
+    # The gauges are placed anew although the robot stays at the one point that is left.
+    reach = {"simulation__station_reach_mm": 8.0}
+    rig = replayed(recording.until(events.Identified), **limits(z=(0.0, 545.0)), **reach)
+    ended = await rig.run()
+    assert ended.exit_code == ExitCode.DONE, ended.line
+    keys = {taken.at for taken in happened(rig, events.RecordTaken)}
+    assert {key.point for key in keys if key.phase is not Phase.IDENTIFY} == {1}
+
+
+async def test_a_refused_visit_of_the_noise_measurement_is_replaced_by_another(make_rig) -> None:
+    rig = make_rig(**limits(x=(-500.0, 100.5)), noise__revisits=6)
+    enough = on(events.NoiseMeasured, lambda: rig.engine.command(Abort()))
+    with pytest.raises(Interruption):
+        await rig.run(enough)
+    (refusal,) = excluded(rig)
+    assert (refusal.orientation, refusal.axis) == (0, "x")
+    assert len(happened(rig, events.ReferenceRepeated)) == 6
+
+
+async def test_a_robot_that_moved_was_not_refused(make_rig) -> None:
+    """A message of a limit that came on the way is a failure, not a refusal."""
+    rig = make_rig()
+    controller = rig.controller
+
+    async def move(pose: Pose) -> None:
+        controller._do("move", str(pose))
+        if len(sent(rig)) < 3:
+            rig.machine.move(pose)
+            return
+        there = Pose(pose.x + 1.0, pose.y, pose.z, pose.a, pose.b, pose.c)
+        rig.machine.move(there)
+        raise refused(pose, "Linear move on line 0 would exceed C's positive limit")
+
+    controller.move = move
+    with pytest.raises(PoseRefused, match="would exceed C's positive limit"):
+        await rig.run()
+    assert not excluded(rig)
+
+
+async def test_a_controller_that_refuses_one_pose_after_another_ends_the_run(
+    make_rig, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(step_executor, "MOST_REFUSALS", 3)
+    rig = make_rig()
+    controller, machine = rig.controller, rig.machine
+
+    async def move(pose: Pose) -> None:
+        controller._do("move", str(pose))
+        if pose.a or pose.b or pose.c:
+            raise refused(pose, "Linear move on line 0 fails kinematicsInverse")
+        machine.move(pose)
+
+    controller.move = move
+    with pytest.raises(PoseRefused, match="fails kinematicsInverse"):
+        await rig.run()
+    assert len(excluded(rig)) == 3

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
+from functools import partial
 
 from drivers.simulated.gauges.indicator import Indicator, PlungerPosition
 from drivers.simulated.gauges.instruments import INSTRUMENTS, Instrument
@@ -76,8 +77,18 @@ class SimulatedGaugeBank(Closeable):
             "at its end": indicator.set_at_end,
             "off its plate": indicator.set_pushed,
             "off its middle": indicator.set_off_middle,
+            "reversed": indicator.set_reversed,
+            "in inches": indicator.set_inch,
+            "exchanged": partial(self._exchange, gauge),
             "frozen": indicator.set_frozen,
         }
+
+    def _exchange(self, gauge: str, *, on: bool) -> None:
+        """Exchange a gauge with the next one; clearing it exchanges them again."""
+        del on
+        names = list(self.indicators)
+        other = names[(names.index(gauge) + 1) % len(names)]
+        self.indicators[gauge].exchange_with(self.indicators[other])
 
     def _serve(self, group: Sequence[GaugeSettings]) -> GaugeLineServer:
         indicators = {_channel(gauge): self.indicators[gauge.name] for gauge in group}

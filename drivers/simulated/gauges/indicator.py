@@ -68,6 +68,18 @@ class Indicator:
         """Push the plunger farther than a ball on its plate could, or release it."""
         self._pushed_mm = -copysign(PUSH_MM, self._plunger()) if on else 0.0
 
+    def set_reversed(self, *, on: bool) -> None:
+        """Count in the other direction, or as it should."""
+        self.reversed = on
+
+    def set_inch(self, *, on: bool) -> None:
+        """Show inches, or mm."""
+        self.inch = on
+
+    def exchange_with(self, other: Indicator) -> None:
+        """Put each of two instruments where the other one is."""
+        self._plunger, other._plunger = other._plunger, self._plunger
+
     def set_off_middle(self, *, on: bool) -> None:
         """Clamp the instrument by its stem so far from where it belongs, or as it belongs."""
         self._off_middle_mm = OFF_MIDDLE_MM if on else 0.0

@@ -25,16 +25,26 @@ def places():
     simulation = load_cell(bundled_config("simulated-hexaglide")).settings.simulation
     assert simulation is not None
 
-    def make(ball: Any = FIRST, *, has_fixture: bool = True, **fixture: float) -> GaugePlaces:
+    def make(
+        ball: Any = FIRST, *, has_fixture: bool = True, off_mm: Any = (0.0, 0.0, 0.0), **fixture: float
+    ) -> GaugePlaces:
         settings = simulation.model_copy(
             update={
                 "fixture": SimulatedFixture(**fixture),
-                "gauges": simulation.gauges.model_copy(update={"misalignment_deg": 1.0}),
+                "gauges": simulation.gauges.model_copy(
+                    update={"misalignment_deg": 1.0, "off_middle_mm": off_mm}
+                ),
             }
         )
         return GaugePlaces(settings, FIXTURE if has_fixture else None, np.random.default_rng(3), ball)
 
     return make
+
+
+def test_plungers_stand_off_their_middle_by_what_the_cell_file_says(places) -> None:
+    right, off = places(ELSEWHERE), places(ELSEWHERE, off_mm=(3.8, -1.0, 0.5))
+    shown = off.triad @ (ELSEWHERE - off.station) - right.triad @ (ELSEWHERE - right.station)
+    assert shown == pytest.approx([3.8, -1.0, 0.5])
 
 
 def test_between_the_seats_the_gauges_keep_the_certified_distance(places) -> None:

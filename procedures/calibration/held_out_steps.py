@@ -127,8 +127,10 @@ class HeldOutSteps:
         move = Move(at=key, orientation=orientation, pose=poses[orientation - 1])
         if orientation == 1:
             return self.sets.paths.towards(state, move)
-        # Each list of poses was chosen with safe lines from one to the next.
-        if state.at_pose == (key, orientation - 1) and orientation != common + 1:
+        # Each list of poses was chosen with safe lines from one to the next, replacements apart.
+        replacements = {new for refused in state.excluded for _, new in refused.replacements}
+        is_as_chosen = not replacements & {move.pose, state.target}
+        if is_as_chosen and state.at_pose == (key, orientation - 1) and orientation != common + 1:
             return move
         return self.sets.paths.towards(state, move, self._ball(state, key))
 

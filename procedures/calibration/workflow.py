@@ -10,6 +10,7 @@ uses hardware or files, so a run, its resumption and its replay decide alike.
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from functools import cached_property
@@ -238,6 +239,24 @@ class Calibration:
         written = self._commanded_by(self.as_written(identified.geometry).geometry)
         return written.held_out.choose_poses_after(identified)
 
+    def held_out_replacements(
+        self, identified: Identification, state: RunState
+    ) -> Iterator[tuple[SixNumbers, SixNumbers]]:
+        """Held-out poses that the controller refuses, each with another one, in the controller's frames.
+
+        Those that were measured before the write-back are not replaced after it: both are compared. A point
+        with too few others keeps what is left of its own, and one whose reference is refused is left.
+        """
+        found = state.identified
+        assert found is not None  # noqa: S101 - its poses are held out of an identification
+        references = [poses[0] for poses in found.held_out]
+        if state.committed is None:
+            others = self._at_start.held_out.choose_poses_after(identified)
+            yield from _replacements(state, references, found.held_out, others)
+        if found.held_out_after:
+            others = self.held_out_poses_after(identified)
+            yield from _replacements(state, references, found.held_out_after, others)
+
     def _write_back(self, state: RunState) -> Step | None:
         if state.proposed is None:
             return Compute(kind="propose")
@@ -331,6 +350,20 @@ def _after_verdict(state: RunState, judged: events.ResultValidated) -> Step | No
         return Compute(kind="accept")
     is_kept = state.accepted is not None and state.accepted.by is not None
     return None if is_kept else Compute(kind="roll back")
+
+
+def _replacements(
+    state: RunState,
+    references: Sequence[SixNumbers],
+    present: Sequence[Sequence[SixNumbers]],
+    others: Sequence[Sequence[SixNumbers]],
+) -> Iterator[tuple[SixNumbers, SixNumbers]]:
+    """The refused poses of each point with others of the same point that it does not have yet."""
+    for reference, poses, chosen in zip(references, present, others, strict=True):
+        if state.refused.allows(reference):
+            refused = (pose for pose in poses if not state.refused.allows(pose))
+            new = (pose for pose in chosen if pose not in poses)
+            yield from zip(refused, new, strict=False)
 
 
 def geometry_of(applied: events.ProvisionalApplied, robot: Robot) -> Geometry:

@@ -9,6 +9,7 @@ from hexacell.acceptance import gates
 from hexacell.campaign.noise_assessment import assess_noise
 from hexacell.cell.loader import Cell
 from hexacell.cell.model import CellSettings
+from hexacell.errors import HexacellError
 from hexacell.identification.estimator import identify
 from hexacell.measurements.csv_file import write_measurements
 from hexacell.measurements.records import MeasurementSet
@@ -24,7 +25,7 @@ from procedures.calibration.noise_steps import noise_readings
 from procedures.calibration.workflow import Calibration, Mode
 from procedures.engine.config_transactions import ConfigTransactions
 from procedures.run import events
-from procedures.run.state import RunState, record
+from procedures.run.state import RunState, apply, record
 from procedures.run.steps import Phase
 
 
@@ -61,6 +62,19 @@ class Computations:
             held_out_after=calibration.held_out_poses_after(identified),
             improvement=assessed.improvement,
         )
+
+    def with_replacements(self, refusal: events.PoseExcluded, state: RunState) -> events.PoseExcluded:
+        """A refusal at a held-out point with others for the held-out poses that it leaves out."""
+        if state.identified is None or refusal.at.phase not in {Phase.BEFORE, Phase.AFTER}:
+            return refusal
+        after = apply(state, refusal)
+        calibration = self.calibration.informed(after)
+        try:
+            identified = identify(calibration.robot_of(after).problem(after.measurements()))
+            pairs = tuple(calibration.held_out_replacements(identified, after))
+        except HexacellError:  # then those that are left are measured
+            return refusal
+        return refusal.model_copy(update={"replacements": pairs})
 
     def propose(self, state: RunState) -> events.Proposed:
         """Save the change of the config and evaluate the gates; raises ``FileError``."""

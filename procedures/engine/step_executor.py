@@ -175,7 +175,7 @@ class StepExecutor:
         refusals = sum(one.at == step.at for one in state.excluded)
         if refusals >= MOST_REFUSALS or not self._is_at(here.pose, state.target):
             raise refusal
-        return events.PoseExcluded(
+        excluded = events.PoseExcluded(
             at=step.at,
             orientation=step.orientation,
             pose=step.pose,
@@ -183,6 +183,7 @@ class StepExecutor:
             axis=refusal.axis,
             is_highest=refusal.is_highest,
         )
+        return await in_thread(self.computations.with_replacements, excluded, state)
 
     def _is_at(self, here: Pose, target: SixNumbers | None) -> bool:
         """Whether a reported pose is the commanded one; each may be off by the tolerance of an arrival."""

@@ -70,7 +70,8 @@ class PoseExcluded(Frozen):
     """The controller refused a pose and did not move; it is not commanded again in this run.
 
     ``axis`` is the axis beyond whose limit it is, the highest or the lowest; then no pose is commanded that
-    is as far out. Without it the pose alone is left out.
+    is as far out. Without it the pose alone is left out. ``replacements`` are held-out poses that cannot be
+    commanded now, each with the one that takes its place.
     """
 
     kind: Literal["excluded"] = "excluded"
@@ -80,6 +81,7 @@ class PoseExcluded(Frozen):
     reason: str
     axis: Literal["x", "y", "z", "a", "b", "c"] | None = None
     is_highest: bool = True
+    replacements: tuple[tuple[SixNumbers, SixNumbers], ...] = ()
 
 
 class Located(Frozen):

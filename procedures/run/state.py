@@ -322,12 +322,24 @@ def _arrived(state: RunState, event: events.Arrived) -> RunState:
 
 def _excluded(state: RunState, event: events.PoseExcluded) -> RunState:
     """The robot is where it was; a record that was to be taken again there is chosen anew."""
-    left = replace(state, excluded=(*state.excluded, event))
+    left = replace(state, excluded=(*state.excluded, event), identified=_with_replacements(state, event))
     if event.at not in state.sets:
         return left
     measured = state.set(event.at)
     again = tuple(pair for pair in measured.again if pair[1] != event.pose)
     return _with_set(left, event.at, replace(measured, again=again))
+
+
+def _with_replacements(state: RunState, event: events.PoseExcluded) -> events.Identified | None:
+    """The identification with other held-out poses in the place of those that cannot be commanded."""
+    found, place = state.identified, dict(event.replacements)
+    if found is None or not place:
+        return found
+    lists = {
+        name: tuple(tuple(place.get(pose, pose) for pose in poses) for poses in getattr(found, name))
+        for name in ("held_out", "held_out_after")
+    }
+    return found.model_copy(update=lists)
 
 
 def _noise_measured(state: RunState, event: events.NoiseMeasured) -> RunState:

@@ -90,7 +90,7 @@ async def test_too_few_points_that_are_not_refused_are_said_in_words(make_rig) -
     assert (refusal.at.point, refusal.axis, refusal.is_highest) == (2, "x", False)
 
 
-async def test_a_refused_held_out_pose_is_left_out_before_and_after(recording, replayed) -> None:
+async def test_a_refused_held_out_pose_is_replaced_before_and_after(recording, replayed) -> None:
     history = recording.until(events.Identified)
     identified = fold(history).identified
     assert identified is not None
@@ -105,10 +105,14 @@ async def test_a_refused_held_out_pose_is_left_out_before_and_after(recording, r
     assert sent(rig)[f"move {Pose(*pose)}"] == 1
     taken = happened(rig, events.RecordTaken)
     compared = [
-        {one.pose for one in taken if one.at.phase is phase and one.orientation <= 3}
+        {one.pose for one in taken if one.at.phase is phase and one.at.point == 1 and one.orientation <= 3}
         for phase in (Phase.BEFORE, Phase.AFTER)
     ]
     assert compared[0] == compared[1], "the same poses are compared"
+    assert len(compared[0]) == 3, "another took its place"
+    new = {old: other for refusal in excluded(rig) for old, other in refusal.replacements}[pose]
+    assert new in compared[0]
+    assert (new[column] < value) == (value > 0)
 
 
 async def test_a_held_out_point_whose_reference_is_refused_is_left(recording, replayed) -> None:

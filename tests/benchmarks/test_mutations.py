@@ -1,7 +1,7 @@
 """Random mutations of everything that the program is given, through the entry points of its commands.
 
-``MUTATIONS`` in the environment says how many; the target is for 10,000. All cores are used. One in a
-hundred is a process of its own.
+``MUTATIONS`` in the environment says how many; the target is for 10,000. All cores are used. One in
+two hundred is a process of its own.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ MUTATIONS = int(os.environ.get("MUTATIONS", "100"))
 TOGETHER = 20
 """Trials that a worker makes in a row."""
 
-PROCESS_EVERY = 100
+PROCESS_EVERY = 200
 LONGEST_S = 10.0
 """Of the processor's time for an answer."""
 

@@ -9,18 +9,19 @@ from tests.mutations.prompts import answers_to_prompts
 from tests.mutations.trials import Trial
 
 SHARES: dict[Trial, int] = {
-    trials.cell_file: 60,
-    trials.config: 13,
-    trials.records: 9,
-    trials.cell_file_of_records: 3,
-    trials.journal_replayed: 6,
-    trials.journal_exported: 3,
-    trials.journal_beside_records: 2,
-    trials.run_resumed: 2,
-    trials.run_checked: 1,
-    answers_to_prompts: 1,
+    trials.cell_file: 700,
+    trials.config: 140,
+    trials.odd_cell_file: 10,
+    trials.records: 60,
+    trials.cell_file_of_records: 10,
+    trials.journal_replayed: 30,
+    trials.journal_exported: 20,
+    trials.journal_beside_records: 10,
+    trials.run_resumed: 10,
+    trials.run_checked: 5,
+    answers_to_prompts: 5,
 }
-"""How many of a hundred trials are of which kind."""
+"""How many of a thousand trials are of which kind; those that compute much are rarer."""
 
 
 def drawn_trial(draw: random.Random) -> Trial:

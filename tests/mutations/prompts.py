@@ -19,7 +19,7 @@ from tests.mutations.journals import with_checksum
 from tests.mutations.texts import ANY, STRANGE_BYTES, STRANGE_NUMBERS, STRANGE_TEXTS, mutated
 from tests.mutations.trials import CELL, RUN, Templates
 
-OFFERED = ("", "y", "yes", "no", "n", "a", "p", "P", "r", "u", "m", "retry", "abort", "simulated-hexaglide")
+OFFERED = ("", "y", "yes", "no", "n", "a", "r", "u", "m", "retry", "abort", "simulated-hexaglide")
 END_OF_INPUT = b"\x04"
 MOST_ANSWERS = 8
 
@@ -33,7 +33,10 @@ def answer(draw: random.Random) -> bytes:
         )
     if draw.random() < 0.3:
         line = mutated(line, ANY, draw)[:1000]
-    return line.replace(b"\n", b" ").replace(b"\r", b" ") + b"\n"
+    line = line.replace(b"\n", b" ").replace(b"\r", b" ")
+    # A pause is a person's to end, and asks nothing.
+    is_pause = line.decode("utf-8", "replace").strip() in {"p", "P"}
+    return (b"no pause" if is_pause else line) + b"\n"
 
 
 @contextlib.contextmanager

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,6 +13,7 @@ from tests.mutations.journals import mutated_journal
 from tests.mutations.texts import ANY, CSV, TOML, mutated
 
 CELL, CONFIG, RECORDS = "cell.toml", "simulated-hexaglide.controller.toml", "m.csv"
+_ODD = re.compile(r"\w+ = [-+.\de]+\n")
 RUN = Path("runs") / "simulated-hexaglide" / "run"
 
 
@@ -129,3 +131,23 @@ def run_checked(templates: Templates, place: Place, draw: random.Random) -> Atte
     text = cell.read_text()
     cell.write_text(text.replace("[100.0, -100.0, 500.0]", "[100.0, -100.0, 5500.0]"))
     return attempt(["run", cell, "--unattended", "--mode", "check"], place)
+
+
+ODD_NUMBERS = ("1e-9", "1e-6", "0.0", "-0.0", "1e6", "-1e6", "999999.0", "1e3", "80.0", "0.5", "1", "2")
+
+
+def odd_cell_file(templates: Templates, place: Place, draw: random.Random) -> Attempt:
+    """A cell file whose numbers are allowed and make little sense."""
+    place.refill(templates.small, templates.small)
+    path = place.cell / CELL
+    lines = path.read_text().splitlines(keepends=True)
+    places = [n for n, line in enumerate(lines) if _ODD.fullmatch(line)]
+    for n in draw.sample(places, draw.choice((1, 1, 2, 4))):
+        lines[n] = f"{lines[n].partition('=')[0]}= {draw.choice(ODD_NUMBERS)}\n"
+    path.write_text("".join(lines))
+    (place.cell / "empty.csv").touch()
+    records = draw.choice((RECORDS, RECORDS, "empty.csv"))
+    if draw.random() < 0.1:
+        return attempt(["preflight", path], place)
+    command = "next" if records == "empty.csv" else draw.choice(("fit", "next"))
+    return attempt([command, path, "--measurements", place.cell / records, "--json"], place)

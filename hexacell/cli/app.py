@@ -11,7 +11,9 @@ from hexacell.cli.console import Console, lost_output
 from hexacell.cli.fault_report import fault_line
 from hexacell.cli.parser import make_parser
 from hexacell.cli.signals import stop_signals_as_sigint
-from hexacell.errors import ExitCode, HexacellError
+from hexacell.errors import ExitCode, HexacellError, UsageError
+
+LONGEST_NAME_BYTES, LONGEST_PATH = 255, 4000
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -26,6 +28,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     console = Console("--json" in typed)
     try:
         with stop_signals_as_sigint():
+            _require_usable(typed)
             options = parser.parse_args(typed)
             module, _, command = options.target.partition(".")
             code = getattr(import_module(f"hexacell.cli.commands.{module}"), command)(options)
@@ -36,6 +39,24 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return _failed(str(error), error.exit_code, console)
     except Exception as error:
         return _failed(fault_line(error, typed), ExitCode.FAULT, console)
+
+
+def _require_usable(typed: Sequence[str]) -> None:
+    """Refuse arguments that can name no file, and are nothing else either.
+
+    Raises:
+        UsageError: one is too long, or has characters that no file name has.
+    """
+    for argument in typed:
+        try:
+            parts = os.fsencode(argument).split(b"/")
+        except UnicodeEncodeError:
+            parts = [b"\0"]
+        is_too_long = max(map(len, parts)) > LONGEST_NAME_BYTES or len(argument) > LONGEST_PATH
+        if is_too_long or any(b"\0" in part for part in parts):
+            raise UsageError(
+                f"'{argument[:20]}...' can be the name of no file", action="Shorten or correct it"
+            )
 
 
 def _unless_output_is_lost(code: int, console: Console) -> int:

@@ -10,8 +10,10 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from hexacell import __main__
 from hexacell.cli import app
 from hexacell.cli.commands import cell as commands
 from tests.signals import terminal_signals
@@ -88,3 +90,23 @@ def test_letters_that_the_locale_does_not_know_are_escaped(cell_folder):
     shown = hexacell("cell", "show", cell_folder.cell, stdout=subprocess.PIPE, PYTHONIOENCODING="ascii")
     assert shown.returncode == 0, shown.stderr
     assert r"Pr\xfcfstand" in shown.stdout
+
+
+def test_a_warning_of_numpy_reaches_no_user(monkeypatch, capsys):
+    monkeypatch.setattr(app, "main", lambda: int(np.sqrt(np.array(-1.0)) > 0))
+    monkeypatch.setattr(sys, "warnoptions", [])
+    with pytest.warns(RuntimeWarning):
+        app.main()
+    assert __main__.main() == 0
+    assert capsys.readouterr().err == ""
+
+
+@pytest.mark.parametrize("argument", ["x" * 5000, "a/" * 3000, "x" * 300, "\0", "\ud800"])
+@pytest.mark.parametrize(
+    "command",
+    [["replay"], ["cell", "validate"], ["run", "cell.toml", "--resume"], ["demo", "--folder"]],
+    ids=" ".join,
+)
+def test_an_argument_that_can_name_no_file_is_refused(capsys, command, argument):
+    assert app.main([*command, argument]) == 2
+    assert "can be the name of no file" in capsys.readouterr().err

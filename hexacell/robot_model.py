@@ -11,23 +11,23 @@ import numpy as np
 from hexacell.cell.fields import GeometryDocument
 from hexacell.cell.loader import Cell
 from hexacell.cell.model import CellSettings
-from hexacell.controller_config.interface import ConfigFormat, ControllerGeometry
-from hexacell.errors import FileError, ReachError
-from hexacell.identification.belief import Limits, RobotBelief
+from hexacell.controller_config.interface import ConfigFormat, ControllerGeometry, JointRanges
+from hexacell.errors import FileError
+from hexacell.identification.belief import RobotBelief
 from hexacell.identification.diagnostics.tolerance_check import ToleranceViolation, tolerance_violations
-from hexacell.identification.gauge_travel import GaugeTravel
 from hexacell.identification.problem.commanded_poses import CommandingGeometry
 from hexacell.identification.problem.problem import Noise, Prior, Problem, Tolerances, build_problem
 from hexacell.identification.solver.result import GeometryEstimate, Identification
 from hexacell.kinematics.commanded_motion import CommandedRobot
 from hexacell.kinematics.geometry import Geometry
-from hexacell.kinematics.mechanism import Branch, FrameTransform, Mechanism, inverse_kinematics
+from hexacell.kinematics.limits import Limits
+from hexacell.kinematics.mechanism import Branch, FrameTransform, Mechanism
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.refused_commands import RefusedCommands
-from hexacell.kinematics.sensitivity import singularity_margin
 from hexacell.measurements.records import MeasurementSet
 from hexacell.plugins import Group, load
 from hexacell.stated_effects import stated_effects
+from hexacell.stated_limits import stated_limits
 from hexacell.uncertainty.effects import Effect
 from hexacell.uncertainty.record_effects import RecordEffects
 
@@ -159,28 +159,6 @@ class Robot:
         """A pose in the convention's frames, in the controller's frames."""
         return self.frames.inverse().poses(PoseBatch.of([pose])).pose(0)
 
-    def require_reach(self, name: str, pose: Pose) -> None:
-        """Check that the controller can take a pose within the limits.
-
-        Raises:
-            ReachError: names the pose, the leg and the limit.
-        """
-        poses = PoseBatch.of([pose])
-        joints = inverse_kinematics(self.mechanism, self.controller, self.branch, poses)
-        low, high = self.limits.joint_min_mm, self.limits.joint_max_mm
-        outside = np.flatnonzero((joints[0] < low) | (joints[0] > high))
-        if len(outside):
-            leg = int(outside[0])
-            raise ReachError(
-                f"q{leg + 1} would be {joints[0, leg]:.1f} mm, outside {low:g} to {high:g}", subject=name
-            )
-        margin = singularity_margin(self.mechanism, self.controller, poses, joints)[0]
-        if margin < self.limits.singularity_margin:
-            raise ReachError(
-                f"the singularity margin is {margin:.3f}, below {self.limits.singularity_margin:g}",
-                subject=name,
-            )
-
 
 def config_format(settings: CellSettings) -> ConfigFormat:
     """The reader and writer of a cell's controller config."""
@@ -230,11 +208,15 @@ def _require_same_robot(cell: Cell, robot: Robot) -> None:
 
 
 def robot_of_start(
-    settings: CellSettings, controller: GeometryDocument, branch: Branch, taught: GeometryDocument | None
+    settings: CellSettings,
+    controller: GeometryDocument,
+    branch: Branch,
+    taught: GeometryDocument | None,
+    joint_ranges: JointRanges | None = None,
 ) -> Robot:
-    """The robot of a cell's settings and of the geometries that its controller had and was taught with."""
+    """The robot of a cell's settings and of what its controller had at the start of a run."""
     parameters = settings.mechanism.parameters
-    commanding = ControllerGeometry(Geometry.of(parameters, controller), branch)
+    commanding = ControllerGeometry(Geometry.of(parameters, controller), branch, joint_ranges)
     return make_robot(
         settings, commanding, taught=None if taught is None else Geometry.of(parameters, taught)
     )
@@ -251,22 +233,11 @@ def noise_of(settings: CellSettings) -> Noise:
     return noise.with_devices(stated.encoders_mm or encoders, stated.gauges_mm or gauges)
 
 
-def gauge_travel_of(settings: CellSettings) -> GaugeTravel:
-    """The travels of a cell's gauges."""
-    x, y, z = sorted(settings.gauges, key=lambda gauge: gauge.axis)
-    return GaugeTravel(
-        settings.limits.gauge_travel_mm,
-        (x.travel_mm / 2.0, y.travel_mm / 2.0, z.travel_mm / 2.0),
-        (x.middle_coordinate_mm, y.middle_coordinate_mm, z.middle_coordinate_mm),
-        settings.stations.mounting_mm,
-    )
-
-
 def make_robot(
     settings: CellSettings, controller: ControllerGeometry, *, taught: Geometry | None = None
 ) -> Robot:
     """The robot of a cell's settings and a controller geometry; ``taught`` as in :class:`Robot`."""
-    mechanism, limits = settings.mechanism, settings.limits
+    mechanism = settings.mechanism
     nominal = Geometry.of(mechanism.parameters, settings.robot.nominal.model_dump())
     drawn = CommandingGeometry.of(mechanism, nominal)
     frames = mechanism.normalize_frames(controller.geometry)[1]
@@ -277,15 +248,7 @@ def make_robot(
         branch=controller.branch,
         tolerances=Tolerances.of_settings(mechanism.parameters, settings.tolerances.model_dump()),
         noise=noise_of(settings),
-        limits=Limits(
-            limits.gauge_travel_mm,
-            float(np.radians(limits.tilt_deg)),
-            limits.joint_min_mm,
-            limits.joint_max_mm,
-            limits.singularity_margin,
-            frames,
-            gauge_travel_of(settings),
-        ),
+        limits=stated_limits(settings, controller, frames),
         frames=frames,
         taught=taught,
         earlier=(drawn,) if taught is None else (drawn, CommandingGeometry.of(mechanism, taught)),

@@ -11,7 +11,15 @@ from drivers.simulated import robot
 from procedures.calibration import workflow
 from procedures.run import events
 
-SMALL: dict[str, Any] = {
+FREE: dict[str, Any] = {
+    "limits.turn_deg": 180.0,
+    "limits.leg_distance_mm": 0.0,
+    "limits.passive_joints.base_cone_deg": 180.0,
+    "limits.passive_joints.platform_cone_deg": 180.0,
+}
+"""Passive joints and legs allow large rotations, from which few records identify the geometry."""
+
+SMALL: dict[str, Any] = FREE | {
     "identification.points": ((100.0, -100.0, 500.0), (-100.0, 100.0, 500.0)),
     "identification.orientations": 9,
     "verification.points": ((-100.0, -50.0, 450.0), (100.0, 100.0, 550.0)),

@@ -19,9 +19,10 @@ CELL = "simulated-hexaglide.toml"
 QUICK = (
     ("clock_factor = 50.0", "clock_factor = 200.0\ngive_up_s = 2000.0"),
     ("orientations = 11", "orientations = 7"),
+    ("platform_cone_deg = 45.0", "platform_cone_deg = 90.0"),
     ("orientations = 6", "orientations = 2"),
-    ("position_mm = 0.15 ", "position_mm = 20.0"),
-    ("orientation_deg = 0.05", "orientation_deg = 5.0"),
+    ("position_mm = 0.25 ", "position_mm = 20.0"),
+    ("orientation_deg = 0.08", "orientation_deg = 5.0"),
     # Each test of the model fails one healthy run in a thousand, and the suite has hundreds of runs.
     ("encoder_mm = 0.01\ngauge_mm = 0.01", "encoder_mm = 0.014\ngauge_mm = 0.014"),
 )

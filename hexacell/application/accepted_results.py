@@ -108,7 +108,9 @@ def _effects(cell: Cell, state: RunState) -> dict[str, tuple[tuple[float, ...], 
     if state.started is None:
         return {}
     settings, started = cell.settings, state.started
-    start = robot_of_start(settings, started.controller, started.branch, started.taught)
+    start = robot_of_start(
+        settings, started.controller, started.branch, started.taught, started.joint_ranges
+    )
     robot = Calibration(settings, start, Mode.OPTIMISE).robot_of(state)
     effects = [one for one in with_measured_scale(robot.effects, _length(state)) if one.size]
     if not effects:

@@ -216,6 +216,7 @@ def run_started(
         pose_list=None if calibration.listed is None else read_text(calibration.listed.path),
         taught=None if robot.taught is None else robot.taught.document(),
         accepted=calibration.accepted,
+        joint_ranges=robot.limits.joint_ranges,
         length_check=calibration.length_check,
     )
 
@@ -260,7 +261,9 @@ def _resumed_start(request: RunRequest) -> events.RunStarted:
 
 def calibration_of_run(cell: Cell, started: events.RunStarted) -> Calibration:
     """The calibration or check that a run was begun for."""
-    robot = robot_of_start(cell.settings, started.controller, started.branch, started.taught)
+    robot = robot_of_start(
+        cell.settings, started.controller, started.branch, started.taught, started.joint_ranges
+    )
     return Calibration(
         cell.settings,
         robot,

@@ -30,8 +30,6 @@ from hexacell.virtual_robot import VirtualRobot, robots_within_tolerances
 
 ROBOTS = 2
 MOST_TRIED = 6
-CANDIDATES = 128
-"""Fewer than a run has, which therefore does a little better."""
 
 
 @dataclass(eq=False)
@@ -156,13 +154,12 @@ class DryRunResult:
 
 def dry_run(plan: Plan, robots: int = ROBOTS) -> DryRunResult:
     """Carry the plan out on a few robots. Takes a second or two for each."""
-    quick = replace(plan, candidates=min(plan.candidates, CANDIDATES))
     identified: list[_Outcome] = []
     tried = 0
     for truth in robots_within_tolerances(plan.robot, MOST_TRIED, plan.settings.identification.seed):
         if len(identified) == robots:
             break
-        outcome = _carry_out(quick, truth, tried)
+        outcome = _carry_out(plan, truth, tried)
         identified += [] if outcome is None else [outcome]
         tried += 1
     return _summary(plan, tried, identified)

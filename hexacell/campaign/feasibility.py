@@ -14,8 +14,9 @@ from hexacell.errors import HexacellError, LimitError, ReachError, UsageError
 from hexacell.experiment_design.predicted_records import GaugeZero, estimate_gauge_zero
 from hexacell.identification.belief import RobotBelief
 from hexacell.identification.solver.result import UNDETERMINED_RATIO
-from hexacell.kinematics.pose import Pose, PoseBatch
+from hexacell.kinematics.pose import Pose
 from hexacell.motion.path_check import is_clear
+from hexacell.pose_limits import broken_limits
 from hexacell.virtual_robot import VirtualRobot, robots_within_tolerances
 
 ROBOTS = 32
@@ -45,14 +46,8 @@ def reach_failures(plan: Plan) -> Iterator[HexacellError]:
 
 def pose_failures(plan: Plan, name: str, pose: Pose) -> Iterator[HexacellError]:
     """Why the controller cannot take a pose within the limits, if it cannot."""
-    try:
-        plan.robot.require_reach(name, pose)
-    except HexacellError as error:
-        yield error if error.subject else type(error)(error.problem, subject=name, action=error.action)
-    tilt = float(np.degrees(PoseBatch.of([pose]).tilts()[0]))
-    if tilt > plan.settings.limits.tilt_deg:
-        limit = plan.settings.limits.tilt_deg
-        yield ReachError(f"is tilted by {tilt:.1f} deg, beyond tilt_deg = {limit:g}", subject=name)
+    for problem in broken_limits(plan.robot, pose):
+        yield ReachError(problem, subject=name)
 
 
 def _out_of_travel(plan: Plan, name: str, point: int, pose: Pose) -> Iterator[HexacellError]:

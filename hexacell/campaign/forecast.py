@@ -214,7 +214,7 @@ def select_sets(drawn: RobotBelief, points: Array, records: int, seed: int) -> t
 
     In the mechanism's frame convention; empty where the robot cannot go.
     """
-    rotated = candidates.orientations(CANDIDATES, drawn.limits.tilt, seed)
+    rotated = candidates.orientations(CANDIDATES, drawn.limits.tilt, seed, most_twist=drawn.limits.turn)
     orientations = drawn.limits.orientations(np.concatenate([np.eye(3)[None], rotated]))
     return tuple(_select(drawn, PoseBatch.at(point, orientations), records) for point in points)
 

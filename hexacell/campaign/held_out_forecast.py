@@ -59,7 +59,9 @@ def with_held_out_records(plan: Plan, found: Identification) -> Identification:
 
 def _records(plan: Plan, robot: Robot, found: Identification) -> Iterator[Record]:
     settings, belief = plan.settings.verification, robot.belief(found)
-    turns = candidates.orientations(CANDIDATES, belief.limits.tilt, settings.seed)
+    turns = candidates.orientations(
+        CANDIDATES, belief.limits.tilt, settings.seed, most_twist=belief.limits.turn
+    )
     first = 1 + max(plan.points)
     for point, position in enumerate(settings.points, start=first):
         ball = robot.from_commands([Pose(*position)]).positions[0]

@@ -100,7 +100,9 @@ class PoseChooser:
         tilt = tilt_share * belief.limits.tilt
         well_known = orientation_sigma(belief, zero.target) <= WELL_KNOWN_SIGMA
         amplitudes = Amplitudes.MOSTLY_LARGE if well_known else Amplitudes.ALL_SCALES
-        orientations = candidates.orientations(self.candidates, tilt, self._seed(state), amplitudes)
+        orientations = candidates.orientations(
+            self.candidates, tilt, self._seed(state), amplitudes, belief.limits.turn
+        )
         return select_pose(planner, zero, orientations, self._criterion(belief))
 
     def _criterion(self, belief: RobotBelief) -> Criterion:

@@ -7,7 +7,6 @@ from typing import Literal, Self
 from pydantic import Field, model_validator
 
 from hexacell.cell.fields import (
-    InRange,
     NotNegative,
     PointInRange,
     Positive,
@@ -196,27 +195,6 @@ class NoiseSettings(Section):
                 f"{self.standstill_readings} standstill_readings are no series",
                 f"Ask for {FEWEST_STANDSTILL_READINGS} or more, or for 0",
             )
-        return self
-
-
-class LimitSettings(Section):
-    """Limits of every commanded pose."""
-
-    gauge_travel_mm: Positive = Field(
-        5.0,
-        description="how far the ball may go from the middle of the plates, and from the gauges' zero",
-    )
-    tilt_deg: Positive = Field(45.0, le=80, description="largest tilt of the platform")
-    joint_min_mm: InRange = Field(-1000.0, description="smallest joint variable of any leg")
-    joint_max_mm: InRange = Field(1000.0, description="largest joint variable of any leg")
-    singularity_margin: Positive = Field(
-        0.03, description="smallest singular value of the dimensionless pose Jacobian"
-    )
-
-    @model_validator(mode="after")
-    def _joint_limits_are_ordered(self) -> Self:
-        if self.joint_min_mm >= self.joint_max_mm:
-            raise broken_rule("joint_min_mm must be below joint_max_mm", "Exchange or correct them")
         return self
 
 

@@ -20,12 +20,12 @@ from hexacell.cell.fields import (
     broken_rule,
 )
 from hexacell.cell.length_check import LengthCheckSettings
+from hexacell.cell.limits import LimitSettings
 from hexacell.cell.measuring import (
     AcceptanceSettings,
     CheckSettings,
     GuardSettings,
     IdentificationSettings,
-    LimitSettings,
     NoiseSettings,
     StationSettings,
     TaskSettings,

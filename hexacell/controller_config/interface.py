@@ -9,13 +9,19 @@ from typing import Protocol
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import Branch
 
+JointRanges = tuple[tuple[float, float], ...]
+
 
 @dataclass(frozen=True, slots=True)
 class ControllerGeometry:
-    """The geometry that a controller uses, as its config states it, and the branch of the robot."""
+    """The geometry that a controller uses, as its config states it, and the branch of the robot.
+
+    ``joint_ranges`` are the smallest and largest joint variable of each leg, mm, where the config has them.
+    """
 
     geometry: Geometry
     branch: Branch
+    joint_ranges: JointRanges | None = None
 
 
 class ConfigFormat(Protocol):

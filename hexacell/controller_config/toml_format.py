@@ -6,6 +6,10 @@
     l = [...]               # six leg lengths, mm
     branch = [1, ...]       # six signs
 
+    [[axes]]                # six sliders or none; the joint variable's range, which may be absent
+    min = -800.0
+    max = 200.0
+
 The file belongs to the robot's owner. A write-back changes the numbers of the geometry and no other
 character.
 """
@@ -20,7 +24,7 @@ from typing import Any, cast
 import numpy as np
 
 from hexacell.cell.fields import LARGEST_NUMBER
-from hexacell.controller_config.interface import ControllerGeometry
+from hexacell.controller_config.interface import ControllerGeometry, JointRanges
 from hexacell.errors import FileError
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import Branch
@@ -41,7 +45,7 @@ class NativeToml:
         """The geometry and the branch in the file; raises ``FileError`` with file and line."""
         text = atomic_files.read_text(path, LARGEST_FILE_BYTES)
         content = _Content(TomlDocument.parse(text, path), self._parameters)
-        return ControllerGeometry(content.geometry(), content.branch())
+        return ControllerGeometry(content.geometry(), content.branch(), content.joint_ranges())
 
     def rewrite(self, text: str, geometry: Geometry) -> str:
         """``text`` with ``geometry`` in it, with as many decimals as the unit has (1 nm), no exponent.
@@ -112,6 +116,21 @@ class _Content:
             if sign not in {1, -1}:
                 raise self._mismatch((*path, leg), "1 or -1")
         return cast("Branch", tuple(int(sign) for sign in signs))
+
+    def joint_ranges(self) -> JointRanges | None:
+        """Smallest and largest joint variable of each leg; none where the six are not all stated."""
+        axes = self.document.data.get("axes")
+        if not isinstance(axes, list) or len(axes) != LEGS:
+            return None
+        if not all(isinstance(axis, dict) and {"min", "max"} <= axis.keys() for axis in axes):
+            return None
+        return tuple(self._joint_range(leg) for leg in range(LEGS))
+
+    def _joint_range(self, leg: int) -> tuple[float, float]:
+        low, high = (self._number(("axes", leg, limit)) for limit in ("min", "max"))
+        if low >= high:
+            raise self._error(("axes", leg, "max"), f"max of axis {leg + 1} is not above its min, {low:g}")
+        return low, high
 
     def _require_positive(self, kind: ParameterKind, values: Any) -> None:  # noqa: ANN401
         for index, value in np.ndenumerate(np.array(values)):

@@ -8,7 +8,7 @@ from enum import Enum
 import numpy as np
 from numpy.typing import NDArray
 
-from hexacell.identification.belief import Limits, RobotBelief
+from hexacell.identification.belief import RobotBelief
 from hexacell.kinematics import rotations
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array, Mask
@@ -55,9 +55,15 @@ class ReachableTargets:
 
 
 def orientations(
-    count: int, tilt: float, seed: int, amplitudes: Amplitudes = Amplitudes.ALL_SCALES
+    count: int,
+    tilt: float,
+    seed: int,
+    amplitudes: Amplitudes = Amplitudes.ALL_SCALES,
+    most_twist: float = np.pi,
 ) -> Array:
     """``count`` rotations (count, 3, 3): tilts up to ``tilt``, rad, after twists up to twice as large.
+
+    No twist is larger than ``most_twist``, rad.
 
     They are quasi-random, from a scrambled Sobol' sequence; ``count`` is a power of two.
     """
@@ -66,7 +72,8 @@ def orientations(
     heading, tilted, sign, twisted, scale = qmc.Sobol(5, seed=seed).random(count).T
     angle = tilt * _amplitudes(tilted, scale, amplitudes)
     direction = np.where(sign < 0.5, -1.0, 1.0)
-    twist = TWIST_PER_TILT * tilt * _amplitudes(twisted, scale, amplitudes) * direction
+    largest_twist = min(TWIST_PER_TILT * tilt, most_twist)
+    twist = largest_twist * _amplitudes(twisted, scale, amplitudes) * direction
     heading, zero = 2.0 * np.pi * heading, np.zeros(count)
     tilts = angle[:, None] * np.stack([np.cos(heading), np.sin(heading), zero], axis=-1)
     twists = np.stack([zero, zero, twist], axis=-1)
@@ -85,7 +92,7 @@ def reachable_targets(belief: RobotBelief, poses: PoseBatch, mode: Array | None 
     With an assembly ``mode`` (1,), only poses on that mode: no path leads to another one.
     """
     joints = belief.mechanism.inverse(belief.estimate, belief.branch, poses)
-    rows = np.flatnonzero(within_limits(belief.limits, poses, joints))
+    rows = np.flatnonzero(belief.keeps_limits(poses, joints))
     poses, joints = poses[rows], joints[rows]
     margin = belief.limits.singularity_margin
     clear, modes = margin_and_mode(belief.mechanism, belief.estimate, poses, joints, margin)
@@ -98,20 +105,22 @@ def commands_for(belief: RobotBelief, targets: ReachableTargets) -> tuple[PoseBa
     """The commands (n) that bring the estimated robot to n targets, and which of them do (n,).
 
     None does where the controller's own geometry cannot take the joint variables, or only next to a
-    singularity or on another assembly mode.
+    singularity, on another assembly mode or beyond the limits of a command.
     """
     commands = belief.commanded.commands_for(targets.poses, targets.joints)
     margin = belief.limits.singularity_margin
     clear = has_singularity_margin(
         belief.mechanism, belief.controller, commands.poses, targets.joints, margin
     )
-    return commands.poses, commands.found & clear
+    return commands.poses, commands.found & clear & belief.limits.allow_commands(commands.poses)
 
 
 def outcomes_of(belief: RobotBelief, commands: PoseBatch) -> tuple[ReachableTargets, NDArray[np.intp]]:
     """Where commands bring the estimated robot, and the rows of those that do so within its limits."""
     actual = belief.commanded.actual_poses(commands)
-    rows = np.flatnonzero(actual.found & within_limits(belief.limits, commands, actual.joints))
+    found = actual.found & belief.limits.allow_commands(commands)
+    found[found] = belief.keeps_limits(actual.poses[found], actual.joints[found])
+    rows = np.flatnonzero(found)
     targets = ReachableTargets(actual.poses[rows], actual.joints[rows])
     margin = belief.limits.singularity_margin
     clear = has_singularity_margin(belief.mechanism, belief.estimate, targets.poses, targets.joints, margin)
@@ -123,12 +132,6 @@ def reachable(belief: RobotBelief, poses: PoseBatch) -> tuple[ReachableTargets, 
     targets = reachable_targets(belief, poses)
     commands, found = commands_for(belief, targets)
     return targets[found], commands[found]
-
-
-def within_limits(limits: Limits, poses: PoseBatch, joints: Array) -> Mask:
-    """Which poses keep the tilt and joint limits; an unreachable one (NaN) does not."""
-    in_range = (joints >= limits.joint_min_mm) & (joints <= limits.joint_max_mm)
-    return in_range.all(axis=-1) & (limits.tilts(poses) <= limits.tilt)
 
 
 def workspace_poses(belief: RobotBelief, points: Array) -> PoseBatch:

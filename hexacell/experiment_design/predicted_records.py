@@ -13,10 +13,11 @@ from numpy.typing import NDArray
 from hexacell.errors import LimitError
 from hexacell.experiment_design.candidates import ReachableTargets, commands_for
 from hexacell.experiment_design.criteria import innovation_covariance
-from hexacell.identification.belief import Limits, RobotBelief
+from hexacell.identification.belief import RobotBelief
 from hexacell.identification.solver.measurement_model import record_covariance, record_weights
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.forward import assembly_mode
+from hexacell.kinematics.limits import Limits
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array, Mask
 from hexacell.kinematics.sensitivity import pose_jacobian, position_sensitivity

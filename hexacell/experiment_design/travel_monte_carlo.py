@@ -2,7 +2,8 @@
 
 A pose may be measured if the ball almost surely stays inside the gauges' travel there. The deviation d of
 the ball from the reference depends on the unknown parameters theta, of which the belief is a normal
-distribution; the constraint is P(|d(theta)| <= travel) >= 1 - epsilon on each axis.
+distribution; the constraint is P(|d(theta)| <= travel) >= 1 - epsilon on each axis. Passive joints and legs
+keep their limits as surely.
 
 Near the reference d is linear in theta, and propagation of covariance gives its distribution
 (:meth:`PredictedRecords.within <hexacell.experiment_design.predicted_records.PredictedRecords.within>`).
@@ -27,9 +28,10 @@ import numpy as np
 
 from hexacell.experiment_design.candidates import ReachableTargets
 from hexacell.experiment_design.predicted_records import GaugeZero, PredictedRecords, predict_records
-from hexacell.identification.belief import Limits, RobotBelief
+from hexacell.identification.belief import SPARE_ANGLE, RobotBelief
 from hexacell.kinematics.forward import apply_twist, forward_kinematics
 from hexacell.kinematics.geometry import GeometryBatch
+from hexacell.kinematics.limits import Limits
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array, Mask
 from hexacell.kinematics.sensitivity import Sensitivity, has_singularity_margin, pose_sensitivity
@@ -86,7 +88,15 @@ class TravelConstraint:
     def _holds_linearly(self, records: PredictedRecords) -> Mask:
         if self._is_uncertain:
             return np.zeros(len(records), dtype=bool)
-        return records.within(self.belief.limits, LINEAR_SHARE)
+        within = records.within(self.belief.limits, LINEAR_SHARE)
+        return within & self._legs_are_free(records.targets)
+
+    def _legs_are_free(self, targets: ReachableTargets) -> Mask:
+        """At which of n targets passive joints have angles left for the orientation's uncertainty."""
+        belief, spare = self.belief, SPARE_ANGLE + SIGMAS * self._orientation_sigma
+        return belief.limits.allow_legs(
+            belief.mechanism, belief.estimate, targets.poses, targets.joints, spare
+        )
 
     def _holds_for_samples(self, targets: ReachableTargets) -> Mask:
         """At which of n targets the constraint holds on the robots sampled from the belief."""
@@ -108,7 +118,11 @@ class TravelConstraint:
 
     @cached_property
     def _is_uncertain(self) -> bool:
-        return orientation_sigma(self.belief, self.zero.target) > UNCERTAIN_SIGMA
+        return self._orientation_sigma > UNCERTAIN_SIGMA
+
+    @cached_property
+    def _orientation_sigma(self) -> float:
+        return orientation_sigma(self.belief, self.zero.target)
 
 
 def orientation_sigma(belief: RobotBelief, targets: ReachableTargets) -> float:
@@ -130,7 +144,7 @@ class _SampledRobots:
     """Robots (r) that can take the reference pose, at n targets.
 
     Attributes:
-        found: (r, n) whether they take the target clear of singularities.
+        found: (r, n) whether they take the target clear of singularities, passive joints and legs free.
         deviations: (r, n, 3), mm, from the reference.
     """
 
@@ -156,12 +170,15 @@ def _sample(
     start, mode = apply_twist(poses[rows], steps), sensitivity.mode[rows]
     result = forward_kinematics(belief.mechanism, robots, joints[rows], start, mode=mode)
     found = result.found.reshape(samples, count)
+    everywhere = (robots, result.poses, joints[rows])
+    is_clear = has_singularity_margin(belief.mechanism, *everywhere, MARGIN_SHARE * margin)
+    are_free = belief.limits.allow_legs(belief.mechanism, *everywhere)
+    found &= (is_clear & are_free).reshape(samples, count)
     first = np.arange(samples) * count
     at_reference = (robots.subset(first), result.poses[first], joints[np.zeros(samples, dtype=int)], margin)
-    # A robot next to a singularity at its reference is refused before anything moves.
+    # A robot next to a singularity at its reference is refused before anything moves, and one whose joints
+    # are at their end there does not come to the reference.
     kept = found[:, 0] & has_singularity_margin(belief.mechanism, *at_reference)
-    everywhere = (robots, result.poses, joints[rows], MARGIN_SHARE * margin)
-    found &= has_singularity_margin(belief.mechanism, *everywhere).reshape(samples, count)
     positions = result.poses.positions.reshape(samples, count, 3)[kept]
     return _SampledRobots(found[kept, 1:], positions[:, 1:] - positions[:, :1])
 

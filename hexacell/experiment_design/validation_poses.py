@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from hexacell.errors import LimitError
-from hexacell.experiment_design.candidates import ReachableTargets, reachable_targets, within_limits
+from hexacell.experiment_design.candidates import ReachableTargets, reachable_targets
 from hexacell.experiment_design.criteria import innovation_covariance
 from hexacell.experiment_design.predicted_records import TRAVEL_SHARE, position_derivatives
 from hexacell.identification.belief import RobotBelief
@@ -40,14 +40,17 @@ def select_validation_poses(
     """
     turns = np.concatenate([np.eye(3)[None], orientations])
     every = PoseBatch.at(point, belief.limits.orientations(turns))
-    in_range = within_limits(belief.limits, every, belief.commanded.joints(every))
-    poses = reachable_targets(belief, every[in_range]).poses
+    limits = belief.limits
+    allowed = limits.allow_commands(every) & limits.allow_joints(belief.commanded.joints(every))
+    poses = reachable_targets(belief, every[allowed]).poses
     if not len(poses) or not np.array_equal(poses.rotations[0], every.rotations[0]):
         raise LimitError(f"the untilted platform cannot reach {every.pose(0)} within the limits")
     actual = belief.commanded.actual_poses(poses)
     if not actual.found[0]:
         raise LimitError(f"the actual pose at the command {poses.pose(0)} cannot be computed")
     inside = _stays_inside(belief, actual)
+    if not inside[0]:
+        raise LimitError(f"the actual pose at the command {poses.pose(0)} is not within the limits")
     selected = _select_farthest(belief, poses[inside], actual.poses[inside], used, count)
     if len(selected) < count:
         raise LimitError(
@@ -57,16 +60,20 @@ def select_validation_poses(
 
 
 def _stays_inside(belief: RobotBelief, actual: ActualPoses) -> Mask:
-    """At which poses the ball stays inside the travel of gauges that are zeroed at the first of them."""
+    """At which poses the ball stays inside the travel of gauges that are zeroed at the first of them.
+
+    Only those at which the robot keeps its limits too.
+    """
     jacobian, _ = position_derivatives(belief, ReachableTargets(actual.poses, actual.joints))
     noise = 2.0 * belief.noise.gauge_covariance
     covariance = innovation_covariance(belief.covariance, jacobian - jacobian[0], noise)
     sigma = np.sqrt(np.diagonal(covariance, axis1=-2, axis2=-1))
     deviation = actual.poses.positions - actual.poses.positions[0]
     # They are chosen long before the gauges are placed there.
-    within = belief.limits.within_travel(deviation, SAFETY_SIGMAS * sigma, TRAVEL_SHARE, surely=True)
-    inside: Mask = within & actual.found
-    inside[0] = actual.found[0]
+    inside = belief.limits.within_travel(deviation, SAFETY_SIGMAS * sigma, TRAVEL_SHARE, surely=True)
+    inside[0] = True
+    inside &= actual.found
+    inside[inside] = belief.keeps_limits(actual.poses[inside], actual.joints[inside])
     return inside
 
 

@@ -1,4 +1,4 @@
-"""What is known of the robot at one moment, and the limits it must keep."""
+"""What is known of the robot at one moment."""
 
 from __future__ import annotations
 
@@ -7,73 +7,17 @@ from functools import cached_property
 
 import numpy as np
 
-from hexacell.identification.gauge_travel import GaugeRoom, GaugeTravel
 from hexacell.identification.problem.problem import Noise
-from hexacell.kinematics.commanded_motion import CommandedRobot
+from hexacell.kinematics.commanded_motion import ActualPoses, CommandedRobot
 from hexacell.kinematics.geometry import Geometry
-from hexacell.kinematics.mechanism import Branch, FrameTransform, Mechanism
+from hexacell.kinematics.limits import Limits
+from hexacell.kinematics.mechanism import Branch, Mechanism
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.refused_commands import RefusedCommands
 from hexacell.kinematics.rotations import Array, Mask
 
-SAME_FRAMES = FrameTransform(np.eye(3), np.zeros(3), np.eye(3))
-
-
-@dataclass(frozen=True, slots=True)
-class Limits:
-    """Limits that every commanded pose keeps: mm and rad; the singularity margin is dimensionless.
-
-    Attributes:
-        frames: from the frames of the commands, in which a level platform is level, to the convention's.
-        gauges: travels and plungers; without them the ball may go as far to all sides.
-        zeroed: the room of the gauges as they were zeroed; none where that is not known yet.
-    """
-
-    gauge_travel_mm: float
-    tilt: float
-    joint_min_mm: float
-    joint_max_mm: float
-    singularity_margin: float
-    frames: FrameTransform = field(default=SAME_FRAMES, compare=False)
-    gauges: GaugeTravel | None = None
-    zeroed: GaugeRoom | None = None
-
-    @property
-    def room(self) -> GaugeRoom:
-        """How far the ball may go from the gauges' zero."""
-        if self.zeroed is not None:
-            return self.zeroed
-        return GaugeRoom.symmetric(self.gauge_travel_mm) if self.gauges is None else self.gauges.room()
-
-    @property
-    def sure_room(self) -> GaugeRoom:
-        """The same of any station that is mounted well enough."""
-        return self.room if self.gauges is None else self.gauges.sure_room
-
-    def within_travel(
-        self, deviations: Array, spread: Array | float = 0.0, share: float = 1.0, *, surely: bool = False
-    ) -> Mask:
-        """Which deviations (..., 3), mm, in the convention's frames stay within a share of the room.
-
-        With ``surely`` it is that of any station.
-        """
-        room = self.sure_room if surely else self.room
-        return room.holds(deviations @ self.frames.base, spread, share)
-
-    def zeroed_at(self, shown_mm: tuple[float, float, float] | None) -> Limits:
-        """The same once the gauges were zeroed where they show ``shown_mm`` along base x, y, z."""
-        if self.gauges is None or shown_mm is None:
-            return self
-        return replace(self, zeroed=self.gauges.room(shown_mm))
-
-    def tilts(self, poses: PoseBatch) -> Array:
-        """The tilts (n,), rad, of poses in the convention's frames."""
-        return self.frames.inverse().poses(poses).tilts()
-
-    def orientations(self, turns: Array) -> Array:
-        """Turns (n, 3, 3) of a level platform, as orientations in the convention's frames."""
-        turned: Array = self.frames.base @ turns @ self.frames.platform.T
-        return turned
+SPARE_ANGLE = np.radians(0.5)
+"""Of passive joints: what the estimate may be wrong by once a few poses were measured."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,3 +62,19 @@ class RobotBelief:
         """The estimated robot under its controller."""
         geometries, refused = (self.controller, self.estimate), (self.refused, self.limits.frames)
         return CommandedRobot(self.mechanism, self.branch, *geometries, *refused)
+
+    def keeps_limits(self, poses: PoseBatch, joints: Array) -> Mask:
+        """At which of n poses, with joint variables (n, 6), mm, the estimated robot keeps its limits.
+
+        Those of tilt and turn, joint ranges, passive joints and legs; an unreachable pose (NaN) does not.
+        """
+        kept = self.limits.allow_poses(poses, joints)
+        of_estimate = (self.mechanism, self.estimate, poses[kept], joints[kept])
+        kept[kept] = self.limits.allow_legs(*of_estimate, SPARE_ANGLE)
+        return kept
+
+    def standing_at(self, command: PoseBatch, actual: ActualPoses) -> RobotBelief:
+        """The same, its limits widened where the robot is beyond them at a command (1)."""
+        at = (command, actual.poses, actual.joints)
+        limits = self.limits.including(self.mechanism, self.estimate, *at, SPARE_ANGLE)
+        return replace(self, limits=limits)

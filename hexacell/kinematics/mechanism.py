@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from hexacell.errors import ReachError
 from hexacell.kinematics.geometry import Geometry, GeometryBatch
+from hexacell.kinematics.legs import Legs
 from hexacell.kinematics.parameters import GeometricParameter, ParameterSet
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array
@@ -206,6 +207,10 @@ class Mechanism(Protocol):
 
     def guides(self, geometry: Geometry, poses: PoseBatch, joints: Array) -> Guides | None:
         """The guides on which sliders move; none for a mechanism without."""
+        ...
+
+    def legs(self, geometry: Geometry | GeometryBatch, poses: PoseBatch, joints: Array) -> Legs:
+        """The legs at n poses; ``geometry`` is one for all of them, or one for each."""
         ...
 
     def platform_radius(self, geometry: Geometry | GeometryBatch) -> Array:

@@ -121,3 +121,9 @@ class PoseBatch:
     def tilts(self) -> Array:
         """Angles (n,), rad, between the platform's z axis and the base's."""
         return np.arccos(np.clip(self.rotations[:, 2, 2], -1.0, 1.0))
+
+    def turns(self) -> Array:
+        """Angles (n,), rad, in (-pi, pi], by which the platform is turned about its normal, then tilted."""
+        r = self.rotations
+        turns: Array = np.arctan2(r[:, 1, 0] - r[:, 0, 1], r[:, 0, 0] + r[:, 1, 1])
+        return turns

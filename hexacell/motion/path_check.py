@@ -1,8 +1,9 @@
-"""Check of straight lines between commands: joint ranges, singularity margin and gauge travel.
+"""Check of straight lines between commands: limits of commands and robot, singularities, gauge travel.
 
-A line is sampled. Joint ranges are checked on a fine sampling of the commands. The singularity margin is
-checked on a coarser one, for the controller's geometry and for the estimated one; both must keep their
-assembly mode. The ball's distance from the reference is computed from the estimated robot's actual path.
+A line is sampled. Joint ranges and what may be commanded are checked on a fine sampling of the commands.
+The singularity margin is checked on a coarser one, for the controller's geometry and for the estimated one;
+both must keep their assembly mode. Tilt, passive joints and legs there are those of the estimated robot,
+and the ball's distance from the reference is computed from its path.
 """
 
 from __future__ import annotations
@@ -48,7 +49,7 @@ class CheckedLines:
         commands: sampled commands (pieces + 1, n).
         joints: (pieces + 1, n, 6), mm.
         actual: actual poses of the estimated robot; meaningless on lines that are not ``is_open``.
-        is_open: (n,) lines that keep joint ranges and singularity margin.
+        is_open: (n,) lines that keep all limits but the gauges' travel.
         is_clear: (n,) lines that are open and keep the ball inside the gauges' travel.
     """
 
@@ -84,15 +85,17 @@ class LinesFrom:
 
         Unless the search is ``thorough``, about one clear line in fifty is reported as not clear.
         """
-        belief, limits = self.belief, self.belief.limits
+        belief = self._belief
+        limits = belief.limits
         fine = interpolate_lines((self.start, *waypoints, ends), JOINT_REFINEMENT)
         fine_joints = belief.commanded.joints(fine.reshape(-1)).reshape(-1, len(ends), 6)
-        in_range = (fine_joints >= limits.joint_min_mm) & (fine_joints <= limits.joint_max_mm)
-        rows = np.flatnonzero(in_range.all(axis=(0, 2)))
+        allowed = limits.allow_commands(fine.reshape(-1)).reshape(-1, len(ends))
+        rows = np.flatnonzero((allowed & limits.allow_joints(fine_joints)).all(axis=0))
         commands, joints = fine[::JOINT_REFINEMENT], fine_joints[::JOINT_REFINEMENT]
         rows = rows[self._keeps_margin(belief.controller, commands, joints, rows)]
         actual, rows = self._trace(commands, joints, rows, thorough=thorough)
         rows = rows[self._keeps_margin(belief.estimate, actual, joints, rows)]
+        rows = rows[self._keeps_limits(actual, joints, rows)]
         is_open = np.zeros(len(ends), dtype=bool)
         is_open[rows] = True
         is_inside = is_open.copy()
@@ -118,6 +121,12 @@ class LinesFrom:
         clear: Mask = np.all(keeps & (mode == mode[:1]), axis=0)
         return clear
 
+    def _keeps_limits(self, actual: PoseBatch, joints: Array, rows: NDArray[np.intp]) -> Mask:
+        """On which of some lines the estimated robot keeps its limits."""
+        poses, at = actual[:, rows].reshape(-1), joints[:, rows].reshape(-1, 6)
+        kept = self._belief.keeps_limits(poses, at).reshape(len(joints), len(rows))
+        return np.asarray(kept.all(axis=0))
+
     def _trace(
         self, commands: PoseBatch, joints: Array, rows: NDArray[np.intp], *, thorough: bool
     ) -> tuple[PoseBatch, NDArray[np.intp]]:
@@ -133,6 +142,13 @@ class LinesFrom:
             thorough=thorough,
         )
         return commands.with_rows(np.s_[:, rows], actual), rows[found]
+
+    @cached_property
+    def _belief(self) -> RobotBelief:
+        """The robot that may be beyond a limit where it stands, and come back from there."""
+        if not self._actual_start.found[0]:
+            return self.belief
+        return self.belief.standing_at(self.start, self._actual_start)
 
     @cached_property
     def _actual_start(self) -> ActualPoses:

@@ -12,7 +12,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from hexacell.errors import LimitError
-from hexacell.experiment_design.candidates import within_limits
 from hexacell.kinematics import rotations
 from hexacell.kinematics.forward import CONTINUATION_STAGES
 from hexacell.kinematics.geometry import Geometry
@@ -173,7 +172,8 @@ def _first_reached(
 def _reached(robot: Robot, truth: Geometry, commands: PoseBatch, margin: float) -> _Reached:
     """Those of some commands that keep the limits and, by both geometries, a singularity margin."""
     actual = robot.commanded(truth).actual_poses(commands)
-    rows = actual.found & within_limits(robot.limits, commands, actual.joints)
+    rows = actual.found & robot.limits.allow_commands(commands) & robot.limits.allow_joints(actual.joints)
+    rows[rows] = robot.limits.allow_legs(robot.mechanism, truth, actual.poses[rows], actual.joints[rows])
     found = _Reached(commands, actual.joints, actual.poses)[rows]
     sides = ((robot.commanding, found.commands), (truth, found.actual))
     clear = [

@@ -75,7 +75,9 @@ class HeldOutSteps:
     def _choose_at(self, point: int, belief: RobotBelief, used: Array | None) -> tuple[SixNumbers, ...]:
         """The poses at a point, counted from 0; the first is its reference."""
         verification, robot = self.settings.verification, self.sets.robot
-        turns = candidates.orientations(self.candidate_count, belief.limits.tilt, verification.seed)
+        turns = candidates.orientations(
+            self.candidate_count, belief.limits.tilt, verification.seed, most_twist=belief.limits.turn
+        )
         position = robot.from_commands([Pose(*verification.points[point])]).positions[0]
         poses = select_validation_poses(belief, position, verification.orientations, turns, used)
         commands = (robot.to_command(poses.pose(row)) for row in range(len(poses)))

@@ -14,7 +14,7 @@ from hexacell.identification.diagnostics.gauge_trial import (
     response_of,
 )
 from hexacell.kinematics.rotations import Array
-from hexacell.robot_model import gauge_travel_of
+from hexacell.stated_limits import gauge_travel_of
 from procedures.run.steps import ThreeNumbers
 
 MISTAKES: Mapping[GaugeMistake, tuple[str, str, str]] = {

@@ -25,7 +25,7 @@ from hexacell.clock import CellClock
 from hexacell.controller_config.current import CurrentConfig
 from hexacell.kinematics.position_agreement import PositionReports, PositionSource
 from hexacell.kinematics.rotations import Array
-from hexacell.robot_model import gauge_travel_of
+from hexacell.stated_limits import gauge_travel_of
 from procedures.devices.device_set import Devices, MountedGauge
 from procedures.guards import rules
 from procedures.guards.heartbeat import WatchedController

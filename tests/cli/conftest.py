@@ -34,8 +34,13 @@ QUICK = (
     ("clock_factor = 50.0", "clock_factor = 200.0\ngive_up_s = 2000.0"),
     ("orientations = 11", "orientations = 7"),
     ("orientations = 6", "orientations = 2"),
-    ("position_mm = 0.15 ", "position_mm = 20.0"),
-    ("orientation_deg = 0.05", "orientation_deg = 5.0"),
+    ("position_mm = 0.25 ", "position_mm = 20.0"),
+    ("orientation_deg = 0.08", "orientation_deg = 5.0"),
+    # Large rotations: few records identify it.
+    ("turn_deg = 60.0", "turn_deg = 180.0"),
+    ("leg_distance_mm = 30.0", "leg_distance_mm = 0.0"),
+    ("base_cone_deg = 45.0", "base_cone_deg = 180.0"),
+    ("platform_cone_deg = 45.0", "platform_cone_deg = 180.0"),
     # Each test of the model fails one healthy run in a thousand, and the suite has hundreds of runs.
     ("encoder_mm = 0.01\ngauge_mm = 0.01", "encoder_mm = 0.014\ngauge_mm = 0.014"),
 )
@@ -230,7 +235,6 @@ def typed_here(
 def one_robot(monkeypatch: pytest.MonkeyPatch) -> None:
     """Predict on a single robot and from few poses: the output is under test, not its quality."""
     monkeypatch.setattr("hexacell.application.offline.dry_run", partial(dry_run, robots=1))
-    monkeypatch.setattr("hexacell.campaign.dry_run.CANDIDATES", 32)
 
 
 @pytest.fixture

@@ -17,14 +17,14 @@ from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import Cell, dump, load_cell
 from hexacell.runs.run_folder import RunFolder
 from hexacell.storage.cell_lock import lock_path
-from tests.small_cell import changed
+from tests.small_cell import FREE, changed
 
 POINTS = ((100.0, -100.0, 500.0), (-100.0, 100.0, 500.0))
 ORIENTATIONS = 9
 PATIENCE_S = 10.0  # a machine under load is no device that fails
 HELD_OUT_ORIENTATIONS = 2
 
-SMALL: dict[str, Any] = {
+SMALL: dict[str, Any] = FREE | {
     "identification.points": POINTS,
     "identification.orientations": ORIENTATIONS,
     "verification.points": ((-100.0, -50.0, 450.0), (100.0, 100.0, 550.0)),

@@ -142,7 +142,7 @@ class TestPermissions:
     def test_a_read_only_cell_folder_is_refused(self, new_site: Any, refused: Any) -> None:
         site = new_site()
         site.folder.chmod(0o555)
-        refused(site, "Have the owner of the folder create it once, empty, with mode 666")
+        refused(site, "Have the owner of the folder create it once, empty, with mode 644")
 
     def test_a_read_only_runs_folder_is_refused(self, new_site: Any, refused: Any) -> None:
         site = new_site()

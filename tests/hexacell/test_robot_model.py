@@ -15,11 +15,11 @@ from hexacell.campaign.teaching import as_written
 from hexacell.cell.loader import load_cell
 from hexacell.controller_config.interface import ControllerGeometry
 from hexacell.controller_config.toml_format import NativeToml
-from hexacell.errors import FileError, ReachError
+from hexacell.errors import FileError
 from hexacell.identification.estimator import estimate_online, identify
 from hexacell.identification.problem.problem import Tolerances
 from hexacell.kinematics.mechanism import FrameTransform, inverse_kinematics
-from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS, Hexaglide, hexaglide_geometry
+from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS, Hexaglide
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.measurements.records import MeasurementSet, Record
 from hexacell.robot_model import make_robot, robot_of
@@ -99,7 +99,9 @@ def test_a_taught_config_must_exist_and_be_of_this_robot(copied):
 def test_limits_are_in_millimetres_and_radians(robot):
     assert robot.limits.gauge_travel_mm == 5.0
     assert robot.limits.tilt == pytest.approx(np.pi / 4)
-    assert (robot.limits.joint_min_mm, robot.limits.joint_max_mm) == (-800.0, 800.0)
+    assert robot.limits.turn == pytest.approx(np.pi / 3)
+    assert robot.limits.joint_ranges == ((-800.0, 200.0),) * 3 + ((-200.0, 800.0),) * 3
+    assert np.degrees(robot.limits.legs.platform_cones) == pytest.approx(np.full(6, 45.0))
     assert robot.limits.singularity_margin == 0.03
 
 
@@ -184,27 +186,3 @@ def test_the_belief_after_measuring_is_the_estimate_with_its_covariance(robot, n
     assert known.estimate.largest_difference(estimate.geometry) == 0.0
     np.testing.assert_array_equal(known.covariance, estimate.free_covariance)
     assert known.controller.largest_difference(robot.controller) < 1e-9
-
-
-def test_a_pose_within_reach_is_no_error(robot):
-    robot.require_reach("task 1", Pose(0, 0, 550, 10, -10, 20))
-
-
-@pytest.mark.parametrize(
-    ("pose", "message"),
-    [
-        (Pose(0, 0, 899), r"leg 1 cannot reach the pose X0\.000 Y0\.000 Z899\.000"),
-        (Pose(390, 0, 550), r"^task 1: q4 would be \d+\.\d mm, outside -800 to 800$"),
-        (Pose(0, 0, 550, 46.0), r"^task 1: the singularity margin is 0\.00\d, below 0\.03$"),
-    ],
-)
-def test_a_pose_out_of_reach_is_refused_with_the_reason(robot, pose, message):
-    with pytest.raises(ReachError, match=message):
-        robot.require_reach("task 1", pose)
-
-
-def test_reach_is_the_controllers_not_the_drawings(cell, paper):
-    short = hexaglide_geometry(paper.nominal["S"], paper.nominal["B"], np.full(6, 450.0))
-    robot = make_robot(cell.settings, ControllerGeometry(short, paper.branch))
-    with pytest.raises(ReachError, match="leg 1"):
-        robot.require_reach("task 1", Pose(0, 0, 600))

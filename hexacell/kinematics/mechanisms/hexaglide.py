@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from hexacell.kinematics.geometry import Geometry, GeometryBatch
+from hexacell.kinematics.legs import Legs
 from hexacell.kinematics.mechanism import (
     Branch,
     ConstraintDerivatives,
@@ -130,6 +131,12 @@ class Hexaglide:
         _, v = _leg_vectors(geometry, poses, joints)
         n = v / geometry["l"][:, None]
         return Guides(RAILS, along=geometry["S"][:, 0] + joints, across=n[..., 1:])
+
+    def legs(self, geometry: Geometry | GeometryBatch, poses: PoseBatch, joints: Array) -> Legs:
+        """See :class:`~hexacell.kinematics.mechanism.Mechanism`."""
+        b, v = _leg_vectors(geometry, poses, joints)
+        at_platform = poses.positions[:, None, :] + b
+        return Legs(at_platform + v, at_platform, poses.rotations)
 
     def platform_radius(self, geometry: Geometry | GeometryBatch) -> Array:
         """See :class:`~hexacell.kinematics.mechanism.Mechanism`."""

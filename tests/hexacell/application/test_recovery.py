@@ -12,6 +12,7 @@ from hexacell.cell.simulation import FaultKind
 from hexacell.errors import DeviceError, ExitCode
 from procedures.devices.reconnection import DeviceReplaced
 from procedures.run import events
+from procedures.run.trips import RobotNotStopped
 
 UNPLUGGED: FaultKind = "unplugged"
 
@@ -80,7 +81,7 @@ async def test_a_robot_that_cannot_be_stopped_ends_the_run_without_recovery(at_s
         if isinstance(event, events.StepBegun) and event.step.key == "P2/o03/move":
             site.simulated.faults.inject(UNPLUGGED, "controller")
 
-    with pytest.raises(DeviceError, match="controller"):
+    with pytest.raises(RobotNotStopped, match="controller"):
         await site.calibrate(pull, resume=True)
     assert not site.happened(events.Failed)
     site.simulated.faults.clear(UNPLUGGED, "controller")

@@ -9,6 +9,7 @@ import pytest
 
 from hexacell.campaign.dry_run import dry_run
 from hexacell.cell.uncertainty import UncertaintySettings
+from hexacell.controller_config.interface import ControllerGeometry
 from hexacell.identification.solver.levenberg_marquardt import Termination
 from hexacell.identification.solver.result import GeometryEstimate
 from hexacell.kinematics.mechanisms.hexaglide import hexaglide_geometry
@@ -95,8 +96,7 @@ def test_a_common_offset_of_the_ball_is_common(make_plan):
 def test_a_robot_calibrated_before_is_near_what_its_controller_has(make_plan, paper):
     plan = make_plan()
     controller = hexaglide_geometry(paper.actual["S"], paper.actual["B"], paper.actual["l"])
-    format_of = type("Held", (), {"geometry": controller, "branch": paper.branch})()
-    robot = make_robot(plan.settings, format_of)
+    robot = make_robot(plan.settings, ControllerGeometry(controller, paper.branch))
     centre = robot.belief().controller.vector
     drawn = robots_within_tolerances(robot, 16, seed=3)
     lengths = np.array([one.vector - centre for one in drawn])[:, -6:]

@@ -11,6 +11,7 @@ import pytest
 from hexacell.campaign.decisions import CampaignState, Finished, FinishPoint, MeasurePose, StartPoint
 from hexacell.campaign.planner import Plan
 from hexacell.campaign.stopping_rules import REFUSALS
+from hexacell.cell.limits import PassiveJointSettings
 from hexacell.controller_config.interface import ControllerGeometry
 from hexacell.errors import IdentifiabilityError
 from hexacell.kinematics.mechanisms.hexaglide import hexaglide_geometry
@@ -254,6 +255,9 @@ def test_points_that_take_long_to_set_up_are_left_later(make_plan, carry_out):
             identification__choose_points=True,
             identification__minutes_per_station=minutes,
             limits__tilt_deg=20.0,
+            limits__turn_deg=180.0,
+            limits__leg_distance_mm=0.0,
+            limits__passive_joints=PassiveJointSettings(),
             stations__placement="by-hand",
         )
 

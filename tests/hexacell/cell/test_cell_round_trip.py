@@ -7,7 +7,7 @@ from typing import Any, get_args
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hexacell.cell import devices, measuring, model, simulation
+from hexacell.cell import devices, limits, measuring, model, simulation
 from hexacell.cell.loader import describe, dump, schema
 
 finite = st.floats(allow_nan=False, allow_infinity=False)
@@ -73,7 +73,7 @@ cells = st.builds(
         offset_mm=six,
         serial_numbers=st.none() | st.tuples(*[st.integers(0, 2**32 - 1)] * 6),
     ),
-    limits=st.builds(measuring.LimitSettings, tilt_deg=st.floats(1e-9, 80)),
+    limits=st.builds(limits.LimitSettings, tilt_deg=st.floats(1e-9, 80)),
     identification=st.builds(
         measuring.IdentificationSettings,
         points=st.lists(points, min_size=2, max_size=4).map(tuple),

@@ -316,3 +316,28 @@ def test_a_geometry_that_does_not_read_back_is_never_written(
     )
     with pytest.raises(FileError, match="reads back with different numbers"):
         FORMAT.rewrite(config.read_text(), geometry)
+
+
+RANGES = "".join(f"[[axes]]\nmin = {-100.0 * (1 + leg)}\nmax = {50.0}\n" for leg in range(6))
+
+
+def test_joint_ranges_are_read_where_all_six_axes_state_them(config: Path) -> None:
+    text = config.read_text()
+    assert FORMAT.read(config).joint_ranges is None
+    config.write_text(text + RANGES)
+    assert FORMAT.read(config).joint_ranges == tuple((-100.0 * (1 + leg), 50.0) for leg in range(6))
+    config.write_text(text + RANGES.replace("max = 50.0\n", "", 1))
+    assert FORMAT.read(config).joint_ranges is None
+    config.write_text(text + RANGES.removeprefix(RANGES[: RANGES.index("[[axes]]", 1)]))
+    assert FORMAT.read(config).joint_ranges is None
+
+
+@pytest.mark.parametrize(("max_", "problem"), [("-100.0", "is not above its min"), ("'x'", "a number")])
+def test_joint_ranges_that_are_none_are_refused_with_the_line(
+    config: Path, max_: str, problem: str
+) -> None:
+    text = config.read_text()
+    config.write_text(text + RANGES.replace("max = 50.0", f"max = {max_}", 1))
+    with pytest.raises(FileError, match=problem) as raised:
+        FORMAT.read(config)
+    assert raised.value.line == len(text.splitlines()) + 3

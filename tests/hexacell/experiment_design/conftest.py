@@ -8,11 +8,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from hexacell.identification.belief import Limits, RobotBelief
+from hexacell.identification.belief import RobotBelief
 from hexacell.identification.estimator import estimate_online
 from hexacell.identification.problem.problem import Noise
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.geometry import Geometry
+from hexacell.kinematics.limits import Limits
 from hexacell.kinematics.mechanisms.hexaglide import Hexaglide
 from hexacell.kinematics.rotations import Array
 from hexacell.measurements.records import MeasurementSet

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from hexacell.experiment_design.candidates import orientations, reachable, within_limits
+from hexacell.experiment_design.candidates import orientations, reachable
 from hexacell.kinematics.mechanism import FrameTransform
 from hexacell.kinematics.pose import Pose, PoseBatch
 
@@ -108,7 +108,7 @@ def test_no_candidate_is_no_error(know, much):
 def test_an_unreachable_pose_is_outside_the_limits(limits, hexaglide, paper):
     poses = PoseBatch.of([Pose(0, 0, 550), Pose(0, 0, 900), Pose(0, 0, 550, 50), Pose(330, 0, 550)])
     joints = hexaglide.inverse(paper.nominal, paper.branch, poses)
-    np.testing.assert_array_equal(within_limits(limits, poses, joints), [True, False, False, False])
+    np.testing.assert_array_equal(limits.allow_poses(poses, joints), [True, False, False, False])
 
 
 def test_tilts_are_those_of_the_commands_in_whatever_frames_these_are(limits, hexaglide, paper):
@@ -120,6 +120,6 @@ def test_tilts_are_those_of_the_commands_in_whatever_frames_these_are(limits, he
     poses = frames.poses(commands)
     np.testing.assert_allclose(np.degrees(poses.tilts()), [27.0, 29.0, 13.0])
     joints = hexaglide.inverse(paper.nominal, paper.branch, poses)
-    np.testing.assert_array_equal(within_limits(here, poses, joints), [True, False, False])
+    np.testing.assert_array_equal(here.allow_poses(poses, joints), [True, False, False])
     level = PoseBatch.at([0.0, 0.0, 550.0], here.orientations(np.eye(3)[None]))
     np.testing.assert_allclose(here.tilts(level), 0.0, atol=1e-7)

@@ -7,6 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from hexacell.kinematics.legs import LegLimits
+from hexacell.kinematics.limits import AxisLimits
+from hexacell.kinematics.mechanisms.hexaglide import Hexaglide
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.motion.path_check import is_clear
 from hexacell.motion.trajectory import PIECES, interpolate_line
@@ -109,3 +112,59 @@ def test_the_travel_is_around_the_reference_given(exactly):
     assert is_clear(exactly(), start, end, np.array([4.9, 0.0, 550.0]))
     assert not is_clear(exactly(), start, end, np.array([-1.5, 0.0, 550.0]))
     assert not is_clear(exactly(), start, end, np.array([0.0, 0.0, 555.5]))
+
+
+@pytest.mark.parametrize(
+    ("change", "within", "beyond"),
+    [
+        ({"tilt": np.radians(20.0)}, (0, 0, 550, 19), (0, 0, 550, 21)),
+        ({"turn": np.radians(20.0)}, (0, 0, 550, 0, 0, 19), (0, 0, 550, 0, 0, -21)),
+        ({"axes": AxisLimits(highest=(50.0, *(np.inf,) * 5))}, (49, 0, 550), (51, 0, 550)),
+        ({"joint_max_mm": np.array([np.inf] * 5 + [530.0])}, (30, 0, 550), (60, 0, 550)),
+    ],
+    ids=["tilt", "turn", "axis", "joint"],
+)
+def test_a_line_to_a_command_beyond_a_limit_is_refused(exactly, change, within, beyond):
+    limited, here = exactly(**change), at(0, 0, 550)
+    assert is_clear(limited, here, at(*within))
+    assert not is_clear(limited, here, at(*beyond))
+    assert is_clear(exactly(), here, at(*beyond))
+
+
+def cones(degrees, distance=0.0):
+    """Of platform joints, about the nominal legs' directions at a level pose."""
+    hexaglide, poses = Hexaglide(), at(0, 0, 550)
+
+    def around(geometry, branch):
+        legs = hexaglide.legs(geometry, poses, hexaglide.inverse(geometry, branch, poses))
+        wide, narrow = np.full(6, np.pi), np.full(6, np.radians(degrees))
+        return LegLimits(legs.directions[0], legs.directions_in_platform[0], wide, narrow, distance)
+
+    return around
+
+
+def test_passive_joints_stay_in_their_cones_along_the_line(exactly, paper):
+    limited = exactly(legs=cones(20.0)(paper.nominal, paper.branch))
+    assert is_clear(limited, at(0, 0, 550), at(0, 0, 550, 15))
+    assert not is_clear(limited, at(0, 0, 550), at(0, 0, 550, 22))
+    # Both ends are alike far from the middle of the cones, on opposite sides.
+    assert is_clear(limited, at(0, 0, 550, 15), at(0, 0, 550, -15))
+
+
+def test_legs_stay_apart_along_the_line(exactly, paper):
+    near = exactly(legs=cones(180.0, distance=70.0)(paper.nominal, paper.branch))
+    assert is_clear(exactly(), at(0, 0, 550), at(-100, 100, 500))
+    assert not is_clear(near, at(0, 0, 550), at(-100, 100, 500))
+
+
+def test_a_robot_beyond_a_cone_may_come_back_and_not_go_farther(exactly, paper):
+    """It was moved there by hand, or its geometry is known better now."""
+    limited = exactly(legs=cones(20.0)(paper.nominal, paper.branch))
+    assert is_clear(limited, at(0, 0, 550, 26), at(0, 0, 550))
+    assert not is_clear(limited, at(0, 0, 550, 26), at(0, 0, 550, 29))
+
+
+def test_a_robot_beyond_the_tilt_may_come_back_and_not_go_farther(exactly):
+    limited = exactly(tilt=np.radians(20.0))
+    assert is_clear(limited, at(0, 0, 550, 26), at(0, 0, 550))
+    assert not is_clear(limited, at(0, 0, 550, 26), at(0, 0, 550, 28))

@@ -12,12 +12,13 @@ import pytest
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from hexacell.identification.belief import Limits, RobotBelief
+from hexacell.identification.belief import RobotBelief
 from hexacell.identification.estimator import identify
 from hexacell.identification.problem.problem import Prior
 from hexacell.identification.solver.levenberg_marquardt import FINE, solve
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.geometry import Geometry
+from hexacell.kinematics.limits import Limits
 from hexacell.kinematics.mechanism import Branch
 from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS
 from hexacell.kinematics.pose import Pose, PoseBatch

@@ -10,12 +10,13 @@ from scipy.stats import multivariate_normal
 
 from hexacell.experiment_design.candidates import ReachableTargets
 from hexacell.experiment_design.predicted_records import position_derivatives
-from hexacell.identification.belief import Limits, RobotBelief
+from hexacell.identification.belief import RobotBelief
 from hexacell.identification.estimator import estimate_online
 from hexacell.identification.problem.problem import Noise, Prior, Tolerances, build_problem
 from hexacell.identification.solver.measurement_model import record_covariance
 from hexacell.kinematics.forward import forward_kinematics
 from hexacell.kinematics.geometry import Geometry
+from hexacell.kinematics.limits import Limits
 from hexacell.kinematics.mechanisms.hexaglide import Hexaglide
 from hexacell.uncertainty.geometry_drift import (
     IdentifiedBefore,

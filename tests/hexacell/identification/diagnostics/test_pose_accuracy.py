@@ -12,10 +12,11 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
-from hexacell.identification.belief import Limits, RobotBelief
+from hexacell.identification.belief import RobotBelief
 from hexacell.identification.diagnostics.pose_accuracy import Accuracy, predicted_accuracy
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.geometry import Geometry
+from hexacell.kinematics.limits import Limits
 from hexacell.kinematics.mechanism import Branch
 from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS
 from hexacell.kinematics.pose import Pose, PoseBatch

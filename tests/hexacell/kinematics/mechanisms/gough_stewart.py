@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from hexacell.kinematics.geometry import Geometry, GeometryBatch
+from hexacell.kinematics.legs import Legs
 from hexacell.kinematics.mechanism import (
     Branch,
     ConstraintDerivatives,
@@ -106,6 +107,11 @@ class GoughStewart:
 
     def guides(self, geometry: Geometry, poses: PoseBatch, joints: Array) -> Guides | None:
         return None
+
+    def legs(self, geometry: Geometry | GeometryBatch, poses: PoseBatch, joints: Array) -> Legs:
+        b, v = _vectors(geometry, poses)
+        at_platform = poses.positions[:, None, :] + b
+        return Legs(at_platform - v, at_platform, poses.rotations)
 
     def platform_radius(self, geometry: Geometry | GeometryBatch) -> Array:
         radius: Array = np.mean(np.linalg.norm(geometry["B"], axis=-1), axis=-1)

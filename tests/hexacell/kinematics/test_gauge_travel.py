@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hexacell.identification.belief import Limits
-from hexacell.identification.gauge_travel import GaugeRoom, GaugeTravel
+from hexacell.kinematics.gauge_travel import GaugeRoom, GaugeTravel
+from hexacell.kinematics.limits import Limits
 from hexacell.kinematics.mechanism import FrameTransform
 
 TRAVEL = GaugeTravel(5.0, (6.25, 6.25, 6.25), (0.0, 0.0, 0.0), 1.0)
@@ -59,7 +59,7 @@ def test_the_sure_room_is_part_of_that_of_every_station_mounted_well_enough(plac
 
 def test_the_sides_are_those_of_the_gauges_in_whatever_frames_the_robot_is_computed() -> None:
     half_a_turn = FrameTransform(np.diag([1.0, -1.0, -1.0]), np.zeros(3), np.eye(3))
-    limits = Limits(5.0, 1.0, -800.0, 800.0, 0.03, half_a_turn, TRAVEL).zeroed_at((0.0, 4.0, 0.0))
+    limits = Limits(5.0, 1.0, -800.0, 800.0, 0.03, half_a_turn, gauges=TRAVEL).zeroed_at((0.0, 4.0, 0.0))
     assert limits.within_travel(np.array([0.0, -0.9, 0.0]))
     assert not limits.within_travel(np.array([0.0, -1.1, 0.0]))
     assert limits.within_travel(np.array([0.0, 4.9, 0.0]))

@@ -1,0 +1,105 @@
+"""Section of the cell file on the limits of motion: of commands, sliders, passive joints and legs."""
+
+from __future__ import annotations
+
+from typing import Annotated, Self
+
+from pydantic import AfterValidator, Field, model_validator
+
+from hexacell.cell.fields import InRange, NotNegative, PointInRange, Positive, Section, broken_rule
+
+SHORTEST_AXIS = 1e-6
+
+
+def _ordered(limits: tuple[float, float]) -> tuple[float, float]:
+    if limits[0] >= limits[1]:
+        raise broken_rule("the smallest value must be below the largest", "Exchange or correct them")
+    return limits
+
+
+def _has_direction(axis: tuple[float, float, float]) -> tuple[float, float, float]:
+    if max(map(abs, axis)) < SHORTEST_AXIS:
+        raise broken_rule("an axis of length zero has no direction", "State where the joint points")
+    return axis
+
+
+MinMax = Annotated[tuple[InRange, InRange], AfterValidator(_ordered)]
+SixRanges = tuple[MinMax, MinMax, MinMax, MinMax, MinMax, MinMax]
+Cone = Annotated[float, Field(gt=0, le=180, allow_inf_nan=False)]
+SixCones = tuple[Cone, Cone, Cone, Cone, Cone, Cone]
+JointAxis = Annotated[PointInRange, AfterValidator(_has_direction)]
+SixJointAxes = tuple[JointAxis, JointAxis, JointAxis, JointAxis, JointAxis, JointAxis]
+
+
+class AxisLimitSettings(Section):
+    """Smallest and largest command of each of the controller's axes; none: any."""
+
+    x: MinMax | None = Field(None, description="mm")
+    y: MinMax | None = Field(None, description="mm")
+    z: MinMax | None = Field(None, description="mm")
+    a: MinMax | None = Field(None, description="deg")
+    b: MinMax | None = Field(None, description="deg")
+    c: MinMax | None = Field(None, description="deg")
+
+    @property
+    def ranges(self) -> tuple[MinMax | None, ...]:
+        """Those of the six axes in their order."""
+        return (self.x, self.y, self.z, self.a, self.b, self.c)
+
+
+class PassiveJointSettings(Section):
+    """How far each leg may turn in its two passive joints, from the joint's axis."""
+
+    base_cone_deg: Cone = Field(180.0, description="at the base's end, on the slider; 180: any")
+    platform_cone_deg: Cone = Field(180.0, description="at the platform; 180: any")
+    base_cones_deg: SixCones | None = Field(
+        None, description="of each leg, where they differ; takes the place of base_cone_deg"
+    )
+    platform_cones_deg: SixCones | None = Field(None, description="likewise, of platform_cone_deg")
+    base_axes: SixJointAxes | None = Field(
+        None,
+        description="axes of the cones in the base frame of the drawing, from the platform to the base; by "
+        "default each leg's direction at the middle of all points, untilted",
+    )
+    platform_axes: SixJointAxes | None = Field(
+        None, description="those at the platform, in the platform frame of the drawing, likewise"
+    )
+
+    @property
+    def base_cones(self) -> tuple[float, ...]:
+        """Those of the six legs at the base, deg."""
+        return self.base_cones_deg or (self.base_cone_deg,) * 6
+
+    @property
+    def platform_cones(self) -> tuple[float, ...]:
+        """Those of the six legs at the platform, deg."""
+        return self.platform_cones_deg or (self.platform_cone_deg,) * 6
+
+
+class LimitSettings(Section):
+    """Limits of every commanded pose, and of the way to it."""
+
+    gauge_travel_mm: Positive = Field(5.0, description="largest deviation from the zeroed reference")
+    tilt_deg: Positive = Field(45.0, le=80, description="largest tilt of the platform")
+    turn_deg: Positive = Field(180.0, le=180, description="largest turn of the platform about its normal")
+    joint_min_mm: InRange = Field(-1000.0, description="smallest joint variable of any leg")
+    joint_max_mm: InRange = Field(1000.0, description="largest joint variable of any leg")
+    joints_mm: SixRanges | None = Field(
+        None,
+        description="smallest and largest joint variable of each leg, where they differ; joint_min_mm and "
+        "joint_max_mm hold as well",
+    )
+    axes: AxisLimitSettings = AxisLimitSettings()
+    passive_joints: PassiveJointSettings = PassiveJointSettings()
+    leg_distance_mm: NotNegative = Field(
+        0.0, description="smallest distance of two legs, from middle line to middle line; 0: any"
+    )
+    singularity_margin: Positive = Field(
+        0.03, description="smallest singular value of the dimensionless pose Jacobian"
+    )
+
+    @model_validator(mode="after")
+    def _joint_limits_are_ordered(self) -> Self:
+        if self.joint_min_mm >= self.joint_max_mm:
+            raise broken_rule("joint_min_mm must be below joint_max_mm", "Exchange or correct them")
+        return self

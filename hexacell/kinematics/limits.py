@@ -1,0 +1,190 @@
+"""The limits that commanded motion keeps: of what is commanded, and of where that brings the robot."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from hexacell.kinematics import rotations
+from hexacell.kinematics.gauge_travel import GaugeRoom, GaugeTravel
+from hexacell.kinematics.geometry import Geometry, GeometryBatch
+from hexacell.kinematics.legs import ROUNDING, LegLimits
+from hexacell.kinematics.mechanism import FrameTransform, Mechanism
+from hexacell.kinematics.pose import PoseBatch
+from hexacell.kinematics.rotations import Array, Mask
+
+SAME_FRAMES = FrameTransform(np.eye(3), np.zeros(3), np.eye(3))
+
+
+@dataclass(frozen=True, slots=True)
+class AxisLimits:
+    """What the controller's six axes x, y, z, a, b, c may be commanded to: (6,) each, mm and deg."""
+
+    lowest: tuple[float, ...] = (-np.inf,) * 6
+    highest: tuple[float, ...] = (np.inf,) * 6
+
+    def including(self, pose: PoseBatch) -> AxisLimits:
+        """These limits, widened to allow one pose (1)."""
+        numbers = _six_numbers(pose)[0]
+        lowest, highest = np.minimum(self.lowest, numbers), np.maximum(self.highest, numbers)
+        return AxisLimits(tuple(lowest.tolist()), tuple(highest.tolist()))
+
+    def allow(self, poses: PoseBatch) -> Mask:
+        """Which of n poses in the controller's frames."""
+        numbers = _six_numbers(poses)
+        low, high = np.array(self.lowest) - ROUNDING, np.array(self.highest) + ROUNDING
+        return np.asarray(((numbers >= low) & (numbers <= high)).all(axis=-1))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Limits:
+    """Limits that every commanded pose keeps: mm and rad; the singularity margin is dimensionless.
+
+    Attributes:
+        gauge_travel_mm: largest deviation from the zeroed reference.
+        tilt: largest angle of the platform's normal from the base's.
+        joint_min_mm: smallest joint variable, of every leg or of each (6,).
+        joint_max_mm: the largest.
+        frames: from the frames of the commands, in which a level platform is level, to the convention's.
+        turn: largest turn of the platform about its normal.
+        axes: what the controller's axes may be commanded to.
+        legs: what passive joints and legs allow; none where that is not known.
+        gauges: travels and plungers; without them the ball may go as far to all sides.
+        zeroed: the room of the gauges as they were zeroed; none where that is not known yet.
+    """
+
+    gauge_travel_mm: float
+    tilt: float
+    joint_min_mm: float | Array
+    joint_max_mm: float | Array
+    singularity_margin: float
+    frames: FrameTransform = field(default=SAME_FRAMES)
+    turn: float = np.pi
+    axes: AxisLimits = AxisLimits()
+    legs: LegLimits | None = None
+    gauges: GaugeTravel | None = None
+    zeroed: GaugeRoom | None = None
+
+    @property
+    def room(self) -> GaugeRoom:
+        """How far the ball may go from the gauges' zero."""
+        if self.zeroed is not None:
+            return self.zeroed
+        return GaugeRoom.symmetric(self.gauge_travel_mm) if self.gauges is None else self.gauges.room()
+
+    @property
+    def sure_room(self) -> GaugeRoom:
+        """The same of any station that is mounted well enough."""
+        return self.room if self.gauges is None else self.gauges.sure_room
+
+    def within_travel(
+        self, deviations: Array, spread: Array | float = 0.0, share: float = 1.0, *, surely: bool = False
+    ) -> Mask:
+        """Which deviations (..., 3), mm, in the convention's frames stay within a share of the room.
+
+        With ``surely`` it is that of any station.
+        """
+        room = self.sure_room if surely else self.room
+        return room.holds(deviations @ self.frames.base, spread, share)
+
+    def zeroed_at(self, shown_mm: tuple[float, float, float] | None) -> Limits:
+        """The same once the gauges were zeroed where they show ``shown_mm`` along base x, y, z."""
+        if self.gauges is None or shown_mm is None:
+            return self
+        return replace(self, zeroed=self.gauges.room(shown_mm))
+
+    @property
+    def joint_ranges(self) -> tuple[tuple[float, float], ...]:
+        """Smallest and largest joint variable of each leg, mm."""
+        lowest, highest = (np.broadcast_to(limit, 6) for limit in (self.joint_min_mm, self.joint_max_mm))
+        return tuple(zip(lowest.tolist(), highest.tolist(), strict=True))
+
+    def tilts(self, poses: PoseBatch) -> Array:
+        """The tilts (n,), rad, of poses in the convention's frames."""
+        return self.frames.inverse().poses(poses).tilts()
+
+    def orientations(self, turns: Array) -> Array:
+        """Turns (n, 3, 3) of a level platform, as orientations in the convention's frames."""
+        turned: Array = self.frames.base @ turns @ self.frames.platform.T
+        return turned
+
+    def allow_commands(self, poses: PoseBatch) -> Mask:
+        """Which of n commands in the convention's frames keep tilt, turn and axes."""
+        commands = self.frames.inverse().poses(poses)
+        return self._allow_orientations(commands) & self.axes.allow(commands)
+
+    def allow_joints(self, joints: Array) -> Mask:
+        """Which joint variables (..., 6), mm, are in their ranges; NaN is not."""
+        in_range = (joints >= self.joint_min_mm) & (joints <= self.joint_max_mm)
+        return np.asarray(in_range.all(axis=-1))
+
+    def allow_poses(self, poses: PoseBatch, joints: Array) -> Mask:
+        """Which of n poses in the convention's frames keep tilt, turn and joint ranges."""
+        return self.allow_joints(joints) & self._allow_orientations(self.frames.inverse().poses(poses))
+
+    def allow_legs(
+        self,
+        mechanism: Mechanism,
+        geometry: Geometry | GeometryBatch,
+        poses: PoseBatch,
+        joints: Array,
+        spare: float = 0.0,
+    ) -> Mask:
+        """At which of n poses a robot's passive joints and legs keep their limits.
+
+        With ``spare``, rad: should the platform be turned by this angle, they would still keep them.
+        """
+        if self.legs is None:
+            return np.ones(len(joints), dtype=bool)
+        spare_mm = spare * mechanism.platform_radius(geometry)
+        return self.legs.are_kept(mechanism.legs(geometry, poses, joints), spare, spare_mm)
+
+    def including(
+        self,
+        mechanism: Mechanism,
+        geometry: Geometry,
+        command: PoseBatch,
+        actual: PoseBatch,
+        joints: Array,
+        spare: float = 0.0,
+    ) -> Limits:
+        """These limits, widened where a robot is beyond them: it may come back, and not go farther.
+
+        Args:
+            mechanism: of the robot.
+            geometry: of the robot.
+            command: where it was commanded to (1), in the convention's frames.
+            actual: its pose (1).
+            joints: its joint variables there (1, 6), mm.
+            spare: what passive joints should have left, rad; see :meth:`allow_legs`.
+        """
+        given = [self.frames.inverse().poses(poses) for poses in (command, actual)]
+        widened = replace(
+            self,
+            tilt=max(self.tilt, *(float(pose.tilts()[0]) for pose in given)),
+            turn=max(self.turn, *(float(np.abs(pose.turns()[0])) for pose in given)),
+            joint_min_mm=np.minimum(self.joint_min_mm, joints[0]),
+            joint_max_mm=np.maximum(self.joint_max_mm, joints[0]),
+            axes=self.axes.including(given[0]),
+        )
+        if self.legs is None:
+            return widened
+        legs, spare_mm = (
+            mechanism.legs(geometry, actual, joints),
+            spare * mechanism.platform_radius(geometry),
+        )
+        return replace(widened, legs=self.legs.including(legs, spare, spare_mm))
+
+    def _allow_orientations(self, poses: PoseBatch) -> Mask:
+        """Which of n poses in the controller's frames keep tilt and turn."""
+        kept: Mask = np.asarray(poses.tilts() <= self.tilt + ROUNDING)
+        if self.turn < np.pi:
+            kept = kept & (np.abs(poses.turns()) <= self.turn + ROUNDING)
+        return kept
+
+
+def _six_numbers(poses: PoseBatch) -> Array:
+    """x, y, z, mm, and a, b, c, deg, of n poses (n, 6)."""
+    angles = np.degrees(rotations.to_angles(poses.rotations))
+    return np.concatenate([poses.positions, angles], axis=-1)

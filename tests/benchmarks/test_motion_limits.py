@@ -1,0 +1,163 @@
+"""Whole campaigns within limits of motion: what real robots are commanded to, and what the limits cost.
+
+Robots are drawn within the tolerances and move along the controller's lines on their own geometry, which
+the program does not know. ``CAMPAIGNS`` in the environment says how many there are; the targets are for
+1,000. All cores are used.
+"""
+
+from __future__ import annotations
+
+import os
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass, field
+from multiprocessing import get_context
+
+import numpy as np
+import pytest
+
+from hexacell.campaign.task_accuracy import Task
+from hexacell.cell.bundled import bundled_config
+from hexacell.cell.loader import Cell, load_cell
+from hexacell.errors import HexacellError, LimitError
+from hexacell.identification.estimator import identify
+from hexacell.kinematics.geometry import Geometry
+from hexacell.kinematics.pose import Pose
+from hexacell.kinematics.rotations import Array
+from hexacell.measurements.records import MeasurementSet
+from hexacell.robot_model import Robot, robot_of
+from hexacell.study import data_sets
+from tests.benchmarks.virtual_calibration import robot_that_reaches
+from tests.benchmarks.watched_robot import Seen, WatchedCampaign
+
+pytestmark = pytest.mark.benchmark
+
+CAMPAIGNS = int(os.environ.get("CAMPAIGNS", "40"))
+DESIGNS = 60
+"""Fixed designs, of which the best is compared."""
+
+COMPARED = 6
+"""Robots on which it is."""
+
+MOST_TIMES = 1.3
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What came of one robot."""
+
+    number: int
+    seen: Seen = field(default_factory=Seen)
+    records: int = 0
+    sigma_mm: float = np.nan
+    margin: float = np.nan
+    reason: str = ""
+
+
+def bundled() -> tuple[Cell, Robot]:
+    cell = load_cell(bundled_config("simulated-hexaglide"))
+    return cell, robot_of(cell)
+
+
+def task_sigma(cell: Cell, robot: Robot, records: MeasurementSet) -> float:
+    """Predicted error at the worst task pose, one standard deviation, mm."""
+    found = identify(robot.problem(records))
+    belief = robot.belief(found)
+    error = Task.of(cell.settings, robot, belief).error(belief)
+    assert error is not None
+    return error.worst(found.free_covariance)
+
+
+def outcome(number: int) -> Outcome:
+    cell, robot = bundled()
+    random = np.random.default_rng([11, number])
+    truth = robot_that_reaches(cell, robot, random)
+    campaign = WatchedCampaign(cell.settings, robot, truth, random)
+    try:
+        campaign.carry_out()
+        sigma = task_sigma(cell, robot, campaign.measurements)
+    except HexacellError as error:
+        return Outcome(number, campaign.watched.seen, reason=str(error))
+    return Outcome(
+        number,
+        campaign.watched.seen,
+        len(campaign.measurements),
+        sigma,
+        campaign.watched.smallest_margin,
+    )
+
+
+def outcomes(numbers: range) -> list[Outcome]:
+    with ProcessPoolExecutor(mp_context=get_context("fork")) as pool:
+        return list(pool.map(outcome, numbers, chunksize=1))
+
+
+def test_no_command_leaves_the_limits(say):
+    _, robot = bundled()
+    found = outcomes(range(CAMPAIGNS))
+    limits = robot.limits
+    assert limits.legs is not None
+    cone = float(np.degrees(limits.legs.platform_cones.min()))
+    seen = [one.seen for one in found]
+    given_up = [one for one in found if one.reason]
+    say("robots, moves", f"{len(found)}, {sum(one.moves for one in seen)}", f"{CAMPAIGNS}")
+    largest = max(one.tilt for one in seen), max(one.turn for one in seen)
+    say("  largest tilt of a command", f"{largest[0]:.1f} deg", f"at most {np.degrees(limits.tilt):g}")
+    say("  largest turn of a command", f"{largest[1]:.1f} deg", f"at most {np.degrees(limits.turn):g}")
+    turned = np.array([cone - one.spare for one in seen])
+    say("  largest angle of a passive joint", f"{turned.max():.1f} deg", f"at most {cone:g}")
+    near = np.array([one.distance_mm for one in seen])
+    say("  smallest distance of legs", f"{near.min():.1f} mm", f"at least {limits.legs.distance_mm:g}")
+    beyond = [one.number for one in found if one.seen.spare < 0.0]
+    close = [one.number for one in found if one.seen.distance_mm < limits.legs.distance_mm]
+    say("  robots beyond a cone, with legs too near", f"{len(beyond)}, {len(close)}", f"none; {beyond[:9]}")
+    margins = [one.margin for one in found if np.isfinite(one.margin)]
+    say("  smallest singularity margin on the way", f"{min(margins):.4f}", "")
+    say("  given up", f"{len(given_up)}", "none")
+    for one in given_up:
+        say("  given up", f"{one.number}", one.reason)
+    sigmas = np.array([one.sigma_mm for one in found])
+    say("  sigma at the worst task pose, median", f"{np.nanmedian(sigmas):.3f} mm", "")
+    assert largest[0] <= np.degrees(limits.tilt) + 1e-6
+    assert largest[1] <= np.degrees(limits.turn) + 1e-6
+    assert all(one.axis_is_kept and one.joint_is_kept for one in seen)
+    assert not beyond
+    assert not close
+    assert not given_up
+
+
+def best_fixed(cell: Cell, robot: Robot, truth: Geometry, random: np.random.Generator) -> float:
+    """Smallest of the predicted errors that fixed designs within the limits give, aimed with the truth.
+
+    Not a number where none of them can be measured on this robot.
+    """
+    settings = cell.settings.identification
+    points: Array = robot.from_commands(Pose(*point) for point in settings.points).positions
+    sigmas = []
+    for _ in range(DESIGNS):
+        amplitude = np.radians(random.uniform(20.0, 45.0))
+        try:
+            design = data_sets.within_travel(robot, truth, points, settings.orientations, amplitude, random)
+        except LimitError:
+            continue
+        sigmas.append(task_sigma(cell, robot, design.measured(0.01, random)))
+    return min(sigmas, default=np.nan)
+
+
+def compared(number: int) -> tuple[float, float]:
+    """The predicted error of a campaign, and of the best fixed design, on one robot."""
+    cell, robot = bundled()
+    random = np.random.default_rng([12, number])
+    truth = robot_that_reaches(cell, robot, np.random.default_rng([11, number]))
+    return outcome(number).sigma_mm, best_fixed(cell, robot, truth, random)
+
+
+def test_accuracy_beside_the_best_fixed_design(say):
+    with ProcessPoolExecutor(mp_context=get_context("fork")) as pool:
+        pairs = np.array(list(pool.map(compared, range(COMPARED), chunksize=1)))
+    pairs = pairs[np.isfinite(pairs).all(axis=1)]
+    assert len(pairs) > COMPARED // 2
+    ratios = pairs[:, 0] / pairs[:, 1]
+    say("sigma at the worst task pose: campaign", f"{np.median(pairs[:, 0]):.4f} mm", "")
+    say(f"  best of {DESIGNS} fixed designs", f"{np.median(pairs[:, 1]):.4f} mm", "")
+    say("  times as large, median and largest", f"{np.median(ratios):.2f}, {ratios.max():.2f}", "1.3")
+    assert np.median(ratios) <= MOST_TIMES

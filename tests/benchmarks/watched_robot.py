@@ -1,0 +1,73 @@
+"""A watched virtual robot: what it is commanded to, and where that brings passive joints and legs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from hexacell.cell.model import CellSettings
+from hexacell.kinematics.geometry import Geometry
+from hexacell.kinematics.pose import Pose, PoseBatch
+from hexacell.robot_model import Robot
+from hexacell.study.simulated_campaign import SimulatedCampaign
+from hexacell.virtual_robot import VirtualRobot
+
+
+@dataclass
+class Seen:
+    """The worst at all ends of moves: of commands, and of the real robot. Angles in deg."""
+
+    moves: int = 0
+    tilt: float = 0.0
+    turn: float = 0.0
+    axis_is_kept: bool = True
+    joint_is_kept: bool = True
+    spare: float = np.inf
+    distance_mm: float = np.inf
+
+
+class WatchedRobot(VirtualRobot):
+    """A virtual robot that notes what its limits say of the end of each move."""
+
+    def __init__(self, model: Robot, truth: Geometry, random: np.random.Generator) -> None:
+        super().__init__(model, truth, random)
+        self.seen = Seen()
+
+    def place(self, command: Pose) -> None:
+        super().place(command)
+        self._note()
+
+    def move(self, command: Pose) -> None:
+        super().move(command)
+        self._note()
+
+    def _note(self) -> None:
+        model, seen, limits = self.model, self.seen, self.model.limits
+        command, commands = PoseBatch.of([self.command]), self._commanded
+        joints = self._joints(commands)
+        assert limits.legs is not None
+        legs = model.mechanism.legs(self.truth, self._actual_pose, joints)
+        seen.moves += 1
+        seen.tilt = max(seen.tilt, float(np.degrees(command.tilts()[0])))
+        seen.turn = max(seen.turn, float(np.degrees(np.abs(command.turns()[0]))))
+        seen.axis_is_kept &= bool(limits.axes.allow(command)[0])
+        seen.joint_is_kept &= bool(limits.allow_joints(joints)[0])
+        seen.spare = min(seen.spare, float(np.degrees(limits.legs.spare_angles(legs).min())))
+        seen.distance_mm = min(seen.distance_mm, float(legs.smallest_distance()[0]))
+
+
+class WatchedCampaign(SimulatedCampaign):
+    """A campaign with a watched robot."""
+
+    def __init__(
+        self,
+        settings: CellSettings,
+        robot: Robot,
+        truth: Geometry,
+        random: np.random.Generator,
+        provisional: bool = False,
+    ) -> None:
+        super().__init__(settings, robot, truth, random, provisional)
+        self.watched = WatchedRobot(robot, truth, random)
+        self.virtual_robot = self.watched

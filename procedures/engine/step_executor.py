@@ -31,6 +31,7 @@ from procedures.devices.settling import DeviceSnapshot, Settled, read_series, se
 from procedures.engine.computations import Computations
 from procedures.engine.config_edits import ConfigEdits
 from procedures.engine.config_transactions import ConfigTransactions
+from procedures.engine.departure import is_at, require_undisturbed
 from procedures.engine.startup import Startup
 from procedures.guards.guards import Guards
 from procedures.run import events
@@ -48,7 +49,6 @@ from procedures.run.steps import (
     Repeat,
     Revisit,
     Sample,
-    SixNumbers,
     Standstill,
     Step,
     Try,
@@ -114,7 +114,7 @@ class StepExecutor:
 
     async def require_unedited_config(self, state: RunState) -> None:
         """See :meth:`ConfigEdits.require_none`."""
-        await in_thread(self.edits.require_none, state)
+        self.edits.require_none(state)
 
     async def perform(self, step: Step, state: RunState) -> events.Event:
         """Do one step; raises ``HexacellError``."""
@@ -155,7 +155,13 @@ class StepExecutor:
             encoders_mm=joints_of(found.encoders),
         )
 
+    async def require_departure(self, state: RunState) -> None:
+        """See :func:`procedures.engine.departure.require_undisturbed`."""
+        settings = self.cell.settings.controller
+        await require_undisturbed(state, self.devices.controller, self.guards, settings)
+
     async def _move(self, step: Move, state: RunState) -> events.Event:
+        await self.require_departure(state)
         try:
             await self.guards.move(step, state, lambda: self._commanded(step))
         except PoseRefused as refusal:
@@ -174,7 +180,10 @@ class StepExecutor:
         """A refusal of the pose is no failure: the robot is where it was, and others may be possible."""
         here = await self.guards.locate()
         refusals = sum(one.at == step.at for one in state.excluded)
-        if refusals >= MOST_REFUSALS or not self._is_at(here.pose, state.target):
+        has_stayed = state.target is not None and is_at(
+            here.pose, state.target, self.cell.settings.controller
+        )
+        if refusals >= MOST_REFUSALS or not has_stayed:
             raise refusal
         excluded = events.PoseExcluded(
             at=step.at,
@@ -185,16 +194,6 @@ class StepExecutor:
             is_highest=refusal.is_highest,
         )
         return await in_thread(self.computations.with_replacements, excluded, state)
-
-    def _is_at(self, here: Pose, target: SixNumbers | None) -> bool:
-        """Whether a reported pose is the commanded one; each may be off by the tolerance of an arrival."""
-        if target is None:
-            return False
-        settings, there = self.cell.settings.controller, Pose(*target)
-        position = np.abs(here.position - there.position).max()
-        angle = np.degrees(np.abs(here.rotation - there.rotation).max())
-        is_near = position <= 2.0 * settings.position_tolerance_mm
-        return bool(is_near and angle <= 2.0 * settings.angle_tolerance_deg)
 
     def _commanded(self, step: Move) -> Array:
         """Where the sliders (6,), mm, belong by the geometry that the controller has now."""

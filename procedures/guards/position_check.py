@@ -23,7 +23,6 @@ from hexacell.kinematics.position_agreement import (
 )
 from procedures.devices.device_set import Devices
 from procedures.guards.polling import POLL_PAUSE_S
-from procedures.run.cancellation import in_thread
 from procedures.run.trips import Guard, Trip
 
 ATTEMPTS = 5
@@ -72,7 +71,7 @@ class PositionCheck:
         reports = await self._reports(encoders)
         if reports is None:
             return CheckedPosition(None, _not_homed())
-        mismatch = await in_thread(self._mismatch, reports)
+        mismatch = self._mismatch(reports)
         if mismatch is None:
             return CheckedPosition(reports)
         return CheckedPosition(reports, self._trip(mismatch, reports), mismatch.odd)

@@ -172,6 +172,9 @@ class RecordedStepExecutor(StepExecutor):
     async def require_unedited_config(self, state: RunState) -> None:
         """The config is that of the replay."""
 
+    async def require_departure(self, state: RunState) -> None:
+        """No robot moves."""
+
     async def locate(self) -> events.Located:
         """The recorded position, which was checked then."""
         outcome = self.recorded.outcome

@@ -154,8 +154,8 @@ class Controller(Device[DeviceIdentity], Protocol):
         """
         ...
 
-    async def move(self, pose: Pose) -> None:
-        """Move to ``pose``; returns on arrival, not on acknowledgement."""
+    async def move(self, pose: Pose, duration_s: float) -> None:
+        """Move straight to ``pose`` in ``duration_s`` or longer; returns on arrival."""
         ...
 
     async def position(self) -> ReportedPosition | None:

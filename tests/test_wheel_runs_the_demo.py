@@ -17,7 +17,8 @@ CELL = "simulated-hexaglide.toml"
 
 # Fewer records and wide limits, on a cell that lives fast.
 QUICK = (
-    ("clock_factor = 50.0", "clock_factor = 200.0\ngive_up_s = 2000.0"),
+    ("clock_factor = 150.0", "clock_factor = 600.0"),
+    ("give_up_s = 60.0", "give_up_s = 6000.0"),
     ("orientations = 11", "orientations = 7"),
     ("platform_cone_deg = 45.0", "platform_cone_deg = 90.0"),
     ("orientations = 6", "orientations = 2"),

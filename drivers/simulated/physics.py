@@ -1,6 +1,6 @@
 """The true state of a simulated cell: actual slider positions, actual ball position, and the sensors.
 
-Sliders move along given paths with a smooth velocity profile, and can be stopped at any time. The
+Sliders move along given paths at one rate with ramps at its ends, and can be stopped at any time. The
 pose under the true geometry is computed by continuation, so that the assembly mode is kept. Gauges and
 encoders add noise.
 """
@@ -25,10 +25,13 @@ from hexacell.kinematics.mechanism import Mechanism, inverse_kinematics
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.rotations import Array
 
+RAMP_S = 0.2
+"""Time to reach the speed of a motion, and to slow down at its end."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Motion:
-    """A motion of the sliders along a path, with a smooth-step time profile.
+    """A motion of the sliders along a path at one rate, with ramps of ``RAMP_S`` at its ends.
 
     Attributes:
         path: slider positions (k, 6), mm, evenly spaced.
@@ -54,9 +57,16 @@ class Motion:
 
     def fraction(self, now_s: float) -> float:
         """The completed fraction of the path, 0 to 1."""
-        elapsed = min(now_s, self.stopped_s) - self.start_s
-        t = 1.0 if elapsed >= self.duration_s else max(0.0, elapsed / self.duration_s)
-        return t * t * (3.0 - 2.0 * t)
+        elapsed = max(0.0, min(now_s, self.stopped_s) - self.start_s)
+        left = self.duration_s - elapsed
+        if left <= 0.0:
+            return 1.0
+        ramp = min(RAMP_S, 0.5 * self.duration_s)
+        rate = 1.0 / (self.duration_s - ramp)
+        if min(elapsed, left) < ramp:
+            speeding = 0.5 * rate * min(elapsed, left) ** 2 / ramp
+            return speeding if elapsed < left else 1.0 - speeding
+        return rate * (elapsed - 0.5 * ramp)
 
     def path_position(self, now_s: float) -> float:
         """The position on the path, in rows."""
@@ -124,15 +134,19 @@ class RobotPhysics:
         self.gauges = GaugePlaces(settings, fixture, self._random, self._pose.positions[0])
         self._draw_noise()
 
-    def start_motion(self, path: Array) -> Motion:
-        """Start a motion from here along a path (k, 6), mm, as the encoders show it; returns at once."""
+    def start_motion(self, path: Array, duration_s: float | None = None) -> Motion:
+        """Start a motion from here along a path (k, 6), mm, as the encoders show it; returns at once.
+
+        Apart from its ends it lasts ``duration_s``, or longer where the machine is not as fast.
+        """
         motion = self._settings.motion
         with self._lock:
             distance = float(np.abs(np.diff(path, axis=0)).sum(axis=0).max())
             scatter = motion.repeatability_mm * self._random.standard_normal(6)
             actual = path / self._shown_per_mm + np.linspace(0.0, 1.0, len(path))[:, None] * scatter
             actual[0] = self._motion.joints(self._update())
-            duration = max(motion.minimum_s, distance / motion.speed_mm_s)
+            told_s = 0.0 if duration_s is None else duration_s + RAMP_S
+            duration = max(motion.minimum_s, distance / motion.speed_mm_s, told_s)
             self._motion, self._rows_passed = Motion(actual, self._clock.now(), duration), 0
             self._draw_noise()
             self.on_motion_start()

@@ -57,8 +57,8 @@ class SimulatedMachine:
         self._stop_count = 0
         self._stopped = threading.Event()
 
-    def move(self, pose: Pose) -> None:
-        """Move straight to a pose; returns at the end or when stopped.
+    def move(self, pose: Pose, duration_s: float | None = None) -> None:
+        """Move straight to a pose, in no less than ``duration_s``; returns at the end or when stopped.
 
         Raises:
             SoftLimitExceeded: it is beyond a soft limit.
@@ -77,7 +77,7 @@ class SimulatedMachine:
                 return
             self._stopped.clear()
             self._line = line
-            motion = self._physics.start_motion(joints)
+            motion = self._physics.start_motion(joints, duration_s)
         self._clock.wait(motion.duration_s, self._stopped)
 
     def _require_soft_limits(self, pose: Pose) -> None:

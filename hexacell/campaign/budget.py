@@ -5,12 +5,21 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from hexacell.campaign.speed_limits import speed_limits
 from hexacell.cell.model import CellSettings
 
 MOVES = 4.7
 MOVES_PROVISIONAL = 1.9
 """Moves a selected record takes, waypoints included: means over six random robots with 55 records each.
 Most waypoints are needed because the controller commands with its own, wrong geometry."""
+
+
+USUAL_JOINT_MM, USUAL_EDGE_MM = 115.0, 60.0
+"""How far the fastest slider and the fastest point of the platform would come at their largest speed for
+the duration of a move: means over 657 moves of two calibrations of the bundled Hexaglide."""
+
+MOVE_OVERHEAD_S = 0.3
+"""To speed up, to slow down, and to be acknowledged."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,7 +35,7 @@ class TimeModel:
         by_hand = settings.stations.placement == "by-hand"
         stated = settings.identification.seconds_per_record
         moves = _usual_moves(settings) if moves is None else moves
-        usual = moves * settings.timing.move_s + settings.timing.window_s
+        usual = moves * usual_move_seconds(settings) + settings.timing.window_s
         return cls(settings.identification.minutes_per_station if by_hand else 0.0, stated or usual)
 
     def minutes(self, records: int, points: int) -> float:
@@ -34,10 +43,18 @@ class TimeModel:
         return points * self.point_minutes + (records + points) * self.record_seconds / 60.0
 
 
+def usual_move_seconds(settings: CellSettings) -> float:
+    """Of a move between poses with gauges at the ball, as stated or by its largest speeds."""
+    if settings.timing.move_s is not None:
+        return settings.timing.move_s
+    limits = speed_limits(settings.speed, at_gauges=True)
+    return MOVE_OVERHEAD_S + max(USUAL_JOINT_MM / limits.joint_mm_s, USUAL_EDGE_MM / limits.edge_mm_s)
+
+
 def noise_minutes(settings: CellSettings) -> float:
     """To measure the noise at the first reference: readings at rest, then leaving it and coming back."""
     noise, timing = settings.noise, settings.timing
-    visit_s = 2.0 * timing.move_s + timing.window_s
+    visit_s = 2.0 * usual_move_seconds(settings) + timing.window_s
     return (noise.standstill_readings * timing.interval_s + noise.revisits * visit_s) / 60.0
 
 

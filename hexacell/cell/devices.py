@@ -136,9 +136,12 @@ class ControllerSettings(Section):
         description="what the program may do by itself to make it ready, a person is asked about the rest: "
         "reset-estop (the emergency stop that it starts in, before a run begins), switch-on, home",
     )
-    move_timeout_s: Positive = Field(60.0, description="longest wait for one move")
+    homing_timeout_s: Positive = Field(60.0, description="longest wait until all joints are homed")
     position_tolerance_mm: Positive = Field(0.01, description="arrival: largest position difference")
     angle_tolerance_deg: Positive = Field(0.01, description="arrival: largest angle difference")
+    move_timeout_s: Positive | None = Field(
+        None, exclude=True, description="no longer used: how long a move may last follows from its duration"
+    )
 
 
 class ThermometerSettings(Section):

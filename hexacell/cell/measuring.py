@@ -150,7 +150,9 @@ class TimingSettings(Section):
     spread_gauge_mm: Positive = Field(0.06, description="largest range of one gauge in the window")
     spread_encoder_mm: Positive = Field(0.06, description="largest range of one slider in the window")
     give_up_s: Positive = Field(20.0, description="longest wait for settled readings")
-    move_s: Positive = Field(1.5, description="duration of an ordinary move, for time estimates only")
+    move_s: Positive | None = Field(
+        None, description="duration of an ordinary move, for time estimates only; by default from [speed]"
+    )
     clock_factor: Positive = Field(
         1.0, description="simulated cells only: cell seconds per second of real time"
     )

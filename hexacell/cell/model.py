@@ -34,6 +34,7 @@ from hexacell.cell.measuring import (
 )
 from hexacell.cell.recovery import RecoverySettings
 from hexacell.cell.simulation import SimulationSettings
+from hexacell.cell.speed import SpeedSettings
 from hexacell.cell.uncertainty import UncertaintySettings
 from hexacell.kinematics.mechanism import Mechanism
 from hexacell.kinematics.parameters import ParameterKind, ParameterSet
@@ -71,6 +72,7 @@ class CellSettings(Section):
     noise: NoiseSettings = NoiseSettings()
     uncertainty: UncertaintySettings = UncertaintySettings()
     limits: LimitSettings = LimitSettings()
+    speed: SpeedSettings = SpeedSettings()
     timing: TimingSettings = TimingSettings()
     guards: GuardSettings = GuardSettings()
     identification: IdentificationSettings

@@ -68,7 +68,7 @@ class SimulatedEncoders(Section):
 class SimulatedMotion(Section):
     """How the simulated robot moves."""
 
-    speed_mm_s: Positive = Field(100.0, description="of the fastest slider")
+    speed_mm_s: Positive = Field(100.0, description="of the fastest slider, however short a move is to be")
     minimum_s: NotNegative = Field(0.3, description="shortest duration of a move")
     ringing_mm: NotNegative = Field(0.2, description="amplitude of the ball's oscillation on arrival")
     ringing_s: Positive = Field(0.15, description="time constant of its decay")

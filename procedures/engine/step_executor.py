@@ -32,6 +32,7 @@ from procedures.engine.computations import Computations
 from procedures.engine.config_edits import ConfigEdits
 from procedures.engine.config_transactions import ConfigTransactions
 from procedures.engine.departure import is_at, require_undisturbed
+from procedures.engine.move_durations import MoveDurations
 from procedures.engine.startup import Startup
 from procedures.guards.guards import Guards
 from procedures.run import events
@@ -83,6 +84,11 @@ class StepExecutor:
     def current_config(self) -> CurrentConfig:
         """The config that the controller is to run."""
         return CurrentConfig(self.cell.config_path, config_format(self.cell.settings))
+
+    @cached_property
+    def durations(self) -> MoveDurations:
+        """How long each move takes."""
+        return MoveDurations(self.cell.settings, self.current_config)
 
     @cached_property
     def startup(self) -> Startup:
@@ -162,8 +168,10 @@ class StepExecutor:
 
     async def _move(self, step: Move, state: RunState) -> events.Event:
         await self.require_departure(state)
+        here = Pose(*state.target) if state.target else Pose(*(await self.locate()).pose)
+        duration_s = self.durations.of(here, step, state)
         try:
-            await self.guards.move(step, state, lambda: self._commanded(step))
+            await self.guards.move(step, state, duration_s, lambda: self._commanded(step))
         except PoseRefused as refusal:
             return await self._refused(step, state, refusal)
         except GuardTripped as tripped:

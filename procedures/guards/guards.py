@@ -72,13 +72,17 @@ class Guards:
         self.supervisor.clear()
         await self.while_not_ready(order)
 
-    async def move(self, step: Move, state: RunState, commanded: Callable[[], Array]) -> None:
+    async def move(
+        self, step: Move, state: RunState, duration_s: float, commanded: Callable[[], Array]
+    ) -> None:
         """Move to the target of a step; ``commanded`` gives the slider positions (6,), mm, at its pose."""
         gauges = self._watched_gauges(step, state)
         pollers = self._pollers(controller=True, gauges=gauges)
         limits = self._limits(zero_mm=state.zero_shown(step.at))
         try:
-            reached = await self.supervisor.supervise(lambda: self._go(step), pollers, limits, STOP_GRACE_S)
+            reached = await self.supervisor.supervise(
+                lambda: self._go(step, duration_s), pollers, limits, STOP_GRACE_S
+            )
         except MotionInterrupted:
             # Where the forward kinematics failed, the robot is not where this error says that it stopped.
             await self.locate()
@@ -125,8 +129,8 @@ class Guards:
         found = await self.position.read(reached)
         return following if following and found.odd is PositionSource.ENCODERS else found.trip or following
 
-    async def _go(self, step: Move) -> EncoderSample:
-        await self._devices.controller.move(step.target)
+    async def _go(self, step: Move, duration_s: float) -> EncoderSample:
+        await self._devices.controller.move(step.target, duration_s)
         return await self._devices.read_encoders()
 
     def _limits(self, rest_mm: float | None = None, zero_mm: ThreeNumbers | None = None) -> GuardLimits:

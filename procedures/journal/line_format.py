@@ -27,8 +27,9 @@ VERSION = 9
 """What this program writes; it reads this and all before. Version 1 had neither version nor ``s``, and
 versions 1 and 2 no verification; checks of version 3 measured held-out points; up to version 5 no noise was
 measured. Versions up to 6 had no length check. Up to 8 only the controller's pose was read where the robot
-was located, its guard tripped on an emergency stop, gauges were not tried, and the place of their plungers
-did not count. So a run of them was decided by other rules."""
+was located, its guard tripped on an emergency stop, gauges were not tried, the place of their plungers
+did not count, and the minutes of a forecast knew no durations of moves. So a run of them was
+decided by other rules."""
 
 RULES_SINCE = 9
 """The version since which runs are decided by the present rules; older ones are not resumed."""

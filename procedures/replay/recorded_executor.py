@@ -87,7 +87,7 @@ class RecordedController:
     async def prepare(self, permitted: StartupActions) -> None:
         """Nothing to do."""
 
-    async def move(self, pose: Pose) -> None:
+    async def move(self, pose: Pose, duration_s: float) -> None:
         """Nothing to do."""
 
     async def position(self) -> ReportedPosition | None:
@@ -133,9 +133,11 @@ class InactiveGuards(Guards):
         """Nothing to do."""
         del order
 
-    async def move(self, step: Move, state: RunState, commanded: Callable[[], Array]) -> None:
+    async def move(
+        self, step: Move, state: RunState, duration_s: float, commanded: Callable[[], Array]
+    ) -> None:
         """Nothing to do."""
-        del step, state, commanded
+        del step, state, duration_s, commanded
 
     async def at_standstill(self, action: Supervised[Result]) -> Result:
         """Run it."""

@@ -77,7 +77,7 @@ class GuardTripped(DeviceError):
         )
 
 
-class RobotNotStopped(SeveralErrors):
+class RobotNotStopped(SeveralErrors, DeviceError):
     """The robot may still move: it could not be stopped after an error, which comes second."""
 
     exit_code = ExitCode.HARDWARE

@@ -71,7 +71,7 @@ class Watched:
     async def slow_move(self, orientation: int) -> None:
         step = Move(at=P1, orientation=orientation, pose=(0.0, 0.0, 550.0, 0.0, 0.0, 2.0 * orientation))
         await self.guards.move(
-            step, self.state, lambda: np.array(self.simulated.physics.encoder_positions())
+            step, self.state, 1.3, lambda: np.array(self.simulated.physics.encoder_positions())
         )
 
 

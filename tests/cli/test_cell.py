@@ -43,7 +43,7 @@ def test_schema_describes_the_bundled_cells(typed_here):
 def test_show_is_a_cell_file_with_defaults_and_origins(typed_here, cell_folder):
     outcome = typed_here("cell", "show", cell_folder.cell)
     assert (outcome.code, outcome.err) == (0, "")
-    assert "move_timeout_s = 60.0  # default\n" in outcome.out
+    assert "homing_timeout_s = 60.0  # default\n" in outcome.out
     number, name = next(
         (number, line.partition("#")[0].strip())
         for number, line in enumerate(cell_folder.cell.read_text().splitlines(), 1)
@@ -60,7 +60,7 @@ def test_show_with_json_has_the_same_settings(typed_here, cell_folder):
     outcome = typed_here("cell", "show", cell_folder.cell, "--json")
     assert (outcome.code, outcome.err) == (0, "")
     document = outcome.document
-    assert document["controller"]["move_timeout_s"] == 60.0
+    assert document["controller"]["homing_timeout_s"] == 60.0
     assert document["limits"]["gauge_travel_mm"] == 5.0
     assert cell_model("hexaglide").model_validate_json(json.dumps(document)).name == "simulated-hexaglide"
 

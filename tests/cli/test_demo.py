@@ -123,7 +123,7 @@ def test_the_mean_deviation_falls_by_more_than_99_percent(demo):
 
 
 def test_the_demo_prints_the_speed_of_its_clock(demo):
-    assert "The simulated cell's clock runs 50 times as fast as real time." in demo.outcome.err
+    assert "The simulated cell's clock runs 150 times as fast as real time." in demo.outcome.err
 
 
 def test_the_output_of_the_demo_fits_a_terminal(demo):

@@ -17,14 +17,14 @@ from procedures.journal.journal import read_journal
 from procedures.run import events
 from tests.waiting import wait_until
 
-FAST = ("clock_factor = 50.0", "clock_factor = 200.0\ngive_up_s = 2000.0")
+FAST = (("clock_factor = 150.0", "clock_factor = 600.0"), ("give_up_s = 60.0", "give_up_s = 6000.0"))
 ASK = ('approval = "automatic"', 'approval = "ask"')
 BY_HAND = ('placement = "fixed"', 'placement = "by-hand"')
 
 
 @pytest.fixture
 def fast_cell(cell_folder):
-    cell_folder.edit(FAST)
+    cell_folder.edit(*FAST)
     cell_folder.wait_long_for_devices()
     return cell_folder
 

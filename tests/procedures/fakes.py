@@ -147,6 +147,7 @@ class FakeController(Fake):
         self.failures: dict[str, BaseException] = {}
         self.now = ControllerStatus(estop=False, enabled=True)
         self.needed: list[StartupAction] = []
+        self.durations_s: list[float] = []
 
     def _do(self, order: str, target: str = "") -> None:
         self.log.append(f"{order} {target}".strip())
@@ -166,11 +167,12 @@ class FakeController(Fake):
         self.log += [action.value for action in self.needed]
         self.needed = []
 
-    async def move(self, pose: Pose) -> None:
+    async def move(self, pose: Pose, duration_s: float) -> None:
         self._do("move", str(pose))
+        self.durations_s.append(duration_s)
         if self.machine:
             try:
-                self.machine.move(pose)
+                self.machine.move(pose, duration_s)
             except SoftLimitExceeded as refusal:
                 raise refused(pose, str(refusal)) from refusal
 

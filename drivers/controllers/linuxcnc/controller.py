@@ -18,7 +18,12 @@ from drivers.controllers.errors import (
 )
 from drivers.controllers.linuxcnc import startup
 from drivers.controllers.linuxcnc.commands import ControllerCommands
-from drivers.controllers.linuxcnc.protocol import parse_pose_refusal, pose_difference, rapid_move
+from drivers.controllers.linuxcnc.protocol import (
+    parse_pose_refusal,
+    pose_difference,
+    restoring_block,
+    timed_move,
+)
 from drivers.controllers.linuxcnc.session import Session
 from drivers.controllers.linuxcnc.settings import Address, Timeouts, loop_time
 from drivers.interfaces import (
@@ -58,6 +63,8 @@ class LinuxcncrshController:
         self._session = Session(address, timeouts, trace)
         self._order = asyncio.Lock()
         self._joints_before_reload: tuple[float, ...] | None = None
+        self._restoring = restoring_block("")
+        self._has_changed_modes = False
 
     async def open(self) -> DeviceIdentity:
         """Connect and take control; nothing moves.
@@ -87,12 +94,15 @@ class LinuxcncrshController:
             commands = await self._session.in_control()
             await startup.acknowledge_on_completion(commands)
             await self._make_ready(commands, permitted, stops)
-            await startup.check_coordinate_system(commands)
+            if self._has_changed_modes:
+                await self._restore_modes(commands)
+            self._restoring = restoring_block(await startup.check_coordinate_system(commands))
 
-    async def move(self, pose: Pose) -> None:
-        """Move to ``pose``; returns when the actual pose agrees with it.
+    async def move(self, pose: Pose, duration_s: float) -> None:
+        """Move to ``pose`` in inverse time; returns when the actual pose agrees with it.
 
-        On cancellation and after ``move_timeout_s`` the machine is stopped.
+        The modes are then what they were. On cancellation, and if it takes more than twice as long and some
+        seconds, the machine is stopped.
 
         Raises:
             PoseRefused: The pose is out of reach or limits.
@@ -101,13 +111,14 @@ class LinuxcncrshController:
             DeviceError: The connection broke.
         """
         stops = self._session.stop_count
-        block = self._rapid_move(pose)
+        block = self._timed_move(pose, duration_s)
         async with self._order:
             commands = await self._session.synchronized()
             if self._was_stopped_since(stops):
                 raise self._stopped_before_moving()
-            await self._execute(commands, block, pose, stops)
+            await self._execute(commands, block, pose, stops, 2.0 * duration_s + self._timeouts.beyond_move)
             await self._verify_arrival(commands, pose, stops)
+            await self._restore_modes_unless_stopped(commands, stops)
 
     async def position(self) -> ReportedPosition | None:
         """Actual pose and joints; none before all joints are homed, when both may be those of home."""
@@ -158,8 +169,23 @@ class LinuxcncrshController:
             await self._make_ready(await self._session.reconnect(), permitted, stops)
 
     async def close(self) -> None:
-        """Close all connections; closing twice is harmless."""
+        """Close all connections, the modes restored if that is possible; closing twice is harmless."""
+        if self._has_changed_modes:
+            with suppress(DeviceError, TimeoutError):
+                async with asyncio.timeout(self._timeouts.restore), self._order:
+                    await self._restore_modes(await self._session.synchronized())
         await self._session.close()
+
+    async def _restore_modes(self, commands: ControllerCommands) -> None:
+        await commands.set(f"mdi {self._restoring}")
+        self._has_changed_modes = False
+
+    async def _restore_modes_unless_stopped(self, commands: ControllerCommands, stops: int) -> None:
+        try:
+            await self._restore_modes(commands)
+        except CommandRefused:
+            if not self._was_stopped_since(stops):  # the stop took control: they are restored later
+                raise
 
     async def _switch_off(self, commands: ControllerCommands) -> None:
         if await commands.is_on("machine"):
@@ -190,19 +216,21 @@ class LinuxcncrshController:
                 await startup.switch_machine(commands, self._timeouts, on=True)
             case StartupAction.HOME:
                 self._joints_before_reload = None  # they may move
-                limit_s, poll_s = self._settings.move_timeout_s, self._timeouts.poll
+                limit_s, poll_s = self._settings.homing_timeout_s, self._timeouts.poll
                 await startup.home_joints(commands, limit_s, poll_s, lambda: self._was_stopped_since(stops))
             case _:
                 await startup.leave_emergency_stop(commands, self._timeouts)
 
-    def _rapid_move(self, pose: Pose) -> str:
+    def _timed_move(self, pose: Pose, duration_s: float) -> str:
         try:
-            return rapid_move(pose)
+            return timed_move(pose, duration_s)
         except ValueError as error:
             raise MoveRefused(f"to move to {pose}", str(error), subject=self._name) from error
 
-    async def _execute(self, commands: ControllerCommands, block: str, pose: Pose, stops: int) -> None:
-        limit_s = self._settings.move_timeout_s
+    async def _execute(
+        self, commands: ControllerCommands, block: str, pose: Pose, stops: int, limit_s: float
+    ) -> None:
+        self._has_changed_modes = True
         try:
             await commands.set(f"mdi {block}", limit_s)
         except CommandRefused as refusal:
@@ -212,7 +240,7 @@ class LinuxcncrshController:
         except ResponseTimeout as overdue:
             await self.stop()
             problem = f"was still moving after {limit_s:g} s and was stopped"
-            action = "Raise controller.move_timeout_s if the move was as it should be"
+            action = "Look for what slows it down: its feed override, or [speed] beyond what it can do"
             raise MotionInterrupted(problem, subject=self._name, action=action) from overdue
         except ConnectionLost:
             await self.stop()

@@ -29,6 +29,7 @@ _UNREACHABLE = re.compile(
     r"would exceed (?:joint \d+'s|limits)|fails kinematicsInverse|gave non-finite joint location",
     re.IGNORECASE,
 )
+_SECONDS_A_MINUTE = 60.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,8 +84,11 @@ def encode_command(command: str) -> bytes:
     return line
 
 
-def rapid_move(pose: Pose) -> str:
-    """The block that moves to ``pose``, with more decimals than the six of reported positions.
+def timed_move(pose: Pose, duration_s: float) -> str:
+    """The block that moves to ``pose`` in inverse time: F is 1 / duration, in 1/min.
+
+    It has more decimals than the six of reported positions. A feed rate (G94) would count X, Y and Z only
+    (LinuxCNC, G-code reference, G93 and G94), and a rapid move (G0) goes as fast as the machine can.
 
     Raises:
         ValueError: A coordinate is not a finite number.
@@ -92,7 +96,22 @@ def rapid_move(pose: Pose) -> str:
     if not all(math.isfinite(value) for value in pose.as_tuple()):
         raise ValueError("a coordinate is not a finite number")
     words = zip("XYZABC", pose.as_tuple(), strict=True)
-    return "G0 " + " ".join(f"{axis}{value:.{_DECIMALS}f}" for axis, value in words)
+    coordinates = " ".join(f"{axis}{value:.{_DECIMALS}f}" for axis, value in words)
+    return f"G93 G1 {coordinates} F{_SECONDS_A_MINUTE / duration_s:.{_DECIMALS}f}"
+
+
+def restoring_block(codes: str) -> str:
+    """The block that restores what :func:`timed_move` changes, from the words after ``PROGRAM_CODES``.
+
+    That are the motion, the feed mode, and the feed, which a change of its mode sets to zero. A G1 that has
+    no feed is refused, and other motions need more words: instead of these, no motion is active (G80).
+    """
+    words = codes.upper().split()
+    mode = next((word for word in words if word in ("G93", "G94", "G95")), "G94")
+    feed = next((word for word in words if word.startswith("F")), "F0")
+    has_feed = mode != "G93" and float(feed[1:]) != 0.0
+    motion = "G0" if not words or "G0" in words else "G1" if "G1" in words and has_feed else "G80"
+    return f"{mode} {motion} {feed}" if has_feed else f"{mode} {motion}"
 
 
 def parse_explanation(line: str) -> str:
@@ -145,6 +164,14 @@ def parse_pose_refusal(reason: str) -> RefusalReason | None:
     if found := _AXIS_LIMIT.search(reason):
         return RefusalReason(found["axis"].lower(), found["side"].lower() == "positive")
     return RefusalReason() if _UNREACHABLE.search(reason) else None
+
+
+def parse_number(text: str) -> float:
+    """The first number of an answer; not finite where there is none."""
+    try:
+        return float(text.split(maxsplit=1)[0])
+    except (IndexError, ValueError):
+        return math.nan
 
 
 def parse_homed(text: str) -> tuple[bool, ...]:

@@ -39,7 +39,7 @@ class Address:
 
 @dataclass(frozen=True, slots=True)
 class Timeouts:
-    """Longest waits, s of real time; the limit of a move is in the cell file.
+    """Longest waits, s of real time. A move may take twice its duration and ``beyond_move``.
 
     Measured on LinuxCNC 2.9: a query is answered in 1 ms, switching takes at most 0.4 s, an
     abort 0.6 s; a refusal of 2.10 comes together with its explanation.
@@ -54,6 +54,8 @@ class Timeouts:
     switch: float = 5.0
     reload: float = 120.0
     reconnect: float = 60.0
+    beyond_move: float = 10.0
+    restore: float = 1.0
 
 
 def loop_time() -> float:

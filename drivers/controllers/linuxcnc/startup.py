@@ -11,7 +11,7 @@ from collections.abc import Awaitable, Callable
 
 from drivers.controllers.errors import CommandRefused, MotionInterrupted
 from drivers.controllers.linuxcnc.commands import ControllerCommands
-from drivers.controllers.linuxcnc.protocol import parse_positions
+from drivers.controllers.linuxcnc.protocol import parse_number, parse_positions
 from drivers.controllers.linuxcnc.settings import Timeouts, loop_time
 from drivers.interfaces import StartupAction
 from hexacell.errors import DeviceError
@@ -20,6 +20,7 @@ Stopped = Callable[[], bool]
 
 _MODAL_ACTION = "Put it into RS274NGC_STARTUP_CODE, or send it in MDI"
 _OFFSET_MM = 1e-6
+_FULL_FEED_PERCENT = 100.0
 
 
 async def acknowledge_on_completion(commands: ControllerCommands) -> None:
@@ -119,11 +120,13 @@ async def enter_mdi_mode(commands: ControllerCommands, timeouts: Timeouts) -> No
         raise DeviceError(problem, subject=commands.subject)
 
 
-async def check_coordinate_system(commands: ControllerCommands) -> None:
-    """Check that ``G0 X1`` means 1 mm in machine coordinates: units, modal codes, offsets.
+async def check_coordinate_system(commands: ControllerCommands) -> str:
+    """Check that ``X1`` means 1 mm in machine coordinates, and a duration what it says.
+
+    Gives the modal codes, empty where the server does not know them.
 
     Raises:
-        DeviceError: Inches, relative moves, a tool length or an offset is active.
+        DeviceError: Inches, relative moves, a tool length, an offset or a feed override is active.
     """
     units = (await commands.get_if_known("user_linear_units")).upper()
     if units not in ("MM", ""):
@@ -132,7 +135,8 @@ async def check_coordinate_system(commands: ControllerCommands) -> None:
             subject=commands.subject,
             action="Set [TRAJ] LINEAR_UNITS = mm in its INI file",
         )
-    codes = (await commands.get_if_known("program_codes")).upper().split()
+    text = await commands.get_if_known("program_codes")
+    codes = text.upper().split()
     for wrong, meaning, right in (
         ("G20", "takes coordinates in inches", "G21"),
         ("G91", "takes coordinates as relative", "G90"),
@@ -145,6 +149,18 @@ async def check_coordinate_system(commands: ControllerCommands) -> None:
                 action=f"{right} is needed. {_MODAL_ACTION}",
             )
     await _refuse_offsets(commands)
+    await _refuse_feed_override(commands)
+    return text
+
+
+async def _refuse_feed_override(commands: ControllerCommands) -> None:
+    percent = await commands.get_if_known("feed_override")
+    if percent and parse_number(percent) > _FULL_FEED_PERCENT:
+        raise DeviceError(
+            f"moves {percent} % as fast as it is told (feed override)",
+            subject=commands.subject,
+            action="Set the feed override to 100 % or less",
+        )
 
 
 async def _refuse_offsets(commands: ControllerCommands) -> None:

@@ -28,9 +28,6 @@ class ClientSession:
         return self.state.commander is self
 
 
-_MODAL_CODES = "G0 G17 G40 G21 G90 G94 G54 G49 G99 G64 G97 G91.1 G8 G92.2 F0 S0"
-
-
 def _on_off(*, on: bool) -> str:
     return "ON" if on else "OFF"
 
@@ -57,7 +54,8 @@ GET_COMMANDS: dict[str, Callable[[ClientSession], str]] = {
     "JOINT_POS": lambda session: _numbers(session.state.machine.joints()),
     "ABS_ACT_POS": lambda session: _numbers(session.state.machine.pose().as_tuple()),
     "POS_OFFSET": lambda _session: _numbers([0.0] * 6),
-    "PROGRAM_CODES": lambda _session: _MODAL_CODES,
+    "PROGRAM_CODES": lambda session: session.state.modes.codes,
+    "FEED_OVERRIDE": lambda session: f"{session.state.feed_override_percent:g}",
     "PROGRAM_UNITS": lambda _session: "MM",
     "USER_LINEAR_UNITS": lambda _session: "MM",
     "INIFILE": lambda session: Path(session.settings.config).name,

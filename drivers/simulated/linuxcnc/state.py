@@ -13,7 +13,7 @@ from concurrent.futures import CancelledError, Future, ThreadPoolExecutor, wait
 from enum import Enum
 from typing import Protocol
 
-from drivers.simulated.linuxcnc.mdi import BlockError, parse_block
+from drivers.simulated.linuxcnc.mdi import BlockError, ModalState, parse_block
 from hexacell.errors import HexacellError
 from hexacell.kinematics.pose import Pose
 
@@ -60,8 +60,8 @@ class Machine(Protocol):
     While ``move`` or ``home`` blocks in one thread, any other method may be called from another.
     """
 
-    def move(self, pose: Pose) -> None:
-        """Move to ``pose``; returns when the motion has ended or was stopped.
+    def move(self, pose: Pose, duration_s: float | None) -> None:
+        """Move to ``pose``, in no less than ``duration_s``; returns when it has ended or was stopped.
 
         Raises:
             SoftLimitExceeded: It is beyond a soft limit; nothing moves.
@@ -104,6 +104,8 @@ class ControllerState:
         self.teleop = False
         self.homed = False
         self.wait_mode = WaitMode.RECEIVED
+        self.modes = ModalState()
+        self.feed_override_percent = 100.0
         self.commander: object | None = None
         self.machine = machine
         self._errors: deque[str] = deque()
@@ -179,14 +181,15 @@ class ControllerState:
             ConnectionCut: The controller is being closed.
         """
         try:
-            target = parse_block(block, self.machine.pose())
+            parsed = parse_block(block, self.machine.pose(), self.modes)
             self._require_mdi()
         except BlockError as error:
             self._errors.append(str(error))
             return self.wait_mode is WaitMode.RECEIVED
-        if target is None:
+        self.modes = parsed.modes
+        if (target := parsed.target) is None:
             return True
-        job = self._start(lambda: self._travel(target))
+        job = self._start(lambda: self._travel(target, self._overridden(parsed.duration_s)))
         return self.wait_mode is WaitMode.RECEIVED or _outcome(job)
 
     def _require_mdi(self) -> None:
@@ -203,9 +206,9 @@ class ControllerState:
             self._jobs = [other for other in self._jobs if not other.done()] + [job]
             return job
 
-    def _travel(self, target: Pose) -> bool:
+    def _travel(self, target: Pose, duration_s: float | None) -> bool:
         try:
-            self.machine.move(target)
+            self.machine.move(target, duration_s)
         except SoftLimitExceeded as refusal:
             self._errors.append(str(refusal))
             self._errors.append("invalid params in linear command")
@@ -218,6 +221,9 @@ class ControllerState:
             self._errors.append(str(error))
             return False
         return True
+
+    def _overridden(self, duration_s: float | None) -> float | None:
+        return None if duration_s is None else duration_s * 100.0 / self.feed_override_percent
 
     def _home(self) -> bool:
         stops = self._abort_count

@@ -29,6 +29,7 @@ from hexacell.kinematics.pose import Pose
 from tests.waiting import until
 
 ALL = frozenset(StartupAction)
+MOVE_S = 1.0
 DRIVERS: dict[str, Any] = {"sylvac": SylvacGauge, "mux10": Mux10Gauge, "cdi": CdiGauge}
 
 
@@ -84,7 +85,7 @@ async def test_every_device_answers_and_the_robot_moves(bundled_cell) -> None:
         async with drivers(cell.settings) as (gauges, encoders, controller):
             await controller.prepare(ALL)
             before = (await encoders.read()).positions_mm
-            await controller.move(target)
+            await controller.move(target, MOVE_S)
             after = (await encoders.read()).positions_mm
             readings = [(await gauge.read()).value_mm for gauge in gauges]
             seen = [cell.physics.gauge_displacement(axis) for axis in "xyz"]
@@ -100,7 +101,7 @@ async def test_a_target_out_of_reach_is_refused(bundled_cell) -> None:
             await controller.prepare(ALL)
             before = (await encoders.read()).positions_mm
             with pytest.raises(MoveRefused, match="kinematicsInverse"):
-                await controller.move(Pose(0.0, 0.0, 2000.0))
+                await controller.move(Pose(0.0, 0.0, 2000.0), MOVE_S)
             assert (await encoders.read()).positions_mm == pytest.approx(before, abs=0.01)
 
 
@@ -108,7 +109,7 @@ async def test_a_cancelled_move_stops_the_robot_in_place(bundled_cell) -> None:
     with serve(bundled_cell, slow(bundled_cell.settings)) as cell:
         async with drivers(cell.settings) as (_, _, controller):
             await controller.prepare(ALL)
-            moving = asyncio.create_task(controller.move(Pose(0.0, -100.0, 550.0)))
+            moving = asyncio.create_task(controller.move(Pose(0.0, -100.0, 550.0), MOVE_S))
             await under_way(cell)
             moving.cancel()
             with pytest.raises(asyncio.CancelledError):
@@ -124,7 +125,7 @@ async def test_a_stop_during_a_move_is_reported(bundled_cell) -> None:
     with serve(bundled_cell, slow(bundled_cell.settings)) as cell:
         async with drivers(cell.settings) as (_, _, controller):
             await controller.prepare(ALL)
-            moving = asyncio.create_task(controller.move(Pose(0.0, -100.0, 550.0)))
+            moving = asyncio.create_task(controller.move(Pose(0.0, -100.0, 550.0), MOVE_S))
             await under_way(cell)
             await controller.stop()
             with pytest.raises(MotionInterrupted, match="stopped on request"):

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.simulated.physics import Motion
+from drivers.simulated.physics import RAMP_S, Motion
 
 PATH = np.array([[0.0] * 6, [1.0] * 6, [3.0, 2.0, 2.0, 2.0, 2.0, 2.0]])
 
@@ -20,16 +20,25 @@ def motion() -> Motion:
 
 
 @pytest.mark.parametrize(
-    ("now_s", "fraction"), [(0.0, 0.0), (10.0, 0.0), (12.0, 0.5), (14.0, 1.0), (99.0, 1.0), (11.0, 0.15625)]
+    ("now_s", "fraction"),
+    [
+        (0.0, 0.0),
+        (10.0, 0.0),
+        (12.0, 0.5),
+        (14.0, 1.0),
+        (99.0, 1.0),
+        (10.1, 0.05 / (2.0 * 3.8)),
+        (11.0, 0.9 / 3.8),
+    ],
 )
 def test_fraction_of_the_path(motion: Motion, now_s: float, fraction: float) -> None:
-    assert motion.fraction(now_s) == fraction
-    assert motion.path_position(now_s) == 2.0 * fraction
+    assert motion.fraction(now_s) == pytest.approx(fraction)
+    assert motion.path_position(now_s) == pytest.approx(2.0 * fraction)
 
 
 def test_a_motion_starts_and_ends_with_the_path(motion: Motion) -> None:
     assert np.array_equal(motion.joints(10.0), PATH[0])
-    assert np.array_equal(motion.joints(12.0), PATH[1])
+    assert motion.joints(12.0) == pytest.approx(PATH[1])
     assert np.array_equal(motion.joints(14.0), PATH[2])
     assert motion.end_s == 14.0
 
@@ -46,6 +55,16 @@ def test_a_motion_starts_and_ends_with_zero_speed(motion: Motion) -> None:
     middle = motion.fraction(12.0 + short) - motion.fraction(12.0 - short)
     for edge in (10.0, 14.0):
         assert abs(motion.fraction(edge + short) - motion.fraction(edge - short)) < 1e-3 * middle
+
+
+@given(st.floats(0.0, 1.0), st.floats(0.5, 20.0))
+def test_no_piece_is_passed_faster_than_at_the_rate_between_the_ramps(
+    place: float, duration_s: float
+) -> None:
+    motion = Motion(PATH, start_s=0.0, duration_s=duration_s + RAMP_S)
+    now_s = place * motion.duration_s
+    passed = motion.fraction(now_s + 1e-3) - motion.fraction(now_s)
+    assert passed <= 1e-3 / duration_s * (1.0 + 1e-9)
 
 
 times = st.floats(-100.0, 100.0)

@@ -56,9 +56,9 @@ def test_moves_are_straight(twin) -> None:
     paths: list[Any] = []
     real = twin.physics.start_motion
 
-    def travel(path: Any) -> Any:
+    def travel(path: Any, duration_s: Any) -> Any:
         paths.append(path)
-        return real(path)
+        return real(path, duration_s)
 
     twin.physics.start_motion = travel
     target = Pose(30.0, -20.0, 540.0)

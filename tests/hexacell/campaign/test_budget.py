@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from hexacell.campaign.budget import Budget, TimeModel
+from hexacell.campaign.budget import MOVE_OVERHEAD_S, Budget, TimeModel, usual_move_seconds
 
 
 def test_minutes_are_of_points_records_and_references_read_again():
@@ -47,3 +47,14 @@ def test_durations_of_a_cell(make_plan):
     assert seconds[0] < seconds[1] < seconds[2] < 12.0, "stops on the way are moves as well"
     stated = make_plan(identification__seconds_per_record=9.0)
     assert TimeModel.of(stated.settings).record_seconds == 9.0
+
+
+def test_a_move_takes_as_long_as_its_largest_speeds_let_it(make_plan):
+    slow, fast = (
+        usual_move_seconds(
+            make_plan(speed__joint_at_gauges_mm_s=speed, speed__edge_at_gauges_mm_s=speed).settings
+        )
+        for speed in (10.0, 40.0)
+    )
+    assert slow - MOVE_OVERHEAD_S == pytest.approx(4.0 * (fast - MOVE_OVERHEAD_S))
+    assert usual_move_seconds(make_plan(timing__move_s=2.5).settings) == 2.5

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from hexacell.campaign.budget import usual_move_seconds
 from hexacell.campaign.dry_run import dry_run
 from hexacell.cell.uncertainty import UncertaintySettings
 from hexacell.controller_config.interface import ControllerGeometry
@@ -55,10 +56,10 @@ def test_the_dry_run_is_repeatable(result, make_plan):
 def test_minutes_are_of_everything_that_is_measured(result, make_plan):
     """Held-out poses are reached on straight lines."""
     plan = make_plan(**SMALL)
-    timing = plan.settings.timing
+    timing, move_s = plan.settings.timing, usual_move_seconds(plan.settings)
     poses = 3 * (6 + 1) + 3 * (6 + 5 + 1)
-    held_out = poses * (timing.move_s + timing.window_s) / 60.0
-    noise = (40 * 0.1 + 6 * (2.0 * 1.5 + 0.6)) / 60.0
+    held_out = poses * (move_s + timing.window_s) / 60.0
+    noise = (40 * 0.1 + 6 * (2.0 * move_s + 0.6)) / 60.0
     records = plan.budget.time_model.minutes(result.records, 2)
     assert result.minutes == pytest.approx(noise + records + held_out)
 

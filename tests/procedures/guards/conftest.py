@@ -102,10 +102,10 @@ class Scene:
         time_s: float = self.rig.clock.time_s
         return time_s
 
-    async def move(self, pose: Any) -> None:
+    async def move(self, pose: Any, duration_s: float) -> None:
         self.controller._do("move", str(pose))
         stops = self.stops
-        self.rig.machine.move(pose)
+        self.rig.machine.move(pose, duration_s)
         while self.now < self.rig.physics.motion_end_s:
             await self.rig.clock.sleep(0.005)
         if self.stops != stops or not self.controller.now.may_move:
@@ -190,6 +190,7 @@ class Scene:
 def scene(make_rig: Any) -> Callable[..., Scene]:
     def make(rig: Any = None, **changes: Any) -> Scene:
         slow = {"simulation__motion__minimum_s": 1.0, "guards__stale_s": GuardSettings().stale_s}
+        slow |= {"speed__joint_at_gauges_mm_s": 100.0, "speed__edge_at_gauges_mm_s": 100.0}
         return Scene(rig or make_rig(**slow | changes))
 
     return make

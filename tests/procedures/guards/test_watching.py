@@ -59,9 +59,9 @@ async def test_a_move_begins_after_every_device_has_answered(scene) -> None:
     begun: list[float] = []
     real = stage.controller.move
 
-    async def late(pose: Any) -> None:
+    async def late(pose: Any, duration_s: float) -> None:
         begun.append(stage.now)
-        await real(pose)
+        await real(pose, duration_s)
 
     stage.controller.move = late
     before = stage.now
@@ -132,7 +132,7 @@ async def test_a_robot_that_cannot_be_stopped_is_reported(scene) -> None:
 async def test_a_failed_move_is_reported_as_the_trip_of_the_guard_with_its_cause(scene) -> None:
     stage = await reference(scene())
 
-    async def interrupted(pose: Any) -> None:
+    async def interrupted(pose: Any, duration_s: float) -> None:
         stage.switch_off("joint 2 following error")
         raise DeviceError("stopped on the way", subject="controller")
 

@@ -140,13 +140,13 @@ async def test_a_robot_that_moved_was_not_refused(make_rig) -> None:
     rig = make_rig()
     controller = rig.controller
 
-    async def move(pose: Pose) -> None:
+    async def move(pose: Pose, duration_s: float) -> None:
         controller._do("move", str(pose))
         if len(sent(rig)) < 3:
-            rig.machine.move(pose)
+            rig.machine.move(pose, duration_s)
             return
         there = Pose(pose.x + 1.0, pose.y, pose.z, pose.a, pose.b, pose.c)
-        rig.machine.move(there)
+        rig.machine.move(there, duration_s)
         raise refused(pose, "Linear move on line 0 would exceed C's positive limit")
 
     controller.move = move
@@ -162,11 +162,11 @@ async def test_a_controller_that_refuses_one_pose_after_another_ends_the_run(
     rig = make_rig()
     controller, machine = rig.controller, rig.machine
 
-    async def move(pose: Pose) -> None:
+    async def move(pose: Pose, duration_s: float) -> None:
         controller._do("move", str(pose))
         if pose.a or pose.b or pose.c:
             raise refused(pose, "Linear move on line 0 fails kinematicsInverse")
-        machine.move(pose)
+        machine.move(pose, duration_s)
 
     controller.move = move
     with pytest.raises(PoseRefused, match="fails kinematicsInverse"):

@@ -184,6 +184,7 @@ class Play:
     async def end(self) -> None:
         """Close everything; fail unless every conversation was played to its end."""
         for driver in self._drivers:
+            driver._has_changed_modes = False  # a test that is about restoring them closes it itself
             await driver.close()
         for server in self.servers:
             await server.close()

@@ -15,7 +15,9 @@ from tests.drivers.controllers.linuxcnc.motion_dialogue import (
     ARRIVED,
     HALF_WAY,
     MDI,
+    MOVE_S,
     NO_ERROR,
+    RESTORED,
     TARGET,
 )
 from tests.waiting import until
@@ -24,22 +26,22 @@ from tests.waiting import until
 async def test_a_cancelled_move_is_stopped_and_its_late_answer_is_discarded(play):
     aborted = play.Pause()
     driver = await play.opened(
-        [(MDI, aborted, ACK), AGAIN_IN_CONTROL, (MDI, ACK), ("get abs_act_pos", ARRIVED)],
+        [(MDI, aborted, ACK), AGAIN_IN_CONTROL, (MDI, ACK), ("get abs_act_pos", ARRIVED), RESTORED],
         play.STOPPING,
     )
-    moving = asyncio.create_task(driver.move(TARGET))
+    moving = asyncio.create_task(driver.move(TARGET, MOVE_S))
     await aborted.reached.wait()
     moving.cancel()
     with pytest.raises(asyncio.CancelledError):
         await moving
     aborted.set()
-    await driver.move(TARGET)
+    await driver.move(TARGET, MOVE_S)
 
 
 async def test_a_cancelled_move_raises_the_cancellation_even_if_the_stop_fails(play):
     never = play.Pause()
     driver = await play.opened([(MDI, never)], *[[("hello EMC hexacell 1.0", play.HANG_UP)]] * 3)
-    moving = asyncio.create_task(driver.move(TARGET))
+    moving = asyncio.create_task(driver.move(TARGET, MOVE_S))
     await never.reached.wait()
     moving.cancel()
     with pytest.raises(asyncio.CancelledError):
@@ -51,7 +53,7 @@ async def test_a_move_cancelled_before_its_turn_stops_nothing(play):
     driver = await play.opened([("get joint_pos", answer, b"JOINT_POS 1 2 3 4 5 6\r\n")])
     asking = asyncio.create_task(driver.joint_positions())
     await asyncio.sleep(0)
-    moving = asyncio.create_task(driver.move(TARGET))
+    moving = asyncio.create_task(driver.move(TARGET, MOVE_S))
     await answer.reached.wait()
     moving.cancel()
     answer.set()
@@ -122,7 +124,7 @@ async def test_a_garbled_query_is_repeated_and_a_garbled_command_is_not(play):
     )
     assert await driver.joint_positions() == (1.0, 2.0, 3.0, 4.0, 5.0, 6.0)
     with pytest.raises(MoveRefused):
-        await driver.move(TARGET)
+        await driver.move(TARGET, MOVE_S)
 
 
 async def test_closing_ends_a_query_in_progress(play):

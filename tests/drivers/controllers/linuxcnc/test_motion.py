@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 from drivers.controllers.errors import ConnectionLost, MotionInterrupted, MoveRefused, PoseRefused
@@ -13,23 +15,25 @@ from tests.drivers.controllers.linuxcnc.motion_dialogue import (
     ARRIVED,
     HALF_WAY,
     MDI,
+    MOVE_S,
     NO_ERROR,
+    RESTORED,
     TARGET,
 )
 
 
 async def test_a_move_returns_when_the_position_is_reached(play):
-    driver = await play.opened([(MDI, ACK), ("get abs_act_pos", ARRIVED)])
-    await driver.move(TARGET)
+    driver = await play.opened([(MDI, ACK), ("get abs_act_pos", ARRIVED), RESTORED])
+    await driver.move(TARGET, MOVE_S)
 
 
 async def test_a_move_returns_when_the_position_is_within_tolerance(play):
     nearly = b"ABS_ACT_POS 10.000000 20.000000 559.980000 5.000000 -4.000000 3.000000\r\n"
     within = b"ABS_ACT_POS 10.009000 20.000000 560.000000 5.009000 -4.000000 363.000000\r\n"
     driver = await play.opened(
-        [(MDI, ACK), *[("get abs_act_pos", nearly)] * 2, ("get abs_act_pos", within)]
+        [(MDI, ACK), *[("get abs_act_pos", nearly)] * 2, ("get abs_act_pos", within), RESTORED]
     )
-    await driver.move(TARGET)
+    await driver.move(TARGET, MOVE_S)
 
 
 @pytest.mark.parametrize(
@@ -47,7 +51,7 @@ async def test_an_acknowledgement_is_not_an_arrival(play, elsewhere):
         "get error": [b"ERROR joint 2 following error\r\n", b"ERROR OK\r\n"],
     }
     with pytest.raises(MotionInterrupted, match=r"before reaching X10\.000 Y20\.000 Z560") as caught:
-        await driver.move(TARGET)
+        await driver.move(TARGET, MOVE_S)
     assert "joint 2 following error" in caught.value.problem
 
 
@@ -69,7 +73,7 @@ async def test_a_move_that_ends_elsewhere_without_an_error_message_is_reported(p
         "get machine": machine,
     }
     with pytest.raises(MotionInterrupted, match=f"stopped at X5.000 Y10.000 Z555.000 .*: {why}"):
-        await driver.move(TARGET)
+        await driver.move(TARGET, MOVE_S)
 
 
 async def test_a_refused_move_reports_and_clears_all_error_messages(play):
@@ -82,15 +86,16 @@ async def test_a_refused_move_reports_and_clears_all_error_messages(play):
             NO_ERROR,
             (MDI, ACK),
             ("get abs_act_pos", ARRIVED),
+            RESTORED,
         ]
     )
     with pytest.raises(MoveRefused) as caught:
-        await driver.move(TARGET)
+        await driver.move(TARGET, MOVE_S)
     assert caught.value.problem == (
         "refuses to move to X10.000 Y20.000 Z560.000 A5.000 B-4.000 C3.000: "
         "Linear move on line 0 fails kinematicsInverse; invalid params in linear command"
     )
-    await driver.move(TARGET)
+    await driver.move(TARGET, MOVE_S)
 
 
 async def test_reading_error_messages_ends_if_the_same_message_repeats(play):
@@ -100,7 +105,7 @@ async def test_reading_error_messages_ends_if_the_same_message_repeats(play):
         "get error": b"ERROR emc_error: bad status from EMC\r\n",
     }
     with pytest.raises(MoveRefused, match=r": emc_error: bad status from EMC$"):
-        await driver.move(TARGET)
+        await driver.move(TARGET, MOVE_S)
 
 
 async def test_a_move_does_not_retake_control_from_another_client(play):
@@ -114,28 +119,28 @@ async def test_a_move_does_not_retake_control_from_another_client(play):
     )
     for _ in range(2):
         with pytest.raises(MoveRefused, match=r"another client has taken control of it\. See that nobody"):
-            await driver.move(TARGET)
+            await driver.move(TARGET, MOVE_S)
 
 
 async def test_a_move_to_a_pose_that_is_not_finite_is_refused(play):
     driver = await play.opened([])
     with pytest.raises(MoveRefused, match="a coordinate is not a finite number"):
-        await driver.move(Pose(float("nan"), 0, 0))
+        await driver.move(Pose(float("nan"), 0, 0), MOVE_S)
 
 
 async def test_a_move_that_exceeds_its_timeout_is_stopped_and_its_late_answer_is_discarded(play):
+    play.patience = replace(play.patience, beyond_move=0.01)
     stopped = play.Pause()
     driver = await play.opened(
         [
-            (MDI, stopped, ACK),
+            (MDI.replace("F20.", "F6000."), stopped, ACK),
             AGAIN_IN_CONTROL,
             ("get joint_pos", b"JOINT_POS 1 2 3 4 5 6\r\n"),
         ],
         [*play.GREETING, ("set abort", b"SET ABORT ACK\n\r"), *play.STOPPING[-3:]],
-        move_timeout_s=0.03,
     )
     with pytest.raises(MotionInterrupted, match=r"still moving after 0\.03 s and was stopped"):
-        await driver.move(TARGET)
+        await driver.move(TARGET, 0.01)
     stopped.set()
     assert await driver.joint_positions() == (1.0, 2.0, 3.0, 4.0, 5.0, 6.0)
 
@@ -143,7 +148,7 @@ async def test_a_move_that_exceeds_its_timeout_is_stopped_and_its_late_answer_is
 async def test_a_connection_lost_during_a_move_stops_the_machine(play):
     driver = await play.opened([(MDI, play.HANG_UP)], play.STOPPING)
     with pytest.raises(ConnectionLost, match="closed the connection"):
-        await driver.move(TARGET)
+        await driver.move(TARGET, MOVE_S)
 
 
 async def test_a_controller_lost_during_a_move_makes_the_error_ask_for_the_emergency_stop(play):
@@ -151,7 +156,7 @@ async def test_a_controller_lost_during_a_move_makes_the_error_ask_for_the_emerg
     with pytest.raises(
         DeviceError, match=r"could not be stopped: it closed the connection: .*\. Press the emer"
     ):
-        await driver.move(TARGET)
+        await driver.move(TARGET, MOVE_S)
 
 
 async def test_the_position_is_pose_and_joints_of_a_homed_machine(play):
@@ -191,11 +196,11 @@ async def test_a_pose_beyond_a_limit_is_refused_as_a_pose(play, message, axis, i
         ("get error", b"ERROR invalid params in linear command\r\n"),
         NO_ERROR,
     ]
-    driver = await play.opened([*refusal, (MDI, ACK), ("get abs_act_pos", ARRIVED)])
+    driver = await play.opened([*refusal, (MDI, ACK), ("get abs_act_pos", ARRIVED), RESTORED])
     with pytest.raises(PoseRefused, match=message) as refused:
-        await driver.move(TARGET)
+        await driver.move(TARGET, MOVE_S)
     assert (refused.value.axis, refused.value.is_highest) == (axis, is_highest)
-    await driver.move(TARGET)
+    await driver.move(TARGET, MOVE_S)
 
 
 async def test_a_refused_pose_whose_command_is_acknowledged_is_refused_all_the_same(play):
@@ -207,7 +212,7 @@ async def test_a_refused_pose_whose_command_is_acknowledged_is_refused_all_the_s
         "get error": [b"ERROR Linear move on line 0 would exceed C's positive limit\r\n", NO_ERROR[1]],
     }
     with pytest.raises(PoseRefused, match="would exceed C's positive limit"):
-        await driver.move(TARGET)
+        await driver.move(TARGET, MOVE_S)
 
 
 async def test_a_machine_that_is_not_homed_refuses_no_pose(play):
@@ -219,5 +224,66 @@ async def test_a_machine_that_is_not_homed_refuses_no_pose(play):
     ]
     driver = await play.opened(refusal)
     with pytest.raises(MoveRefused, match="when not homed") as refused:
-        await driver.move(TARGET)
+        await driver.move(TARGET, MOVE_S)
     assert not isinstance(refused.value, PoseRefused)
+
+
+MODES = ("get program_codes", b"PROGRAM_CODES G1 G17 G40 G21 G90 G94 G54 G49 F250 S0\r\n")
+READY = [
+    ("set enable EMCTOO", ACK.replace(b"MDI", b"ENABLE")),
+    NO_ERROR,
+    ("set set_wait done", b"SET SET_WAIT ACK\n\r"),
+    ("get estop", b"ESTOP OFF\r\n"),
+    ("get machine", b"MACHINE ON\r\n"),
+    ("get joint_homed", b"JOINT_HOMED YES YES YES YES YES YES\r\n"),
+    ("set mode mdi", b"SET MODE ACK\n\r"),
+    ("get mode", b"MODE MDI\r\n"),
+]
+CHECKED = [
+    ("get user_linear_units", b"USER_LINEAR_UNITS MM\r\n"),
+    MODES,
+    ("get pos_offset", b"POS_OFFSET 0.0 0.0 0.0 0.0 0.0 0.0\r\n"),
+    ("get feed_override", b"FEED_OVERRIDE 100\r\n"),
+]
+RESTORED_HERE = ("set mdi G94 G1 F250", ACK)
+
+
+async def test_the_modes_of_before_are_restored_after_a_move(play):
+    driver = await play.opened([*READY, *CHECKED, (MDI, ACK), ("get abs_act_pos", ARRIVED), RESTORED_HERE])
+    await driver.prepare(frozenset())
+    await driver.move(TARGET, MOVE_S)
+    await driver.close()
+
+
+async def test_the_modes_that_a_stopped_move_leaves_are_restored_by_the_next_preparation(play):
+    play.patience = play.IMPATIENT
+    refused = [(MDI, b"SET MDI NAK\n\r"), ("get enable", b"ENABLE ON\r\n"), NO_ERROR]
+    state = [("get estop", b"ESTOP OFF\r\n"), ("get machine", b"MACHINE ON\r\n")]
+    driver = await play.opened([*READY, *CHECKED, *refused, *state, *READY, RESTORED_HERE, *CHECKED])
+    await driver.prepare(frozenset())
+    with pytest.raises(MoveRefused):
+        await driver.move(TARGET, MOVE_S)
+    await driver.prepare(frozenset())
+
+
+async def test_the_modes_that_a_stopped_move_leaves_are_restored_on_closing(play):
+    refused = [(MDI, b"SET MDI NAK\n\r"), ("get enable", b"ENABLE ON\r\n"), NO_ERROR]
+    state = [("get estop", b"ESTOP OFF\r\n"), ("get machine", b"MACHINE ON\r\n")]
+    driver = await play.opened([*READY, *CHECKED, *refused, *state, RESTORED_HERE])
+    await driver.prepare(frozenset())
+    with pytest.raises(MoveRefused):
+        await driver.move(TARGET, MOVE_S)
+    await driver.close()
+
+
+@pytest.mark.parametrize(
+    ("percent", "is_refused"), [(b"100", False), (b"50", False), (b"120", True), (b"strange", False)]
+)
+async def test_a_feed_override_that_makes_moves_faster_is_refused(play, percent, is_refused):
+    override = ("get feed_override", b"FEED_OVERRIDE " + percent + b"\r\n")
+    driver = await play.opened([*READY, *CHECKED[:-1], override])
+    if not is_refused:
+        await driver.prepare(frozenset())
+        return
+    with pytest.raises(DeviceError, match=r"moves 120 % as fast as it is told \(feed override\)"):
+        await driver.prepare(frozenset())

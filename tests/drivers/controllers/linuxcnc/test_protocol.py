@@ -16,7 +16,8 @@ from drivers.controllers.linuxcnc.protocol import (
     parse_positions,
     parse_response,
     pose_difference,
-    rapid_move,
+    restoring_block,
+    timed_move,
 )
 from hexacell.kinematics.pose import Pose
 
@@ -65,25 +66,43 @@ def test_a_command_longer_than_the_limit_is_refused():
         encode_command("x" * 254)
 
 
-def test_a_rapid_move_is_formatted_exactly():
+def test_a_timed_move_is_formatted_exactly():
     pose = Pose(10.0, -20.5, 560.123456789, 5.0, -4.0, 3.0)
-    assert rapid_move(pose) == (
-        "G0 X10.00000000 Y-20.50000000 Z560.12345679 A5.00000000 B-4.00000000 C3.00000000"
+    assert timed_move(pose, 2.5) == (
+        "G93 G1 X10.00000000 Y-20.50000000 Z560.12345679 A5.00000000 B-4.00000000 C3.00000000 F24.00000000"
     )
 
 
-@given(st.builds(Pose, *[COORDINATES] * 6))
-def test_a_rapid_move_keeps_the_pose_to_seven_decimals_and_fits_a_line(pose):
-    letters, values = zip(*((word[0], float(word[1:])) for word in rapid_move(pose).split()), strict=True)
-    assert "".join(letters) == "GXYZABC"
-    assert values[1:] == pytest.approx(pose.as_tuple(), abs=1e-7)
-    encode_command(f"set mdi {rapid_move(pose)}")
+@given(st.builds(Pose, *[COORDINATES] * 6), st.floats(0.1, 1e5))
+def test_a_timed_move_keeps_pose_and_duration_and_fits_a_line(pose, duration_s):
+    words = timed_move(pose, duration_s).split()
+    letters, values = zip(*((word[0], float(word[1:])) for word in words), strict=True)
+    assert "".join(letters) == "GGXYZABCF"
+    assert values[2:8] == pytest.approx(pose.as_tuple(), abs=1e-7)
+    assert 60.0 / values[8] == pytest.approx(duration_s, rel=1e-4)
+    encode_command(f"set mdi {timed_move(pose, duration_s)}")
+
+
+@pytest.mark.parametrize(
+    ("codes", "block"),
+    [
+        ("G0 G17 G40 G21 G90 G94 G54 G49 F0 S0", "G94 G0"),
+        ("G1 G17 G40 G21 G90 G94 G54 G49 F250 S0", "G94 G1 F250"),
+        ("G80 G17 G40 G21 G90 G94 F0 S0", "G94 G80"),
+        ("G1 G90 G93 F3000 S0", "G93 G80"),
+        ("G1 G90 G94 F0 S0", "G94 G80"),
+        ("G2 G90 G95 F0.5 S0", "G95 G80 F0.5"),
+        ("", "G94 G0"),
+    ],
+)
+def test_the_modes_of_before_are_restored_by_one_block(codes, block):
+    assert restoring_block(codes) == block
 
 
 @pytest.mark.parametrize("value", [float("nan"), float("inf"), float("-inf")])
-def test_a_rapid_move_to_a_pose_that_is_not_finite_is_refused(value):
+def test_a_timed_move_to_a_pose_that_is_not_finite_is_refused(value):
     with pytest.raises(ValueError, match="not a finite number"):
-        rapid_move(Pose(0.0, 0.0, 500.0, 0.0, value, 0.0))
+        timed_move(Pose(0.0, 0.0, 500.0, 0.0, value, 0.0), 1.0)
 
 
 @pytest.mark.parametrize(

@@ -38,6 +38,7 @@ MDI = [("set mode mdi", b"SET MODE ACK\n\r"), ("get mode", b"MODE MDI\r\n")]
 UNITS = ("get user_linear_units", b"USER_LINEAR_UNITS MM\r\n")
 CODES = ("get program_codes", b"PROGRAM_CODES G80 G17 G40 G21 G90 G94 G54 G49 G92.2 F0 S0\r\n")
 OFFSETS = ("get pos_offset", b"POS_OFFSET 0.000000 0.000000 -0.000000 0.000000 0.000000 0.000000\r\n")
+OVERRIDE = ("get feed_override", b"FEED_OVERRIDE 100\r\n")
 UNTIL_HOMED = [*TAKING_CONTROL, *SWITCHING_ON]
 UNTIL_MDI = [*UNTIL_HOMED, *READY, *MDI]
 
@@ -56,13 +57,14 @@ async def test_prepare_releases_the_emergency_stop_switches_on_and_homes(play):
             UNITS,
             CODES,
             OFFSETS,
+            OVERRIDE,
         ]
     )
     await driver.prepare(ALL)
 
 
 async def test_prepare_changes_no_state_that_is_already_right(play):
-    driver = await play.opened([*TAKING_CONTROL, *READY, *MDI, UNITS, CODES, OFFSETS])
+    driver = await play.opened([*TAKING_CONTROL, *READY, *MDI, UNITS, CODES, OFFSETS, OVERRIDE])
     await driver.prepare(ALL)
 
 
@@ -81,6 +83,7 @@ async def test_homing_leaves_teleoperation_first(play):
             UNITS,
             CODES,
             OFFSETS,
+            OVERRIDE,
         ]
     )
     await driver.prepare(ALL)
@@ -103,6 +106,7 @@ async def test_prepare_waits_until_each_state_is_reached(play):
             UNITS,
             CODES,
             OFFSETS,
+            OVERRIDE,
         ]
     )
     await driver.prepare(ALL)
@@ -113,6 +117,7 @@ async def test_prepare_accepts_a_server_without_the_optional_queries(play):
         ("get user_linear_units", b"GET USER_LINEAR_UNITS NAK\r\n\r\n"),
         ("get program_codes", b"GET PROGRAM_CODES NAK\r\n\r\n"),
         ("get pos_offset", b"GET NAK\r\n"),
+        ("get feed_override", b"GET NAK\r\n"),
     ]
     driver = await play.opened([*UNTIL_MDI, *(ask for question in unknown for ask in (question,) * 2)])
     await driver.prepare(ALL)
@@ -157,7 +162,7 @@ async def test_prepare_accepts_a_server_without_the_optional_queries(play):
 )
 async def test_an_acknowledged_command_without_effect_is_reported(play, conversation, states, problem):
     play.patience = play.IMPATIENT
-    driver = await play.opened(conversation, move_timeout_s=0.2)
+    driver = await play.opened(conversation, homing_timeout_s=0.2)
     play.servers[0].afterwards = states
     with pytest.raises(DeviceError, match=problem) as caught:
         await driver.prepare(ALL)

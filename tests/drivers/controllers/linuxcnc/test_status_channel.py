@@ -54,7 +54,11 @@ async def test_error_messages_are_read_when_the_machine_switches_off(play) -> No
 
 
 FAULT = ("get error", b"ERROR joint 3 following error\r\n")
-BLOCK = "set mdi G0 X1.00000000 Y2.00000000 Z3.00000000 A0.00000000 B0.00000000 C0.00000000"
+MOVE_S = 3.0
+BLOCK = (
+    "set mdi G93 G1 X1.00000000 Y2.00000000 Z3.00000000 A0.00000000 B0.00000000 C0.00000000 F20.00000000"
+)
+RESTORED = ("set mdi G94 G0", b"SET MDI ACK\n\r")
 
 
 async def test_status_has_the_messages_that_the_order_is_reading(play) -> None:
@@ -69,7 +73,7 @@ async def test_status_has_the_messages_that_the_order_is_reading(play) -> None:
     off = asked(machine="OFF")
     driver = await play.opened(main, [*GREETING, *asked(), *off, ERROR_OK])
     await driver.status()
-    moving = asyncio.create_task(driver.move(Pose(1.0, 2.0, 3.0)))
+    moving = asyncio.create_task(driver.move(Pose(1.0, 2.0, 3.0), MOVE_S))
     await reading.reached.wait()
     status = asyncio.create_task(driver.status())
     reading.set()
@@ -83,7 +87,7 @@ async def test_an_order_has_the_messages_that_the_status_read(play) -> None:
     main = [(BLOCK, refused, b"SET MDI NAK\n\r"), ("get enable", b"ENABLE ON\r\n"), ERROR_OK]
     driver = await play.opened(main, [*GREETING, *asked(), *asked(machine="OFF"), FAULT, ERROR_OK])
     await driver.status()
-    moving = asyncio.create_task(driver.move(Pose(1.0, 2.0, 3.0)))
+    moving = asyncio.create_task(driver.move(Pose(1.0, 2.0, 3.0), MOVE_S))
     await refused.reached.wait()
     assert (await driver.status()).error_messages == ("joint 3 following error",)
     refused.set()
@@ -126,6 +130,7 @@ async def test_error_messages_are_read_if_the_machine_switches_off_between_prepa
         ("get user_linear_units", b"USER_LINEAR_UNITS MM\r\n"),
         ("get program_codes", b"PROGRAM_CODES G21 G90\r\n"),
         ("get pos_offset", b"POS_OFFSET 0.0 0.0 0.0 0.0 0.0 0.0\r\n"),
+        ("get feed_override", b"FEED_OVERRIDE 100\r\n"),
     ]
     driver = await play.opened(preparation, [*GREETING, *asked(machine="OFF"), FAULT, ERROR_OK])
     await driver.prepare(frozenset({StartupAction.SWITCH_ON}))
@@ -140,9 +145,9 @@ async def test_error_messages_are_not_read_if_the_machine_was_never_on(play) -> 
 async def test_the_status_is_read_during_a_move(play) -> None:
     arrived = play.Pause()
     there = b"ABS_ACT_POS 1.000000 2.000000 3.000000 0.000000 0.000000 0.000000\r\n"
-    main = [(BLOCK, arrived, b"SET MDI ACK\n\r"), ("get abs_act_pos", there)]
+    main = [(BLOCK, arrived, b"SET MDI ACK\n\r"), ("get abs_act_pos", there), RESTORED]
     driver = await play.opened(main, [*GREETING, *asked()])
-    moving = asyncio.create_task(driver.move(Pose(1.0, 2.0, 3.0)))
+    moving = asyncio.create_task(driver.move(Pose(1.0, 2.0, 3.0), MOVE_S))
     await arrived.reached.wait()
     assert await driver.status() == ON
     assert not moving.done()
@@ -258,7 +263,7 @@ async def test_a_stop_during_a_move_is_reported_by_the_move(play) -> None:
         ],
     )
     await driver.status()
-    moving = asyncio.create_task(driver.move(Pose(1.0, 2.0, 3.0)))
+    moving = asyncio.create_task(driver.move(Pose(1.0, 2.0, 3.0), MOVE_S))
     await stopped.reached.wait()
     await driver.stop()
     stopped.set()
@@ -274,7 +279,7 @@ async def test_a_move_that_is_refused_because_a_stop_took_control_was_stopped(pl
         main, [*GREETING, *asked(), *stopping, *[("get joint_pos", play.AT_REST)] * 3]
     )
     await driver.status()
-    moving = asyncio.create_task(driver.move(Pose(1.0, 2.0, 3.0)))
+    moving = asyncio.create_task(driver.move(Pose(1.0, 2.0, 3.0), MOVE_S))
     await received.reached.wait()
     await driver.stop()
     received.set()

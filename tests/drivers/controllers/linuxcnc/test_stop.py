@@ -14,6 +14,8 @@ from tests.drivers.controllers.linuxcnc.motion_dialogue import (
     ARRIVED,
     HALF_WAY,
     MDI,
+    MOVE_S,
+    RESTORED,
     TARGET,
 )
 
@@ -27,16 +29,17 @@ async def test_stopping_goes_over_a_second_connection_while_the_first_is_mute(pl
             AGAIN_IN_CONTROL,
             (MDI, ACK),
             ("get abs_act_pos", ARRIVED),
+            RESTORED,
         ],
         [*play.GREETING, ("set abort", b"SET ABORT ACK\n\r"), *play.STOPPING[-3:]],
     )
-    moving = asyncio.create_task(driver.move(TARGET))
+    moving = asyncio.create_task(driver.move(TARGET, MOVE_S))
     await aborted.reached.wait()
     await driver.stop()
     aborted.set()
     with pytest.raises(MotionInterrupted, match=r"stopped at X5\.000 .*: it was stopped on request"):
         await moving
-    await driver.move(TARGET)
+    await driver.move(TARGET, MOVE_S)
 
 
 async def test_no_command_is_sent_on_one_connection_while_the_other_awaits_an_answer(play):
@@ -46,7 +49,7 @@ async def test_no_command_is_sent_on_one_connection_while_the_other_awaits_an_an
         [(MDI, ACK), ("get abs_act_pos", HALF_WAY)],
         [*play.GREETING, ("set abort", speak, b"SET ABORT ACK\n\r"), *play.STOPPING[-3:]],
     )
-    moving = asyncio.create_task(driver.move(TARGET))
+    moving = asyncio.create_task(driver.move(TARGET, MOVE_S))
     await asyncio.sleep(0)
     stopping = asyncio.create_task(driver.stop())
     await speak.reached.wait()
@@ -144,7 +147,7 @@ async def test_a_move_that_waits_for_its_turn_is_not_begun_after_a_stop(play):
         [*play.GREETING, ("set abort", abort, b"SET ABORT ACK\n\r"), *play.STOPPING[-3:]],
     )
     asking = asyncio.create_task(driver.joint_positions())
-    moving = asyncio.create_task(driver.move(TARGET))
+    moving = asyncio.create_task(driver.move(TARGET, MOVE_S))
     await answer.reached.wait()
     stopping = asyncio.create_task(driver.stop())
     await abort.reached.wait()

@@ -33,12 +33,14 @@ class FakeMachine:
         self.refusal = ""
         self.ignored_moves = 0
         self.events: list[str] = []
+        self.durations_s: list[float | None] = []
         self._geometry = 0.0
         self._joints = (0.0,) * 6
         self._stop = threading.Event()
         self._lock = threading.Lock()
 
-    def move(self, pose: Pose) -> None:
+    def move(self, pose: Pose, duration_s: float | None) -> None:
+        self.durations_s.append(duration_s)
         if pose.z > 1000.0:
             raise KinematicsFailure
         if self.refusal:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from dataclasses import replace
 
 import pytest
 
@@ -10,16 +11,20 @@ from drivers.controllers.errors import (
     ConnectionLost,
     MotionInterrupted,
     MoveRefused,
+    PoseRefused,
     ResponseTimeout,
     StartupNotPermitted,
 )
 from drivers.controllers.linuxcnc.settings import Timeouts
 from drivers.interfaces import StartupAction
+from drivers.simulated.linuxcnc.mdi import ModalState
 from drivers.simulated.linuxcnc.state import WaitMode
 from hexacell.errors import DeviceError
 from hexacell.kinematics.pose import Pose
+from tests.drivers.simulated.linuxcnc.conftest import QUICK
 
 ALL = frozenset(StartupAction)
+MOVE_S = 0.1
 TARGET = Pose(100.0, -200.0, 550.0, 12.5, -3.0, 8.0)
 HOME = Pose(0.0, 0.0, 0.0)
 LONG_S = 30.0  # slow enough to be stopped on the way, quick enough to be seen moving
@@ -39,7 +44,7 @@ async def begin(ready, machine):
     """A long move that has started."""
     machine.duration_s = LONG_S
     machine.events.clear()
-    moving = asyncio.create_task(ready.move(TARGET))
+    moving = asyncio.create_task(ready.move(TARGET, MOVE_S))
     await asyncio.to_thread(machine.wait_for, "move")
     return moving
 
@@ -51,7 +56,7 @@ async def test_from_emergency_stop_to_a_pose(driver, machine):
         assert machine.events == []
         await controller.prepare(ALL)
         assert machine.events == ["on", "home"]
-        await controller.move(TARGET)
+        await controller.move(TARGET, MOVE_S)
         assert await controller.pose() == TARGET
         assert await controller.joint_positions() == TARGET.as_tuple()
         await controller.prepare(ALL)
@@ -64,14 +69,14 @@ async def test_a_move_of_an_unprepared_machine_is_refused_with_the_reason(driver
     controller = driver()
     await controller.open()
     with pytest.raises(MoveRefused, match="it is in emergency stop"):
-        await controller.move(TARGET)
+        await controller.move(TARGET, MOVE_S)
     await controller.close()
 
 
 async def test_a_move_after_a_target_out_of_reach(ready):
     with pytest.raises(MoveRefused, match="Linear move on line 0 fails kinematicsInverse"):
-        await ready.move(Pose(0.0, 0.0, 5000.0))
-    await ready.move(TARGET)
+        await ready.move(Pose(0.0, 0.0, 5000.0), MOVE_S)
+    await ready.move(TARGET, MOVE_S)
     assert await ready.pose() == TARGET
 
 
@@ -83,14 +88,14 @@ async def test_a_stop_during_a_move_ends_it_in_place(ready, machine):
     stood = await ready.pose()
     assert 0.0 <= stood.x < 90.0
     machine.duration_s = 0.01
-    await ready.move(TARGET)
+    await ready.move(TARGET, MOVE_S)
     assert await ready.pose() == TARGET
 
 
 async def test_a_stop_that_overtakes_its_move(ready, machine):
     """The abort may overtake the move that it is meant for."""
     machine.duration_s = LONG_S
-    moving = asyncio.create_task(ready.move(TARGET))
+    moving = asyncio.create_task(ready.move(TARGET, MOVE_S))
     await asyncio.sleep(0)
     await ready.stop()
     with pytest.raises(MotionInterrupted):
@@ -115,18 +120,18 @@ async def test_a_cancelled_move_stops_the_machine_and_the_next_one_is_executed(r
     assert stood == await ready.pose()
     assert stood.x < 90.0
     machine.duration_s = 0.01
-    await ready.move(TARGET)
+    await ready.move(TARGET, MOVE_S)
 
 
 async def test_a_move_that_takes_too_long(driver, machine):
-    controller = driver(move_timeout_s=1.0)
+    controller = driver(replace(QUICK, beyond_move=0.8))
     await controller.open()
     await controller.prepare(ALL)
     machine.duration_s = LONG_S
     with pytest.raises(MotionInterrupted, match=r"still moving after 1 s"):
-        await controller.move(TARGET)
+        await controller.move(TARGET, MOVE_S)
     machine.duration_s = 0.01
-    await controller.move(HOME)
+    await controller.move(HOME, MOVE_S)
     await controller.close()
 
 
@@ -141,37 +146,37 @@ async def test_stopping_while_homing(driver, machine):
         await preparing
     machine.duration_s = 0.01
     await controller.prepare(ALL)
-    await controller.move(TARGET)
+    await controller.move(TARGET, MOVE_S)
     await controller.close()
 
 
 async def test_an_unreachable_pose_while_another_client_waits_for_no_completion(ready, simulated):
     """``set_wait received`` is global in 2.9: NAK becomes ACK, and only the position tells."""
     simulated.state.wait_mode = WaitMode.RECEIVED
-    with pytest.raises(MotionInterrupted, match="fails kinematicsInverse"):
-        await ready.move(Pose(0.0, 0.0, 5000.0))
+    with pytest.raises(PoseRefused, match="fails kinematicsInverse"):
+        await ready.move(Pose(0.0, 0.0, 5000.0), MOVE_S)
     await ready.prepare(ALL)
     with pytest.raises(MoveRefused):
-        await ready.move(Pose(0.0, 0.0, 5000.0))
+        await ready.move(Pose(0.0, 0.0, 5000.0), MOVE_S)
 
 
 async def test_another_client_takes_control_and_gives_it_back(ready, driver):
     other = driver()
     await other.open()
     with pytest.raises(MoveRefused, match="another client has taken control"):
-        await ready.move(TARGET)
+        await ready.move(TARGET, MOVE_S)
     await ready.prepare(ALL)
-    await ready.move(TARGET)
+    await ready.move(TARGET, MOVE_S)
     await other.close()
 
 
 async def test_reloading_reads_the_config_and_moves_no_slider(ready, machine):
-    await ready.move(TARGET)
+    await ready.move(TARGET, MOVE_S)
     machine.config = 2.5
     await ready.reload(ALL)
     assert await ready.joint_positions() == TARGET.as_tuple()
     assert (await ready.pose()).x == TARGET.x - 2.5
-    await ready.move(TARGET)
+    await ready.move(TARGET, MOVE_S)
     assert (await ready.joint_positions())[0] == TARGET.x + 2.5
 
 
@@ -206,16 +211,16 @@ async def test_a_refused_password(driver):
 async def test_a_refused_move(ready, machine):
     machine.refusal = "joint 3 following error"
     with pytest.raises(MoveRefused, match="joint 3 following error"):
-        await ready.move(TARGET)
+        await ready.move(TARGET, MOVE_S)
     machine.refusal = ""
-    await ready.move(TARGET)
+    await ready.move(TARGET, MOVE_S)
 
 
 async def test_an_acknowledged_move_that_does_not_take_place(ready, machine):
     machine.ignored_moves = 1
     with pytest.raises(MotionInterrupted, match=r"stopped at X0\.000 .* before reaching X100\.000"):
-        await ready.move(TARGET)
-    await ready.move(TARGET)
+        await ready.move(TARGET, MOVE_S)
+    await ready.move(TARGET, MOVE_S)
 
 
 async def test_a_connection_cut_during_a_move(ready, simulated, machine):
@@ -239,7 +244,7 @@ async def test_an_emergency_stop_during_a_move(ready, simulated, machine):
         await ready.prepare(ALL - {StartupAction.RESET_ESTOP})
     assert simulated.state.estop
     await ready.prepare(ALL)
-    await ready.move(TARGET)
+    await ready.move(TARGET, MOVE_S)
 
 
 async def test_a_controller_that_is_closed(ready, simulated):
@@ -276,12 +281,32 @@ async def test_a_frozen_controller_and_one_that_was_ended_are_told_apart(driver,
 async def test_a_controller_that_works_again_executes_what_it_is_told(ready, simulated) -> None:
     simulated.set_frozen(on=True)
     simulated.set_frozen(on=False)
-    await ready.move(TARGET)
+    await ready.move(TARGET, MOVE_S)
     assert await ready.pose() == TARGET
 
 
 async def test_the_heartbeat_changes_with_the_position(ready) -> None:
     before = (await ready.status()).heartbeat
     assert (await ready.status()).heartbeat == before
-    await ready.move(TARGET)
+    await ready.move(TARGET, MOVE_S)
     assert (await ready.status()).heartbeat not in {before, ""}
+
+
+async def test_a_move_lasts_as_long_as_it_is_told_and_leaves_the_modes_as_they_were(
+    ready, simulated, machine
+) -> None:
+    simulated.state.modes = ModalState(1, 94, 250.0)
+    await ready.prepare(ALL)
+    await ready.move(TARGET, 2.5)
+    assert machine.durations_s == [pytest.approx(2.5)]
+    assert simulated.state.modes == ModalState(1, 94, 250.0)
+
+
+async def test_the_modes_are_restored_on_closing_after_a_stop(ready, simulated, machine) -> None:
+    moving = await begin(ready, machine)
+    await ready.stop()
+    with pytest.raises(MotionInterrupted):
+        await moving
+    assert simulated.state.modes.feed_mode == 93
+    await ready.close()
+    assert simulated.state.modes == ModalState()

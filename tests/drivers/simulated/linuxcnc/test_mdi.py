@@ -6,18 +6,27 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.controllers.linuxcnc.protocol import rapid_move
-from drivers.simulated.linuxcnc.mdi import BlockError, parse_block
+from drivers.controllers.linuxcnc.protocol import restoring_block, timed_move
+from drivers.simulated.linuxcnc.mdi import BlockError, ModalState, parse_block
 from hexacell.kinematics.pose import Pose
 
 HERE = Pose(1.0, 2.0, 3.0, 4.0, 5.0, 6.0)
 
 
-@given(st.builds(Pose, *[st.floats(-1e4, 1e4)] * 6))
-def test_blocks_written_by_the_driver_are_parsed(pose):
-    target = parse_block(rapid_move(pose), HERE)
-    assert target is not None
-    assert target.as_tuple() == pytest.approx(pose.as_tuple(), abs=1e-8)
+@given(st.builds(Pose, *[st.floats(-1e4, 1e4)] * 6), st.floats(0.1, 1e4))
+def test_blocks_written_by_the_driver_are_parsed(pose, duration_s):
+    parsed = parse_block(timed_move(pose, duration_s), HERE)
+    assert parsed.target is not None
+    assert parsed.target.as_tuple() == pytest.approx(pose.as_tuple(), abs=1e-8)
+    assert parsed.duration_s == pytest.approx(duration_s, rel=1e-4)
+    assert parsed.modes == ModalState(1, 93, 0.0)
+
+
+@pytest.mark.parametrize("modes", [ModalState(), ModalState(1, 94, 250.0), ModalState(80, 93)])
+def test_the_driver_restores_the_modes_of_before(modes):
+    moved = parse_block(timed_move(HERE, 1.0), HERE, modes)
+    assert moved.modes == ModalState(1, 93, 0.0)
+    assert parse_block(restoring_block(modes.codes), HERE, moved.modes).modes == modes
 
 
 @pytest.mark.parametrize(
@@ -32,7 +41,21 @@ def test_blocks_written_by_the_driver_are_parsed(pose):
     ],
 )
 def test_missing_words_keep_their_values(block, target):
-    assert parse_block(block, HERE) == target
+    assert parse_block(block, HERE).target == target
+
+
+@pytest.mark.parametrize(
+    ("block", "duration_s"),
+    [
+        ("G0 X10 F30", None),
+        ("G1 X11 F60", 10.0),
+        ("G1 A14 F60", 10.0),
+        ("G93 G1 X11 F30", 2.0),
+        ("F30 G93 G1 A14", 2.0),
+    ],
+)
+def test_a_move_lasts_as_its_feed_or_inverse_time_says(block, duration_s):
+    assert parse_block(block, HERE).duration_s == duration_s
 
 
 @pytest.mark.parametrize(
@@ -44,6 +67,12 @@ def test_missing_words_keep_their_values(block, target):
         ("G20", "Unknown g code used"),
         ("G999", "G-code out of range"),
         ("hello", "No characters found in reading real value"),
+        ("G93 G1 X10", "F word missing with inverse time g1 move"),
+        ("G1 X10", "Cannot do g1 with zero feed rate"),
+        ("G93 G94", "Two g codes used from same modal group"),
+        ("G94 G1", "Cannot do g1 with zero feed rate"),
+        ("G93 G1", "F word missing with inverse time g1 move"),
+        ("G80 X1", "Cannot use axis values without a g code that uses them"),
     ],
 )
 def test_invalid_blocks_are_refused_with_the_error_of_linuxcnc(block, words):

@@ -1,0 +1,90 @@
+"""Durations of ways: no piece is passed faster than allowed, and the fastest as fast as allowed."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from hexacell.cell.bundled import bundled_config
+from hexacell.cell.loader import load_cell
+from hexacell.kinematics.mechanisms.hexaglide import Hexaglide
+from hexacell.kinematics.pose import Pose, PoseBatch
+from hexacell.motion.duration import SHORTEST_S, LineDurations, SpeedLimits, shortest_duration
+from hexacell.motion.trajectory import interpolate_line
+from hexacell.robot_model import robot_of
+
+ROBOT = robot_of(load_cell(bundled_config("simulated-hexaglide")))
+LINES = LineDurations(Hexaglide(), ROBOT.controller, ROBOT.branch)
+LIMITS = SpeedLimits(joint_mm_s=20.0, edge_mm_s=30.0)
+HOME = Pose(0.0, 0.0, 550.0)
+
+
+def passed(start: Pose, end: Pose, pieces: int) -> tuple[Any, Any]:
+    """How far the fastest slider and the fastest platform joint come in each piece of the line, mm."""
+    line = interpolate_line(PoseBatch.of([start]), PoseBatch.of([end]), pieces)
+    joints = Hexaglide().inverse(ROBOT.controller, ROBOT.branch, line)
+    edge = line.positions[:, None] + ROBOT.controller["B"] @ np.swapaxes(line.rotations, 1, 2)
+    steps = np.linalg.norm(np.diff(edge, axis=0), axis=2).max(axis=1)
+    return np.abs(np.diff(joints, axis=0)).max(axis=1), steps
+
+
+small = st.floats(-20.0, 20.0)
+
+
+@given(st.builds(Pose, small, small, st.floats(540.0, 560.0), small, small, small))
+def test_no_piece_of_a_line_is_passed_faster_than_allowed(end: Pose) -> None:
+    duration_s = LINES.of(HOME, end, LIMITS)
+    pieces = 24  # of the simulated controller; another number than the durations are found with
+    joints, edge = passed(HOME, end, pieces)
+    assert joints.max() * pieces / duration_s <= LIMITS.joint_mm_s * (1.0 + 1e-6)
+    assert edge.max() * pieces / duration_s <= LIMITS.edge_mm_s * (1.0 + 1e-6)
+
+
+@given(st.builds(Pose, small, small, st.floats(540.0, 560.0), small, small, small))
+def test_the_fastest_piece_is_passed_as_fast_as_allowed(end: Pose) -> None:
+    duration_s = LINES.of(HOME, end, LIMITS)
+    if duration_s == SHORTEST_S:
+        return
+    joints, edge = passed(HOME, end, 48)
+    share = np.maximum(joints / LIMITS.joint_mm_s, edge / LIMITS.edge_mm_s) * 48 / duration_s
+    assert share.max() == pytest.approx(1.0)
+
+
+def test_a_tilt_about_the_ball_takes_time_although_the_ball_stays() -> None:
+    """A feed rate would not see it: X, Y and Z do not change."""
+    tilted = Pose(0.0, 0.0, 550.0, 30.0, 0.0, 0.0)
+    radius_mm = np.linalg.norm(ROBOT.controller["B"], axis=1).max()
+    free = SpeedLimits(joint_mm_s=1e9, edge_mm_s=25.0)
+    assert LINES.of(HOME, tilted, free) > 0.8 * radius_mm * np.radians(30.0) / 25.0
+
+
+def test_the_stricter_limit_decides() -> None:
+    end = Pose(50.0, 20.0, 530.0, 10.0, -5.0, 8.0)
+    by_joints = LINES.of(HOME, end, SpeedLimits(10.0, 1e9))
+    by_edge = LINES.of(HOME, end, SpeedLimits(1e9, 10.0))
+    assert LINES.of(HOME, end, SpeedLimits(10.0, 10.0)) == pytest.approx(max(by_joints, by_edge), rel=0.01)
+    assert LINES.of(HOME, end, SpeedLimits(5.0, 5.0)) == pytest.approx(
+        2.0 * max(by_joints, by_edge), rel=0.01
+    )
+
+
+def test_a_move_to_where_the_robot_is_has_a_duration_too() -> None:
+    assert LINES.of(HOME, HOME, LIMITS) == SHORTEST_S
+
+
+def test_poses_out_of_reach_do_not_count() -> None:
+    line = interpolate_line(PoseBatch.of([HOME]), PoseBatch.of([Pose(10.0, 0.0, 550.0)]), 4)
+    joints = np.zeros((5, 6))
+    joints[2, 3] = np.nan
+    assert shortest_duration(joints, line.positions[:, None], SpeedLimits(1.0, 10.0)) == pytest.approx(1.0)
+
+
+def test_a_way_with_one_fast_piece_is_slow_as_a_whole() -> None:
+    """A controller that is told a duration passes all pieces in the same time."""
+    joints = np.cumsum([np.full(6, step) for step in (0.0, 1.0, 1.0, 10.0, 1.0)], axis=0)
+    still = np.zeros((5, 1, 3))
+    assert shortest_duration(joints, still, SpeedLimits(5.0, 1.0)) == pytest.approx(4 * 10.0 / 5.0)

@@ -35,7 +35,7 @@ class SpeedLimits:
 def shortest_duration(joints: Array, points: Array, limits: SpeedLimits) -> float:
     """The shortest duration, s, of a way that is passed at a constant rate of its rows.
 
-    The way are ``joints`` (k, 6), mm, and ``points`` (k, m, 3) of the platform's edge in the base frame, mm,
+    The way: ``joints`` (k, 6), mm, and ``points`` (k, m, 3) of the platform's edge in the base frame, mm,
     evenly in its parameter. Joints that are out of reach (NaN) do not count.
     """
     by_joints = np.abs(np.diff(joints, axis=0)).max(axis=1) / limits.joint_mm_s

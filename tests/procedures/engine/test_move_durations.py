@@ -63,10 +63,17 @@ def test_fixed_gauges_are_everywhere(make_rig: Any) -> None:
 
 async def test_a_move_with_gauges_at_the_ball_is_as_much_slower_as_stated(make_rig: Any) -> None:
     rig = make_rig(stations__placement="by-hand", speed__joint_mm_s=40.0, speed__edge_mm_s=40.0)
-    state = fold([arrived(P1)])
-    await rig.performer.perform(move(P1), state)
-    await rig.performer.perform(move(P1), fold([arrived(P1), placed(P1)]))
-    free_s, at_gauges_s = rig.controller.durations_s
+    back = Move(at=P1, orientation=1, pose=POSE)
+    there = events.Arrived(at=P1, orientation=2, pose=NEXT)
+    steps: list[tuple[Move, list[events.Event]]] = [
+        (back, []),
+        (move(P1), [arrived(P1)]),
+        (back, [there]),
+        (move(P1), [arrived(P1), placed(P1)]),
+    ]
+    for step, history in steps:
+        await rig.performer.perform(step, fold(history))
+    _, free_s, _, at_gauges_s = rig.controller.durations_s
     assert at_gauges_s == pytest.approx(free_s * 40.0 / 25.0)
 
 

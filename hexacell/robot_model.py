@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from pathlib import Path
 
 import numpy as np
 
@@ -12,7 +13,7 @@ from hexacell.cell.fields import GeometryDocument
 from hexacell.cell.loader import Cell
 from hexacell.cell.model import CellSettings
 from hexacell.controller_config.interface import ConfigFormat, ControllerGeometry, JointRanges
-from hexacell.errors import FileError
+from hexacell.errors import FileError, UsageError
 from hexacell.identification.belief import RobotBelief
 from hexacell.identification.diagnostics.tolerance_check import ToleranceViolation, tolerance_violations
 from hexacell.identification.problem.commanded_poses import CommandingGeometry
@@ -181,9 +182,27 @@ def robot_of(cell: Cell) -> Robot:
             subject=cell.taught_path,
             action="Copy the config there when you teach points and frames, or remove `taught`",
         )
+    nominal = Geometry.of(cell.settings.mechanism.parameters, cell.settings.robot.nominal.model_dump())
+    for geometry, path in ((controller.geometry, cell.config_path), (taught.geometry, cell.taught_path)):
+        _require_frames(cell.settings.mechanism, geometry, path)
+    line = cell.document.line_of(("robot", "nominal"))
+    _require_frames(cell.settings.mechanism, nominal, cell.path, line)
     robot = make_robot(cell.settings, controller, taught=taught.geometry)
     _require_same_robot(cell, robot)
     return robot
+
+
+def _require_frames(mechanism: Mechanism, geometry: Geometry, path: Path, line: int | None = None) -> None:
+    """Refuse a geometry whose joints do not fix a frame; raises ``FileError``."""
+    try:
+        mechanism.normalize_frames(geometry)
+    except UsageError as error:
+        raise FileError(
+            f"the geometry is no robot's: {error.problem}",
+            subject=path,
+            line=line,
+            action="Correct its joints",
+        ) from error
 
 
 def _require_same_robot(cell: Cell, robot: Robot) -> None:

@@ -80,7 +80,7 @@ def test_mutated_input_is_refused_or_used(templates, say) -> None:
                 print(
                     f"\n  seed {one.seed}, {one.kind}, {one.found.seconds:.1f} s: {one.found}", flush=True
                 )
-            if len(found) % 500 == 0:
+            if len(found) % 200 == 0:
                 print(f"\n  {len(found)} of {MUTATIONS}", end="", flush=True)
     codes = Counter(one.found.code for one in found)
     kinds = Counter(one.kind for one in found)

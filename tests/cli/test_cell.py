@@ -302,3 +302,14 @@ def test_a_drawing_of_another_machine_is_refused_with_its_line(typed_here, cell_
         f"{cell_folder.cell}:{line}: the drawing is not of the robot in {cell_folder.controller}"
         in outcome.err
     )
+
+
+def test_a_geometry_whose_joints_fix_no_frame_is_refused(typed_here, cell_folder):
+    text = cell_folder.cell.read_text()
+    assert "[0.0, 155.0, 0.0]" in text
+    cell_folder.cell.write_text(text.replace("[0.0, 155.0, 0.0]", "[0.0, 0.0, 0.0]", 1))
+    outcome = typed_here("cell", "validate", cell_folder.cell)
+    line = line_of(cell_folder.cell.read_text(), "[robot.nominal]")
+    assert outcome.code == 2
+    told = "the geometry is no robot's: two slider joints that fix the frame are on one rail"
+    assert f"{cell_folder.cell}:{line}: {told}" in outcome.err

@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
+from hexacell.errors import UsageError
 from hexacell.kinematics.geometry import Geometry, GeometryBatch
 from hexacell.kinematics.legs import Legs
 from hexacell.kinematics.mechanism import (
@@ -66,6 +67,9 @@ PAPER_FRAME = FrameConvention(
 
 RAILS = ((0, 5), (1, 4), (2, 3))
 """Legs, counted from 0, whose sliders share a rail: their joints are at the same height and side."""
+
+CLOSEST_JOINTS_MM = 1e-6
+"""Joints that are closer than that are at one place."""
 
 
 class Hexaglide:
@@ -180,13 +184,20 @@ def _pose_jacobian(b: Array, n: Array) -> Array:
 
 def _leveling_roll(vector: Array) -> Array:
     """The rotation about x that turns ``vector`` into z = 0, y > 0."""
-    y, z = vector[1:] / np.hypot(vector[1], vector[2])
+    across = np.hypot(vector[1], vector[2])
+    if across < CLOSEST_JOINTS_MM:
+        raise UsageError("two slider joints that fix the frame are on one rail")
+    y, z = vector[1:] / across
     return np.array([[1.0, 0.0, 0.0], [0.0, y, z], [0.0, -z, y]])
 
 
 def _axes_through(second: Array, fifth: Array, third: Array) -> Array:
     """Rows: x from B2 to B5, z normal to the plane of B2, B5, B3, y toward B3."""
-    x = (fifth - second) / np.linalg.norm(fifth - second)
+    if (width := np.linalg.norm(fifth - second)) < CLOSEST_JOINTS_MM:
+        raise UsageError("two platform joints that fix the frame are at one place")
+    x = (fifth - second) / width
     z = np.cross(x, third - second)
-    z /= np.linalg.norm(z)
+    if (height := np.linalg.norm(z)) < CLOSEST_JOINTS_MM:
+        raise UsageError("the platform joints that fix the frame are in one line")
+    z /= height
     return np.stack([x, np.cross(z, x), z])

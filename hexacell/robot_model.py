@@ -187,9 +187,8 @@ def robot_of(cell: Cell) -> Robot:
         _require_frames(cell.settings.mechanism, geometry, path)
     line = cell.document.line_of(("robot", "nominal"))
     _require_frames(cell.settings.mechanism, nominal, cell.path, line)
-    robot = make_robot(cell.settings, controller, taught=taught.geometry)
-    _require_same_robot(cell, robot)
-    return robot
+    _require_same_robot(cell, nominal, controller.geometry)
+    return make_robot(cell.settings, controller, taught=taught.geometry)
 
 
 def _require_frames(mechanism: Mechanism, geometry: Geometry, path: Path, line: int | None = None) -> None:
@@ -205,18 +204,19 @@ def _require_frames(mechanism: Mechanism, geometry: Geometry, path: Path, line: 
         ) from error
 
 
-def _require_same_robot(cell: Cell, robot: Robot) -> None:
+def _require_same_robot(cell: Cell, drawing: Geometry, controller: Geometry) -> None:
     """Refuse a drawing so far from the config that no calibration leads from one to the other.
 
     Raises:
         FileError: names the parameter that differs most.
     """
-    drawn = robot.mechanism.normalize_frames(robot.drawing)[0].vector
-    commanding = robot.mechanism.normalize_frames(robot.controller)[0].vector
+    mechanism = cell.settings.mechanism
+    drawn = mechanism.normalize_frames(drawing)[0].vector
+    commanding = mechanism.normalize_frames(controller)[0].vector
     difference = np.abs(drawn - commanding)
     worst = int(difference.argmax())
     if difference[worst] > FARTHEST_DRAWING * np.abs(commanding).max():
-        name = robot.mechanism.convention.display_name(robot.mechanism.parameters.names[worst])
+        name = mechanism.convention.display_name(mechanism.parameters.names[worst])
         raise FileError(
             f"the drawing is not of the robot in {cell.config_path}: {name} differs by "
             f"{difference[worst]:.4g} once both are in the same frames",

@@ -16,7 +16,8 @@ from hexacell.kinematics.rotations import Array
 from hexacell.motion.path_check import is_clear
 from procedures.calibration.set_steps import SetSteps, reference_pose
 from procedures.run.events import Reading
-from procedures.run.state import RunState, SetState
+from procedures.run.set_state import SetState
+from procedures.run.state import RunState
 from procedures.run.steps import Compute, Move, Repeat, SetKey, SixNumbers, Standstill, Step
 
 DISTANCE_SHARE = 0.3

@@ -166,7 +166,7 @@ class _Event:
         yield from self._covariance(result.covariance)
         held_out, after = identified.held_out, identified.held_out_after
         yield from _out_of_range((held_out, after), LARGEST_NUMBER)
-        fits = len(held_out) == points and all(held_out) and len(after) in {0, points}
+        fits = len(held_out) == points and any(held_out) and len(after) in {0, points}
         if self.follows_plan and not fits:
             yield "the held-out poses are not those of the cell file's points"
         if any(not math.isfinite(one) for one in (result.chi2, result.residual_rms_mm)):

@@ -230,6 +230,9 @@ class Plan:
             belief = self.estimate(state).belief
         except IdentifiabilityError:
             return True  # the identification reports what is wrong with the records
+        actual = belief.commanded.actual_poses(reference)
+        if not actual.found[0] or not belief.keeps_limits(actual.poses, actual.joints)[0]:
+            return False
         return is_clear(belief, reference, reference)
 
     def _start(self, point: int) -> StartPoint:

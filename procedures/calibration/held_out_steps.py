@@ -49,13 +49,25 @@ class HeldOutSteps:
     def choose_poses(self, identified: Identification) -> tuple[tuple[SixNumbers, ...], ...]:
         """Poses at each held-out point, in the controller's frames.
 
+        A point at which it has too few, because the ball would leave the travel or the robot its limits,
+        gets none and is left.
+
         Raises:
-            LimitError: a point has too few that keep the ball inside the travel.
+            LimitError: every point has too few.
         """
         belief = self.sets.robot.belief(identified)
         used = identified.poses.rotations
-        points = range(len(self.settings.verification.points))
-        return tuple(self._choose_at(point, belief, used) for point in points)
+        chosen: list[tuple[SixNumbers, ...]] = []
+        failures: list[LimitError] = []
+        for point in range(len(self.settings.verification.points)):
+            try:
+                chosen.append(self._choose_at(point, belief, used))
+            except LimitError as error:
+                chosen.append(())
+                failures.append(error)
+        if not any(chosen):
+            raise failures[0]
+        return tuple(chosen)
 
     def choose_poses_after(self, identified: Identification) -> tuple[tuple[SixNumbers, ...], ...]:
         """Further poses at each held-out point, for a robot whose controller has the identified geometry.
@@ -92,9 +104,9 @@ class HeldOutSteps:
         return common + state.identified.held_out_after[key.point - 1], len(common)
 
     def _is_left(self, state: RunState, key: SetKey) -> bool:
-        """Whether a point cannot be measured, because the controller refuses its reference."""
-        poses, _ = self._poses(state, key)
-        return not state.set(key).samples and not state.refused.allows(poses[0])
+        """Whether a point cannot be measured: it has no poses, or the controller refuses its reference."""
+        poses, common = self._poses(state, key)
+        return not common or (not state.set(key).samples and not state.refused.allows(poses[0]))
 
     def _in_set(self, state: RunState, key: SetKey) -> Step:
         measured = state.set(key)

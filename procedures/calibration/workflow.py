@@ -249,7 +249,7 @@ class Calibration:
         """
         found = state.identified
         assert found is not None  # noqa: S101 - its poses are held out of an identification
-        references = [poses[0] for poses in found.held_out]
+        references = [poses[0] if poses else None for poses in found.held_out]
         if state.committed is None:
             others = self._at_start.held_out.choose_poses_after(identified)
             yield from _replacements(state, references, found.held_out, others)
@@ -354,13 +354,13 @@ def _after_verdict(state: RunState, judged: events.ResultValidated) -> Step | No
 
 def _replacements(
     state: RunState,
-    references: Sequence[SixNumbers],
+    references: Sequence[SixNumbers | None],
     present: Sequence[Sequence[SixNumbers]],
     others: Sequence[Sequence[SixNumbers]],
 ) -> Iterator[tuple[SixNumbers, SixNumbers]]:
     """The refused poses of each point with others of the same point that it does not have yet."""
     for reference, poses, chosen in zip(references, present, others, strict=True):
-        if state.refused.allows(reference):
+        if reference is not None and state.refused.allows(reference):
             refused = (pose for pose in poses if not state.refused.allows(pose))
             new = (pose for pose in chosen if pose not in poses)
             yield from zip(refused, new, strict=False)

@@ -129,7 +129,7 @@ def test_the_predicted_accuracy_is_printed_before_any_motion(typed_here: Any, ce
     assert "A healthy machine of this cell passes with a probability of 99.7%." in said
     assert "The noise of the encoders makes about 0." in said
     words = r"\d+ records at 5 points will give about 0\.\d{3} mm at the worst of your task poses"
-    assert re.search(rf"{words} \(one sigma\), in about \d minutes\.", said)
+    assert re.search(rf"{words} \(one sigma\), in about \d+ minutes\.", said)
     assert cell_folder.snapshot() == before
 
 

@@ -7,10 +7,9 @@ from collections.abc import Iterator
 import numpy as np
 
 from hexacell.errors import ReachError
-from hexacell.kinematics import rotations
 from hexacell.kinematics.legs import ROUNDING
 from hexacell.kinematics.mechanism import inverse_kinematics
-from hexacell.kinematics.pose import Pose, PoseBatch
+from hexacell.kinematics.pose import AXES, Pose, PoseBatch
 from hexacell.kinematics.rotations import Array
 from hexacell.kinematics.sensitivity import singularity_margin
 from hexacell.robot_model import Robot
@@ -43,10 +42,8 @@ def _of_command(robot: Robot, pose: Pose) -> Iterator[str]:
     ):
         if angle > largest + ROUNDING:
             yield f"{name} by {np.degrees(angle):.1f} deg, beyond {key} = {np.degrees(largest):g}"
-    numbers = [*pose.position, *np.degrees(rotations.to_angles(command.rotations[0]))]
-    for axis, number, low, high in zip(
-        "xyzabc", numbers, limits.axes.lowest, limits.axes.highest, strict=True
-    ):
+    numbers, axes = command.numbers()[0], limits.axes
+    for axis, number, low, high in zip(AXES, numbers, axes.lowest, axes.highest, strict=True):
         if not low - ROUNDING <= number <= high + ROUNDING:
             yield f"axis {axis} would be at {number:.1f}, outside {low:g} to {high:g}"
 

@@ -6,7 +6,6 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from hexacell.kinematics import rotations
 from hexacell.kinematics.gauge_travel import GaugeRoom, GaugeTravel
 from hexacell.kinematics.geometry import Geometry, GeometryBatch
 from hexacell.kinematics.legs import ROUNDING, LegLimits
@@ -26,13 +25,13 @@ class AxisLimits:
 
     def including(self, pose: PoseBatch) -> AxisLimits:
         """These limits, widened to allow one pose (1)."""
-        numbers = _six_numbers(pose)[0]
+        numbers = pose.numbers()[0]
         lowest, highest = np.minimum(self.lowest, numbers), np.maximum(self.highest, numbers)
         return AxisLimits(tuple(lowest.tolist()), tuple(highest.tolist()))
 
     def allow(self, poses: PoseBatch) -> Mask:
         """Which of n poses in the controller's frames."""
-        numbers = _six_numbers(poses)
+        numbers = poses.numbers()
         low, high = np.array(self.lowest) - ROUNDING, np.array(self.highest) + ROUNDING
         return np.asarray(((numbers >= low) & (numbers <= high)).all(axis=-1))
 
@@ -182,9 +181,3 @@ class Limits:
         if self.turn < np.pi:
             kept = kept & (np.abs(poses.turns()) <= self.turn + ROUNDING)
         return kept
-
-
-def _six_numbers(poses: PoseBatch) -> Array:
-    """x, y, z, mm, and a, b, c, deg, of n poses (n, 6)."""
-    angles = np.degrees(rotations.to_angles(poses.rotations))
-    return np.concatenate([poses.positions, angles], axis=-1)

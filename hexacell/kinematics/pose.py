@@ -14,6 +14,9 @@ from hexacell.kinematics.rotations import Array, Mask
 Index = slice | NDArray[np.intp] | Mask | list[int]
 """Which poses of a batch. With two axes a pair: which poses of a line, and which lines."""
 
+AXES = "xyzabc"
+"""Of a controller, in the order of a pose's six numbers."""
+
 SAME_MM = 1e-6
 SAME_ANGLE = float(np.radians(1e-6))
 """Poses that differ by less are the same, converted between frames, or written and read again."""
@@ -121,6 +124,10 @@ class PoseBatch:
     def tilts(self) -> Array:
         """Angles (n,), rad, between the platform's z axis and the base's."""
         return np.arccos(np.clip(self.rotations[:, 2, 2], -1.0, 1.0))
+
+    def numbers(self) -> Array:
+        """x, y, z, mm, and a, b, c, deg, of n poses (n, 6), as a controller gets them."""
+        return np.concatenate([self.positions, np.degrees(rotations.to_angles(self.rotations))], axis=-1)
 
     def turns(self) -> Array:
         """Angles (n,), rad, in (-pi, pi], by which the platform is turned about its normal, then tilted."""

@@ -10,12 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hexacell.kinematics import rotations
 from hexacell.kinematics.mechanism import FrameTransform
-from hexacell.kinematics.pose import Pose, PoseBatch
-from hexacell.kinematics.rotations import Array, Mask
-
-AXES = "xyzabc"
+from hexacell.kinematics.pose import AXES, Pose, PoseBatch
+from hexacell.kinematics.rotations import Mask
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,7 +35,7 @@ class RefusedCommand:
         if self.axis is None:
             return concerned
         column, sign = AXES.index(self.axis), 1.0 if self.is_highest else -1.0
-        beyond = sign * (_six_numbers(poses)[:, column] - self.pose[column]) >= 0.0
+        beyond = sign * (poses.numbers()[:, column] - self.pose[column]) >= 0.0
         return np.asarray(concerned | beyond)
 
 
@@ -64,9 +61,3 @@ class RefusedCommands:
     def allows(self, pose: tuple[float, float, float, float, float, float]) -> bool:
         """The same of a single command, in the controller's frames."""
         return bool(self.allow(PoseBatch.of([Pose(*pose)]))[0])
-
-
-def _six_numbers(poses: PoseBatch) -> Array:
-    """x, y, z, mm, and a, b, c, deg, of n poses (n, 6), as a controller gets them."""
-    angles = np.degrees(rotations.to_angles(poses.rotations))
-    return np.concatenate([poses.positions, angles], axis=-1)

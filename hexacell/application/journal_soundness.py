@@ -18,6 +18,7 @@ import numpy as np
 from hexacell.cell.fields import LARGEST_NUMBER, GeometryDocument
 from hexacell.cell.measuring import MOST_POINTS, MOST_POSES
 from hexacell.cell.model import CellSettings
+from hexacell.controller_config.interface import JointRanges
 from hexacell.errors import FileError
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.parameters import LEGS
@@ -146,6 +147,7 @@ class _Event:
         match self.event:
             case events.RunStarted() as started:
                 yield from self._geometries(started.controller, started.taught)
+                yield from _joint_range_problems(started.joint_ranges)
                 if started.accepted is not None:
                     yield from self._covariance(started.accepted.covariance)
                     yield from _out_of_range(started.accepted.model_dump(exclude={"at"}), LARGEST_VARIANCE)
@@ -211,6 +213,14 @@ class _Event:
 def _is_round(counts: tuple[int, ...]) -> bool:
     """Whether these are counts of six encoders."""
     return len(counts) == LEGS and max(map(abs, counts)) <= LARGEST_COUNT
+
+
+def _joint_range_problems(ranges: JointRanges | None) -> Iterator[str]:
+    if ranges is None:
+        return
+    if len(ranges) != LEGS:
+        yield "there are six joint ranges"
+    yield from _out_of_range(ranges, LARGEST_NUMBER)
 
 
 def _noise_problems(measured: events.NoiseMeasured) -> Iterator[str]:

@@ -19,17 +19,17 @@ from hexacell.controller_config.interface import ControllerGeometry
 from hexacell.controller_config.write_back import BEFORE, RECEIPT, Receipt
 from hexacell.errors import FileError
 from hexacell.kinematics.geometry import Geometry
+from hexacell.kinematics.limits import SAME_FRAMES
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.robot_model import Robot, config_format, robot_of_start
 from hexacell.runs.run_folder import RunFolder
+from hexacell.stated_limits import stated_limits
 from hexacell.storage import atomic_files
 from procedures.engine.config_edits import PROVISIONAL_FOLDER
 from procedures.journal.line_format import RESTORE
 from procedures.run import events
 from procedures.run.state import RunState
 from procedures.run.steps import SixNumbers
-
-STEEPEST_DEG = 90.0
 
 
 def require_own_run(cell: Cell, folder: RunFolder, state: RunState) -> None:
@@ -83,12 +83,15 @@ def _require_own_geometry(
     found = config_format(cell.settings).read(path)
     stated = Geometry.of(cell.settings.mechanism.parameters, started.controller)
     if not _is_same(found, stated, started):
-        raise FileError(
-            f"states another geometry than {path}, with which the run began",
-            subject=folder.journal,
-            line=1,
-            action=RESTORE,
-        )
+        raise _differs(folder, f"another geometry than {path}")
+    own = stated_limits(cell.settings, found, SAME_FRAMES).joint_ranges
+    if started.joint_ranges != own:
+        raise _differs(folder, f"other joint ranges than the cell file and {path}")
+
+
+def _differs(folder: RunFolder, what: str) -> FileError:
+    problem = f"states {what}, with which the run began"
+    return FileError(problem, subject=folder.journal, line=1, action=RESTORE)
 
 
 def _has_fingerprint(path: Path, sha256: str) -> bool:
@@ -108,15 +111,15 @@ def _require_own_poses(cell: Cell, folder: RunFolder, state: RunState, started: 
     poses = list(dict.fromkeys(_poses_to_come(state)))
     if not poses:
         return
-    robot = robot_of_start(cell.settings, started.controller, started.branch, started.taught)
+    robot = robot_of_start(
+        cell.settings, started.controller, started.branch, started.taught, started.joint_ranges
+    )
     batch = PoseBatch.of(Pose(*pose) for pose in poses)
-    allowed = np.zeros(len(poses), dtype=bool)
+    reached = np.zeros(len(poses), dtype=bool)
     for geometry in _commanding(robot, state):
         joints = robot.mechanism.inverse(geometry, robot.branch, batch)
-        low, high = cell.settings.limits.joint_min_mm, cell.settings.limits.joint_max_mm
-        with np.errstate(invalid="ignore"):
-            allowed |= ((joints >= low) & (joints <= high)).all(axis=-1)
-    allowed &= np.degrees(batch.tilts()) <= STEEPEST_DEG
+        reached |= robot.limits.allow_joints(joints)
+    allowed = reached & robot.limits.allow_commands(robot.frames.poses(batch))
     if not allowed.all():
         wrong = poses[int(np.flatnonzero(~allowed)[0])]
         pose = ", ".join(f"{number:g}" for number in wrong)

@@ -32,7 +32,7 @@ class RunStarted(Frozen):
     ``taught`` is the geometry with which the robot was taught last, in frames of its own. Without it the
     result is written in frames by the mechanism's convention. ``accepted`` is the result that a check or a
     length check starts from, if there is one. ``length_check`` is whether a calibration has one.
-    ``joint_ranges`` are those of the controller's config, mm, where it states them.
+    ``joint_ranges`` are those of cell file and config together, mm; none in runs of older versions.
     """
 
     kind: Literal["started"] = "started"

@@ -37,6 +37,7 @@ def reading_changed(history: History, **changes: Any) -> None:
 
 
 FAR = (0.0, 0.0, 5500.0, 0.0, 0.0, 0.0)
+TILTED = (0.0, 0.0, 550.0, 0.0, 46.0, 0.0)
 STEEP = (0.0, 0.0, 550.0, 170.0, 0.0, 0.0)
 V9 = SetKey(phase=Phase.BEFORE, point=9)
 
@@ -44,6 +45,22 @@ FORGERIES: dict[str, tuple[Callable[[History], None], str]] = {
     "another geometry": (
         lambda h: changed(h, events.RunStarted, controller=scaled(h[0].controller, 1.01)),
         "states another geometry than",
+    ),
+    "wider joint ranges": (
+        lambda h: changed(h, events.RunStarted, joint_ranges=((-800.0, 800.0),) * 6),
+        "states other joint ranges than",
+    ),
+    "no joint ranges": (
+        lambda h: changed(h, events.RunStarted, joint_ranges=None),
+        "states other joint ranges than",
+    ),
+    "five joint ranges": (
+        lambda h: changed(h, events.RunStarted, joint_ranges=((-800.0, 200.0),) * 5),
+        "there are six joint ranges",
+    ),
+    "joint ranges that are none": (
+        lambda h: changed(h, events.RunStarted, joint_ranges=((float("nan"), 200.0),) * 6),
+        "is not within +-1e+06",
     ),
     "another branch": (
         lambda h: changed(h, events.RunStarted, branch=tuple(-one for one in h[0].branch)),
@@ -63,6 +80,10 @@ FORGERIES: dict[str, tuple[Callable[[History], None], str]] = {
     ),
     "a steep held-out pose": (
         lambda h: changed(h, events.Identified, held_out_after=((STEEP,), (STEEP,))),
+        "which the robot cannot take",
+    ),
+    "a held-out pose beyond the tilt": (
+        lambda h: changed(h, events.Identified, held_out_after=((TILTED,), (TILTED,))),
         "which the robot cannot take",
     ),
     "a reference out of reach": (

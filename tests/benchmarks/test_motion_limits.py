@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import os
 from concurrent.futures import ProcessPoolExecutor
+from contextlib import suppress
 from dataclasses import dataclass, field
 from multiprocessing import get_context
 
@@ -16,18 +17,23 @@ import numpy as np
 import pytest
 
 from hexacell.campaign.task_accuracy import Task
+from hexacell.campaign.teaching import as_written
 from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import Cell, load_cell
+from hexacell.controller_config.interface import ControllerGeometry
 from hexacell.errors import HexacellError, LimitError
+from hexacell.experiment_design import candidates
+from hexacell.experiment_design.validation_poses import select_validation_poses
 from hexacell.identification.estimator import identify
+from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.pose import Pose
 from hexacell.kinematics.rotations import Array
-from hexacell.measurements.records import MeasurementSet
-from hexacell.robot_model import Robot, robot_of
+from hexacell.robot_model import Robot, make_robot, robot_of
 from hexacell.study import data_sets
+from hexacell.study.simulated_campaign import SimulatedCampaign
 from tests.benchmarks.virtual_calibration import robot_that_reaches
-from tests.benchmarks.watched_robot import Seen, WatchedCampaign
+from tests.benchmarks.watched_robot import Seen, WatchedRobot, watch
 
 pytestmark = pytest.mark.benchmark
 
@@ -37,6 +43,9 @@ DESIGNS = 60
 
 COMPARED = 6
 """Robots on which it is."""
+
+CANDIDATES = 512
+"""Of held-out poses."""
 
 MOST_TIMES = 1.3
 
@@ -49,6 +58,7 @@ class Outcome:
     seen: Seen = field(default_factory=Seen)
     records: int = 0
     points: int = 0
+    held_out: int = 0
     sigma_mm: float = np.nan
     margin: float = np.nan
     reason: str = ""
@@ -69,32 +79,59 @@ def robot_that_stands(cell: Cell, robot: Robot, random: np.random.Generator) -> 
             return truth
 
 
-def task_sigma(cell: Cell, robot: Robot, records: MeasurementSet) -> float:
+def task_sigma(cell: Cell, robot: Robot, found: Identification) -> float:
     """Predicted error at the worst task pose, one standard deviation, mm."""
-    found = identify(robot.problem(records))
     belief = robot.belief(found)
     error = Task.of(cell.settings, robot, belief).error(belief)
     assert error is not None
     return error.worst(found.free_covariance)
 
 
+def visit_held_out(
+    cell: Cell, robot: Robot, found: Identification, truth: Geometry, seen: Seen, seed: int
+) -> int:
+    """Move through the held-out poses of a robot with some geometry in its controller; how many points."""
+    watched = WatchedRobot(robot, truth, np.random.default_rng(seed), seen)
+    belief, wanted, visited = robot.belief(found), cell.settings.verification, 0
+    turns = candidates.orientations(
+        CANDIDATES, belief.limits.tilt, wanted.seed, most_twist=belief.limits.turn
+    )
+    for point in wanted.points:
+        ball = robot.from_commands([Pose(*point)]).positions[0]
+        with suppress(LimitError):
+            poses = select_validation_poses(belief, ball, wanted.orientations, turns, found.poses.rotations)
+            commands = [robot.to_command(poses.pose(row)) for row in range(len(poses))]
+            watched.place(commands[0])
+            for command in (*commands[1:], commands[0]):
+                watched.move(command)
+            visited += 1
+    return visited
+
+
 def outcome(number: int) -> Outcome:
     cell, robot = bundled()
     random = np.random.default_rng([11, number])
     truth = robot_that_stands(cell, robot, random)
-    campaign = WatchedCampaign(cell.settings, robot, truth, random)
+    campaign = SimulatedCampaign(cell.settings, robot, truth, random)
+    watched = watch(campaign, random)
     try:
         campaign.carry_out()
-        sigma = task_sigma(cell, robot, campaign.measurements)
+        found = identify(robot.problem(campaign.measurements))
+        sigma = task_sigma(cell, robot, found)
+        held_out = visit_held_out(cell, robot, found, truth, watched.seen, number)
+        written = as_written(cell.settings, robot, found.geometry).geometry
+        after = make_robot(cell.settings, ControllerGeometry(written, robot.branch), taught=written)
+        held_out += visit_held_out(cell, after, found, truth, watched.seen, number)
     except HexacellError as error:
-        return Outcome(number, campaign.watched.seen, reason=str(error))
+        return Outcome(number, watched.seen, reason=str(error))
     return Outcome(
         number,
-        campaign.watched.seen,
+        watched.seen,
         len(campaign.measurements),
         len(np.unique(campaign.measurements.points)),
+        held_out,
         sigma,
-        campaign.watched.smallest_margin,
+        watched.smallest_margin,
     )
 
 
@@ -104,7 +141,7 @@ def outcomes(numbers: range) -> list[Outcome]:
 
 
 def test_no_command_leaves_the_limits(say):
-    _, robot = bundled()
+    cell, robot = bundled()
     found = outcomes(range(CAMPAIGNS))
     limits = robot.limits
     assert limits.legs is not None
@@ -124,7 +161,9 @@ def test_no_command_leaves_the_limits(say):
     say("  robots beyond a cone, with legs too near", f"{len(beyond)}, {len(close)}", f"none; {beyond[:9]}")
     margins = [one.margin for one in found if np.isfinite(one.margin)]
     say("  smallest singularity margin on the way", f"{min(margins):.4f}", "")
-    left = sum(one.points < len(bundled()[0].settings.identification.points) for one in found)
+    left = sum(one.points < len(cell.settings.identification.points) for one in found)
+    visited, planned = sum(one.held_out for one in found), 2 * len(cell.settings.verification.points)
+    say("  held-out points visited, before and after", f"{visited} of {planned * len(found)}", "")
     say("  given up; with a point left whose reference is beyond", f"{len(given_up)}; {left}", "none;")
     for one in given_up:
         say("  given up", f"{one.number}", one.reason)
@@ -152,7 +191,8 @@ def best_fixed(cell: Cell, robot: Robot, truth: Geometry, random: np.random.Gene
             design = data_sets.within_travel(robot, truth, points, settings.orientations, amplitude, random)
         except LimitError:
             continue
-        sigmas.append(task_sigma(cell, robot, design.measured(0.01, random)))
+        found = identify(robot.problem(design.measured(0.01, random)))
+        sigmas.append(task_sigma(cell, robot, found))
     return min(sigmas, default=np.nan)
 
 

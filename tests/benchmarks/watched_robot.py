@@ -6,11 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hexacell.cell.model import CellSettings
+from hexacell.campaign.dry_run import VirtualCampaign
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.robot_model import Robot
-from hexacell.study.simulated_campaign import SimulatedCampaign
 from hexacell.virtual_robot import VirtualRobot
 
 
@@ -28,11 +27,13 @@ class Seen:
 
 
 class WatchedRobot(VirtualRobot):
-    """A virtual robot that notes what its limits say of the end of each move."""
+    """A virtual robot that notes what its limits say of the end of each move, in ``seen``."""
 
-    def __init__(self, model: Robot, truth: Geometry, random: np.random.Generator) -> None:
+    def __init__(
+        self, model: Robot, truth: Geometry, random: np.random.Generator, seen: Seen | None = None
+    ) -> None:
         super().__init__(model, truth, random)
-        self.seen = Seen()
+        self.seen = Seen() if seen is None else seen
 
     def place(self, command: Pose) -> None:
         super().place(command)
@@ -57,17 +58,8 @@ class WatchedRobot(VirtualRobot):
         seen.distance_mm = min(seen.distance_mm, float(legs.smallest_distance()[0]))
 
 
-class WatchedCampaign(SimulatedCampaign):
-    """A campaign with a watched robot."""
-
-    def __init__(
-        self,
-        settings: CellSettings,
-        robot: Robot,
-        truth: Geometry,
-        random: np.random.Generator,
-        provisional: bool = False,
-    ) -> None:
-        super().__init__(settings, robot, truth, random, provisional)
-        self.watched = WatchedRobot(robot, truth, random)
-        self.virtual_robot = self.watched
+def watch(campaign: VirtualCampaign, random: np.random.Generator) -> WatchedRobot:
+    """Have a campaign carried out on a watched robot of the same geometry."""
+    watched = WatchedRobot(campaign.plan.robot, campaign.virtual_robot.truth, random)
+    campaign.virtual_robot = watched
+    return watched

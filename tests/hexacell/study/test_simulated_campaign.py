@@ -10,7 +10,8 @@ from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import load_cell
 from hexacell.identification.estimator import identify
 from hexacell.robot_model import robot_of
-from tests.benchmarks.watched_robot import WatchedCampaign
+from hexacell.study.simulated_campaign import SimulatedCampaign
+from tests.benchmarks.watched_robot import watch
 
 
 @pytest.fixture
@@ -22,7 +23,7 @@ def make_campaign(paper):
     truth, _ = robot.mechanism.normalize_frames(paper.actual)
 
     def make(**options):
-        return WatchedCampaign(settings, robot, truth, np.random.default_rng(5), **options)
+        return SimulatedCampaign(settings, robot, truth, np.random.default_rng(5), **options)
 
     return make
 
@@ -47,8 +48,8 @@ def test_a_campaign_measures_all_poses_safely_and_identifies_the_robot(make_camp
 def test_no_command_stop_or_return_is_beyond_a_limit(make_campaign, provisional):
     """Passive joints and legs are those of the real robot, which the program does not know."""
     campaign = make_campaign(provisional=provisional)
+    seen, limits = watch(campaign, np.random.default_rng(5)).seen, campaign.robot.limits
     campaign.carry_out()
-    seen, limits = campaign.watched.seen, campaign.robot.limits
     assert seen.moves > len(campaign.measurements)
     assert 30.0 < seen.tilt <= 45.0 + 1e-6
     assert 30.0 < seen.turn <= 60.0 + 1e-6

@@ -207,11 +207,15 @@ def test_the_controller_holds_what_was_identified_and_nothing_else_was_touched(d
 
 
 def test_the_identified_geometry_is_the_true_one(demo):
+    """Within five of its standard deviations: which noise a record meets differs from run to run."""
     truth = tomllib.loads(demo.cell.read_text())["simulation"]["geometry"]
     nominal = tomllib.loads(demo.cell.read_text())["robot"]["nominal"]
-    result = json.loads((demo.run / "result.json").read_text())["geometry"]
+    result = json.loads((demo.run / "result.json").read_text())
     for name in ("S", "B", "l"):
-        assert np.abs(np.subtract(result[name], truth[name])).max() < 1.2
+        error = np.abs(np.subtract(result["geometry"][name], truth[name]))
+        sigma = np.array(result["sigma"][name])
+        assert sigma.max() < 1.5
+        assert (error <= 5.0 * sigma + 1e-9).all(), error / np.where(sigma > 0.0, sigma, np.inf)
         assert np.abs(np.subtract(nominal[name], truth[name])).max() > 5.0
 
 

@@ -32,13 +32,13 @@ class RunProgress:
         """Show one event."""
         if not self.has_started:
             # Reset, not updated: records of an earlier attempt do not count for the present speed.
-            self.bar.reset(self._task, completed=completed(state))
+            self.bar.reset(self._task, completed=state.completed)
             self.has_started = True
         if _may_ask(event):
             self.bar.stop()
         else:
             self.bar.start()
-        self.bar.update(self._task, completed=completed(state), description=activity(event))
+        self.bar.update(self._task, completed=state.completed, description=activity(event))
         for line in self._formatter.lines(event, state):
             self._console.print(line)
 
@@ -70,8 +70,3 @@ def _bar() -> Progress:
         # Text for the same terminal goes above the bar; text for a file or a pipe goes there.
         redirect_stdout=sys.stdout is not None and sys.stdout.isatty(),
     )
-
-
-def completed(state: RunState) -> int:
-    """Number of records and closed sets, of which a run is made."""
-    return sum(len(measured.samples) + measured.closed for measured in state.sets.values())

@@ -81,6 +81,11 @@ class RunState:
         """The sets that are not closed, in the order in which they were begun."""
         return [key for key, measured in self.sets.items() if not measured.closed]
 
+    @property
+    def completed(self) -> int:
+        """Number of records and closed sets, of which a run is made."""
+        return sum(len(measured.samples) + measured.closed for measured in self.sets.values())
+
     def attempts(self, kind: FailureKind, step: Step | None) -> int:
         """How often a step, or another one of its set, failed in this way."""
         return self.failures.get((kind, _place_of(step)), 0)

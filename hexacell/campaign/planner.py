@@ -33,7 +33,6 @@ from hexacell.campaign.task_accuracy import Task
 from hexacell.cell.model import CellSettings
 from hexacell.errors import IdentifiabilityError, LimitError
 from hexacell.experiment_design.candidates import ReachableTargets
-from hexacell.experiment_design.travel_monte_carlo import orientation_sigma
 from hexacell.identification.belief import RobotBelief
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.rotations import Array
@@ -96,7 +95,7 @@ class Plan:
         if found is None:
             return False
         last = ReachableTargets(found.poses[[-1]], found.problem.joints[[-1]])
-        return orientation_sigma(estimate.belief, last) <= PROVISIONAL_SIGMA
+        return estimate.belief.orientation_sigma(last.poses, last.joints) <= PROVISIONAL_SIGMA
 
     def forecast(self, state: CampaignState) -> Forecast | None:
         """The gain of further records; None without task poses."""
@@ -231,7 +230,10 @@ class Plan:
         except IdentifiabilityError:
             return True  # the identification reports what is wrong with the records
         actual = belief.commanded.actual_poses(reference)
-        if not actual.found[0] or not belief.keeps_limits(actual.poses, actual.joints)[0]:
+        if not actual.found[0]:
+            return False
+        spare = belief.spare_angle(actual)
+        if not belief.keeps_limits(actual.poses, actual.joints, spare)[0]:
             return False
         return is_clear(belief, reference, reference)
 

@@ -17,7 +17,6 @@ from hexacell.experiment_design.candidates import Amplitudes
 from hexacell.experiment_design.criteria import D_OPTIMAL, Criterion
 from hexacell.experiment_design.pose_selection import SelectedPose, select_from_list, select_pose
 from hexacell.experiment_design.predicted_records import GaugeZero
-from hexacell.experiment_design.travel_monte_carlo import orientation_sigma
 from hexacell.identification.belief import RobotBelief
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.motion.paths import PathPlanner, find_route
@@ -98,7 +97,8 @@ class PoseChooser:
             waiting = without_visited(self.pose_list.at(state.point or 0)[1:], _visited(state))
             return select_from_list(planner, zero, self.robot.from_commands(waiting), state.rejections)
         tilt = tilt_share * belief.limits.tilt
-        well_known = orientation_sigma(belief, zero.target) <= WELL_KNOWN_SIGMA
+        target = zero.target
+        well_known = belief.orientation_sigma(target.poses, target.joints) <= WELL_KNOWN_SIGMA
         amplitudes = Amplitudes.MOSTLY_LARGE if well_known else Amplitudes.ALL_SCALES
         orientations = candidates.orientations(
             self.candidates, tilt, self._seed(state), amplitudes, belief.limits.turn

@@ -28,7 +28,7 @@ import numpy as np
 
 from hexacell.experiment_design.candidates import ReachableTargets
 from hexacell.experiment_design.predicted_records import GaugeZero, PredictedRecords, predict_records
-from hexacell.identification.belief import SPARE_ANGLE, RobotBelief
+from hexacell.identification.belief import SPARE_ANGLE, SPARE_SIGMAS, UNCERTAIN_SIGMA, RobotBelief
 from hexacell.kinematics.forward import apply_twist, forward_kinematics
 from hexacell.kinematics.geometry import GeometryBatch
 from hexacell.kinematics.limits import Limits
@@ -40,10 +40,6 @@ from hexacell.motion.paths import Path
 LINEAR_SHARE = 0.4
 """Of the travel. Within it, at four sigma, linear propagation is believed unless the orientation is
 uncertain: the ball stays inside even if the prediction is wrong by a factor of two."""
-
-UNCERTAIN_SIGMA = float(np.radians(3.0))
-"""Standard deviation, rad, beyond which the orientation is uncertain. Under the drawing's tolerances one
-robot in a hundred then deviates twenty times as far as linear propagation gives."""
 
 HALF_TRAVEL_SIGMA = float(np.radians(6.0))
 """Standard deviation of the orientation, rad, at which half of the travel may be used."""
@@ -93,7 +89,7 @@ class TravelConstraint:
 
     def _legs_are_free(self, targets: ReachableTargets) -> Mask:
         """At which of n targets passive joints have angles left for the orientation's uncertainty."""
-        belief, spare = self.belief, SPARE_ANGLE + SIGMAS * self._orientation_sigma
+        belief, spare = self.belief, SPARE_ANGLE + SPARE_SIGMAS * self._orientation_sigma
         return belief.limits.allow_legs(
             belief.mechanism, belief.estimate, targets.poses, targets.joints, spare
         )
@@ -106,7 +102,7 @@ class TravelConstraint:
         # The reference is estimated from its records, so that it closes the legs only approximately.
         poses = forward_kinematics(belief.mechanism, belief.estimate, joints, poses).poses
         sensitivity = pose_sensitivity(belief.mechanism, belief.estimate, poses, joints)
-        sigma = _orientation_sigma(belief, sensitivity)
+        sigma = belief.orientation_sigma_from(sensitivity)
         is_uncertain = sigma > UNCERTAIN_SIGMA
         samples = SAMPLES_UNCERTAIN if is_uncertain else SAMPLES
         sampled = _sample(belief, samples, joints, poses, sensitivity)
@@ -122,21 +118,8 @@ class TravelConstraint:
 
     @cached_property
     def _orientation_sigma(self) -> float:
-        return orientation_sigma(self.belief, self.zero.target)
-
-
-def orientation_sigma(belief: RobotBelief, targets: ReachableTargets) -> float:
-    """Standard deviation, rad, of the platform's orientation at the first of some targets.
-
-    About the base axis about which it is known least.
-    """
-    sensitivity = pose_sensitivity(belief.mechanism, belief.estimate, targets.poses, targets.joints)
-    return _orientation_sigma(belief, sensitivity)
-
-
-def _orientation_sigma(belief: RobotBelief, sensitivity: Sensitivity) -> float:
-    rotation = sensitivity.parameters[0, 3:] @ belief.basis
-    return float(np.sqrt(np.einsum("ip,pq,iq->i", rotation, belief.covariance, rotation).max()))
+        target = self.zero.target
+        return self.belief.orientation_sigma(target.poses, target.joints)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -144,12 +127,15 @@ class _SampledRobots:
     """Robots (r) that can take the reference pose, at n targets.
 
     Attributes:
-        found: (r, n) whether they take the target clear of singularities, passive joints and legs free.
+        found: (r, n) whether they take the target clear of singularities.
         deviations: (r, n, 3), mm, from the reference.
+        leg_margins: (r, n, m) of passive joints and legs; see
+            :meth:`~hexacell.kinematics.limits.Limits.leg_margins`.
     """
 
     found: Mask
     deviations: Array
+    leg_margins: Array
 
 
 def _sample(
@@ -172,30 +158,36 @@ def _sample(
     found = result.found.reshape(samples, count)
     everywhere = (robots, result.poses, joints[rows])
     is_clear = has_singularity_margin(belief.mechanism, *everywhere, MARGIN_SHARE * margin)
-    are_free = belief.limits.allow_legs(belief.mechanism, *everywhere)
-    found &= (is_clear & are_free).reshape(samples, count)
+    found &= is_clear.reshape(samples, count)
+    leg_margins = belief.limits.leg_margins(belief.mechanism, *everywhere).reshape(samples, count, -1)
     first = np.arange(samples) * count
     at_reference = (robots.subset(first), result.poses[first], joints[np.zeros(samples, dtype=int)], margin)
     # A robot next to a singularity at its reference is refused before anything moves, and one whose joints
     # are at their end there does not come to the reference.
     kept = found[:, 0] & has_singularity_margin(belief.mechanism, *at_reference)
+    kept &= (leg_margins[:, 0] >= 0.0).all(axis=-1)
     positions = result.poses.positions.reshape(samples, count, 3)[kept]
-    return _SampledRobots(found[kept, 1:], positions[:, 1:] - positions[:, :1])
+    return _SampledRobots(found[kept, 1:], positions[:, 1:] - positions[:, :1], leg_margins[kept, 1:])
 
 
 def _nearly_all_within(sampled: _SampledRobots, limits: Limits, share: float) -> Mask:
-    """At which targets all sampled robots but the worst stay within a share of the gauges' room."""
+    """At which targets all sampled robots but the worst stay within a share of the gauges' room.
+
+    Of all that take the target the legs are free.
+    """
     stay = sampled.found & limits.within_travel(sampled.deviations, share=share)
-    within: Mask = np.count_nonzero(~stay, axis=0) <= 1
+    are_free = (sampled.leg_margins >= 0.0).all(axis=-1)
+    within: Mask = (np.count_nonzero(~stay, axis=0) <= 1) & (are_free | ~sampled.found).all(axis=0)
     return within
 
 
 def _all_within(sampled: _SampledRobots, limits: Limits, share: float) -> Mask:
     """At which targets all sampled robots, and those that ``SIGMAS`` predict, stay within a share of it."""
-    deviations = sampled.deviations
+    deviations, margins = sampled.deviations, sampled.leg_margins
     predicted = limits.within_travel(deviations.mean(axis=0), SIGMAS * deviations.std(axis=0), share)
     stay = sampled.found & limits.within_travel(deviations, share=share)
-    within: Mask = np.all(stay, axis=0) & predicted
+    are_free = (margins.mean(axis=0) >= SPARE_SIGMAS * margins.std(axis=0)).all(axis=-1)
+    within: Mask = np.all(stay, axis=0) & predicted & are_free
     return within
 
 

@@ -116,6 +116,16 @@ class LegLimits:
             distance_mm=min(self.distance_mm, max(0.0, nearest)),
         )
 
+    def margins(self, legs: Legs) -> Array:
+        """By how much n poses keep these limits, (n, 12 or 13), negative beyond them.
+
+        The spare angles of the passive joints, rad, then the legs' spare distance, mm, if it has a limit.
+        """
+        angles = self.spare_angles(legs).reshape(-1, 12)
+        if self.distance_mm == 0.0:
+            return angles
+        return np.column_stack([angles, legs.smallest_distance() - self.distance_mm])
+
     def are_kept(self, legs: Legs, spare: float = 0.0, spare_mm: Array | float = 0.0) -> Mask:
         """At which of n poses; each passive joint has ``spare``, rad, left, each two legs ``spare_mm``."""
         kept = np.asarray((self.spare_angles(legs) >= spare).all(axis=(-2, -1)))

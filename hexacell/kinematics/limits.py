@@ -139,6 +139,17 @@ class Limits:
         spare_mm = spare * mechanism.platform_radius(geometry)
         return self.legs.are_kept(mechanism.legs(geometry, poses, joints), spare, spare_mm)
 
+    def leg_margins(
+        self, mechanism: Mechanism, geometry: Geometry | GeometryBatch, poses: PoseBatch, joints: Array
+    ) -> Array:
+        """By how much passive joints and legs keep their limits at n poses: (n, m), m = 0 without limits.
+
+        See :meth:`LegLimits.margins <hexacell.kinematics.legs.LegLimits.margins>`.
+        """
+        if self.legs is None:
+            return np.zeros((len(joints), 0))
+        return self.legs.margins(mechanism.legs(geometry, poses, joints))
+
     def including(
         self,
         mechanism: Mechanism,

@@ -232,8 +232,8 @@ class Plan:
         actual = belief.commanded.actual_poses(reference)
         if not actual.found[0]:
             return False
-        spare = belief.spare_angle(actual)
-        if not belief.keeps_limits(actual.poses, actual.joints, spare)[0]:
+        wanted = belief.margins_at(actual)
+        if not belief.keeps_limits(actual.poses, actual.joints, wanted)[0]:
             return False
         return is_clear(belief, reference, reference)
 

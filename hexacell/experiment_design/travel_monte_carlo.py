@@ -89,10 +89,10 @@ class TravelConstraint:
 
     def _legs_are_free(self, targets: ReachableTargets) -> Mask:
         """At which of n targets passive joints have angles left for the orientation's uncertainty."""
-        belief, spare = self.belief, SPARE_ANGLE + SPARE_SIGMAS * self._orientation_sigma
-        return belief.limits.allow_legs(
-            belief.mechanism, belief.estimate, targets.poses, targets.joints, spare
-        )
+        belief, sigma = self.belief, self._orientation_sigma
+        wanted = belief.margins_for(SPARE_ANGLE + SPARE_SIGMAS * sigma)
+        at = (belief.mechanism, belief.estimate, targets.poses, targets.joints)
+        return belief.limits.allow_legs(*at, wanted)
 
     def _holds_for_samples(self, targets: ReachableTargets) -> Mask:
         """At which of n targets the constraint holds on the robots sampled from the belief."""

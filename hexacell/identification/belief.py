@@ -9,7 +9,8 @@ import numpy as np
 
 from hexacell.identification.problem.problem import Noise
 from hexacell.kinematics.commanded_motion import ActualPoses, CommandedRobot
-from hexacell.kinematics.geometry import Geometry
+from hexacell.kinematics.forward import apply_twist
+from hexacell.kinematics.geometry import Geometry, GeometryBatch
 from hexacell.kinematics.limits import Limits
 from hexacell.kinematics.mechanism import Branch, Mechanism
 from hexacell.kinematics.pose import PoseBatch
@@ -84,30 +85,59 @@ class RobotBelief:
         rotation = sensitivity.parameters[0, 3:] @ self.basis
         return float(np.sqrt(np.einsum("ip,pq,iq->i", rotation, self.covariance, rotation).max()))
 
-    def spare_angle(self, at: ActualPoses) -> float:
-        """What passive joints are to have left, rad, on a way from the first of some poses.
+    @cached_property
+    def least_margins(self) -> Array:
+        """What passive joints and legs are to have left (m,) for ``SPARE_ANGLE``, or () without limits."""
+        return self.margins_for(SPARE_ANGLE)
 
-        While the orientation is uncertain nothing of use would be left; the robot then goes only where
-        robots drawn within the tolerances were tried.
+    def margins_for(self, turn: float) -> Array:
+        """What they are to have left should the platform be turned by an angle, rad, from the estimate."""
+        if self.limits.legs is None:
+            return np.zeros(())
+        return self.limits.legs.margins_for(turn, float(self.mechanism.platform_radius(self.estimate)))
+
+    def margins_at(self, at: ActualPoses) -> Array:
+        """What they are to have left (m,) where the robot goes without a record, from the first of n poses.
+
+        ``SPARE_SIGMAS`` of what is not known of them there. While the orientation is uncertain nothing of
+        use would be left; the robot then goes only where robots drawn within the tolerances were tried.
         """
-        sigma = self.orientation_sigma(at.poses, at.joints)
-        return SPARE_ANGLE if sigma > UNCERTAIN_SIGMA else SPARE_ANGLE + SPARE_SIGMAS * sigma
+        poses, joints = at.poses[:1], at.joints[:1]
+        sensitivity = pose_sensitivity(self.mechanism, self.estimate, poses, joints)
+        if self.orientation_sigma_from(sensitivity) > UNCERTAIN_SIGMA:
+            return self.least_margins
+        changes = np.vstack([np.zeros(len(self.basis)), self._principal_changes])
+        rows = np.zeros(len(changes), dtype=int)
+        robots = GeometryBatch(self.mechanism.parameters, self.estimate.vector + changes)
+        moved = apply_twist(poses[rows], changes @ sensitivity.parameters[0].T)
+        margins = self.limits.leg_margins(self.mechanism, robots, moved, joints[rows])
+        sigma: Array = np.linalg.norm(margins[1:] - margins[0], axis=0)
+        return self.least_margins + SPARE_SIGMAS * sigma
 
-    def keeps_limits(self, poses: PoseBatch, joints: Array, spare: float = SPARE_ANGLE) -> Mask:
+    @property
+    def _principal_changes(self) -> Array:
+        """(p, P): one standard deviation along each principal axis of the parameters' distribution, mm."""
+        variances, axes = np.linalg.eigh(self.covariance)
+        changes: Array = np.sqrt(np.maximum(variances, 0.0))[:, None] * axes.T @ self.basis.T
+        return changes
+
+    def keeps_limits(self, poses: PoseBatch, joints: Array, wanted: Array | None = None) -> Mask:
         """At which of n poses, with joint variables (n, 6), mm, the estimated robot keeps its limits.
 
-        Those of tilt and turn, joint ranges, passive joints (with ``spare`` left, rad) and legs; an
-        unreachable pose (NaN) does not.
+        Those of tilt and turn, joint ranges, passive joints and legs, with the ``wanted`` margins (m,) or
+        the least ones; an unreachable pose (NaN) does not.
         """
         kept = self.limits.allow_poses(poses, joints)
         of_estimate = (self.mechanism, self.estimate, poses[kept], joints[kept])
-        kept[kept] = self.limits.allow_legs(*of_estimate, spare)
+        wanted = self.least_margins if wanted is None else wanted
+        kept[kept] = self.limits.allow_legs(*of_estimate, wanted)
         return kept
 
     def standing_at(
-        self, command: PoseBatch, actual: ActualPoses, spare: float = SPARE_ANGLE
+        self, command: PoseBatch, actual: ActualPoses, wanted: Array | None = None
     ) -> RobotBelief:
         """The same, its limits widened where the robot is beyond them at a command (1)."""
         at = (command, actual.poses, actual.joints)
-        limits = self.limits.including(self.mechanism, self.estimate, *at, spare)
+        wanted = self.least_margins if wanted is None else wanted
+        limits = self.limits.including(self.mechanism, self.estimate, *at, wanted)
         return replace(self, limits=limits)

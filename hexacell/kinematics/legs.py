@@ -105,19 +105,8 @@ class LegLimits:
         at_platform = self.platform_cones - angles_between(legs.directions_in_platform, self.platform_axes)
         return np.stack([at_base, at_platform], axis=-2)
 
-    def including(self, legs: Legs, spare: float, spare_mm: Array | float) -> LegLimits:
-        """These limits, widened where legs at one pose (1) do not keep them with what is to be spare."""
-        beyond = np.maximum(0.0, spare - self.spare_angles(legs)[0] + ROUNDING)
-        nearest = float(np.min(legs.smallest_distance() - spare_mm)) - ROUNDING
-        return replace(
-            self,
-            base_cones=self.base_cones + beyond[0],
-            platform_cones=self.platform_cones + beyond[1],
-            distance_mm=min(self.distance_mm, max(0.0, nearest)),
-        )
-
     def margins(self, legs: Legs) -> Array:
-        """By how much n poses keep these limits, (n, 12 or 13), negative beyond them.
+        """By how much n poses keep these limits, (n, m), negative beyond them.
 
         The spare angles of the passive joints, rad, then the legs' spare distance, mm, if it has a limit.
         """
@@ -126,12 +115,24 @@ class LegLimits:
             return angles
         return np.column_stack([angles, legs.smallest_distance() - self.distance_mm])
 
-    def are_kept(self, legs: Legs, spare: float = 0.0, spare_mm: Array | float = 0.0) -> Mask:
-        """At which of n poses; each passive joint has ``spare``, rad, left, each two legs ``spare_mm``."""
-        kept = np.asarray((self.spare_angles(legs) >= spare).all(axis=(-2, -1)))
-        if self.distance_mm > 0.0:
-            kept = kept & np.asarray(legs.smallest_distance() >= self.distance_mm + spare_mm)
-        return kept
+    def margins_for(self, turn: float, radius_mm: float) -> Array:
+        """Margins (m,) that hold should a platform of some radius turn by an angle, rad."""
+        turns = np.full(12, turn)
+        return turns if self.distance_mm == 0.0 else np.append(turns, turn * radius_mm)
+
+    def including(self, legs: Legs, wanted: Array | float = 0.0) -> LegLimits:
+        """These limits, widened where the margins at one pose (1) are less than wanted (m,)."""
+        missing = np.maximum(0.0, wanted - self.margins(legs)[0] + ROUNDING)
+        return replace(
+            self,
+            base_cones=self.base_cones + missing[:6],
+            platform_cones=self.platform_cones + missing[6:12],
+            distance_mm=max(0.0, self.distance_mm - float(missing[12:].sum())),
+        )
+
+    def are_kept(self, legs: Legs, wanted: Array | float = 0.0) -> Mask:
+        """At which of n poses, with at least the wanted margins (m,)."""
+        return np.asarray((self.margins(legs) >= wanted).all(axis=-1))
 
 
 def _dot(one: Array, other: Array) -> Array:

@@ -128,16 +128,11 @@ class Limits:
         geometry: Geometry | GeometryBatch,
         poses: PoseBatch,
         joints: Array,
-        spare: float = 0.0,
+        wanted: Array | float = 0.0,
     ) -> Mask:
-        """At which of n poses a robot's passive joints and legs keep their limits.
-
-        With ``spare``, rad: should the platform be turned by this angle, they would still keep them.
-        """
-        if self.legs is None:
-            return np.ones(len(joints), dtype=bool)
-        spare_mm = spare * mechanism.platform_radius(geometry)
-        return self.legs.are_kept(mechanism.legs(geometry, poses, joints), spare, spare_mm)
+        """At which of n poses a robot's passive joints and legs keep their limits, with margins (m,)."""
+        margins = self.leg_margins(mechanism, geometry, poses, joints)
+        return np.asarray((margins >= wanted).all(axis=-1))
 
     def leg_margins(
         self, mechanism: Mechanism, geometry: Geometry | GeometryBatch, poses: PoseBatch, joints: Array
@@ -157,7 +152,7 @@ class Limits:
         command: PoseBatch,
         actual: PoseBatch,
         joints: Array,
-        spare: float = 0.0,
+        wanted: Array | float = 0.0,
     ) -> Limits:
         """These limits, widened where a robot is beyond them: it may come back, and not go farther.
 
@@ -167,7 +162,7 @@ class Limits:
             command: where it was commanded to (1), in the convention's frames.
             actual: its pose (1).
             joints: its joint variables there (1, 6), mm.
-            spare: what passive joints should have left, rad; see :meth:`allow_legs`.
+            wanted: margins (m,) of passive joints and legs; see :meth:`leg_margins`.
         """
         given = [self.frames.inverse().poses(poses) for poses in (command, actual)]
         widened = replace(
@@ -180,11 +175,7 @@ class Limits:
         )
         if self.legs is None:
             return widened
-        legs, spare_mm = (
-            mechanism.legs(geometry, actual, joints),
-            spare * mechanism.platform_radius(geometry),
-        )
-        return replace(widened, legs=self.legs.including(legs, spare, spare_mm))
+        return replace(widened, legs=self.legs.including(mechanism.legs(geometry, actual, joints), wanted))
 
     def _allow_orientations(self, poses: PoseBatch) -> Mask:
         """Which of n poses in the controller's frames keep tilt and turn."""

@@ -15,7 +15,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from hexacell.identification.belief import SPARE_ANGLE, RobotBelief
+from hexacell.identification.belief import RobotBelief
 from hexacell.kinematics.commanded_motion import ActualPoses
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.pose import PoseBatch
@@ -124,7 +124,7 @@ class LinesFrom:
     def _keeps_limits(self, actual: PoseBatch, joints: Array, rows: NDArray[np.intp]) -> Mask:
         """On which of some lines the estimated robot keeps its limits."""
         poses, at = actual[:, rows].reshape(-1), joints[:, rows].reshape(-1, 6)
-        kept = self._belief.keeps_limits(poses, at, self._spare_angle).reshape(len(joints), len(rows))
+        kept = self._belief.keeps_limits(poses, at, self._wanted_margins).reshape(len(joints), len(rows))
         return np.asarray(kept.all(axis=0))
 
     def _trace(
@@ -148,12 +148,14 @@ class LinesFrom:
         """The robot that may be beyond a limit where it stands, and come back from there."""
         if not self._actual_start.found[0]:
             return self.belief
-        return self.belief.standing_at(self.start, self._actual_start, self._spare_angle)
+        return self.belief.standing_at(self.start, self._actual_start, self._wanted_margins)
 
     @cached_property
-    def _spare_angle(self) -> float:
-        """Of passive joints. With gauges at the ball whoever chooses a record checks how sure they are."""
-        return SPARE_ANGLE if self.reference is not None else self.belief.spare_angle(self._actual_start)
+    def _wanted_margins(self) -> Array:
+        """Of passive joints and legs. With gauges at the ball whoever chooses a record checks more."""
+        if self.reference is not None or not self._actual_start.found[0]:
+            return self.belief.least_margins
+        return self.belief.margins_at(self._actual_start)
 
     @cached_property
     def _actual_start(self) -> ActualPoses:

@@ -277,10 +277,13 @@ def test_no_provisional_geometry_before_the_robot_is_known_well_enough(campaign,
     assert plan.allows_provisional(campaign[-1].state)
 
 
-def test_a_point_whose_reference_is_beyond_a_limit_is_left(make_plan, carry_out):
+def test_a_point_whose_reference_is_beyond_a_limit_is_left_and_an_uncertain_one_put_off(
+    make_plan, carry_out
+):
     """No leg is turned by more than 17.6 deg at the references by the drawing, by 23.9 on the robot."""
-    narrow = PassiveJointSettings(platform_cone_deg=22.0)
+    narrow = PassiveJointSettings(platform_cone_deg=23.0)
     taken = carry_out(make_plan(limits__passive_joints=narrow, limits__tilt_deg=20.0), most=120)
-    begun = {one.decision.point for one in taken if isinstance(one.decision, StartPoint)}
-    assert begun == {1, 2, 3, 4}
+    begun = [one.decision.point for one in taken if isinstance(one.decision, StartPoint)]
+    # After point 1 the robot is not known well enough for points 2 and 3.
+    assert begun == [1, 4, 2, 3]
     assert taken[-1].decision.reason == "none of the remaining points can be reached safely"

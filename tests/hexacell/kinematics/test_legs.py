@@ -83,7 +83,7 @@ def test_a_platform_joint_turns_as_far_as_the_platform_does():
     np.testing.assert_allclose(spare[0, 1], 18.0, atol=1e-6)
     assert limits().are_kept(turned([1, 0, 0], 29.9))[0]
     assert not limits().are_kept(turned([1, 0, 0], 30.1))[0]
-    assert not limits().are_kept(turned([1, 0, 0], 29.9), spare=np.radians(0.2))[0]
+    assert not limits().are_kept(turned([1, 0, 0], 29.9), np.radians(0.2))[0]
 
 
 def test_a_turn_about_vertical_legs_turns_no_joint():
@@ -95,12 +95,14 @@ def test_legs_that_come_too_near_are_seen():
     assert apart == pytest.approx(2 * 50.0 * np.sin(0.5), abs=1.0)
     assert limits(distance=apart - 0.1).are_kept(turned([1, 0, 0], 0.0))[0]
     assert not limits(distance=apart + 0.1).are_kept(turned([1, 0, 0], 0.0))[0]
-    assert not limits(distance=apart - 0.1).are_kept(turned([1, 0, 0], 0.0), spare_mm=0.2)[0]
+    assert not limits(distance=apart - 0.1).are_kept(turned([1, 0, 0], 0.0), np.append(np.zeros(12), 0.2))[
+        0
+    ]
 
 
 def test_limits_that_include_a_pose_allow_it_and_nothing_beyond():
     here = turned([1, 0, 0], 33.0)
-    widened = limits(distance=60.0).including(here, spare=0.0, spare_mm=0.0)
+    widened = limits(distance=60.0).including(here)
     assert widened.are_kept(here)[0]
     assert widened.are_kept(turned([1, 0, 0], 10.0))[0]
     assert not widened.are_kept(turned([1, 0, 0], 33.1))[0]

@@ -151,6 +151,32 @@ def test_passive_joints_stay_in_their_cones_along_the_line(exactly, paper):
     assert is_clear(limited, at(0, 0, 550, 15), at(0, 0, 550, -15))
 
 
+def test_the_less_is_known_the_more_passive_joints_keep_on_a_way_without_gauges(know, limits, paper):
+    """With gauges at the ball the check of the record does the same, robot by robot."""
+    limited = replace(limits, legs=cones(20.0)(paper.nominal, paper.branch))
+    line = (at(0, 0, 550), at(0, 0, 550, 15))
+    reference = np.array([0.0, 0.0, 550.0])
+    known, vague = (know(paper.nominal, sigma, limits=limited) for sigma in (0.01, 1.0))
+    assert is_clear(known, *line)
+    assert not is_clear(vague, *line)
+    assert is_clear(vague, at(0, 0, 550), at(0, 0, 550, 5))
+    assert is_clear(vague, *line, reference) == is_clear(known, *line, reference)
+
+
+def test_margins_wanted_are_four_sigma_of_what_robots_drawn_show(know, limits, paper):
+    """Against Monte Carlo: margins of robots drawn from the belief, each moved by its own kinematics."""
+    limited = replace(limits, legs=cones(45.0, distance=30.0)(paper.nominal, paper.branch))
+    belief = know(paper.nominal, 0.05, limits=limited)
+    at_start = belief.commanded.actual_poses(at(0, -30, 560, 5))
+    drawn = []
+    for free in np.random.default_rng(3).multivariate_normal(belief.free, belief.covariance, size=300):
+        robot = replace(belief, free=free)
+        actual = robot.commanded.actual_poses(at(0, -30, 560, 5))
+        drawn.append(limited.leg_margins(robot.mechanism, robot.estimate, actual.poses, actual.joints)[0])
+    expected = belief.least_margins + 4.0 * np.std(drawn, axis=0)
+    np.testing.assert_allclose(belief.margins_at(at_start), expected, rtol=0.15)
+
+
 def test_legs_stay_apart_along_the_line(exactly, paper):
     near = exactly(legs=cones(180.0, distance=70.0)(paper.nominal, paper.branch))
     assert is_clear(exactly(), at(0, 0, 550), at(-100, 100, 500))

@@ -19,6 +19,9 @@ GRACE_S = 20.0  # for what is on its way out when a test returns; only a test th
 BENCHMARKS = Path(__file__).parent / "benchmarks"
 FAULTS = "fault-matrix"  # what a test calls the cases that it tried
 
+# As in the program and the Makefile: threads only slow small matrices down. Numpy is imported later.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
 settings.register_profile(
     "hexacell",
     deadline=None,  # a shared machine is slow now and then

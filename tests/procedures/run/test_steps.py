@@ -27,6 +27,7 @@ from hexacell.reporting.result import OutlierRecord
 from hexacell.reporting.verification import JudgedError, ModelTest, Verification, VerifiedAccuracy
 from procedures.journal.journal import Journal, read_journal
 from procedures.run import events
+from procedures.run.events import course, measuring, results
 from procedures.run.steps import (
     CloseSet,
     Compute,
@@ -298,10 +299,9 @@ def test_events_survive_the_journal(history: list[events.Event], tmp_path_factor
 def test_every_kind_of_event_is_in_the_union_and_under_test() -> None:
     kinds = {
         kind
-        for _, kind in inspect.getmembers(events, inspect.isclass)
-        if issubclass(kind, Frozen)
-        and "kind" in kind.model_fields
-        and kind.__module__ == "procedures.run.events"
+        for module in (course, measuring, results)
+        for _, kind in inspect.getmembers(module, inspect.isclass)
+        if issubclass(kind, Frozen) and "kind" in kind.model_fields and kind.__module__ == module.__name__
     }
     in_union = set(get_args(get_args(events.Event)[0]))
     names = [kind.model_fields["kind"].default for kind in in_union]

@@ -7,11 +7,11 @@ from collections.abc import Iterator
 import numpy as np
 
 from hexacell.errors import ReachError
-from hexacell.kinematics.legs import ROUNDING
 from hexacell.kinematics.mechanism import inverse_kinematics
 from hexacell.kinematics.pose import AXES, Pose, PoseBatch
 from hexacell.kinematics.rotations import Array
 from hexacell.kinematics.sensitivity import singularity_margin
+from hexacell.limits.leg_limits import ROUNDING
 from hexacell.robot_model import Robot
 
 

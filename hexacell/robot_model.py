@@ -21,10 +21,10 @@ from hexacell.identification.problem.problem import Noise, Prior, Problem, Toler
 from hexacell.identification.solver.result import GeometryEstimate, Identification
 from hexacell.kinematics.commanded_motion import CommandedRobot
 from hexacell.kinematics.geometry import Geometry
-from hexacell.kinematics.limits import Limits
 from hexacell.kinematics.mechanism import Branch, FrameTransform, Mechanism
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.refused_commands import RefusedCommands
+from hexacell.limits.limits import Limits
 from hexacell.measurements.records import MeasurementSet
 from hexacell.plugins import Group, load
 from hexacell.stated_effects import stated_effects

@@ -9,13 +9,14 @@ from hexacell.cell.limits import LimitSettings
 from hexacell.cell.model import CellSettings
 from hexacell.controller_config.interface import ControllerGeometry, JointRanges
 from hexacell.errors import ReachError
-from hexacell.kinematics.gauge_travel import GaugeTravel
 from hexacell.kinematics.geometry import Geometry
-from hexacell.kinematics.legs import LegLimits, Legs
-from hexacell.kinematics.limits import AxisLimits, Limits
+from hexacell.kinematics.legs import Legs
 from hexacell.kinematics.mechanism import Branch, FrameTransform, Mechanism
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array
+from hexacell.limits.gauge_travel import GaugeTravel
+from hexacell.limits.leg_limits import LegLimits
+from hexacell.limits.limits import AxisLimits, Limits
 
 NO_CONE_DEG = 180.0
 

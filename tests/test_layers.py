@@ -13,7 +13,7 @@ import pytest
 
 CHECKOUT = Path(__file__).parent.parent
 PACKAGES = ("hexacell", "drivers", "procedures")
-MATHEMATICS = ("kinematics", "identification", "uncertainty", "motion", "experiment_design")
+MATHEMATICS = ("kinematics", "limits", "identification", "uncertainty", "motion", "experiment_design")
 
 FORBIDDEN = [
     ("hexacell.errors", "hexacell.cli"),

@@ -19,8 +19,8 @@ from hexacell.controller_config.interface import ControllerGeometry
 from hexacell.controller_config.write_back import BEFORE, RECEIPT, Receipt
 from hexacell.errors import FileError
 from hexacell.kinematics.geometry import Geometry
-from hexacell.kinematics.limits import SAME_FRAMES
 from hexacell.kinematics.pose import Pose, PoseBatch
+from hexacell.limits.limits import SAME_FRAMES
 from hexacell.robot_model import Robot, config_format, robot_of_start
 from hexacell.runs.run_folder import RunFolder
 from hexacell.stated_limits import stated_limits

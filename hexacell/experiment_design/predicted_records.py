@@ -17,10 +17,10 @@ from hexacell.identification.belief import RobotBelief
 from hexacell.identification.solver.measurement_model import record_covariance, record_weights
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.forward import assembly_mode
-from hexacell.kinematics.limits import Limits
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array, Mask
 from hexacell.kinematics.sensitivity import pose_jacobian, position_sensitivity
+from hexacell.limits.limits import Limits
 
 SAFETY_SIGMAS = 4.0
 TRAVEL_SHARE = 0.9

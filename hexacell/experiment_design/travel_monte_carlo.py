@@ -31,10 +31,10 @@ from hexacell.experiment_design.predicted_records import GaugeZero, PredictedRec
 from hexacell.identification.belief import SPARE_ANGLE, SPARE_SIGMAS, UNCERTAIN_SIGMA, RobotBelief
 from hexacell.kinematics.forward import apply_twist, forward_kinematics
 from hexacell.kinematics.geometry import GeometryBatch
-from hexacell.kinematics.limits import Limits
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array, Mask
 from hexacell.kinematics.sensitivity import Sensitivity, has_singularity_margin, pose_sensitivity
+from hexacell.limits.limits import Limits
 from hexacell.motion.paths import Path
 
 LINEAR_SHARE = 0.4
@@ -130,7 +130,7 @@ class _SampledRobots:
         found: (r, n) whether they take the target clear of singularities.
         deviations: (r, n, 3), mm, from the reference.
         leg_margins: (r, n, m) of passive joints and legs; see
-            :meth:`~hexacell.kinematics.limits.Limits.leg_margins`.
+            :meth:`~hexacell.limits.limits.Limits.leg_margins`.
     """
 
     found: Mask

@@ -11,12 +11,12 @@ from hexacell.identification.problem.problem import Noise
 from hexacell.kinematics.commanded_motion import ActualPoses, CommandedRobot
 from hexacell.kinematics.forward import apply_twist
 from hexacell.kinematics.geometry import Geometry, GeometryBatch
-from hexacell.kinematics.limits import Limits
 from hexacell.kinematics.mechanism import Branch, Mechanism
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.refused_commands import RefusedCommands
 from hexacell.kinematics.rotations import Array, Mask
 from hexacell.kinematics.sensitivity import Sensitivity, pose_sensitivity
+from hexacell.limits.limits import Limits
 
 SPARE_ANGLE = float(np.radians(0.5))
 """Of passive joints, rad: what the estimate may be wrong by once many poses were measured."""

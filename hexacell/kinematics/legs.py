@@ -8,18 +8,15 @@ distance of two legs is that of the segments between their joints (Lumelsky, Inf
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
 
-from hexacell.kinematics.rotations import Array, Mask
+from hexacell.kinematics.rotations import Array
 
 PAIRS = np.array(list(combinations(range(6), 2)))
 """Of legs, counted from 0."""
-
-ROUNDING = 1e-9
-"""Of an angle, rad, or a length, mm: a pose at a limit is within it."""
 
 PARALLEL = 1e-12
 """Squared sine of the angle between two legs below which they are parallel."""
@@ -79,60 +76,6 @@ def segment_distances(start: Array, end: Array, other_start: Array, other_end: A
 def angles_between(vectors: Array, axes: Array) -> Array:
     """Angles (...,), rad, between unit vectors (..., 3) and unit ``axes`` (..., 3)."""
     return np.arccos(np.clip(_dot(vectors, axes), -1.0, 1.0))
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class LegLimits:
-    """What passive joints and legs allow.
-
-    Attributes:
-        base_axes: (6, 3) unit vectors in the base frame about which the base's passive joints turn.
-        platform_axes: (6, 3) those of the platform's joints, in the platform frame.
-        base_cones: (6,) largest angles of the legs from these axes, rad.
-        platform_cones: (6,) those at the platform, rad.
-        distance_mm: smallest distance of two legs.
-    """
-
-    base_axes: Array
-    platform_axes: Array
-    base_cones: Array
-    platform_cones: Array
-    distance_mm: float
-
-    def spare_angles(self, legs: Legs) -> Array:
-        """Angles (n, 2, 6), rad, that passive joints have left, at the base and at the platform."""
-        at_base = self.base_cones - angles_between(legs.directions, self.base_axes)
-        at_platform = self.platform_cones - angles_between(legs.directions_in_platform, self.platform_axes)
-        return np.stack([at_base, at_platform], axis=-2)
-
-    def margins(self, legs: Legs) -> Array:
-        """By how much n poses keep these limits, (n, m), negative beyond them.
-
-        The spare angles of the passive joints, rad, then the legs' spare distance, mm, if it has a limit.
-        """
-        angles = self.spare_angles(legs).reshape(-1, 12)
-        if self.distance_mm == 0.0:
-            return angles
-        return np.column_stack([angles, legs.smallest_distance() - self.distance_mm])
-
-    def margins_for(self, turn: float, radius_mm: float) -> Array:
-        """Margins (m,) that hold should a platform of some radius turn by an angle, rad."""
-        turns = np.full(12, turn)
-        return turns if self.distance_mm == 0.0 else np.append(turns, turn * radius_mm)
-
-    def including(self, legs: Legs, wanted: Array | float = 0.0) -> LegLimits:
-        """These limits, widened where the margins at one pose (1) are less than wanted (m,)."""
-        missing = np.maximum(0.0, wanted - self.margins(legs)[0] + ROUNDING)
-        return replace(
-            self,
-            base_cones=self.base_cones + missing[:6],
-            platform_cones=self.platform_cones + missing[6:12],
-            distance_mm=max(0.0, self.distance_mm - float(missing[12:].sum())),
-        )
-
-    def are_kept(self, legs: Legs, wanted: Array | float = 0.0) -> Mask:
-        """At which of n poses, with at least the wanted margins (m,)."""
-        return np.asarray((self.margins(legs) >= wanted).all(axis=-1))
 
 
 def _dot(one: Array, other: Array) -> Array:

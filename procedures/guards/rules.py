@@ -17,8 +17,8 @@ import numpy as np
 from drivers.controllers.errors import ControllerFrozen
 from drivers.errors import GaugeAtEnd
 from drivers.stop_input import SUBJECT as STOP_LINE
-from hexacell.kinematics.gauge_travel import GaugeRoom
 from hexacell.kinematics.rotations import Array
+from hexacell.limits.gauge_travel import GaugeRoom
 from hexacell.storage import atomic_files
 from procedures.guards.polling import DevicePoller, GaugeDeviation, PolledDevices
 from procedures.run.trips import Guard, Trip

@@ -13,9 +13,9 @@ from hexacell.identification.estimator import estimate_online
 from hexacell.identification.problem.problem import Noise
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.geometry import Geometry
-from hexacell.kinematics.limits import Limits
 from hexacell.kinematics.mechanisms.hexaglide import Hexaglide
 from hexacell.kinematics.rotations import Array
+from hexacell.limits.limits import Limits
 from hexacell.measurements.records import MeasurementSet
 
 NOISE = Noise(0.01, 0.01)

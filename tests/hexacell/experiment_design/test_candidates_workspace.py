@@ -10,7 +10,7 @@ import pytest
 from hexacell.experiment_design.candidates import workspace_poses
 from hexacell.identification.belief import RobotBelief
 from hexacell.identification.problem.problem import Noise
-from hexacell.kinematics.limits import Limits
+from hexacell.limits.limits import Limits
 
 LIMITS = Limits(5.0, np.radians(45.0), -800.0, 800.0, 0.05)
 

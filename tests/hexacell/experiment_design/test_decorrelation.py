@@ -11,7 +11,7 @@ from hexacell.experiment_design.decorrelation import decorrelating_poses
 from hexacell.identification.belief import RobotBelief
 from hexacell.identification.diagnostics.correlations import strongly_correlated
 from hexacell.identification.estimator import identify
-from hexacell.kinematics.limits import Limits
+from hexacell.limits.limits import Limits
 from hexacell.measurements.records import MeasurementSet, Record
 
 LIMITS = Limits(5.0, np.radians(45.0), -800.0, 800.0, 0.05)

@@ -1,4 +1,4 @@
-"""Distances of legs and angles of passive joints, against closed forms and brute force."""
+"""The legs and their distances, against closed forms and brute force."""
 
 from __future__ import annotations
 
@@ -8,9 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy.optimize import minimize
-from scipy.spatial.transform import Rotation
 
-from hexacell.kinematics.legs import LegLimits, Legs, segment_distances
+from hexacell.kinematics.legs import segment_distances
 from hexacell.kinematics.mechanisms.hexaglide import Hexaglide
 from hexacell.kinematics.pose import Pose, PoseBatch
 
@@ -63,47 +62,3 @@ def test_legs_close_the_mechanism(paper):
     np.testing.assert_allclose(lengths, np.tile(paper.nominal["l"], (2, 1)))
     np.testing.assert_allclose(legs.base_joints[..., 0], paper.nominal["S"][:, 0] + joints)
     np.testing.assert_allclose(legs.base_joints[:, :, 1:], np.tile(paper.nominal["S"][:, 1:], (2, 1, 1)))
-
-
-def turned(axis, degrees):
-    """Six parallel legs on a platform that is turned."""
-    rotation = Rotation.from_rotvec(np.radians(degrees) * np.array(axis, dtype=float)).as_matrix()
-    feet = 50.0 * np.stack([np.cos(np.arange(6)), np.sin(np.arange(6)), np.zeros(6)], axis=-1)
-    return Legs(feet[None] + [0.0, 0.0, -500.0], feet[None], rotation[None])
-
-
-def limits(cone=30.0, distance=0.0):
-    down = np.tile([0.0, 0.0, -1.0], (6, 1))
-    return LegLimits(down, down, np.full(6, np.radians(20.0)), np.full(6, np.radians(cone)), distance)
-
-
-def test_a_platform_joint_turns_as_far_as_the_platform_does():
-    spare = np.degrees(limits().spare_angles(turned([1, 0, 0], 12.0)))
-    np.testing.assert_allclose(spare[0, 0], 20.0, atol=1e-6)
-    np.testing.assert_allclose(spare[0, 1], 18.0, atol=1e-6)
-    assert limits().are_kept(turned([1, 0, 0], 29.9))[0]
-    assert not limits().are_kept(turned([1, 0, 0], 30.1))[0]
-    assert not limits().are_kept(turned([1, 0, 0], 29.9), np.radians(0.2))[0]
-
-
-def test_a_turn_about_vertical_legs_turns_no_joint():
-    np.testing.assert_allclose(np.degrees(limits().spare_angles(turned([0, 0, 1], 80.0)))[0, 1], 30.0)
-
-
-def test_legs_that_come_too_near_are_seen():
-    apart = turned([1, 0, 0], 0.0).smallest_distance()[0]
-    assert apart == pytest.approx(2 * 50.0 * np.sin(0.5), abs=1.0)
-    assert limits(distance=apart - 0.1).are_kept(turned([1, 0, 0], 0.0))[0]
-    assert not limits(distance=apart + 0.1).are_kept(turned([1, 0, 0], 0.0))[0]
-    assert not limits(distance=apart - 0.1).are_kept(turned([1, 0, 0], 0.0), np.append(np.zeros(12), 0.2))[
-        0
-    ]
-
-
-def test_limits_that_include_a_pose_allow_it_and_nothing_beyond():
-    here = turned([1, 0, 0], 33.0)
-    widened = limits(distance=60.0).including(here)
-    assert widened.are_kept(here)[0]
-    assert widened.are_kept(turned([1, 0, 0], 10.0))[0]
-    assert not widened.are_kept(turned([1, 0, 0], 33.1))[0]
-    np.testing.assert_allclose(np.degrees(widened.base_cones), 20.0)

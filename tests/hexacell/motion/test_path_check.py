@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hexacell.kinematics.legs import LegLimits
-from hexacell.kinematics.limits import AxisLimits
 from hexacell.kinematics.mechanisms.hexaglide import Hexaglide
 from hexacell.kinematics.pose import Pose, PoseBatch
+from hexacell.limits.leg_limits import LegLimits
+from hexacell.limits.limits import AxisLimits
 from hexacell.motion.path_check import is_clear
 from hexacell.motion.trajectory import PIECES, interpolate_line
 

@@ -18,10 +18,10 @@ from hexacell.identification.problem.problem import Prior
 from hexacell.identification.solver.levenberg_marquardt import FINE, solve
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.geometry import Geometry
-from hexacell.kinematics.limits import Limits
 from hexacell.kinematics.mechanism import Branch
 from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS
 from hexacell.kinematics.pose import Pose, PoseBatch
+from hexacell.limits.limits import Limits
 from hexacell.measurements.records import MeasurementSet
 from hexacell.uncertainty.propagation import Propagation
 

@@ -16,8 +16,8 @@ from hexacell.identification.problem.problem import Noise, Prior, Tolerances, bu
 from hexacell.identification.solver.measurement_model import record_covariance
 from hexacell.kinematics.forward import forward_kinematics
 from hexacell.kinematics.geometry import Geometry
-from hexacell.kinematics.limits import Limits
 from hexacell.kinematics.mechanisms.hexaglide import Hexaglide
+from hexacell.limits.limits import Limits
 from hexacell.uncertainty.geometry_drift import (
     IdentifiedBefore,
     drift_covariance,

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from drivers.errors import GaugeAtEnd, GaugeSilent, WrongAnswer, ZeroVoid
 from drivers.interfaces import ControllerStatus, EncoderSample
 from hexacell.errors import DeviceError, ExitCode, LimitError
-from hexacell.kinematics.gauge_travel import GaugeRoom
+from hexacell.limits.gauge_travel import GaugeRoom
 from procedures.guards import rules
 from procedures.guards.polling import DevicePoller, GaugeDeviation, LineActivity, PolledDevices
 from procedures.guards.rules import GuardLimits

@@ -11,7 +11,7 @@ import pytest
 from drivers.errors import GaugeAtEnd, WrongAnswer
 from drivers.interfaces import GaugeReading
 from hexacell.errors import DeviceError, HexacellError, LimitError
-from hexacell.kinematics.gauge_travel import GaugeRoom
+from hexacell.limits.gauge_travel import GaugeRoom
 from procedures.guards.polling import DevicePoller, LineActivity, PolledDevices
 from procedures.guards.rules import GuardLimits
 from procedures.guards.supervision import GuardMonitor

@@ -16,10 +16,10 @@ from hexacell.identification.belief import RobotBelief
 from hexacell.identification.diagnostics.pose_accuracy import Accuracy, predicted_accuracy
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.geometry import Geometry
-from hexacell.kinematics.limits import Limits
 from hexacell.kinematics.mechanism import Branch
 from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS
 from hexacell.kinematics.pose import Pose, PoseBatch
+from hexacell.limits.limits import Limits
 
 DRAWS = 60
 

@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hexacell.kinematics.gauge_travel import GaugeRoom, GaugeTravel
-from hexacell.kinematics.limits import Limits
 from hexacell.kinematics.mechanism import FrameTransform
+from hexacell.limits.gauge_travel import GaugeRoom, GaugeTravel
+from hexacell.limits.limits import Limits
 
 TRAVEL = GaugeTravel(5.0, (6.25, 6.25, 6.25), (0.0, 0.0, 0.0), 1.0)
 

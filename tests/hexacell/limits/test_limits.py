@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hexacell.kinematics.limits import AxisLimits, Limits
 from hexacell.kinematics.mechanisms.hexaglide import Hexaglide
 from hexacell.kinematics.pose import Pose, PoseBatch
+from hexacell.limits.limits import AxisLimits, Limits
 
 LIMITS = Limits(5.0, np.radians(45.0), -800.0, 800.0, 0.03, turn=np.radians(60.0))
 

@@ -6,12 +6,12 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from hexacell.kinematics.gauge_travel import GaugeRoom, GaugeTravel
 from hexacell.kinematics.geometry import Geometry, GeometryBatch
-from hexacell.kinematics.legs import ROUNDING, LegLimits
 from hexacell.kinematics.mechanism import FrameTransform, Mechanism
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array, Mask
+from hexacell.limits.gauge_travel import GaugeRoom, GaugeTravel
+from hexacell.limits.leg_limits import ROUNDING, LegLimits
 
 SAME_FRAMES = FrameTransform(np.eye(3), np.zeros(3), np.eye(3))
 
@@ -139,7 +139,7 @@ class Limits:
     ) -> Array:
         """By how much passive joints and legs keep their limits at n poses: (n, m), m = 0 without limits.
 
-        See :meth:`LegLimits.margins <hexacell.kinematics.legs.LegLimits.margins>`.
+        See :meth:`LegLimits.margins <hexacell.limits.leg_limits.LegLimits.margins>`.
         """
         if self.legs is None:
             return np.zeros((len(joints), 0))

@@ -1,12 +1,14 @@
-"""The decision on a stated error: a rule with a guard band of the expanded uncertainty.
+"""The decision on a stated error: a rule with a guard band w.
 
-    value + U <= limit           pass
-    value <= limit < value + U   conditional pass
-    value - U <= limit < value   conditional fail
-    limit < value - U            fail
+    value + w <= limit           pass
+    value <= limit < value + w   conditional pass
+    value - w <= limit < value   conditional fail
+    limit < value - w            fail
 
-A limit below U can be failed, but not passed: then nothing is decided, as without evidence that the
-model is right. Source: ILAC-G8:09/2019, Guidelines on decision rules and statements of conformity.
+The guard band is the expanded uncertainty U times a factor. With U itself a pass is false with a
+probability below 2.5 %, with 1.5 U below 0.16 %. A limit below w can be failed, but not passed: then
+nothing is decided, as without evidence that the model is right. Source: ILAC-G8:09/2019, Guidelines on
+decision rules and statements of conformity.
 """
 
 from __future__ import annotations
@@ -16,6 +18,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from math import isfinite
 
+from hexacell.cell.measuring import AcceptanceSettings
 from hexacell.uncertainty.statement import LargestError, TaskErrors
 
 
@@ -34,14 +37,14 @@ class Verdict(StrEnum):
         return self in {Verdict.CONDITIONAL_PASS, Verdict.CONDITIONAL_FAIL}
 
 
-def decide(error: LargestError, limit: float) -> Verdict:
+def decide(error: LargestError, limit: float, guard_band_factor: float = 1.0) -> Verdict:
     """The verdict on an error under a limit, both in the same unit; not a number is not evaluated."""
-    value, expanded = error.value, error.expanded
-    if value - expanded > limit:
+    value, guard_band = error.value, guard_band_factor * error.expanded
+    if value - guard_band > limit:
         return Verdict.FAIL
-    if not (expanded <= limit and isfinite(value)):
+    if not (guard_band <= limit and isfinite(value)):
         return Verdict.NOT_EVALUATED
-    if value + expanded <= limit:
+    if value + guard_band <= limit:
         return Verdict.PASS
     return Verdict.CONDITIONAL_PASS if value <= limit else Verdict.CONDITIONAL_FAIL
 
@@ -54,12 +57,26 @@ def worst_verdict(verdicts: Iterable[Verdict]) -> Verdict:
 
 @dataclass(frozen=True, slots=True)
 class ErrorLimits:
-    """Limits of the largest position error, mm, and of the largest orientation error, deg."""
+    """Limits of the largest position error, mm, and of the largest orientation error, deg.
+
+    ``guard_band_factor`` is the guard band as a multiple of U.
+    """
 
     position_mm: float
     orientation_deg: float
+    guard_band_factor: float = 1.0
+
+    @classmethod
+    def of(cls, settings: AcceptanceSettings) -> ErrorLimits:
+        """Those of a cell."""
+        return cls(settings.position_mm, settings.orientation_deg, settings.guard_band_factor)
 
     def decide(self, errors: TaskErrors) -> Verdict:
         """The verdict on both errors together."""
-        position = decide(errors.position, self.position_mm)
-        return worst_verdict([position, decide(errors.orientation, self.orientation_deg)])
+        return self.decide_largest(errors.position, errors.orientation)
+
+    def decide_largest(self, position: LargestError, orientation: LargestError) -> Verdict:
+        """The verdict on the largest errors, mm and deg, together."""
+        of_position = decide(position, self.position_mm, self.guard_band_factor)
+        of_orientation = decide(orientation, self.orientation_deg, self.guard_band_factor)
+        return worst_verdict([of_position, of_orientation])

@@ -36,9 +36,9 @@ def predicted_verdicts(
     after = plan.task.budget(updated, plan.robot.belief(updated), plan.robot.effects)
     if budget is None or after is None or len(after.jacobian) != len(budget.jacobian):
         return None
-    limits = plan.settings.acceptance
+    limits = ErrorLimits.of(plan.settings.acceptance)
     stated = stated_errors(found, updated, budget, after)
-    return forecast_verdicts(stated, after, ErrorLimits(limits.position_mm, limits.orientation_deg))
+    return forecast_verdicts(stated, after, limits)
 
 
 def with_held_out_records(plan: Plan, found: Identification) -> Identification:

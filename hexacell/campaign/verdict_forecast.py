@@ -14,11 +14,11 @@ machine with a probability of 0.1 % each.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hexacell.decision import ErrorLimits, Verdict, decide, worst_verdict
+from hexacell.decision import ErrorLimits, Verdict
 from hexacell.identification.solver.chi_square import SMALLEST_PROBABILITY
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.rotations import Array
@@ -68,7 +68,7 @@ class VerdictForecast:
         return cls(
             {verdict: float(np.mean([one.probabilities[verdict] for one in each])) for verdict in Verdict},
             worst.limits,
-            ErrorLimits(worst.passing.position_mm, degrees),
+            replace(worst.passing, orientation_deg=degrees),
             worst.largest_part,
             worst.largest_part_mm,
             worst.standard_mm,
@@ -93,14 +93,14 @@ def forecast_verdicts(stated: Array, budget: UncertaintyBudget, limits: ErrorLim
     positions = _statements(errors[..., :3], around[..., :3])
     orientations = _statements(np.degrees(errors[..., 3:]), np.degrees(around[..., 3:]))
     verdicts = [
-        worst_verdict([decide(first, limits.position_mm), decide(second, limits.orientation_deg)])
-        for first, second in zip(positions, orientations, strict=True)
+        limits.decide_largest(first, second) for first, second in zip(positions, orientations, strict=True)
     ]
     name, part = _largest_part(budget)
+    factor = limits.guard_band_factor
     return VerdictForecast(
         _probabilities(verdicts),
         limits,
-        ErrorLimits(_passing(positions), _passing(orientations)),
+        ErrorLimits(_passing(positions, factor), _passing(orientations, factor), factor),
         name,
         part,
         budget.standard_mm,
@@ -151,8 +151,8 @@ def _probabilities(verdicts: Sequence[Verdict]) -> dict[Verdict, float]:
     return shares
 
 
-def _passing(statements: Sequence[LargestError]) -> float:
-    return float(np.quantile([one.value + one.expanded for one in statements], WANTED))
+def _passing(statements: Sequence[LargestError], guard_band_factor: float) -> float:
+    return float(np.quantile([one.value + guard_band_factor * one.expanded for one in statements], WANTED))
 
 
 def _largest_part(budget: UncertaintyBudget) -> tuple[str, float]:

@@ -37,7 +37,7 @@ def length_text(stated: LengthStatement) -> str:
         return "\n".join([*lines, wrapped(f"  the length check says nothing: {result.reason}", indent=2)])
     lines += [f"  {line}" for line in scale_lines(result)]
     if error is not None:
-        size = f"{error.value:.3f} mm, U {error.expanded:.3f} (limit {error.limit:g})"
+        size = f"{error.value:.3f} mm, U {error.expanded:.3f} ({error.rule})"
         lines.append(f"  position error by that at the task poses: {size}")
     largest = sorted(result.sources, key=lambda source: -source.um_m)[:NAMED_SOURCES]
     named = ", ".join(f"{source.name} {source.um_m:.1f}" for source in largest)

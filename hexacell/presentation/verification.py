@@ -69,7 +69,7 @@ def _errors(accuracy: VerifiedAccuracy | None) -> list[str]:
 
 def _error(what: str, error: JudgedError, unit: str) -> str:
     """U is the expanded uncertainty."""
-    stated = f"{error.value:.3f} {unit}, U {error.expanded:.3f} (limit {error.limit:g})"
+    stated = f"{error.value:.3f} {unit}, U {error.expanded:.3f} ({error.rule})"
     return f"  {what}: {stated}"
 
 

@@ -115,9 +115,10 @@ def _reason(result: CheckResult) -> str:
 
 def _accuracy(check: Check, stated: CheckStatement, length: LengthResult | None) -> VerifiedAccuracy:
     task = check.plan.task.reachable(stated.estimate.belief)
+    limits, factor = check.limits, check.limits.guard_band_factor
     return VerifiedAccuracy(
-        position=JudgedError.of(stated.position, check.limits.position_mm),
-        orientation=JudgedError.of(stated.orientation, check.limits.orientation_deg),
+        position=JudgedError.of(stated.position, limits.position_mm, factor),
+        orientation=JudgedError.of(stated.orientation, limits.orientation_deg, factor),
         poses=len(task.poses),
         task_named=bool(check.settings.task.poses),
         worst=check.robot.to_command(task.poses.pose(stated.errors.worst)).as_tuple(),

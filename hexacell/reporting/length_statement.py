@@ -58,9 +58,7 @@ def length_line(stated: LengthStatement) -> str:
         return f"length check: {stated.verdict} ({result.reason})"
     parts = [f"length check over {result.distance_mm:.3f} mm: {encoders_read(result)}"]
     if error is not None:
-        parts.append(
-            f"position error by that {error.value:.3f} +- {error.expanded:.3f} mm (limit {error.limit:g})"
-        )
+        parts.append(f"position error by that {error.value:.3f} +- {error.expanded:.3f} mm ({error.rule})")
     return f"{'; '.join(parts)}: {stated.verdict}"
 
 
@@ -81,4 +79,5 @@ def _error(
     unit = errors_by_scale(belief, task.poses, task.workspace, known)
     sigma = result.expanded_um_m / COVERAGE_FACTOR
     errors = TaskErrors(-result.long_um_m * unit, sigma * unit[..., np.newaxis])
-    return JudgedError.of(errors.position, settings.acceptance.position_mm)
+    limits = settings.acceptance
+    return JudgedError.of(errors.position, limits.position_mm, limits.guard_band_factor)

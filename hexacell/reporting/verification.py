@@ -40,17 +40,34 @@ class ModelTest(Frozen):
 
 
 class JudgedError(Frozen):
-    """The largest error over the task poses, its expanded uncertainty and limit, mm or deg; the verdict."""
+    """The largest error over the task poses, its expanded uncertainty and limit, mm or deg; the verdict.
+
+    The guard band of the decision is ``guard_band_factor`` times the expanded uncertainty.
+    """
 
     value: float
     expanded: float
     limit: float
     verdict: Verdict
+    guard_band_factor: float = 1.0
 
     @classmethod
-    def of(cls, error: LargestError, limit: float) -> JudgedError:
+    def of(cls, error: LargestError, limit: float, guard_band_factor: float) -> JudgedError:
         """The decision on an error."""
-        return cls(value=error.value, expanded=error.expanded, limit=limit, verdict=decide(error, limit))
+        return cls(
+            value=error.value,
+            expanded=error.expanded,
+            limit=limit,
+            verdict=decide(error, limit, guard_band_factor),
+            guard_band_factor=guard_band_factor,
+        )
+
+    @property
+    def rule(self) -> str:
+        """The limit, and the guard band where it is not U, for people."""
+        factor = self.guard_band_factor
+        guard_band = "" if factor == 1.0 else f", guard band {factor:g} U"
+        return f"limit {self.limit:g}{guard_band}"
 
 
 class VerifiedAccuracy(Frozen):
@@ -162,10 +179,7 @@ def _stated(accuracy: VerifiedAccuracy) -> str:
         name, error, unit = "position", position, "mm"
     else:
         name, error, unit = "orientation", orientation, "deg"
-    return (
-        f"{name} error at the task poses {error.value:.3f} +- {error.expanded:.3f} {unit} "
-        f"(limit {error.limit:g})"
-    )
+    return f"{name} error at the task poses {error.value:.3f} +- {error.expanded:.3f} {unit} ({error.rule})"
 
 
 def _reason(verified: Verification) -> str:
@@ -219,9 +233,10 @@ def verified_accuracy(
         budget = task.budget(updated, belief, robot.effects, scale=check.observation) or budget
     errors = budget.errors_of(found.free - updated.free)
     limits = settings.acceptance
+    factor = limits.guard_band_factor
     return VerifiedAccuracy(
-        position=JudgedError.of(errors.position, limits.position_mm),
-        orientation=JudgedError.of(errors.orientation, limits.orientation_deg),
+        position=JudgedError.of(errors.position, limits.position_mm, factor),
+        orientation=JudgedError.of(errors.orientation, limits.orientation_deg, factor),
         poses=len(task.poses),
         task_named=bool(settings.task.poses),
         worst=robot.to_command(task.poses.pose(errors.worst)).as_tuple(),

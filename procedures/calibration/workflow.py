@@ -142,7 +142,7 @@ class Calibration:
             self.settings,
             robot,
             before,
-            ErrorLimits(limits.position_mm, limits.orientation_deg),
+            ErrorLimits.of(limits),
             wanted.budget_records,
             self.listed,
             robot.effects,

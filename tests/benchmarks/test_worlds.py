@@ -86,9 +86,11 @@ def test_machines_drawn_from_their_budget_err_by_no_more_than_is_stated(say, nam
         f"{totals.passes}, {totals.false_passes} of {len(totals.outcomes)}",
         "no false",
     )
+    say("  false ones with a guard band of 1.5 U", f"{totals.false_passes_of_three_sigma}", "none")
     say("  causes named wrongly", f"{totals.wrongly_named}", "at most 1 %")
     covered = round(totals.covered * len(judged))
     assert least_by_chance(0.93, len(judged)) <= covered <= most_by_chance(0.98, len(judged))
+    assert not totals.false_passes_of_three_sigma
     assert not totals.false_passes
     assert totals.wrongly_named <= most_by_chance(0.01, len(totals.outcomes))
 

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from hexacell.decision import Verdict, decide, worst_verdict
+from hexacell.decision import ErrorLimits, Verdict, decide, worst_verdict
 from hexacell.uncertainty.statement import LargestError
 
 
@@ -29,6 +29,27 @@ from hexacell.uncertainty.statement import LargestError
 )
 def test_a_limit_with_a_guard_band(value: float, expanded: float, verdict: Verdict) -> None:
     assert decide(LargestError(value, expanded), 0.15) is verdict
+
+
+@pytest.mark.parametrize(
+    ("value", "verdict"),
+    [
+        (0.06, Verdict.PASS),
+        (0.07, Verdict.CONDITIONAL_PASS),
+        (0.16, Verdict.CONDITIONAL_FAIL),
+        (0.23, Verdict.CONDITIONAL_FAIL),
+        (0.25, Verdict.FAIL),
+    ],
+)
+def test_a_guard_band_wider_than_u(value: float, verdict: Verdict) -> None:
+    position, orientation = LargestError(value, 0.06), LargestError(0.0, 0.1)
+    assert decide(position, 0.15, guard_band_factor=1.5) is verdict
+    assert ErrorLimits(0.15, 1.0, 1.5).decide_largest(position, orientation) is verdict
+
+
+def test_a_limit_within_a_wide_guard_band_is_not_passed() -> None:
+    assert decide(LargestError(0.0, 0.11), 0.15) is Verdict.PASS
+    assert decide(LargestError(0.0, 0.11), 0.15, guard_band_factor=1.5) is Verdict.NOT_EVALUATED
 
 
 positive = st.floats(0.0, 10.0)

@@ -56,6 +56,11 @@ class Totals:
         return sum(one.is_false_pass for one in self.outcomes)
 
     @property
+    def false_passes_of_three_sigma(self) -> int:
+        """How many of these would pass with a guard band of 1.5 U."""
+        return sum(one.is_false_pass_of_three_sigma for one in self.outcomes)
+
+    @property
     def wrongly_named(self) -> int:
         """In how many a cause was named that is not there."""
         return sum(one.is_wrongly_named for one in self.outcomes)

@@ -86,6 +86,11 @@ class Outcome:
         """Whether the verdict is a pass although the expected error is above the limit."""
         return self.verdict is Verdict.PASS and self.true_mm > self.trial.limit_mm
 
+    @property
+    def is_false_pass_of_three_sigma(self) -> bool:
+        """Whether it would be one with a guard band of 1.5 U."""
+        return self.is_false_pass and self.value_mm + 1.5 * self.u_mm <= self.trial.limit_mm
+
 
 def carry_out(trial: Trial) -> Outcome:
     """Measure, identify, state and compare."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import AsyncIterator, Sequence
+from collections.abc import AsyncIterator, Callable, Sequence
 from contextlib import asynccontextmanager, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -30,6 +30,7 @@ from procedures.calibration.preflight import (
     start_failures,
 )
 from procedures.calibration.workflow import Calibration, Mode
+from procedures.devices.device_set import Devices
 from procedures.devices.live_values import LiveValues
 from procedures.devices.reconnection import require_known
 from procedures.engine.config_transactions import holds_provisional
@@ -43,6 +44,12 @@ from procedures.run import events
 from procedures.run.commands import CommandQueue
 from procedures.run.questions import Operator, QuestionBroker
 from procedures.run.state import fold
+
+EngineWatcher = Callable[[Engine, Devices], None]
+
+
+def _watch_nothing(_engine: Engine, _devices: Devices) -> None:
+    pass
 
 
 @dataclass(frozen=True)
@@ -76,6 +83,7 @@ async def calibrate(
     listeners: Sequence[Listener] = (),
     queue: CommandQueue | None = None,
     live: LiveValues | None = None,
+    on_engine: EngineWatcher = _watch_nothing,
 ) -> events.Ended:
     """Measure, identify, verify, propose and write back, as far as the mode and the results allow.
 
@@ -84,6 +92,7 @@ async def calibrate(
         listeners: called with every event.
         queue: commands for the engine (:mod:`procedures.run.commands`).
         live: gets what the devices show during the run.
+        on_engine: called with the engine before it begins, and with the devices that it uses.
 
     Raises:
         Interruption: a command ended it.
@@ -103,7 +112,8 @@ async def calibrate(
             if started is None:  # a resumed run may have to finish a change of the config first
                 raise_all(await _position_failures(cell, connected))
             devices = connected.devices if live is None else replace(connected.devices, live=live)
-            return await _run(request, calibration, replace(connected, devices=devices), listeners, queue)
+            watched = replace(connected, devices=devices)
+            return await _run(request, calibration, watched, listeners, queue, on_engine)
 
 
 @asynccontextmanager
@@ -169,6 +179,7 @@ async def _run(
     connected: Connected,
     listeners: Sequence[Listener],
     queue: CommandQueue | None,
+    on_engine: EngineWatcher,
 ) -> events.Ended:
     cell, folder = replace(request.cell, settings=connected.settings), request.folder
     if not request.resume:
@@ -188,6 +199,7 @@ async def _run(
         with Journal(folder.journal) as journal:
             remove_stale_temporaries(folder.path)
             engine = Engine(executor, journal, listeners, queue=queue, broker=broker, policy=policy)
+            on_engine(engine, connected.devices)
             if engine.state.started is None:
                 engine.record(run_started(cell, calibration, connected.identities))
             engine.reopen_sets()

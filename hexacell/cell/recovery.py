@@ -142,5 +142,10 @@ class RecoverySettings(Section):
         0.05, description="largest change of a reference, gauges and sliders, with which a set continues"
     )
     wait_s: NotNegative = Field(2.0, description="wait before a failed device is tried again")
+    away_minutes: Positive = Field(
+        30.0,
+        description="a run that waits for a person ends, resumable, when nobody has been connected for so "
+        "long",
+    )
     attended: AttendedRecovery = AttendedRecovery()
     unattended: UnattendedRecovery = UnattendedRecovery()

@@ -53,6 +53,7 @@ def make_parser() -> Parser:
     _length(commands)
     _preflight(commands)
     _simulate(commands)
+    _host(commands)
     _next(commands)
     _fit(commands)
     _replay(commands)
@@ -159,6 +160,17 @@ def _simulate(commands: Any) -> None:  # noqa: ANN401
         metavar="FILE",
         help="write the cell file for `run` there instead of to stdout",
     )
+
+
+def _host(commands: Any) -> None:  # noqa: ANN401
+    """The process of a run. People never type it, so the help does not list it."""
+    parser = commands.add_parser("host")
+    parser.set_defaults(target="host.main")
+    _add_cell(parser)
+    parser.add_argument("--folder", type=Path, required=True)
+    parser.add_argument("--mode", choices=("check", "optimise", "length"), required=True)
+    parser.add_argument("--resume", action="store_true")
+    parser.add_argument("--length-check", action="store_true")
 
 
 def _next(commands: Any) -> None:  # noqa: ANN401

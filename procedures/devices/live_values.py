@@ -28,18 +28,19 @@ class LiveValue(Generic[T]):
     Attributes:
         value: what it answered last; None before the first answer.
         problem: why it failed to answer after that; empty if it did not.
+        at_s: when it answered, by the clock of all values.
     """
 
     def __init__(self, live: LiveValues) -> None:
         self.value: T | None = None
         self.problem = ""
         self._live = live
-        self._at_s = float("-inf")
+        self.at_s = float("-inf")
 
     @property
     def age_s(self) -> float:
         """How long ago the device answered, s; infinite before the first answer."""
-        return self._live.now() - self._at_s
+        return self._live.now() - self.at_s
 
     async def of(self, read: Callable[[], Awaitable[T]]) -> T:
         """Ask for a value and keep it, or why there is none."""
@@ -49,7 +50,7 @@ class LiveValue(Generic[T]):
             self.problem = str(error)
             raise
         else:
-            self.value, self.problem, self._at_s = value, "", self._live.now()
+            self.value, self.problem, self.at_s = value, "", self._live.now()
             return value
         finally:
             self._live.notify()

@@ -27,7 +27,7 @@ from procedures.run.commands import (
     Undo,
     invalidation_event,
 )
-from procedures.run.questions import QuestionBroker
+from procedures.run.questions import Question, QuestionBroker
 from procedures.run.state import RunState, apply
 
 Result = TypeVar("Result")
@@ -105,12 +105,13 @@ class CommandLoop:
     ) -> None:
         self.flags = EngineFlags()
         self.watchers: list[Callable[[Status], None]] = []
+        self.question_watchers: list[Callable[[Question | None], None]] = []
         self._queue = queue
         self._broker = broker
         self._state = state
         self._reject = reject
         self._invalidations: list[Invalidation] = []
-        broker.on_change = lambda: self.set_flags(asking=broker.open is not None)
+        broker.on_change = self._note_question
 
     def set_flags(self, **flags: Any) -> None:  # noqa: ANN401 - the fields of EngineFlags
         """Set flags; watchers are called if the status changes by that."""
@@ -157,6 +158,11 @@ class CommandLoop:
         """
         taken, self._invalidations = self._invalidations, []
         return taken
+
+    def _note_question(self) -> None:
+        self.set_flags(asking=self._broker.open is not None)
+        for watcher in self.question_watchers:
+            watcher(self._broker.open)
 
     async def _until_cancelled(self) -> None:
         while not self._take(await self._queue.next()):

@@ -78,6 +78,10 @@ class Engine:
         """Call ``watcher`` with every new status."""
         self._commands.watchers.append(watcher)
 
+    def watch_questions(self, watcher: Callable[[Question | None], None]) -> None:
+        """Call ``watcher`` with every question that is opened, and with None when it is closed."""
+        self._commands.question_watchers.append(watcher)
+
     def command(self, command: Command) -> None:
         """Give a command (:mod:`procedures.run.commands`), from any thread."""
         self._queue.put(command)

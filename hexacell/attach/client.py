@@ -1,0 +1,155 @@
+"""A connection to a run in another process, and how such a process is started."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import sys
+import tempfile
+from asyncio import StreamReader, StreamWriter
+from collections.abc import AsyncIterator, Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import BinaryIO
+
+from hexacell.attach.messages import (
+    LONGEST_MESSAGE,
+    ClientMessage,
+    GiveCommand,
+    HostFailed,
+    HostMessage,
+    Leave,
+    TakeControl,
+    host_message,
+    message_line,
+)
+from hexacell.attach.run_socket import peer_of
+from hexacell.errors import ExitCode, FileError, HexacellError
+from procedures.run.commands import Command
+
+READY = b"ready\n"
+"""What a host writes to its stdout when it listens; else it writes why it does not, as a message."""
+
+LEAVE_S = 0.4
+"""How long leaving waits for a run that is to be stopped, s."""
+
+
+class HostNotStarted(HexacellError):
+    """The process of a run could not begin; the exit code is that of the reason."""
+
+    def __init__(self, failure: HostFailed) -> None:
+        super().__init__(failure.problem, action=failure.action or None)
+        self.exit_code = ExitCode(failure.exit_code or ExitCode.FAULT)
+
+
+class HostConnection:
+    """A :class:`~hexacell.attach.connection.RunConnection` over a socket."""
+
+    def __init__(self, reader: StreamReader, writer: StreamWriter) -> None:
+        self._reader = reader
+        self._writer = writer
+
+    async def messages(self) -> AsyncIterator[HostMessage]:
+        """See :meth:`RunConnection.messages`."""
+        with suppress(ConnectionError):
+            while (line := await self._reader.readline()).endswith(b"\n"):
+                yield host_message(line)
+        self._writer.close()
+
+    async def give(self, command: Command) -> None:
+        """See :meth:`RunConnection.give`."""
+        await self._send(GiveCommand(command=command))
+
+    async def take_control(self) -> None:
+        """See :meth:`RunConnection.take_control`."""
+        await self._send(TakeControl())
+
+    async def leave(self, *, keep_running: bool) -> None:
+        """See :meth:`RunConnection.leave`; of a run that ends, its end is awaited for a moment."""
+        with suppress(HexacellError):
+            await self._send(Leave(keep_running=keep_running))
+            if not keep_running:
+                with suppress(TimeoutError):
+                    await asyncio.wait_for(self._until_gone(), LEAVE_S)
+        self._writer.close()
+
+    async def _send(self, message: ClientMessage) -> None:
+        try:
+            self._writer.write(message_line(message))
+            await self._writer.drain()
+        except OSError as error:
+            raise FileError(
+                "the run cannot be reached any more", action="Look at it with `hexacell history`"
+            ) from error
+
+    async def _until_gone(self) -> None:
+        """Until the other side has closed; somebody else may be reading what it says."""
+        while not self._reader.at_eof():  # noqa: ASYNC110 - a stream tells this to its only reader
+            await asyncio.sleep(0.01)
+
+
+async def connect_to_run(path: Path) -> HostConnection | None:
+    """A connection to the run whose socket is there; none if there is no run.
+
+    Raises:
+        FileError: it is another user's.
+    """
+    try:
+        reader, writer = await asyncio.open_unix_connection(str(path), limit=LONGEST_MESSAGE)
+    except OSError:
+        return None
+    _, user = peer_of(writer.get_extra_info("socket"))
+    if user != os.getuid():
+        writer.transport.abort()
+        raise FileError("this run is another user's", subject=path, action="Remove the socket")
+    return HostConnection(reader, writer)
+
+
+async def start_host(path: Path, arguments: Sequence[str]) -> HostConnection:
+    """Start ``hexacell host`` with these arguments, and connect to it; its socket is ``path``.
+
+    Raises:
+        HostNotStarted: the reason.
+    """
+    await asyncio.to_thread(_spawn, list(arguments))
+    connection = await connect_to_run(path)
+    if connection is None:
+        raise HostNotStarted(HostFailed(problem="the run's process ended at once"))
+    return connection
+
+
+def _spawn(arguments: list[str]) -> None:
+    """Start the process and wait until it listens; it is no child of this one then."""
+    command = [sys.executable, "-m", "hexacell", "host", *arguments]
+    told, telling = os.pipe()
+    with tempfile.TemporaryFile() as errors, os.fdopen(told, "rb") as answers:
+        try:
+            process = os.posix_spawn(
+                sys.executable, command, os.environ, file_actions=_streams(telling, errors), setsid=True
+            )
+        finally:
+            os.close(telling)
+        os.waitpid(process, 0)
+        answer = answers.readline()
+        if answer != READY:
+            raise HostNotStarted(_failure_in(answer, errors))
+
+
+def _streams(telling: int, errors: BinaryIO) -> list[tuple[int, ...] | tuple[int, int, str, int, int]]:
+    """Nothing to read, the answer on stdout, and messages of the interpreter in a file."""
+    return [
+        (os.POSIX_SPAWN_OPEN, 0, os.devnull, os.O_RDONLY, 0),
+        (os.POSIX_SPAWN_DUP2, telling, 1),
+        (os.POSIX_SPAWN_DUP2, errors.fileno(), 2),
+    ]
+
+
+def _failure_in(answer: bytes, errors: BinaryIO) -> HostFailed:
+    with suppress(HexacellError):
+        message = host_message(answer)
+        if isinstance(message, HostFailed):
+            return message
+    errors.seek(0)
+    words = errors.read().decode(errors="replace").strip().splitlines()
+    problem = words[-1] if words else "its process ended without a word"
+    return HostFailed(problem=f"the run could not begin: {problem}", exit_code=int(ExitCode.FAULT))

@@ -1,0 +1,127 @@
+"""The Unix socket by which a run is reached: only its owner may open it.
+
+It is in a folder of mode 0700 under ``XDG_RUNTIME_DIR``, or under the folder for temporary files where
+there is none. Its name follows from the controller's config, as that of the cell's lock does: cell files
+for the same robot find the same run.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import hashlib
+import os
+import socket
+import stat
+import struct
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+from hexacell.cell.loader import Cell
+from hexacell.errors import CellBusy, FileError
+from hexacell.storage.atomic_files import os_error_to_file_error
+
+LONGEST_SOCKET_PATH = 107
+"""Bytes: what Linux takes."""
+
+_PEER = struct.Struct("3i")
+
+
+def socket_path(cell: Cell) -> Path:
+    """Where the socket of a cell's run is; raises ``FileError`` where none can be."""
+    config = os.path.realpath(cell.config_path)
+    name = hashlib.sha256(os.fsencode(config)).hexdigest()[:16]
+    path = _runtime_folder() / f"{name}.sock"
+    if len(os.fsencode(path)) > LONGEST_SOCKET_PATH:
+        raise FileError(
+            "the path of a socket there would be too long",
+            subject=path.parent,
+            action="Set XDG_RUNTIME_DIR to a folder with a shorter path",
+        )
+    return path
+
+
+@contextmanager
+def listening_socket(path: Path) -> Iterator[socket.socket]:
+    """A socket that listens there; it is removed at the end of this context.
+
+    Raises:
+        CellBusy: another process listens there.
+        FileError: it cannot be made.
+    """
+    _require_private(path.parent)
+    listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+    try:
+        with _alone_in(path.parent):
+            _bind(listener, path)
+        try:
+            yield listener
+        finally:
+            path.unlink(missing_ok=True)
+    finally:
+        listener.close()
+
+
+def is_served(path: Path) -> bool:
+    """Whether a process listens there."""
+    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as probe:
+        try:
+            probe.connect(str(path))
+        except OSError:
+            return False
+    return True
+
+
+def peer_of(connection: socket.socket) -> tuple[int, int]:
+    """Process and user at the other end, by the kernel's word."""
+    credentials = connection.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, _PEER.size)
+    process, user, _ = _PEER.unpack(credentials)
+    return process, user
+
+
+def _bind(listener: socket.socket, path: Path) -> None:
+    if is_served(path):
+        raise CellBusy("another process runs this cell", subject=path, action="Attach to its run")
+    try:
+        path.unlink(missing_ok=True)  # of a process that was killed
+        os.fchmod(listener.fileno(), 0o600)
+        listener.bind(str(path))
+        listener.listen()
+    except OSError as error:
+        raise os_error_to_file_error("the socket of the run cannot be made", path, error) from error
+
+
+def _runtime_folder() -> Path:
+    stated = os.environ.get("XDG_RUNTIME_DIR")
+    if stated and Path(stated).is_dir():
+        return Path(stated) / "hexacell"
+    return Path(tempfile.gettempdir()) / f"hexacell-{os.getuid()}"
+
+
+def _require_private(folder: Path) -> None:
+    """Make the folder; refuse one that others could have made or can look into."""
+    try:
+        with suppress(FileExistsError):
+            folder.mkdir(mode=0o700)
+        found = folder.lstat()
+    except OSError as error:
+        raise os_error_to_file_error("the folder for the socket cannot be made", folder, error) from error
+    is_ours = stat.S_ISDIR(found.st_mode) and found.st_uid == os.getuid()
+    if not is_ours or stat.S_IMODE(found.st_mode) & 0o077:
+        raise FileError(
+            "this folder for sockets is not yours alone",
+            subject=folder,
+            action="Remove it, or set XDG_RUNTIME_DIR to a folder of yours with mode 700",
+        )
+
+
+@contextmanager
+def _alone_in(folder: Path) -> Iterator[None]:
+    """No other process makes a socket there meanwhile; no lock is left."""
+    descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX)
+        yield
+    finally:
+        os.close(descriptor)

@@ -1,0 +1,71 @@
+"""``hexacell host``: the process of a run that terminals attach to and leave; started by the program."""
+
+from __future__ import annotations
+
+import argparse
+import asyncio
+import os
+import sys
+from pathlib import Path
+from socket import socket
+
+from hexacell.application.calibration_run import RunRequest
+from hexacell.attach.client import READY
+from hexacell.attach.host import RemoteOperator, RunHost, failure_message
+from hexacell.attach.messages import message_line
+from hexacell.attach.run_socket import listening_socket, socket_path
+from hexacell.cell.loader import load_cell
+from hexacell.cli.console import Console
+from hexacell.cli.signal_commands import SignalCommands
+from hexacell.errors import ExitCode, HexacellError
+from hexacell.runs.run_folder import RunFolder
+from procedures.calibration.workflow import Mode
+
+
+def main(options: argparse.Namespace) -> ExitCode:
+    """Serve one run; stdout gets one line, which says that it listens or why it does not."""
+    if os.fork():
+        os._exit(0)  # whoever started it need not wait for its end
+    try:
+        _serve(options)
+    except HexacellError as error:
+        _say(message_line(failure_message(error)))
+        return error.exit_code
+    return ExitCode.DONE
+
+
+def _serve(options: argparse.Namespace) -> None:
+    request = _request(options)
+    signals = SignalCommands(Console(wants_json=True))
+    path = socket_path(request.cell)
+    with listening_socket(path) as listener:
+        host = RunHost(request, signals.queue)
+        _say(READY)
+        signals.run(_serve_and_exit(host, listener, path))
+
+
+async def _serve_and_exit(host: RunHost, listener: socket, path: Path) -> None:
+    """Exit at once when the run is over: a computation that nobody waits for may go on in a thread."""
+    code = await host.serve(listener)
+    await asyncio.to_thread(path.unlink, missing_ok=True)
+    os._exit(int(code))
+
+
+def _request(options: argparse.Namespace) -> RunRequest:
+    return RunRequest(
+        cell=load_cell(options.cell),
+        folder=RunFolder(options.folder),
+        mode=Mode(options.mode),
+        operator=RemoteOperator(),
+        resume=options.resume,
+        length_check=options.length_check,
+    )
+
+
+def _say(line: bytes) -> None:
+    """The one line for who started it, who need not read more."""
+    stdout = sys.stdout.fileno()
+    os.write(stdout, line)
+    null = os.open(os.devnull, os.O_WRONLY)
+    os.dup2(null, stdout)
+    os.close(null)

@@ -1,0 +1,183 @@
+"""A run in a process of its own: it outlives its terminal, and nothing of it outlives its end."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from hexacell.attach.client import HostConnection, HostNotStarted, connect_to_run, start_host
+from hexacell.attach.messages import EventRecorded, HostMessage, StatusChanged
+from hexacell.attach.run_socket import socket_path
+from hexacell.cell.loader import Cell, load_cell
+from hexacell.errors import ExitCode
+from hexacell.runs.run_folder import RunFolder, runs_folder
+from hexacell.storage.cell_lock import cell_lock
+from procedures.engine.command_loop import Status
+from procedures.journal.journal import read_journal
+from procedures.run import events
+from procedures.run.commands import Resume
+from tests.waiting import until, wait_until
+
+TERMINAL = """
+import asyncio, sys
+from pathlib import Path
+from hexacell.attach.client import start_host
+from hexacell.attach.messages import EventRecorded
+
+async def watch():
+    connection = await start_host(Path(sys.argv[1]), sys.argv[2:])
+    async for message in connection.messages():
+        if isinstance(message, EventRecorded):
+            print(message.event.kind, flush=True)
+
+asyncio.run(watch())
+"""
+"""A terminal in a process of its own, which can be killed."""
+
+
+@pytest.fixture
+def cell(quick_cell, tmp_path, monkeypatch) -> Cell:
+    runtime = tmp_path / "r"
+    runtime.mkdir()
+    monkeypatch.setenv("XDG_RUNTIME_DIR", str(runtime))
+    monkeypatch.setenv("TMPDIR", str(runtime))
+    return load_cell(quick_cell.cell)
+
+
+@pytest.fixture
+def run(cell) -> RunFolder:
+    return RunFolder(runs_folder(cell) / "run")
+
+
+def arguments(cell: Cell, run: RunFolder) -> list[str]:
+    return [str(cell.path), "--folder", str(run.path), "--mode", "optimise"]
+
+
+def hosts_of(cell: Cell) -> list[int]:
+    """The processes that run the cell."""
+    found = []
+    for folder in Path("/proc").glob("[0-9]*"):
+        try:
+            words = (folder / "cmdline").read_bytes().split(b"\0")
+        except OSError:
+            continue
+        if b"host" in words and os.fsencode(cell.path) in words:
+            found.append(int(folder.name))
+    return found
+
+
+def nothing_is_left(cell: Cell) -> bool:
+    """No process, socket or temporary file, and the cell can be locked."""
+    sockets, temporary = socket_path(cell).parent, Path(os.environ["TMPDIR"])
+    if hosts_of(cell) or any(sockets.iterdir()) or list(temporary.iterdir()) != [sockets]:
+        return False
+    with cell_lock(cell.config_path):
+        return True
+
+
+async def until_told(connection: HostConnection, condition: Callable[[HostMessage], bool]) -> HostMessage:
+    async for message in connection.messages():
+        if condition(message):
+            return message
+    pytest.fail("the run is over")
+
+
+def is_record(message: HostMessage) -> bool:
+    return isinstance(message, EventRecorded) and isinstance(message.event, events.RecordTaken)
+
+
+async def attached(cell: Cell) -> HostConnection:
+    connection = await connect_to_run(socket_path(cell))
+    assert connection is not None
+    return connection
+
+
+@pytest.mark.slow
+async def test_a_whole_run_leaves_nothing(cell, run) -> None:
+    connection = await start_host(socket_path(cell), arguments(cell, run))
+    assert len(hosts_of(cell)) == 1
+    told = [one.event async for one in connection.messages() if isinstance(one, EventRecorded)]
+    assert told == list(read_journal(run.journal))
+    assert isinstance(told[-1], events.Ended)
+    await until(lambda: nothing_is_left(cell))
+
+
+async def test_leaving_ends_the_run_and_its_process(cell, run) -> None:
+    connection = await start_host(socket_path(cell), arguments(cell, run))
+    await until_told(connection, is_record)
+    await connection.leave(keep_running=False)
+    await until(lambda: nothing_is_left(cell))
+    assert isinstance(read_journal(run.journal)[-1], events.Interrupted)
+
+
+def test_a_killed_terminal_is_replaced(cell, run) -> None:
+    command = [sys.executable, "-c", TERMINAL, str(socket_path(cell)), *arguments(cell, run)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as terminal:
+        output = terminal.stdout
+        assert output is not None
+        wait_until(lambda: output.readline() == "sampled\n")
+        terminal.send_signal(signal.SIGKILL)
+    assert len(hosts_of(cell)) == 1, "the run goes on in its process"
+    wait_until(lambda: isinstance(read_journal(run.journal)[-1], events.Paused))
+    before = read_journal(run.journal)
+    asyncio.run(_carry_on(cell, before))
+    wait_until(lambda: nothing_is_left(cell))
+    history = read_journal(run.journal)
+    assert history[: len(before)] == before
+    assert isinstance(history[len(before)], events.Resumed)
+
+
+async def _carry_on(cell: Cell, before: tuple[events.Event, ...]) -> None:
+    """Attach, see that it is paused, resume it, see a further record, and end it."""
+    connection = await attached(cell)
+    told: list[events.Event] = []
+
+    def is_paused(message: HostMessage) -> bool:
+        if isinstance(message, EventRecorded):
+            told.append(message.event)
+        return message == StatusChanged(status=Status.PAUSED)
+
+    messages = connection.messages()
+    async for message in messages:
+        if is_paused(message):
+            break
+    assert told == list(before)
+    await connection.give(Resume())
+    async for message in messages:
+        if is_record(message):
+            break
+    await connection.leave(keep_running=False)
+
+
+async def test_one_cell_has_one_run(cell, run) -> None:
+    connection = await start_host(socket_path(cell), arguments(cell, run))
+    with pytest.raises(HostNotStarted, match="another process runs this cell") as refusal:
+        await start_host(socket_path(cell), arguments(cell, run))
+    assert refusal.value.exit_code is ExitCode.BUSY
+    await connection.leave(keep_running=False)
+    await until(lambda: nothing_is_left(cell))
+
+
+async def test_a_host_that_cannot_begin_says_why(cell, run) -> None:
+    cell.path.write_text("nothing")
+    with pytest.raises(HostNotStarted, match=str(cell.path)) as refusal:
+        await start_host(socket_path(cell), arguments(cell, run))
+    assert refusal.value.exit_code is ExitCode.USAGE
+    await until(lambda: not hosts_of(cell))
+
+
+async def test_a_terminated_host_ends_its_run_cleanly(cell, run) -> None:
+    connection = await start_host(socket_path(cell), arguments(cell, run))
+    await until_told(connection, is_record)
+    (host,) = hosts_of(cell)
+    os.kill(host, signal.SIGTERM)
+    told = [one.event async for one in connection.messages() if isinstance(one, EventRecorded)]
+    assert isinstance(told[-1], events.Interrupted)
+    await until(lambda: nothing_is_left(cell))

@@ -7,6 +7,7 @@ from datetime import datetime
 from pathlib import Path
 
 from hexacell.application.journal_soundness import require_sound
+from hexacell.application.proposals import later_approval
 from hexacell.campaign.task_accuracy import Task
 from hexacell.cell.loader import Cell
 from hexacell.controller_config.change import fingerprint
@@ -65,25 +66,29 @@ def _accepted(cell: Cell, path: Path) -> _AcceptedRun | None:
         entries = read_entries(journal)
         history = (entry.event for entry in entries)
         state = require_sound(history, cell.settings, journal, follows_plan=False)
+        is_applied_later = later_approval(RunFolder(path)) is not None
     except HexacellError:
         return None
-    if state.identified is None or not _is_accepted(state):
+    if state.identified is None or not _is_accepted(state, is_applied_later=is_applied_later):
         return None
     return _AcceptedRun(path, entries[-1].at, state, state.identified)
 
 
-def _is_accepted(state: RunState) -> bool:
+def _is_accepted(state: RunState, *, is_applied_later: bool) -> bool:
     """Whether the result passed, or a person kept it although its error is not certain to be within limits.
 
-    Where the model did not hold, nothing is known of the geometry, whoever kept it.
+    Who had the proposal applied after the run kept it too. Where the model did not hold, nothing is known
+    of the geometry, whoever kept it.
     """
-    if state.judged is None or state.rolled_back or state.rolling_back:
+    is_back = state.rolled_back or state.rolling_back
+    if state.judged is None or (is_back and not is_applied_later):
         return False
     if state.judged.verdict is Verdict.PASS:
         return True
     verification = state.judged.verification
     holds = verification is not None and all(test.passed for test in verification.tests)
-    return holds and state.accepted is not None and state.accepted.by is not None
+    is_kept = state.accepted is not None and state.accepted.by is not None
+    return holds and (is_kept or is_applied_later)
 
 
 def _result(cell: Cell, accepted: _AcceptedRun) -> AcceptedResult:

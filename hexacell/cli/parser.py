@@ -57,6 +57,8 @@ def make_parser() -> Parser:
     _next(commands)
     _fit(commands)
     _replay(commands)
+    _apply(commands)
+    _rollback(commands)
     _cell(commands)
     return parser
 
@@ -224,6 +226,27 @@ def _replay(commands: Any) -> None:  # noqa: ANN401
         type=Path,
         metavar="FOLDER",
         help="replay nothing; copy the run folder there with every password masked, to be given to others",
+    )
+    _add_json(parser)
+
+
+def _apply(commands: Any) -> None:  # noqa: ANN401
+    parser = _command(
+        commands, "apply", "write the proposal of a run into the controller's config", "config.apply"
+    )
+    parser.add_argument("run", type=Path, metavar="RUN", help="a run folder")
+    _add_json(parser)
+
+
+def _rollback(commands: Any) -> None:  # noqa: ANN401
+    parser = _command(
+        commands, "rollback", "undo what was written into the controller's config", "config.rollback"
+    )
+    _add_cell(parser)
+    parser.add_argument(
+        "--to",
+        metavar="RUN",
+        help="restore what this run wrote, by its folder or name (default: undo the latest write)",
     )
     _add_json(parser)
 

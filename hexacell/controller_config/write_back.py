@@ -102,8 +102,17 @@ def rollback(receipt: Receipt) -> None:
             subject=receipt.path,
             action=f"Review it; if it may be lost, copy {receipt.backup_folder / BEFORE} over it",
         )
-    atomic_files.write_atomically(receipt.path, before, expected=found)
-    _require_written(receipt.path, before)
+    restore(receipt.path, before, expected=found)
+
+
+def restore(path: Path, data: bytes, *, expected: bytes) -> None:
+    """Replace the config by an earlier version in one step, while it is as ``expected``, and read it back.
+
+    Raises:
+        FileError: it has changed, or cannot be written.
+    """
+    atomic_files.write_atomically(path, data, expected=expected)
+    _require_written(path, data)
 
 
 def _is_complete(receipt: Receipt) -> bool:

@@ -8,7 +8,9 @@ from typing import Any
 
 from drivers.interfaces import DeviceIdentity
 from hexacell.application.calibration_run import RunRequest
+from hexacell.application.config_rollback import ConfigRollback
 from hexacell.application.offline import NextPose, PlanTrial
+from hexacell.application.proposals import AppliedProposal
 from hexacell.campaign.decisions import Finished, Forecast, MeasurePose, StartPoint
 from hexacell.presentation.teaching import teaching_sentence
 from procedures.replay.comparison import ReplayReport
@@ -130,4 +132,27 @@ def replay_document(replayed: ReplayReport) -> dict[str, Any]:
             }
             for difference in replayed.differences
         ],
+    }
+
+
+def applied_document(applied: AppliedProposal) -> dict[str, Any]:
+    """What ``apply --json`` prints."""
+    change, moved = applied.proposal.change, applied.proposal.displacement
+    return {
+        "applied": bool(applied.by),
+        "by": applied.by or None,
+        "config": str(change.path),
+        "run": str(applied.proposal.folder.path),
+        "sha256": change.sha256_after,
+        "teach": None if moved is None else teaching_sentence(moved),
+    }
+
+
+def rollback_document(done: ConfigRollback) -> dict[str, Any]:
+    """What ``rollback --json`` prints."""
+    return {
+        "restored": bool(done.change),
+        "config": str(done.path),
+        "from": str(done.restored),
+        "undone": None if done.undone is None else str(done.undone),
     }

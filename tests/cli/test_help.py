@@ -13,7 +13,19 @@ from hexacell.cli.app import main
 from hexacell.cli.parser import make_parser
 
 SLOW_TO_IMPORT = {"numpy", "scipy", "textual", "matplotlib", "pydantic", "rich", "asyncio"}
-COMMANDS = ("demo", "run", "length", "preflight", "simulate", "next", "fit", "replay", "cell")
+COMMANDS = (
+    "demo",
+    "run",
+    "length",
+    "preflight",
+    "simulate",
+    "next",
+    "fit",
+    "replay",
+    "apply",
+    "rollback",
+    "cell",
+)
 PAGES = [
     [],
     *([command] for command in COMMANDS),

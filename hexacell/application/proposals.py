@@ -1,0 +1,199 @@
+"""The proposal of a run, written into the controller's config afterwards by a person."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import ClassVar
+
+from hexacell.acceptance import AcceptanceGate
+from hexacell.campaign.teaching import TaskDisplacement
+from hexacell.cell.loader import load_cell
+from hexacell.controller_config.change import ConfigChange, JsonRecord
+from hexacell.controller_config.interface import ConfigFormat
+from hexacell.controller_config.three_way import ConfigEditedSince, compare_versions
+from hexacell.controller_config.write_back import commit
+from hexacell.decision import Verdict
+from hexacell.errors import FileError, LimitError, UsageError
+from hexacell.kinematics.geometry import Geometry
+from hexacell.kinematics.parameters import ParameterSet
+from hexacell.robot_model import config_format
+from hexacell.runs.run_folder import RunFolder
+from hexacell.storage import atomic_files
+from hexacell.storage.cell_lock import cell_lock
+from procedures.engine.config_transactions import holds_provisional
+from procedures.journal.journal import read_journal
+from procedures.journal.line_format import RESTORE
+from procedures.run import events
+from procedures.run.questions import Operator, ask_approval
+from procedures.run.state import RunState, fold
+
+COMMAND = "the command"
+"""Who approves what needs no person: who typed ``apply``."""
+
+
+class LaterApproval(JsonRecord):
+    """Who had a proposal written after its run, and when: ``applied.json`` in the run folder."""
+
+    noun: ClassVar[str] = "approval of a proposal"
+
+    by: str
+    at: datetime
+    sha256_after: str
+
+
+@dataclass(frozen=True, slots=True)
+class Proposal:
+    """The change of the config that a run proposed, and the conditions under which it may be written."""
+
+    folder: RunFolder
+    cell: str
+    change: ConfigChange
+    gates: tuple[AcceptanceGate, ...]
+    config_format: ConfigFormat
+    parameters: ParameterSet
+    state: RunState
+
+    @property
+    def displacement(self) -> TaskDisplacement | None:
+        """How far it moves taught points and frames; none if that is not known."""
+        return None if self.state.proposed is None else self.state.proposed.displacement
+
+
+@dataclass(frozen=True, slots=True)
+class AppliedProposal:
+    """A proposal that the config has now; ``by`` is who had it written, empty if it was there already."""
+
+    proposal: Proposal
+    by: str
+
+
+def read_proposal(folder: RunFolder) -> Proposal:
+    """The proposal of a run.
+
+    Raises:
+        UsageError: the run proposed nothing.
+        FileError: its files cannot be read, or do not belong together.
+    """
+    state = fold(read_journal(folder.journal))
+    if state.started is None or state.proposed is None or not folder.proposal.exists():
+        raise UsageError(
+            "this run proposed no change of a config",
+            subject=folder.path,
+            action="Name a calibration that identified a geometry",
+        )
+    change = ConfigChange.load(folder.proposal)
+    _require_together(folder, state.started, state.proposed, change)
+    settings = load_cell(folder.path / "cell.toml").settings
+    return Proposal(
+        folder,
+        state.started.cell,
+        change,
+        (*state.proposed.gates, _verification_gate(state)),
+        config_format(settings),
+        settings.mechanism.parameters,
+        state,
+    )
+
+
+async def apply_proposal(proposal: Proposal, operator: Operator) -> AppliedProposal:
+    """Write a proposal into the controller's config, once a person has accepted what needs one.
+
+    Raises:
+        LimitError: a gate refuses it, or the person declined.
+        AnswerNeeded: a person must accept it, and nobody is there.
+        ConfigEditedSince: the config was edited since the run began.
+        CellBusy, FileError, WriteBackUndone: see :func:`~hexacell.controller_config.write_back.commit`.
+    """
+    change = proposal.change
+    with cell_lock(change.path):
+        if atomic_files.sha256(atomic_files.read_bytes(change.path)) == change.sha256_after:
+            return AppliedProposal(proposal, "")
+        _require_unedited(proposal)
+        by = await _approval(proposal, operator)
+        commit(change, proposal.folder.path)
+        approval = LaterApproval(by=by, at=datetime.now(UTC), sha256_after=change.sha256_after)
+        approval.save(_approval_path(proposal.folder), like=change.path)
+    return AppliedProposal(proposal, by)
+
+
+def later_approval(folder: RunFolder) -> LaterApproval | None:
+    """Who had the proposal of a run written after it; none if nobody did. Raises ``FileError``."""
+    path = _approval_path(folder)
+    return LaterApproval.load(path) if path.exists() else None
+
+
+def _approval_path(folder: RunFolder) -> Path:
+    return folder.path / "applied.json"
+
+
+async def _approval(proposal: Proposal, operator: Operator) -> str:
+    failed = [gate for gate in proposal.gates if not gate.passed]
+    if refused := [gate.sentence for gate in failed if not gate.needs_person]:
+        raise LimitError("the new geometry is refused: " + " ".join(refused))
+    if not failed:
+        return COMMAND
+    state = proposal.state
+    improvement = state.identified.improvement if state.identified else None
+    question = ask_approval(
+        proposal.gates, proposal.change.diff, proposal.displacement, improvement, cell=proposal.cell
+    )
+    if (name := await operator.ask(question)) is None:
+        raise LimitError("the new geometry was declined; nothing was applied")
+    return name
+
+
+def _verification_gate(state: RunState) -> AcceptanceGate:
+    """What the held-out records say of the written geometry."""
+    judged = state.judged
+    if judged is None or judged.verification is None:
+        sentence = "No held-out record has verified it."
+        return AcceptanceGate(name="verified", passed=False, sentence=sentence, needs_person=True)
+    return AcceptanceGate(
+        name="verified",
+        passed=judged.verdict is Verdict.PASS,
+        sentence=f"Its verification: {judged.line}.",
+        needs_person=judged.verification.is_offered,
+    )
+
+
+def _require_unedited(proposal: Proposal) -> None:
+    change = proposal.change
+    if atomic_files.sha256(atomic_files.read_bytes(change.path)) == change.sha256_before:
+        return
+    if holds_provisional(proposal.folder, change.path):
+        raise UsageError(
+            "the run was interrupted and left its provisional geometry here",
+            subject=change.path,
+            action="Resume that run, which takes it back",
+        )
+    versions = compare_versions(
+        change.path,
+        proposal.config_format,
+        (Geometry.of(proposal.parameters, change.before), change.text_before),
+        (Geometry.of(proposal.parameters, change.after), change.text_after),
+    )
+    raise ConfigEditedSince(
+        "the config changed since the run began; its geometry does not belong to it",
+        versions,
+        path=change.path,
+        action="Nothing was written: undo the edit and repeat, or calibrate again",
+    )
+
+
+def _require_together(
+    folder: RunFolder, started: events.RunStarted, proposed: events.Proposed, change: ConfigChange
+) -> None:
+    """The proposal is the one of the journal, and for the config that the run began with."""
+    is_same_config = os.path.realpath(change.path) == os.path.realpath(started.config)
+    is_same_text = change.sha256_before == started.config_sha256
+    if folder.proposal.is_symlink() or not (is_same_config and is_same_text) or _differs(proposed, change):
+        raise FileError(
+            "this proposal is not the one of its journal", subject=folder.proposal, action=RESTORE
+        )
+
+
+def _differs(proposed: events.Proposed, change: ConfigChange) -> bool:
+    return proposed.written is not None and proposed.written != change.after

@@ -1,0 +1,51 @@
+"""``hexacell apply`` and ``rollback``: a proposal written into the controller's config, and undone."""
+
+from __future__ import annotations
+
+import argparse
+import asyncio
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from hexacell.application.config_rollback import roll_back_config
+from hexacell.application.proposals import apply_proposal, read_proposal
+from hexacell.cli.cell_argument import cell_at
+from hexacell.cli.console import Console
+from hexacell.cli.terminal import TerminalOperator, is_interactive
+from hexacell.controller_config.three_way import ConfigEditedSince
+from hexacell.errors import ExitCode
+from hexacell.presentation.config_changes import applied_text, rollback_text, versions_text
+from hexacell.presentation.documents import applied_document, rollback_document
+from hexacell.runs.run_folder import RunFolder
+from procedures.run.questions import UnattendedOperator
+
+
+def apply(options: argparse.Namespace) -> ExitCode:
+    """Write the proposal of a run; a person is asked where a gate needs one."""
+    console = Console(options.json)
+    proposal = read_proposal(RunFolder(options.run))
+    operator = TerminalOperator(console) if is_interactive() else UnattendedOperator()
+    with _edits_shown(console):
+        applied = asyncio.run(apply_proposal(proposal, operator))
+    console.document(applied_document(applied))
+    console.print(applied_text(applied))
+    return ExitCode.DONE
+
+
+def rollback(options: argparse.Namespace) -> ExitCode:
+    """Undo the latest write, or restore what a run wrote."""
+    console = Console(options.json)
+    with _edits_shown(console):
+        done = roll_back_config(cell_at(options.cell, console), options.to)
+    console.document(rollback_document(done))
+    console.print(rollback_text(done))
+    return ExitCode.DONE
+
+
+@contextmanager
+def _edits_shown(console: Console) -> Iterator[None]:
+    try:
+        yield
+    except ConfigEditedSince as edited:
+        console.error(versions_text(edited.versions))
+        raise

@@ -1,0 +1,51 @@
+"""Text for changes of the controller's config outside a run: applied, rolled back, or edited by hand."""
+
+from __future__ import annotations
+
+from hexacell.application.config_rollback import ConfigRollback
+from hexacell.application.proposals import AppliedProposal
+from hexacell.controller_config.three_way import ConfigVersions, NumberVersions
+from hexacell.controller_config.write_back import BEFORE
+from hexacell.presentation.layout import wrapped
+from hexacell.presentation.teaching import teaching_line
+
+RELOAD = "Restart or reload the controller before it moves: until then it has the geometry of before."
+
+
+def applied_text(applied: AppliedProposal) -> str:
+    """What an application of a proposal did, and what is to be done next."""
+    proposal = applied.proposal
+    if not applied.by:
+        return f"{proposal.change.path} has this geometry already; nothing was written."
+    teaching = () if proposal.displacement is None else (teaching_line(proposal.displacement),)
+    return "\n".join(
+        (
+            f"Written into {proposal.change.path}, approved by {applied.by}.",
+            *teaching,
+            wrapped(RELOAD),
+            f"`hexacell rollback` undoes it; the old config is {proposal.folder.path / BEFORE}.",
+        )
+    )
+
+
+def rollback_text(done: ConfigRollback) -> str:
+    """What a rollback did, and what is to be done next."""
+    if not done.change:
+        return f"{done.path} is as in {done.restored} already; nothing was written."
+    undone = "" if done.undone is None else f", which undoes the run {done.undone.name}"
+    return f"{done.change}\n{done.path} is {done.restored} again, bit for bit{undone}.\n{wrapped(RELOAD)}"
+
+
+def versions_text(versions: ConfigVersions) -> str:
+    """The three versions of an edited config, number by number, and the edit itself."""
+    origin = "the run wrote it" if versions.is_from_written else "it was before the run"
+    numbers = [_number_line(one) for one in versions.numbers]
+    head = f"{'number':9}{'before':>16}{'written':>16}{'now':>16}"
+    table = [head, *numbers] if numbers else ["No number of the geometry differs."]
+    return "\n".join([*table, f"The edit since {origin}:", versions.edit.rstrip("\n")])
+
+
+def _number_line(number: NumberVersions) -> str:
+    now = f"{'unreadable':>16}" if number.now is None else f"{number.now:16.6f}"
+    edited = "  edited by hand" if number.is_edited else ""
+    return f"{number.name:9}{number.before:16.6f}{number.written:16.6f}{now}{edited}"

@@ -1,0 +1,89 @@
+"""``apply`` and ``rollback`` as they are typed."""
+
+from __future__ import annotations
+
+import os
+import pty
+
+import pytest
+
+from hexacell.acceptance import AcceptanceGate
+from hexacell.cell.loader import load_cell
+from tests.cli.test_run_answers import Terminal, ended
+from tests.hexacell.application.proposed_runs import MET, propose_run
+
+GRAVE = AcceptanceGate(
+    name="within tolerance", passed=False, sentence="Beyond: S1x.", needs_person=True, needs_cell_name=True
+)
+KEYS_APPLIED = {"applied", "by", "config", "run", "sha256", "teach"}
+KEYS_RESTORED = {"restored", "config", "from", "undone"}
+
+
+@pytest.fixture
+def cell(cell_folder):
+    return load_cell(cell_folder.cell)
+
+
+@pytest.fixture
+def terminal():
+    master, slave = pty.openpty()
+    yield Terminal(master, slave)
+    os.close(master)
+    os.close(slave)
+
+
+def test_applied_and_undone(cell, typed_here) -> None:
+    run = propose_run(cell)
+    applied = typed_here("apply", run.folder.path)
+    assert (applied.code, cell.config_path.read_bytes()) == (0, run.after)
+    assert "approved by the command" in applied.out
+    assert "Restart or reload the controller before it moves" in applied.out
+    again = typed_here("apply", run.folder.path)
+    assert (again.code, "nothing was written" in again.out) == (0, True)
+    undone = typed_here("rollback", cell.path)
+    assert (undone.code, cell.config_path.read_bytes()) == (0, run.before)
+    assert "bit for bit, which undoes the run 2026-11-20T100000Z" in undone.out
+    restored = typed_here("rollback", cell.path, "--to", run.folder.path.name)
+    assert (restored.code, cell.config_path.read_bytes()) == (0, run.after)
+
+
+def test_programs_get_one_document(cell, typed_here) -> None:
+    run = propose_run(cell)
+    applied = typed_here("apply", run.folder.path, "--json").document
+    assert set(applied) == KEYS_APPLIED
+    assert (applied["applied"], applied["by"]) == (True, "the command")
+    restored = typed_here("rollback", cell.path, "--json").document
+    assert set(restored) == KEYS_RESTORED
+    assert restored["restored"] is True
+    nothing = typed_here("rollback", cell.path, "--json")
+    assert (nothing.code, nothing.document["exit_code"]) == (2, 2)
+
+
+def test_an_edit_is_refused_politely(cell, typed_here) -> None:
+    run = propose_run(cell)
+    edited = run.before + b"# a note\n"
+    cell.config_path.write_bytes(edited)
+    refused = typed_here("apply", run.folder.path)
+    assert (refused.code, cell.config_path.read_bytes()) == (2, edited)
+    assert "The edit since it was before the run:" in refused.err
+    assert "+# a note" in refused.err
+    assert refused.err.splitlines()[-1].endswith("undo the edit and repeat, or calibrate again")
+
+
+def test_unattended_what_needs_a_person_is_refused(cell, typed) -> None:
+    run = propose_run(cell, gates=(MET, GRAVE))
+    refused = typed("apply", run.folder.path)
+    assert (refused.code, cell.config_path.read_bytes()) == (4, run.before)
+    assert "Beyond: S1x." in refused.err
+
+
+def test_what_is_grave_needs_the_cells_name(cell, start, terminal) -> None:
+    run = propose_run(cell, gates=(MET, GRAVE))
+    process = start("apply", run.folder.path, stdin=terminal.slave, stderr=terminal.slave)
+    terminal.read_until("Type the cell's name, simulated-hexaglide, to take the responsibility, or no: ")
+    terminal.type("yes\n")
+    terminal.read_until("Type the cell's name")
+    terminal.type("simulated-hexaglide\n")
+    assert ended(process, terminal) == 0
+    assert cell.config_path.read_bytes() == run.after
+    assert "approved by a person at the terminal" in process.out

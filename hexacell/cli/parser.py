@@ -232,7 +232,7 @@ def _replay(commands: Any) -> None:  # noqa: ANN401
 
 def _apply(commands: Any) -> None:  # noqa: ANN401
     parser = _command(
-        commands, "apply", "write the proposal of a run into the controller's config", "config.apply"
+        commands, "apply", "write the proposal of a run into the controller's config", "config.apply_run"
     )
     parser.add_argument("run", type=Path, metavar="RUN", help="a run folder")
     _add_json(parser)
@@ -240,7 +240,7 @@ def _apply(commands: Any) -> None:  # noqa: ANN401
 
 def _rollback(commands: Any) -> None:  # noqa: ANN401
     parser = _command(
-        commands, "rollback", "undo what was written into the controller's config", "config.rollback"
+        commands, "rollback", "undo what was written into the controller's config", "config.rollback_config"
     )
     _add_cell(parser)
     parser.add_argument(

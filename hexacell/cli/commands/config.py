@@ -20,7 +20,7 @@ from hexacell.runs.run_folder import RunFolder
 from procedures.run.questions import UnattendedOperator
 
 
-def apply(options: argparse.Namespace) -> ExitCode:
+def apply_run(options: argparse.Namespace) -> ExitCode:
     """Write the proposal of a run; a person is asked where a gate needs one."""
     console = Console(options.json)
     proposal = read_proposal(RunFolder(options.run))
@@ -32,7 +32,7 @@ def apply(options: argparse.Namespace) -> ExitCode:
     return ExitCode.DONE
 
 
-def rollback(options: argparse.Namespace) -> ExitCode:
+def rollback_config(options: argparse.Namespace) -> ExitCode:
     """Undo the latest write, or restore what a run wrote."""
     console = Console(options.json)
     with _edits_shown(console):

@@ -59,6 +59,7 @@ def make_parser() -> Parser:
     _replay(commands)
     _apply(commands)
     _rollback(commands)
+    _history(commands)
     _cell(commands)
     return parser
 
@@ -248,6 +249,20 @@ def _rollback(commands: Any) -> None:  # noqa: ANN401
         metavar="RUN",
         help="restore what this run wrote, by its folder or name (default: undo the latest write)",
     )
+    _add_json(parser)
+
+
+def _history(commands: Any) -> None:  # noqa: ANN401
+    parser = _command(commands, "history", "list the runs of a cell, compare two, see what drifts")
+    _add_cell(parser)
+    what = parser.add_mutually_exclusive_group()
+    what.add_argument(
+        "--compare",
+        nargs=2,
+        metavar=("RUN", "RUN"),
+        help="what changed from one calibration to another, parameter by parameter",
+    )
+    what.add_argument("--drift", action="store_true", help="the trend of every parameter over all runs")
     _add_json(parser)
 
 

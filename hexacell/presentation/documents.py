@@ -9,10 +9,12 @@ from typing import Any
 from drivers.interfaces import DeviceIdentity
 from hexacell.application.calibration_run import RunRequest
 from hexacell.application.config_rollback import ConfigRollback
+from hexacell.application.history import PastRun
 from hexacell.application.offline import NextPose, PlanTrial
 from hexacell.application.proposals import AppliedProposal
 from hexacell.campaign.decisions import Finished, Forecast, MeasurePose, StartPoint
 from hexacell.presentation.teaching import teaching_sentence
+from hexacell.reporting.run_comparison import ParameterTrend, RunComparison
 from procedures.replay.comparison import ReplayReport
 from procedures.run import events
 from procedures.run.state import RunState
@@ -156,3 +158,51 @@ def rollback_document(done: ConfigRollback) -> dict[str, Any]:
         "from": str(done.restored),
         "undone": None if done.undone is None else str(done.undone),
     }
+
+
+def history_document(runs: Sequence[PastRun]) -> dict[str, Any]:
+    """What ``history --json`` prints: the runs, the newest first."""
+    return {"runs": [past_run_document(run) for run in runs]}
+
+
+def past_run_document(run: PastRun) -> dict[str, Any]:
+    """One of them."""
+    error = None if run.accuracy is None else run.accuracy.position
+    return {
+        "run": str(run.folder.path),
+        "began": None if run.began is None else run.began.isoformat(),
+        "ended": None if run.ended is None else run.ended.isoformat(),
+        "mode": run.mode or None,
+        "records": run.records,
+        "verdict": None if run.verdict is None else run.verdict.value,
+        "position_mm": None if error is None else error.value,
+        "expanded_mm": None if error is None else error.expanded,
+        "limit_mm": None if error is None else error.limit,
+        "line": run.line,
+        "over": run.is_over,
+        "in_controller": run.is_in_controller,
+        "written": run.has_written,
+        "proposal": run.has_proposal,
+    }
+
+
+def comparison_document(before: PastRun, after: PastRun, compared: RunComparison) -> dict[str, Any]:
+    """What ``history --compare --json`` prints."""
+    return {
+        "before": str(before.folder.path),
+        "after": str(after.folder.path),
+        "frame": compared.frame,
+        "changed": compared.is_changed,
+        "chi2": compared.test.chi2,
+        "dof": compared.test.expected,
+        "probability": compared.test.probability,
+        "parameters": [
+            {**asdict(one), "change": one.change, "significant": one.is_significant}
+            for one in compared.parameters
+        ],
+    }
+
+
+def drift_document(found: Sequence[ParameterTrend]) -> dict[str, Any]:
+    """What ``history --drift --json`` prints."""
+    return {"parameters": [{**asdict(one), "walking": one.is_walking} for one in found]}

@@ -24,6 +24,7 @@ COMMANDS = (
     "replay",
     "apply",
     "rollback",
+    "history",
     "cell",
 )
 PAGES = [

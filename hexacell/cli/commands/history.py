@@ -1,0 +1,38 @@
+"""``hexacell history``: the runs of a cell, two of them compared, and what drifts."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+
+from hexacell.application.history import compare_runs, parameter_trends, past_runs
+from hexacell.cell.loader import Cell
+from hexacell.cli.cell_argument import cell_at
+from hexacell.cli.console import Console
+from hexacell.errors import ExitCode
+from hexacell.presentation.documents import comparison_document, drift_document, history_document
+from hexacell.presentation.history import comparison_text, drift_text, history_text
+
+
+def main(options: argparse.Namespace) -> ExitCode:
+    """List, compare, or look for drift; nothing is changed."""
+    console = Console(options.json)
+    cell = cell_at(options.cell, console)
+    if options.compare is not None:
+        _compare(cell, options.compare, console)
+    elif options.drift:
+        found = parameter_trends(cell, past_runs(cell))
+        console.document(drift_document(found))
+        console.print(drift_text(found))
+    else:
+        runs = past_runs(cell)
+        console.document(history_document(runs))
+        console.print(history_text(runs))
+    return ExitCode.DONE
+
+
+def _compare(cell: Cell, named: Sequence[str], console: Console) -> None:
+    before, after = named
+    compared = compare_runs(cell, before, after)
+    console.document(comparison_document(*compared))
+    console.print(comparison_text(*compared))

@@ -1,0 +1,57 @@
+"""``hexacell history`` as it is typed."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from hexacell.cell.loader import load_cell
+from hexacell.controller_config.write_back import commit
+from tests.hexacell.application.proposed_runs import propose_run
+from tests.hexacell.application.test_history import identified
+
+KEYS = {
+    "run", "began", "ended", "mode", "records", "verdict", "position_mm", "expanded_mm", "limit_mm", "line",
+    "over", "in_controller", "written", "proposal",
+}  # fmt: skip
+
+
+@pytest.fixture
+def cell(cell_folder):
+    return load_cell(cell_folder.cell)
+
+
+def test_the_runs_are_listed(cell, typed_here) -> None:
+    run = propose_run(cell)
+    commit(run.change, run.folder.path)
+    listed = typed_here("history", cell.path)
+    assert listed.code == 0
+    assert [line.split()[:3] for line in listed.out.splitlines()] == [
+        ["run", "mode", "verdict"],
+        ["2026-11-20T100000Z", "optimise", "pass"],
+    ]
+    (document,) = typed_here("history", cell.path, "--json").document["runs"]
+    assert set(document) == KEYS
+    assert (document["run"], document["in_controller"]) == (str(run.folder.path), True)
+
+
+def test_two_runs_and_the_drift(cell, typed_here) -> None:
+    for name in "abc":
+        identified(cell, name, shift_mm=0.0)
+    compared = typed_here("history", cell.path, "--compare", "a", "b")
+    assert (compared.code, compared.out.startswith("a -> b: nothing changed")) == (0, True)
+    document = typed_here("history", cell.path, "--compare", "a", "b", "--json").document
+    assert (document["changed"], document["frame"], len(document["parameters"])) == (False, "paper", 35)
+    assert set(document["parameters"][0]) == {
+        "name", "unit", "before", "after", "sigma", "change", "significant",
+    }  # fmt: skip
+    drift = typed_here("history", cell.path, "--drift", "--json").document
+    assert len(drift["parameters"]) == 35
+    json.dumps(drift, allow_nan=False)
+    assert typed_here("history", cell.path, "--drift").out.startswith("No parameter walks.")
+
+
+def test_one_question_at_a_time(cell, typed_here) -> None:
+    refused = typed_here("history", cell.path, "--drift", "--compare", "a", "b")
+    assert (refused.code, "not allowed with" in refused.err) == (2, True)

@@ -50,6 +50,7 @@ def make_parser() -> Parser:
     )
     _demo(commands)
     _run(commands)
+    _tui(commands)
     _length(commands)
     _preflight(commands)
     _simulate(commands)
@@ -135,6 +136,11 @@ def _add_resume(parser: argparse.ArgumentParser, what: str) -> None:
         const="latest",
         help=f"resume an interrupted {what}: its folder or name (default: the latest one)",
     )
+
+
+def _tui(commands: Any) -> None:  # noqa: ANN401
+    parser = _command(commands, "tui", "the technician's screen: measure, review, approve, roll back")
+    _add_cell(parser)
 
 
 def _length(commands: Any) -> None:  # noqa: ANN401

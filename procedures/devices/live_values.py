@@ -42,6 +42,11 @@ class LiveValue(Generic[T]):
         """How long ago the device answered, s; infinite before the first answer."""
         return self._live.now() - self.at_s
 
+    def fail(self, problem: str) -> None:
+        """Say why the device cannot be asked."""
+        self.problem = problem
+        self._live.notify()
+
     async def of(self, read: Callable[[], Awaitable[T]]) -> T:
         """Ask for a value and keep it, or why there is none."""
         try:

@@ -16,6 +16,7 @@ SLOW_TO_IMPORT = {"numpy", "scipy", "textual", "matplotlib", "pydantic", "rich",
 COMMANDS = (
     "demo",
     "run",
+    "tui",
     "length",
     "preflight",
     "simulate",

@@ -1,0 +1,1 @@
+"""What the technician's screens show: views of a run, a cell and its history, made from typed data."""

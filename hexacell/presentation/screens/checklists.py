@@ -1,0 +1,85 @@
+"""Text for what must hold before motion: devices from their live values, the rest from a preflight."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from hexacell.attach.snapshots import LiveSnapshot
+from hexacell.errors import HexacellError, flatten_errors
+from hexacell.presentation.screens.views import ChecklistItem, ChecklistView, Mark
+
+PRESS_CHECK = "Enter looks at everything; nothing moves. v tries the plan, s starts the run."
+CHECKING = "Looking at everything: this takes some seconds, and nothing moves."
+RUNNING = "A run goes on: see 3 Measure. Its checks are made again before each step that depends on them."
+NOT_CHECKED_YET = (
+    "points and poses within reach",
+    "devices answer with the right settings",
+    "stop line, disk, and the robot's position",
+)
+PLAN_UNKNOWN = "v carries the plan out on simulated robots: records, minutes, and predicted accuracy."
+TRYING = "Trying the plan on simulated robots, some seconds ..."
+
+
+def live_items(live: LiveSnapshot | None) -> tuple[ChecklistItem, ...]:
+    """An item for each device, from what it shows now."""
+    if live is None:
+        return (ChecklistItem(Mark.OPEN, "devices", "not connected"),)
+    gauges = [
+        _device(f"gauge {one.name}", one.problem, "" if one.shown_mm is None else f"{one.shown_mm:+.3f} mm")
+        for one in live.gauges
+    ]
+    found = "" if live.encoders.positions_mm is None else "six positions"
+    encoders = _device("encoders", live.encoders.problem, found)
+    stop = ChecklistItem(Mark.DONE, "stop line", "motion is allowed")
+    if live.stop_reason:
+        stop = ChecklistItem(Mark.FAILED, "stop line", live.stop_reason, "Release it")
+    return (*gauges, encoders, _controller(live), stop)
+
+
+def _device(name: str, problem: str, found: str) -> ChecklistItem:
+    if problem:
+        return ChecklistItem(Mark.FAILED, name, problem.removeprefix(f"{name}: "))
+    return ChecklistItem(Mark.DONE, name, found) if found else ChecklistItem(Mark.BUSY, name, "waited for")
+
+
+def _controller(live: LiveSnapshot) -> ChecklistItem:
+    controller = live.controller
+    if controller.problem:
+        return ChecklistItem(Mark.FAILED, "controller", controller.problem)
+    if controller.estop is None:
+        return ChecklistItem(Mark.BUSY, "controller", "waited for")
+    if controller.estop:
+        return ChecklistItem(
+            Mark.DONE, "controller", "answers; in emergency stop, asked about at the start"
+        )
+    return ChecklistItem(Mark.DONE, "controller", "answers")
+
+
+def failed_items(error: HexacellError) -> tuple[ChecklistItem, ...]:
+    """An item for each failure in a report."""
+    return tuple(
+        ChecklistItem(Mark.FAILED, one.subject or "plan", one.problem, one.action or "")
+        for one in flatten_errors(error)
+    )
+
+
+def passed_items(devices: Sequence[str]) -> tuple[ChecklistItem, ...]:
+    """The items of a preflight that found nothing; ``devices`` are those that answered."""
+    named = (ChecklistItem(Mark.DONE, line) for line in devices)
+    return (*named, *(ChecklistItem(Mark.DONE, name) for name in NOT_CHECKED_YET))
+
+
+def checklist_view(
+    live: LiveSnapshot | None,
+    checked: tuple[ChecklistItem, ...] | None,
+    plan: tuple[str, ...],
+    *,
+    is_checking: bool = False,
+    refusal: str = "",
+) -> ChecklistView:
+    """The whole list; ``checked`` is what the preflight found, none before it."""
+    if checked is None:
+        mark = Mark.BUSY if is_checking else Mark.OPEN
+        checked = tuple(ChecklistItem(mark, name) for name in NOT_CHECKED_YET)
+    instruction = CHECKING if is_checking else refusal or PRESS_CHECK
+    return ChecklistView((*live_items(live), *checked), plan or (PLAN_UNKNOWN,), instruction, refusal)

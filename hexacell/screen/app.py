@@ -1,0 +1,210 @@
+"""The application: five screens over one backend, keys, palette, themes, overlays, and quitting."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable, Coroutine, Iterable
+from contextlib import suppress
+from functools import partial
+from typing import Any, ClassVar
+
+from textual.app import App, SystemCommand
+from textual.binding import BindingType
+from textual.css.query import NoMatches
+from textual.screen import Screen
+
+from hexacell.errors import HexacellError
+from hexacell.presentation.screens.views import FaultView
+from hexacell.screen.backend import Backend, ScreenAction
+from hexacell.screen.cell_screen import CellScreen
+from hexacell.screen.digits_screen import DigitsScreen
+from hexacell.screen.history_screen import HistoryScreen
+from hexacell.screen.key_map import KEYS, THEMES, ScreenPreferences
+from hexacell.screen.measure_screen import MeasureScreen
+from hexacell.screen.overlays.fault_overlay import FaultOverlay
+from hexacell.screen.overlays.help_overlay import HelpOverlay
+from hexacell.screen.overlays.question_overlay import QuestionOverlay
+from hexacell.screen.overlays.quit_overlay import Leaving, QuitOverlay
+from hexacell.screen.preflight_screen import PreflightScreen
+from hexacell.screen.review_screen import ReviewScreen
+from hexacell.screen.tab_screen import TabScreen
+from hexacell.screen.themes import SCREEN_THEMES
+
+DRAWN_EVERY_S = 0.1
+LEAVING_TAKES_S = 0.4
+"""The host is told that one leaves; it is not waited for longer."""
+
+SCREENS: tuple[type[TabScreen], ...] = (
+    CellScreen,
+    PreflightScreen,
+    MeasureScreen,
+    ReviewScreen,
+    HistoryScreen,
+)
+
+
+class TechnicianApp(App[int]):
+    """Loads its backend behind the first screen and draws what that knows ten times a second."""
+
+    TITLE = "hexacell"
+    CSS_PATH = "styles.tcss"
+    BINDINGS: ClassVar[list[BindingType]] = list(KEYS)
+    HORIZONTAL_BREAKPOINTS = [(0, "-narrow"), (110, "-wide")]  # noqa: RUF012 - as Textual declares it
+    VERTICAL_BREAKPOINTS = [(0, "-low"), (32, "-tall")]  # noqa: RUF012 - as Textual declares it
+    DEFAULT_MODE = "cell"
+
+    def __init__(
+        self, load: Callable[[], Backend], preferences: ScreenPreferences | None = None, tab: str = "cell"
+    ) -> None:
+        self.preferences = preferences or ScreenPreferences()
+        self.keys_in_use = {str(one.id): one.key_display or one.key for one in KEYS} | self.preferences.keys
+        self._load, self._tab = load, tab
+        self._backend: Backend | None = None
+        self._question_seen, self._fault_seen, self._runs_seen = 0, 0, 0
+        self._allowed: frozenset[ScreenAction] = frozenset()
+        super().__init__()
+        for theme in SCREEN_THEMES:
+            self.register_theme(theme)
+        for screen in SCREENS:
+            self.add_mode(screen.TAB, partial(screen, self.keys_in_use))
+        self.theme = self.preferences.theme
+        self.set_keymap(self.preferences.keys)
+
+    @property
+    def backend(self) -> Backend | None:
+        """What is shown; none while it loads."""
+        return self._backend
+
+    def on_mount(self) -> None:
+        """Load what is behind the screens once the first one is drawn."""
+        self.call_after_refresh(self._begin)
+
+    def _begin(self) -> None:
+        self.run_worker(self._attend(), exit_on_error=False, group="attend")
+
+    async def _attend(self) -> None:
+        """Follow the cell as long as the application runs."""
+        try:
+            self._backend = await asyncio.to_thread(self._load)
+            self.draw()
+            self.set_interval(DRAWN_EVERY_S, self.draw)
+            await self.switch_mode(self._tab)
+            await self._backend.attend()
+        except HexacellError as error:
+            self._tell(error)
+
+    def draw(self) -> None:
+        """Show what is so now in the screen in front, and in what lies below it."""
+        if self._backend is None:
+            return
+        for screen in self.screen_stack:
+            if isinstance(screen, TabScreen | DigitsScreen | QuestionOverlay):
+                with suppress(NoMatches):  # it is being composed, or taken away
+                    screen.draw(self._backend)
+        if not self._goes_to_new_run(self._backend):
+            self._overlay_question(self._backend)
+            self._overlay_fault(self._backend)
+        allowed = frozenset(action for action in ScreenAction if self._backend.allows(action))
+        if allowed != self._allowed:
+            self._allowed = allowed
+            self.refresh_bindings()
+
+    def _goes_to_new_run(self, backend: Backend) -> bool:
+        """Whether the screen changes because a run is followed anew; overlays come after that."""
+        is_new = backend.runs_followed != self._runs_seen
+        if is_new:
+            self._runs_seen = backend.runs_followed
+            self.action_show("measure")
+        return is_new
+
+    def _overlay_question(self, backend: Backend) -> None:
+        """Show a new question; take away one that was answered."""
+        number, view = backend.question_number, backend.question()
+        shown = next((one for one in self.screen_stack if isinstance(one, QuestionOverlay)), None)
+        if shown is not None and (view is None or shown.number != number) and shown.is_current:
+            shown.dismiss()
+        if view is not None and number != self._question_seen:
+            self._question_seen = number
+            self.push_screen(QuestionOverlay(view, number, self._answer))
+
+    def _overlay_fault(self, backend: Backend) -> None:
+        view, number = backend.fault(), backend.fault_number
+        if view is not None and number != self._fault_seen:
+            self.push_screen(FaultOverlay(view))
+        self._fault_seen = number
+
+    async def _answer(self, value: str | None) -> None:
+        if self._backend is not None:
+            self._start(self._backend.answer(value))
+
+    def _start(self, work: Coroutine[Any, Any, str | None]) -> None:
+        """Do something without waiting for it, so that the next key is heard at once."""
+        self.run_worker(self._telling(work), exit_on_error=False)
+
+    async def _telling(self, work: Coroutine[Any, Any, str | None]) -> None:
+        """Wait for some work; say what it says, or what went wrong."""
+        try:
+            if said := await work:
+                self.notify(said, markup=False)
+        except HexacellError as error:
+            self._tell(error)
+
+    def _tell(self, error: HexacellError) -> None:
+        """Show an error that a person can act on."""
+        cause = str(error).removesuffix(f". {error.action}") if error.action else str(error)
+        self.push_screen(FaultOverlay(FaultView("That did not work", cause, error.action or "")))
+
+    def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
+        """Grey what has no effect now."""
+        if action != "perform" or not parameters:
+            return True
+        return True if ScreenAction(str(parameters[0])) in self._allowed else None
+
+    def action_show(self, tab: str) -> None:
+        """Go to another screen."""
+        self.switch_mode(tab)
+
+    def action_perform(self, action: str, argument: str = "") -> None:
+        """Ask for something."""
+        if self._backend is not None:
+            self._start(self._backend.perform(ScreenAction(action), argument))
+
+    def action_answer(self) -> None:
+        """Show the open question again."""
+        self._question_seen = 0
+
+    def action_digits(self) -> None:
+        """Show the gauges in large figures."""
+        self.push_screen(DigitsScreen())
+
+    def action_help(self) -> None:
+        """Explain the screen in front."""
+        self.push_screen(HelpOverlay(self.current_mode, self.keys_in_use))
+
+    def action_next_theme(self) -> None:
+        """Dark, light, monochrome, in turn."""
+        self.theme = THEMES[(THEMES.index(self.theme) + 1) % len(THEMES)]
+
+    def action_leave(self) -> None:
+        """Quit; while a run goes on, ask what becomes of it."""
+        if self._backend is not None and self._backend.may_leave_run:
+            self.push_screen(QuitOverlay(), self._leave)
+        else:
+            self._leave("leave")
+
+    def _leave(self, leaving: Leaving | None) -> None:
+        if leaving in {"stop", "leave"}:
+            self.run_worker(self._quit(keep_running=leaving == "leave"), exit_on_error=False)
+
+    async def _quit(self, *, keep_running: bool) -> None:
+        if self._backend is not None:
+            with suppress(HexacellError, TimeoutError):
+                async with asyncio.timeout(LEAVING_TAKES_S):
+                    await self._backend.leave(keep_running=keep_running)
+        self.exit(0)
+
+    def get_system_commands(self, screen: Screen[Any]) -> Iterable[SystemCommand]:  # noqa: ARG002 - the same everywhere
+        """Everything that a key does, by its name."""
+        for one in KEYS:
+            key = self.keys_in_use[str(one.id)]
+            yield SystemCommand(one.description, f"key {key}", partial(self.run_action, one.action))

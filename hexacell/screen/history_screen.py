@@ -1,0 +1,57 @@
+"""The screen of a cell's runs: list, comparison, and rollback."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from textual.app import ComposeResult
+from textual.binding import Binding, BindingType
+from textual.content import Content
+from textual.widgets import OptionList
+from textual.widgets.option_list import Option
+
+from hexacell.presentation.screens.views import HistoryEntry
+from hexacell.screen.backend import Backend
+from hexacell.screen.tab_screen import TabScreen
+from hexacell.screen.widgets.text_panel import TextList, TextPanel
+
+
+class HistoryScreen(TabScreen):
+    """The runs above, what was asked about one of them below."""
+
+    TAB = "history"
+    AUTO_FOCUS = "#runs"
+    BINDINGS: ClassVar[list[BindingType]] = [
+        Binding("v", "about('compare')", "Compare with the one before", show=False),
+        Binding("b", "about('roll back')", "Put back the config of before it", show=False),
+    ]
+    _entries: tuple[HistoryEntry, ...] = ()
+
+    def compose_body(self) -> ComposeResult:
+        """See the class."""
+        yield TextPanel(id="history-header", classes="table-header")
+        yield OptionList(id="runs", markup=False)
+        yield TextPanel("Comparison", classes="title")
+        yield TextList(id="comparison")
+
+    def draw_body(self, backend: Backend) -> None:
+        """Show the runs."""
+        view = backend.history()
+        self.query_one("#history-header", TextPanel).show(view.note or view.header)
+        self.query_one("#comparison", TextList).show(view.comparison)
+        if view.entries != self._entries:
+            self._entries = view.entries
+            runs = self.query_one("#runs", OptionList)
+            runs.clear_options()
+            runs.add_options(Option(Content(entry.line), id=entry.name) for entry in view.entries)
+            runs.highlighted = 0 if view.entries else None
+
+    async def action_about(self, what: str) -> None:
+        """Do something about the run that is chosen."""
+        chosen = self.query_one("#runs", OptionList).highlighted
+        if chosen is not None and chosen < len(self._entries):
+            await self.run_action(f"app.perform({what!r}, {self._entries[chosen].name!r})")
+
+    async def on_option_list_option_selected(self) -> None:
+        """Open the run."""
+        await self.action_about("open")

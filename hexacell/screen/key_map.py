@@ -1,0 +1,84 @@
+"""The keys of the screens, and the file in which a person may choose others."""
+
+from __future__ import annotations
+
+import os
+import tomllib
+from collections import Counter
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from textual.binding import Binding
+
+from hexacell.errors import FileError, did_you_mean
+
+KEYS = (
+    Binding("1", "show('cell')", "Cell", id="cell", show=False),
+    Binding("2", "show('preflight')", "Preflight", id="preflight", show=False),
+    Binding("3", "show('measure')", "Measure", id="measure", show=False),
+    Binding("4", "show('review')", "Review", id="review", show=False),
+    Binding("5", "show('history')", "History", id="history", show=False),
+    Binding("p", "perform('pause')", "Pause", id="pause"),
+    Binding("P", "perform('pause at once')", "Pause at once", id="pause-at-once", show=False),
+    Binding("u", "perform('undo')", "Undo", id="undo"),
+    Binding("m", "perform('measure again')", "Again", id="measure-again"),
+    Binding("a", "perform('abort')", "Abort", id="abort"),
+    Binding("d", "digits", "Digits", id="digits"),
+    Binding("w", "answer", "Answer the question", id="answer", show=False),
+    Binding("c", "perform('take control')", "Take control", id="take-control", show=False),
+    Binding("t", "next_theme", "Light, dark, monochrome", id="theme", show=False),
+    Binding("question_mark", "help", "Help", key_display="?", id="help"),
+    Binding("q", "leave", "Quit", id="quit"),
+)
+"""The same on every screen; ``id`` is the name in the file."""
+
+THEMES = ("dark", "light", "monochrome")
+
+
+@dataclass(frozen=True, slots=True)
+class ScreenPreferences:
+    """What a person chose: keys by the names of actions, and a theme."""
+
+    keys: dict[str, str] = field(default_factory=dict)
+    theme: str = THEMES[0]
+
+
+def preferences_path() -> Path:
+    """``hexacell/screen.toml`` in the person's folder of configs."""
+    folder = os.environ.get("XDG_CONFIG_HOME") or Path.home() / ".config"
+    return Path(folder) / "hexacell" / "screen.toml"
+
+
+def read_preferences(path: Path) -> ScreenPreferences:
+    """What the file says; the defaults where there is none.
+
+    Raises:
+        FileError: it cannot be read, names no action or no theme, or one key for several actions.
+    """
+    try:
+        content = tomllib.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        return ScreenPreferences()
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise FileError(f"it cannot be read: {error}", subject=path, action="Correct it") from error
+    keys, theme = content.get("keys", {}), content.get("theme", THEMES[0])
+    _require_keys(keys, path)
+    if theme not in THEMES:
+        raise FileError(
+            f"there is no theme {theme!r}", subject=path, action=f"Choose one of {', '.join(THEMES)}"
+        )
+    return ScreenPreferences(keys, theme)
+
+
+def _require_keys(keys: object, path: Path) -> None:
+    """Refuse what names no action, or one key for several; raises ``FileError``."""
+    known = {str(binding.id): binding.key for binding in KEYS}
+    if not isinstance(keys, dict) or not all(isinstance(key, str) for key in keys.values()):
+        raise FileError("[keys] must name a key for each action", subject=path, action='Like pause = "f5"')
+    for name in keys:
+        if name not in known:
+            action = did_you_mean(name, known) or f"The actions are {', '.join(known)}"
+            raise FileError(f"there is no action {name!r}", subject=path, action=action)
+    used = Counter((known | keys).values())
+    if twice := [key for key, times in used.items() if times > 1]:
+        raise FileError(f"the key {twice[0]!r} is used twice", subject=path, action="Choose another")

@@ -1,0 +1,41 @@
+"""The screen of everything that must hold before motion, and of what the plan gives."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from textual.app import ComposeResult
+from textual.binding import Binding, BindingType
+
+from hexacell.presentation.screens.lines import checklist_lines
+from hexacell.screen.backend import Backend
+from hexacell.screen.tab_screen import TabScreen
+from hexacell.screen.widgets.text_panel import TextList, TextPanel
+
+
+class PreflightScreen(TabScreen):
+    """The checklist above, the plan below."""
+
+    TAB = "preflight"
+    AUTO_FOCUS = "#checklist"
+    BINDINGS: ClassVar[list[BindingType]] = [
+        Binding("enter", "app.perform('check')", "Look at everything", show=False),
+        Binding("v", "app.perform('preview')", "Try the plan", show=False),
+        Binding("s", "app.perform('start')", "Start the run", show=False),
+    ]
+
+    def compose_body(self) -> ComposeResult:
+        """See the class."""
+        yield TextPanel(id="instruction", classes="instruction")
+        yield TextPanel("What must hold before the robot moves", classes="title")
+        yield TextList(id="checklist")
+        yield TextPanel("The plan", classes="title")
+        yield TextList(id="plan")
+
+    def draw_body(self, backend: Backend) -> None:
+        """Show the checklist."""
+        view = backend.checklist()
+        self.query_one("#instruction", TextPanel).show(view.instruction)
+        lines = [line for item in view.items for line in checklist_lines(item)]
+        self.query_one("#checklist", TextList).show(lines)
+        self.query_one("#plan", TextList).show(view.plan)

@@ -1,0 +1,88 @@
+"""Follows one run at a time: folds what its host says, and passes commands on."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from contextlib import suppress
+
+from hexacell.attach.connection import RunConnection
+from hexacell.attach.messages import HostFailed
+from hexacell.errors import HexacellError, UsageError
+from hexacell.presentation.screens.run_picture import RunPicture, picture_after
+from procedures.run.cancellation import cancel_and_wait
+from procedures.run.commands import Command
+
+FEW_MESSAGES = 50
+"""After so many at once, as on attaching, the screen is drawn before the next."""
+
+
+class RunFollower:
+    """A run as a screen sees it.
+
+    Args:
+        now: seconds, for the age of values.
+        on_end: called when a run has told everything.
+
+    Attributes:
+        picture: what is known of it; stays when the run is over.
+        questions: how many were opened, so that none is taken for another.
+        runs: how many were followed.
+    """
+
+    def __init__(self, now: Callable[[], float], on_end: Callable[[], None]) -> None:
+        self.picture = RunPicture()
+        self.questions = 0
+        self.runs = 0
+        self._now, self._on_end = now, on_end
+        self._connection: RunConnection | None = None
+        self._following: asyncio.Task[None] | None = None
+
+    @property
+    def connection(self) -> RunConnection | None:
+        """The run that is followed; none when it is over."""
+        return self._connection
+
+    async def follow(self, connection: RunConnection) -> None:
+        """Follow another run."""
+        await self.stop()
+        self.picture, self._connection = RunPicture(), connection
+        self.runs += 1
+        self._following = asyncio.create_task(self._follow(connection))
+
+    async def stop(self) -> None:
+        """Follow no run; it is not told."""
+        following, self._following, self._connection = self._following, None, None
+        if following is not None:
+            await cancel_and_wait(following)
+
+    async def give(self, command: Command) -> None:
+        """Give a command; raises ``HexacellError``."""
+        if self._connection is None:
+            raise UsageError("no run goes on here", action="Start one from 2 Preflight")
+        await self._connection.give(command)
+
+    async def leave(self, *, keep_running: bool) -> None:
+        """Let the run go on alone, or have it stopped; raises ``HexacellError``."""
+        if self._connection is not None:
+            await self._connection.leave(keep_running=keep_running)
+
+    async def _follow(self, connection: RunConnection) -> None:
+        count = 0
+        try:
+            async for message in connection.messages():
+                question = self.picture.question
+                self.picture = picture_after(self.picture, message, self._now())
+                if self.picture.question not in {None, question}:
+                    self.questions += 1
+                count += 1
+                if count % FEW_MESSAGES == 0:
+                    await asyncio.sleep(0)
+        except HexacellError as error:
+            failed = HostFailed(problem=str(error), action=error.action or "")
+            self.picture = picture_after(self.picture, failed, self._now())
+        finally:
+            if self._connection is connection:
+                self._connection = None
+        with suppress(HexacellError):
+            self._on_end()

@@ -1,0 +1,158 @@
+"""The world behind the screens: a cell, the run in it, and what was asked for."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections.abc import Callable
+
+from hexacell.cell.loader import describe
+from hexacell.presentation.screens.checklists import RUNNING, checklist_view
+from hexacell.presentation.screens.faults import fault_view
+from hexacell.presentation.screens.headers import header_view
+from hexacell.presentation.screens.history import history_view
+from hexacell.presentation.screens.live import live_view
+from hexacell.presentation.screens.measuring import measure_view
+from hexacell.presentation.screens.questions import question_view
+from hexacell.presentation.screens.reviewing import review_view
+from hexacell.presentation.screens.views import (
+    CellView,
+    ChecklistView,
+    FaultView,
+    HeaderView,
+    HistoryView,
+    LiveView,
+    MeasureView,
+    QuestionView,
+    ReviewView,
+)
+from hexacell.screen.backend import ScreenAction
+from hexacell.screen.device_watcher import DeviceWatcher
+from hexacell.screen.run_follower import RunFollower
+from hexacell.screen.session_actions import SessionActions
+from hexacell.screen.workplace import Workplace
+from procedures.run.commands import Answer
+
+
+class ScreenSession:
+    """A backend (:class:`~hexacell.screen.backend.Backend`) over one workplace; ``now`` gives seconds."""
+
+    def __init__(self, workplace: Workplace, now: Callable[[], float] = time.monotonic) -> None:
+        self._workplace, self._now = workplace, now
+        self._run = RunFollower(now, self._after_run)
+        self._devices = DeviceWatcher(workplace.watch, now)
+        self._actions = SessionActions(workplace, self._run, self._devices)
+        self._description = tuple(describe(workplace.cell).splitlines())
+        self._reviewed: tuple[object, ReviewView] | None = None
+
+    @property
+    def question_number(self) -> int:
+        """See :class:`~hexacell.screen.backend.Backend`."""
+        return self._run.questions
+
+    @property
+    def fault_number(self) -> int:
+        """See :class:`~hexacell.screen.backend.Backend`."""
+        return 1000 * self._run.runs + self._run.picture.setbacks
+
+    @property
+    def runs_followed(self) -> int:
+        """See :class:`~hexacell.screen.backend.Backend`."""
+        return self._run.runs
+
+    @property
+    def may_leave_run(self) -> bool:
+        """See :class:`~hexacell.screen.backend.Backend`."""
+        return self._actions.is_running and self._run.picture.may_command
+
+    def header(self) -> HeaderView:
+        """The first line of every screen."""
+        return header_view(self._workplace.cell.settings.name, self._run.picture)
+
+    def cell(self) -> CellView:
+        """The cell and its devices."""
+        cell = self._workplace.cell
+        live = self._live()
+        if self._devices.problem and not live.gauges:
+            live = LiveView(note=self._devices.problem)
+        title = f"What {cell.path.name} says; behind each value its line in the file, or default"
+        return CellView(title, live, self._description, self._workplace.warnings)
+
+    def _live(self) -> LiveView:
+        if self._actions.is_running:
+            return live_view(self._run.picture.live, self._now() - self._run.picture.live_at_s)
+        return live_view(self._devices.live, self._now() - self._devices.live_at_s)
+
+    def checklist(self) -> ChecklistView:
+        """What must hold before motion."""
+        found, is_running = self._actions.findings, self._actions.is_running
+        return checklist_view(
+            self._run.picture.live if is_running else self._devices.live,
+            found.checked,
+            found.plan,
+            is_checking=found.is_checking,
+            refusal=RUNNING if is_running else "",
+        )
+
+    def measure(self) -> MeasureView:
+        """The run that is being measured; its devices are shown even where none has begun."""
+        picture = self._run.picture
+        return measure_view(picture, self._workplace.cell.settings, self._now())
+
+    def review(self) -> ReviewView:
+        """The result; made again where something has changed beside the live values."""
+        picture = self._run.picture
+        if self._reviewed is None or self._reviewed[0] != (id(picture.state), id(picture.question)):
+            view = review_view(picture, self._workplace.cell.settings)
+            self._reviewed = ((id(picture.state), id(picture.question)), view)
+        return self._reviewed[1]
+
+    def history(self) -> HistoryView:
+        """The runs of the cell."""
+        return history_view(self._actions.findings.entries, self._actions.findings.compared)
+
+    def question(self) -> QuestionView | None:
+        """The question that waits, if one does and may be answered here."""
+        picture = self._run.picture
+        if picture.question is None or not picture.may_command:
+            return None
+        return question_view(picture.question, picture.live)
+
+    def fault(self) -> FaultView | None:
+        """The latest fault."""
+        setback = self._run.picture.setback
+        return None if setback is None else fault_view(setback)
+
+    def allows(self, action: ScreenAction) -> bool:
+        """Whether an action has an effect now."""
+        return self._actions.allows(action)
+
+    async def perform(self, action: ScreenAction, argument: str = "") -> str:
+        """Do what was asked for; what there is to say about it. Raises ``HexacellError``."""
+        return await self._actions.perform(action, argument)
+
+    async def answer(self, value: str | None) -> None:
+        """Answer the question. Raises ``HexacellError``."""
+        await self._run.give(Answer(value))
+
+    async def attend(self) -> None:
+        """Follow the cell and its run until cancelled. Raises ``HexacellError``."""
+        try:
+            running = await self._workplace.attach()
+            if running is None:
+                self._devices.start()
+            else:
+                await self._run.follow(running)
+            await self._actions.read_history()
+            await asyncio.get_running_loop().create_future()
+        finally:
+            await self._run.stop()
+            await self._devices.stop()
+
+    async def leave(self, *, keep_running: bool) -> None:
+        """Let the run go on alone, or have it stopped. Raises ``HexacellError``."""
+        if self._actions.is_running:
+            await self._run.leave(keep_running=keep_running)
+
+    def _after_run(self) -> None:
+        self._devices.start()

@@ -1,0 +1,193 @@
+"""What a person may ask for, and what it does to a workplace and its run."""
+
+from __future__ import annotations
+
+from collections.abc import Awaitable, Callable
+from dataclasses import dataclass, field
+from functools import partial
+
+from hexacell.attach.connection import RunConnection
+from hexacell.attach.recorded import RecordedRun
+from hexacell.errors import UsageError
+from hexacell.presentation.screens.checklists import TRYING
+from hexacell.presentation.screens.views import ChecklistItem, HistoryEntry
+from hexacell.screen.backend import ScreenAction
+from hexacell.screen.device_watcher import DeviceWatcher
+from hexacell.screen.run_follower import RunFollower
+from hexacell.screen.workplace import Workplace
+from procedures.engine.command_loop import Status
+from procedures.run.commands import Abort, Command, MeasureAgain, Pause, Resume, Undo
+
+OF_A_RUN = frozenset(
+    {
+        ScreenAction.PAUSE,
+        ScreenAction.PAUSE_AT_ONCE,
+        ScreenAction.UNDO,
+        ScreenAction.MEASURE_AGAIN,
+        ScreenAction.ABORT,
+    }
+)
+OF_A_RECORDING = frozenset({ScreenAction.STEP, ScreenAction.PLAY})
+SPEEDS = (0.0, 1.0, 10.0, 60.0, 600.0)
+"""At which a recorded run advances; the first is standstill."""
+
+
+@dataclass
+class Findings:
+    """What was asked for so far, and what came of it.
+
+    Attributes:
+        checked: by the preflight; none before it. ``is_ready``: it found nothing.
+        plan: what the plan gives, in lines.
+        entries: of the history; none before it was read.
+        compared: a comparison of two runs, in lines.
+    """
+
+    checked: tuple[ChecklistItem, ...] | None = None
+    is_ready: bool = False
+    is_checking: bool = False
+    plan: tuple[str, ...] = ()
+    entries: tuple[HistoryEntry, ...] | None = None
+    compared: tuple[str, ...] = field(default=())
+
+
+class SessionActions:
+    """Does what was asked for."""
+
+    def __init__(self, workplace: Workplace, run: RunFollower, devices: DeviceWatcher) -> None:
+        self.findings = Findings()
+        self._workplace, self._run, self._devices = workplace, run, devices
+        self._does: dict[ScreenAction, Callable[[str], Awaitable[str]]] = {
+            ScreenAction.PAUSE: self._pause,
+            ScreenAction.PAUSE_AT_ONCE: partial(self._give, Pause(at_once=True)),
+            ScreenAction.UNDO: partial(self._give, Undo()),
+            ScreenAction.MEASURE_AGAIN: self._measure_again,
+            ScreenAction.ABORT: partial(self._give, Abort()),
+            ScreenAction.TAKE_CONTROL: self._take_control,
+            ScreenAction.CHECK: self._check,
+            ScreenAction.START: self._start,
+            ScreenAction.PREVIEW: self._preview,
+            ScreenAction.COMPARE: self._compare,
+            ScreenAction.ROLL_BACK: self._roll_back,
+            ScreenAction.OPEN: self._open,
+            ScreenAction.STEP: self._step,
+            ScreenAction.PLAY: self._play,
+        }
+
+    @property
+    def recording(self) -> RecordedRun | None:
+        """The recorded run that is shown; none if a run goes on, or nothing is shown."""
+        connection = self._run.connection
+        return connection if isinstance(connection, RecordedRun) else None
+
+    @property
+    def is_running(self) -> bool:
+        """Whether a run goes on that has the devices."""
+        return self._run.connection is not None and self.recording is None
+
+    def allows(self, action: ScreenAction) -> bool:
+        """Whether an action has an effect now."""
+        if action in OF_A_RUN:
+            is_over = self._run.picture.status is Status.ENDED
+            return self.is_running and self._run.picture.may_command and not is_over
+        if action in OF_A_RECORDING:
+            return self.recording is not None
+        if action is ScreenAction.TAKE_CONTROL:
+            return self.is_running and not self._run.picture.may_command
+        if action in {ScreenAction.CHECK, ScreenAction.START, ScreenAction.ROLL_BACK}:
+            return not self.is_running and not self.findings.is_checking
+        return True
+
+    async def perform(self, action: ScreenAction, argument: str) -> str:
+        """See :meth:`~hexacell.screen.backend.Backend.perform`."""
+        if not self.allows(action):
+            raise UsageError(f"{action} has no effect now")
+        return await self._does[action](argument)
+
+    async def _give(self, command: Command, _: str) -> str:
+        await self._run.give(command)
+        return ""
+
+    async def _pause(self, _: str) -> str:
+        is_paused = self._run.picture.status in {Status.PAUSED, Status.PAUSING}
+        return await self._give(Resume() if is_paused else Pause(), "")
+
+    async def _measure_again(self, _: str) -> str:
+        at = self._run.picture.at
+        if at is None:
+            raise UsageError("no point is being measured now")
+        return await self._give(MeasureAgain(at), "")
+
+    async def _take_control(self, _: str) -> str:
+        if self._run.connection is not None:
+            await self._run.connection.take_control()
+        return ""
+
+    async def _check(self, _: str) -> str:
+        found = self.findings
+        found.checked, found.is_ready, found.is_checking = None, False, True
+        try:
+            async with self._devices.released():
+                preflight = await self._workplace.check()
+            found.checked, found.is_ready = preflight.items, preflight.is_ready
+        finally:
+            found.is_checking = False
+        return ""
+
+    async def _start(self, _: str) -> str:
+        """Checked again, as anything may have changed since somebody looked."""
+        await self._check("")
+        if not self.findings.is_ready:
+            raise UsageError("not everything holds that must hold", action="Look at 2 Preflight")
+        await self._devices.stop()
+        await self._follow(await self._workplace.start())
+        return ""
+
+    async def _preview(self, _: str) -> str:
+        self.findings.plan = (TRYING,)
+        try:
+            self.findings.plan = await self._workplace.preview()
+        except BaseException:
+            self.findings.plan = ()
+            raise
+        return ""
+
+    async def _compare(self, run: str) -> str:
+        self.findings.compared = await self._workplace.compare(run)
+        return ""
+
+    async def _roll_back(self, run: str) -> str:
+        said = await self._workplace.roll_back(run)
+        await self.read_history()
+        return said
+
+    async def _open(self, run: str) -> str:
+        await self._follow(await self._workplace.open_run(run))
+        return ""
+
+    async def _follow(self, connection: RunConnection) -> None:
+        await self._run.follow(connection)
+
+    async def read_history(self) -> None:
+        """Read which runs there are; raises ``HexacellError``."""
+        self.findings.entries = await self._workplace.runs()
+
+    async def _step(self, argument: str) -> str:
+        """To an end, or by a number of events."""
+        if self.recording is not None:
+            ends = {"first": 1, "last": self.recording.last}
+            if argument in ends:
+                self.recording.jump(ends[argument])
+            else:
+                self.recording.step(int(argument or 1))
+        return ""
+
+    async def _play(self, argument: str) -> str:
+        """Halt or go on; ``+`` faster, ``-`` slower."""
+        cursor = self._run.picture.cursor
+        speed = 0.0 if cursor is None else cursor.speed
+        place = SPEEDS.index(speed) if speed in SPEEDS else 0
+        wanted = {"+": place + 1, "-": place - 1}.get(argument, 0 if place else 1)
+        if self.recording is not None:
+            self.recording.set_speed(SPEEDS[min(max(wanted, 0), len(SPEEDS) - 1)])
+        return ""

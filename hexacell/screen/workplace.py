@@ -1,0 +1,70 @@
+"""What a session needs of a real cell; tests have one of their own."""
+
+from __future__ import annotations
+
+from collections.abc import AsyncIterator
+from dataclasses import dataclass
+from typing import Protocol
+
+from hexacell.attach.connection import RunConnection
+from hexacell.attach.snapshots import LiveSnapshot
+from hexacell.cell.loader import Cell
+from hexacell.presentation.screens.views import ChecklistItem, HistoryEntry
+
+
+@dataclass(frozen=True, slots=True)
+class Preflight:
+    """What a preflight found, and whether a run may begin."""
+
+    items: tuple[ChecklistItem, ...]
+    is_ready: bool
+
+
+class Workplace(Protocol):
+    """A cell, its devices, its run and its history. All raise ``HexacellError``."""
+
+    @property
+    def cell(self) -> Cell:
+        """Its file."""
+        ...
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What a person should change in it."""
+        ...
+
+    def watch(self) -> AsyncIterator[LiveSnapshot]:
+        """What the devices show while no run has them; cancelling lets them go."""
+        ...
+
+    async def attach(self) -> RunConnection | None:
+        """The run that goes on in this cell, if one does."""
+        ...
+
+    async def start(self) -> RunConnection:
+        """Begin a run in a process of its own, or resume the latest one that was interrupted."""
+        ...
+
+    async def check(self) -> Preflight:
+        """Look at everything that must hold before motion; needs the devices."""
+        ...
+
+    async def preview(self) -> tuple[str, ...]:
+        """Carry the plan out on simulated robots."""
+        ...
+
+    async def runs(self) -> tuple[HistoryEntry, ...]:
+        """The runs of the cell, the latest first."""
+        ...
+
+    async def compare(self, run: str) -> tuple[str, ...]:
+        """A run beside the one before it."""
+        ...
+
+    async def roll_back(self, run: str) -> str:
+        """Put back the config of before a run; what was done."""
+        ...
+
+    async def open_run(self, run: str) -> RunConnection:
+        """A recorded run."""
+        ...

@@ -1,0 +1,102 @@
+"""A cell, a recorded run, an application over them, and pictures that must stay the same."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import AsyncIterator, Callable
+from contextlib import AbstractAsyncContextManager, asynccontextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+from pydantic import TypeAdapter
+from textual.pilot import Pilot
+
+from hexacell.cell.bundled import bundled_config
+from hexacell.cell.loader import Cell, load_cell
+from hexacell.screen.app import TechnicianApp
+from hexacell.screen.key_map import ScreenPreferences
+from hexacell.screen.session import ScreenSession
+from procedures.run.events import Event
+from tests.screen.told_run import ToldWorkplace
+from tests.waiting import until
+
+HERE = Path(__file__).parent
+SNAPSHOTS = HERE / "snapshots"
+UPDATE = "HEXACELL_UPDATE_SNAPSHOTS"
+"""In the environment: pictures are written instead of compared."""
+
+MOST_DRAWINGS = 20
+"""A busy machine may need several until all is drawn; what is wrong stays wrong."""
+
+Opened = Callable[..., AbstractAsyncContextManager[Pilot[int]]]
+
+
+@pytest.fixture(scope="session")
+def history() -> tuple[Event, ...]:
+    """A whole calibration, as a simulated cell recorded it, without raw readings."""
+    lines = (HERE / "recorded" / "events.jsonl").read_text().splitlines()
+    event: TypeAdapter[Any] = TypeAdapter(Event)
+    return tuple(event.validate_json(line) for line in lines)
+
+
+@pytest.fixture(scope="session")
+def cell() -> Cell:
+    """The cell that recorded it."""
+    return load_cell(bundled_config("simulated-hexaglide"))
+
+
+@pytest.fixture
+def opened() -> Opened:
+    """An application over a workplace, once its backend is loaded; its clock stands still."""
+
+    @asynccontextmanager
+    async def opened_app(
+        workplace: ToldWorkplace,
+        size: tuple[int, int] = (80, 24),
+        preferences: ScreenPreferences | None = None,
+    ) -> AsyncIterator[Pilot[int]]:
+        app = TechnicianApp(lambda: ScreenSession(workplace, lambda: 0.0), preferences)
+        async with app.run_test(size=size) as pilot:
+            await until(lambda: app.backend is not None)
+            await settled(pilot)
+            yield pilot
+
+    return opened_app
+
+
+async def settled(pilot: Pilot[int]) -> None:
+    """Until everything that was said and pressed is drawn."""
+    app = pilot.app
+    assert isinstance(app, TechnicianApp)
+    await pilot.pause()
+    app.draw()
+    await pilot.pause()
+
+
+def picture_of(app: TechnicianApp) -> str:
+    """The screen as SVG, without what differs between two equal ones, and without fonts from elsewhere."""
+    svg = app.export_screenshot(simplify=True)
+    svg = re.sub(r"@font-face \{.*?\}\s*", "", svg, flags=re.DOTALL)
+    return re.sub(r"terminal-\d+", "terminal", svg)
+
+
+async def compare_with_snapshot(name: str, pilot: Pilot[int]) -> None:
+    """Compare what is shown with the picture that was kept; keep it where that is asked for."""
+    path, app = SNAPSHOTS / f"{name}.svg", pilot.app
+    assert isinstance(app, TechnicianApp)
+    await settled(pilot)
+    if UPDATE in os.environ:
+        for _ in range(5):  # scroll bars come last
+            await settled(pilot)
+        path.parent.mkdir(exist_ok=True)
+        path.write_text(picture_of(app))
+        return
+    kept = path.read_text()
+    for _ in range(MOST_DRAWINGS):
+        if picture_of(app) == kept:
+            return
+        await settled(pilot)
+    (path.parent / f"{name}.now.svg").write_text(picture_of(app))
+    pytest.fail(f"{name} looks different, see {name}.now.svg; {UPDATE}=1 keeps it so")

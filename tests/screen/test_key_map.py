@@ -1,0 +1,79 @@
+"""Keys that a person chose: taken over everywhere, and mistakes in the file named."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from hexacell.cell.loader import Cell
+from hexacell.errors import FileError
+from hexacell.screen.key_map import KEYS, ScreenPreferences, preferences_path, read_preferences
+from procedures.run.commands import Pause
+from procedures.run.events import Event
+from tests.screen.conftest import Opened, settled
+from tests.screen.told_run import ToldRun, ToldWorkplace
+from tests.waiting import until
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    return tmp_path / "screen.toml"
+
+
+def test_without_a_file_the_keys_are_as_described(path: Path) -> None:
+    assert read_preferences(path) == ScreenPreferences({}, "dark")
+
+
+def test_keys_and_theme_are_read(path: Path) -> None:
+    path.write_text('theme = "light"\n[keys]\npause = "f5"\n')
+    assert read_preferences(path) == ScreenPreferences({"pause": "f5"}, "light")
+
+
+@pytest.mark.parametrize(
+    ("text", "problem"),
+    [
+        ('[keys]\npuase = "f5"', "there is no action 'puase'. Did you mean 'pause'?"),
+        ('[keys]\npause = "u"', "the key 'u' is used twice. Choose another"),
+        ("[keys]\npause = 5", "[keys] must name a key for each action"),
+        ('theme = "pink"', "there is no theme 'pink'. Choose one of dark, light, monochrome"),
+        ("[keys", "it cannot be read"),
+    ],
+)
+def test_a_mistake_in_the_file_is_named(text: str, problem: str, path: Path) -> None:
+    path.write_text(text)
+    with pytest.raises(FileError, match=r"screen\.toml") as caught:
+        read_preferences(path)
+    assert problem in str(caught.value)
+
+
+def test_the_file_is_where_configs_are(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path))
+    assert preferences_path() == tmp_path / "hexacell" / "screen.toml"
+
+
+def test_every_action_has_a_name_and_a_key_of_its_own() -> None:
+    assert len({one.id for one in KEYS}) == len({one.key for one in KEYS}) == len(KEYS)
+
+
+async def test_a_chosen_key_takes_the_place_of_the_other(
+    cell: Cell, history: tuple[Event, ...], opened: Opened
+) -> None:
+    run = ToldRun()
+    run.begin(cell)
+    run.record(history[:300])
+    workplace = ToldWorkplace(cell, run=run)
+    async with opened(workplace, preferences=ScreenPreferences({"pause": "f5", "review": "f8"})) as pilot:
+        await pilot.press("p")
+        await settled(pilot)
+        assert run.given == []
+        await pilot.press("f5")
+        await until(lambda: run.given == [Pause()])
+        await pilot.press("f8")
+        await until(lambda: pilot.app.current_mode == "review")
+
+
+async def test_the_palette_has_everything_that_a_key_does(cell: Cell, opened: Opened) -> None:
+    async with opened(ToldWorkplace(cell)) as pilot:
+        named = {command.title for command in pilot.app.get_system_commands(pilot.app.screen)}
+        assert named == {one.description for one in KEYS}

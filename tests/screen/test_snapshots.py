@@ -1,0 +1,168 @@
+"""Every screen at two sizes, in three themes: pictures that must stay the same."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import pytest
+
+from hexacell.acceptance import AcceptanceGate
+from hexacell.attach.messages import StatusChanged
+from hexacell.cell.loader import Cell
+from hexacell.kinematics.pose import Pose
+from hexacell.presentation.screens.views import ChecklistItem, HistoryEntry, Mark
+from hexacell.screen.key_map import THEMES
+from hexacell.screen.workplace import Preflight
+from procedures.engine.command_loop import Status
+from procedures.run import events
+from procedures.run.questions import ask_approval, ask_placement
+from procedures.run.steps import Phase, SetKey
+from procedures.run.trips import Guard
+from tests.screen.conftest import Opened, compare_with_snapshot, settled
+from tests.screen.told_run import ToldRun, ToldWorkplace, snapshot
+
+SIZES = {"80x24": (80, 24), "140x40": (140, 40)}
+
+MEASURED = 262
+"""Events until the fourth point is nearly measured; PROPOSED until the change waits for approval."""
+PROPOSED, COMMITTED = 455, 457
+
+DIFF = """\
+--- simulated-hexaglide.controller.toml
++++ proposed
+@@ -12,6 +12,6 @@
+ S = [
+-  [0.0, -160.0, 0.0],
++  [4.871475, -164.490216, 7.355836],
+"""
+
+
+def idle(cell: Cell) -> ToldWorkplace:
+    entries = (
+        HistoryEntry("2026-03-02T080000Z", "2026-03-02 08:00:00   calibration  pass: 0.034 +- 0.090 mm"),
+        HistoryEntry("2026-02-02T073000Z", "2026-02-02 07:30:00   check        pass: 0.051 +- 0.080 mm"),
+    )
+    return ToldWorkplace(
+        cell,
+        live=[snapshot(y={"problem": "gauge y: it does not answer. Look at its cable"})],
+        entries=entries,
+        preflight=Preflight(
+            (
+                ChecklistItem(
+                    Mark.FAILED, "gauge y", "it answers in inch", "Press the in/mm key, then Enter"
+                ),
+                ChecklistItem(Mark.DONE, "points and poses within reach"),
+            ),
+            is_ready=False,
+        ),
+        plan=(
+            "55 records at 5 points will give about 0.062 mm at the worst of your task poses (one sigma),",
+            "in about 24 minutes.",
+        ),
+        compared=("changed most: B2y by +0.021 mm (sigma 0.009)", "compared with"),
+    )
+
+
+def running(cell: Cell, history: tuple[events.Event, ...], count: int) -> tuple[ToldRun, ToldWorkplace]:
+    run = ToldRun()
+    run.begin(cell)
+    run.record(history[:count])
+    run.tell(snapshot())
+    return run, ToldWorkplace(cell, run=run)
+
+
+Scene = Callable[[Cell, tuple[events.Event, ...]], tuple[ToldWorkplace, tuple[str, ...]]]
+
+
+def scene_cell(cell: Cell, _: tuple[events.Event, ...]) -> tuple[ToldWorkplace, tuple[str, ...]]:
+    return idle(cell), ("1",)
+
+
+def scene_preflight(cell: Cell, _: tuple[events.Event, ...]) -> tuple[ToldWorkplace, tuple[str, ...]]:
+    return idle(cell), ("2", "v", "enter")
+
+
+def scene_measure(cell: Cell, history: tuple[events.Event, ...]) -> tuple[ToldWorkplace, tuple[str, ...]]:
+    _, workplace = running(cell, history, MEASURED)
+    target = cell.settings.identification.model_copy(update={"target_mm": 0.1})
+    settings = cell.settings.model_copy(update={"identification": target})
+    workplace.cell = replace(cell, settings=settings)
+    return workplace, ("3",)
+
+
+def scene_review(cell: Cell, history: tuple[events.Event, ...]) -> tuple[ToldWorkplace, tuple[str, ...]]:
+    run, workplace = running(cell, history, len(history))
+    run.tell(StatusChanged(status=Status.ENDED))
+    return workplace, ("4",)
+
+
+def scene_history(cell: Cell, _: tuple[events.Event, ...]) -> tuple[ToldWorkplace, tuple[str, ...]]:
+    return idle(cell), ("5", "v")
+
+
+def scene_place(cell: Cell, history: tuple[events.Event, ...]) -> tuple[ToldWorkplace, tuple[str, ...]]:
+    run, workplace = running(cell, history, 5)
+    run.tell(
+        snapshot(x={"shown_mm": -1.2}, z={"shown_mm": None, "age_s": None, "problem": "gauge z: silent"})
+    )
+    run.ask(ask_placement(SetKey(phase=Phase.IDENTIFY, point=1), Pose(0.0, 0.0, 550.0)))
+    return workplace, ()
+
+
+def scene_approve(cell: Cell, history: tuple[events.Event, ...]) -> tuple[ToldWorkplace, tuple[str, ...]]:
+    run, workplace = running(cell, history, PROPOSED)
+    proposed = next(event for event in history if isinstance(event, events.Proposed))
+    far = AcceptanceGate(
+        name="within tolerance",
+        passed=False,
+        sentence="Beyond the drawing's tolerance: B3 z (+8.21 mm).",
+        needs_person=True,
+        needs_cell_name=True,
+    )
+    gates = tuple(far if gate.name == far.name else gate for gate in proposed.gates)
+    run.ask(ask_approval(gates, DIFF, proposed.displacement, cell=cell.settings.name))
+    return workplace, ("4",)
+
+
+def scene_fault(cell: Cell, history: tuple[events.Event, ...]) -> tuple[ToldWorkplace, tuple[str, ...]]:
+    run, workplace = running(cell, history, MEASURED)
+    run.record(
+        [
+            events.Tripped(
+                guard=Guard.GAUGE_END,
+                device="gauge y",
+                problem="its plunger is at the end of its travel",
+                action="Move the gauge by 3.8 mm along +y, then answer the question",
+            )
+        ]
+    )
+    return workplace, ()
+
+
+def scene_digits(cell: Cell, history: tuple[events.Event, ...]) -> tuple[ToldWorkplace, tuple[str, ...]]:
+    return running(cell, history, MEASURED)[1], ("d",)
+
+
+def scene_help(cell: Cell, history: tuple[events.Event, ...]) -> tuple[ToldWorkplace, tuple[str, ...]]:
+    return running(cell, history, MEASURED)[1], ("question_mark",)
+
+
+SCENES: dict[str, Scene] = {
+    name.removeprefix("scene_"): scene for name, scene in globals().items() if name.startswith("scene_")
+}
+
+
+@pytest.mark.parametrize("size", SIZES)
+@pytest.mark.parametrize("scene", SCENES)
+async def test_it_looks_as_it_did(
+    scene: str, size: str, cell: Cell, history: tuple[events.Event, ...], opened: Opened
+) -> None:
+    workplace, keys = SCENES[scene](cell, history)
+    async with opened(workplace, SIZES[size]) as pilot:
+        for key in keys:
+            await pilot.press(key)
+            await settled(pilot)
+        for theme in THEMES:
+            pilot.app.theme = theme
+            await compare_with_snapshot(f"{scene}-{size}-{theme}", pilot)

@@ -1,0 +1,185 @@
+"""A run that is told by a test: the connection and the workplace of a screen, without processes."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator, Iterable, Sequence
+from dataclasses import dataclass, field
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+
+from hexacell.attach.connection import RunConnection
+from hexacell.attach.messages import (
+    ControlChanged,
+    EventRecorded,
+    HostMessage,
+    QuestionClosed,
+    QuestionOpened,
+    RunDescribed,
+    StatusChanged,
+)
+from hexacell.attach.snapshots import (
+    ControllerSnapshot,
+    EncoderSnapshot,
+    GaugeSnapshot,
+    LiveSnapshot,
+)
+from hexacell.cell.loader import Cell
+from hexacell.errors import UsageError
+from hexacell.presentation.screens.views import ChecklistItem, HistoryEntry, Mark
+from hexacell.screen.workplace import Preflight
+from procedures.engine.command_loop import Status
+from procedures.run.commands import Command
+from procedures.run.events import Event
+from procedures.run.questions import Question
+
+BEGUN = datetime(2026, 3, 2, 8, 0, tzinfo=UTC)
+
+
+def gauges(**changes: dict[str, object]) -> tuple[GaugeSnapshot, ...]:
+    """Three gauges that show something; ``x={...}`` changes one of them."""
+    shown = {"x": 0.4127, "y": -0.2089, "z": 1.1034}
+    return tuple(
+        GaugeSnapshot.model_validate(
+            {
+                "name": axis,
+                "axis": axis,
+                "shown_mm": value,
+                "age_s": 0.1,
+                "noise_mm": 0.0008,
+                "travel_mm": 12.5,
+                "middle_mm": 0.0,
+            }
+            | changes.get(axis, {})
+        )
+        for axis, value in shown.items()
+    )
+
+
+def snapshot(stop_reason: str = "", **changes: dict[str, object]) -> LiveSnapshot:
+    """All devices, working."""
+    return LiveSnapshot(
+        gauges=gauges(**changes),
+        encoders=EncoderSnapshot(
+            positions_mm=(-120.4531, 14.2187, 88.0021, 301.7745, -45.1002, 210.6654), age_s=0.1
+        ),
+        controller=ControllerSnapshot(estop=False, enabled=True, age_s=0.2),
+        stop_reason=stop_reason,
+    )
+
+
+@dataclass
+class ToldRun:
+    """A :class:`RunConnection` that tells what a test puts into it, and keeps what it is given."""
+
+    given: list[Command] = field(default_factory=list)
+    left: list[bool] = field(default_factory=list)
+    taken: int = 0
+    events: int = 0
+    _waiting: asyncio.Queue[HostMessage | None] = field(default_factory=asyncio.Queue)
+
+    def tell(self, *messages: HostMessage) -> None:
+        """Tell some messages."""
+        for message in messages:
+            self._waiting.put_nowait(message)
+
+    def record(self, history: Iterable[Event]) -> None:
+        """Tell events, five seconds apart."""
+        for event in history:
+            self.events += 1
+            at = BEGUN + timedelta(seconds=5 * self.events)
+            self.tell(EventRecorded(sequence=self.events, at=at, event=event))
+
+    def begin(self, cell: Cell, *, expected_records: int = 150, in_control: bool = True) -> None:
+        """What every run tells first."""
+        folder = Path("runs/simulated-hexaglide/2026-03-02T080000Z")
+        self.tell(
+            RunDescribed(
+                cell=cell.settings.name,
+                cell_file=cell.path,
+                folder=folder,
+                mode="optimise",
+                expected_records=expected_records,
+            ),
+            ControlChanged(is_in_control=in_control, who="ada"),
+            StatusChanged(status=Status.RUNNING),
+        )
+
+    def ask(self, question: Question) -> None:
+        """Open a question."""
+        self.tell(QuestionOpened(question=question), StatusChanged(status=Status.AWAITING_OPERATOR))
+
+    def close_question(self) -> None:
+        """Close it."""
+        self.tell(QuestionClosed(), StatusChanged(status=Status.RUNNING))
+
+    def end(self) -> None:
+        """The host is gone."""
+        self._waiting.put_nowait(None)
+
+    async def messages(self) -> AsyncIterator[HostMessage]:
+        while (message := await self._waiting.get()) is not None:
+            yield message
+
+    async def give(self, command: Command) -> None:
+        self.given.append(command)
+
+    async def take_control(self) -> None:
+        self.taken += 1
+
+    async def leave(self, *, keep_running: bool) -> None:
+        self.left.append(keep_running)
+        self.end()
+
+
+@dataclass
+class ToldWorkplace:
+    """A workplace without devices and processes."""
+
+    cell: Cell
+    run: RunConnection | None = None
+    warnings: tuple[str, ...] = ()
+    live: Sequence[LiveSnapshot] = ()
+    preflight: Preflight = field(
+        default_factory=lambda: Preflight((ChecklistItem(Mark.DONE, "all"),), is_ready=True)
+    )
+    plan: tuple[str, ...] = ()
+    entries: tuple[HistoryEntry, ...] = ()
+    compared: tuple[str, ...] = ()
+    started: RunConnection | None = None
+    opened: RunConnection | None = None
+    rolled_back: list[str] = field(default_factory=list)
+
+    async def watch(self) -> AsyncIterator[LiveSnapshot]:
+        for one in self.live:
+            yield one
+        await asyncio.get_running_loop().create_future()
+
+    async def attach(self) -> RunConnection | None:
+        return self.run
+
+    async def start(self) -> RunConnection:
+        assert self.started is not None
+        return self.started
+
+    async def check(self) -> Preflight:
+        return self.preflight
+
+    async def preview(self) -> tuple[str, ...]:
+        return self.plan
+
+    async def runs(self) -> tuple[HistoryEntry, ...]:
+        return self.entries
+
+    async def compare(self, run: str) -> tuple[str, ...]:
+        return (*self.compared, run)
+
+    async def roll_back(self, run: str) -> str:
+        if run.startswith("edited"):
+            raise UsageError("somebody has edited the config since", action="Merge it by hand")
+        self.rolled_back.append(run)
+        return f"the config of before {run} is back"
+
+    async def open_run(self, run: str) -> RunConnection:
+        assert self.opened is not None, run
+        return self.opened

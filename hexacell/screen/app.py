@@ -21,6 +21,7 @@ from hexacell.screen.digits_screen import DigitsScreen
 from hexacell.screen.history_screen import HistoryScreen
 from hexacell.screen.key_map import KEYS, THEMES, ScreenPreferences
 from hexacell.screen.measure_screen import MeasureScreen
+from hexacell.screen.overlays.confirm_overlay import ConfirmOverlay
 from hexacell.screen.overlays.fault_overlay import FaultOverlay
 from hexacell.screen.overlays.help_overlay import HelpOverlay
 from hexacell.screen.overlays.question_overlay import QuestionOverlay
@@ -167,7 +168,14 @@ class TechnicianApp(App[int]):
     def action_perform(self, action: str, argument: str = "") -> None:
         """Ask for something."""
         if self._backend is not None:
-            self._start(self._backend.perform(ScreenAction(action), argument))
+            self._start(self._confirmed(self._backend, ScreenAction(action), argument))
+
+    async def _confirmed(self, backend: Backend, action: ScreenAction, argument: str) -> str:
+        """Do something, once a person has confirmed it where that is needed."""
+        question = await backend.confirmation(action, argument)
+        if question and not await self.push_screen_wait(ConfirmOverlay(question)):
+            return ""
+        return await backend.perform(action, argument)
 
     def action_answer(self) -> None:
         """Show the open question again."""

@@ -32,6 +32,7 @@ class ScreenAction(StrEnum):
     COMPARE = "compare"
     ROLL_BACK = "roll back"
     OPEN = "open"
+    DRIFT = "drift"
     STEP = "step"
     PLAY = "play"
 
@@ -100,6 +101,10 @@ class Backend(Protocol):
 
     async def perform(self, action: ScreenAction, argument: str = "") -> str:
         """Do what was asked for; what there is to say about it. Raises ``HexacellError``."""
+        ...
+
+    async def confirmation(self, action: ScreenAction, argument: str) -> str:
+        """What a person must confirm before an action; empty if nothing. Raises ``HexacellError``."""
         ...
 
     async def answer(self, value: str | None) -> None:

@@ -6,6 +6,8 @@ import asyncio
 from collections.abc import AsyncIterator
 from pathlib import Path
 
+from hexacell.application.config_rollback import roll_back_config
+from hexacell.application.history import PastRun, compare_runs, parameter_trends, past_runs
 from hexacell.application.interrupted_runs import LATEST, run_to_resume
 from hexacell.application.security_warnings import exposure_warnings
 from hexacell.attach.client import connect_to_run, start_host
@@ -17,10 +19,12 @@ from hexacell.attach.snapshots import LiveSnapshot
 from hexacell.cell.loader import Cell, load_cell
 from hexacell.cell.passwords import password_warnings
 from hexacell.errors import UsageError
+from hexacell.presentation.config_changes import rollback_text
+from hexacell.presentation.history import comparison_text, drift_text
+from hexacell.presentation.screens.past import history_entries
 from hexacell.presentation.screens.views import ChecklistItem, HistoryEntry, Mark
 from hexacell.runs.run_folder import find_run, new_run
 from hexacell.screen.child_process import run_child
-from hexacell.screen.recorded_entries import recorded_entries
 from hexacell.screen.workplace import Preflight
 
 
@@ -68,15 +72,34 @@ class CellWorkplace:
 
     async def runs(self) -> tuple[HistoryEntry, ...]:
         """See :class:`Workplace`."""
-        return await asyncio.to_thread(recorded_entries, self.cell)
+        return history_entries(await self._past_runs())
 
     async def compare(self, run: str) -> tuple[str, ...]:
         """See :class:`Workplace`."""
-        raise UsageError(f"{run}: runs cannot be compared yet")
+        identified = [one.name for one in await self._past_runs() if one.result is not None]
+        earlier = identified[identified.index(run) + 1 :] if run in identified else []
+        if not earlier:
+            raise UsageError(f"no run before {run} identified a geometry", action="Choose a later one")
+        compared = await asyncio.to_thread(compare_runs, self.cell, earlier[0], run)
+        return tuple(comparison_text(*compared).splitlines())
 
-    async def roll_back(self, run: str) -> str:
+    async def drift(self) -> tuple[str, ...]:
         """See :class:`Workplace`."""
-        raise UsageError(f"{run}: nothing can be rolled back yet")
+        found = await asyncio.to_thread(parameter_trends, self.cell, await self._past_runs())
+        return tuple(drift_text(found).splitlines())
+
+    async def is_in_controller(self, run: str) -> bool:
+        """See :class:`Workplace`."""
+        return any(one.name == run and one.is_in_controller for one in await self._past_runs())
+
+    async def roll_back(self, run: str) -> tuple[str, ...]:
+        """See :class:`Workplace`."""
+        to = None if await self.is_in_controller(run) else run
+        done = await asyncio.to_thread(roll_back_config, self.cell, to)
+        return tuple(rollback_text(done).splitlines())
+
+    async def _past_runs(self) -> tuple[PastRun, ...]:
+        return await asyncio.to_thread(past_runs, self.cell)
 
     async def open_run(self, run: str) -> RunConnection:
         """See :class:`Workplace`."""

@@ -23,7 +23,8 @@ class HistoryScreen(TabScreen):
     AUTO_FOCUS = "#runs"
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("v", "about('compare')", "Compare with the one before", show=False),
-        Binding("b", "about('roll back')", "Put back the config of before it", show=False),
+        Binding("b", "about('roll back')", "Go back to its config, or undo it", show=False),
+        Binding("o", "app.perform('drift')", "Drift over all runs", show=False),
     ]
     _entries: tuple[HistoryEntry, ...] = ()
 

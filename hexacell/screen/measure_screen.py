@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from typing import ClassVar
+
 from textual.app import ComposeResult
+from textual.binding import Binding, BindingType
 from textual.containers import Horizontal, Vertical
 
 from hexacell.screen.backend import Backend
@@ -18,6 +21,17 @@ class MeasureScreen(TabScreen):
 
     TAB = "measure"
     AUTO_FOCUS = "#records"
+    BINDINGS: ClassVar[list[BindingType]] = [
+        Binding("space", "app.perform('play')", "Play or halt", show=False, priority=True),
+        Binding("plus", "app.perform('play', '+')", "Faster", show=False),
+        Binding("minus", "app.perform('play', '-')", "Slower", show=False),
+        Binding("right", "app.perform('step', '1')", "One event on", show=False, priority=True),
+        Binding("left", "app.perform('step', '-1')", "One event back", show=False, priority=True),
+        Binding("pagedown", "app.perform('step', '100')", "A hundred on", show=False, priority=True),
+        Binding("pageup", "app.perform('step', '-100')", "A hundred back", show=False, priority=True),
+        Binding("home", "app.perform('step', 'first')", "To the beginning", show=False, priority=True),
+        Binding("end", "app.perform('step', 'last')", "To the end", show=False, priority=True),
+    ]
 
     def compose_body(self) -> ComposeResult:
         """See the class."""

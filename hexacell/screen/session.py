@@ -5,14 +5,15 @@ from __future__ import annotations
 import asyncio
 import time
 from collections.abc import Callable
+from dataclasses import replace
 
 from hexacell.cell.loader import describe
 from hexacell.presentation.screens.checklists import RUNNING, checklist_view
 from hexacell.presentation.screens.faults import fault_view
 from hexacell.presentation.screens.headers import header_view
-from hexacell.presentation.screens.history import history_view
 from hexacell.presentation.screens.live import live_view
 from hexacell.presentation.screens.measuring import measure_view
+from hexacell.presentation.screens.past import history_view, rollback_question
 from hexacell.presentation.screens.questions import question_view
 from hexacell.presentation.screens.reviewing import review_view
 from hexacell.presentation.screens.views import (
@@ -96,8 +97,9 @@ class ScreenSession:
 
     def measure(self) -> MeasureView:
         """The run that is being measured; its devices are shown even where none has begun."""
-        picture = self._run.picture
-        return measure_view(picture, self._workplace.cell.settings, self._now())
+        view = measure_view(self._run.picture, self._workplace.cell.settings, self._now())
+        is_shown_live = self._run.connection is not None or self._devices.live is None
+        return view if is_shown_live else replace(view, live=self._live())
 
     def review(self) -> ReviewView:
         """The result; made again where something has changed beside the live values."""
@@ -130,6 +132,13 @@ class ScreenSession:
     async def perform(self, action: ScreenAction, argument: str = "") -> str:
         """Do what was asked for; what there is to say about it. Raises ``HexacellError``."""
         return await self._actions.perform(action, argument)
+
+    async def confirmation(self, action: ScreenAction, argument: str) -> str:
+        """What a person must confirm before an action; empty if nothing. Raises ``HexacellError``."""
+        if action is not ScreenAction.ROLL_BACK:
+            return ""
+        is_there = await self._workplace.is_in_controller(argument)
+        return rollback_question(argument, is_in_controller=is_there)
 
     async def answer(self, value: str | None) -> None:
         """Answer the question. Raises ``HexacellError``."""

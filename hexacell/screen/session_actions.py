@@ -8,7 +8,9 @@ from functools import partial
 
 from hexacell.attach.connection import RunConnection
 from hexacell.attach.recorded import RecordedRun
+from hexacell.controller_config.three_way import ConfigEditedSince
 from hexacell.errors import UsageError
+from hexacell.presentation.config_changes import versions_text
 from hexacell.presentation.screens.checklists import TRYING
 from hexacell.presentation.screens.views import ChecklistItem, HistoryEntry
 from hexacell.screen.backend import ScreenAction
@@ -70,6 +72,7 @@ class SessionActions:
             ScreenAction.COMPARE: self._compare,
             ScreenAction.ROLL_BACK: self._roll_back,
             ScreenAction.OPEN: self._open,
+            ScreenAction.DRIFT: self._drift,
             ScreenAction.STEP: self._step,
             ScreenAction.PLAY: self._play,
         }
@@ -157,9 +160,19 @@ class SessionActions:
         return ""
 
     async def _roll_back(self, run: str) -> str:
-        said = await self._workplace.roll_back(run)
+        """Where somebody has edited the config since, the three versions are shown."""
+        try:
+            async with self._devices.released():
+                self.findings.compared = await self._workplace.roll_back(run)
+        except ConfigEditedSince as edited:
+            self.findings.compared = tuple(versions_text(edited.versions).splitlines())
+            raise
         await self.read_history()
-        return said
+        return self.findings.compared[-1]
+
+    async def _drift(self, _: str) -> str:
+        self.findings.compared = await self._workplace.drift()
+        return ""
 
     async def _open(self, run: str) -> str:
         await self._follow(await self._workplace.open_run(run))

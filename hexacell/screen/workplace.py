@@ -61,8 +61,20 @@ class Workplace(Protocol):
         """A run beside the one before it."""
         ...
 
-    async def roll_back(self, run: str) -> str:
-        """Put back the config of before a run; what was done."""
+    async def drift(self) -> tuple[str, ...]:
+        """The drift of each parameter over all runs."""
+        ...
+
+    async def is_in_controller(self, run: str) -> bool:
+        """Whether the controller's config is the one that a run wrote."""
+        ...
+
+    async def roll_back(self, run: str) -> tuple[str, ...]:
+        """Put back the config that a run wrote, or of before it if the controller has it; what was done.
+
+        Raises:
+            ConfigEditedSince: somebody has edited the config since.
+        """
         ...
 
     async def open_run(self, run: str) -> RunConnection:

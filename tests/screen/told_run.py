@@ -25,7 +25,6 @@ from hexacell.attach.snapshots import (
     LiveSnapshot,
 )
 from hexacell.cell.loader import Cell
-from hexacell.errors import UsageError
 from hexacell.presentation.screens.views import ChecklistItem, HistoryEntry, Mark
 from hexacell.screen.workplace import Preflight
 from procedures.engine.command_loop import Status
@@ -174,11 +173,15 @@ class ToldWorkplace:
     async def compare(self, run: str) -> tuple[str, ...]:
         return (*self.compared, run)
 
-    async def roll_back(self, run: str) -> str:
-        if run.startswith("edited"):
-            raise UsageError("somebody has edited the config since", action="Merge it by hand")
+    async def drift(self) -> tuple[str, ...]:
+        return ("No parameter walks.",)
+
+    async def is_in_controller(self, run: str) -> bool:
+        return run == self.entries[0].name
+
+    async def roll_back(self, run: str) -> tuple[str, ...]:
         self.rolled_back.append(run)
-        return f"the config of before {run} is back"
+        return (f"the config of before {run} is back",)
 
     async def open_run(self, run: str) -> RunConnection:
         assert self.opened is not None, run

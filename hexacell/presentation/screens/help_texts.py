@@ -33,8 +33,12 @@ is beyond the drawing's tolerance, the cell's name must be typed.""",
     "history": """\
 All runs of this cell, the latest first. The arrows choose one.
   Enter  open it: 3 Measure and 4 Review show it as it was, with a cursor in time
-  v      compare it with the one before
-  b      put back the config of before it; refused if somebody has edited the file since""",
+  v      compare it with the one before it
+  o      the drift of each parameter over all runs, with its sigma
+  b      go back to the config that it wrote, or undo it if the controller has it
+
+Going back asks first. It is refused where somebody has edited the file since; then all three versions are
+shown.""",
 }
 
 REPLAY_HELP = """\

@@ -49,6 +49,7 @@ def test_a_run_and_the_command_find_the_same_scale_and_the_command_changes_nothi
     assert replayed.code == 0, replayed.out
 
 
+@pytest.mark.slow
 def test_a_check_afterwards_counts_with_the_scale_that_was_found(typed_here, calibrated) -> None:
     """Its own records would show an error of some hundredths."""
     cell, outcome = calibrated

@@ -126,6 +126,7 @@ def test_a_closed_terminal_stops_the_run_with_a_json_document(start, good_cell):
     assert "To continue:" in outcome.err
 
 
+@pytest.mark.slow
 def test_repeated_ctrl_c_changes_nothing(start, good_cell):
     """Ctrl-C several times while it stops."""
     process = start("run", good_cell.cell, "--unattended")
@@ -161,6 +162,7 @@ def test_a_killed_run_can_be_resumed(start, typed_here, good_cell):
     assert "no run of this cell was interrupted" in again.err
 
 
+@pytest.mark.slow
 def test_a_closed_output_does_not_stop_the_run(start, good_cell):
     """``hexacell run ... | head -1``: the job is done, and the exit code is the job's."""
     reader, writer = os.pipe()

@@ -68,6 +68,7 @@ def test_a_gauge_plugged_in_again_while_measuring_is_recovered(puller: Puller) -
     assert puller.pull("gauge y", "sampling", back=True) == "done, recovered"
 
 
+@pytest.mark.slow
 def test_a_gauge_plugged_in_again_while_the_noise_is_measured_is_recovered(puller: Puller) -> None:
     assert puller.pull("gauge y", "measuring noise", back=True) == "done, recovered"
 

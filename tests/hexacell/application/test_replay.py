@@ -62,6 +62,7 @@ async def test_a_journal_alone_is_replayed(finished, tmp_path) -> None:
     assert replayed.results > 60
 
 
+@pytest.mark.slow
 async def test_a_run_that_followed_a_list_is_the_same_without_the_list(make_cell, tmp_path) -> None:
     """Gauges with a long travel can measure it; the journal contains its poses."""
     listed, run = tmp_path / "list.csv", RunFolder(tmp_path / "run")

@@ -81,6 +81,7 @@ def test_a_robot_near_its_prior_keeps_all_records(noisy, chain):
     assert not last.false_records
 
 
+@pytest.mark.slow
 def test_a_search_in_vain_is_not_repeated_at_every_record(noisy, chain, monkeypatch):
     searched = []
     restarts = multistart.restarts

@@ -109,7 +109,8 @@ def tokens_and_values(draw: st.DrawFn) -> tuple[list[str], np.ndarray]:
     few = draw(st.lists(st.tuples(spellings, moves), min_size=1, max_size=6))
     pairs = [few[index % len(few)] for index in range(len(HEXAGLIDE_PARAMETERS))]
     values = np.array([tomllib.loads(f"x = {text}")["x"] + move for text, move in pairs])
-    values[36:] = np.abs(values[36:]) + 1e-9
+    # A length stays above zero when it is written with six decimals.
+    values[36:] = np.abs(values[36:]) + 1e-6
     return [text for text, _ in pairs], values
 
 

@@ -144,6 +144,7 @@ def test_each_line_is_what_its_source_does(laboratory, exact, paper) -> None:
     assert lines["noise of the readings"] > 1e6 * 0.01 * np.sqrt(1 / 12 + 1 / 6) / 300.0
 
 
+@pytest.mark.slow
 def test_u_covers_the_true_scale(laboratory, paper, visit, make_problem) -> None:
     """Calibrations and checks, every number drawn: noise of both, seating, fixture."""
     random = np.random.default_rng(7)

@@ -93,7 +93,7 @@ async def interrupted_twice(rig: Any, how: str, first: int, second: int) -> None
 HERE_AND_THERE = [("power cut", 7, 5), ("aborted", 16, 4), ("power cut", 3, 9)]
 """From the drawing, the last one's records lead to another robot, whose gauges would read in inches."""
 
-LATER = [("power cut", 1, 27, 3), ("aborted", 2, 14, 6)]
+LATER = [pytest.param("power cut", 1, 27, 3, marks=pytest.mark.slow), ("aborted", 2, 14, 6)]
 """The first number is of sets that are measured already."""
 
 

@@ -37,7 +37,13 @@ KILLED = {"in the first set", "at a held-out point afterwards"}
 """Here the process ended without a word; in the other places it could still write one."""
 
 
-@pytest.mark.parametrize("place", PLACES)
+SELDOM = {"at the second point", "with everything measured", "with everything verified"}
+"""Tried in ``make test-full`` only."""
+
+
+@pytest.mark.parametrize(
+    "place", [pytest.param(one, marks=[pytest.mark.slow] * (one in SELDOM)) for one in PLACES]
+)
 async def test_a_run_resumes_after_an_interruption_at_any_stage(recording, replayed, place: str) -> None:
     kind, count = PLACES[place]
     done = recording.until(kind, count=count)

@@ -225,7 +225,7 @@ def test_the_run_is_reproduced(whole: Rig, few_candidates: None, tmp_path: Path)
     assert report.results > 60
 
 
-@pytest.mark.parametrize("command", [Abort(), None])
+@pytest.mark.parametrize("command", [Abort(), pytest.param(None, marks=pytest.mark.slow)])
 async def test_interrupted_anywhere_it_is_measured_once(
     make_rig: MakeRig, few_candidates: None, tmp_path: Path, command: Abort | None
 ) -> None:

@@ -41,6 +41,7 @@ def excluded(rig: Any) -> list[events.PoseExcluded]:
     return happened(rig, events.PoseExcluded)
 
 
+@pytest.mark.slow
 async def test_a_run_within_narrow_limits_of_the_controller_ends_well(make_rig) -> None:
     rig = make_rig(**limits(a=(-9.0, 9.0), b=(-9.0, 9.0), c=(-14.0, 14.0)))
     ended = await rig.run()

@@ -73,7 +73,9 @@ def test_a_large_gross_error_in_an_imperfect_machine_is_named(noisy, make_proble
     assert fault.left_out == ((4, 4),)
 
 
-@pytest.mark.parametrize("error", IMPERFECT)
+@pytest.mark.parametrize(
+    "error", [IMPERFECT[0], *(pytest.param(one, marks=pytest.mark.slow) for one in IMPERFECT[1:])]
+)
 def test_gauges_reversed_in_an_imperfect_machine_are_named(noisy, make_problem, error):
     imperfect = with_encoders(noisy, error)
     wrong = MeasurementSet(
@@ -87,7 +89,15 @@ def test_gauges_reversed_in_an_imperfect_machine_are_named(noisy, make_problem, 
     assert raised.value.fault.kind is DataFaultKind.REVERSED
 
 
-@pytest.mark.parametrize(("records", "named"), [(7, False), (8, False), (9, False), (10, True)])
+@pytest.mark.parametrize(
+    ("records", "named"),
+    [
+        pytest.param(7, False, marks=pytest.mark.slow),
+        (8, False),
+        pytest.param(9, False, marks=pytest.mark.slow),
+        (10, True),
+    ],
+)
 def test_a_slip_is_named_only_with_equations_to_spare(visit, make_problem, records, named):
     """Split at the slip, 2 x 10 records give 51 equations for 35 parameters; 2 x 9 only 45."""
     few = visit(points=2, orientations=records, seed=81).measured(0.01, seed=81)

@@ -92,6 +92,7 @@ def test_one_encoder_is_named(visit) -> None:
     assert sum(found.values()) - found[ScatterSource.ENCODER_3] - found[None] <= 2
 
 
+@pytest.mark.slow
 def test_a_single_instrument_is_rarely_blamed_for_all_sliders_or_encoders(visit) -> None:
     found = Counter(visit(sliders=0.03).source for _ in range(100))
     found += Counter(visit(encoders=0.03).source for _ in range(100))

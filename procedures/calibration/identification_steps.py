@@ -60,11 +60,12 @@ class IdentificationSteps:
         if trial := self.trials.next_step(state, key, self._ball(state, key)):
             return trial
         measuring_noise = self.noise.next_step(state, key, self._ball(state, key))
-        if step := measuring_noise or self.sets.at_pose(state, key):
+        # With several records to be taken again, one is, before the robot moves to the next of them.
+        orientation, pose = measured.again[0] if measured.again else (None, None)
+        if step := measuring_noise or self.sets.at_pose(state, key, orientation):
             return step
-        if not measured.again:
+        if orientation is None or pose is None:
             return None
-        orientation, pose = measured.again[0]
         move = Move(at=key, orientation=orientation, pose=pose)
         return self.sets.paths.towards(state, move, self._ball(state, key))
 

@@ -12,8 +12,8 @@ from hexacell.campaign import pose_chooser
 from hexacell.motion.paths import find_route
 from procedures.calibration.workflow import Mode, expected_records
 from procedures.run import events
-from procedures.run.state import fold
-from procedures.run.steps import Move
+from procedures.run.state import apply, fold
+from procedures.run.steps import Move, Sample
 
 POINTS, ORIENTATIONS, HELD_OUT = 2, 9, 3
 
@@ -55,6 +55,29 @@ def test_the_next_step_depends_on_the_state_only(recording, make_rig) -> None:
         event = history[place]
         assert isinstance(event, events.StepBegun)
         assert calibration.next_step(fold(history[:place])) == event.step
+
+
+@pytest.mark.parametrize("undone", [(4, 2), (2, 4), (3, 4, 2)])
+def test_several_records_are_taken_again_one_after_the_other(recording, make_rig, undone) -> None:
+    """Whatever the order in which they were undone; the robot does not go to one and sample another."""
+    sampled = recording.until(events.RecordTaken, count=4)
+    taken = {event.orientation: event for event in sampled if isinstance(event, events.RecordTaken)}
+    at = taken[1].at
+    calibration = make_rig().calibration
+    state = fold([*sampled, *(events.RecordDiscarded(at=at, orientation=number) for number in undone)])
+    again = []
+    for _ in range(4 * len(undone)):
+        match calibration.next_step(state):
+            case Move(expected=None, orientation=orientation, pose=pose):
+                state = apply(state, events.Arrived(at=at, orientation=orientation, pose=pose))
+            case Sample(orientation=orientation, pose=pose):
+                assert pose == taken[orientation].pose
+                again.append(orientation)
+                state = apply(state, taken[orientation])
+            case _:
+                break
+    assert again == list(undone)
+    assert not state.set(at).again
 
 
 def test_after_a_refusal_another_pose_is_chosen(recording, make_rig) -> None:

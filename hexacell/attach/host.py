@@ -13,7 +13,7 @@ from socket import socket
 
 from hexacell.application.calibration_run import RunRequest, calibrate
 from hexacell.attach.audience import Audience, AudienceEvents, audience_server
-from hexacell.attach.live_feed import LiveFeed
+from hexacell.attach.run_device_watch import RunDeviceWatch
 from hexacell.attach.messages import (
     EventRecorded,
     HostFailed,
@@ -28,8 +28,6 @@ from hexacell.campaign.pose_list import pose_list_of
 from hexacell.errors import ExitCode, HexacellError, SeveralErrors
 from procedures.calibration.workflow import expected_records
 from procedures.devices.device_set import Devices
-from procedures.devices.live_polling import poll_for_screens
-from procedures.devices.live_values import LiveValues
 from procedures.engine.command_loop import Status
 from procedures.engine.engine import Engine
 from procedures.journal.journal import read_entries
@@ -37,7 +35,7 @@ from procedures.run import events
 from procedures.run.commands import Abort, Command, CommandQueue, Pause, Stop
 from procedures.run.questions import Question
 from procedures.run.state import RunState
-from procedures.run.steps import Compute, Move
+from procedures.run.steps import Compute
 
 FIRST_CLIENT_S = 30.0
 """How long a host waits for who started it; nothing moves before."""
@@ -45,8 +43,6 @@ FIRST_CLIENT_S = 30.0
 ABORT_S = 0.35
 """How long an abandoned computation may last that moves nothing and writes nothing but its result."""
 
-WAITING = {Status.PAUSED, Status.AWAITING_OPERATOR, Status.FAULTED}
-"""In which a run does nothing until a person says something."""
 
 _ONLY_COMPUTING = {"assess noise", "identify", "propose", "judge"}
 
@@ -80,11 +76,10 @@ class RunHost:
         stuck_s: float = STUCK_S,
     ) -> None:
         settings = request.cell.settings
-        self.live = LiveValues()
+        self._watching = RunDeviceWatch(settings.gauges)
         self._request = request
         self._queue = queue
         self._away_s = 60.0 * settings.recovery.away_minutes if away_s is None else away_s
-        self._feed = LiveFeed(self.live, settings.gauges)
         self._audience = Audience(
             self._told,
             AudienceEvents(self._obey, self._on_control, self._on_leave, self._on_lost),
@@ -96,8 +91,6 @@ class RunHost:
         self._question: Question | None = None
         self._failure: HostFailed | None = None
         self._last: events.Event | None = None
-        self._devices: Devices | None = None
-        self._polling: asyncio.Task[None] | None = None
         self._is_lost = False
         self._giving_up: asyncio.TimerHandle | None = None
         self._aborted = asyncio.Event()
@@ -125,13 +118,14 @@ class RunHost:
             await asyncio.wait([running, aborting], return_when=asyncio.FIRST_COMPLETED)
             return running.result() if running.done() else ExitCode.INTERRUPTED
         finally:
-            for task in (watching, aborting, self._polling, self._giving_up):
+            self._watching.close()
+            for task in (watching, aborting, self._giving_up):
                 if task is not None:
                     task.cancel()
             await self._audience.dismiss()
 
     async def _run(self) -> ExitCode:
-        request, live = self._request, self.live
+        request, live = self._request, self._watching.live
         try:
             ended = await calibrate(request, [self._record], self._queue, live, self._watch)
         except HexacellError as error:
@@ -169,9 +163,9 @@ class RunHost:
 
     def _watch(self, engine: Engine, devices: Devices) -> None:
         """Called with the engine before it begins: what happened before is told first."""
-        self._devices = devices
         for entry in read_entries(self._request.folder.journal):
             self._tell_event(EventRecorded(sequence=entry.number, at=entry.at, event=entry.event))
+        self._watching.follow(engine, devices)
         engine.watch(self._on_status)
         engine.watch_questions(self._on_question)
 
@@ -183,11 +177,7 @@ class RunHost:
         self._sequence, self._last = recorded.sequence, recorded.event
         self._lines.append(message_line(recorded))
         self._audience.tell(recorded)
-        match recorded.event:
-            case events.StepBegun(step=step):
-                self._feed.is_moving = isinstance(step, Move)
-            case _:
-                self._feed.is_moving = False
+        self._watching.note(recorded.event)
 
     def _on_status(self, status: Status) -> None:
         self._status = status
@@ -234,10 +224,8 @@ class RunHost:
     # What follows from both.
 
     def _reconsider(self) -> None:
-        """Read devices for screens while the run reads none, and count the time while nobody is there."""
-        is_waiting = self._question is not None or self._status is Status.PAUSED
-        self._poll(wanted=is_waiting)
-        is_away = is_waiting and not self._audience.is_controlled
+        """Count the time while the run waits and nobody is there."""
+        is_away = self._watching.is_waiting and not self._audience.is_controlled
         if self._giving_up is not None and not is_away:
             self._giving_up.cancel()
             self._giving_up = None
@@ -248,16 +236,9 @@ class RunHost:
     def _give_up(self) -> None:
         self._queue.put(Stop(f"nobody was connected for {self._away_s / 60.0:g} minutes"))
 
-    def _poll(self, *, wanted: bool) -> None:
-        if wanted and self._polling is None and self._devices is not None:
-            self._polling = asyncio.ensure_future(poll_for_screens(self._devices))
-        elif not wanted and self._polling is not None:
-            self._polling.cancel()
-            self._polling = None
-
     async def _watch_devices(self) -> None:
-        async for _ in self.live.changes():
-            self._audience.tell_latest(self._feed.snapshot())
+        async for snapshot in self._watching.snapshots():
+            self._audience.tell_latest(snapshot)
 
     def _description(self) -> RunDescribed:
         request = self._request

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from statistics import stdev
 from typing import Any
 
+from drivers.interfaces import GaugeReading
 from hexacell.attach.snapshots import ControllerSnapshot, EncoderSnapshot, GaugeSnapshot, LiveSnapshot
 from hexacell.cell.devices import GaugeSettings
 from procedures.devices.live_values import LiveValue, LiveValues
@@ -30,6 +31,11 @@ class LiveFeed:
         self._recent: dict[str, deque[tuple[float, float]]] = {
             gauge.name: deque(maxlen=NOISE_READINGS) for gauge in gauges
         }
+
+    @property
+    def gauges(self) -> tuple[LiveValue[GaugeReading], ...]:
+        """The live values of the gauges."""
+        return tuple(self._live.gauge(gauge.name) for gauge in self._gauges)
 
     def snapshot(self) -> LiveSnapshot:
         """The latest values of all devices."""

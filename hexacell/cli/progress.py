@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 
 from rich.console import Console as RichConsole
@@ -9,9 +10,13 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from hexacell.cli.console import Console
 from hexacell.presentation.events import EventFormatter, activity
+from hexacell.presentation.line_face import record_text
 from procedures.run import events
 from procedures.run.state import RunState
 from procedures.run.steps import Compute, Place
+
+PLAIN_TERMINALS = {"dumb", "unknown"}
+"""Values of TERM: no bar is drawn, and each record has a line."""
 
 
 class RunProgress:
@@ -19,13 +24,16 @@ class RunProgress:
 
     Attributes:
         has_started: whether the run exists on the disk, and so can be resumed.
+        expected: how many records and closings of sets are planned.
     """
 
     def __init__(self, console: Console, expected_records: int) -> None:
         self.has_started = False
+        self.expected = expected_records
         self._console = console
         self._formatter = EventFormatter()
         self.bar = _bar()
+        self._is_plain = is_plain_terminal()
         self._task = self.bar.add_task("connecting", total=expected_records)
 
     def __call__(self, event: events.Event, state: RunState) -> None:
@@ -41,10 +49,18 @@ class RunProgress:
         self.bar.update(self._task, completed=state.completed, description=activity(event))
         for line in self._formatter.lines(event, state):
             self._console.print(line)
+        if self._is_plain and isinstance(event, events.RecordTaken):
+            self._console.print(f"{state.completed} of {self.expected}: {record_text(event)}")
 
     def hide(self) -> None:
         """Remove the bar until the next event, so that a question can be shown."""
         self.bar.stop()
+
+
+def is_plain_terminal() -> bool:
+    """Whether people read lines only: a dumb terminal, or a screen reader's."""
+    terminal = sys.stderr is not None and sys.stderr.isatty()
+    return terminal and os.environ.get("TERM", "dumb") in PLAIN_TERMINALS
 
 
 def _may_ask(event: events.Event) -> bool:
@@ -66,7 +82,7 @@ def _bar() -> Progress:
         TextColumn("left"),
         console=RichConsole(file=sys.stderr),
         transient=True,
-        disable=not terminal,
+        disable=not terminal or is_plain_terminal(),
         # Text for the same terminal goes above the bar; text for a file or a pipe goes there.
         redirect_stdout=sys.stdout is not None and sys.stdout.isatty(),
     )

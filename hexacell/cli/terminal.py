@@ -5,26 +5,22 @@ from __future__ import annotations
 import asyncio
 import sys
 import termios
-from collections.abc import Callable, Coroutine
+from collections.abc import Callable, Coroutine, Mapping
 from io import TextIOWrapper
 from typing import Any, TextIO, TypeVar
 
 from hexacell.cli.console import Console
 from hexacell.errors import AnswerNeeded
 from hexacell.presentation.answers import request_text, typed_answer
+from hexacell.presentation.line_face import LETTERS
 from hexacell.presentation.run import question_text
 from procedures.run import events
-from procedures.run.commands import Abort, Command, CommandQueue, MeasureAgain, Pause, Resume, Undo
+from procedures.run.commands import Abort, Command, MeasureAgain, Pause, Resume, Undo
 from procedures.run.questions import Question
 from procedures.run.state import RunState
 from procedures.run.steps import SetKey
 
 Result = TypeVar("Result")
-
-HELP = (
-    "Letters, each with Enter: p pause after this record, P at once, r resume,\n"
-    "u undo the last record, m measure this point again, a abort."
-)
 
 APPROVER = "a person at the terminal"
 """Who approves a change, as the journal has it."""
@@ -36,12 +32,29 @@ def is_interactive() -> bool:
 
 
 class KeyboardCommands:
-    """Turns typed letters into commands; listens to the engine to know which set they refer to."""
+    """Turns typed letters into commands; listens to the engine to know which set they refer to.
 
-    def __init__(self, console: Console, queue: CommandQueue, terminal: TextIO) -> None:
+    Args:
+        console: where is told what is asked.
+        put: takes the commands.
+        terminal: what is typed.
+        tell: further letters, each with what tells something.
+        letters: what is told of all of them.
+    """
+
+    def __init__(
+        self,
+        console: Console,
+        put: Callable[[Command], None],
+        terminal: TextIO,
+        tell: Mapping[str, Callable[[], None]],
+        letters: str = LETTERS,
+    ) -> None:
         self._console = console
-        self._queue = queue
+        self._put = put
         self._terminal = terminal
+        self._tell = tell
+        self._letters = letters
         self._at: SetKey | None = None
 
     def __call__(self, event: events.Event, _: RunState) -> None:
@@ -70,14 +83,20 @@ class KeyboardCommands:
 
     def take(self, line: str) -> None:
         """Put the command that a line means into the queue; where it means none, say which there are."""
-        make = self._commands().get(line.strip())
-        if make is not None:
-            self._queue.put(make())
-        elif line.strip():
-            self._console.print(HELP)
+        word, _, number = line.strip().partition(" ")
+        tell, make = self._tell.get(word), self._commands(number).get(word)
+        if tell is not None:
+            tell()
+        elif make is not None:
+            self._put(make())
+        elif word:
+            self._console.print(self._letters)
 
-    def _commands(self) -> dict[str, Callable[[], Command]]:
-        at = self._at
+    def _commands(self, number: str) -> dict[str, Callable[[], Command]]:
+        """The commands by their letters; a number is that of a record of this point."""
+        at, again = self._at, int(number) if number.isdecimal() else None
+        if number:
+            return {} if at is None or again is None else {"m": lambda: MeasureAgain(at, again)}
         here: dict[str, Callable[[], Command]] = {} if at is None else {"m": lambda: MeasureAgain(at)}
         return here | {
             "p": Pause,

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import asyncio
 import time
-from collections.abc import AsyncIterator, Awaitable, Callable
+from collections.abc import AsyncGenerator, Awaitable, Callable
 from typing import Generic, TypeVar
 
 from drivers.interfaces import ControllerStatus, EncoderSample, GaugeReading
@@ -82,7 +82,7 @@ class LiveValues:
         """The reading of a gauge, mm in its own zero and direction."""
         return self._gauges.setdefault(name, LiveValue(self))
 
-    async def changes(self, period_s: float = SAMPLE_PERIOD_S) -> AsyncIterator[None]:
+    async def changes(self, period_s: float = SAMPLE_PERIOD_S) -> AsyncGenerator[None]:
         """Gives way after each change, at most once every ``period_s`` seconds, until cancelled."""
         changed = asyncio.Event()
         self._subscribers.add(changed)

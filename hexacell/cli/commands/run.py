@@ -9,17 +9,22 @@ from dataclasses import replace
 from hexacell.application.calibration_run import RunRequest, calibrate, is_unverified
 from hexacell.application.demo import prepare_demo
 from hexacell.application.interrupted_runs import run_to_resume
+from hexacell.attach.run_device_watch import RunDeviceWatch
 from hexacell.campaign.pose_list import pose_list_of
 from hexacell.cli.cell_argument import cell_with_devices_at
 from hexacell.cli.console import Console
 from hexacell.cli.progress import RunProgress
+from hexacell.cli.run_status import RunStatus
 from hexacell.cli.signal_commands import SignalCommands
-from hexacell.cli.terminal import HELP, KeyboardCommands, TerminalOperator, is_interactive
+from hexacell.cli.telling import Telling
+from hexacell.cli.terminal import KeyboardCommands, TerminalOperator, is_interactive
 from hexacell.errors import ExitCode, HexacellError, UsageError
 from hexacell.presentation.documents import run_document
+from hexacell.presentation.line_face import LETTERS
 from hexacell.presentation.run import UNVERIFIED, clock_notice, closing_lines, demo_opening, resume_hint
 from hexacell.runs.run_folder import new_run
 from procedures.calibration.workflow import Mode, expected_records
+from procedures.engine.engine import Listener
 from procedures.journal.journal import read_journal
 from procedures.run import events
 from procedures.run.commands import CommandQueue
@@ -119,8 +124,14 @@ async def _calibrate(
     """Calibrate; a person at a terminal may also type commands."""
     if not isinstance(request.operator, TerminalOperator):
         return await calibrate(request, [progress], queue)
-    keys = KeyboardCommands(console, queue, sys.stdin)
+    watching, status = RunDeviceWatch(request.cell.settings.gauges), RunStatus(progress.expected)
+    telling = Telling(console, watching)
+    tell = {"g": telling.gauges, "s": lambda: console.print(status.text())}
+    keys = KeyboardCommands(console, queue.put, sys.stdin, tell)
     request.operator.before_question, request.operator.after_question = progress.hide, keys.listen
     request.operator.type_command = keys.take
-    console.print(HELP)
-    return await keys.listen_during(calibrate(request, [progress, keys], queue))
+    console.print(LETTERS)
+    listeners: list[Listener] = [progress, keys, status, watching.note]
+    run = calibrate(request, listeners, queue, watching.live, watching.follow)
+    async with telling:
+        return await keys.listen_during(run)

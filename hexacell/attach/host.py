@@ -13,7 +13,6 @@ from socket import socket
 
 from hexacell.application.calibration_run import RunRequest, calibrate
 from hexacell.attach.audience import Audience, AudienceEvents, audience_server
-from hexacell.attach.run_device_watch import RunDeviceWatch
 from hexacell.attach.messages import (
     EventRecorded,
     HostFailed,
@@ -24,6 +23,7 @@ from hexacell.attach.messages import (
     message_line,
 )
 from hexacell.attach.outbox import STUCK_S
+from hexacell.attach.run_device_watch import RunDeviceWatch
 from hexacell.campaign.pose_list import pose_list_of
 from hexacell.errors import ExitCode, HexacellError, SeveralErrors
 from procedures.calibration.workflow import expected_records

@@ -1,7 +1,7 @@
 # All commands of a newcomer or of CI. Each target sets up .venv first, which takes milliseconds and no
 # network once it is done.
 #
-#   make demo | test | test-full | lint | bench | clean
+#   make demo | test | test-full | lint | bench | screenshots | clean
 #   make test ARGS="-k gauges"       more arguments for the program
 #   make PYTHON=python3.12 test      the Python for .venv, the first time
 
@@ -21,7 +21,7 @@ unexport PYTHONDONTWRITEBYTECODE
 # The matrices are small: threads of the linear algebra only slow them down.
 export OPENBLAS_NUM_THREADS = 1
 
-.PHONY: demo test test-full lint bench clean venv
+.PHONY: demo test test-full lint bench screenshots clean venv
 
 demo: venv
 	.venv/bin/hexacell demo $(ARGS)
@@ -44,6 +44,9 @@ lint: venv
 
 venv:
 	@.ci/venv "$(PYTHON)"
+
+screenshots:
+	@.ci/screenshots build/screenshots
 
 clean:
 	rm -rf .venv build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis .import_linter_cache

@@ -5,7 +5,9 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable, Coroutine, Iterable
 from contextlib import suppress
+from dataclasses import dataclass
 from functools import partial
+from pathlib import Path
 from typing import Any, ClassVar
 
 from textual.app import App, SystemCommand
@@ -15,6 +17,7 @@ from textual.screen import Screen
 
 from hexacell.errors import HexacellError
 from hexacell.presentation.screens.views import FaultView
+from hexacell.screen.assistant_screen import Assistant, AssistantScreen
 from hexacell.screen.backend import Backend, ScreenAction
 from hexacell.screen.cell_screen import CellScreen
 from hexacell.screen.digits_screen import DigitsScreen
@@ -44,6 +47,14 @@ SCREENS: tuple[type[TabScreen], ...] = (
 )
 
 
+@dataclass(frozen=True, slots=True)
+class FirstCell:
+    """A cell file that does not exist yet, and what makes the assistant for it."""
+
+    path: Path
+    make: Callable[[], Assistant]
+
+
 class TechnicianApp(App[int]):
     """Loads its backend behind the first screen and draws what that knows ten times a second."""
 
@@ -55,11 +66,15 @@ class TechnicianApp(App[int]):
     DEFAULT_MODE = "cell"
 
     def __init__(
-        self, load: Callable[[], Backend], preferences: ScreenPreferences | None = None, tab: str = "cell"
+        self,
+        load: Callable[[], Backend],
+        preferences: ScreenPreferences | None = None,
+        *,
+        first_cell: FirstCell | None = None,
     ) -> None:
         self.preferences = preferences or ScreenPreferences()
         self.keys_in_use = {str(one.id): one.key_display or one.key for one in KEYS} | self.preferences.keys
-        self._load, self._tab = load, tab
+        self._load, self._first_cell = load, first_cell
         self._backend: Backend | None = None
         self._question_seen, self._fault_seen, self._runs_seen = 0, 0, 0
         self._allowed: frozenset[ScreenAction] = frozenset()
@@ -86,13 +101,23 @@ class TechnicianApp(App[int]):
     async def _attend(self) -> None:
         """Follow the cell as long as the application runs."""
         try:
+            if not await self._has_cell():
+                self.exit(0)
+                return
             self._backend = await asyncio.to_thread(self._load)
             self.draw()
             self.set_interval(DRAWN_EVERY_S, self.draw)
-            await self.switch_mode(self._tab)
             await self._backend.attend()
         except HexacellError as error:
             self._tell(error)
+
+    async def _has_cell(self) -> bool:
+        """Whether there is a cell file, once the first-time assistant was used if it is needed."""
+        if self._first_cell is None:
+            return True
+        assistant = await asyncio.to_thread(self._first_cell.make)
+        is_made: bool = await self.push_screen_wait(AssistantScreen(assistant, self._first_cell.path))
+        return is_made
 
     def draw(self) -> None:
         """Show what is so now in the screen in front, and in what lies below it."""

@@ -16,6 +16,9 @@ from hexacell.presentation.screens.views import (
     ReviewView,
 )
 
+RESUME = "resume"
+"""In the place of a mode: go on with the latest run that was interrupted."""
+
 
 class ScreenAction(StrEnum):
     """What a person may ask for with one key."""

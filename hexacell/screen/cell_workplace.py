@@ -24,8 +24,12 @@ from hexacell.presentation.history import comparison_text, drift_text
 from hexacell.presentation.screens.past import history_entries
 from hexacell.presentation.screens.views import ChecklistItem, HistoryEntry, Mark
 from hexacell.runs.run_folder import find_run, new_run
+from hexacell.screen.backend import RESUME
 from hexacell.screen.child_process import run_child
 from hexacell.screen.workplace import Preflight
+from procedures.calibration.workflow import Mode
+from procedures.journal.journal import read_journal
+from procedures.run.events import RunStarted
 
 
 class CellWorkplace:
@@ -48,16 +52,16 @@ class CellWorkplace:
         """See :class:`Workplace`."""
         return await connect_to_run(socket_path(self.cell))
 
-    async def start(self) -> RunConnection:
-        """See :class:`Workplace`; an interrupted calibration is resumed."""
-        arguments = [str(self.cell.path), "--mode", "optimise"]
-        try:
-            interrupted = run_to_resume(self.cell, LATEST)
-        except UsageError:
-            folder, resuming = new_run(self.cell), []
+    async def start(self, what: str) -> RunConnection:
+        """See :class:`Workplace`."""
+        if what == RESUME:
+            folder = run_to_resume(self.cell, LATEST)
+            started = next(iter(read_journal(folder.journal)))
+            mode = started.mode if isinstance(started, RunStarted) else Mode.OPTIMISE.value
+            more = ["--resume"]
         else:
-            folder, resuming = interrupted, ["--resume"]
-        arguments += ["--folder", str(folder.path), *resuming]
+            folder, mode, more = new_run(self.cell), Mode(what).value, []
+        arguments = [str(self.cell.path), "--mode", mode, "--folder", str(folder.path), *more]
         return await start_host(socket_path(self.cell), arguments)
 
     async def check(self) -> Preflight:

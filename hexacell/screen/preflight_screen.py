@@ -21,7 +21,9 @@ class PreflightScreen(TabScreen):
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("enter", "app.perform('check')", "Look at everything", show=False),
         Binding("v", "app.perform('preview')", "Try the plan", show=False),
-        Binding("s", "app.perform('start')", "Start the run", show=False),
+        Binding("s", "app.perform('start', 'optimise')", "Start a calibration", show=False),
+        Binding("k", "app.perform('start', 'check')", "Start a check", show=False),
+        Binding("r", "app.perform('start', 'resume')", "Resume the latest run", show=False),
     ]
 
     def compose_body(self) -> ComposeResult:

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from hexacell.cell.loader import describe
-from hexacell.presentation.screens.checklists import RUNNING, checklist_view
+from hexacell.presentation.screens.checklists import RUNNING, STARTING, checklist_view
 from hexacell.presentation.screens.faults import fault_view
 from hexacell.presentation.screens.headers import header_view
 from hexacell.presentation.screens.live import live_view
@@ -92,7 +92,7 @@ class ScreenSession:
             found.checked,
             found.plan,
             is_checking=found.is_checking,
-            refusal=RUNNING if is_running else "",
+            refusal=RUNNING if is_running else STARTING if found.is_starting else "",
         )
 
     def measure(self) -> MeasureView:

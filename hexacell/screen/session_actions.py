@@ -48,6 +48,7 @@ class Findings:
     checked: tuple[ChecklistItem, ...] | None = None
     is_ready: bool = False
     is_checking: bool = False
+    is_starting: bool = False
     plan: tuple[str, ...] = ()
     entries: tuple[HistoryEntry, ...] | None = None
     compared: tuple[str, ...] = field(default=())
@@ -98,7 +99,7 @@ class SessionActions:
         if action is ScreenAction.TAKE_CONTROL:
             return self.is_running and not self._run.picture.may_command
         if action in {ScreenAction.CHECK, ScreenAction.START, ScreenAction.ROLL_BACK}:
-            return not self.is_running and not self.findings.is_checking
+            return not (self.is_running or self.findings.is_checking or self.findings.is_starting)
         return True
 
     async def perform(self, action: ScreenAction, argument: str) -> str:
@@ -137,13 +138,20 @@ class SessionActions:
             found.is_checking = False
         return ""
 
-    async def _start(self, _: str) -> str:
+    async def _start(self, what: str) -> str:
         """Checked again, as anything may have changed since somebody looked."""
         await self._check("")
         if not self.findings.is_ready:
             raise UsageError("not everything holds that must hold", action="Look at 2 Preflight")
         await self._devices.stop()
-        await self._follow(await self._workplace.start())
+        self.findings.is_starting = True
+        try:
+            await self._follow(await self._workplace.start(what))
+        except BaseException:
+            self._devices.start()
+            raise
+        finally:
+            self.findings.is_starting = False
         return ""
 
     async def _preview(self, _: str) -> str:

@@ -41,8 +41,8 @@ class Workplace(Protocol):
         """The run that goes on in this cell, if one does."""
         ...
 
-    async def start(self) -> RunConnection:
-        """Begin a run in a process of its own, or resume the latest one that was interrupted."""
+    async def start(self, what: str) -> RunConnection:
+        """Begin a run in a process of its own: the name of a mode; or resume the latest interrupted one."""
         ...
 
     async def check(self) -> Preflight:

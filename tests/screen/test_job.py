@@ -13,10 +13,12 @@ from hexacell.attach.messages import ControlChanged, HostFailed, StatusChanged
 from hexacell.cell.loader import Cell
 from hexacell.cell.recovery import Action
 from hexacell.kinematics.pose import Pose
+from hexacell.presentation.screens.views import ChecklistItem, Mark
 from hexacell.screen.app import TechnicianApp
 from hexacell.screen.overlays.fault_overlay import FaultOverlay
 from hexacell.screen.overlays.question_overlay import QuestionOverlay
-from hexacell.screen.widgets.text_panel import TextPanel
+from hexacell.screen.widgets.text_panel import TextList, TextPanel
+from hexacell.screen.workplace import Preflight
 from procedures.engine.command_loop import Status
 from procedures.run import events
 from procedures.run.commands import Abort, Answer, Command, MeasureAgain, Pause, Resume, Undo
@@ -254,3 +256,40 @@ async def test_quitting_may_stop_the_run(
         await until_shown(pilot, "point 5")
         await press(pilot, "q", "s")
         await until(lambda: run.left == [False])
+
+
+@pytest.mark.parametrize(("key", "what"), [("s", "optimise"), ("k", "check"), ("r", "resume")])
+async def test_a_run_begins_only_after_everything_was_looked_at(
+    key: str, what: str, cell: Cell, run: ToldRun, opened: Opened
+) -> None:
+    run.begin(cell)
+    workplace = ToldWorkplace(cell, live=[snapshot()], started=run)
+    async with opened(workplace) as pilot:
+        await press(pilot, "2", key)
+        await until_shown(pilot, "calibration")
+        assert workplace.begun == [what]
+        assert pilot.app.current_mode == "measure"
+
+
+async def test_no_run_begins_while_something_does_not_hold(
+    cell: Cell, run: ToldRun, opened: Opened
+) -> None:
+    found = ChecklistItem(Mark.FAILED, "gauge y", "it answers in inch", "Press the in/mm key")
+    workplace = ToldWorkplace(cell, started=run, preflight=Preflight((found,), is_ready=False))
+    async with opened(workplace) as pilot:
+        await press(pilot, "2", "s")
+        await until_shown(pilot, "not everything holds that must hold")
+        await press(pilot, "enter")
+        assert "NO  gauge y: it answers in inch" in shown_list(pilot, "#checklist")
+        assert "-> Press the in/mm key" in shown_list(pilot, "#checklist")
+        assert workplace.begun == []
+
+
+async def test_quitting_without_a_run_asks_nothing(cell: Cell, opened: Opened) -> None:
+    async with opened(ToldWorkplace(cell, live=[snapshot()])) as pilot:
+        await pilot.press("q")
+        await until(lambda: pilot.app.return_code == 0)
+
+
+def shown_list(pilot: Pilot[int], place: str) -> str:
+    return pilot.app.screen.query_one(place, TextList).text

@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
+from textual.widgets import Input
 
 from hexacell.acceptance import AcceptanceGate
 from hexacell.attach.messages import StatusChanged
 from hexacell.cell.loader import Cell
 from hexacell.kinematics.pose import Pose
 from hexacell.presentation.screens.views import ChecklistItem, HistoryEntry, Mark
+from hexacell.screen.app import FirstCell, TechnicianApp
+from hexacell.screen.assistant import FirstCellAssistant
+from hexacell.screen.assistant_screen import AssistantScreen
 from hexacell.screen.key_map import THEMES
 from hexacell.screen.workplace import Preflight
 from procedures.engine.command_loop import Status
@@ -19,8 +25,10 @@ from procedures.run import events
 from procedures.run.questions import ask_approval, ask_placement
 from procedures.run.steps import Phase, SetKey
 from procedures.run.trips import Guard
-from tests.screen.conftest import Opened, compare_with_snapshot, settled
+from tests.screen.conftest import SNAPSHOTS, UPDATE, Opened, compare_with_snapshot, settled
+from tests.screen.test_job import until_shown
 from tests.screen.told_run import ToldRun, ToldWorkplace, snapshot
+from tests.waiting import until
 
 SIZES = {"80x24": (80, 24), "140x40": (140, 40)}
 
@@ -40,8 +48,13 @@ DIFF = """\
 
 def idle(cell: Cell) -> ToldWorkplace:
     entries = (
-        HistoryEntry("2026-03-02T080000Z", "2026-03-02 08:00:00   calibration  pass: 0.034 +- 0.090 mm"),
-        HistoryEntry("2026-02-02T073000Z", "2026-02-02 07:30:00   check        pass: 0.051 +- 0.080 mm"),
+        HistoryEntry(
+            "2026-03-02T080000Z",
+            "2026-03-02T080000Z     optimise pass             0.034 +- 0.090   in controller",
+        ),
+        HistoryEntry(
+            "2026-02-02T073000Z", "2026-02-02T073000Z     check    conditional pass 0.201 +- 0.080"
+        ),
     )
     return ToldWorkplace(
         cell,
@@ -122,7 +135,7 @@ def scene_approve(cell: Cell, history: tuple[events.Event, ...]) -> tuple[ToldWo
     )
     gates = tuple(far if gate.name == far.name else gate for gate in proposed.gates)
     run.ask(ask_approval(gates, DIFF, proposed.displacement, cell=cell.settings.name))
-    return workplace, ("4",)
+    return workplace, ()
 
 
 def scene_fault(cell: Cell, history: tuple[events.Event, ...]) -> tuple[ToldWorkplace, tuple[str, ...]]:
@@ -154,6 +167,22 @@ SCENES: dict[str, Scene] = {
 
 
 @pytest.mark.parametrize("size", SIZES)
+async def test_the_assistant_looks_as_it_did(size: str, tmp_path: Path) -> None:
+    path = tmp_path / "cell.toml"
+    first = FirstCell(path, lambda: FirstCellAssistant(path))
+    app = TechnicianApp(lambda: pytest.fail("there is no cell"), first_cell=first)
+    async with app.run_test(size=SIZES[size]) as pilot:
+        await until(lambda: isinstance(app.screen, AssistantScreen))
+        await until_shown(pilot, "Question 1 of")
+        app.screen.query_one(Input).value = ""
+        await pilot.press("enter")
+        await until_shown(pilot, "must be text that is not empty")
+        for theme in THEMES:
+            app.theme = theme
+            await compare_with_snapshot(f"assistant-{size}-{theme}", pilot)
+
+
+@pytest.mark.parametrize("size", SIZES)
 @pytest.mark.parametrize("scene", SCENES)
 async def test_it_looks_as_it_did(
     scene: str, size: str, cell: Cell, history: tuple[events.Event, ...], opened: Opened
@@ -166,3 +195,15 @@ async def test_it_looks_as_it_did(
         for theme in THEMES:
             pilot.app.theme = theme
             await compare_with_snapshot(f"{scene}-{size}-{theme}", pilot)
+
+
+@pytest.mark.parametrize(
+    ("page", "snapshot_name"),
+    [("screen-measure", "measure-140x40-dark"), ("screen-review", "review-140x40-light")],
+)
+def test_the_pictures_in_the_docs_are_those_that_are_kept(page: str, snapshot_name: str) -> None:
+    docs = SNAPSHOTS.parents[2] / "docs" / f"{page}.svg"
+    kept = (SNAPSHOTS / f"{snapshot_name}.svg").read_text()
+    if UPDATE in os.environ:
+        docs.write_text(kept)
+    assert docs.read_text() == kept

@@ -147,6 +147,7 @@ class ToldWorkplace:
     compared: tuple[str, ...] = ()
     started: RunConnection | None = None
     opened: RunConnection | None = None
+    begun: list[str] = field(default_factory=list)
     rolled_back: list[str] = field(default_factory=list)
 
     async def watch(self) -> AsyncIterator[LiveSnapshot]:
@@ -157,8 +158,9 @@ class ToldWorkplace:
     async def attach(self) -> RunConnection | None:
         return self.run
 
-    async def start(self) -> RunConnection:
-        assert self.started is not None
+    async def start(self, what: str) -> RunConnection:
+        assert self.started is not None, what
+        self.begun.append(what)
         return self.started
 
     async def check(self) -> Preflight:

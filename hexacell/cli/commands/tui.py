@@ -9,10 +9,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from hexacell.errors import ExitCode, UsageError
-from hexacell.screen.app import TechnicianApp
+from hexacell.screen.app import FirstCell, TechnicianApp
 from hexacell.screen.key_map import preferences_path, read_preferences
 
 if TYPE_CHECKING:
+    from hexacell.screen.assistant_screen import Assistant
     from hexacell.screen.backend import Backend
 
 
@@ -28,9 +29,17 @@ def main(options: argparse.Namespace) -> ExitCode:
             "the screen needs a terminal, and this is none",
             action="Use `hexacell run`, which asks line by line",
         )
-    app = TechnicianApp(partial(_session, options.cell), read_preferences(preferences_path()))
+    path: Path = options.cell
+    first = None if path.exists() else FirstCell(path, partial(_assistant, path))
+    app = TechnicianApp(partial(_session, path), read_preferences(preferences_path()), first_cell=first)
     code = app.run()
     return ExitCode(code or app.return_code or ExitCode.DONE)
+
+
+def _assistant(path: Path) -> Assistant:
+    from hexacell.screen.assistant import FirstCellAssistant  # noqa: PLC0415 - behind the first screen
+
+    return FirstCellAssistant(path)
 
 
 def _session(path: Path) -> Backend:

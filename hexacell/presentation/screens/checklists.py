@@ -8,9 +8,13 @@ from hexacell.attach.snapshots import LiveSnapshot
 from hexacell.errors import HexacellError, flatten_errors
 from hexacell.presentation.screens.views import ChecklistItem, ChecklistView, Mark
 
-PRESS_CHECK = "Enter looks at everything; nothing moves. v tries the plan, s starts the run."
+PRESS_CHECK = (
+    "Enter looks at everything, v tries the plan. "
+    "s starts a calibration, k a check, r resumes the latest run."
+)
 CHECKING = "Looking at everything: this takes some seconds, and nothing moves."
 RUNNING = "A run goes on: see 3 Measure. Its checks are made again before each step that depends on them."
+STARTING = "The run is being started: a process of its own connects to the devices."
 NOT_CHECKED_YET = (
     "points and poses within reach",
     "devices answer with the right settings",

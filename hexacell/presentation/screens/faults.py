@@ -7,7 +7,7 @@ from hexacell.presentation.screens.run_picture import Setback
 from hexacell.presentation.screens.views import FaultView
 from procedures.run import events
 
-RESUMABLE = "What was measured is kept. Mend it, then resume the run from 2 Preflight."
+RESUMABLE = "What was measured is kept. Mend it, then press r in 2 Preflight, which resumes the run."
 
 
 def fault_view(setback: Setback) -> FaultView:

@@ -105,10 +105,10 @@ def _consenting(question: Question, what: str, title: str) -> QuestionView:
     decline = Choice("n", "no, leave the config as it is", None)
     if question.consent == "yes":
         consent = Choice("y", f"yes, {what}", PERSON, is_consent=True)
-        return QuestionView(title, (), "Press y or n.", (consent, decline))
+        return QuestionView(title, (), "Press y or n; page up and page down scroll.", (consent, decline))
     instruction = (
         f"Type the cell's name, {question.consent}, and Enter to take the responsibility. "
-        "Tab, then n declines."
+        "Tab, then n declines; page up and page down scroll."
     )
     return QuestionView(title, (), instruction, (decline,), typed=question.consent, consent=PERSON)
 

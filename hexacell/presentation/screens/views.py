@@ -255,6 +255,23 @@ class ReviewView:
 
 
 @dataclass(frozen=True, slots=True)
+class FirstQuestionView:
+    """One question of the first-time assistant.
+
+    Attributes:
+        progress: which of how many it is.
+        answer: what is in the field at first.
+        problem: why the last answer could not be taken; empty if it could.
+    """
+
+    progress: str
+    text: str
+    hint: str
+    answer: str
+    problem: str = ""
+
+
+@dataclass(frozen=True, slots=True)
 class HistoryEntry:
     """One run of the cell: the name of its folder, and a line of text."""
 

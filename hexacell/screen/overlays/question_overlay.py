@@ -26,6 +26,8 @@ class QuestionOverlay(ModalScreen[None]):
     BINDINGS: ClassVar[list[BindingType]] = [
         ("escape", "dismiss", "Look at the screens first"),
         ("a", "abort", "Abort"),
+        ("pagedown", "scroll_text(1)", "Scroll on"),
+        ("pageup", "scroll_text(-1)", "Scroll back"),
     ]
     AUTO_FOCUS = "#question-text"
 
@@ -56,6 +58,11 @@ class QuestionOverlay(ModalScreen[None]):
         for field in self.query(Input):
             field.focus()
 
+    def action_scroll_text(self, pages: int) -> None:
+        """Scroll what is asked, also while a name is typed."""
+        text = self.query_one("#question-text", VerticalScroll)
+        text.scroll_relative(y=pages * text.size.height, animate=False)
+
     async def action_abort(self) -> None:
         """Abort the run; not where a name is typed, which may have this letter."""
         if not self._view.typed:
@@ -85,7 +92,8 @@ class QuestionOverlay(ModalScreen[None]):
 
 def _line(choice: Choice, view: QuestionView) -> str:
     blocked = choice.is_consent and view.refusal
-    return f"  {'--' if blocked else choice.key.capitalize():8} {choice.label}"
+    key = choice.key if len(choice.key) == 1 else choice.key.capitalize()
+    return f"  {'--' if blocked else key:8} {choice.label}"
 
 
 def _classes(choice: Choice, view: QuestionView) -> str:

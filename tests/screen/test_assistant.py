@@ -1,0 +1,121 @@
+"""The first-time assistant: from questions to a valid cell file, with every mistake named at once."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from functools import partial
+from pathlib import Path
+
+import pytest
+from textual.pilot import Pilot
+from textual.widgets import Input
+
+from hexacell.application.first_cell import CellDraft
+from hexacell.cell.bundled import bundled_config
+from hexacell.cell.loader import load_cell
+from hexacell.errors import FileError, HexacellError
+from hexacell.screen.app import FirstCell, TechnicianApp
+from hexacell.screen.assistant import FirstCellAssistant
+from hexacell.screen.assistant_screen import AssistantScreen
+from hexacell.screen.session import ScreenSession
+from tests.screen.test_history_screen import WithoutDevices
+from tests.screen.test_job import press, shown, until_shown
+from tests.waiting import until
+
+CONFIG = "simulated-hexaglide.controller.toml"
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    shutil.copy(bundled_config("simulated-hexaglide").with_name(CONFIG), tmp_path / "robot-geometry.toml")
+    return tmp_path / "cell.toml"
+
+
+@asynccontextmanager
+async def opened_assistant(path: Path) -> AsyncIterator[Pilot[int]]:
+    first = FirstCell(path, lambda: FirstCellAssistant(path))
+    app = TechnicianApp(lambda: ScreenSession(WithoutDevices(path)), first_cell=first)
+    async with app.run_test(size=(80, 24)) as pilot:
+        await until(lambda: isinstance(app.screen, AssistantScreen))
+        await until(lambda: "Question 1 of" in shown(pilot))
+        yield pilot
+
+
+def is_other(pilot: Pilot[int], before: str) -> bool:
+    """Whether something else is shown than before."""
+    return shown(pilot) != before
+
+
+async def test_the_questions_lead_to_a_valid_cell_file(path: Path) -> None:
+    async with opened_assistant(path) as pilot:
+        await press(pilot, "enter")
+        assert pilot.app.screen.query_one(Input).value == "robot-geometry.toml"  # found beside it
+        pilot.app.screen.query_one(Input).value = "nowhere.toml"
+        await pilot.press("enter")
+        await until_shown(pilot, "nowhere.toml: cannot be read: it does not exist. Check the path")
+        pilot.app.screen.query_one(Input).value = "robot-geometry.toml"
+        await pilot.press("enter")
+        await until_shown(pilot, "Question 3 of")
+        await press(pilot, "escape")
+        assert "Question 2 of" in shown(pilot)
+        app = pilot.app
+        assert isinstance(app, TechnicianApp)
+        for _ in range(len(CellDraft(path).answers()) - 1):
+            before = shown(pilot)
+            await pilot.press("enter")
+            await until(partial(is_other, pilot, before))
+        await until_shown(pilot, "What cell.toml says")
+    cell = load_cell(path)
+    assert cell.settings.name == "cell"
+    assert cell.config_path.name == "robot-geometry.toml"
+    assert [gauge.port for gauge in cell.settings.gauges] == [
+        "/dev/ttyUSB0",
+        "/dev/ttyUSB1",
+        "/dev/ttyUSB2",
+    ]
+
+
+async def test_leaving_it_writes_nothing(path: Path) -> None:
+    async with opened_assistant(path) as pilot:
+        await press(pilot, "enter")
+        await pilot.press("ctrl+q")
+        await until(lambda: pilot.app.return_code is not None)
+    with pytest.raises(FileError, match="does not exist"):
+        load_cell(path)
+
+
+@pytest.mark.parametrize(
+    ("name", "given", "problem"),
+    [
+        ("name", "", "must be text that is not empty"),
+        ("tolerance", "x", "'x' is no number"),
+        ("tolerance", "-1", "must be more than 0"),
+        ("port", "99999999", "must be 65535 or less"),
+        ("port", "1.5", "'1.5' is no whole number"),
+        ("sliders", "5", "2 numbers are expected: the smallest and the largest position"),
+        ("sliders", "800 -800", "joint_m"),
+        ("protocol x", "foo", "it is one of sylvac, mux10, cdi"),
+        ("sign y", "perhaps", "answer yes or no"),
+        ("nodes", "1 1 2 3 4 5", "two encoders have the same node id"),
+        ("bus", "can0", "name the interface and the channel"),
+        ("plates", "-3", "must be more than 0"),
+        ("points", "1 2", "4 numbers are expected"),
+    ],
+)
+def test_a_wrong_answer_is_refused_with_its_reason(path: Path, name: str, given: str, problem: str) -> None:
+    assert problem in CellDraft(path).problem(name, given)
+
+
+def test_points_out_of_reach_leave_no_file(path: Path) -> None:
+    draft = CellDraft(path, {"points": "0 0 5500 200"})
+    with pytest.raises(HexacellError, match="reaches none of the points"):
+        draft.write()
+    assert not path.exists()
+
+
+def test_a_sign_is_asked_in_words(path: Path) -> None:
+    draft = CellDraft(path, {"sign z": "no"})
+    draft.write()
+    assert [gauge.sign for gauge in load_cell(path).settings.gauges] == [1, 1, -1]

@@ -40,7 +40,7 @@ from procedures.run.steps import Compute
 FIRST_CLIENT_S = 30.0
 """How long a host waits for who started it; nothing moves before."""
 
-ABORT_S = 0.35
+ABORT_S = 0.2
 """How long an abandoned computation may last that moves nothing and writes nothing but its result."""
 
 

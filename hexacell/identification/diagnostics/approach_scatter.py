@@ -24,8 +24,6 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 import numpy as np
-from scipy.linalg import eigh
-from scipy.optimize import minimize_scalar
 from scipy.special import chdtrc, chdtri
 
 from hexacell.identification.diagnostics.standstill import SIGNIFICANCE
@@ -172,6 +170,8 @@ class _Visits:
 
     def excess(self, source: ScatterSource) -> tuple[float, float]:
         """The largest log likelihood with one more variance, and its standard deviation, mm."""
+        from scipy.optimize import minimize_scalar  # noqa: PLC0415 - its import takes half a second
+
         added = np.diag(source.instruments)
         if source is ScatterSource.SLIDERS:
             moved = np.concatenate([self.motion[:3], np.zeros((LEGS, LEGS))])
@@ -190,6 +190,8 @@ class _Visits:
 
         In the coordinates in which both covariances are diagonal it is a sum.
         """
+        from scipy.linalg import eigh  # noqa: PLC0415 - as slow to import, and as seldom needed
+
         shares, axes = eigh(self.motion @ self.motion.T, covariance)
         squares = np.einsum("ij,ik,kj->j", axes, self.products, axes)
         bound = np.log(LARGEST_EXCESS)

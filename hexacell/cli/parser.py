@@ -51,6 +51,7 @@ def make_parser() -> Parser:
     _demo(commands)
     _run(commands)
     _tui(commands)
+    _attach(commands)
     _length(commands)
     _preflight(commands)
     _simulate(commands)
@@ -125,6 +126,11 @@ def _run(commands: Any) -> None:  # noqa: ANN401
         help="check the length scale before the verdict, with the fixture of [length_check]; a resumed run "
         "has it if it was begun with it",
     )
+    parser.add_argument(
+        "--detachable",
+        action="store_true",
+        help="in a process of its own, which goes on when this terminal is left (see attach)",
+    )
     _add_json(parser)
 
 
@@ -140,6 +146,11 @@ def _add_resume(parser: argparse.ArgumentParser, what: str) -> None:
 
 def _tui(commands: Any) -> None:  # noqa: ANN401
     parser = _command(commands, "tui", "the technician's screen: measure, review, approve, roll back")
+    _add_cell(parser)
+
+
+def _attach(commands: Any) -> None:  # noqa: ANN401
+    parser = _command(commands, "attach", "come back to a run that goes on without a terminal")
     _add_cell(parser)
 
 

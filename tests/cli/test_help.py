@@ -17,6 +17,7 @@ COMMANDS = (
     "demo",
     "run",
     "tui",
+    "attach",
     "length",
     "preflight",
     "simulate",

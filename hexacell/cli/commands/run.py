@@ -12,6 +12,7 @@ from hexacell.application.interrupted_runs import run_to_resume
 from hexacell.attach.run_device_watch import RunDeviceWatch
 from hexacell.campaign.pose_list import pose_list_of
 from hexacell.cli.cell_argument import cell_with_devices_at
+from hexacell.cli.commands.attach import run_detachable
 from hexacell.cli.console import Console
 from hexacell.cli.progress import RunProgress
 from hexacell.cli.run_status import RunStatus
@@ -41,8 +42,15 @@ def main(options: argparse.Namespace) -> ExitCode:
             "a check does not check the length scale", action="Use `hexacell length`, or --mode optimise"
         )
     console = Console(options.json)
-    request = _request(options, console, mode)
-    return _run_to_end(replace(request, length_check=options.length_check), console)
+    request = replace(_request(options, console, mode), length_check=options.length_check)
+    if options.detachable:
+        if request.unattended or options.json:
+            raise UsageError(
+                "a run that terminals attach to needs somebody at a terminal, and prints no document",
+                action="Leave --detachable away",
+            )
+        return run_detachable(request, console)
+    return _run_to_end(request, console)
 
 
 def length(options: argparse.Namespace) -> ExitCode:

@@ -4,14 +4,19 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable
-from contextlib import suppress
 
 from hexacell.attach.connection import RunConnection
-from hexacell.attach.messages import HostFailed
+from hexacell.attach.messages import HostFailed, HostMessage, StatusChanged
 from hexacell.errors import HexacellError, UsageError
 from hexacell.presentation.screens.run_picture import RunPicture, picture_after
+from procedures.engine.command_loop import Status
 from procedures.run.cancellation import cancel_and_wait
 from procedures.run.commands import Command
+
+GONE = HostFailed(
+    problem="the process of the run is gone without a word; the robot may still move",
+    action="Look at the robot. What was measured is kept: r in 2 Preflight resumes the run",
+)
 
 FEW_MESSAGES = 50
 """After so many at once, as on attaching, the screen is drawn before the next."""
@@ -35,6 +40,7 @@ class RunFollower:
         self.questions = 0
         self.runs = 0
         self._now, self._on_end = now, on_end
+        self._is_left = False
         self._connection: RunConnection | None = None
         self._following: asyncio.Task[None] | None = None
 
@@ -65,24 +71,34 @@ class RunFollower:
     async def leave(self, *, keep_running: bool) -> None:
         """Let the run go on alone, or have it stopped; raises ``HexacellError``."""
         if self._connection is not None:
+            self._is_left = True
             await self._connection.leave(keep_running=keep_running)
 
     async def _follow(self, connection: RunConnection) -> None:
-        count = 0
         try:
-            async for message in connection.messages():
-                question = self.picture.question
-                self.picture = picture_after(self.picture, message, self._now())
-                if self.picture.question not in {None, question}:
-                    self.questions += 1
-                count += 1
-                if count % FEW_MESSAGES == 0:
-                    await asyncio.sleep(0)
+            await self._take_all(connection)
         except HexacellError as error:
-            failed = HostFailed(problem=str(error), action=error.action or "")
-            self.picture = picture_after(self.picture, failed, self._now())
+            self._take(HostFailed(problem=str(error), action=error.action or ""))
         finally:
             if self._connection is connection:
                 self._connection = None
-        with suppress(HexacellError):
-            self._on_end()
+        if self._is_left:
+            return
+        if self.picture.status is not Status.ENDED and not self.picture.is_recorded:
+            self._take(GONE)
+            self._take(StatusChanged(status=Status.ENDED))
+        self._on_end()
+
+    async def _take_all(self, connection: RunConnection) -> None:
+        count = 0
+        async for message in connection.messages():
+            self._take(message)
+            count += 1
+            if count % FEW_MESSAGES == 0:
+                await asyncio.sleep(0)
+
+    def _take(self, message: HostMessage) -> None:
+        question = self.picture.question
+        self.picture = picture_after(self.picture, message, self._now())
+        if self.picture.question not in {None, question}:
+            self.questions += 1

@@ -238,6 +238,28 @@ async def test_a_run_that_could_not_begin_says_why(cell: Cell, run: ToldRun, ope
         await until_shown(pilot, "What to do: Wait for it")
 
 
+async def test_the_end_of_a_run_is_told_once_and_how_to_go_on(
+    cell: Cell, run: ToldRun, history: tuple[events.Event, ...], opened: Opened
+) -> None:
+    async with opened(workplace_of(cell, run, history[:300])) as pilot:
+        run.record([events.Interrupted(reason="aborted", exit_code=130)])
+        run.tell(StatusChanged(status=Status.ENDED), HostFailed(problem="aborted", exit_code=130))
+        await until_shown(pilot, "The run ended early")
+        await press(pilot, "enter")
+        await until_shown(pilot, "ended early: aborted")
+        assert "2 Preflight resumes it with r" in shown(pilot)
+
+
+async def test_a_run_whose_process_dies_is_not_shown_as_running(
+    cell: Cell, run: ToldRun, history: tuple[events.Event, ...], opened: Opened
+) -> None:
+    async with opened(workplace_of(cell, run, history[:300])) as pilot:
+        run.end()
+        await until_shown(pilot, "the process of the run is gone without a word")
+        await press(pilot, "enter")
+        await until_shown(pilot, "ENDED")
+
+
 async def test_quitting_asks_what_becomes_of_the_run(
     cell: Cell, run: ToldRun, history: tuple[events.Event, ...], opened: Opened
 ) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import shutil
 import signal
 import subprocess
@@ -11,6 +12,7 @@ from pathlib import Path
 
 import pytest
 
+from hexacell.attach.client import connect_to_run
 from hexacell.attach.run_socket import socket_path
 from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import load_cell
@@ -25,6 +27,12 @@ pytestmark = [
 ]
 
 
+async def end_run(path: Path) -> None:
+    """End the run that a failed test has left."""
+    if (run := await connect_to_run(socket_path(load_cell(path)))) is not None:
+        await run.leave(keep_running=False)
+
+
 @pytest.fixture
 def served(tmp_path: Path) -> Iterator[Path]:
     """The cell file of a cell that another process serves."""
@@ -37,6 +45,8 @@ def served(tmp_path: Path) -> Iterator[Path]:
             wait_until(path.exists)
             yield path
         finally:
+            if path.exists():
+                asyncio.run(end_run(path))
             process.send_signal(signal.SIGINT)
             process.wait()
 

@@ -6,6 +6,7 @@ from datetime import datetime
 from itertools import pairwise
 from statistics import median
 
+from hexacell.attach.messages import HostFailed
 from hexacell.cell.model import CellSettings
 from hexacell.presentation.events import activity, set_name
 from hexacell.presentation.layout import duration
@@ -64,14 +65,24 @@ def _now(picture: RunPicture) -> str:
         return f"{refusal.command} was refused: {refusal.reason}"
     if state.ended is not None:
         return state.ended.line
-    if isinstance(picture.setback, events.Interrupted) and picture.status is Status.ENDED:
-        return f"ended early: {picture.setback.reason}"
+    if picture.status is Status.ENDED:
+        return f"ended early: {_reason(picture)}"
     if picture.question is not None:
         return "a question waits for you"
     if picture.status is Status.PAUSED:
         return "paused: the robot stands still"
     pausing = ", then it pauses" if picture.status is Status.PAUSING else ""
     return f"{_doing(picture)}{pausing}"
+
+
+def _reason(picture: RunPicture) -> str:
+    match picture.setback:
+        case events.Interrupted(reason=reason):
+            return reason
+        case HostFailed(problem=problem):
+            return problem
+        case _:
+            return "its process is gone"
 
 
 def _doing(picture: RunPicture) -> str:
@@ -108,6 +119,8 @@ def _following(picture: RunPicture, settings: CellSettings | None) -> str:
     at, step = picture.at, picture.step
     if picture.state.ended is not None:
         return "look at 4 Review; 5 History has all runs"
+    if picture.status is Status.ENDED:
+        return "2 Preflight resumes it with r; what was measured is kept"
     if picture.status is Status.PAUSED:
         return "it goes on where it was when you press p"
     if isinstance(step, Compute) or at is None:

@@ -61,10 +61,14 @@ class RunPicture:
     record_times: tuple[datetime, ...] = ()
 
     @property
+    def is_recorded(self) -> bool:
+        """Whether this is a recorded run, which is watched again."""
+        return self.described is not None and self.described.is_recorded
+
+    @property
     def may_command(self) -> bool:
         """Whether commands of this screen are taken."""
-        is_recorded = self.described is not None and self.described.is_recorded
-        return not is_recorded and (self.control is None or self.control.is_in_control)
+        return not self.is_recorded and (self.control is None or self.control.is_in_control)
 
     @property
     def at(self) -> SetKey | None:
@@ -97,7 +101,7 @@ def picture_after(  # noqa: PLR0911 - a case a message
         case CursorMoved():
             return replace(picture, cursor=message)
         case HostFailed():
-            return _with_setback(picture, message)
+            return _with_failure(picture, message)
 
 
 def _with_event(picture: RunPicture, message: EventRecorded) -> RunPicture:
@@ -126,6 +130,12 @@ def _with_step(picture: RunPicture, step: Step) -> RunPicture:
         return picture
     records = len(picture.state.samples(Phase.IDENTIFY))
     return replace(picture, forecasts=(*picture.forecasts, (records, step.expected.forecast)))
+
+
+def _with_failure(picture: RunPicture, failed: HostFailed) -> RunPicture:
+    """What the journal has said of the end of a run is not said again."""
+    was_told = isinstance(picture.setback, events.Interrupted) and failed.exit_code is not None
+    return picture if was_told else _with_setback(picture, failed)
 
 
 def _with_setback(picture: RunPicture, setback: Setback) -> RunPicture:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -27,3 +28,19 @@ def test_the_first_screen_needs_neither_numpy_nor_pydantic(tmp_path: Path) -> No
     loaded = set(imported.stdout.split())
     assert "textual" in loaded
     assert loaded.isdisjoint({"numpy", "scipy", "pydantic", "can", "tomlkit"})
+
+
+def test_a_dumb_terminal_is_a_usage_error(tmp_path: Path) -> None:
+    program = "import os, pty; os._exit(os.waitstatus_to_exitcode(pty.spawn(__import__('sys').argv[1:])))"
+    command = [sys.executable, "-m", "hexacell", "tui", str(bundled_config("simulated-hexaglide"))]
+    ended = subprocess.run(
+        [sys.executable, "-c", program, *command],
+        cwd=tmp_path,
+        env={**os.environ, "TERM": "dumb"},
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert ended.returncode == 2
+    assert "this terminal cannot draw a screen (TERM is dumb). Use `hexacell run`" in ended.stdout

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 from functools import partial
 from pathlib import Path
@@ -18,22 +19,31 @@ if TYPE_CHECKING:
 
 
 def main(options: argparse.Namespace) -> ExitCode:
-    """Show the screen until the person leaves it.
+    """Show the screen until the person leaves it; then the process ends at once.
 
     Raises:
         UsageError: there is no terminal.
         FileError: the key map cannot be read.
     """
-    if not (sys.stdin.isatty() and sys.stdout.isatty()):
-        raise UsageError(
-            "the screen needs a terminal, and this is none",
-            action="Use `hexacell run`, which asks line by line",
-        )
+    _require_terminal()
     path: Path = options.cell
     first = None if path.exists() else FirstCell(path, partial(_assistant, path))
     app = TechnicianApp(partial(_session, path), read_preferences(preferences_path()), first_cell=first)
-    code = app.run()
-    return ExitCode(code or app.return_code or ExitCode.DONE)
+    app.run()
+    if app.return_code:
+        return ExitCode.FAULT  # Textual has said why
+    # Everything is closed; to take all modules apart would last half a second more.
+    sys.stdout.flush()
+    os._exit(int(ExitCode.DONE))
+
+
+def _require_terminal() -> None:
+    """Refuse what Textual would draw on all the same; raises ``UsageError``."""
+    action = "Use `hexacell run`, which asks line by line"
+    if not (sys.stdin.isatty() and sys.stdout.isatty()):
+        raise UsageError("the screen needs a terminal, and this is none", action=action)
+    if os.environ.get("TERM") == "dumb":
+        raise UsageError("this terminal cannot draw a screen (TERM is dumb)", action=action)
 
 
 def _assistant(path: Path) -> Assistant:

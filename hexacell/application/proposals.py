@@ -113,9 +113,13 @@ async def apply_proposal(proposal: Proposal, operator: Operator) -> AppliedPropo
             return AppliedProposal(proposal, "")
         _require_unedited(proposal)
         by = await _approval(proposal, operator)
-        commit(change, proposal.folder.path)
         approval = LaterApproval(by=by, at=datetime.now(UTC), sha256_after=change.sha256_after)
         approval.save(_approval_path(proposal.folder), like=change.path)
+        try:
+            commit(change, proposal.folder.path)
+        except BaseException:
+            _approval_path(proposal.folder).unlink(missing_ok=True)
+            raise
     return AppliedProposal(proposal, by)
 
 

@@ -15,6 +15,7 @@ from typing import BinaryIO
 from hexacell.attach.messages import (
     LONGEST_MESSAGE,
     ClientMessage,
+    EventRecorded,
     GiveCommand,
     HostFailed,
     HostMessage,
@@ -25,6 +26,7 @@ from hexacell.attach.messages import (
 )
 from hexacell.attach.run_socket import peer_of
 from hexacell.errors import ExitCode, FileError, HexacellError
+from procedures.run import events
 from procedures.run.commands import Command
 
 READY = b"ready\n"
@@ -32,6 +34,12 @@ READY = b"ready\n"
 
 LEAVE_S = 0.4
 """How long leaving waits for a run that is to be stopped, s."""
+
+LOST = HostFailed(
+    problem="the connection to the run is lost: its process was killed, or let this terminal go",
+    action="Attach again. If nothing is there, look at the robot, whose last move may go on, and resume",
+    exit_code=int(ExitCode.HARDWARE),
+)
 
 
 class HostNotStarted(HexacellError):
@@ -48,13 +56,19 @@ class HostConnection:
     def __init__(self, reader: StreamReader, writer: StreamWriter) -> None:
         self._reader = reader
         self._writer = writer
+        self._is_left = False
 
     async def messages(self) -> AsyncIterator[HostMessage]:
-        """See :meth:`RunConnection.messages`."""
+        """See :meth:`RunConnection.messages`; a connection that is lost ends with a failure."""
+        is_told = False
         with suppress(ConnectionError):
             while (line := await self._reader.readline()).endswith(b"\n"):
-                yield host_message(line)
+                message = host_message(line)
+                is_told = is_told or _is_ending(message)
+                yield message
         self._writer.close()
+        if not is_told and not self._is_left:
+            yield LOST
 
     async def give(self, command: Command) -> None:
         """See :meth:`RunConnection.give`."""
@@ -66,6 +80,7 @@ class HostConnection:
 
     async def leave(self, *, keep_running: bool) -> None:
         """See :meth:`RunConnection.leave`; of a run that ends, its end is awaited for a moment."""
+        self._is_left = True
         with suppress(HexacellError):
             await self._send(Leave(keep_running=keep_running))
             if not keep_running:
@@ -86,6 +101,17 @@ class HostConnection:
         """Until the other side has closed; somebody else may be reading what it says."""
         while not self._reader.at_eof():  # noqa: ASYNC110 - a stream tells this to its only reader
             await asyncio.sleep(0.01)
+
+
+def _is_ending(message: HostMessage) -> bool:
+    """Whether a message says that the run is over."""
+    match message:
+        case EventRecorded(event=events.Ended() | events.Interrupted()):
+            return True
+        case HostFailed(exit_code=int()):
+            return True
+        case _:
+            return False
 
 
 async def connect_to_run(path: Path) -> HostConnection | None:

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from hexacell.attach.client import HostConnection, HostNotStarted, connect_to_run, start_host
+from hexacell.attach.client import LOST, HostConnection, HostNotStarted, connect_to_run, start_host
 from hexacell.attach.messages import EventRecorded, HostMessage, StatusChanged
 from hexacell.attach.run_socket import socket_path
 from hexacell.cell.loader import Cell, load_cell
@@ -170,6 +170,27 @@ async def test_a_host_that_cannot_begin_says_why(cell, run) -> None:
     with pytest.raises(HostNotStarted, match=str(cell.path)) as refusal:
         await start_host(socket_path(cell), arguments(cell, run))
     assert refusal.value.exit_code is ExitCode.USAGE
+    await until(lambda: not hosts_of(cell))
+
+
+async def test_a_killed_host_is_missed_and_its_run_resumed(cell, run) -> None:
+    connection = await start_host(socket_path(cell), arguments(cell, run))
+    await until_told(connection, is_record)
+    (host,) = hosts_of(cell)
+    os.kill(host, signal.SIGKILL)
+    assert [one async for one in connection.messages()][-1] == LOST
+    assert socket_path(cell).exists(), "nobody could remove it"
+    before = read_journal(run.journal)
+    again = await start_host(socket_path(cell), [*arguments(cell, run), "--resume"])
+    told = []
+
+    def is_further_record(message: HostMessage) -> bool:
+        told.append(message)
+        return is_record(message) and len(told) > len(before)
+
+    await until_told(again, is_further_record)
+    assert [one.event for one in told if isinstance(one, EventRecorded)][: len(before)] == list(before)
+    await again.leave(keep_running=False)
     await until(lambda: not hosts_of(cell))
 
 

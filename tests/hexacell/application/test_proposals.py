@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -12,8 +13,17 @@ from hexacell.cell.loader import Cell
 from hexacell.controller_config.three_way import ConfigEditedSince
 from hexacell.controller_config.write_back import Receipt
 from hexacell.decision import Verdict
-from hexacell.errors import AnswerNeeded, CellBusy, ExitCode, FileError, LimitError, UsageError
+from hexacell.errors import (
+    AnswerNeeded,
+    CellBusy,
+    ExitCode,
+    FileError,
+    LimitError,
+    UsageError,
+    WriteBackUndone,
+)
 from hexacell.runs.run_folder import RunFolder
+from hexacell.storage import atomic_files
 from hexacell.storage.cell_lock import cell_lock
 from procedures.run.questions import PendingChange, Question, UnattendedOperator
 from tests.hexacell.application.proposed_runs import MET, ProposedRun, a_cell, propose_run
@@ -148,6 +158,21 @@ async def test_an_edit_that_is_no_config_is_shown_too(cell) -> None:
         await apply(run)
     numbers = refusal.value.versions.numbers
     assert {(one.now, one.is_edited) for one in numbers} == {(None, False)}
+
+
+async def test_a_write_that_fails_is_undone_and_approved_by_nobody(cell, monkeypatch) -> None:
+    run = propose_run(cell)
+    written = atomic_files.write_atomically
+
+    def garbled(path: Path, data: bytes, **options: Any) -> None:
+        written(path, data + b"#" if data == run.after else data, **options)
+
+    monkeypatch.setattr(atomic_files, "write_atomically", garbled)
+    with pytest.raises(WriteBackUndone) as failure:
+        await apply(run)
+    assert failure.value.exit_code is ExitCode.WRITE_BACK_UNDONE
+    assert cell.config_path.read_bytes() == run.before
+    assert later_approval(run.folder) is None
 
 
 async def test_a_cell_in_use_is_left_alone(cell) -> None:

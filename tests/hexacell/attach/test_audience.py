@@ -8,7 +8,7 @@ import socket
 
 import pytest
 
-from hexacell.attach.client import connect_to_run
+from hexacell.attach.client import LOST, connect_to_run
 from hexacell.attach.messages import (
     ControlChanged,
     GiveCommand,
@@ -192,7 +192,7 @@ async def test_another_user_is_told_nothing(scripted_run, monkeypatch) -> None:
     async with scripted_run() as run:
         monkeypatch.setattr("hexacell.attach.audience.peer_of", lambda _: (1, 12345))
         stranger = await run.client()
-        assert await stranger.until_over() == []
+        assert await stranger.until_over() == [LOST]
         assert not run.audience.is_controlled
 
 

@@ -44,6 +44,8 @@ ABORT_S = 0.2
 """How long an abandoned computation may last that moves nothing and writes nothing but its result."""
 
 
+STOPPED = HostFailed(problem="stopped by who left it", exit_code=int(ExitCode.INTERRUPTED))
+
 _ONLY_COMPUTING = {"assess noise", "identify", "propose", "judge"}
 
 
@@ -116,7 +118,10 @@ class RunHost:
         aborting = asyncio.ensure_future(self._until_aborted(running))
         try:
             await asyncio.wait([running, aborting], return_when=asyncio.FIRST_COMPLETED)
-            return running.result() if running.done() else ExitCode.INTERRUPTED
+            if running.done():
+                return running.result()
+            self._fail(STOPPED)
+            return ExitCode.INTERRUPTED
         finally:
             self._watching.close()
             for task in (watching, aborting, self._giving_up):
@@ -132,6 +137,7 @@ class RunHost:
             self._fail(failure_message(error))
             return error.exit_code
         except asyncio.CancelledError:
+            self._fail(STOPPED)
             return ExitCode.INTERRUPTED
         except Exception as error:
             problem = f"this is a fault of the program: {type(error).__name__}: {error}"
@@ -211,7 +217,7 @@ class RunHost:
 
     def _on_leave(self, keep_running: bool) -> None:
         if not keep_running:
-            self._queue.put(Abort("stopped by who left it"))
+            self._queue.put(Abort(STOPPED.problem))
             self._aborted.set()
         self._reconsider()
 

@@ -8,15 +8,18 @@ import signal
 import subprocess
 import sys
 from collections.abc import Callable
+from contextlib import suppress
+from datetime import UTC, datetime
 from pathlib import Path
 
 import pytest
 
 from hexacell.attach.client import LOST, HostConnection, HostNotStarted, connect_to_run, start_host
+from hexacell.attach.host import STOPPED
 from hexacell.attach.messages import EventRecorded, HostMessage, StatusChanged
 from hexacell.attach.run_socket import socket_path
 from hexacell.cell.loader import Cell, load_cell
-from hexacell.errors import ExitCode
+from hexacell.errors import CellBusy, ExitCode
 from hexacell.runs.run_folder import RunFolder, runs_folder
 from hexacell.storage.cell_lock import cell_lock
 from procedures.engine.command_loop import Status
@@ -24,6 +27,8 @@ from procedures.journal.journal import read_journal
 from procedures.run import events
 from procedures.run.commands import Resume
 from tests.waiting import until, wait_until
+
+NOON = datetime(2026, 11, 20, 12, 0, tzinfo=UTC)
 
 TERMINAL = """
 import asyncio, sys
@@ -75,11 +80,12 @@ def hosts_of(cell: Cell) -> list[int]:
 
 def nothing_is_left(cell: Cell) -> bool:
     """No process, socket or temporary file, and the cell can be locked."""
-    sockets, temporary = socket_path(cell).parent, Path(os.environ["TMPDIR"])
+    sockets, temporary = socket_path(cell).parent, Path(os.environ["XDG_RUNTIME_DIR"])
     if hosts_of(cell) or any(sockets.iterdir()) or list(temporary.iterdir()) != [sockets]:
         return False
-    with cell_lock(cell.config_path):
+    with suppress(CellBusy), cell_lock(cell.config_path):
         return True
+    return False
 
 
 async def until_told(connection: HostConnection, condition: Callable[[HostMessage], bool]) -> HostMessage:
@@ -115,6 +121,28 @@ async def test_leaving_ends_the_run_and_its_process(cell, run) -> None:
     await connection.leave(keep_running=False)
     await until(lambda: nothing_is_left(cell))
     assert isinstance(read_journal(run.journal)[-1], events.Interrupted)
+
+
+@pytest.mark.slow
+async def test_a_computation_is_not_waited_for(cell, run) -> None:
+    """The others are told, nothing is left, and the run is resumed where it was."""
+    connection = await start_host(socket_path(cell), arguments(cell, run))
+    other = await attached(cell)
+
+    def is_identifying(message: HostMessage) -> bool:
+        event = message.event if isinstance(message, EventRecorded) else None
+        return isinstance(event, events.StepBegun) and event.step.key == "identify"
+
+    await until_told(connection, is_identifying)
+    await connection.leave(keep_running=False)
+    assert [one async for one in other.messages()][-1] == STOPPED
+    await until(lambda: nothing_is_left(cell))
+    last = read_journal(run.journal)[-1]
+    assert is_identifying(EventRecorded(sequence=1, at=NOON, event=last))
+    again = await start_host(socket_path(cell), [*arguments(cell, run), "--resume"])
+    await until_told(again, lambda one: isinstance(one, EventRecorded) and one.event.kind == "identified")
+    await again.leave(keep_running=False)
+    await until(lambda: nothing_is_left(cell))
 
 
 def test_a_killed_terminal_is_replaced(cell, run) -> None:

@@ -5,7 +5,11 @@ from __future__ import annotations
 import argparse
 import asyncio
 import os
+import shutil
 import sys
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from socket import socket
 
@@ -38,17 +42,33 @@ def _serve(options: argparse.Namespace) -> None:
     request = _request(options)
     signals = SignalCommands(Console(wants_json=True))
     path = socket_path(request.cell)
-    with listening_socket(path) as listener:
+    with listening_socket(path) as listener, _own_temporary_folder() as folder:
         host = RunHost(request, signals.queue)
         _say(READY)
-        signals.run(_serve_and_exit(host, listener, path))
+        signals.run(_serve_and_exit(host, listener, (path, folder)))
 
 
-async def _serve_and_exit(host: RunHost, listener: socket, path: Path) -> None:
+async def _serve_and_exit(host: RunHost, listener: socket, traces: tuple[Path, Path]) -> None:
     """Exit at once when the run is over: a computation that nobody waits for may go on in a thread."""
     code = await host.serve(listener)
-    await asyncio.to_thread(path.unlink, missing_ok=True)
+    await asyncio.to_thread(_remove, *traces)
     os._exit(int(code))
+
+
+def _remove(path: Path, folder: Path) -> None:
+    path.unlink(missing_ok=True)
+    shutil.rmtree(folder, ignore_errors=True)
+
+
+@contextmanager
+def _own_temporary_folder() -> Iterator[Path]:
+    """Where temporary files of the run are, a simulated cell's too: whoever exits at once removes them."""
+    with tempfile.TemporaryDirectory(prefix="hexacell-run-") as folder:
+        tempfile.tempdir = folder
+        try:
+            yield Path(folder)
+        finally:
+            tempfile.tempdir = None
 
 
 def _request(options: argparse.Namespace) -> RunRequest:

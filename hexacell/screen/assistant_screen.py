@@ -65,6 +65,7 @@ class AssistantScreen(Screen[bool]):
 
     def on_mount(self) -> None:
         """Ask the first question."""
+        self.query_one(Input).cursor_blink = False
         self._show()
 
     async def on_input_submitted(self, event: Input.Submitted) -> None:

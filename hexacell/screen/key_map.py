@@ -49,6 +49,12 @@ def preferences_path() -> Path:
     return Path(folder) / "hexacell" / "screen.toml"
 
 
+def shown_path(path: Path) -> str:
+    """A path as a person knows it: below ``~`` where it is in the home folder."""
+    home = Path.home()
+    return f"~/{path.relative_to(home)}" if path.is_relative_to(home) else str(path)
+
+
 def read_preferences(path: Path) -> ScreenPreferences:
     """What the file says; the defaults where there is none.
 

@@ -33,6 +33,13 @@ MOST_DRAWINGS = 20
 Opened = Callable[..., AbstractAsyncContextManager[Pilot[int]]]
 
 
+@pytest.fixture(autouse=True)
+def nobodys_preferences(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What a developer has chosen changes no picture."""
+    for name in ("XDG_CONFIG_HOME", "NO_COLOR"):
+        monkeypatch.delenv(name, raising=False)
+
+
 @pytest.fixture(scope="session")
 def history() -> tuple[Event, ...]:
     """A whole calibration, as a simulated cell recorded it, without raw readings."""

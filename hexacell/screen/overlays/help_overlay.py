@@ -17,7 +17,7 @@ from hexacell.presentation.screens.help_texts import (
     SCREEN_HELP,
     reflowed,
 )
-from hexacell.screen.key_map import KEYS, preferences_path
+from hexacell.screen.key_map import KEYS, preferences_path, shown_path
 from hexacell.screen.widgets.text_panel import TextList, TextPanel
 
 
@@ -41,7 +41,7 @@ class HelpOverlay(ModalScreen[None]):
     def on_mount(self) -> None:
         """Show the texts."""
         keys = [f"  {self._keys[str(one.id)]:8} {one.description}" for one in KEYS]
-        note = KEYS_NOTE.format(path=preferences_path())
+        note = KEYS_NOTE.format(path=shown_path(preferences_path()))
         about = [*reflowed(SCREEN_HELP[self._tab]), ""]
         replay = ["", *reflowed(REPLAY_HELP)]
         self.query_one(TextList).show([*about, f"{KEYS_TITLE}:", *keys, "", note, *replay])

@@ -56,6 +56,7 @@ class QuestionOverlay(ModalScreen[None]):
     def on_mount(self) -> None:
         """What is typed goes into the field, if there is one."""
         for field in self.query(Input):
+            field.cursor_blink = False
             field.focus()
 
     def action_scroll_text(self, pages: int) -> None:

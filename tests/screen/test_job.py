@@ -11,7 +11,7 @@ from drivers.interfaces import StartupAction
 from hexacell.acceptance import AcceptanceGate
 from hexacell.attach.messages import ControlChanged, HostFailed, StatusChanged
 from hexacell.cell.loader import Cell
-from hexacell.cell.recovery import Action
+from hexacell.cell.recovery import Action, FailureKind
 from hexacell.kinematics.pose import Pose
 from hexacell.presentation.screens.views import ChecklistItem, Mark
 from hexacell.screen.app import TechnicianApp
@@ -229,6 +229,20 @@ async def test_every_guard_says_what_to_do(
             assert "What to do: Mend it" in shown(pilot)
             await press(pilot, "enter")
             assert not isinstance(pilot.app.screen, FaultOverlay)
+
+
+async def test_every_kind_of_failure_says_what_the_run_does(
+    cell: Cell, run: ToldRun, history: tuple[events.Event, ...], opened: Opened
+) -> None:
+    async with opened(workplace_of(cell, run, history[:300])) as pilot:
+        for kind in FailureKind:
+            reason = f"gauge y: {kind.value}. Mend it"
+            run.record(
+                [events.Failed(step=None, failure=kind, attempt=2, reason=reason, action=Action.REDO_SET)]
+            )
+            await until_shown(pilot, reason)
+            assert "What to do: The run does this now: redo-set (attempt 2)." in shown(pilot)
+            await press(pilot, "enter")
 
 
 async def test_a_run_that_could_not_begin_says_why(cell: Cell, run: ToldRun, opened: Opened) -> None:

@@ -9,6 +9,7 @@ import numpy as np
 from hexacell.cell.model import CellSettings
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.parameters import ParameterUnit
+from hexacell.reporting.check_result import ParameterChange
 from procedures.run import events
 from procedures.run.state import RunState
 
@@ -18,10 +19,12 @@ SIGNIFICANT = 3.0
 
 
 def parameter_lines(state: RunState, settings: CellSettings | None) -> tuple[str, ...]:
-    """A line for each parameter; none before the geometry is identified.
+    """A line for each parameter; of a check its change since the geometry was identified.
 
     Both geometries are in the mechanism's frame convention, so that a choice of frames is no change.
     """
+    if state.judged is not None and state.judged.check is not None:
+        return tuple(map(_changed_row, state.judged.check.changes)) or ("No parameter was free.",)
     if state.identified is None or state.started is None or settings is None:
         return ("The geometry is not identified yet.",)
     return tuple(_rows(state.started, state.identified, settings))
@@ -41,6 +44,12 @@ def _rows(
         sizes = f"{change:+10.{decimals}f}{sigma[row]:9.{decimals}f}"
         word = _word(change, sigma[row], is_known=parameter.name not in undetermined)
         yield f"{parameter.name:6}{values}{sizes}  {word}"
+
+
+def _changed_row(found: ParameterChange) -> str:
+    """A check compares with the controller's geometry, and has no new one."""
+    sizes = f"{found.change:+10.3f}{found.sigma:9.3f}"
+    return f"{found.name:6}{'':24}{sizes}  {_word(found.change, found.sigma, is_known=True)}"
 
 
 def _word(change: float, sigma: float, *, is_known: bool) -> str:

@@ -17,18 +17,23 @@ from hexacell.attach.messages import (
     StatusChanged,
 )
 from hexacell.attach.snapshots import ControllerSnapshot, EncoderSnapshot, GaugeSnapshot, LiveSnapshot
+from hexacell.decision import Verdict
 from hexacell.kinematics.pose import Pose
 from hexacell.presentation.screens.block_digits import block_text
 from hexacell.presentation.screens.faults import fault_view
 from hexacell.presentation.screens.lines import device_lines
 from hexacell.presentation.screens.live import live_view, mounting_advice, travel_bar
 from hexacell.presentation.screens.measuring import guidance, record_lines
+from hexacell.presentation.screens.parameters import parameter_lines
 from hexacell.presentation.screens.questions import question_view
+from hexacell.presentation.screens.reviewing import review_view
 from hexacell.presentation.screens.run_picture import RunPicture, picture_after
 from hexacell.presentation.screens.views import Urgency
+from hexacell.reporting.check_result import CheckResult, ParameterChange
 from procedures.engine.command_loop import Status
 from procedures.run import events
 from procedures.run.questions import ask_mounting, ask_startup
+from procedures.run.state import fold
 from procedures.run.steps import Expectation, Move, Phase, SetKey
 from tests.procedures.story import Story
 
@@ -209,3 +214,40 @@ def test_figures_for_across_the_room() -> None:
         "........██████..██",
     ]
     assert len(block_text("5", 2)) == 10
+
+
+def test_a_check_shows_what_has_changed() -> None:
+    changes = (
+        ParameterChange(name="S1y", unit="mm", change=0.12, sigma=0.02),
+        ParameterChange(name="l4", unit="mm", change=-0.01, sigma=0.02),
+    )
+    check = CheckResult(verdict=Verdict.PASS, records=16, points=4, changes=changes)
+    judged = events.ResultValidated(verdict=Verdict.PASS, line="pass", check=check)
+    assert parameter_lines(fold([judged]), None) == (
+        "S1y                               +0.120    0.020  changed (6 sigma)",
+        "l4                                -0.010    0.020  unchanged (0.5 sigma)",
+    )
+
+
+@pytest.mark.parametrize("verdict", Verdict)
+def test_every_verdict_is_said_in_words_with_its_scope(verdict: Verdict) -> None:
+    judged = events.ResultValidated(verdict=verdict, line="what came of it")
+    view = review_view(pictured(described(), recorded(judged)), None)
+    assert view.verdict.lower().startswith(f"{verdict.value}: ")
+    assert view.scope == ("what came of it",)
+
+
+@pytest.mark.parametrize(
+    ("told", "approval"),
+    [
+        ((), "Approving is not possible yet: the geometry is not identified."),
+        (
+            (events.ResultValidated(verdict=Verdict.FAIL, line=""), events.RolledBack()),
+            "The old config was put back.",
+        ),
+        ((events.Committed(approved_by="ada"),), "Written to the controller, approved by ada."),
+    ],
+)
+def test_the_approval_says_how_it_stands(told: tuple[events.Event, ...], approval: str) -> None:
+    picture = pictured(described(), *map(recorded, told))
+    assert review_view(picture, None).approval == approval

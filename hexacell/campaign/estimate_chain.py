@@ -49,7 +49,7 @@ TRIAL = replace(COARSE, iterations=20, searches=12)
 
 @dataclass(frozen=True, slots=True)
 class SearchInVain:
-    """A search that found no plausible estimate: its cost, and of how many records."""
+    """A search that found no plausible estimate: the cost that was to be explained, of how many records."""
 
     cost: float
     records: int
@@ -100,7 +100,8 @@ def _search(problem: Problem, found: Identification) -> ChainedEstimate:
     best = _best(problem, found)
     if _is_plausible(problem, best):
         return ChainedEstimate(best)
-    in_vain = SearchInVain(cost(best), problem.records)
+    # The best one may be of fewer records, and the cost of all of them is what there was to explain.
+    in_vain = SearchInVain(max(cost(found), cost(best)), problem.records)
     return _without_false_records(best) or ChainedEstimate(best, in_vain=in_vain)
 
 

@@ -121,9 +121,9 @@ class ScreenSession:
         return question_view(picture.question, picture.live)
 
     def fault(self) -> FaultView | None:
-        """The latest fault."""
-        setback = self._run.picture.setback
-        return None if setback is None else fault_view(setback)
+        """The latest fault; those of a recorded run are long past."""
+        picture = self._run.picture
+        return None if picture.setback is None or picture.is_recorded else fault_view(picture.setback)
 
     def allows(self, action: ScreenAction) -> bool:
         """Whether an action has an effect now."""

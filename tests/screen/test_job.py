@@ -231,6 +231,16 @@ async def test_every_guard_says_what_to_do(
             assert not isinstance(pilot.app.screen, FaultOverlay)
 
 
+async def test_a_fault_that_the_run_has_left_behind_is_not_shown_on_attaching(
+    cell: Cell, run: ToldRun, history: tuple[events.Event, ...], opened: Opened
+) -> None:
+    tripped = events.Tripped(guard=Guard.DRIFT, device="gauge y", problem="it drifts", action="Mend it")
+    told = [*history[:100], tripped, events.Interrupted(reason="it drifts", exit_code=1), *history[100:300]]
+    async with opened(workplace_of(cell, run, told)) as pilot:
+        await until_shown(pilot, "point 5")
+        assert not isinstance(pilot.app.screen, FaultOverlay)
+
+
 async def test_every_kind_of_failure_says_what_the_run_does(
     cell: Cell, run: ToldRun, history: tuple[events.Event, ...], opened: Opened
 ) -> None:

@@ -38,7 +38,7 @@ class RunPicture:
         step: the step that was begun last; none between steps.
         expected: what the gauges were to show, by set and orientation.
         forecasts: predicted errors, each with the number of records for the identification before it.
-        setback: the latest fault, and ``setbacks`` how many there were.
+        setback: the latest fault, until a step is begun after it; ``setbacks`` how many there were.
         refusal: the command that was refused last, until the next event.
         record_times: when records were taken, for the time that is left.
     """
@@ -121,7 +121,7 @@ def _with_event(picture: RunPicture, message: EventRecorded) -> RunPicture:
 
 
 def _with_step(picture: RunPicture, step: Step) -> RunPicture:
-    picture = replace(picture, step=step)
+    picture = replace(picture, step=step, setback=None)
     if not isinstance(step, Move) or step.expected is None:
         return picture
     expected = {**picture.expected, (step.at, step.orientation): step.expected}

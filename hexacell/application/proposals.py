@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from dataclasses import dataclass
-from datetime import UTC, datetime
+from datetime import datetime
 from pathlib import Path
 from typing import ClassVar
 
@@ -25,7 +25,7 @@ from hexacell.storage import atomic_files
 from hexacell.storage.cell_lock import cell_lock
 from procedures.engine.config_transactions import holds_provisional
 from procedures.journal.journal import read_journal
-from procedures.journal.line_format import RESTORE
+from procedures.journal.line_format import RESTORE, now
 from procedures.run import events
 from procedures.run.questions import Operator, ask_approval
 from procedures.run.state import RunState, fold
@@ -113,7 +113,7 @@ async def apply_proposal(proposal: Proposal, operator: Operator) -> AppliedPropo
             return AppliedProposal(proposal, "")
         _require_unedited(proposal)
         by = await _approval(proposal, operator)
-        approval = LaterApproval(by=by, at=datetime.now(UTC), sha256_after=change.sha256_after)
+        approval = LaterApproval(by=by, at=now()[0], sha256_after=change.sha256_after)
         approval.save(_approval_path(proposal.folder), like=change.path)
         try:
             commit(change, proposal.folder.path)

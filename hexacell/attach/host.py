@@ -8,7 +8,6 @@ cell file states, it ends in place and can be resumed.
 from __future__ import annotations
 
 import asyncio
-from datetime import UTC, datetime
 from socket import socket
 
 from hexacell.application.calibration_run import RunRequest, calibrate
@@ -31,6 +30,7 @@ from procedures.devices.device_set import Devices
 from procedures.engine.command_loop import Status
 from procedures.engine.engine import Engine
 from procedures.journal.journal import read_entries
+from procedures.journal.line_format import now
 from procedures.run import events
 from procedures.run.commands import Abort, Command, CommandQueue, Pause, Stop
 from procedures.run.questions import Question
@@ -176,7 +176,7 @@ class RunHost:
         engine.watch_questions(self._on_question)
 
     def _record(self, event: events.Event, _: RunState) -> None:
-        at = datetime.now(UTC)
+        at = now()[0]
         self._tell_event(EventRecorded(sequence=self._sequence + 1, at=at, event=event))
 
     def _tell_event(self, recorded: EventRecorded) -> None:

@@ -26,6 +26,7 @@ from hexacell.cli.terminal import APPROVER, KeyboardCommands
 from hexacell.errors import ExitCode, HexacellError
 from hexacell.presentation.answers import request_text, typed_answer
 from hexacell.presentation.events import EventFormatter
+from hexacell.presentation.layout import wrapped
 from hexacell.presentation.line_face import (
     DETACHABLE_LETTERS,
     attached_resume_hint,
@@ -110,7 +111,8 @@ class AttachedTerminal:
             self._exit_code = ExitCode(event.exit_code)
             lines.append(event.line)
         if isinstance(event, events.RecordTaken):
-            lines.append(f"{self._state.completed} of {self._expected}: {record_text(event)}")
+            line = f"{self._state.completed} of {self._expected}: {record_text(event)}"
+            lines.append(wrapped(line, indent=2))
         if not self._is_catching_up:
             for line in lines:
                 self._console.print(line)

@@ -279,6 +279,7 @@ def _history(commands: Any) -> None:  # noqa: ANN401
         metavar=("RUN", "RUN"),
         help="what changed from one calibration to another, parameter by parameter",
     )
+    what.add_argument("--show", metavar="RUN", help="what happened in a run, and when")
     what.add_argument("--drift", action="store_true", help="the trend of every parameter over all runs")
     _add_json(parser)
 

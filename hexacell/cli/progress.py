@@ -10,6 +10,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from hexacell.cli.console import Console
 from hexacell.presentation.events import EventFormatter, activity
+from hexacell.presentation.layout import wrapped
 from hexacell.presentation.line_face import record_text
 from procedures.run import events
 from procedures.run.state import RunState
@@ -50,7 +51,8 @@ class RunProgress:
         for line in self._formatter.lines(event, state):
             self._console.print(line)
         if self._is_plain and isinstance(event, events.RecordTaken):
-            self._console.print(f"{state.completed} of {self.expected}: {record_text(event)}")
+            line = f"{state.completed} of {self.expected}: {record_text(event)}"
+            self._console.print(wrapped(line, indent=2))
 
     def hide(self) -> None:
         """Remove the bar until the next event, so that a question can be shown."""

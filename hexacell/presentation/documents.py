@@ -13,8 +13,10 @@ from hexacell.application.history import PastRun
 from hexacell.application.offline import NextPose, PlanTrial
 from hexacell.application.proposals import AppliedProposal
 from hexacell.campaign.decisions import Finished, Forecast, MeasurePose, StartPoint
+from hexacell.presentation.run_story import run_story
 from hexacell.presentation.teaching import teaching_sentence
 from hexacell.reporting.run_comparison import ParameterTrend, RunComparison
+from procedures.journal.line_format import Entry
 from procedures.replay.comparison import ReplayReport
 from procedures.run import events
 from procedures.run.state import RunState
@@ -206,3 +208,13 @@ def comparison_document(before: PastRun, after: PastRun, compared: RunComparison
 def drift_document(found: Sequence[ParameterTrend]) -> dict[str, Any]:
     """What ``history --drift --json`` prints."""
     return {"parameters": [{**asdict(one), "walking": one.is_walking} for one in found]}
+
+
+def story_document(entries: Sequence[Entry]) -> dict[str, Any]:
+    """What ``history --show --json`` prints."""
+    return {
+        "events": [
+            {"line": entry.number, "at": entry.at.isoformat(), "kind": entry.event.kind, "text": text}
+            for entry, text in run_story(entries)
+        ]
+    }

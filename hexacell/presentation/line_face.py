@@ -7,6 +7,7 @@ import shlex
 from hexacell.attach.messages import ControlChanged, RunDescribed
 from hexacell.attach.snapshots import GaugeSnapshot, LiveSnapshot
 from hexacell.campaign.decisions import Forecast
+from hexacell.presentation.events import set_name
 from hexacell.presentation.layout import duration, wrapped
 from procedures.engine.command_loop import Status
 from procedures.run import events
@@ -57,7 +58,8 @@ def run_status_text(
 def record_text(record: events.RecordTaken) -> str:
     """A record in a line: where, and how far the ball was from the point's reference."""
     x, y, z = record.deviation_mm
-    return f"{record.at.station}, orientation {record.orientation}: x {x:+.3f}, y {y:+.3f}, z {z:+.3f} mm"
+    where = f"{set_name(record.at)}, orientation {record.orientation}"
+    return f"{where}: x {x:+.3f}, y {y:+.3f}, z {z:+.3f} mm"
 
 
 def gauges_text(snapshot: LiveSnapshot) -> str:

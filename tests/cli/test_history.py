@@ -52,6 +52,20 @@ def test_two_runs_and_the_drift(cell, typed_here) -> None:
     assert typed_here("history", cell.path, "--drift").out.startswith("No parameter walks.")
 
 
+def test_a_run_is_told_in_lines(cell, typed_here) -> None:
+    identified(cell, "a")
+    told = typed_here("history", cell.path, "--show", "a")
+    assert told.code == 0
+    lines = told.out.splitlines()
+    assert lines[0][8:] == "  optimise of simulated-hexaglide, hexacell 0"
+    assert any(line.endswith("the old geometry is back in the controller") for line in lines)
+    assert lines[-1].endswith("  over")
+    events = typed_here("history", cell.path, "--show", "a", "--json").document["events"]
+    assert [events[0]["kind"], events[-1]["kind"]] == ["started", "ended"]
+    assert events[-1]["text"] == "over"
+    assert typed_here("history", cell.path, "--show", "never").code == 2
+
+
 def test_one_question_at_a_time(cell, typed_here) -> None:
     refused = typed_here("history", cell.path, "--drift", "--compare", "a", "b")
     assert (refused.code, "not allowed with" in refused.err) == (2, True)

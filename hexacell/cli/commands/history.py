@@ -10,8 +10,16 @@ from hexacell.cell.loader import Cell
 from hexacell.cli.cell_argument import cell_at
 from hexacell.cli.console import Console
 from hexacell.errors import ExitCode
-from hexacell.presentation.documents import comparison_document, drift_document, history_document
+from hexacell.presentation.documents import (
+    comparison_document,
+    drift_document,
+    history_document,
+    story_document,
+)
 from hexacell.presentation.history import comparison_text, drift_text, history_text
+from hexacell.presentation.run_story import story_text
+from hexacell.runs.run_folder import find_run
+from procedures.journal.journal import read_entries
 
 
 def main(options: argparse.Namespace) -> ExitCode:
@@ -20,6 +28,10 @@ def main(options: argparse.Namespace) -> ExitCode:
     cell = cell_at(options.cell, console)
     if options.compare is not None:
         _compare(cell, options.compare, console)
+    elif options.show is not None:
+        entries = read_entries(find_run(cell, options.show).journal)
+        console.document(story_document(entries))
+        console.print(story_text(entries))
     elif options.drift:
         found = parameter_trends(cell, past_runs(cell))
         console.document(drift_document(found))

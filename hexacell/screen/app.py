@@ -35,6 +35,8 @@ from hexacell.screen.tab_screen import TabScreen
 from hexacell.screen.themes import SCREEN_THEMES
 
 DRAWN_EVERY_S = 0.1
+BETWEEN_SCREENS_S = 0.05
+"""Keys are heard in between."""
 LEAVING_TAKES_S = 0.4
 """The host is told that one leaves; it is not waited for longer."""
 
@@ -107,9 +109,16 @@ class TechnicianApp(App[int]):
             self._backend = await asyncio.to_thread(self._load)
             self.draw()
             self.set_interval(DRAWN_EVERY_S, self.draw)
+            self.run_worker(self._prepare_screens(), exit_on_error=False)
             await self._backend.attend()
         except HexacellError as error:
             self._tell(error)
+
+    async def _prepare_screens(self) -> None:
+        """Make the other screens before they are wanted: that takes longer than a key may wait."""
+        for screen in SCREENS:
+            await self._init_mode(screen.TAB)
+            await asyncio.sleep(BETWEEN_SCREENS_S)
 
     async def _has_cell(self) -> bool:
         """Whether there is a cell file, once the first-time assistant was used if it is needed."""

@@ -44,6 +44,7 @@ class ScreenSession:
         self._devices = DeviceWatcher(workplace.watch, now)
         self._actions = SessionActions(workplace, self._run, self._devices)
         self._description = tuple(describe(workplace.cell).splitlines())
+        self._run_is_over = asyncio.Event()
         self._reviewed: tuple[object, ReviewView] | None = None
 
     @property
@@ -152,8 +153,10 @@ class ScreenSession:
                 self._devices.start()
             else:
                 await self._run.follow(running)
-            await self._actions.read_history()
-            await asyncio.get_running_loop().create_future()
+            while True:
+                await self._actions.read_history()
+                await self._run_is_over.wait()
+                self._run_is_over.clear()
         finally:
             await self._run.stop()
             await self._devices.stop()
@@ -164,4 +167,6 @@ class ScreenSession:
             await self._run.leave(keep_running=keep_running)
 
     def _after_run(self) -> None:
+        """The devices are free, and there is one more run in the history."""
         self._devices.start()
+        self._run_is_over.set()

@@ -9,7 +9,7 @@ from functools import partial
 from hexacell.attach.connection import RunConnection
 from hexacell.attach.recorded import RecordedRun
 from hexacell.controller_config.three_way import ConfigEditedSince
-from hexacell.errors import UsageError
+from hexacell.errors import HexacellError, UsageError
 from hexacell.presentation.config_changes import versions_text
 from hexacell.presentation.screens.checklists import TRYING
 from hexacell.presentation.screens.views import ChecklistItem, HistoryEntry
@@ -190,8 +190,11 @@ class SessionActions:
         await self._run.follow(connection)
 
     async def read_history(self) -> None:
-        """Read which runs there are; raises ``HexacellError``."""
-        self.findings.entries = await self._workplace.runs()
+        """Read which runs there are; where that fails, the history says why."""
+        try:
+            self.findings.entries = await self._workplace.runs()
+        except HexacellError as error:
+            self.findings.entries, self.findings.compared = (), tuple(str(error).splitlines())
 
     async def _step(self, argument: str) -> str:
         """To an end, or by a number of events."""

@@ -109,6 +109,18 @@ async def test_what_cannot_be_compared_says_why(cell: Cell, runs: list[ProposedR
         assert "no run before 2026-11-20T100000Z identified a geometry" in shown(pilot)
 
 
+async def test_a_history_that_cannot_be_read_says_why_and_the_devices_stay(
+    cell: Cell, runs: list[ProposedRun]
+) -> None:
+    cell.config_path.unlink()
+    app = TechnicianApp(lambda: ScreenSession(WithoutDevices(cell.path)))
+    async with app.run_test(size=(100, 30)) as pilot:
+        await until(lambda: app.backend is not None)
+        await press(pilot, "5")
+        await until_shown(pilot, "cannot be read")
+        assert not isinstance(app.screen, FaultOverlay)
+
+
 async def test_the_drift_needs_three_calibrations(cell: Cell, runs: list[ProposedRun]) -> None:
     async with opened_history(cell) as pilot:
         await press(pilot, "o")

@@ -13,7 +13,7 @@ from hexacell.attach.messages import ControlChanged, HostFailed, StatusChanged
 from hexacell.cell.loader import Cell
 from hexacell.cell.recovery import Action, FailureKind
 from hexacell.kinematics.pose import Pose
-from hexacell.presentation.screens.views import ChecklistItem, Mark
+from hexacell.presentation.screens.views import ChecklistItem, HistoryEntry, Mark
 from hexacell.screen.app import TechnicianApp
 from hexacell.screen.overlays.fault_overlay import FaultOverlay
 from hexacell.screen.overlays.question_overlay import QuestionOverlay
@@ -182,6 +182,29 @@ async def test_a_grave_change_needs_the_name_of_the_cell(
         assert run.given == [Answer("a person at the screen")]
 
 
+@pytest.mark.parametrize("size", [(80, 24), (100, 32), (140, 40)])
+@pytest.mark.parametrize("is_grave", [False, True])
+async def test_a_long_change_leaves_in_sight_what_to_press(
+    size: tuple[int, int],
+    is_grave: bool,
+    cell: Cell,
+    run: ToldRun,
+    history: tuple[events.Event, ...],
+    opened: Opened,
+) -> None:
+    gate = AcceptanceGate(
+        name="far", passed=not is_grave, sentence="Far. " * 40, needs_person=True, needs_cell_name=True
+    )
+    async with opened(workplace_of(cell, run, history[:PROPOSED]), size) as pilot:
+        run.ask(ask_approval([gate], "-  old\n+  new\n" * 100, cell=cell.settings.name))
+        await until_shown(pilot, "+  new")
+        await settled(pilot)
+        last = pilot.app.screen.query("Input" if is_grave else ".choice").last()
+        assert last.region.height > 0
+        assert last.region.bottom <= size[1]
+        assert pilot.app.screen.get_widget_at(last.region.x, last.region.bottom - 1)[0] is last
+
+
 async def test_a_question_may_wait_while_one_looks_at_the_screens(
     cell: Cell, run: ToldRun, history: tuple[events.Event, ...], opened: Opened
 ) -> None:
@@ -329,6 +352,20 @@ async def test_no_run_begins_while_something_does_not_hold(
         assert "NO  gauge y: it answers in inch" in shown_list(pilot, "#checklist")
         assert "-> Press the in/mm key" in shown_list(pilot, "#checklist")
         assert workplace.begun == []
+
+
+async def test_a_run_that_is_over_is_in_the_history(cell: Cell, run: ToldRun, opened: Opened) -> None:
+    run.begin(cell)
+    workplace = ToldWorkplace(cell, run=run)
+    async with opened(workplace) as pilot:
+        app = pilot.app
+        assert isinstance(app, TechnicianApp)
+        assert app.backend is not None
+        workplace.entries = (HistoryEntry("2026-03-02T080000Z", "it passed"),)
+        run.tell(StatusChanged(status=Status.ENDED))
+        run.end()
+        backend = app.backend
+        await until(lambda: backend.history().entries == workplace.entries)
 
 
 async def test_quitting_without_a_run_asks_nothing(cell: Cell, opened: Opened) -> None:

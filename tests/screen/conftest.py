@@ -18,6 +18,7 @@ from hexacell.cell.loader import Cell, load_cell
 from hexacell.screen.app import TechnicianApp
 from hexacell.screen.key_map import ScreenPreferences
 from hexacell.screen.session import ScreenSession
+from hexacell.screen.widgets.text_panel import TextList
 from procedures.run.events import Event
 from tests.screen.told_run import ToldWorkplace
 from tests.waiting import until
@@ -79,6 +80,11 @@ async def settled(pilot: Pilot[int]) -> None:
     assert isinstance(app, TechnicianApp)
     await pilot.pause()
     app.draw()
+    await pilot.pause()
+    # At its anchor a list moves its scroll bar without drawing it.
+    for screen in app.screen_stack:
+        for one in screen.query(TextList):
+            one.vertical_scrollbar.refresh()
     await pilot.pause()
 
 

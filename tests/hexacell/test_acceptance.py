@@ -76,6 +76,9 @@ def test_all_gates_but_one_may_be_overruled_by_a_person(judged):
     overruled = {name for name, gate in judged().items() if gate.needs_person}
     assert overruled == {"determined", "agrees with the noise", "within tolerance", "small change"}
     assert [name for name, gate in judged().items() if gate.needs_cell_name] == ["within tolerance"]
+    far = judged(largest_change_mm=1e-6)
+    named = [name for name, gate in far.items() if gate.needs_cell_name]
+    assert named == ["within tolerance", "small change"], "above the change limit it is typed"
 
 
 def test_a_solver_that_did_not_converge_fails_the_gate(judged, identified):

@@ -27,12 +27,12 @@ from hexacell.robot_model import Robot, robot_of
 from tests.benchmarks.virtual_calibration import calibrate, robot_that_reaches
 from tests.benchmarks.worlds.closure import Bodies, CannotCloseError, follow, slider_places
 from tests.benchmarks.worlds.effects import Effect
-from tests.benchmarks.worlds.stating import LIMIT_MM
 from tests.benchmarks.worlds.table import least_by_chance
 from tests.benchmarks.worlds.world import World
 
 MACHINES = int(os.environ.get("MACHINES", "4"))
 TIMES = 5
+LIMIT_MM = load_cell(bundled_config("simulated-hexaglide")).settings.acceptance.position_mm
 PASSES = 0.99
 
 

@@ -12,6 +12,7 @@ from hexacell.campaign.teaching import as_written
 from hexacell.cell.loader import Cell
 from hexacell.cell.model import CellSettings
 from hexacell.controller_config.interface import ControllerGeometry
+from hexacell.errors import LimitError
 from hexacell.experiment_design import candidates
 from hexacell.experiment_design.validation_poses import select_validation_poses
 from hexacell.identification.estimator import identify
@@ -69,17 +70,32 @@ def calibrate(cell: Cell, robot: Robot, truth: Geometry, random: np.random.Gener
 def measured_held_out(
     settings: CellSettings, found: Identification, robot: Robot, virtual: VirtualRobot
 ) -> HeldOut:
-    """What the held-out poses give, chosen as a run does after the identification."""
+    """What the held-out poses give, chosen as a run does after the identification.
+
+    A point at which the robot would leave its limits is left.
+
+    Raises:
+        LimitError: all of them are.
+    """
     belief, wanted = robot.belief(found), settings.verification
-    turns: Array = candidates.orientations(CANDIDATES, belief.limits.tilt, wanted.seed)
+    turns: Array = candidates.orientations(
+        CANDIDATES, belief.limits.tilt, wanted.seed, most_twist=belief.limits.turn
+    )
     records: list[Record] = []
+    failures: list[LimitError] = []
     for number, point in enumerate(wanted.points, start=HELD_OUT_FROM):
         position = robot.from_commands([Pose(*point)]).positions[0]
         used = found.poses.rotations
-        poses = select_validation_poses(belief, position, wanted.orientations, turns, used)
+        try:
+            poses = select_validation_poses(belief, position, wanted.orientations, turns, used)
+        except LimitError as error:
+            failures.append(error)
+            continue
         virtual.zero_gauges()
         for row in range(len(poses)):
             virtual.place(robot.to_command(poses.pose(row)))
             records.append(virtual.measure(number, row + 1))
+    if not records:
+        raise failures[0]
     deviations = [record.deviation for record in records if record.orientation > 1]
     return HeldOut(MeasurementSet(tuple(records)), deviations, deviations)

@@ -30,8 +30,6 @@ MAY_LOOK = {
     "hexacell/runs/run_folder.py": "names a run folder",
     "hexacell/storage/cell_lock.py": "says since when somebody holds a cell",
     "procedures/journal/line_format.py": "dates a record",
-    "hexacell/attach/host.py": "dates an event for those who watch",
-    "hexacell/application/proposals.py": "dates an approval",
     "drivers/serial/port.py": "dates what went over a wire",
     "drivers/controllers/linuxcnc/connection.py": "likewise",
     "drivers/encoders/can_bus.py": "likewise",

@@ -14,6 +14,7 @@ from textual.app import App, SystemCommand
 from textual.binding import BindingType
 from textual.css.query import NoMatches
 from textual.screen import Screen
+from textual.widgets._footer import FooterKey
 
 from hexacell.errors import HexacellError
 from hexacell.presentation.screens.views import FaultView
@@ -35,8 +36,6 @@ from hexacell.screen.tab_screen import TabScreen
 from hexacell.screen.themes import SCREEN_THEMES
 
 DRAWN_EVERY_S = 0.1
-BETWEEN_SCREENS_S = 0.05
-"""Keys are heard in between."""
 LEAVING_TAKES_S = 0.4
 """The host is told that one leaves; it is not waited for longer."""
 
@@ -109,16 +108,9 @@ class TechnicianApp(App[int]):
             self._backend = await asyncio.to_thread(self._load)
             self.draw()
             self.set_interval(DRAWN_EVERY_S, self.draw)
-            self.run_worker(self._prepare_screens(), exit_on_error=False)
             await self._backend.attend()
         except HexacellError as error:
             self._tell(error)
-
-    async def _prepare_screens(self) -> None:
-        """Make the other screens before they are wanted: that takes longer than a key may wait."""
-        for screen in SCREENS:
-            await self._init_mode(screen.TAB)
-            await asyncio.sleep(BETWEEN_SCREENS_S)
 
     async def _has_cell(self) -> bool:
         """Whether there is a cell file, once the first-time assistant was used if it is needed."""
@@ -136,13 +128,18 @@ class TechnicianApp(App[int]):
             if isinstance(screen, TabScreen | DigitsScreen | QuestionOverlay):
                 with suppress(NoMatches):  # it is being composed, or taken away
                     screen.draw(self._backend)
-        if not self._goes_to_new_run(self._backend):
+        if not self._goes_to_new_run(self._backend) and self._is_whole:
             self._overlay_question(self._backend)
             self._overlay_fault(self._backend)
         allowed = frozenset(action for action in ScreenAction if self._backend.allows(action))
         if allowed != self._allowed:
             self._allowed = allowed
             self.refresh_bindings()
+
+    @property
+    def _is_whole(self) -> bool:
+        """Whether the screen in front is made to its last line; nothing is laid above it before."""
+        return not isinstance(self.screen, TabScreen) or bool(self.screen.query(FooterKey))
 
     def _goes_to_new_run(self, backend: Backend) -> bool:
         """Whether the screen changes because a run is followed anew; overlays come after that."""

@@ -210,14 +210,15 @@ async def test_a_killed_host_is_missed_and_its_run_resumed(cell, run) -> None:
     assert socket_path(cell).exists(), "nobody could remove it"
     before = read_journal(run.journal)
     again = await start_host(socket_path(cell), [*arguments(cell, run), "--resume"])
-    told = []
+    told: list[events.Event] = []
 
     def is_further_record(message: HostMessage) -> bool:
-        told.append(message)
+        if isinstance(message, EventRecorded):
+            told.append(message.event)
         return is_record(message) and len(told) > len(before)
 
     await until_told(again, is_further_record)
-    assert [one.event for one in told if isinstance(one, EventRecorded)][: len(before)] == list(before)
+    assert told[: len(before)] == list(before)
     await again.leave(keep_running=False)
     await until(lambda: not hosts_of(cell))
 

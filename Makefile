@@ -7,9 +7,9 @@
 
 PYTHON = python3
 ARGS =
-# Tests of devices mostly wait, so that three processes keep two cores busy. In the order of the folders
+# Tests of devices mostly wait, so that four processes keep two cores busy. In the order of the folders
 # the long files come early; by default files with few tests, which are the long ones, would come last.
-THREE_AT_A_TIME = -n 3 --dist loadfile --no-loadscope-reorder
+FOUR_AT_A_TIME = -n 4 --dist loadfile --no-loadscope-reorder
 RUN = .venv/bin/python -m
 
 # Packages of other software on these paths would take precedence over the pinned ones.
@@ -27,10 +27,10 @@ demo: venv
 	.venv/bin/hexacell demo $(ARGS)
 
 test: venv
-	$(RUN) pytest $(THREE_AT_A_TIME) -m "not slow and not benchmark" $(ARGS)
+	$(RUN) pytest $(FOUR_AT_A_TIME) -m "not slow and not benchmark" $(ARGS)
 
 test-full: venv
-	$(RUN) pytest $(THREE_AT_A_TIME) -m "not benchmark" $(ARGS)
+	$(RUN) pytest $(FOUR_AT_A_TIME) -m "not benchmark" $(ARGS)
 
 bench:
 	@.ci/venv "$(PYTHON)" bench

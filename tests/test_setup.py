@@ -12,7 +12,7 @@ import pytest
 
 CHECKOUT = Path(__file__).parent.parent
 
-THE_TESTS = "-m pytest -n 3 --dist loadfile --no-loadscope-reorder -m not slow and not benchmark"
+THE_TESTS = "-m pytest -n 4 --dist loadfile --no-loadscope-reorder -m not slow and not benchmark"
 """The arguments that ``make test`` gives to Python."""
 
 FAKE_PYTHON = """\

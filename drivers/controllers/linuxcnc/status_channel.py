@@ -85,7 +85,8 @@ class StatusConnection:
 
     async def _read(self, commands: ControllerCommands) -> ControllerStatus:
         known = len(self._messages.for_status)
-        estop, enabled = await commands.is_on("estop"), await commands.is_on("machine")
+        # In this order: an emergency stop between the two is not taken for a machine that was switched off.
+        enabled, estop = await commands.is_on("machine"), await commands.is_on("estop")
         heartbeat = await commands.get("joint_pos")
         if enabled and not estop:
             self._was_enabled = True

@@ -25,14 +25,19 @@ JOINTS = "1.000000 2.000000 3.000000 4.000000 5.000000 6.000000"
 
 def asked(*, estop: str = "OFF", machine: str = "ON") -> list[tuple[str, bytes]]:
     return [
-        ("get estop", f"ESTOP {estop}\r\n".encode()),
         ("get machine", f"MACHINE {machine}\r\n".encode()),
+        ("get estop", f"ESTOP {estop}\r\n".encode()),
         ("get joint_pos", f"JOINT_POS {JOINTS}\r\n".encode()),
     ]
 
 
 ON = ControllerStatus(estop=False, enabled=True, heartbeat=JOINTS)
 ERROR_OK = ("get error", b"ERROR OK\r\n")
+
+
+async def test_an_emergency_stop_while_the_status_is_read_is_told_as_one(play) -> None:
+    driver = await play.opened([], [*GREETING, *asked(machine="ON", estop="ON")])
+    assert (await driver.status()).estop
 
 
 async def test_the_status_is_read_without_taking_control(play) -> None:
@@ -181,7 +186,7 @@ async def test_stopping_works_if_the_status_connection_does_not_answer(play) -> 
 
 
 async def test_a_lost_status_connection_is_reopened(play) -> None:
-    driver = await play.opened([], [*GREETING, ("get estop", play.HANG_UP)], [*GREETING, *asked()])
+    driver = await play.opened([], [*GREETING, ("get machine", play.HANG_UP)], [*GREETING, *asked()])
     with pytest.raises(DeviceError, match="closed the connection"):
         await driver.status()
     assert await driver.status() == ON

@@ -32,7 +32,6 @@ from hexacell.campaign.stopping_rules import Goal, StoppingRules
 from hexacell.campaign.task_accuracy import Task
 from hexacell.cell.model import CellSettings
 from hexacell.errors import IdentifiabilityError, LimitError
-from hexacell.experiment_design.candidates import ReachableTargets
 from hexacell.identification.belief import RobotBelief
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.rotations import Array
@@ -94,8 +93,8 @@ class Plan:
         found = estimate.identification
         if found is None:
             return False
-        last = ReachableTargets(found.poses[[-1]], found.problem.joints[[-1]])
-        return estimate.belief.orientation_sigma(last.poses, last.joints) <= PROVISIONAL_SIGMA
+        at_last = found.poses[[-1]], found.problem.joints[[-1]]
+        return estimate.belief.orientation_sigma(*at_last) <= PROVISIONAL_SIGMA
 
     def forecast(self, state: CampaignState) -> Forecast | None:
         """The gain of further records; None without task poses."""

@@ -1,9 +1,7 @@
-"""The legs in space: how far passive joints are turned, and how near legs come to each other; batched.
+"""The legs in space: their directions, and how near they come to each other; batched.
 
-A passive joint (ball joint or universal joint) lets a leg turn within a cone about an axis that is fixed to
-what carries the joint: the slider, which does not turn, at one end, and the platform at the other. The
-distance of two legs is that of the segments between their joints (Lumelsky, Information Processing Letters
-21, 1985).
+The distance of two legs is that of the segments between their joints (Lumelsky, Information Processing
+Letters 21, 1985).
 """
 
 from __future__ import annotations

@@ -1,4 +1,8 @@
-"""What passive joints and legs allow: cones about the joints' axes, and a smallest distance; batched."""
+"""What passive joints and legs allow: cones about the joints' axes, and a smallest distance; batched.
+
+A passive joint (ball joint or universal joint) lets a leg turn within a cone about an axis that is fixed to
+what carries the joint: the slider, which does not turn, at one end, and the platform at the other.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hexacell.kinematics.legs import Legs, angles_between
-from hexacell.kinematics.rotations import Array, Mask
+from hexacell.kinematics.rotations import Array
 
 ROUNDING = 1e-9
 """Of an angle, rad, or a length, mm: a pose at a limit is within it."""
@@ -61,7 +65,3 @@ class LegLimits:
             platform_cones=self.platform_cones + missing[6:12],
             distance_mm=max(0.0, self.distance_mm - float(missing[12:].sum())),
         )
-
-    def are_kept(self, legs: Legs, wanted: Array | float = 0.0) -> Mask:
-        """At which of n poses, with at least the wanted margins (m,)."""
-        return np.asarray((self.margins(legs) >= wanted).all(axis=-1))

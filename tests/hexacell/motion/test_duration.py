@@ -24,10 +24,11 @@ HOME = Pose(0.0, 0.0, 550.0)
 
 
 def passed(start: Pose, end: Pose, pieces: int) -> tuple[Any, Any]:
-    """How far the fastest slider and the fastest platform joint come in each piece of the line, mm."""
+    """How far the fastest slider and the fastest of ball and platform joints come in each piece, mm."""
     line = interpolate_line(PoseBatch.of([start]), PoseBatch.of([end]), pieces)
     joints = Hexaglide().inverse(ROBOT.controller, ROBOT.branch, line)
-    edge = line.positions[:, None] + ROBOT.controller["B"] @ np.swapaxes(line.rotations, 1, 2)
+    of_platform = np.vstack([np.zeros(3), ROBOT.controller["B"]])
+    edge = line.positions[:, None] + of_platform @ np.swapaxes(line.rotations, 1, 2)
     steps = np.linalg.norm(np.diff(edge, axis=0), axis=2).max(axis=1)
     return np.abs(np.diff(joints, axis=0)).max(axis=1), steps
 

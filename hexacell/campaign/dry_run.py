@@ -122,7 +122,8 @@ class VirtualCampaign:
             self._return_to(reference)
             self.state = replace(self.state, present=reference)
             return
-        self.state = CampaignState(self.state.measurements, done=self.state.done | {point})
+        done = self.state.done | {point}
+        self.state = CampaignState(self.state.measurements, done=done, present=reference)
         self._leave_point()
 
 

@@ -37,6 +37,7 @@ from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.rotations import Array
 from hexacell.measurements.records import deviation_of, joints_of
 from hexacell.motion.path_check import is_clear
+from hexacell.motion.paths import find_route
 from hexacell.robot_model import Robot
 
 CANDIDATES = 1024
@@ -120,6 +121,16 @@ class Plan:
         """Where a point's gauges are zeroed, in the controller's frames."""
         return self.poses_at(point)[0]
 
+    def route(self, state: CampaignState, start: Pose, end: Pose) -> tuple[Pose, ...] | None:
+        """Level poses by way of which clear lines lead from one pose to another; none if there are none.
+
+        Poses are in the controller's frames. The gauges are not at the ball.
+        """
+        via = (start.level, end.level)
+        first, last, *others = (self.robot.from_commands([pose]) for pose in (start, end, *via))
+        rows = find_route(self.estimate(state).belief, first, last, others)
+        return None if rows is None else tuple(via[row] for row in rows)
+
     @property
     def points(self) -> range:
         """All points, counted from 1."""
@@ -176,7 +187,7 @@ class Plan:
         safe = [point for point in self.points if point not in state.done and self._is_safe(state, point)]
         if not safe:
             return Finished("none of the remaining points can be reached safely")
-        worthwhile = self._worthwhile(state, safe)
+        worthwhile = self._worthwhile(state, self._reachable(state, safe) or safe)
         if not worthwhile:
             least = self.settings.identification.least_gain_mm
             return Finished(f"no record would gain {least:g} mm at the task poses")
@@ -235,6 +246,20 @@ class Plan:
         if not belief.keeps_limits(actual.poses, actual.joints, wanted)[0]:
             return False
         return is_clear(belief, reference, reference)
+
+    def _reachable(self, state: CampaignState, points: list[int]) -> list[int]:
+        """Those of some points to which clear lines lead from the present pose; all where that is unknown.
+
+        While little is known of the robot, some lines may be too near a limit that are clear later.
+        """
+        here = state.present
+        if here is None or not len(state.measurements):
+            return points
+        try:
+            routes = {point: self.route(state, here, self.reference_pose(point)) for point in points}
+        except IdentifiabilityError:
+            return points  # the identification reports what is wrong with the records
+        return [point for point, route in routes.items() if route is not None]
 
     def _start(self, point: int) -> StartPoint:
         pose = self.reference_pose(point)

@@ -53,6 +53,11 @@ class Pose:
         """The rotation matrix (3, 3) from the platform frame to the base frame."""
         return rotations.from_angles(np.radians([self.a, self.b, self.c]))
 
+    @property
+    def level(self) -> Pose:
+        """The same position without tilt and turn."""
+        return Pose(self.x, self.y, self.z)
+
     def as_tuple(self) -> tuple[float, float, float, float, float, float]:
         """``(x, y, z, a, b, c)``, mm and deg."""
         return (self.x, self.y, self.z, self.a, self.b, self.c)

@@ -18,7 +18,7 @@ from hexacell.errors import LimitError
 from hexacell.identification.belief import RobotBelief
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.pose import Pose
-from hexacell.motion.paths import find_route, next_return_move
+from hexacell.motion.paths import next_return_move
 from hexacell.robot_model import Robot
 from hexacell.virtual_robot import VirtualRobot
 
@@ -58,12 +58,10 @@ class SimulatedCampaign(VirtualCampaign):
             self.virtual_robot.place(start.pose)
         elif start.pose != self.virtual_robot.command:
             here = self.virtual_robot.command
-            level = [replace(pose, a=0.0, b=0.0, c=0.0) for pose in (here, start.pose)]
-            commands = [self.robot.from_commands([pose]) for pose in (here, start.pose, *level)]
-            route = find_route(self._belief, commands[0], commands[1], commands[2:])
+            route = self.plan.route(self.state, here, start.pose)
             if route is None:
                 raise LimitError(f"no safe path leads from {here} to {start.pose}")
-            for pose in (*(level[row] for row in route), start.pose):
+            for pose in (*route, start.pose):
                 self.virtual_robot.move(pose)
         self._trail = [(start.pose, True)]
 

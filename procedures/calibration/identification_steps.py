@@ -132,7 +132,7 @@ def campaign_state(state: RunState, key: SetKey | None) -> CampaignState:
         measurements=MeasurementSet(records),
         point=None if key is None else key.point,
         done=frozenset(at.point for at, measured in sets.items() if measured.closed) | _left_points(state),
-        present=None if key is None else _present_pose(state, key),
+        present=_present_pose(state, key),
         rejections=0 if key is None else state.set(key).rejections,
         zero_mm=None if key is None else state.zero_shown(key),
     )
@@ -144,10 +144,15 @@ def _left_points(state: RunState) -> frozenset[int]:
     return frozenset(key.point for key in keys if state.is_left(key))
 
 
-def _present_pose(state: RunState, key: SetKey) -> Pose | None:
-    """The pose that the robot was commanded to last, that of a rejected record included."""
-    if state.target is not None:
+def _present_pose(state: RunState, key: SetKey | None) -> Pose | None:
+    """The pose that the robot was commanded to last, that of a rejected record included.
+
+    Between points none where it was brought by somebody: it can be brought elsewhere, too.
+    """
+    if state.target is not None and (key is not None or state.at_pose is not None):
         return Pose(*state.target)
+    if key is None:
+        return None
     samples = state.set(key).samples
     return Pose(*samples[-1].pose) if samples else None
 

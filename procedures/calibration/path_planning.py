@@ -115,8 +115,8 @@ class RunPathPlanner:
         """Poses that a route may use as waypoints, with their orientations; 0 where nothing is measured."""
         samples = state.set(goal.at).samples
         visited = [(s.orientation, s.pose) for s in samples if s.orientation != goal.orientation]
-        level = [_level(pose) for pose in (state.target, goal.pose) if pose is not None]
-        return [*((0, pose) for pose in level), *visited]
+        ends = (Pose(*pose) for pose in (state.target, goal.pose) if pose is not None)
+        return [*((0, pose.level.as_tuple()) for pose in ends), *visited]
 
     def _command(self, pose: SixNumbers) -> PoseBatch:
         return self.robot.from_commands([Pose(*pose)])
@@ -142,12 +142,6 @@ class RunPathPlanner:
 def _is_inside(belief: RobotBelief, command: PoseBatch, reference: Array, share: float = 1.0) -> bool:
     ball = ball_position(belief, command)
     return ball is not None and bool(belief.limits.within_travel(ball - reference, share=share))
-
-
-def _level(pose: SixNumbers) -> SixNumbers:
-    """The same position without tilt and rotation."""
-    x, y, z, *_ = pose
-    return (x, y, z, 0.0, 0.0, 0.0)
 
 
 def _no_safe_path(here: SixNumbers, goal: Move) -> NoSafePath:

@@ -287,3 +287,24 @@ def test_a_point_whose_reference_is_beyond_a_limit_is_left_and_an_uncertain_one_
     # After point 1 the robot is not known well enough for points 2 and 3.
     assert begun == [1, 4, 2, 3]
     assert taken[-1].decision.reason == "none of the remaining points can be reached safely"
+
+
+def test_a_point_to_which_no_line_is_clear_yet_is_put_off(campaign, make_plan, monkeypatch):
+    """With three points, of which the second can be reached from the third only."""
+    plan = make_plan(identification__points=(*TWO_POINTS, (0.0, 0.0, 500.0)))
+    state = next(one.state for one in campaign if one.state.done == {1})
+    assert state.present == plan.reference_pose(1)
+    assert _started(plan, state) == 2
+    blocked = [(plan.reference_pose(1), plan.reference_pose(2))]
+    monkeypatch.setattr(Plan, "route", lambda _, __, *ends: None if ends in blocked else ())
+    assert _started(plan, state) == 3
+    at_third = replace(state, done=frozenset({1, 3}), present=plan.reference_pose(3))
+    assert _started(plan, at_third) == 2
+    blocked.append((plan.reference_pose(3), plan.reference_pose(2)))
+    assert _started(plan, at_third) == 2, "what the run then says of the way is better than an end"
+
+
+def _started(plan, state):
+    decision = plan.decide(state)
+    assert isinstance(decision, StartPoint)
+    return decision.point

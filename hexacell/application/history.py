@@ -1,4 +1,7 @@
-"""The runs of a cell so far: verdicts, errors, results, and which of them the controller has."""
+"""The runs of a cell so far: verdicts, errors, results, and which of them the controller has.
+
+What a run was is read from its folder once and kept in the cell's archive (:mod:`.run_index`).
+"""
 
 from __future__ import annotations
 
@@ -7,6 +10,8 @@ from dataclasses import dataclass
 from datetime import datetime
 
 from hexacell.application.proposals import later_approval
+from hexacell.application.run_index import RunIndex
+from hexacell.cell.fields import Frozen
 from hexacell.cell.loader import Cell
 from hexacell.controller_config.change import fingerprint
 from hexacell.controller_config.write_back import RECEIPT, Receipt
@@ -15,16 +20,16 @@ from hexacell.errors import HexacellError, UsageError
 from hexacell.reporting.result import IdentificationResult
 from hexacell.reporting.run_comparison import ParameterTrend, RunComparison, compare_results, trends
 from hexacell.reporting.verification import VerifiedAccuracy
+from hexacell.runs.archive import DocumentKind
 from hexacell.runs.run_folder import RunFolder, find_run, runs_folder
-from procedures.journal.journal import read_entries
+from procedures.journal.journal import read_entries, read_journal
 from procedures.journal.line_format import Entry
 from procedures.run import events
 from procedures.run.state import RunState, fold
 
 
-@dataclass(frozen=True, slots=True)
-class PastRun:
-    """One run of a cell.
+class RunSummary(Frozen):
+    """What a run was, by its folder alone: what the archive keeps of it.
 
     Attributes:
         began, ended: when its first and its last event were written, UTC.
@@ -32,14 +37,13 @@ class PastRun:
         verdict: none where there is none.
         accuracy: the errors at the task poses that the verdict is on; none where there is no such verdict.
         line: how it ended, in words; why its journal cannot be read, if it cannot.
-        result: of its identification; none where there is none.
+        has_result: whether it identified a geometry.
         is_over: whether it has ended; one that has not can be resumed.
-        is_in_controller: whether the controller's config is the one that it wrote.
+        written_sha256: fingerprint of the controller's config as it wrote it; none where it wrote none.
         has_written: whether it wrote the config at all, whatever was undone.
         has_proposal: whether it has a proposal that is not in the config, and can be applied.
     """
 
-    folder: RunFolder
     began: datetime | None = None
     ended: datetime | None = None
     mode: str = ""
@@ -47,11 +51,20 @@ class PastRun:
     verdict: Verdict | None = None
     accuracy: VerifiedAccuracy | None = None
     line: str = ""
-    result: IdentificationResult | None = None
+    has_result: bool = False
     is_over: bool = False
-    is_in_controller: bool = False
+    written_sha256: str | None = None
     has_written: bool = False
     has_proposal: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class PastRun:
+    """One run of a cell; ``is_in_controller``: whether the controller's config is the one that it wrote."""
+
+    folder: RunFolder
+    summary: RunSummary
+    is_in_controller: bool = False
 
     @property
     def name(self) -> str:
@@ -59,29 +72,36 @@ class PastRun:
         return self.folder.path.name
 
 
-def past_runs(cell: Cell) -> tuple[PastRun, ...]:
+def past_runs(cell: Cell, index: RunIndex | None = None) -> tuple[PastRun, ...]:
     """All runs of a cell, the newest first; those that cannot be read come last, with the reason.
 
     Raises:
-        FileError: the controller's config cannot be read.
+        FileError: the controller's config, or the folder of the runs, cannot be read.
     """
-    folder, config = runs_folder(cell), fingerprint(cell.config_path)
-    paths = [path for path in folder.iterdir() if path.is_dir()] if folder.is_dir() else []
-    runs = [past_run(RunFolder(path), config) for path in sorted(paths)]
+    config, folder = fingerprint(cell.config_path), runs_folder(cell)
+    found = (index or RunIndex(cell)).documents(DocumentKind.SUMMARY, RunSummary, _summary)
+    runs = [_past_run(RunFolder(folder / name), summary, config) for name, summary in found.items()]
     return tuple(sorted(runs, key=_age_rank, reverse=True))
 
 
 def past_run(folder: RunFolder, config_sha256: str) -> PastRun:
     """One run; ``config_sha256`` is the fingerprint of the controller's config now."""
+    return _past_run(folder, _summary(folder), config_sha256)
+
+
+def _past_run(folder: RunFolder, summary: RunSummary, config_sha256: str) -> PastRun:
+    return PastRun(folder, summary, summary.written_sha256 == config_sha256)
+
+
+def _summary(folder: RunFolder) -> RunSummary:
     try:
         entries = read_entries(folder.journal)
     except HexacellError as error:
-        return PastRun(folder, line=str(error))
+        return RunSummary(line=str(error))
     if not entries:
-        return PastRun(folder, line="its journal is empty")
+        return RunSummary(line="its journal is empty")
     state = fold(entry.event for entry in entries)
-    return PastRun(
-        folder,
+    return RunSummary(
         began=entries[0].at,
         ended=entries[-1].at,
         mode="" if state.started is None else state.started.mode,
@@ -89,9 +109,9 @@ def past_run(folder: RunFolder, config_sha256: str) -> PastRun:
         verdict=None if state.judged is None else state.judged.verdict,
         accuracy=_accuracy(state.judged),
         line=_last_line(entries, state),
-        result=None if state.identified is None else state.identified.result,
+        has_result=state.identified is not None,
         is_over=state.ended is not None,
-        is_in_controller=_wrote_config(folder, config_sha256),
+        written_sha256=_written_sha256(folder),
         has_written=(folder.path / RECEIPT).is_file(),
         has_proposal=_has_open_proposal(folder, state),
     )
@@ -110,28 +130,44 @@ def compare_runs(cell: Cell, before: str, after: str) -> tuple[PastRun, PastRun,
     return one, other, compare_results(parameters, _result_of(one), _result_of(other))
 
 
-def parameter_trends(cell: Cell, runs: Iterable[PastRun]) -> tuple[ParameterTrend, ...]:
+def parameter_trends(
+    cell: Cell, runs: Iterable[PastRun], index: RunIndex | None = None
+) -> tuple[ParameterTrend, ...]:
     """The trend of each parameter over the runs whose identification converged, oldest first.
 
     Raises:
         UsageError: they have different frame conventions.
     """
+    identified = [run for run in sorted(runs, key=_age_rank) if run.summary.has_result]
+    found = (index or RunIndex(cell)).documents(
+        DocumentKind.RESULT, IdentificationResult, _result, [run.name for run in identified]
+    )
     results = [
-        (run.ended, run.result)
-        for run in sorted(runs, key=_age_rank)
-        if run.ended is not None and run.result is not None and run.result.converged
+        (run.summary.ended, found[run.name])
+        for run in identified
+        if run.summary.ended is not None and run.name in found and found[run.name].converged
     ]
     return trends(cell.settings.mechanism.parameters, results)
 
 
 def _result_of(run: PastRun) -> IdentificationResult:
-    if run.result is None:
+    result = _result(run.folder)
+    if result is None:
         raise UsageError(f"the run {run.name} identified no geometry", action="Name calibrations, which do")
-    return run.result
+    return result
+
+
+def _result(folder: RunFolder) -> IdentificationResult | None:
+    try:
+        state = fold(read_journal(folder.journal))
+    except HexacellError:
+        return None
+    return None if state.identified is None else state.identified.result
 
 
 def _age_rank(run: PastRun) -> tuple[bool, float, str]:
-    return run.ended is not None, 0.0 if run.ended is None else run.ended.timestamp(), run.name
+    ended = run.summary.ended
+    return ended is not None, 0.0 if ended is None else ended.timestamp(), run.name
 
 
 def _accuracy(judged: events.ResultValidated | None) -> VerifiedAccuracy | None:
@@ -157,8 +193,8 @@ def _has_open_proposal(folder: RunFolder, state: RunState) -> bool:
     return state.proposed is not None and folder.proposal.is_file() and not is_applied
 
 
-def _wrote_config(folder: RunFolder, sha256: str) -> bool:
+def _written_sha256(folder: RunFolder) -> str | None:
     try:
-        return Receipt.of(folder.path).sha256_after == sha256
+        return Receipt.of(folder.path).sha256_after
     except HexacellError:
-        return False
+        return None

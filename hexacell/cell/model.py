@@ -8,6 +8,7 @@ from typing import Any, Literal, Self, TypeVar
 from pydantic import Field, ValidationError, create_model, field_validator, model_validator
 from pydantic_core import InitErrorDetails
 
+from hexacell.cell.archive import ArchiveSettings
 from hexacell.cell.devices import ControllerSettings, EncoderSettings, GaugeSettings, ThermometerSettings
 from hexacell.cell.fields import (
     GeometrySettings,
@@ -81,6 +82,7 @@ class CellSettings(Section):
     check: CheckSettings = CheckSettings()
     length_check: LengthCheckSettings | None = None
     recovery: RecoverySettings = RecoverySettings()
+    archive: ArchiveSettings = ArchiveSettings()
     task: TaskSettings = TaskSettings()
     simulation: SimulationSettings | None = None
 

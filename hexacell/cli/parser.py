@@ -281,6 +281,11 @@ def _history(commands: Any) -> None:  # noqa: ANN401
     )
     what.add_argument("--show", metavar="RUN", help="what happened in a run, and when")
     what.add_argument("--drift", action="store_true", help="the trend of every parameter over all runs")
+    parser.add_argument(
+        "--archive",
+        metavar="URL",
+        help="the index over the runs: postgresql://user@host/database (default: as [archive] has it)",
+    )
     _add_json(parser)
 
 

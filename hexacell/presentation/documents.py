@@ -169,22 +169,23 @@ def history_document(runs: Sequence[PastRun]) -> dict[str, Any]:
 
 def past_run_document(run: PastRun) -> dict[str, Any]:
     """One of them."""
-    error = None if run.accuracy is None else run.accuracy.position
+    was = run.summary
+    error = None if was.accuracy is None else was.accuracy.position
     return {
         "run": str(run.folder.path),
-        "began": None if run.began is None else run.began.isoformat(),
-        "ended": None if run.ended is None else run.ended.isoformat(),
-        "mode": run.mode or None,
-        "records": run.records,
-        "verdict": None if run.verdict is None else run.verdict.value,
+        "began": None if was.began is None else was.began.isoformat(),
+        "ended": None if was.ended is None else was.ended.isoformat(),
+        "mode": was.mode or None,
+        "records": was.records,
+        "verdict": None if was.verdict is None else was.verdict.value,
         "position_mm": None if error is None else error.value,
         "expanded_mm": None if error is None else error.expanded,
         "limit_mm": None if error is None else error.limit,
-        "line": run.line,
-        "over": run.is_over,
+        "line": was.line,
+        "over": was.is_over,
         "in_controller": run.is_in_controller,
-        "written": run.has_written,
-        "proposal": run.has_proposal,
+        "written": was.has_written,
+        "proposal": was.has_proposal,
     }
 
 

@@ -28,28 +28,30 @@ def history_head() -> str:
 
 def history_line(run: PastRun) -> str:
     """One run: its name, mode, verdict, error and what became of it."""
-    verdict = "-" if run.verdict is None else run.verdict.value
-    return _columns(run.name[:LONGEST_RUN_NAME], run.mode or "-", verdict, error_text(run), standing(run))
+    verdict = "-" if run.summary.verdict is None else run.summary.verdict.value
+    return _columns(
+        run.name[:LONGEST_RUN_NAME], run.summary.mode or "-", verdict, error_text(run), standing(run)
+    )
 
 
 def error_text(run: PastRun) -> str:
     """The largest position error at the task poses, +- its expanded uncertainty, mm; - if there is none."""
-    if run.accuracy is None:
+    if run.summary.accuracy is None:
         return "-"
-    return f"{run.accuracy.position.value:.3f} +- {run.accuracy.position.expanded:.3f}"
+    return f"{run.summary.accuracy.position.value:.3f} +- {run.summary.accuracy.position.expanded:.3f}"
 
 
 def standing(run: PastRun) -> str:
     """What became of a run, in a few words."""
-    if not run.mode:
+    if not run.summary.mode:
         return "unreadable"
     if run.is_in_controller:
-        return "in controller" if run.is_over else "unverified!"
-    if not run.is_over:
+        return "in controller" if run.summary.is_over else "unverified!"
+    if not run.summary.is_over:
         return "not over"
-    if run.has_proposal:
+    if run.summary.has_proposal:
         return "proposal"
-    return "replaced" if run.has_written else ""
+    return "replaced" if run.summary.has_written else ""
 
 
 def comparison_text(before: PastRun, after: PastRun, compared: RunComparison) -> str:

@@ -13,6 +13,8 @@ from hexacell.cell.loader import Cell
 from hexacell.errors import UsageError
 from hexacell.storage.atomic_files import create_folder_durably, write_atomically
 
+JOURNAL = "journal.jsonl"
+
 
 @dataclass(frozen=True, slots=True)
 class RunFolder:
@@ -23,7 +25,7 @@ class RunFolder:
     @property
     def journal(self) -> Path:
         """The run itself; all else can be derived from it."""
-        return self.path / "journal.jsonl"
+        return self.path / JOURNAL
 
     @property
     def measurements(self) -> Path:

@@ -80,7 +80,7 @@ class CellWorkplace:
 
     async def compare(self, run: str) -> tuple[str, ...]:
         """See :class:`Workplace`."""
-        identified = [one.name for one in await self._past_runs() if one.result is not None]
+        identified = [one.name for one in await self._past_runs() if one.summary.has_result]
         earlier = identified[identified.index(run) + 1 :] if run in identified else []
         if not earlier:
             raise UsageError(f"no run before {run} identified a geometry", action="Choose a later one")

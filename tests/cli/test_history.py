@@ -69,3 +69,18 @@ def test_a_run_is_told_in_lines(cell, typed_here) -> None:
 def test_one_question_at_a_time(cell, typed_here) -> None:
     refused = typed_here("history", cell.path, "--drift", "--compare", "a", "b")
     assert (refused.code, "not allowed with" in refused.err) == (2, True)
+
+
+def test_an_archive_that_is_not_there_is_warned_about(cell, typed_here, tmp_path) -> None:
+    propose_run(cell)
+    listed = typed_here("history", cell.path, "--archive", f"postgresql://nobody@/none?host={tmp_path}")
+    assert (listed.code, len(listed.out.splitlines())) == (0, 2)
+    assert "warning" in listed.err
+    assert "read from their folders" in listed.err
+
+
+def test_passwords_are_refused_in_the_address_of_an_archive(cell, typed_here) -> None:
+    for url in ("postgresql://me:secret@host/cells", "postgresql://me@host/cells?password=secret"):
+        refused = typed_here("history", cell.path, "--archive", url)
+        assert (refused.code, "secret" in refused.err, ".pgpass" in refused.err) == (2, False, True)
+    assert typed_here("history", cell.path, "--archive", "sqlite:///x").code == 2

@@ -6,10 +6,12 @@ import argparse
 from collections.abc import Sequence
 
 from hexacell.application.history import compare_runs, parameter_trends, past_runs
+from hexacell.application.run_index import RunIndex
+from hexacell.cell.archive import mistake_in_url
 from hexacell.cell.loader import Cell
 from hexacell.cli.cell_argument import cell_at
 from hexacell.cli.console import Console
-from hexacell.errors import ExitCode
+from hexacell.errors import ExitCode, UsageError
 from hexacell.presentation.documents import (
     comparison_document,
     drift_document,
@@ -33,14 +35,23 @@ def main(options: argparse.Namespace) -> ExitCode:
         console.document(story_document(entries))
         console.print(story_text(entries))
     elif options.drift:
-        found = parameter_trends(cell, past_runs(cell))
+        index = _index(cell, options, console)
+        found = parameter_trends(cell, past_runs(cell, index), index)
         console.document(drift_document(found))
         console.print(drift_text(found))
     else:
-        runs = past_runs(cell)
+        runs = past_runs(cell, _index(cell, options, console))
         console.document(history_document(runs))
         console.print(history_text(runs))
     return ExitCode.DONE
+
+
+def _index(cell: Cell, options: argparse.Namespace, console: Console) -> RunIndex:
+    """Of the archive that the command or the cell file names."""
+    mistake = None if options.archive is None else mistake_in_url(options.archive)
+    if mistake is not None:
+        raise UsageError(mistake[0], subject="--archive", action=mistake[1])
+    return RunIndex(cell, options.archive, console.warn)
 
 
 def _compare(cell: Cell, named: Sequence[str], console: Console) -> None:

@@ -61,7 +61,7 @@ def test_what_became_of_each_run_is_told(cell) -> None:
     commit(third.change, third.folder.path)
     runs = past_runs(cell)
     assert [run.name for run in runs] == ["c", "b", "a"]
-    assert [run.verdict for run in runs] == [Verdict.PASS, Verdict.CONDITIONAL_PASS, Verdict.PASS]
+    assert [run.summary.verdict for run in runs] == [Verdict.PASS, Verdict.CONDITIONAL_PASS, Verdict.PASS]
     assert [run.is_in_controller for run in runs] == [True, False, False]
     assert runs[1].folder == second.folder
     assert standing(runs[1]) == "proposal"
@@ -77,8 +77,8 @@ def test_a_run_that_is_not_over_says_so(cell) -> None:
         for event in (*history[:-1], events.Interrupted(reason="a cable broke", exit_code=3)):
             journal.append(event)
     (found,) = past_runs(cell)
-    assert not found.is_over
-    assert (found.line, standing(found)) == ("not over: a cable broke", "not over")
+    assert not found.summary.is_over
+    assert (found.summary.line, standing(found)) == ("not over: a cable broke", "not over")
 
 
 def test_what_cannot_be_read_is_listed_last_with_its_reason(cell) -> None:
@@ -89,7 +89,7 @@ def test_what_cannot_be_read_is_listed_last_with_its_reason(cell) -> None:
     (damaged.folder.path.parent / "note.txt").write_text("not a run")
     runs = past_runs(cell)
     assert [(run.name, standing(run)) for run in runs[1:]] == [("z", "unreadable"), ("empty", "unreadable")]
-    assert "damaged" in runs[1].line
+    assert "damaged" in runs[1].summary.line
     assert max(map(len, history_text(runs).splitlines())) <= 80
 
 

@@ -1,0 +1,113 @@
+"""What is known of all runs of a cell, from the archive where it is as new as the run folders.
+
+What is missing there, or older than its folder, is read from the folder and kept. Where the archive cannot
+be used at all, everything is read from the folders.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from contextlib import closing
+from typing import TypeVar
+
+from pydantic import BaseModel, ValidationError
+
+from hexacell.cell.loader import Cell
+from hexacell.runs.archive import Archive, ArchiveUnavailable, DocumentKind, StampedDocument
+from hexacell.runs.folder_stamps import folder_stamps
+from hexacell.runs.run_folder import RunFolder, runs_folder
+
+BATCH = 100
+"""Of runs that are kept at once, so that an interrupted reading of thousands of folders is not lost."""
+
+NOTHING = b""
+"""What is kept of a run that has no such document."""
+
+Document = TypeVar("Document", bound=BaseModel)
+
+
+class RunIndex:
+    """The runs of a cell; ``warn`` is told why the archive cannot be used, if it cannot.
+
+    ``url`` is that of a shared archive, if it is another than the cell file's.
+    """
+
+    def __init__(
+        self, cell: Cell, url: str | None = None, warn: Callable[[str], None] = lambda _: None
+    ) -> None:
+        self._cell = cell
+        self._folder = runs_folder(cell)
+        self._url = cell.settings.archive.url if url is None else url
+        self._warn = warn
+        self._has_warned = False
+
+    def documents(
+        self,
+        kind: DocumentKind,
+        model: type[Document],
+        read: Callable[[RunFolder], Document | None],
+        runs: Iterable[str] | None = None,
+    ) -> dict[str, Document]:
+        """The documents of all runs, or of some, by name; without those that have none.
+
+        ``read`` derives a document from its folder; a part of the runs has none.
+
+        Raises:
+            FileError: the folder of the runs cannot be read.
+        """
+        stamps = folder_stamps(self._folder)
+        wanted = {name: stamps[name] for name in (stamps if runs is None else runs) if name in stamps}
+        if not wanted:
+            return {}
+        with closing(Archive(self._folder, self._cell.settings.name, self._url)) as archive:
+            known = self._known(archive, kind, stamps)
+            found = {name: _decoded(model, known.get(name), stamp) for name, stamp in wanted.items()}
+            unknown = [name for name, one in found.items() if one is _UNKNOWN]
+            for start in range(0, len(unknown), BATCH):
+                batch = unknown[start : start + BATCH]
+                fresh = {name: read(RunFolder(self._folder / name)) for name in batch}
+                self._keep(archive, kind, {name: _encoded(fresh[name], stamps[name]) for name in batch})
+                found |= fresh
+        return {name: one for name, one in found.items() if isinstance(one, model)}
+
+    def _known(
+        self, archive: Archive, kind: DocumentKind, stamps: Mapping[str, str]
+    ) -> Mapping[str, StampedDocument]:
+        """What the archive has; runs whose folders are gone are dropped from it."""
+        try:
+            known = archive.documents(kind)
+            archive.forget([name for name in known if name not in stamps])
+        except ArchiveUnavailable as error:
+            self._tell(error)
+            return {}
+        return known
+
+    def _keep(self, archive: Archive, kind: DocumentKind, documents: Mapping[str, StampedDocument]) -> None:
+        if self._has_warned:
+            return
+        try:
+            archive.store(kind, documents)
+        except ArchiveUnavailable as error:
+            self._tell(error)
+
+    def _tell(self, error: ArchiveUnavailable) -> None:
+        self._has_warned = True
+        self._warn(str(error))
+
+
+_UNKNOWN = object()
+
+
+def _decoded(model: type[Document], kept: StampedDocument | None, stamp: str) -> Document | object | None:
+    """What is kept of a run, if its folder has not changed since and the content is whole."""
+    if kept is None or kept.stamp != stamp:
+        return _UNKNOWN
+    try:
+        return None if kept.content == NOTHING else model.model_validate_json(kept.content)
+    except ValidationError:
+        return _UNKNOWN
+
+
+def _encoded(document: BaseModel | None, stamp: str) -> StampedDocument:
+    content = NOTHING if document is None else document.model_dump_json().encode()
+    return StampedDocument(stamp, content)

@@ -1,0 +1,236 @@
+"""The archive: an index over the run folders of a cell, in SQLite or in a PostgreSQL that cells share.
+
+The folders are the truth. The archive keeps documents that were derived from them, each with the stamp of
+its folder then (:mod:`~hexacell.runs.folder_stamps`); a document whose folder has another stamp now counts
+for nothing. So it may be deleted at any time, and a file that is damaged is replaced by an empty one.
+"""
+
+from __future__ import annotations
+
+import os
+import socket
+import sqlite3
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from enum import StrEnum
+from functools import cached_property
+from pathlib import Path
+from typing import TypeVar
+
+from sqlalchemy import (
+    URL,
+    Column,
+    Connection,
+    Engine,
+    LargeBinary,
+    MetaData,
+    String,
+    Table,
+    bindparam,
+    create_engine,
+    make_url,
+    select,
+)
+from sqlalchemy.exc import DBAPIError, SQLAlchemyError
+from sqlalchemy.pool import NullPool
+
+from hexacell.errors import FileError
+from hexacell.storage.atomic_files import NOT_FOR_OTHERS
+
+VERSION = 1
+"""Of the documents and their table. A newer program makes a table of its own and fills it anew."""
+
+INDEX = "index.sqlite"
+"""The file of a cell's own archive, in the folder of its runs."""
+
+PATIENCE_S = 5
+"""Of a connection to a database server, and of a wait for another process."""
+
+Found = TypeVar("Found")
+
+_TABLE = Table(
+    f"hexacell_runs_{VERSION}",
+    MetaData(),
+    Column("place", String(1024), primary_key=True),
+    Column("run", String(255), primary_key=True),
+    Column("kind", String(16), primary_key=True),
+    Column("cell", String(64), nullable=False, index=True),
+    Column("stamp", String(255), nullable=False),
+    Column("content", LargeBinary, nullable=False),
+)
+
+_READ_ONLY_OR_BUSY = frozenset(
+    {
+        sqlite3.SQLITE_BUSY,
+        sqlite3.SQLITE_LOCKED,
+        sqlite3.SQLITE_READONLY,
+        sqlite3.SQLITE_FULL,
+        sqlite3.SQLITE_CANTOPEN,
+        sqlite3.SQLITE_PERM,
+        sqlite3.SQLITE_AUTH,
+    }
+)
+
+
+class DocumentKind(StrEnum):
+    """What the archive keeps of a run."""
+
+    SUMMARY = "summary"
+    RESULT = "result"
+
+
+@dataclass(frozen=True, slots=True)
+class StampedDocument:
+    """A document that was derived from a run folder when that had the ``stamp``."""
+
+    stamp: str
+    content: bytes
+
+
+class ArchiveUnavailable(FileError):
+    """The archive cannot be used; what is asked of it must be read from the folders."""
+
+
+class Archive:
+    """The documents of one cell.
+
+    Args:
+        folder: of the cell's runs, which exists.
+        cell: its name, for those who read a shared archive.
+        url: of a shared PostgreSQL; without one, a file in ``folder``.
+    """
+
+    def __init__(self, folder: Path, cell: str, url: str | None = None) -> None:
+        self._file = folder / INDEX if url is None else None
+        self._cell = cell
+        # A folder that is moved or copied takes its own file along, where the place is always the same.
+        self._place = "" if url is None else f"{socket.gethostname()}:{folder.absolute()}"
+        self._url = URL.create("sqlite", database=str(folder / INDEX)) if url is None else make_url(url)
+        self._is_ready = False
+
+    @cached_property
+    def _engine(self) -> Engine:
+        try:
+            return _engine(self._url)
+        except ModuleNotFoundError as error:
+            action = "Install hexacell[postgresql]. The runs are read from their folders"
+            raise ArchiveUnavailable(str(error), subject="PostgreSQL", action=action) from error
+
+    def documents(self, kind: DocumentKind) -> dict[str, StampedDocument]:
+        """All documents of one kind, by the names of their runs.
+
+        Raises:
+            ArchiveUnavailable: it cannot be read.
+        """
+        query = select(_TABLE.c.run, _TABLE.c.stamp, _TABLE.c.content).where(
+            _TABLE.c.place == self._place, _TABLE.c.kind == kind.value
+        )
+
+        def read(connection: Connection) -> dict[str, StampedDocument]:
+            return {
+                run: StampedDocument(stamp, content) for run, stamp, content in connection.execute(query)
+            }
+
+        return self._transact(read)
+
+    def store(self, kind: DocumentKind, documents: Mapping[str, StampedDocument]) -> None:
+        """Keep documents, in the place of older ones.
+
+        Raises:
+            ArchiveUnavailable: it cannot be written.
+        """
+        rows = [
+            {"place": self._place, "run": run, "kind": kind.value, "cell": self._cell}
+            | {"stamp": one.stamp, "content": one.content}
+            for run, one in documents.items()
+        ]
+
+        def write(connection: Connection) -> None:
+            connection.execute(
+                _TABLE.delete().where(
+                    _TABLE.c.place == self._place,
+                    _TABLE.c.kind == kind.value,
+                    _TABLE.c.run == bindparam("of_run"),
+                ),
+                [{"of_run": run} for run in documents],
+            )
+            connection.execute(_TABLE.insert(), rows)
+
+        if rows:
+            self._transact(write)
+
+    def forget(self, runs: Sequence[str]) -> None:
+        """Drop everything about runs that are gone.
+
+        Raises:
+            ArchiveUnavailable: it cannot be written.
+        """
+        query = _TABLE.delete().where(_TABLE.c.place == self._place, _TABLE.c.run == bindparam("of_run"))
+        if runs:
+            self._transact(lambda connection: connection.execute(query, [{"of_run": run} for run in runs]))
+
+    def close(self) -> None:
+        """Close all connections."""
+        if "_engine" in vars(self):
+            self._engine.dispose()
+
+    def _transact(self, act: Callable[[Connection], Found]) -> Found:
+        """Do something in one transaction; in a new file where the old one is damaged."""
+        try:
+            return self._act(act)
+        except DBAPIError as error:
+            if self._file is None or not _is_damaged(error):
+                raise self._unavailable(error) from error
+        except SQLAlchemyError as error:
+            raise self._unavailable(error) from error
+        self._discard_file()
+        try:
+            return self._act(act)
+        except SQLAlchemyError as error:
+            raise self._unavailable(error) from error
+
+    def _act(self, act: Callable[[Connection], Found]) -> Found:
+        if not self._is_ready:
+            _make_file(self._file)
+        with self._engine.begin() as connection:
+            if not self._is_ready:
+                _TABLE.metadata.create_all(connection)
+                self._is_ready = True
+            return act(connection)
+
+    def _discard_file(self) -> None:
+        assert self._file is not None  # noqa: S101 - only a file is found damaged
+        self._is_ready = False
+        for path in (self._file, self._file.with_name(f"{INDEX}-journal")):
+            path.unlink(missing_ok=True)
+
+    def _unavailable(self, error: SQLAlchemyError) -> ArchiveUnavailable:
+        cause = error.orig if isinstance(error, DBAPIError) else error
+        reason = " ".join(str(cause).split())
+        where = self._url.render_as_string() if self._file is None else self._file
+        return ArchiveUnavailable(
+            f"the archive cannot be used ({reason})",
+            subject=where,
+            action="The runs are read from their folders, which takes longer",
+        )
+
+
+def _engine(url: URL) -> Engine:
+    if url.drivername == "sqlite":
+        return create_engine(url, poolclass=NullPool, connect_args={"timeout": PATIENCE_S})
+    with_driver = url.set(drivername="postgresql+psycopg")
+    return create_engine(with_driver, poolclass=NullPool, connect_args={"connect_timeout": PATIENCE_S})
+
+
+def _make_file(path: Path | None) -> None:
+    """SQLite would make a file as the umask has it; where there can be none, it says why."""
+    if path is not None and not path.exists():
+        with suppress(OSError):
+            os.close(os.open(path, os.O_CREAT | os.O_WRONLY, 0o666 & ~NOT_FOR_OTHERS))
+
+
+def _is_damaged(error: DBAPIError) -> bool:
+    """Whether a file of SQLite is none, or has other tables than it should."""
+    code = getattr(error.orig, "sqlite_errorcode", None)
+    return code is not None and code & 0xFF not in _READ_ONLY_OR_BUSY

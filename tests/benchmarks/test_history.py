@@ -1,0 +1,53 @@
+"""The history of a cell with 10,000 runs: how long it takes to open."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from hexacell.application.history import past_runs
+from hexacell.runs.archive import INDEX
+from hexacell.runs.run_folder import runs_folder
+from tests.hexacell.application.proposed_runs import a_cell, propose_run
+
+Say = Callable[[str, str, str], None]
+
+pytestmark = pytest.mark.benchmark
+
+RUNS = 10_000
+LIMIT_S = 0.5
+
+
+def test_a_long_history_opens_at_once(tmp_path: Path, say: Say) -> None:
+    cell = a_cell(tmp_path)
+    journal = propose_run(cell, "0").folder.journal.read_bytes()
+    for number in range(1, RUNS):
+        folder = runs_folder(cell) / str(number)
+        folder.mkdir()
+        (folder / "journal.jsonl").write_bytes(journal)
+    began = time.perf_counter()
+    assert len(past_runs(cell)) == RUNS
+    made = time.perf_counter() - began
+    opened = min(seconds_to_open(cell) for _ in range(3))
+    command = [sys.executable, "-m", "hexacell", "history", str(cell.path)]
+    began = time.perf_counter()
+    printed = subprocess.run(command, capture_output=True, check=True, text=True).stdout
+    whole = time.perf_counter() - began
+    size = (runs_folder(cell) / INDEX).stat().st_size / RUNS
+    say(f"history of {RUNS} runs: opened, best of three", f"{opened:.2f} s", f"{LIMIT_S} s")
+    say("  the command, with the start of the program and all lines", f"{whole:.2f} s", "-")
+    say("  without an archive, journals of 5 lines", f"{made:.1f} s", "-")
+    say("  the archive takes", f"{size:.0f} bytes a run", "-")
+    assert len(printed.splitlines()) == RUNS + 1
+    assert opened < LIMIT_S
+
+
+def seconds_to_open(cell) -> float:
+    began = time.perf_counter()
+    past_runs(cell)
+    return time.perf_counter() - began

@@ -13,7 +13,15 @@ import pytest
 
 CHECKOUT = Path(__file__).parent.parent
 PACKAGES = ("hexacell", "drivers", "procedures")
-MATHEMATICS = ("kinematics", "limits", "identification", "uncertainty", "motion", "experiment_design")
+MATHEMATICS = (
+    "kinematics",
+    "limits",
+    "identification",
+    "uncertainty",
+    "motion",
+    "experiment_design",
+    "change_detection",
+)
 
 FORBIDDEN = [
     ("hexacell.errors", "hexacell.cli"),

@@ -1,0 +1,73 @@
+"""What is known of an unchanged robot from all its runs so far, and how far the next one contradicts it.
+
+Estimates of several nights share the error of the calibration that they start from, so that a test of
+them one by one would alarm on a robot that has not changed. Their innovations do not: what a run shows
+beyond what all runs before it predict is independent of these, if nothing changed (Kailath, An innovations
+approach to least-squares estimation, IEEE Transactions on Automatic Control 13, 1968, 646-655). With the
+information L carried so far, at whose estimate the new evidence has the gradient g, and the information N
+of that,
+
+    s = L (L + N)^-1 g        and its covariance        L (L + N)^-1 N,
+
+so that ``d^T s`` over its standard deviation is the score of a change along d, standard normal without one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from hexacell.change_detection.run_evidence import RunEvidence
+from hexacell.kinematics.rotations import Array
+
+DIFFUSE = 1e2
+"""Standard deviation of a free parameter of which nothing is known, mm or rad."""
+
+LEAST_SHARE = 1e-3
+"""Of the information of a run: what must be left of it, for a cause, by what is not known from before."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CarriedPosterior:
+    """The evidence of all runs so far, with the prior."""
+
+    evidence: RunEvidence
+
+    @classmethod
+    def diffuse(cls, free: int, causes: int) -> CarriedPosterior:
+        """Nothing known of so many free parameters; shared causes have unit variance."""
+        precision = np.diag([DIFFUSE**-2] * free + [1.0] * causes)
+        return cls(RunEvidence(precision, np.zeros(free + causes)))
+
+    @property
+    def state(self) -> Array:
+        """The estimate (s,)."""
+        found: Array = np.linalg.solve(self.evidence.information, self.evidence.weighted)
+        return found
+
+    def after(self, run: RunEvidence) -> CarriedPosterior:
+        """With one more run."""
+        return CarriedPosterior(self.evidence + run)
+
+    def scores(self, run: RunEvidence, causes: Array) -> Array:
+        """Innovations (m,) of a run by each cause (m, s); NaN where it says nothing of a change.
+
+        They are standard normal, and independent of all before, if the robot has not changed.
+        """
+        information = self.evidence.information
+        share = np.linalg.solve(information + run.information, information).T
+        score = causes @ (share @ run.gradient(self.state))
+        variance = np.einsum("ms,st,mt->m", causes, share @ run.information, causes)
+        own = np.einsum("ms,st,mt->m", causes, run.information, causes)
+        is_seen = variance > LEAST_SHARE * own
+        return np.where(is_seen, score / np.sqrt(np.where(is_seen, variance, 1.0)), np.nan)
+
+    def forgetting(self, cause: Array) -> CarriedPosterior:
+        """The same when the robot may have changed by any amount along a cause (s,), now."""
+        information, weighted = self.evidence.information, self.evidence.weighted
+        along = information @ cause
+        taken = along / (DIFFUSE**-2 + float(cause @ along))
+        return CarriedPosterior(
+            RunEvidence(information - np.outer(taken, along), weighted - taken * float(cause @ weighted))
+        )

@@ -16,7 +16,8 @@ import pytest
 from hypothesis import settings
 
 GRACE_S = 20.0  # for what is on its way out when a test returns; only a test that fails waits so long
-BENCHMARKS = Path(__file__).parent / "benchmarks"
+TESTS = Path(__file__).parent
+BENCHMARKS = TESTS / "benchmarks"
 FAULTS = "fault-matrix"  # what a test calls the cases that it tried
 
 # As in the program and the Makefile: threads only slow small matrices down. Numpy is imported later.
@@ -33,10 +34,14 @@ settings.load_profile("hexacell")
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Whatever lies in tests/benchmarks is a benchmark."""
+    """Whatever lies in tests/benchmarks is a benchmark; tests of the whole project come first.
+
+    They are the longest, and the processes that share the tests should end together.
+    """
     for item in items:
         if BENCHMARKS in item.path.parents:
             item.add_marker(pytest.mark.benchmark)
+    items.sort(key=lambda item: item.path.parent != TESTS)
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:

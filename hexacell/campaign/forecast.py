@@ -54,12 +54,12 @@ class Forecaster:
     """Forecasts the error at the task poses.
 
     Attributes:
-        sizes: how many records each point gets at most.
+        sizes: gives how many records each point gets at most, by what is known in a state.
         planned_sets: gives a set of poses at each point, which represent those not selected yet.
         systematic_mm: gives the standard uncertainty by the systematic effects at the end, if it is known.
     """
 
-    sizes: Mapping[int, int]
+    sizes: Callable[[CampaignState], Mapping[int, int]]
     budget: Budget
     task: Task
     planned_sets: Callable[[], Sequence[PoseBatch]]
@@ -102,7 +102,7 @@ class Forecaster:
         planned: dict[int, int] = {}
         records, points = len(state.measurements), state.begun_points
         # The present point comes first.
-        left = sorted(set(self.sizes) - state.done, key=lambda point: (point != state.point, point))
+        left = sorted(set(self.sizes(state)) - state.done, key=lambda point: (point != state.point, point))
         for point in left:
             is_begun = state.point == point
             more = self._most(state, point, records, points)
@@ -161,7 +161,7 @@ class Forecaster:
     def _most(self, state: CampaignState, point: int, records: int, points: int) -> int:
         """How many more records a point may get after some records at some points."""
         affordable = self.budget.records_left(records, points + (state.point != point))
-        return int(min(self.sizes[point] - state.records_at(point), affordable))
+        return int(min(self.sizes(state)[point] - state.records_at(point), affordable))
 
 
 @dataclass(frozen=True, eq=False)

@@ -27,6 +27,7 @@ from hexacell.campaign.forecast import Forecaster, select_sets
 from hexacell.campaign.planned_uncertainty import planned_systematic_mm
 from hexacell.campaign.pose_chooser import PoseChooser
 from hexacell.campaign.pose_list import PoseList
+from hexacell.campaign.record_shares import shared_sizes
 from hexacell.campaign.recursive_estimator import OnlineEstimate, OnlineEstimator, RecordEstimator
 from hexacell.campaign.stopping_rules import Goal, StoppingRules
 from hexacell.campaign.task_accuracy import Task
@@ -117,6 +118,17 @@ class Plan:
             return len(self.pose_list.at(point))
         return self.settings.identification.orientations
 
+    def sizes(self, state: CampaignState) -> Mapping[int, int]:
+        """How many records each point gets at most, once some points were found to be out of reach.
+
+        What a file lists, a goal needs, or points gain in the same time, is not shared.
+        """
+        planned = {point: self.records_at(point) for point in self.points}
+        is_shared = self.pose_list is None and self.goal is None
+        if not is_shared or self.settings.identification.choose_points:
+            return planned
+        return shared_sizes(planned, state, self._out_of_reach(state))
+
     def reference_pose(self, point: int) -> Pose:
         """Where a point's gauges are zeroed, in the controller's frames."""
         return self.poses_at(point)[0]
@@ -163,9 +175,8 @@ class Plan:
     @cached_property
     def forecaster(self) -> Forecaster:
         """Forecasts what further records gain."""
-        sizes = {point: self.records_at(point) for point in self.points}
         return Forecaster(
-            sizes, self.budget, self.task, lambda: self.planned_sets, lambda: self.systematic_mm
+            self.sizes, self.budget, self.task, lambda: self.planned_sets, lambda: self.systematic_mm
         )
 
     @cached_property
@@ -230,8 +241,22 @@ class Plan:
             via=via,
         )
 
-    def _is_safe(self, state: CampaignState, point: int) -> bool:
-        """Whether the robot, as it is known by now, takes a point's reference within the limits."""
+    def _out_of_reach(self, state: CampaignState) -> frozenset[int]:
+        """Points that are not to be begun as far as is known.
+
+        A point that is only too uncertain may be measured later, if there is another one to learn from.
+        """
+        others = {point for point in self.points if point not in state.done and point != state.point}
+        unsafe = {point for point in others if not self._is_safe(state, point)}
+        if unsafe == others:
+            return frozenset(unsafe)
+        return frozenset(point for point in unsafe if not self._is_safe(state, point, certainly=False))
+
+    def _is_safe(self, state: CampaignState, point: int, *, certainly: bool = True) -> bool:
+        """Whether the robot, as it is known by now, takes a point's reference within the limits.
+
+        ``certainly``: or only as the estimate has it.
+        """
         if not len(state.measurements):
             return True  # by the drawing it does, as preflight has checked
         reference = self.robot.from_commands([self.reference_pose(point)])
@@ -242,7 +267,7 @@ class Plan:
         actual = belief.commanded.actual_poses(reference)
         if not actual.found[0]:
             return False
-        wanted = belief.margins_at(actual)
+        wanted = belief.margins_at(actual) if certainly else None
         if not belief.keeps_limits(actual.poses, actual.joints, wanted)[0]:
             return False
         return is_clear(belief, reference, reference)

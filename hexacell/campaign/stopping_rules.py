@@ -39,7 +39,8 @@ class StoppingRules:
 
     def end_of_campaign(self, state: CampaignState) -> str | None:
         """Between points: why no other point is to be begun, whichever it is."""
-        sizes, count = self.forecaster.sizes, len(self.forecaster.sizes)
+        sizes = self.forecaster.sizes(state)
+        count = len(sizes)
         if all(state.records_at(point) >= size for point, size in sizes.items()):
             return f"all {count} points are measured"
         reached = (
@@ -53,7 +54,7 @@ class StoppingRules:
 
     def end_of_point(self, state: CampaignState, point: int) -> str | None:
         """At a point: why no more records are to be taken there, whichever they are."""
-        size = self.forecaster.sizes[point]
+        size = self.forecaster.sizes(state)[point]
         if state.records_at(point) >= size:
             return f"all its {size} orientations are measured"
         if state.rejections > REFUSALS:
@@ -92,7 +93,8 @@ class StoppingRules:
 
     def _another_point(self, state: CampaignState, point: int) -> str | None:
         """That another point is worth more, if points are to be chosen."""
-        others = [other for other in self.forecaster.sizes if other not in state.done and other != point]
+        sizes = self.forecaster.sizes(state)
+        others = [other for other in sizes if other not in state.done and other != point]
         if not self.settings.identification.choose_points or not others:
             return None
         belief = self.estimator.estimate(state.measurements).belief

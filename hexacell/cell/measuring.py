@@ -45,7 +45,11 @@ class IdentificationSettings(Section):
         min_length=2, max_length=MOST_POINTS, description="ball positions, mm, in this order"
     )
     orientations: int = Field(
-        11, ge=2, le=MOST_POSES, description="records at each point, its reference included"
+        11,
+        ge=2,
+        le=MOST_POSES,
+        description="records at each point, its reference included; "
+        "those of a point out of reach are taken at the others",
     )
     seed: Seed = Field(1, description="random seed of the candidate orientations")
     criterion: Literal["task", "parameters", "information"] = Field(

@@ -42,6 +42,7 @@ QUICK = (
     ("leg_distance_mm = 30.0", "leg_distance_mm = 0.0"),
     ("base_cone_deg = 45.0", "base_cone_deg = 180.0"),
     ("platform_cone_deg = 45.0", "platform_cone_deg = 180.0"),
+    ("[stations]\n", "[stations]\ntrial_mm = 0.0\n"),
     # Each test of the model fails one healthy run in a thousand, and the suite has hundreds of runs.
     ("encoder_mm = 0.01\ngauge_mm = 0.01", "encoder_mm = 0.014\ngauge_mm = 0.014"),
 )

@@ -287,6 +287,8 @@ def test_a_point_whose_reference_is_beyond_a_limit_is_left_and_an_uncertain_one_
     # After point 1 the robot is not known well enough for points 2 and 3.
     assert begun == [1, 4, 2, 3]
     assert taken[-1].decision.reason == "none of the remaining points can be reached safely"
+    counts = [int((taken[-1].state.measurements.points == point).sum()) for point in range(1, 6)]
+    assert counts == [13, 14, 14, 14, 0], "together 5 times 11"
 
 
 def test_a_point_to_which_no_line_is_clear_yet_is_put_off(campaign, make_plan, monkeypatch):

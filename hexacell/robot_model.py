@@ -55,7 +55,7 @@ class Robot:
             that the controller had before in the same run.
         work_frame: the axes of the controller's base frame about which a work frame can be taught.
         effects: systematic ones, as they are stated of the machine.
-        refused: commands that the controller refused in this run.
+        refused: commands that the controller refused in this run, and those that a person took out.
     """
 
     mechanism: Mechanism

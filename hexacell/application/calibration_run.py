@@ -14,6 +14,7 @@ from hexacell.application.device_setup import Connected, device_addresses, open_
 from hexacell.application.journal_soundness import require_sound
 from hexacell.application.run_ownership import require_own_run
 from hexacell.campaign.pose_list import pose_list_of
+from hexacell.campaign.removed_poses import NOTHING_REMOVED, RemovedPoses, require_enough
 from hexacell.cell.loader import Cell
 from hexacell.controller_config.change import fingerprint
 from hexacell.controller_config.current import CurrentConfig
@@ -54,7 +55,10 @@ def _watch_nothing(_engine: Engine, _devices: Devices) -> None:
 
 @dataclass(frozen=True)
 class RunRequest:
-    """One run of a cell, new or resumed, and the folder that keeps it."""
+    """One run of a cell, new or resumed, and the folder that keeps it.
+
+    ``removed`` is what a person took out of the plan of a new one; a resumed one keeps its own.
+    """
 
     cell: Cell
     folder: RunFolder
@@ -63,6 +67,7 @@ class RunRequest:
     unattended: bool = False
     resume: bool = False
     length_check: bool = False
+    removed: RemovedPoses = NOTHING_REMOVED
 
 
 async def preflight(cell: Cell, mode: Mode, *, unattended: bool) -> tuple[DeviceIdentity, ...]:
@@ -104,7 +109,9 @@ async def calibrate(
         started = _resumed_start(request) if request.resume else None
         if started is None:
             _require_own_geometry(cell)
-            calibration = _new_calibration(cell, request.mode, length_check=request.length_check)
+            require_enough(request.removed, len(cell.settings.identification.points))
+            whole = _new_calibration(cell, request.mode, length_check=request.length_check)
+            calibration = whole.without(request.removed)
         else:
             calibration = calibration_of_run(cell, started)
         async with _checked_devices(cell, calibration, folder.path, request.unattended) as connected:
@@ -230,6 +237,7 @@ def run_started(
         accepted=calibration.accepted,
         joint_ranges=robot.limits.joint_ranges,
         length_check=calibration.length_check,
+        removed=calibration.removed,
     )
 
 
@@ -283,7 +291,7 @@ def calibration_of_run(cell: Cell, started: events.RunStarted) -> Calibration:
         pose_list_of(cell),
         started.accepted,
         length_check=started.length_check,
-    )
+    ).without(started.removed)
 
 
 def _new_calibration(cell: Cell, mode: Mode, *, length_check: bool = False) -> Calibration:

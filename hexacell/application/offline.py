@@ -21,6 +21,7 @@ from hexacell.campaign.feasibility import unreachable_share
 from hexacell.campaign.measured_noise import AveragingForecast, with_measured_noise
 from hexacell.campaign.planner import Plan
 from hexacell.campaign.pose_list import pose_list_of
+from hexacell.campaign.removed_poses import NOTHING_REMOVED, RemovedPoses, require_enough
 from hexacell.cell.loader import Cell
 from hexacell.errors import UsageError
 from hexacell.identification.estimator import identify
@@ -111,9 +112,15 @@ def next_pose(cell: Cell, measurements: MeasurementSet, *, rejections: int = 0) 
     return NextPose(decision, forecast, tuple(sorted(plan.estimate(state).false_records)))
 
 
-def try_plan(cell: Cell) -> PlanTrial:
-    """Carry out a cell's plan on robots drawn within its tolerances; takes some seconds."""
-    plan = plan_of(cell)
+def try_plan(cell: Cell, removed: RemovedPoses = NOTHING_REMOVED) -> PlanTrial:
+    """Carry out a cell's plan on robots drawn within its tolerances; takes some seconds.
+
+    Raises:
+        UsageError: without what is removed too little is left.
+        FileError: see :func:`plan_of`.
+    """
+    require_enough(removed, len(cell.settings.identification.points))
+    plan = plan_of(cell, removed)
     averaging, noise = AveragingForecaster(plan), plan.robot.noise
     return PlanTrial(
         dry_run(plan),
@@ -124,9 +131,11 @@ def try_plan(cell: Cell) -> PlanTrial:
     )
 
 
-def plan_of(cell: Cell) -> Plan:
+def plan_of(cell: Cell, removed: RemovedPoses = NOTHING_REMOVED) -> Plan:
     """The plan of a cell; raises ``FileError`` if its config or its list of poses cannot be read."""
-    return Plan(cell.settings, robot_of(cell), pose_list_of(cell))
+    robot = replace(robot_of(cell), refused=removed.refused)
+    listed = removed.left_of(pose_list_of(cell))
+    return Plan(cell.settings, robot, listed, left_points=frozenset(removed.points))
 
 
 def _state_of_records(plan: Plan, measurements: MeasurementSet, rejections: int) -> CampaignState:

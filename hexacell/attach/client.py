@@ -25,6 +25,7 @@ from hexacell.attach.messages import (
     message_line,
 )
 from hexacell.attach.run_socket import peer_of
+from hexacell.campaign.removed_poses import NOTHING_REMOVED, RemovedPoses
 from hexacell.errors import ExitCode, FileError, HexacellError
 from procedures.run import events
 from procedures.run.commands import Command
@@ -131,24 +132,34 @@ async def connect_to_run(path: Path) -> HostConnection | None:
     return HostConnection(reader, writer)
 
 
-async def start_host(path: Path, arguments: Sequence[str]) -> HostConnection:
+async def start_host(
+    path: Path, arguments: Sequence[str], removed: RemovedPoses = NOTHING_REMOVED
+) -> HostConnection:
     """Start ``hexacell host`` with these arguments, and connect to it; its socket is ``path``.
+
+    A new run goes without what is ``removed`` from its plan.
 
     Raises:
         HostNotStarted: the reason.
     """
-    await asyncio.to_thread(_spawn, list(arguments))
+    await asyncio.to_thread(_spawn, list(arguments), removed)
     connection = await connect_to_run(path)
     if connection is None:
         raise HostNotStarted(HostFailed(problem="the run's process ended at once"))
     return connection
 
 
-def _spawn(arguments: list[str]) -> None:
+def _spawn(arguments: list[str], removed: RemovedPoses) -> None:
     """Start the process and wait until it listens; it is no child of this one then."""
-    command = [sys.executable, "-m", "hexacell", "host", *arguments]
     told, telling = os.pipe()
-    with tempfile.TemporaryFile() as errors, os.fdopen(told, "rb") as answers:
+    with (
+        tempfile.NamedTemporaryFile() as without,
+        tempfile.TemporaryFile() as errors,
+        os.fdopen(told, "rb") as answers,
+    ):
+        without.write(removed.model_dump_json().encode())
+        without.flush()
+        command = [sys.executable, "-m", "hexacell", "host", *arguments, "--removed", without.name]
         try:
             process = os.posix_spawn(
                 sys.executable, command, os.environ, file_actions=_streams(telling, errors), setsid=True

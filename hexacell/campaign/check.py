@@ -51,6 +51,7 @@ class Check:
             its records do not reduce them.
         earlier: what these did to that result, as errors (p, k) of its free parameters by effect.
         candidates: number of candidate orientations for each record.
+        left_points: points that are not measured, counted from 1.
     """
 
     settings: CellSettings
@@ -62,19 +63,21 @@ class Check:
     effects: tuple[Effect, ...] = ()
     earlier: Mapping[str, Array] = field(default_factory=dict)
     candidates: int = CANDIDATES
+    left_points: frozenset[int] = frozenset()
 
     @cached_property
     def plan(self) -> Plan:
         """What to measure, until the check is decided or its budget is used."""
         drifting = self._drifting
         return Plan(
-            check_settings(self.settings, self.budget),
+            check_settings(self.settings, self.budget, len(self.left_points)),
             self.robot if drifting is None else drifting.robot,
             self.listed,
             self.candidates,
             estimator=self._by_drawing if drifting is None else drifting,
             goal=self,
             earlier=self.earlier,
+            left_points=self.left_points,
         )
 
     def reached(self, measurements: MeasurementSet) -> str | None:
@@ -164,7 +167,8 @@ class Check:
         total = np.sum(
             [planned.information(point, len(sets[point - 1])) for point in self.plan.points], axis=0
         )
-        return records_to_decide(first, second, self.limits, total / sum(map(len, sets)))
+        size = sum(len(sets[point - 1]) for point in self.plan.points)
+        return records_to_decide(first, second, self.limits, total / size)
 
     @cached_property
     def _drifting(self) -> DriftEstimator | None:
@@ -179,13 +183,17 @@ class Check:
         return {}
 
 
-def check_settings(settings: CellSettings, budget: int) -> CellSettings:
-    """A cell's settings with those of a check, of ``budget`` records, in the place of the calibration's."""
+def check_settings(settings: CellSettings, budget: int, left_points: int = 0) -> CellSettings:
+    """A cell's settings with those of a check, of ``budget`` records, in the place of the calibration's.
+
+    So many of the points are not measured.
+    """
     plan = settings.identification
+    points = len(plan.points) - left_points
     identification = plan.model_copy(
         update={
             "criterion": "task",
-            "orientations": max(2, math.ceil(budget / len(plan.points))),
+            "orientations": max(2, math.ceil(budget / points)),
             "budget_records": budget,
             "budget_minutes": None,
             "target_mm": None,

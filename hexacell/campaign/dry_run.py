@@ -140,6 +140,7 @@ class DryRunResult:
         minutes: to measure, noise and held-out poses included.
         expanded_mm: U of the largest error at the task poses, systematic effects included; none likewise.
         verdicts: what a run will say of healthy machines; none likewise, or without held-out poses.
+        visited: the poses of the first of these robots, in their order, with point and orientation.
     """
 
     drawn: int
@@ -151,6 +152,7 @@ class DryRunResult:
     minutes: float
     expanded_mm: float | None = None
     verdicts: VerdictForecast | None = None
+    visited: tuple[tuple[int, int, Pose], ...] = ()
 
 
 def dry_run(plan: Plan, robots: int = ROBOTS) -> DryRunResult:
@@ -218,4 +220,7 @@ def _summary(plan: Plan, tried: int, identified: list[_Outcome]) -> DryRunResult
         + after,
         expanded_mm=median(expanded) if expanded else None,
         verdicts=VerdictForecast.mean(verdicts) if verdicts else None,
+        visited=tuple(
+            (one.point, one.orientation, one.pose) for one in identified[0].campaign.measurements.records
+        ),
     )

@@ -172,7 +172,7 @@ def _points_without_poses(plan: Plan) -> Iterator[list[HexacellError]]:
     for point in plan.points:
         failures[point] = _no_safe_pose(plan, now, point)
         yield []
-    first_points = list(plan.points) if plan.settings.identification.choose_points else [1]
+    first_points = list(plan.points if plan.settings.identification.choose_points else plan.points[:1])
     if all(failures[point] for point in first_points):
         yield [error for point in first_points if (error := failures[point])]
     for point in plan.points:

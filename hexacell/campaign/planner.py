@@ -58,6 +58,7 @@ class Plan:
         estimator: of the robot from the records; none for the usual one.
         goal: what the records are for; none to identify the geometry as well as the settings ask for.
         earlier: what the systematic effects did to an earlier result that is the prior, by their names.
+        left_points: points that are not measured, counted from 1.
     """
 
     settings: CellSettings
@@ -68,6 +69,7 @@ class Plan:
     estimator: RecordEstimator | None = None
     goal: Goal | None = None
     earlier: Mapping[str, Array] = field(default_factory=dict)
+    left_points: frozenset[int] = frozenset()
 
     def decide(self, state: CampaignState) -> Decision:
         """What to do now.
@@ -144,9 +146,10 @@ class Plan:
         return None if rows is None else tuple(via[row] for row in rows)
 
     @property
-    def points(self) -> range:
-        """All points, counted from 1."""
-        return range(1, len(self.settings.identification.points) + 1)
+    def points(self) -> tuple[int, ...]:
+        """The points that are measured, counted from 1 among all of the cell."""
+        every = range(1, len(self.settings.identification.points) + 1)
+        return tuple(point for point in every if point not in self.left_points)
 
     @cached_property
     def chooser(self) -> PoseChooser:
@@ -182,7 +185,8 @@ class Plan:
     @cached_property
     def systematic_mm(self) -> float | None:
         """Standard uncertainty by the systematic effects at the end; none where it is not known."""
-        return planned_systematic_mm(self.robot, self.task, self.planned_sets, self.earlier)
+        sets = [self.planned_sets[point - 1] for point in self.points]
+        return planned_systematic_mm(self.robot, self.task, sets, self.earlier)
 
     @cached_property
     def _estimator(self) -> RecordEstimator:

@@ -121,6 +121,11 @@ def _run(commands: Any) -> None:  # noqa: ANN401
         "optimise: calibrate and write back (default otherwise)",
     )
     parser.add_argument(
+        "--plan",
+        action="store_true",
+        help="show the poses of the plan first, each of which may be taken out",
+    )
+    parser.add_argument(
         "--length-check",
         action="store_true",
         help="check the length scale before the verdict, with the fixture of [length_check]; a resumed run "
@@ -191,6 +196,7 @@ def _host(commands: Any) -> None:  # noqa: ANN401
     parser.add_argument("--mode", choices=("check", "optimise", "length"), required=True)
     parser.add_argument("--resume", action="store_true")
     parser.add_argument("--length-check", action="store_true")
+    parser.add_argument("--removed", type=Path, required=True)
 
 
 def _next(commands: Any) -> None:  # noqa: ANN401

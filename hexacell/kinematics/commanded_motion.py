@@ -54,7 +54,7 @@ class CommandedRobot:
     Both geometries and all poses are in one frame convention.
 
     Attributes:
-        refused: commands that the controller refused; it computes no joint variables for them.
+        refused: commands that are not given; no joint variables are computed for them.
         frames: from the frames of the commands to the convention's.
     """
 

@@ -1,7 +1,8 @@
-"""Commands that a controller refused, and what that says about others.
+"""Commands that a controller refused or a person took out, and what that says about others.
 
 A command beyond the limit of an axis says that every command at least as far out along it is refused as
-well. Any other refusal concerns that command alone.
+well. One that a person took out may concern all that are near it. Any other refusal concerns that command
+alone.
 """
 
 from __future__ import annotations
@@ -23,15 +24,23 @@ class RefusedCommand:
         pose: x, y, z, a, b, c, mm and deg.
         axis: the axis beyond whose limit it is, one of ``xyzabc``; none if another reason was given.
         is_highest: whether that is the axis' highest value, not its lowest.
+        within_mm: commands that are as near as this and as ``within_deg`` are concerned as well, unless
+            that is zero.
     """
 
     pose: tuple[float, float, float, float, float, float]
     axis: str | None = None
     is_highest: bool = True
+    within_mm: float = 0.0
+    within_deg: float = 0.0
 
     def concerns(self, poses: PoseBatch) -> Mask:
-        """Which of n commands, in the controller's frames, are this one or at least as far out."""
-        concerned = np.asarray(poses.is_same(PoseBatch.of([Pose(*self.pose)])))
+        """Which of n commands, in the controller's frames, are this one, near it, or as far out."""
+        this = PoseBatch.of([Pose(*self.pose)])
+        concerned = np.asarray(poses.is_same(this))
+        if self.within_deg > 0.0:
+            apart = np.linalg.norm(poses.positions - this.positions, axis=-1)
+            concerned |= (apart <= self.within_mm) & (poses.angles_to(this) <= np.radians(self.within_deg))
         if self.axis is None:
             return concerned
         column, sign = AXES.index(self.axis), 1.0 if self.is_highest else -1.0

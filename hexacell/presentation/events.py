@@ -8,6 +8,7 @@ from hexacell.campaign.decisions import Forecast
 from hexacell.presentation.layout import wrapped
 from hexacell.presentation.length import length_text
 from hexacell.presentation.measured_noise import noise_and_averaging_text
+from hexacell.presentation.plan_draft import removed_summary
 from hexacell.presentation.planning import run_forecast_line
 from hexacell.presentation.verification import check_start_text, check_text, verification_text
 from procedures.run import events
@@ -105,7 +106,10 @@ def event_text(event: events.Event, state: RunState) -> str | None:
 def _basis_or_verdict(event: events.RunStarted | events.ResultValidated) -> str | None:
     """What a check starts from, and the verdict of any run."""
     if isinstance(event, events.RunStarted):
-        return None if event.mode == "optimise" else check_start_text(event.accepted)
+        basis = None if event.mode == "optimise" else check_start_text(event.accepted)
+        removed = removed_summary(event.removed)
+        told = f"left out of the plan: {removed}" if removed else None
+        return "\n".join(filter(None, (basis, told))) or None
     if event.verification is not None:
         return verification_text(event.verification)
     if event.length is not None:

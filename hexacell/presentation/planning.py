@@ -12,6 +12,8 @@ from hexacell.presentation.layout import duration
 from hexacell.presentation.measured_noise import averaging_lines
 from hexacell.presentation.verdict_forecast import verdict_forecast_lines
 
+TRYING_PLAN = "Trying the plan on simulated robots within the tolerances, some seconds ..."
+
 
 def decision_text(decision: StartPoint | MeasurePose | Finished) -> str:
     """What to do now."""
@@ -120,4 +122,4 @@ def preflight_lines(devices: Sequence[DeviceIdentity]) -> Iterator[str]:
     for identity in devices:
         yield f"ok  {device_line(identity)}"
     yield "ok  all points can be reached, all devices answer; nothing was moved"
-    yield "Trying the plan on simulated robots within the tolerances, some seconds ..."
+    yield TRYING_PLAN

@@ -19,7 +19,7 @@ from textual.widgets._footer import FooterKey
 from hexacell.errors import HexacellError
 from hexacell.presentation.screens.views import FaultView
 from hexacell.screen.assistant_screen import Assistant, AssistantScreen
-from hexacell.screen.backend import Backend, ScreenAction
+from hexacell.screen.backend import ONCE, Backend, ScreenAction
 from hexacell.screen.cell_screen import CellScreen
 from hexacell.screen.digits_screen import DigitsScreen
 from hexacell.screen.history_screen import HistoryScreen
@@ -30,6 +30,7 @@ from hexacell.screen.overlays.fault_overlay import FaultOverlay
 from hexacell.screen.overlays.help_overlay import HelpOverlay
 from hexacell.screen.overlays.question_overlay import QuestionOverlay
 from hexacell.screen.overlays.quit_overlay import Leaving, QuitOverlay
+from hexacell.screen.plan_screen import PlanScreen
 from hexacell.screen.preflight_screen import PreflightScreen
 from hexacell.screen.review_screen import ReviewScreen
 from hexacell.screen.tab_screen import TabScreen
@@ -125,7 +126,7 @@ class TechnicianApp(App[int]):
         if self._backend is None:
             return
         for screen in self.screen_stack:
-            if isinstance(screen, TabScreen | DigitsScreen | QuestionOverlay):
+            if isinstance(screen, TabScreen | DigitsScreen | PlanScreen | QuestionOverlay):
                 with suppress(NoMatches):  # it is being composed, or taken away
                     screen.draw(self._backend)
         if not self._goes_to_new_run(self._backend) and self._is_whole:
@@ -215,6 +216,12 @@ class TechnicianApp(App[int]):
     def action_digits(self) -> None:
         """Show the gauges in large figures."""
         self.push_screen(DigitsScreen())
+
+    def action_plan(self) -> None:
+        """Show the poses of the plan; it is tried first where it was not yet."""
+        if self._backend is not None:
+            self.push_screen(PlanScreen())
+            self.action_perform("preview", ONCE)
 
     def action_help(self) -> None:
         """Explain the screen in front."""

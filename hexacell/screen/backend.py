@@ -12,12 +12,17 @@ from hexacell.presentation.screens.views import (
     HeaderView,
     HistoryView,
     MeasureView,
+    PlanView,
     QuestionView,
     ReviewView,
 )
 
 RESUME = "resume"
 """In the place of a mode: go on with the latest run that was interrupted."""
+
+
+ONCE = "once"
+"""The plan is not tried again where it was, or is being tried."""
 
 
 class ScreenAction(StrEnum):
@@ -32,6 +37,7 @@ class ScreenAction(StrEnum):
     CHECK = "check"
     START = "start"
     PREVIEW = "preview"
+    TAKE_OUT = "take out"
     COMPARE = "compare"
     ROLL_BACK = "roll back"
     OPEN = "open"
@@ -76,6 +82,10 @@ class Backend(Protocol):
 
     def checklist(self) -> ChecklistView:
         """What must hold before motion."""
+        ...
+
+    def plan(self) -> PlanView:
+        """The poses of the plan, which may be taken out of it."""
         ...
 
     def measure(self) -> MeasureView:

@@ -9,6 +9,7 @@ from pathlib import Path
 from hexacell.application.config_rollback import roll_back_config
 from hexacell.application.history import PastRun, compare_runs, parameter_trends, past_runs
 from hexacell.application.interrupted_runs import LATEST, run_to_resume
+from hexacell.application.plan_draft import PlanPreview
 from hexacell.application.security_warnings import exposure_warnings
 from hexacell.attach.client import connect_to_run, start_host
 from hexacell.attach.connection import RunConnection
@@ -16,6 +17,7 @@ from hexacell.attach.device_watch import watch_devices
 from hexacell.attach.recorded import RecordedRun
 from hexacell.attach.run_socket import socket_path
 from hexacell.attach.snapshots import LiveSnapshot
+from hexacell.campaign.removed_poses import RemovedPoses
 from hexacell.cell.loader import Cell, load_cell
 from hexacell.cell.passwords import password_warnings
 from hexacell.errors import UsageError
@@ -26,7 +28,7 @@ from hexacell.presentation.screens.views import ChecklistItem, HistoryEntry, Mar
 from hexacell.runs.run_folder import find_run, new_run
 from hexacell.screen.backend import RESUME
 from hexacell.screen.child_process import run_child
-from hexacell.screen.workplace import Preflight
+from hexacell.screen.workplace import Preflight, TriedPlan
 from procedures.calibration.workflow import Mode
 from procedures.journal.journal import read_journal
 from procedures.run.events import RunStarted
@@ -52,7 +54,7 @@ class CellWorkplace:
         """See :class:`Workplace`."""
         return await connect_to_run(socket_path(self.cell))
 
-    async def start(self, what: str) -> RunConnection:
+    async def start(self, what: str, removed: RemovedPoses) -> RunConnection:
         """See :class:`Workplace`."""
         if what == RESUME:
             folder = run_to_resume(self.cell, LATEST)
@@ -62,7 +64,7 @@ class CellWorkplace:
         else:
             folder, mode, more = new_run(self.cell), Mode(what).value, []
         arguments = [str(self.cell.path), "--mode", mode, "--folder", str(folder.path), *more]
-        return await start_host(socket_path(self.cell), arguments)
+        return await start_host(socket_path(self.cell), arguments, removed)
 
     async def check(self) -> Preflight:
         """See :class:`Workplace`."""
@@ -70,9 +72,11 @@ class CellWorkplace:
         items = tuple(ChecklistItem(**{**one, "mark": Mark(one["mark"])}) for one in found["items"])
         return Preflight(items, bool(found["is_ready"]))
 
-    async def preview(self) -> tuple[str, ...]:
+    async def preview(self, removed: RemovedPoses) -> TriedPlan:
         """See :class:`Workplace`."""
-        return tuple(await run_child("hexacell.screen.plan_child", self.cell.path))
+        found = await run_child("hexacell.screen.plan_child", self.cell.path, removed.model_dump_json())
+        preview = found["preview"]
+        return TriedPlan(tuple(found["lines"]), preview and PlanPreview.model_validate(preview))
 
     async def runs(self) -> tuple[HistoryEntry, ...]:
         """See :class:`Workplace`."""

@@ -12,13 +12,13 @@ from typing import Any
 from hexacell.errors import HexacellError
 
 
-async def run_child(module: str, cell: Path) -> Any:  # noqa: ANN401 - what JSON can hold
-    """Run ``python -m module CELL`` and give the JSON document that it prints.
+async def run_child(module: str, cell: Path, *more: str) -> Any:  # noqa: ANN401 - what JSON can hold
+    """Run ``python -m module CELL``, with ``more`` behind it, and give the JSON document that it prints.
 
     Raises:
         HexacellError: it printed none.
     """
-    command = (sys.executable, "-m", module, str(cell))
+    command = (sys.executable, "-m", module, str(cell), *more)
     process = await asyncio.create_subprocess_exec(*command, stdin=DEVNULL, stdout=PIPE, stderr=DEVNULL)
     try:
         printed, _ = await process.communicate()

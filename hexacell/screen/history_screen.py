@@ -6,13 +6,10 @@ from typing import ClassVar
 
 from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
-from textual.content import Content
-from textual.widgets import OptionList
-from textual.widgets.option_list import Option
 
-from hexacell.presentation.screens.views import HistoryEntry
 from hexacell.screen.backend import Backend
 from hexacell.screen.tab_screen import TabScreen
+from hexacell.screen.widgets.row_list import RowList
 from hexacell.screen.widgets.text_panel import TextList, TextPanel
 
 
@@ -26,12 +23,11 @@ class HistoryScreen(TabScreen):
         Binding("b", "about('roll back')", "Go back to its config, or undo it", show=False),
         Binding("o", "app.perform('drift')", "Drift over all runs", show=False),
     ]
-    _entries: tuple[HistoryEntry, ...] = ()
 
     def compose_body(self) -> ComposeResult:
         """See the class."""
         yield TextPanel(id="history-header", classes="table-header")
-        yield OptionList(id="runs", markup=False)
+        yield RowList(id="runs")
         yield TextPanel("Comparison", classes="title")
         yield TextList(id="comparison")
 
@@ -40,18 +36,12 @@ class HistoryScreen(TabScreen):
         view = backend.history()
         self.query_one("#history-header", TextPanel).show(view.note or view.header)
         self.query_one("#comparison", TextList).show(view.comparison)
-        if view.entries != self._entries:
-            self._entries = view.entries
-            runs = self.query_one("#runs", OptionList)
-            runs.clear_options()
-            runs.add_options(Option(Content(entry.line), id=entry.name) for entry in view.entries)
-            runs.highlighted = 0 if view.entries else None
+        self.query_one(RowList).show([(entry.name, entry.line) for entry in view.entries])
 
     async def action_about(self, what: str) -> None:
         """Do something about the run that is chosen."""
-        chosen = self.query_one("#runs", OptionList).highlighted
-        if chosen is not None and chosen < len(self._entries):
-            await self.run_action(f"app.perform({what!r}, {self._entries[chosen].name!r})")
+        if (run := self.query_one(RowList).chosen) is not None:
+            await self.run_action(f"app.perform({what!r}, {run!r})")
 
     async def on_option_list_option_selected(self) -> None:
         """Open the run."""

@@ -1,24 +1,30 @@
-"""The plan carried out on simulated robots in a process of its own; prints lines of text as JSON."""
+"""The plan carried out on simulated robots in a process of its own; prints text and poses as JSON."""
 
 from __future__ import annotations
 
 import json
 import sys
 from pathlib import Path
+from typing import Any
 
 from hexacell.application.offline import try_plan
+from hexacell.application.plan_draft import preview_of
+from hexacell.campaign.removed_poses import RemovedPoses
 from hexacell.cell.loader import load_cell
 from hexacell.errors import HexacellError
 from hexacell.presentation.planning import plan_trial_lines
 
 
-def planned_lines(path: Path) -> list[str]:
-    """What the plan is expected to give, or why it cannot be tried."""
+def tried_plan_document(path: Path, removed: RemovedPoses) -> dict[str, Any]:
+    """What the plan is expected to give, and its poses; or why it cannot be tried."""
     try:
-        return list(plan_trial_lines(try_plan(load_cell(path))))
+        trial = try_plan(load_cell(path), removed)
     except HexacellError as error:
-        return [str(error)]
+        return {"lines": [str(error)], "preview": None}
+    preview = preview_of(trial).model_dump(mode="json")
+    return {"lines": list(plan_trial_lines(trial)), "preview": preview if trial.result.robots else None}
 
 
 if __name__ == "__main__":
-    sys.stdout.write(json.dumps(planned_lines(Path(sys.argv[1]))))
+    what = RemovedPoses.model_validate_json(sys.argv[2])
+    sys.stdout.write(json.dumps(tried_plan_document(Path(sys.argv[1]), what)))

@@ -21,6 +21,7 @@ class PreflightScreen(TabScreen):
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("enter", "app.perform('check')", "Look at everything", show=False),
         Binding("v", "app.perform('preview')", "Try the plan", show=False),
+        Binding("x", "app.plan", "Take poses out of the plan", show=False),
         Binding("s", "app.perform('start', 'optimise')", "Start a calibration", show=False),
         Binding("k", "app.perform('start', 'check')", "Start a check", show=False),
         Binding("r", "app.perform('start', 'resume')", "Resume the latest run", show=False),

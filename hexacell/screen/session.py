@@ -14,6 +14,7 @@ from hexacell.presentation.screens.headers import header_view
 from hexacell.presentation.screens.live import live_view
 from hexacell.presentation.screens.measuring import measure_view
 from hexacell.presentation.screens.past import history_view, rollback_question
+from hexacell.presentation.screens.planned_poses import plan_view
 from hexacell.presentation.screens.questions import question_view
 from hexacell.presentation.screens.reviewing import review_view
 from hexacell.presentation.screens.views import (
@@ -24,6 +25,7 @@ from hexacell.presentation.screens.views import (
     HistoryView,
     LiveView,
     MeasureView,
+    PlanView,
     QuestionView,
     ReviewView,
 )
@@ -91,10 +93,15 @@ class ScreenSession:
         return checklist_view(
             self._run.picture.live if is_running else self._devices.live,
             found.checked,
-            found.plan,
+            self._actions.plan.lines,
             is_checking=found.is_checking,
             refusal=RUNNING if is_running else STARTING if found.is_starting else "",
         )
+
+    def plan(self) -> PlanView:
+        """The poses of the plan, which may be taken out of it."""
+        plan = self._actions.plan
+        return plan_view(plan.draft, is_trying=plan.is_trying)
 
     def measure(self) -> MeasureView:
         """The run that is being measured; its devices are shown even where none has begun."""

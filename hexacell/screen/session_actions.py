@@ -11,10 +11,10 @@ from hexacell.attach.recorded import RecordedRun
 from hexacell.controller_config.three_way import ConfigEditedSince
 from hexacell.errors import HexacellError, UsageError
 from hexacell.presentation.config_changes import versions_text
-from hexacell.presentation.screens.checklists import TRYING
 from hexacell.presentation.screens.views import ChecklistItem, HistoryEntry
-from hexacell.screen.backend import ScreenAction
+from hexacell.screen.backend import ONCE, ScreenAction
 from hexacell.screen.device_watcher import DeviceWatcher
+from hexacell.screen.plan_trials import PlanTrials
 from hexacell.screen.run_follower import RunFollower
 from hexacell.screen.workplace import Workplace
 from procedures.engine.command_loop import Status
@@ -40,7 +40,6 @@ class Findings:
 
     Attributes:
         checked: by the preflight; none before it. ``is_ready``: it found nothing.
-        plan: what the plan gives, in lines.
         entries: of the history; none before it was read.
         compared: a comparison of two runs, in lines.
     """
@@ -49,7 +48,6 @@ class Findings:
     is_ready: bool = False
     is_checking: bool = False
     is_starting: bool = False
-    plan: tuple[str, ...] = ()
     entries: tuple[HistoryEntry, ...] | None = None
     compared: tuple[str, ...] = field(default=())
 
@@ -58,7 +56,7 @@ class SessionActions:
     """Does what was asked for."""
 
     def __init__(self, workplace: Workplace, run: RunFollower, devices: DeviceWatcher) -> None:
-        self.findings = Findings()
+        self.findings, self.plan = Findings(), PlanTrials(workplace)
         self._workplace, self._run, self._devices = workplace, run, devices
         self._does: dict[ScreenAction, Callable[[str], Awaitable[str]]] = {
             ScreenAction.PAUSE: self._pause,
@@ -70,6 +68,7 @@ class SessionActions:
             ScreenAction.CHECK: self._check,
             ScreenAction.START: self._start,
             ScreenAction.PREVIEW: self._preview,
+            ScreenAction.TAKE_OUT: self._take_out,
             ScreenAction.COMPARE: self._compare,
             ScreenAction.ROLL_BACK: self._roll_back,
             ScreenAction.OPEN: self._open,
@@ -146,7 +145,8 @@ class SessionActions:
         await self._devices.stop()
         self.findings.is_starting = True
         try:
-            await self._follow(await self._workplace.start(what))
+            await self._follow(await self._workplace.start(what, self.plan.removed))
+            self.plan.forget()  # the next run has everything again
         except BaseException:
             self._devices.start()
             raise
@@ -154,13 +154,14 @@ class SessionActions:
             self.findings.is_starting = False
         return ""
 
-    async def _preview(self, _: str) -> str:
-        self.findings.plan = (TRYING,)
-        try:
-            self.findings.plan = await self._workplace.preview()
-        except BaseException:
-            self.findings.plan = ()
-            raise
+    async def _preview(self, how_often: str) -> str:
+        is_enough = how_often == ONCE and (self.plan.is_trying or self.plan.draft is not None)
+        if not is_enough:
+            await self.plan.try_again()
+        return ""
+
+    async def _take_out(self, name: str) -> str:
+        await self.plan.take_out(name)
         return ""
 
     async def _compare(self, run: str) -> str:

@@ -6,8 +6,10 @@ from collections.abc import AsyncIterator
 from dataclasses import dataclass
 from typing import Protocol
 
+from hexacell.application.plan_draft import PlanPreview
 from hexacell.attach.connection import RunConnection
 from hexacell.attach.snapshots import LiveSnapshot
+from hexacell.campaign.removed_poses import RemovedPoses
 from hexacell.cell.loader import Cell
 from hexacell.presentation.screens.views import ChecklistItem, HistoryEntry
 
@@ -18,6 +20,14 @@ class Preflight:
 
     items: tuple[ChecklistItem, ...]
     is_ready: bool
+
+
+@dataclass(frozen=True, slots=True)
+class TriedPlan:
+    """What a plan gives in lines of text, and its poses; none where it could not be tried."""
+
+    lines: tuple[str, ...]
+    preview: PlanPreview | None = None
 
 
 class Workplace(Protocol):
@@ -41,16 +51,19 @@ class Workplace(Protocol):
         """The run that goes on in this cell, if one does."""
         ...
 
-    async def start(self, what: str) -> RunConnection:
-        """Begin a run in a process of its own: the name of a mode; or resume the latest interrupted one."""
+    async def start(self, what: str, removed: RemovedPoses) -> RunConnection:
+        """Begin a run in a process of its own: the name of a mode; or resume the latest interrupted one.
+
+        A new one goes without what is ``removed`` from the plan.
+        """
         ...
 
     async def check(self) -> Preflight:
         """Look at everything that must hold before motion; needs the devices."""
         ...
 
-    async def preview(self) -> tuple[str, ...]:
-        """Carry the plan out on simulated robots."""
+    async def preview(self, removed: RemovedPoses) -> TriedPlan:
+        """Carry the plan, without what is ``removed``, out on simulated robots."""
         ...
 
     async def runs(self) -> tuple[HistoryEntry, ...]:

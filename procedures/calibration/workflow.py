@@ -21,6 +21,7 @@ from hexacell.campaign.check import Check, identified_before
 from hexacell.campaign.measured_noise import MeasuredNoise, with_measured_noise
 from hexacell.campaign.planner import Plan
 from hexacell.campaign.pose_list import PoseList
+from hexacell.campaign.removed_poses import NOTHING_REMOVED, RemovedPoses
 from hexacell.campaign.teaching import WrittenGeometry, as_written
 from hexacell.cell.model import CellSettings
 from hexacell.decision import ErrorLimits, Verdict
@@ -100,6 +101,7 @@ class Calibration:
             drawing. A length check has one.
         measured_noise: what settings and robot contain of it; none before it is measured.
         length_check: whether the length scale of a calibration is checked.
+        removed: what a person took out of the plan; see :meth:`without`.
     """
 
     settings: CellSettings
@@ -109,6 +111,12 @@ class Calibration:
     accepted: AcceptedResult | None = None
     measured_noise: MeasuredNoise | None = None
     length_check: bool = False
+    removed: RemovedPoses = NOTHING_REMOVED
+
+    def without(self, removed: RemovedPoses) -> Calibration:
+        """The same without what a person took out of its plan."""
+        robot = replace(self.robot, refused=removed.refused)
+        return replace(self, robot=robot, listed=removed.left_of(self.listed), removed=removed)
 
     @property
     def length_poses(self) -> tuple[tuple[str, Pose], ...]:
@@ -148,15 +156,16 @@ class Calibration:
             robot.effects,
             {} if accepted is None else accepted.parameter_columns,
             CANDIDATES,
+            frozenset(self.removed.points),
         )
 
     def informed(self, state: RunState) -> Calibration:
-        """The same with what the run has learnt: its noise, and poses that the controller refused."""
+        """The same with what the run has learnt: its noise, and poses that are not commanded."""
         known = self._with_measured_noise(state)
         return known if known.robot.refused == state.refused else known._without(state.refused)
 
     def _without(self, refused: RefusedCommands) -> Calibration:
-        """The same for a controller that refused some poses."""
+        """The same where some poses are not commanded."""
         if refused not in self._with_refusals:
             self._with_refusals.clear()  # a run only adds to them
             self._with_refusals[refused] = replace(self, robot=replace(self.robot, refused=refused))
@@ -318,7 +327,8 @@ class Calibration:
         return _Measuring(self._calibrating(self.robot_checked if self.mode is Mode.LENGTH else self.robot))
 
     def _calibrating(self, robot: Robot) -> Plan:
-        return Plan(self.settings, robot, self.listed, CANDIDATES)
+        left_points = frozenset(self.removed.points)
+        return Plan(self.settings, robot, self.listed, CANDIDATES, left_points=left_points)
 
     @cached_property
     def _with_noise(self) -> dict[MeasuredNoise, Calibration]:

@@ -19,7 +19,7 @@ from hexacell.screen.app import FirstCell, TechnicianApp
 from hexacell.screen.assistant import FirstCellAssistant
 from hexacell.screen.assistant_screen import AssistantScreen
 from hexacell.screen.key_map import THEMES
-from hexacell.screen.workplace import Preflight
+from hexacell.screen.workplace import Preflight, TriedPlan
 from procedures.engine.command_loop import Status
 from procedures.run import events
 from procedures.run.questions import ask_approval, ask_placement
@@ -27,6 +27,7 @@ from procedures.run.steps import Phase, SetKey
 from procedures.run.trips import Guard
 from tests.screen.conftest import SNAPSHOTS, UPDATE, Opened, compare_with_snapshot, settled
 from tests.screen.test_job import until_shown
+from tests.screen.test_plan_screen import tried
 from tests.screen.told_run import ToldRun, ToldWorkplace, snapshot
 from tests.waiting import until
 
@@ -69,9 +70,8 @@ def idle(cell: Cell) -> ToldWorkplace:
             ),
             is_ready=False,
         ),
-        plan=(
-            "55 records at 5 points will give about 0.062 mm at the worst of your task poses (one sigma),",
-            "in about 24 minutes.",
+        plan=TriedPlan(
+            ("55 records will give about 0.062 mm at the worst of your task poses, in about 24 minutes.",)
         ),
         compared=("changed most: B2y by +0.021 mm (sigma 0.009)", "compared with"),
     )
@@ -94,6 +94,12 @@ def scene_cell(cell: Cell, _: tuple[events.Event, ...]) -> tuple[ToldWorkplace, 
 
 def scene_preflight(cell: Cell, _: tuple[events.Event, ...]) -> tuple[ToldWorkplace, tuple[str, ...]]:
     return idle(cell), ("2", "v", "enter")
+
+
+def scene_plan(cell: Cell, _: tuple[events.Event, ...]) -> tuple[ToldWorkplace, tuple[str, ...]]:
+    workplace = idle(cell)
+    workplace.plan = tried(cell)
+    return workplace, ("2", "x", "down", "down", "x")
 
 
 def scene_measure(cell: Cell, history: tuple[events.Event, ...]) -> tuple[ToldWorkplace, tuple[str, ...]]:

@@ -24,9 +24,10 @@ from hexacell.attach.snapshots import (
     GaugeSnapshot,
     LiveSnapshot,
 )
+from hexacell.campaign.removed_poses import RemovedPoses
 from hexacell.cell.loader import Cell
 from hexacell.presentation.screens.views import ChecklistItem, HistoryEntry, Mark
-from hexacell.screen.workplace import Preflight
+from hexacell.screen.workplace import Preflight, TriedPlan
 from procedures.engine.command_loop import Status
 from procedures.run.commands import Command
 from procedures.run.events import Event
@@ -142,12 +143,13 @@ class ToldWorkplace:
     preflight: Preflight = field(
         default_factory=lambda: Preflight((ChecklistItem(Mark.DONE, "all"),), is_ready=True)
     )
-    plan: tuple[str, ...] = ()
+    plan: TriedPlan = field(default_factory=lambda: TriedPlan(()))
     entries: tuple[HistoryEntry, ...] = ()
     compared: tuple[str, ...] = ()
     started: RunConnection | None = None
     opened: RunConnection | None = None
     begun: list[str] = field(default_factory=list)
+    removed: list[RemovedPoses] = field(default_factory=list)
     rolled_back: list[str] = field(default_factory=list)
 
     async def watch(self) -> AsyncIterator[LiveSnapshot]:
@@ -158,15 +160,17 @@ class ToldWorkplace:
     async def attach(self) -> RunConnection | None:
         return self.run
 
-    async def start(self, what: str) -> RunConnection:
+    async def start(self, what: str, removed: RemovedPoses) -> RunConnection:
         assert self.started is not None, what
         self.begun.append(what)
+        self.removed.append(removed)
         return self.started
 
     async def check(self) -> Preflight:
         return self.preflight
 
-    async def preview(self) -> tuple[str, ...]:
+    async def preview(self, removed: RemovedPoses) -> TriedPlan:
+        self.removed.append(removed)
         return self.plan
 
     async def runs(self) -> tuple[HistoryEntry, ...]:

@@ -44,7 +44,8 @@ async def _begin(request: RunRequest, console: Console) -> ExitCode:
     arguments = [str(request.cell.path), "--folder", str(request.folder.path), "--mode", request.mode.value]
     arguments += ["--resume"] if request.resume else []
     arguments += ["--length-check"] if request.length_check else []
-    return await _at_terminal(await start_host(socket_path(request.cell), arguments), console)
+    started = await start_host(socket_path(request.cell), arguments, request.removed)
+    return await _at_terminal(started, console)
 
 
 async def _at_terminal(connection: HostConnection, console: Console) -> ExitCode:

@@ -18,6 +18,7 @@ from hexacell.attach.client import READY
 from hexacell.attach.host import RemoteOperator, RunHost, failure_message
 from hexacell.attach.messages import message_line
 from hexacell.attach.run_socket import listening_socket, socket_path
+from hexacell.campaign.removed_poses import RemovedPoses
 from hexacell.cell.loader import load_cell
 from hexacell.cli.console import Console
 from hexacell.cli.signal_commands import SignalCommands
@@ -79,6 +80,7 @@ def _request(options: argparse.Namespace) -> RunRequest:
         operator=RemoteOperator(),
         resume=options.resume,
         length_check=options.length_check,
+        removed=RemovedPoses.model_validate_json(options.removed.read_bytes()),
     )
 
 

@@ -9,7 +9,7 @@ from hexacell.errors import HexacellError, flatten_errors
 from hexacell.presentation.screens.views import ChecklistItem, ChecklistView, Mark
 
 PRESS_CHECK = (
-    "Enter looks at everything, v tries the plan. "
+    "Enter looks at everything, v tries the plan, x takes poses out of it. "
     "s starts a calibration, k a check, r resumes the latest run."
 )
 CHECKING = "Looking at everything: this takes some seconds, and nothing moves."

@@ -14,7 +14,8 @@ Everything that must hold before the robot moves, one line each:
   ok  it holds      NO  it does not, with what to do
   ..  being looked at      --  not looked at yet
 Enter looks at all of it; nothing moves. v tries the plan on simulated robots and says how many records and
-minutes it takes and how accurate the robot will be. s starts a calibration, k a check that changes nothing,
+minutes it takes and how accurate the robot will be. x shows its poses: take out what the robot must not be
+sent to, for the next run. s starts a calibration, k a check that changes nothing,
 r goes on with the latest run that was interrupted. Everything is looked at again before the first move.""",
     "measure": """\
 What happens now, what is next, how long it takes, and how to stop. Each gauge shows its reading, the

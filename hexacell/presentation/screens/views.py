@@ -234,6 +234,17 @@ class ChecklistView:
 
 
 @dataclass(frozen=True, slots=True)
+class PlanView:
+    """The poses of a plan; ``note`` says what is left out and what that costs, or why there are none.
+
+    Each row is the name of a point or a pose, and a line of text.
+    """
+
+    note: str
+    rows: tuple[tuple[str, str], ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
 class ReviewView:
     """A result: the verdict first, with its scope, and everything behind it.
 

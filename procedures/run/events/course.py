@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Literal, Self
 
 from drivers.interfaces import DeviceIdentity
+from hexacell.campaign.removed_poses import RemovedPoses
 from hexacell.campaign.teaching import TaskDisplacement
 from hexacell.cell.fields import Frozen, GeometryDocument
 from hexacell.cell.recovery import Action, FailureKind
@@ -21,6 +22,7 @@ class RunStarted(Frozen):
     result is written in frames by the mechanism's convention. ``accepted`` is the result that a check or a
     length check starts from, if there is one. ``length_check`` is whether a calibration has one.
     ``joint_ranges`` are those of cell file and config together, mm; none in runs of older versions.
+    ``removed`` is what a person took out of the plan: it is neither measured nor commanded.
     """
 
     kind: Literal["started"] = "started"
@@ -38,6 +40,7 @@ class RunStarted(Frozen):
     accepted: AcceptedResult | None = None
     length_check: bool = False
     joint_ranges: tuple[tuple[float, float], ...] | None = None
+    removed: RemovedPoses = RemovedPoses()
 
 
 class StepBegun(Frozen):

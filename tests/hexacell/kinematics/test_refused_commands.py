@@ -51,3 +51,15 @@ def test_every_refusal_counts() -> None:
     level = Pose(0.0, 0.0, 550.0, 6.0)
     poses = PoseBatch.of([level, Pose(0.0, 0.0, 550.0, 4.0), Pose(0.0, 0.0, 550.0, 6.0, 0.0, 41.0)])
     assert refused.allow(poses).tolist() == [True, False, False]
+
+
+@pytest.mark.parametrize(
+    ("by_mm", "by_deg", "is_near"), [(29.0, 4.9, True), (31.0, 0.0, False), (0.0, 5.1, False)]
+)
+def test_what_is_near_a_command_that_was_taken_out_is_left_out(
+    by_mm: float, by_deg: float, is_near: bool
+) -> None:
+    refused = RefusedCommands((RefusedCommand(POSE, within_mm=30.0, within_deg=5.0),))
+    x, y, z, a, b, c = POSE
+    assert refused.allows((x, y, z + by_mm, a, b, c + by_deg)) is not is_near
+    assert not refused.allows(POSE)

@@ -104,7 +104,7 @@ def check_demo(venv: Path, folder: Path, records: int) -> None:
     assert found
     assert records - 5 <= int(found[1]) <= records
     assert said[-1].endswith(": pass")
-    result = folder / "hexacell-demo" / "run" / "result.json"
+    result = folder / "hexacell-demo" / "runs" / "simulated-hexaglide" / "demo" / "result.json"
     assert json.loads(result.read_text())["converged"] is True
 
 

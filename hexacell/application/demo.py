@@ -13,7 +13,7 @@ from hexacell.cell.bundled import CONTROLLER, bundled_config
 from hexacell.cell.loader import Cell, dump, load_cell
 from hexacell.cell.passwords import password_path
 from hexacell.errors import FileError, UsageError
-from hexacell.runs.run_folder import RunFolder
+from hexacell.runs.run_folder import RunFolder, runs_folder
 from hexacell.storage.atomic_files import create_folder_durably, os_error_to_file_error, write_atomically
 from hexacell.storage.cell_lock import cell_lock, lock_path
 from procedures.calibration.workflow import Mode
@@ -21,6 +21,9 @@ from procedures.run.questions import UnattendedOperator
 
 MARKER = ".hexacell-demo"
 """Name of the file that marks a folder as a demo's, which the next demo may replace."""
+
+RUN = "demo"
+"""Name of its run, among the runs of its cell; the same each time, so that it can be referred to."""
 
 
 def require_simulation(cell: Cell) -> Cell:
@@ -63,7 +66,8 @@ def prepare_demo(folder: Path, config_name: str) -> RunRequest:
     """
     bundled = require_simulation(load_cell(bundled_config(config_name)))
     cell = load_cell(_copy_cell(bundled.path, folder))
-    return RunRequest(cell, RunFolder(folder / "run"), Mode.OPTIMISE, UnattendedOperator(), unattended=True)
+    run = RunFolder(runs_folder(cell) / RUN)
+    return RunRequest(cell, run, Mode.OPTIMISE, UnattendedOperator(), unattended=True)
 
 
 def _copy_cell(cell_file: Path, folder: Path) -> Path:

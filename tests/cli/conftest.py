@@ -358,7 +358,7 @@ class Demo:
 
     @property
     def run(self) -> Path:
-        return self.folder / "run"
+        return self.folder / "runs" / "simulated-hexaglide" / "demo"
 
     @property
     def cell(self) -> Path:

@@ -234,6 +234,13 @@ def test_the_run_folder_of_the_demo_has_all_documented_files(demo):
     assert {path.name for path in demo.run.iterdir()} >= promised
 
 
+def test_its_run_is_in_the_history_of_its_cell(demo, typed_here):
+    [_, line] = typed_here("history", demo.cell).out.splitlines()
+    assert line.startswith("demo ")
+    assert line.endswith("in controller")
+    assert "optimise of simulated-hexaglide" in typed_here("history", demo.cell, "--show", "demo").out
+
+
 @pytest.fixture
 def earlier(tmp_path: Path) -> Path:
     """An earlier demo's folder, with something in it that a new one would remove."""

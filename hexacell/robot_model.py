@@ -24,6 +24,7 @@ from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import Branch, FrameTransform, Mechanism
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.refused_commands import RefusedCommands
+from hexacell.kinematics.rotations import Array
 from hexacell.limits.limits import Limits
 from hexacell.measurements.records import MeasurementSet
 from hexacell.plugins import Group, load
@@ -81,6 +82,11 @@ class Robot:
         if self.uses_provisional:
             return self.provisional[-1]
         return self.mechanism.normalize_frames(self.controller)[0]
+
+    @property
+    def free_parameters(self) -> Array:
+        """Those (p,) of that geometry, mm."""
+        return self.mechanism.convention.free_parameters(self.commanding)
 
     def commanded(self, actual: Geometry) -> CommandedRobot:
         """This robot under its controller, with an ``actual`` geometry in the convention's frames."""

@@ -14,6 +14,7 @@ from functools import cached_property
 
 import numpy as np
 
+from hexacell.campaign.change_alarm import ChangeTest, change_test
 from hexacell.campaign.check_statement import (
     CheckStatement,
     ErrorEstimate,
@@ -29,7 +30,7 @@ from hexacell.cell.model import CellSettings
 from hexacell.decision import ErrorLimits, Verdict
 from hexacell.identification.solver.chi_square import ChiSquareVerdict
 from hexacell.kinematics.rotations import Array
-from hexacell.measurements.records import MeasurementSet, Record
+from hexacell.measurements.records import MeasurementSet, Record, RecordId
 from hexacell.robot_model import Robot
 from hexacell.uncertainty.effects import Effect
 from hexacell.uncertainty.geometry_drift import IdentifiedBefore, drift_covariance, drift_sigma
@@ -119,6 +120,21 @@ class Check:
             return stated
         further = self._further_records(measurements, effects) if stated.is_consistent else None
         return replace(stated, verdict=Verdict.NOT_EVALUATED, further_records=further)
+
+    def change_test(
+        self, measurements: MeasurementSet, expansion: Array | None = None
+    ) -> ChangeTest | None:
+        """Whether some records contradict an unchanged robot; none where it was not identified before.
+
+        ``expansion`` (n, P) is by how much the parameters differ at each record from those of then.
+        """
+        if self.before is None:
+            return None
+        return change_test(self.robot, self.before, measurements, self.earlier, expansion)
+
+    def false_records(self, measurements: MeasurementSet) -> frozenset[RecordId]:
+        """Records that the others prove false; no statement counts them."""
+        return self._estimates(measurements)[0].estimate.false_records
 
     def _decided(self, measurements: MeasurementSet) -> str | None:
         stated = self.statement(measurements)

@@ -7,7 +7,7 @@ from pathlib import Path
 from hexacell.decision import Verdict
 from hexacell.presentation.layout import wrapped
 from hexacell.presentation.length import earlier_scale_line, scale_lines
-from hexacell.reporting.check_result import CheckResult
+from hexacell.reporting.check_result import ChangeAlarm, CheckResult
 from hexacell.reporting.result import AcceptedResult
 from hexacell.reporting.verification import JudgedError, Verification, VerifiedAccuracy
 
@@ -31,11 +31,23 @@ def _verdict(verified: Verification) -> str:
 def check_text(found: CheckResult) -> str:
     """The same for a check: the verdict, the error now, and what has changed."""
     lines = [f"verdict: {found.verdict}", *_errors(found.accuracy), *_drift(found)]
+    if found.alarm is not None and found.alarm.is_raised:
+        lines.append(wrapped(f"  {alarm_sentence(found.alarm)}", indent=2))
     if not found.is_consistent:
         lines.append("  the residuals are larger than the stated noise explains: the model does not hold")
     if found.accuracy is not None:
         lines.append(f"  {earlier_scale_line(found.accuracy.length)}")
     return "\n".join(lines)
+
+
+def alarm_sentence(alarm: ChangeAlarm) -> str:
+    """What an alarm says, and what to do."""
+    size = f"{alarm.change:+.3f} +- {alarm.sigma:.3f} {alarm.unit}"
+    return (
+        f"alarm: the first {alarm.records} records contradict an unchanged machine (score "
+        f"{alarm.score:.1f}, by chance {alarm.limit:.1f} in one check of 100). If one part changed, it is "
+        f"of leg {alarm.leg}, as by {size} of {alarm.parameter}. Repeat the check: this is no verdict"
+    )
 
 
 def check_start_text(accepted: AcceptedResult | None) -> str:

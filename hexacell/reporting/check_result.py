@@ -7,13 +7,14 @@ from datetime import datetime
 
 import numpy as np
 
+from hexacell.campaign.change_alarm import FIRST_RECORDS
 from hexacell.campaign.check import Check
 from hexacell.campaign.check_statement import CheckStatement
 from hexacell.campaign.recursive_estimator import OnlineEstimate
 from hexacell.cell.fields import Frozen
 from hexacell.decision import Verdict
 from hexacell.identification.diagnostics.tolerance_check import SIGNIFICANT_SIGMAS
-from hexacell.measurements.records import MeasurementSet
+from hexacell.measurements.records import MeasurementSet, RecordId
 from hexacell.reporting.length_result import LengthResult
 from hexacell.reporting.result import AcceptedResult
 from hexacell.reporting.verification import JudgedError, VerifiedAccuracy, outcome_of
@@ -34,6 +35,32 @@ class ParameterChange(Frozen):
         return abs(self.change) / self.sigma
 
 
+class ChangeAlarm(Frozen):
+    """Whether the first records of a check contradict a robot that has not changed since, by one parameter.
+
+    Attributes:
+        records: that were tested.
+        score: the largest of all parameters; each is standard normal for an unchanged robot.
+        limit: what the largest exceeds in one of a hundred checks of unchanged robots.
+        leg: that changed, if one did, by all records of the check; its likeliest ``parameter``, the
+            ``change`` of that and its standard deviation, if it alone changed.
+    """
+
+    records: int
+    score: float
+    limit: float
+    leg: int
+    parameter: str
+    unit: str
+    change: float
+    sigma: float
+
+    @property
+    def is_raised(self) -> bool:
+        """Whether an unchanged robot is contradicted."""
+        return self.score > self.limit
+
+
 class CheckResult(Frozen):
     """What a check says of the robot as it is now.
 
@@ -44,6 +71,9 @@ class CheckResult(Frozen):
         earlier_run, earlier_at: the accepted result that it started from; none where that is the drawing.
         drift_scale: how many times as large as stated the drift since then is.
         changes: of the free parameters, in the mechanism's frame convention.
+        left_out: records that the others prove false.
+        alarm: the test of a change by the first records; none where the robot was not identified before, or
+            where there were fewer.
     """
 
     verdict: Verdict
@@ -56,6 +86,8 @@ class CheckResult(Frozen):
     earlier_at: datetime | None = None
     drift_scale: float | None = None
     changes: tuple[ParameterChange, ...] = ()
+    left_out: tuple[RecordId, ...] = ()
+    alarm: ChangeAlarm | None = None
 
     @property
     def significant_change(self) -> ParameterChange | None:
@@ -92,6 +124,36 @@ def check_result(
         earlier_at=earlier and earlier.at,
         drift_scale=stated.drift_scale,
         changes=tuple(_changes(stated.estimate)),
+        left_out=tuple(sorted(check.false_records(measurements))),
+        alarm=change_alarm(check, measurements),
+    )
+
+
+def change_alarm(check: Check, measurements: MeasurementSet) -> ChangeAlarm | None:
+    """Whether the first records raise an alarm, and which leg all of them name.
+
+    Records that the others prove false are not tested.
+
+    Raises:
+        IdentifiabilityError: the records do not belong to this robot.
+    """
+    false = check.false_records(measurements)
+    sound = [one for one in measurements.records if one.id not in false]
+    first = check.change_test(MeasurementSet(tuple(sound[:FIRST_RECORDS])))
+    if first is None or len(sound) < FIRST_RECORDS:
+        return None
+    every = check.change_test(MeasurementSet(tuple(sound)))
+    assert every is not None  # noqa: S101 - the first records had a test
+    parameter = check.robot.mechanism.parameters.parameters[every.cause]
+    return ChangeAlarm(
+        records=FIRST_RECORDS,
+        score=float(np.abs(first.test.scores).max()),
+        limit=first.test.limit,
+        leg=every.leg,
+        parameter=parameter.name,
+        unit=parameter.kind.unit.value,
+        change=float(every.test.changes[every.cause]),
+        sigma=float(every.test.sigmas[every.cause]),
     )
 
 

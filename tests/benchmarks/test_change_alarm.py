@@ -1,0 +1,102 @@
+"""The alarm of a check: what its first 8 records say of a leg that became 0.05 mm longer or shorter.
+
+Table 1's robot is calibrated once (0.01 mm noise on joint variables and deviations). Its true geometry is
+drawn about the result by the result's covariance; then nothing changes, or the length of one leg does. The
+poses are those that a check chooses. ``RUNS`` in the environment says how many robots there are of each.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass, replace
+from multiprocessing import get_context
+
+import numpy as np
+import pytest
+
+from hexacell.campaign.dry_run import VirtualCampaign
+from hexacell.kinematics.frame_derivatives import free_parameter_derivatives
+from hexacell.kinematics.rotations import Array
+from hexacell.reporting.check_result import ChangeAlarm, change_alarm
+from hexacell.virtual_robot import VirtualRobot
+from tests.benchmarks.test_check import Calibrated, calibrated
+
+Say = Callable[[str, str, str], None]
+
+pytestmark = pytest.mark.benchmark
+
+RUNS = int(os.environ.get("RUNS", "60"))
+CHANGE_MM = 0.05
+RECORDS = (8, 12, 16)
+ALLOWANCE = 1.5 / np.sqrt(RUNS)
+"""Of a share: three standard deviations of one half."""
+
+
+@dataclass(frozen=True)
+class Robot:
+    """One that was checked: the leg that changed, 0 for none, and the alarm by so many records."""
+
+    leg: int
+    alarms: dict[int, ChangeAlarm]
+
+
+def checked(job: tuple[int, int]) -> Robot:
+    leg, number = job
+    known = calibrated()
+    check, random = known.check(), np.random.default_rng([8, leg, number])
+    assert check.before is not None
+    factor = np.linalg.cholesky(check.before.covariance)
+    change = factor @ random.standard_normal(len(factor))
+    if leg:
+        change = change + random.choice([-1.0, 1.0]) * CHANGE_MM * by_length(known, leg)
+    convention = check.robot.mechanism.convention
+    truth = convention.geometry(check.robot.free_parameters + change)
+    # Longer than a check that is decided, to see what more records say.
+    plan = replace(check.plan, with_forecast=False, goal=None)
+    campaign = VirtualCampaign(plan, VirtualRobot(check.robot, truth, random))
+    while len(campaign.measurements) < max(RECORDS):
+        campaign.step()
+    records = campaign.measurements.records
+    found = {n: change_alarm(check, type(campaign.measurements)(records[:n])) for n in RECORDS}
+    return Robot(leg, {n: alarm for n, alarm in found.items() if alarm is not None})
+
+
+def by_length(known: Calibrated, leg: int) -> Array:
+    mechanism = known.robot.mechanism
+    row: Array = free_parameter_derivatives(mechanism, known.robot.commanding)[
+        mechanism.parameters.names.index(f"l{leg}")
+    ]
+    return row
+
+
+@pytest.fixture(scope="module")
+def robots() -> list[Robot]:
+    calibrated()  # once, before there are more processes
+    legs = [0] * RUNS + [number % 6 + 1 for number in range(RUNS)]
+    with ProcessPoolExecutor(2, mp_context=get_context("fork")) as pool:
+        return list(pool.map(checked, [(leg, number) for number, leg in enumerate(legs)]))
+
+
+def share(values: list[bool]) -> float:
+    return sum(values) / len(values)
+
+
+def test_a_leg_that_changed_is_noticed_and_named(robots, say):
+    changed = [one for one in robots if one.leg]
+    noticed = share([one.alarms[8].is_raised for one in changed])
+    say(
+        f"first 8 records notice {CHANGE_MM} mm of one leg, {RUNS} robots", f"{100 * noticed:.1f} %", "95 %"
+    )
+    for number, target in zip(RECORDS, ("90 %", "-", "-"), strict=True):
+        named = share([one.alarms[number].leg == one.leg for one in changed])
+        say(f"  {number} records name the leg", f"{100 * named:.1f} %", target)
+    assert noticed >= 0.95 - ALLOWANCE
+    assert share([one.alarms[8].leg == one.leg for one in changed]) >= 0.9 - ALLOWANCE
+
+
+def test_unchanged_robots_raise_few_alarms(robots, say):
+    raised = share([one.alarms[8].is_raised for one in robots if not one.leg])
+    say(f"unchanged robots raise an alarm, {RUNS}", f"{100 * raised:.1f} %", "at most 1 %")
+    assert raised <= 0.01 + ALLOWANCE / 5

@@ -1,0 +1,97 @@
+"""The alarm of a check: quiet on an unchanged robot, and what it says of one that changed."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from hexacell.campaign.change_alarm import FIRST_RECORDS
+from hexacell.campaign.check import Check, identified_before
+from hexacell.campaign.decisions import Finished
+from hexacell.campaign.dry_run import VirtualCampaign
+from hexacell.decision import ErrorLimits
+from hexacell.kinematics.geometry import Geometry
+from hexacell.measurements.records import MeasurementSet
+from hexacell.presentation.verification import alarm_sentence, check_text
+from hexacell.reporting.check_result import change_alarm, check_result
+from hexacell.uncertainty.encoder_effects import encoder_scales
+from hexacell.virtual_robot import VirtualRobot
+
+SIGMA_MM = 0.005
+SCALE_UM_M = 100.0
+
+
+@pytest.fixture(scope="module")
+def check(make_plan, paper) -> Check:
+    """Of the paper's robot, whose controller has its true geometry."""
+    plan = make_plan()
+    normal, frames = plan.robot.mechanism.normalize_frames(paper.actual)
+    robot = replace(plan.robot, controller=normal, frames=frames)
+    before = identified_before(robot, SIGMA_MM**2 * np.eye(len(robot.mechanism.parameters)), 0.02)
+    return Check(plan.settings, robot, before, ErrorLimits(0.15, 0.05), 40, candidates=32)
+
+
+def measured(check: Check, name: str = "", change_mm: float = 0.0, seed: int = 1) -> MeasurementSet:
+    """The first records of a robot of which one parameter has changed."""
+    vector = check.robot.commanding.vector.copy()
+    parameters = check.robot.mechanism.parameters
+    if name:
+        vector[parameters.names.index(name)] += change_mm
+    truth = check.robot.mechanism.normalize_frames(Geometry(parameters, vector))[0]
+    return first_records(check, truth, seed)
+
+
+def first_records(check: Check, truth: Geometry, seed: int = 1) -> MeasurementSet:
+    """Of a check that is not decided before."""
+    robot = VirtualRobot(check.robot, truth, np.random.default_rng(seed))
+    campaign = VirtualCampaign(replace(check.plan, with_forecast=False), robot)
+    while len(campaign.measurements) < FIRST_RECORDS:
+        assert not isinstance(campaign.step(), Finished)
+    return campaign.measurements
+
+
+def test_an_unchanged_robot_raises_none(check) -> None:
+    alarm = change_alarm(check, measured(check))
+    assert alarm is not None
+    assert (alarm.records, alarm.is_raised) == (FIRST_RECORDS, False)
+
+
+@pytest.mark.parametrize(("name", "leg"), [("l2", 2), ("l5", 5), ("S4z", 4)])
+def test_a_part_that_moved_raises_one_that_names_its_leg(check, name, leg) -> None:
+    alarm = change_alarm(check, measured(check, name, 0.08))
+    assert alarm is not None
+    assert (alarm.is_raised, alarm.leg) == (True, leg)
+    assert f"leg {leg}" in alarm_sentence(alarm)
+
+
+def test_too_few_records_or_no_calibration_raise_none(check) -> None:
+    records = measured(check, "l2", 0.08)
+    assert change_alarm(check, MeasurementSet(records.records[:-1])) is None
+    assert change_alarm(replace(check, before=None), records) is None
+
+
+def test_effects_that_the_calibration_had_too_are_no_change(check) -> None:
+    """Encoder scales made it err; they are the same now and explain the same records."""
+    scales = replace(encoder_scales(SCALE_UM_M), size=SCALE_UM_M)
+    moved = np.random.default_rng(2).normal(0.0, 2e-4, (len(check.robot.free_parameters), 6))
+    known = replace(check, robot=replace(check.robot, effects=(scales,)), earlier={scales.name: moved})
+    errs = check.robot.free_parameters + SCALE_UM_M * moved[:, 1]
+    truth = check.robot.mechanism.convention.geometry(errs)
+    records = first_records(check, truth)
+    naive, aware = (change_alarm(one, records) for one in (check, known))
+    assert naive is not None
+    assert aware is not None
+    assert naive.is_raised
+    assert aware.score < 0.5 * naive.score
+
+
+def test_the_result_of_a_check_has_it_and_the_verdict_does_not_heed_it(check) -> None:
+    records = measured(check, "l2", 0.08)
+    result = check_result(check, records, None, ())
+    assert result.alarm is not None
+    assert result.alarm.is_raised
+    assert result.left_out == ()
+    assert "Repeat the check" in " ".join(check_text(result).split())
+    assert max(map(len, check_text(result).splitlines())) <= 80

@@ -45,18 +45,23 @@ def gates(
     residuals: ChiSquareTest,
     largest_change_mm: float,
     before: Geometry,
+    expired: Sequence[str] | None = None,
 ) -> tuple[AcceptanceGate, ...]:
     """All conditions on an identification.
 
     ``violations`` are those of the drawing's tolerances. ``before`` is the controller's geometry, as the
     identified one in the mechanism's frame convention: other frames change numbers, and no robot.
+    ``expired`` are the instruments whose certificate had expired when the run began; none where no
+    instrument has one.
     """
+    certified = () if expired is None else (_certified(expired),)
     return (
         _converged(identified),
         _determined(identified),
         _agrees(residuals),
         _within_tolerance(violations),
         _small_change(identified.geometry, before, largest_change_mm),
+        *certified,
     )
 
 
@@ -124,6 +129,16 @@ def _small_change(after: Geometry, before: Geometry, largest_change_mm: float) -
         needs_person=True,
         needs_cell_name=not change_mm <= largest_change_mm,
     )
+
+
+def _certified(expired: Sequence[str]) -> AcceptanceGate:
+    """What rests on an instrument out of its term is no calibration to others; here a person decides."""
+    sentence = (
+        f"The certificate has expired: {', '.join(expired)}."
+        if expired
+        else "The certificates of the instruments were valid when the run began."
+    )
+    return AcceptanceGate(name="certified", passed=not expired, sentence=sentence, needs_person=True)
 
 
 @dataclass(frozen=True, slots=True)

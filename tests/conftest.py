@@ -92,9 +92,12 @@ def _blocked_signals() -> set[str]:
 
 
 def _descriptors() -> set[str]:
-    """Every open file descriptor and what it refers to; none where there is no /proc."""
-    found = set()
+    """Every open file descriptor and what it refers to; none where there is no /proc.
+
+    Without the fonts that matplotlib opens once and keeps.
+    """
+    found = {}
     for descriptor in Path("/proc/self/fd").glob("*"):
         with contextlib.suppress(FileNotFoundError):  # the one that lists the folder
-            found.add(f"descriptor {descriptor.name} -> {descriptor.readlink()}")
-    return found
+            found[descriptor.name] = str(descriptor.readlink())
+    return {f"descriptor {name} -> {file}" for name, file in found.items() if "/mpl-data/" not in file}

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import AsyncIterator, Callable, Sequence
 from contextlib import asynccontextmanager, suppress
 from dataclasses import dataclass, replace
+from datetime import UTC, datetime
 from pathlib import Path
 
 from drivers.interfaces import DeviceIdentity
@@ -238,6 +239,7 @@ def run_started(
         joint_ranges=robot.limits.joint_ranges,
         length_check=calibration.length_check,
         removed=calibration.removed,
+        expired=cell.settings.expired_on(datetime.now(UTC).date()),
     )
 
 

@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, SecretStr, field_validator
 
+from hexacell.cell.certificates import CertificateSettings
 from hexacell.cell.fields import InRange, Name, Password, Positive, Section, SixInRange, Text, broken_rule
 
 NodeId = Annotated[int, Field(ge=1, le=127)]
@@ -59,6 +60,8 @@ class GaugeSettings(Section):
         description="what it shows in the middle of its travel; without it, its display does not tell "
         "where its plunger stands",
     )
+    serial_number: Text = Field("", description="of the instrument, where it does not tell it itself")
+    certificate: CertificateSettings | None = Field(None, description="of its calibration")
 
     @property
     def mounting(self) -> GaugeAxis:
@@ -92,6 +95,7 @@ class EncoderSettings(Section):
     )
     timeout_s: Positive = Field(0.5, description="longest wait for a complete round or an SDO answer")
     heartbeat_ms: int = Field(500, ge=0, le=65535, description="heartbeat period written to the nodes, ms")
+    certificate: CertificateSettings | None = Field(None, description="of the calibration of all six")
 
     @field_validator("nodes")
     @classmethod

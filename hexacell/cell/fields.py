@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from datetime import date, datetime
 from typing import Annotated
 
 from pydantic import (
     AfterValidator,
     BaseModel,
+    BeforeValidator,
     ConfigDict,
     Field,
     PlainSerializer,
@@ -82,6 +84,15 @@ def _may_be_in_a_name(sign: str) -> bool:
     return sign.isalnum() or sign in SIGNS_OF_NAMES
 
 
+def _a_day(value: object) -> date:
+    if isinstance(value, date):
+        return value
+    try:
+        return datetime.strptime(str(value), "%Y-%m-%d").date()  # noqa: DTZ007 - a day has no zone
+    except ValueError as error:
+        raise _outside('a day, as "2027-03-31"') from error
+
+
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 InRange = Annotated[
     float,
@@ -104,6 +115,7 @@ Password = Annotated[
     SecretStr, AfterValidator(_a_password), PlainSerializer(lambda _: MASK, return_type=str)
 ]
 """Nothing that is printed or kept shows it."""
+Day = Annotated[date, BeforeValidator(_a_day)]
 Seed = Annotated[int, Field(ge=0, le=LARGEST_SEED)]
 Point = tuple[Finite, Finite, Finite]
 SixNumbers = tuple[Finite, Finite, Finite, Finite, Finite, Finite]

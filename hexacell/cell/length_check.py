@@ -7,6 +7,7 @@ from typing import Annotated, Literal, Self
 import numpy as np
 from pydantic import Field, model_validator
 
+from hexacell.cell.certificates import CertificateSettings
 from hexacell.cell.fields import InRange, NotNegative, PointInRange, Positive, Section, Text, broken_rule
 
 MicrometresPerMetreKelvin = Annotated[float, Field(ge=0, le=100, allow_inf_nan=False)]
@@ -25,6 +26,7 @@ class LengthCheckSettings(Section):
     )
     distance_mm: float = Field(ge=20, le=5000, description="of the two places of the ball, as certified")
     uncertainty_mm: Positive = Field(description="of that distance, expanded (k = 2), as certified")
+    certificate: CertificateSettings | None = Field(None, description="of that distance")
     parallel_mrad: NotNegative = Field(
         0.1, le=20, description="angle between the seats about each axis, 1 sigma"
     )

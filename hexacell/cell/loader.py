@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from datetime import date
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -169,6 +170,8 @@ def _value(value: object) -> str:
         table = tomlkit.inline_table()
         table.update(_masked(value))
         return table.as_string()
+    if isinstance(value, date):
+        value = value.isoformat()
     return tomlkit.item(value).as_string()
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from datetime import date
 from functools import cache
 from typing import Any, Literal, Self, TypeVar
 
@@ -9,6 +10,7 @@ from pydantic import Field, ValidationError, create_model, field_validator, mode
 from pydantic_core import InitErrorDetails
 
 from hexacell.cell.archive import ArchiveSettings
+from hexacell.cell.certificates import CertificateSettings, ReportSettings
 from hexacell.cell.devices import ControllerSettings, EncoderSettings, GaugeSettings, ThermometerSettings
 from hexacell.cell.fields import (
     GeometrySettings,
@@ -84,12 +86,28 @@ class CellSettings(Section):
     recovery: RecoverySettings = RecoverySettings()
     archive: ArchiveSettings = ArchiveSettings()
     task: TaskSettings = TaskSettings()
+    report: ReportSettings = ReportSettings()
     simulation: SimulationSettings | None = None
 
     @property
     def mechanism(self) -> Mechanism:
         """The mechanism that the file names; raises ``UsageError`` if it is not installed."""
         return mechanism_named(self.robot.mechanism)
+
+    @property
+    def certificates(self) -> dict[str, CertificateSettings]:
+        """Those of all instruments that have one, by the instrument's name."""
+        fixture = self.length_check
+        named = {
+            **{f"gauge {gauge.name}": gauge.certificate for gauge in self.gauges},
+            "encoders": self.encoders.certificate,
+            "fixture of the length check": None if fixture is None else fixture.certificate,
+        }
+        return {name: certificate for name, certificate in named.items() if certificate is not None}
+
+    def expired_on(self, day: date) -> tuple[str, ...]:
+        """The instruments whose certificate holds no longer on a day."""
+        return tuple(name for name, stated in self.certificates.items() if stated.has_expired(day))
 
     @field_validator("gauges")
     @classmethod

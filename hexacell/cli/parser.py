@@ -62,6 +62,7 @@ def make_parser() -> Parser:
     _apply(commands)
     _rollback(commands)
     _history(commands)
+    _report(commands)
     _cell(commands)
     return parser
 
@@ -291,6 +292,21 @@ def _history(commands: Any) -> None:  # noqa: ANN401
         "--archive",
         metavar="URL",
         help="the index over the runs: postgresql://user@host/database (default: as [archive] has it)",
+    )
+    _add_json(parser)
+
+
+def _report(commands: Any) -> None:  # noqa: ANN401
+    parser = _command(commands, "report", "write the report of a run: one file to read, print and file")
+    parser.add_argument("run", type=Path, metavar="RUN", help="a run folder")
+    parser.add_argument(
+        "--output",
+        type=Path,
+        metavar="FILE",
+        help="where to (default: report.html in the run folder); .pdf gives PDF/A",
+    )
+    parser.add_argument(
+        "--compare", type=Path, metavar="RUN", help="say also what has changed since this run, a folder"
     )
     _add_json(parser)
 

@@ -78,7 +78,6 @@ class DocumentKind(StrEnum):
 
     SUMMARY = "summary"
     RESULT = "result"
-    EVIDENCE = "evidence"
 
 
 @dataclass(frozen=True, slots=True)

@@ -88,6 +88,7 @@ class Computations:
             residuals=result.residuals,
             largest_change_mm=self.cell.settings.acceptance.largest_change_mm,
             before=commanding,
+            expired=_expired(self.cell.settings, state),
         )
         written = self.calibration.as_written(identified.geometry)
         self.config.change_to(written.geometry, state).save(
@@ -126,6 +127,13 @@ class Computations:
             self.cell.settings, calibration.robot_checked, calibration.accepted, measured
         )
         return events.ResultValidated(verdict=stated.verdict, line=length_line(stated), length=stated)
+
+
+def _expired(settings: CellSettings, state: RunState) -> tuple[str, ...] | None:
+    """The instruments whose certificate had expired when the run began; none where none has one."""
+    if not settings.certificates or state.started is None:
+        return None
+    return state.started.expired
 
 
 def _length_measurements(settings: CellSettings, state: RunState) -> LengthMeasurements:

@@ -27,6 +27,7 @@ COMMANDS = (
     "apply",
     "rollback",
     "history",
+    "report",
     "cell",
 )
 PAGES = [

@@ -35,6 +35,7 @@ def judged(identified, paper):
         largest_change_mm=15.0,
         before=paper.nominal,
         residuals=identified.goodness,
+        expired=None,
     ):
         found_gates = gates(
             found,
@@ -42,6 +43,7 @@ def judged(identified, paper):
             residuals=residuals,
             largest_change_mm=largest_change_mm,
             before=before,
+            expired=expired,
         )
         return {gate.name: gate for gate in found_gates}
 
@@ -202,3 +204,11 @@ def test_noise_alone_is_hardly_ever_worse():
 @pytest.mark.parametrize("broken", [np.nan, np.inf, -np.inf])
 def test_nan_gives_no_statistics(broken):
     assert DeviationStatistics.of([[0.01, 0.0, 0.0], [0.0, broken, 0.0]]) is None
+
+
+def test_an_expired_certificate_needs_a_person(judged):
+    assert "certified" not in judged()
+    assert judged(expired=())["certified"].passed
+    gate = judged(expired=("gauge x", "encoders"))["certified"]
+    assert (gate.passed, gate.needs_person, gate.needs_cell_name) == (False, True, False)
+    assert gate.sentence == "The certificate has expired: gauge x, encoders."

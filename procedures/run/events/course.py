@@ -23,6 +23,7 @@ class RunStarted(Frozen):
     length check starts from, if there is one. ``length_check`` is whether a calibration has one.
     ``joint_ranges`` are those of cell file and config together, mm; none in runs of older versions.
     ``removed`` is what a person took out of the plan: it is neither measured nor commanded.
+    ``expired`` are the instruments whose certificate had expired on the day it began.
     """
 
     kind: Literal["started"] = "started"
@@ -41,6 +42,7 @@ class RunStarted(Frozen):
     length_check: bool = False
     joint_ranges: tuple[tuple[float, float], ...] | None = None
     removed: RemovedPoses = RemovedPoses()
+    expired: tuple[str, ...] = ()
 
 
 class StepBegun(Frozen):

@@ -3,18 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 
 from hexacell.acceptance import AcceptanceGate
+from hexacell.application.calibration_run import run_started
+from hexacell.cell.certificates import CertificateSettings
 from hexacell.cell.simulation import SimulatedFault
 from hexacell.controller_config.change import ConfigChange
 from hexacell.decision import Verdict
 from hexacell.errors import AnswerNeeded, DeviceError, ExitCode, FileError, LimitError, WriteBackUndone
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS, hexaglide_geometry
+from hexacell.robot_model import robot_of
+from procedures.calibration.workflow import Calibration, Mode
 from procedures.run import events
 from procedures.run.steps import Phase
 
@@ -79,6 +84,30 @@ async def test_a_gate_that_requires_approval_is_approved_by_the_operator(propose
     site = proposed([DOUBTFUL])
     assert (await site.calibrate(resume=True, operator=approver)).exit_code == ExitCode.DONE
     assert site.happened(events.Committed) == [events.Committed(approved_by="a tester")]
+
+
+async def test_what_rests_on_an_expired_certificate_needs_a_person(finished, make_site) -> None:
+    first, *others = finished.cell.settings.gauges
+    certified = first.model_copy(update={"certificate": CertificateSettings(number="17", due="2020-01-01")})
+    site = make_site(gauges=(certified, *others))
+    history = list(finished.until(events.Proposed))[:-2]
+    history[0] = history[0].model_copy(update={"expired": ("gauge x",)})
+    site.write(history, finished)
+    with pytest.raises(AnswerNeeded, match="The certificate has expired: gauge x"):
+        await site.calibrate(resume=True)
+    assert site.config == finished.config_before
+
+
+def test_a_run_notes_which_certificates_have_expired_when_it_begins(finished) -> None:
+    first, *others = finished.cell.settings.gauges
+    stated = {"2020-01-01": ("gauge x",), "2999-12-31": ()}
+    for due, expired in stated.items():
+        certificate = CertificateSettings(number="17", due=due)
+        gauges = (first.model_copy(update={"certificate": certificate}), *others)
+        settings = finished.cell.settings.model_copy(update={"gauges": gauges})
+        cell = replace(finished.cell, settings=settings)
+        calibration = Calibration(settings, robot_of(finished.cell), Mode.OPTIMISE)
+        assert run_started(cell, calibration, ()).expired == expired
 
 
 def bend(site: Any, millimetres: float) -> None:

@@ -1,0 +1,25 @@
+"""``hexacell report``: a run as a page that can be filed."""
+
+from __future__ import annotations
+
+import argparse
+
+from hexacell.application.reported_run import reported_run
+from hexacell.cli.console import Console
+from hexacell.errors import ExitCode
+from hexacell.presentation.calibration_report.html import html_of
+from hexacell.presentation.calibration_report.pdf import pdf_of
+from hexacell.presentation.calibration_report.report import report_of
+from hexacell.storage.atomic_files import write_atomically
+
+
+def main(options: argparse.Namespace) -> ExitCode:
+    """Write the report; the run folder is only read, unless the report goes into it."""
+    console = Console(options.json)
+    earlier = None if options.compare is None else reported_run(options.compare)
+    report = report_of(reported_run(options.run), earlier)
+    target = options.output or options.run / "report.html"
+    write_atomically(target, pdf_of(report) if target.suffix == ".pdf" else html_of(report).encode())
+    console.document({"report": str(target), "identifier": report.identifier, "verdict": report.verdict})
+    console.print(f"{target}: {report.title.lower()}, {report.verdict}")
+    return ExitCode.DONE

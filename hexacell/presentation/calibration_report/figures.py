@@ -1,0 +1,106 @@
+"""The pictures of a report, drawn as SVG text that is the same, byte for byte, whenever it is drawn."""
+
+from __future__ import annotations
+
+import io
+import re
+from typing import Any
+
+import numpy as np
+
+from hexacell.application.reported_run import ReportedRun
+from hexacell.kinematics.geometry import Geometry
+from hexacell.kinematics.rotations import Array
+from hexacell.presentation.calibration_report.blocks import Chapter, Picture
+from procedures.run.steps import Phase
+
+SMALLEST_MM = 1e-4
+"""A distance that is drawn on a logarithmic axis is no smaller."""
+
+BEFORE, AFTER, INK = "#b35806", "#2166ac", "#222222"
+"""Apart for colour-blind readers too; the markers differ besides."""
+
+STYLE: dict[Any, Any] = {
+    "svg.hashsalt": "hexacell",
+    "svg.fonttype": "path",
+    "font.family": "sans-serif",
+    "font.size": 9.0,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.edgecolor": INK,
+}
+
+
+def figure_chapter(run: ReportedRun) -> Chapter | None:
+    """The ball's deviations before and after, and how well the records agree; none without records."""
+    pictures = tuple(one for one in (_deviations(run), _changes(run)) if one is not None)
+    return Chapter("Figures", pictures) if pictures else None
+
+
+def _deviations(run: ReportedRun) -> Picture | None:
+    """As figures 8 and 9 of the paper: what the gauges show at each held-out pose."""
+    phases = (("as found", Phase.BEFORE, BEFORE, "o"), ("as left", Phase.AFTER, AFTER, "s"))
+    series = [(name, _distances(run, phase), colour, marker) for name, phase, colour, marker in phases]
+    if not any(len(distances) for _, distances, _, _ in series):
+        return None
+    figure, axes = _axes()
+    for name, distances, colour, marker in series:
+        numbers = np.arange(1, len(distances) + 1)
+        axes.semilogy(numbers, distances, marker, color=colour, label=name, markersize=5)
+    axes.set_xlabel("held-out pose")
+    axes.set_ylabel("deviation of the ball, mm")
+    axes.grid(visible=True, axis="y", color="#dddddd", linewidth=0.6)
+    axes.legend(frameon=False, ncols=2, loc="lower right", bbox_to_anchor=(1.0, 1.0))
+    return Picture(_svg(figure), "Distance of the ball from its reference at each held-out pose.")
+
+
+def _distances(run: ReportedRun, phase: Phase) -> Array:
+    deviations = np.array(run.state.held_out(phase), dtype=float).reshape(-1, 3)
+    distances: Array = np.maximum(np.linalg.norm(deviations, axis=-1), SMALLEST_MM)
+    return distances
+
+
+def _changes(run: ReportedRun) -> Picture | None:
+    """The change of each free parameter by its expanded uncertainty."""
+    identified = run.state.identified
+    if identified is None:
+        return None
+    mechanism = run.settings.mechanism
+    parameters = mechanism.parameters
+    old = mechanism.normalize_frames(Geometry.of(parameters, run.started.controller))[0].vector
+    sigma = parameters.vector(identified.result.sigma)
+    rows = np.flatnonzero(sigma > 0.0)
+    change = (parameters.vector(identified.result.geometry) - old)[rows]
+    figure, axes = _axes()
+    axes.errorbar(
+        np.arange(len(rows)),
+        change,
+        yerr=2.0 * sigma[rows],
+        fmt="o",
+        color=AFTER,
+        markersize=3.5,
+        capsize=2,
+    )
+    axes.axhline(0.0, color=INK, linewidth=0.6)
+    axes.set_xticks(np.arange(len(rows)), [parameters.parameters[row].name for row in rows], rotation=90)
+    axes.set_ylabel("change, mm")
+    return Picture(_svg(figure), "Change of each parameter, with its expanded uncertainty (k = 2).")
+
+
+def _axes() -> tuple[Any, Any]:
+    """A figure without pyplot, which keeps state, and its axes."""
+    from matplotlib import rc_context  # noqa: PLC0415 - half a second that only figures need
+    from matplotlib.figure import Figure  # noqa: PLC0415 - likewise
+
+    with rc_context(STYLE):
+        figure = Figure(figsize=(7.0, 2.8), layout="constrained")
+        return figure, figure.add_subplot()
+
+
+def _svg(figure: Any) -> str:  # noqa: ANN401 - matplotlib is imported where it is used
+    from matplotlib import rc_context  # noqa: PLC0415 - half a second that only figures need
+
+    stream = io.StringIO()
+    with rc_context(STYLE):
+        figure.savefig(stream, format="svg", metadata={"Date": None, "Creator": None})
+    return re.sub(r"\A.*?(?=<svg )", "", stream.getvalue(), flags=re.DOTALL)

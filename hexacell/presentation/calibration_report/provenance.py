@@ -1,0 +1,98 @@
+"""Where the figures come from: conditions, instruments and their certificates, files, who answers."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from datetime import date
+
+from drivers.interfaces import DeviceIdentity
+from hexacell.application.reported_run import ReportedRun
+from hexacell.cell.certificates import CertificateSettings
+from hexacell.presentation.calibration_report.blocks import Chapter, Facts, Paragraph, Table
+from hexacell.presentation.measured_noise import measured_noise_text
+
+NOT_STATED = "not stated"
+
+
+def conditions_chapter(run: ReportedRun) -> Chapter:
+    """Temperatures, records, noise: under what the figures were taken."""
+    state = run.state
+    pairs = [("Records", str(sum(len(measured.samples) for measured in state.sets.values())))]
+    pairs += [(f"Temperature, {name}", shown) for name, shown in _temperatures(run)]
+    if len(pairs) == 1:
+        pairs.append(("Temperature", "not measured"))
+    pairs += [("Sets measured again", str(state.invalidated))] if state.invalidated else []
+    noise = () if state.noise is None else (Paragraph(_one_line(measured_noise_text(state.noise.noise))),)
+    return Chapter("Conditions", (Facts(tuple(pairs)), *noise))
+
+
+def traceability_chapter(run: ReportedRun) -> Chapter:
+    """Every instrument with its serial number and certificate."""
+    day = run.began.date()
+    rows = tuple(_instrument_row(run, device, day) for device in run.started.devices)
+    expired = run.settings.expired_on(day)
+    text = f"Expired on the day of the run: {', '.join(expired)}." if expired else ""
+    table = Table(("Instrument", "kind", "serial number", "certificate", "due"), rows, 9)
+    return Chapter(
+        "Instruments and traceability", (table, *([Paragraph(text, is_strong=True)] if text else []))
+    )
+
+
+def integrity_chapter(run: ReportedRun) -> Chapter:
+    """The fingerprints of the files that everything above can be derived from."""
+    text = (
+        "Everything in this report can be derived again from these files of the run folder; "
+        "`hexacell replay` repeats its decisions and results."
+    )
+    rows = tuple((name, digest) for name, digest in sorted(run.fingerprints.items()))
+    return Chapter("Files", (Paragraph(text), Table(("File", "SHA-256"), rows, 9)))
+
+
+def authorisation_chapter(run: ReportedRun) -> Chapter:
+    """Who answers for it."""
+    named = run.settings.report.authorised_by or "not stated in the cell file"
+    pairs = (("Authorised by", named), ("Date and signature", "\u2003" * 20))
+    text = (
+        "This report may be copied as a whole only. Its results are of this robot alone, as it was when it "
+        "was measured."
+    )
+    return Chapter("Authorisation", (Facts(pairs), Paragraph(text)))
+
+
+def _one_line(text: str) -> str:
+    return "; ".join(" ".join(line.split()) for line in text.splitlines())
+
+
+def _temperatures(run: ReportedRun) -> Iterator[tuple[str, str]]:
+    shown: dict[str, list[float]] = {}
+    for measured in run.state.sets.values():
+        for sample in measured.samples:
+            for one in sample.reading.temperatures:
+                if one.celsius is not None:
+                    shown.setdefault(one.name, []).append(one.celsius)
+    for name, values in shown.items():
+        yield name, f"{min(values):.1f} to {max(values):.1f} deg C"
+
+
+def _instrument_row(run: ReportedRun, device: DeviceIdentity, day: date) -> tuple[str, ...]:
+    certificate = _certificate_of(run, device)
+    number = NOT_STATED if certificate is None else certificate.number
+    if certificate is not None and certificate.expanded_um is not None:
+        number = f"{number} (U {certificate.expanded_um:g} um)"
+    due = "" if certificate is None or certificate.due is None else certificate.due.isoformat()
+    if certificate is not None and certificate.has_expired(day):
+        due = f"{due}: EXPIRED"
+    serial = device.serial_number or _stated_serial(run, device.name) or NOT_STATED
+    return device.name, device.description, serial, number, due
+
+
+def _certificate_of(run: ReportedRun, device: DeviceIdentity) -> CertificateSettings | None:
+    """A gauge has its own; the encoders have one together."""
+    certificates = run.settings.certificates
+    if device.name.startswith("encoder"):
+        return certificates.get("encoders")
+    return certificates.get(f"gauge {device.name}")
+
+
+def _stated_serial(run: ReportedRun, name: str) -> str:
+    return next((gauge.serial_number for gauge in run.settings.gauges if gauge.name == name), "")

@@ -1,0 +1,140 @@
+"""The results behind the statement: uncertainty budget, parameters, what the records could tell apart."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import numpy as np
+
+from hexacell.application.reported_run import ReportedRun
+from hexacell.errors import UsageError
+from hexacell.kinematics.geometry import Geometry
+from hexacell.kinematics.parameters import ParameterUnit
+from hexacell.presentation.calibration_report.blocks import Block, Chapter, Paragraph, Table
+from hexacell.reporting.check_result import ParameterChange
+from hexacell.reporting.run_comparison import ParameterDifference, compare_results
+from hexacell.uncertainty.statement import COVERAGE_FACTOR
+
+SMALLEST_MM = 0.0005
+"""Lines of the budget below are zero in the table, and left out."""
+
+
+def uncertainty_chapter(run: ReportedRun) -> Chapter | None:
+    """The budget that U comes from; none without an identification."""
+    budget = run.document.get("uncertainty")
+    if not budget:
+        return None
+    rows = [("noise of the readings", "", f"{budget['noise_mm']:.3f}", "measured and stated")]
+    rows += [_budget_row(line) for line in budget["lines"] if line["combined_mm"] >= SMALLEST_MM]
+    rows.append(("standard uncertainty (root of the squares)", "", f"{budget['standard_mm']:.3f}", ""))
+    table = Table(("Cause", "size", "at the worst task pose, mm", "source"), tuple(rows))
+    unseen = [line["name"] for line in budget["lines"] if not line["visible"]]
+    text = f"No record shows these: {', '.join(unseen)}." if unseen else ""
+    return Chapter("Uncertainty budget of the identified geometry", (table, *_text(text)))
+
+
+def parameter_chapter(run: ReportedRun) -> Chapter | None:
+    """Old, new, change and uncertainty of each parameter; none where nothing was identified or checked."""
+    state = run.state
+    if state.judged is not None and state.judged.check is not None and state.judged.check.changes:
+        return _changes_chapter(state.judged.check.changes)
+    if state.identified is None:
+        return None
+    table = Table(
+        ("Parameter", "unit", "old", "new", "change", "U (k = 2)"), tuple(_parameter_rows(run)), 2
+    )
+    text = (
+        "Both geometries are in the frame convention of the mechanism, so that a choice of frames is no "
+        "change; the controller's config has the new one in the frames in which the task poses move least."
+    )
+    return Chapter("Identified geometry", (table, Paragraph(text)))
+
+
+def comparison_chapter(earlier: ReportedRun, run: ReportedRun) -> Chapter:
+    """What has changed since an earlier run.
+
+    Raises:
+        UsageError: one of them identified nothing, or their frames differ.
+    """
+    then, now = earlier.state.identified, run.state.identified
+    if then is None or now is None:
+        raise UsageError("one of the runs identified no geometry", action="Name calibrations, which do")
+    compared = compare_results(run.settings.mechanism.parameters, then.result, now.result)
+    rows = tuple(map(_difference_row, compared.parameters))
+    columns = ("Parameter", "unit", "then", "now", "change", "U (k = 2)", "")
+    text = (
+        "All changes together are more than the noise of both runs explains."
+        if compared.is_changed
+        else "The noise of both runs explains all changes together."
+    )
+    title = f"Compared with {earlier.name} of {earlier.ended:%Y-%m-%d}"
+    return Chapter(title, (Paragraph(text, is_strong=True), Table(columns, rows, 2)))
+
+
+def observability_chapter(run: ReportedRun) -> Chapter | None:
+    """What the records determine and what they hardly tell apart, and which were left out."""
+    state, document = run.state, run.document
+    if state.identified is None:
+        return None
+    result = state.identified.result
+    undetermined = ", ".join(result.undetermined) or "none"
+    sentences = [
+        f"{result.records} records at {result.points} points.",
+        f"Residuals {1e3 * result.residual_rms_mm:.1f} um (rms), chi2 {result.chi2:.1f} of {result.dof}.",
+        f"Parameters that the records do not determine: {undetermined}.",
+        f"Records left out as false: {_left_out(run)}.",
+    ]
+    pairs = document.get("correlated") or []
+    rows = tuple((" and ".join(pair["parameters"]), f"{pair['correlation']:+.2f}") for pair in pairs[:10])
+    tables = (Table(("Strongly correlated parameters", "correlation"), rows),) if rows else ()
+    return Chapter("Observability", (*map(Paragraph, sentences), *tables))
+
+
+def _text(text: str) -> tuple[Block, ...]:
+    return (Paragraph(text),) if text else ()
+
+
+def _budget_row(line: Mapping[str, Any]) -> tuple[str, str, str, str]:
+    size = f"{line['size']:.3g} {line['unit']}"
+    return line["name"], size, f"{line['combined_mm']:.3f}", line["source"]
+
+
+def _changes_chapter(changes: tuple[ParameterChange, ...]) -> Chapter:
+    rows = tuple(
+        (one.name, one.unit, f"{one.change:+.3f}", f"{COVERAGE_FACTOR * one.sigma:.3f}") for one in changes
+    )
+    table = Table(("Parameter", "unit", "change since identified", "U (k = 2)"), rows, 2)
+    return Chapter("Changes of the geometry", (table,))
+
+
+def _parameter_rows(run: ReportedRun) -> Iterator[tuple[str, ...]]:
+    identified, mechanism = run.state.identified, run.settings.mechanism
+    assert identified is not None  # noqa: S101 - asked only then
+    parameters = mechanism.parameters
+    old = mechanism.normalize_frames(Geometry.of(parameters, run.started.controller))[0].vector
+    new = parameters.vector(identified.result.geometry)
+    sigma = parameters.vector(identified.result.sigma)
+    for row in np.flatnonzero(sigma > 0.0):
+        unit = parameters.parameters[row].kind.unit
+        decimals = 3 if unit is ParameterUnit.MM else 6
+        figures = (old[row], new[row])
+        yield (
+            parameters.parameters[row].name,
+            unit.value,
+            *(f"{value:.{decimals}f}" for value in figures),
+            f"{new[row] - old[row]:+.{decimals}f}",
+            f"{COVERAGE_FACTOR * sigma[row]:.{decimals}f}",
+        )
+
+
+def _difference_row(one: ParameterDifference) -> tuple[str, ...]:
+    values = f"{one.before:.3f}", f"{one.after:.3f}", f"{one.change:+.3f}"
+    expanded = f"{COVERAGE_FACTOR * one.sigma:.3f}"
+    return one.name, one.unit, *values, expanded, "changed" if one.is_significant else ""
+
+
+def _left_out(run: ReportedRun) -> str:
+    assert run.state.identified is not None  # noqa: S101 - asked only then
+    outliers = run.state.identified.result.outliers
+    return ", ".join(f"P{one.point}/{one.orientation} ({one.kind.value})" for one in outliers) or "none"

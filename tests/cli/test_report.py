@@ -1,0 +1,122 @@
+"""``hexacell report``: what the page of a run says, and that it says it of that run alone."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import re
+import shutil
+from html import unescape
+
+import pytest
+
+from procedures.journal.journal import read_entries
+from procedures.journal.line_format import encode
+from procedures.run import events
+
+CHAPTERS = [
+    "Statement of conformity",
+    "As found and as left",
+    "Subject and method",
+    "Figures",
+    "Uncertainty budget of the identified geometry",
+    "Identified geometry",
+    "Observability",
+    "Conditions",
+    "Instruments and traceability",
+    "Files",
+    "Authorisation",
+]
+
+
+def text_of(page: str) -> str:
+    without = re.sub(r"<(style|svg)\b.*?</\1>", "", page, flags=re.DOTALL)
+    return " ".join(unescape(re.sub(r"<[^>]+>", " ", without)).split())
+
+
+@pytest.fixture
+def run(demo, tmp_path):
+    """A copy of the demo's run, to be written into."""
+    copy = tmp_path / "2026-11-23T000000Z"
+    shutil.copytree(demo.run, copy)
+    return copy
+
+
+def test_the_page_says_what_the_run_found_the_verdict_first(typed_here, demo, run) -> None:
+    outcome = typed_here("report", run, "--json")
+    assert outcome.code == 0, outcome.err
+    page = (run / "report.html").read_text()
+    assert re.findall(r"<h2>(.*?)</h2>", page) == CHAPTERS
+    said, verified = text_of(page), demo.outcome.document["verification"]
+    assert said.index("PASS") < said.index("Statement of conformity")
+    error = verified["accuracy"]["position"]
+    assert f"position, mm {error['value']:.3f} {error['expanded']:.3f} 0.25 pass" in said
+    assert f"{verified['before_mm']:.3f} {verified['after_mm']:.3f}" in said
+    assert "it was not checked" in said
+    digest = hashlib.sha256((run / "journal.jsonl").read_bytes()).hexdigest()
+    assert f"journal.jsonl {digest}" in said
+    assert outcome.document["identifier"] == f"simulated-hexaglide / {run.name} / {digest[:12]}"
+    assert outcome.document["identifier"] in said
+    for parameter in json.loads((run / "result.json").read_text())["parameters"]:
+        is_free = parameter["sigma"] > 0.0
+        assert (re.search(rf"\b{parameter['name']} mm -?\d", said) is not None) == is_free
+
+
+def test_it_is_the_same_again_and_changes_nothing_else(typed_here, run) -> None:
+    before = {path: path.read_bytes() for path in run.rglob("*") if path.is_file()}
+    assert typed_here("report", run).code == 0
+    page = (run / "report.html").read_bytes()
+    assert typed_here("report", run).code == 0
+    assert (run / "report.html").read_bytes() == page
+    assert {path: path.read_bytes() for path in before} == before
+    assert sum(path.is_file() for path in run.rglob("*")) == len(before) + 1
+
+
+def test_a_pdf_is_written_where_it_is_wanted(typed_here, run, tmp_path) -> None:
+    assert typed_here("report", run, "--output", tmp_path / "r.pdf").code == 0
+    assert (tmp_path / "r.pdf").read_bytes().startswith(b"%PDF-")
+    assert not (run / "report.html").exists()
+
+
+def test_two_runs_are_compared(typed_here, demo, run, tmp_path) -> None:
+    assert typed_here("report", run, "--compare", demo.run).code == 0
+    said = text_of((run / "report.html").read_text())
+    assert f"Compared with {demo.run.name} of " in said
+    assert "The noise of both runs explains all changes together." in said
+
+
+def test_an_interrupted_run_has_no_verdict(typed_here, run) -> None:
+    entries = list(read_entries(run / "journal.jsonl"))
+    first = next(n for n, one in enumerate(entries) if isinstance(one.event, events.SetClosed))
+    (run / "journal.jsonl").write_bytes(b"".join(encode(one) for one in entries[: first + 1]))
+    (run / "result.json").unlink()
+    assert typed_here("report", run).code == 0
+    said = text_of((run / "report.html").read_text())
+    assert "NOT EVALUATED" in said
+    assert "The run ended before anything could be said of the robot." in said
+    assert "Nothing was written: the robot is left as it was found." in said
+
+
+def test_an_expired_certificate_stands_in_it(typed_here, run) -> None:
+    cell = run / "cell.toml"
+    gauge = 'name = "x"\naxis = "x"\n'
+    stated = f'{gauge}certificate = {{number = "D-K <17>", due = "2020-01-01"}}\n'
+    cell.write_text(cell.read_text().replace(gauge, stated, 1))
+    assert typed_here("report", run).code == 0
+    said = text_of((run / "report.html").read_text())
+    assert "D-K <17> 2020-01-01: EXPIRED" in said
+    assert "Expired on the day of the run: gauge x." in said
+
+
+@pytest.mark.parametrize("named", ["nowhere", ".", "cell.toml"])
+def test_what_is_no_run_is_refused(typed_here, cell_folder, named) -> None:
+    outcome = typed_here("report", named)
+    assert outcome.code == 2
+    assert "this is no run folder" in outcome.err
+
+
+def test_a_damaged_result_is_told(typed_here, run) -> None:
+    (run / "result.json").write_text("{")
+    outcome = typed_here("report", run)
+    assert outcome.code == 2
+    assert "result.json: is damaged" in outcome.err

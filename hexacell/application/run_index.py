@@ -47,15 +47,17 @@ class RunIndex:
         model: type[Document],
         read: Callable[[RunFolder], Document | None],
         runs: Iterable[str] | None = None,
+        context: str = "",
     ) -> dict[str, Document]:
         """The documents of all runs, or of some, by name; without those that have none.
 
-        ``read`` derives a document from its folder; a part of the runs has none.
+        ``read`` derives a document from its folder; a part of the runs has none. ``context`` is a word for
+        what it depends on beside the folder: documents of another one are derived again.
 
         Raises:
             FileError: the folder of the runs cannot be read.
         """
-        stamps = folder_stamps(self._folder)
+        stamps = {name: f"{stamp} {context}" for name, stamp in folder_stamps(self._folder).items()}
         wanted = {name: stamps[name] for name in (stamps if runs is None else runs) if name in stamps}
         if not wanted:
             return {}

@@ -9,6 +9,7 @@ from typing import Any
 from drivers.interfaces import DeviceIdentity
 from hexacell.application.calibration_run import RunRequest
 from hexacell.application.config_rollback import ConfigRollback
+from hexacell.application.drift_history import DriftHistory, FoundChange
 from hexacell.application.history import PastRun
 from hexacell.application.offline import NextPose, PlanTrial
 from hexacell.application.proposals import AppliedProposal
@@ -206,9 +207,28 @@ def comparison_document(before: PastRun, after: PastRun, compared: RunComparison
     }
 
 
-def drift_document(found: Sequence[ParameterTrend]) -> dict[str, Any]:
+def drift_document(found: Sequence[ParameterTrend], watched: DriftHistory) -> dict[str, Any]:
     """What ``history --drift --json`` prints."""
-    return {"parameters": [{**asdict(one), "walking": one.is_walking} for one in found]}
+    return {
+        "parameters": [{**asdict(one), "walking": one.is_walking} for one in found],
+        "runs": [at.isoformat() for at in watched.runs],
+        "changes": [_change_document(one) for one in watched.changes],
+        "shares_of_limit": dict(watched.shares),
+    }
+
+
+def _change_document(found: FoundChange) -> dict[str, Any]:
+    return {
+        "leg": found.leg,
+        "after": found.after.isoformat(),
+        "before": found.before.isoformat(),
+        "noticed": found.noticed.isoformat(),
+        "parameter": found.parameter.name,
+        "unit": found.parameter.kind.unit.value,
+        "change": found.change,
+        "sigma": found.sigma,
+        "other_legs": list(found.other_legs),
+    }
 
 
 def story_document(entries: Sequence[Entry]) -> dict[str, Any]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from hexacell.application.drift_history import DriftHistory, FoundChange
 from hexacell.application.history import PastRun
 from hexacell.presentation.layout import wrapped
 from hexacell.reporting.run_comparison import ParameterDifference, ParameterTrend, RunComparison
@@ -89,6 +90,32 @@ def drift_text(found: Sequence[ParameterTrend]) -> str:
     verdict = f"Walking: {', '.join(walking)}." if walking else "No parameter walks."
     head = f"{'':5}{'first':>15}{'last':>15}{'in 30 days':>14}{'sigma':>10}"
     return "\n".join([wrapped(verdict), head, *map(_trend_line, found)])
+
+
+def watch_text(found: DriftHistory) -> str:
+    """What changed and when, and how near the largest sum is to an alarm; empty without runs."""
+    if not found.runs:
+        return ""
+    lines = [wrapped(change_sentence(one), indent=2) for one in found.changes]
+    name, share = max(found.shares, key=lambda one: one[1])
+    since = "since then " if found.changes else ""
+    runs = f"{len(found.runs)} runs from {found.runs[0]:%Y-%m-%d} to {found.runs[-1]:%Y-%m-%d}"
+    quiet = "" if found.changes else "no leg has moved: "
+    rest = f"{runs}: {quiet}{since}the largest sum of innovations is {share:.0%} of its limit ({name})."
+    return "\n".join([*lines, wrapped(rest, indent=2)])
+
+
+def change_sentence(found: FoundChange) -> str:
+    """A change that was found: which leg, by how much, when, and whether others changed as well."""
+    unit = found.parameter.kind.unit.value
+    others = " and ".join(str(leg) for leg in found.other_legs)
+    size = f"{abs(found.change):.3f} +- {found.sigma:.3f} {unit}"
+    rest = f"legs {others} moved as well" if len(found.other_legs) > 1 else f"leg {others} moved as well"
+    return (
+        f"leg {found.leg} moved {size} (as {found.parameter.name} by {found.change:+.3f}) "
+        f"between {found.after:%Y-%m-%d %H:%M} and {found.before:%Y-%m-%d %H:%M}; "
+        f"{rest if others else 'the others did not'}. Noticed {found.noticed:%Y-%m-%d}."
+    )
 
 
 def _columns(name: str, mode: str, verdict: str, error: str, what: str) -> str:

@@ -78,6 +78,7 @@ class DocumentKind(StrEnum):
 
     SUMMARY = "summary"
     RESULT = "result"
+    EVIDENCE = "evidence"
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,6 +9,7 @@ import pytest
 from hexacell.cell.loader import load_cell
 from hexacell.controller_config.write_back import commit
 from tests.hexacell.application.proposed_runs import propose_run
+from tests.hexacell.application.recorded_nights import Nights
 from tests.hexacell.application.test_history import identified
 
 KEYS = {
@@ -84,3 +85,22 @@ def test_passwords_are_refused_in_the_address_of_an_archive(cell, typed_here) ->
         refused = typed_here("history", cell.path, "--archive", url)
         assert (refused.code, "secret" in refused.err, ".pgpass" in refused.err) == (2, False, True)
     assert typed_here("history", cell.path, "--archive", "sqlite:///x").code == 2
+
+
+def test_a_leg_that_moved_is_told_with_the_night(cell, typed_here) -> None:
+    nights = Nights(cell)
+    nights.calibrate()
+    for _ in range(4):
+        nights.check()
+    nights.changes = {"l4": 0.31}
+    nights.check()
+    told = typed_here("history", cell.path, "--drift")
+    assert (told.code, told.out.startswith("leg 4 moved 0.3")) == (0, True)
+    document = typed_here("history", cell.path, "--drift", "--json").document
+    assert set(document) == {"parameters", "runs", "changes", "shares_of_limit"}
+    (change,) = document["changes"]
+    assert set(change) == {
+        "leg", "after", "before", "noticed", "parameter", "unit", "change", "sigma", "other_legs",
+    }  # fmt: skip
+    assert (change["leg"], change["before"]) == (4, "2026-03-06T02:30:00+00:00")
+    json.dumps(document, allow_nan=False)

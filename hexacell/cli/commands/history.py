@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Sequence
 
+from hexacell.application.drift_history import drift_history
 from hexacell.application.history import compare_runs, parameter_trends, past_runs
 from hexacell.application.run_index import RunIndex
 from hexacell.cell.archive import mistake_in_url
@@ -18,7 +19,7 @@ from hexacell.presentation.documents import (
     history_document,
     story_document,
 )
-from hexacell.presentation.history import comparison_text, drift_text, history_text
+from hexacell.presentation.history import comparison_text, drift_text, history_text, watch_text
 from hexacell.presentation.run_story import story_text
 from hexacell.runs.run_folder import find_run
 from procedures.journal.journal import read_entries
@@ -36,9 +37,9 @@ def main(options: argparse.Namespace) -> ExitCode:
         console.print(story_text(entries))
     elif options.drift:
         index = _index(cell, options, console)
-        found = parameter_trends(cell, past_runs(cell, index), index)
-        console.document(drift_document(found))
-        console.print(drift_text(found))
+        found, watched = parameter_trends(cell, past_runs(cell, index), index), drift_history(cell, index)
+        console.document(drift_document(found, watched))
+        console.print("\n".join(filter(None, [watch_text(watched), drift_text(found)])))
     else:
         runs = past_runs(cell, _index(cell, options, console))
         console.document(history_document(runs))

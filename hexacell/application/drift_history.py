@@ -1,0 +1,102 @@
+"""The watch over all runs of a cell: what changed, when, and how near the sums are to an alarm."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from datetime import datetime
+
+from hexacell.application.run_evidence_document import EvidenceDocument, evidence_document
+from hexacell.application.run_index import RunIndex
+from hexacell.campaign.change_alarm import machine_causes
+from hexacell.cell.loader import Cell
+from hexacell.change_detection.drift_watch import StepAlarm, watch_runs
+from hexacell.kinematics.parameters import GeometricParameter
+from hexacell.robot_model import robot_of
+from hexacell.runs.archive import DocumentKind
+from hexacell.runs.run_folder import RunFolder
+from hexacell.storage.atomic_files import sha256
+
+
+@dataclass(frozen=True, slots=True)
+class FoundChange:
+    """A change that the watch found.
+
+    Attributes:
+        noticed: when the run ended that alarmed.
+        after, before: when the runs ended between which it happened.
+        parameter: the likeliest one of its leg, with its ``change`` and one standard deviation of that.
+        other_legs: that changed as well.
+    """
+
+    noticed: datetime
+    after: datetime
+    before: datetime
+    leg: int
+    parameter: GeometricParameter
+    change: float
+    sigma: float
+    other_legs: tuple[int, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class DriftHistory:
+    """What all runs of a cell say of changes.
+
+    Attributes:
+        runs: when each run ended that counts, oldest first.
+        changes: oldest first.
+        shares: the cumulative sum of each parameter of the machine, as a share of its limit.
+    """
+
+    runs: tuple[datetime, ...]
+    changes: tuple[FoundChange, ...]
+    shares: tuple[tuple[str, float], ...]
+
+
+def drift_history(cell: Cell, index: RunIndex | None = None) -> DriftHistory:
+    """The watch over the runs of a cell, since its file last stated other systematic effects.
+
+    Raises:
+        FileError: the controller's config, or the folder of the runs, cannot be read.
+    """
+    runs = _counted_runs(cell, index or RunIndex(cell))
+    if not runs:
+        return DriftHistory((), (), ())
+    causes = machine_causes(robot_of(cell), len(runs[-1].evidence.weighted))
+    watched = watch_runs([run.evidence for run in runs], causes)
+    parameters = cell.settings.mechanism.parameters
+    ended = tuple(run.at for run in runs)
+    changes = tuple(_change(alarm, ended, parameters.parameters) for alarm in watched.alarms)
+    shares = zip(parameters.names, watched.share_of_limit.tolist(), strict=True)
+    return DriftHistory(ended, changes, tuple(shares))
+
+
+def _counted_runs(cell: Cell, index: RunIndex) -> list[EvidenceDocument]:
+    """The runs that have evidence of the same state as the latest, oldest first."""
+    settings = cell.settings
+
+    def read(folder: RunFolder) -> EvidenceDocument | None:
+        return evidence_document(settings, folder)
+
+    # What the noise or the effects are stated to be decides what the records say.
+    stated = sha256(
+        settings.model_dump_json(include={"robot", "noise", "uncertainty", "stations"}).encode()
+    )
+    found = index.documents(DocumentKind.EVIDENCE, EvidenceDocument, read, context=stated[:16])
+    runs = sorted(found.values(), key=lambda run: run.at)
+    return [run for run in runs if len(run.weighted) == len(runs[-1].weighted)]
+
+
+def _change(
+    alarm: StepAlarm, ended: tuple[datetime, ...], parameters: tuple[GeometricParameter, ...]
+) -> FoundChange:
+    return FoundChange(
+        noticed=ended[alarm.run],
+        after=ended[max(alarm.first - 1, 0)],
+        before=ended[alarm.last],
+        leg=alarm.leg,
+        parameter=parameters[alarm.cause],
+        change=alarm.change,
+        sigma=alarm.sigma,
+        other_legs=alarm.other_legs,
+    )

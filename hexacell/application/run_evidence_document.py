@@ -1,0 +1,124 @@
+"""The evidence of a recorded run on the geometry, from its folder, as the archive keeps it."""
+
+from __future__ import annotations
+
+import base64
+from dataclasses import dataclass
+from datetime import datetime
+from typing import Self
+
+import numpy as np
+
+from hexacell.application.journal_soundness import require_sound
+from hexacell.campaign.change_alarm import machine_records
+from hexacell.cell.fields import Frozen
+from hexacell.cell.model import CellSettings
+from hexacell.change_detection.run_evidence import RunEvidence
+from hexacell.errors import HexacellError
+from hexacell.kinematics.rotations import Array
+from hexacell.measurements.records import MeasurementSet, RecordId
+from hexacell.robot_model import robot_of_start
+from hexacell.runs.run_folder import RunFolder
+from procedures.calibration.workflow import Calibration, Mode
+from procedures.journal.journal import read_entries
+from procedures.run.state import RunState
+
+
+class EvidenceDocument(Frozen):
+    """The evidence of one run, which ended ``at``; arrays as base64 of IEEE 754 doubles, little endian.
+
+    ``information`` has the upper triangle, row by row. The first ``free`` numbers of the state are the free
+    parameters, the others shared causes.
+    """
+
+    at: datetime
+    free: int
+    information: str
+    weighted: str
+
+    @classmethod
+    def of(cls, at: datetime, free: int, evidence: RunEvidence) -> Self:
+        """The document of an evidence."""
+        upper = evidence.information[np.triu_indices(len(evidence.weighted))]
+        return cls(at=at, free=free, information=_encoded(upper), weighted=_encoded(evidence.weighted))
+
+    @property
+    def evidence(self) -> RunEvidence:
+        """The evidence again."""
+        weighted = _decoded(self.weighted)
+        upper = np.zeros((len(weighted), len(weighted)))
+        upper[np.triu_indices(len(weighted))] = _decoded(self.information)
+        return RunEvidence(upper + np.triu(upper, 1).T, weighted)
+
+
+def evidence_document(settings: CellSettings, folder: RunFolder) -> EvidenceDocument | None:
+    """The evidence of a run by the settings that the cell has now.
+
+    None where it has none: it is not over, measured no geometry, its residuals do not agree with the noise,
+    it started from a drawing, or its journal cannot be read.
+    """
+    try:
+        entries = read_entries(folder.journal)
+        events = (entry.event for entry in entries)
+        state = require_sound(events, settings, folder.journal, follows_plan=False)
+        counted = _counted_calibration(settings, state) or _counted_check(settings, state)
+        if counted is None or not counted.measurements.records:
+            return None
+        records = machine_records(counted.calibration.robot_of(state), counted.measurements, counted.free)
+    except (HexacellError, np.linalg.LinAlgError):  # records that fit no robot near this one
+        return None
+    return EvidenceDocument.of(entries[-1].at, len(counted.free), records.evidence)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _CountedRun:
+    """A run that counts, its records without false ones, and where they are linearized."""
+
+    calibration: Calibration
+    measurements: MeasurementSet
+    free: Array
+
+
+def _counted_calibration(settings: CellSettings, state: RunState) -> _CountedRun | None:
+    """A calibration that converged, at its own result."""
+    if state.identified is None or not state.identified.result.converged:
+        return None
+    calibration = _calibration(settings, state, Mode.OPTIMISE)
+    result, mechanism = state.identified.result, settings.mechanism
+    free = mechanism.convention.free_parameters(result.identified(mechanism.parameters))
+    false = {(one.point, one.orientation) for one in result.outliers}
+    return None if calibration is None else _CountedRun(calibration, _without(state, false), free)
+
+
+def _counted_check(settings: CellSettings, state: RunState) -> _CountedRun | None:
+    """A check of a calibrated robot, at the calibration's result."""
+    check = None if state.judged is None else state.judged.check
+    if check is None or check.earlier_run is None or not check.is_consistent:
+        return None
+    calibration = _calibration(settings, state, Mode.CHECK)
+    if calibration is None:
+        return None
+    free = calibration.robot_of(state).free_parameters
+    return _CountedRun(calibration, _without(state, set(check.left_out)), free)
+
+
+def _calibration(settings: CellSettings, state: RunState, mode: Mode) -> Calibration | None:
+    started = state.started
+    if started is None:
+        return None
+    robot = robot_of_start(
+        settings, started.controller, started.branch, started.taught, started.joint_ranges
+    )
+    return Calibration(settings, robot, mode, accepted=started.accepted)
+
+
+def _without(state: RunState, false: set[RecordId]) -> MeasurementSet:
+    return MeasurementSet(tuple(one for one in state.measurements().records if one.id not in false))
+
+
+def _encoded(values: Array) -> str:
+    return base64.b64encode(values.astype("<f8").tobytes()).decode()
+
+
+def _decoded(text: str) -> Array:
+    return np.frombuffer(base64.b64decode(text), dtype="<f8").astype(np.float64)

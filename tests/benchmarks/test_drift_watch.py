@@ -1,0 +1,154 @@
+"""The watch over nights: false alarms of unchanged robots, how soon a step is found, and where.
+
+The information of a calibration and of a night is that of Table 1's robot: 55 records, then a check of 16
+(0.01 mm noise on joint variables and deviations). Each night's evidence is drawn with it. ``CELLS`` in the
+environment says how many cells are watched for ten years without a change, ``STEPS`` how many steps of one
+sigma are tried.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from multiprocessing import get_context
+from typing import TypeVar
+
+import numpy as np
+import pytest
+
+from hexacell.campaign.change_alarm import machine_causes, machine_records
+from hexacell.campaign.dry_run import VirtualCampaign
+from hexacell.change_detection.carried_posterior import CarriedPosterior
+from hexacell.change_detection.drift_watch import Causes, DriftWatch, StepAlarm, watch_runs
+from hexacell.change_detection.run_evidence import RunEvidence
+from hexacell.kinematics.rotations import Array
+from hexacell.virtual_robot import VirtualRobot
+from tests.benchmarks.test_check import calibrated
+
+Job = TypeVar("Job")
+Outcome = TypeVar("Outcome")
+Say = Callable[[str, str, str], None]
+
+pytestmark = pytest.mark.benchmark
+
+CELLS = int(os.environ.get("CELLS", "6"))
+STEPS = int(os.environ.get("STEPS", "60"))
+YEARS, NIGHTS = 10, 3650
+RECORDS = 16
+BEFORE = (30, 90, 365)
+LONGEST = 200
+CRASH_MM = 0.31
+
+
+@dataclass(frozen=True, eq=False)
+class Machine:
+    """A robot's causes, and the information of its calibration and of a night."""
+
+    causes: Causes
+    calibration: Array
+    night: Array
+
+    def runs(
+        self, random: np.random.Generator, nights: int, step: Array, after: int
+    ) -> Iterator[RunEvidence]:
+        """A calibration and nights of a robot at 0 that changes by a step after some of them."""
+        yield drawn(self.calibration, np.zeros(len(step)), random)
+        for number in range(nights):
+            yield drawn(self.night, step if number >= after else np.zeros(len(step)), random)
+
+
+def drawn(information: Array, state: Array, random: np.random.Generator) -> RunEvidence:
+    """The evidence of a run of a robot at a state."""
+    values, vectors = np.linalg.eigh(information)
+    noise = vectors @ (np.sqrt(np.maximum(values, 0.0)) * random.standard_normal(len(state)))
+    return RunEvidence(information, information @ state + noise)
+
+
+@lru_cache
+def machine() -> Machine:
+    known = calibrated()
+    check = known.check()
+    assert check.before is not None
+    robot = VirtualRobot(check.robot, check.robot.commanding, np.random.default_rng(1))
+    campaign = VirtualCampaign(replace(check.plan, with_forecast=False, goal=None), robot)
+    while len(campaign.measurements) < RECORDS:
+        campaign.step()
+    night = machine_records(check.robot, campaign.measurements, check.robot.free_parameters).evidence
+    causes = machine_causes(check.robot, len(night.weighted))
+    return Machine(causes, np.linalg.inv(check.before.covariance), night.information)
+
+
+def false_alarms(seed: int) -> int:
+    one, random = machine(), np.random.default_rng([9, seed])
+    return len(watch_runs(one.runs(random, NIGHTS, np.zeros(one.causes.free), 0), one.causes).alarms)
+
+
+def one_sigma(before: int, cause: int) -> Array:
+    """A step by one cause that shifts its innovation by one standard deviation after so many nights."""
+    one = machine()
+    posterior = CarriedPosterior.diffuse(one.causes.free, 0)
+    for information in [one.calibration] + [one.night] * before:
+        posterior = posterior.after(RunEvidence(information, np.zeros(len(information))))
+    total = posterior.evidence.information
+    direction = one.causes.by_state[cause]
+    share = np.linalg.solve(total + one.night, total).T
+    step: Array = direction / np.sqrt(direction @ share @ one.night @ direction)
+    return step
+
+
+def nights_to_alarm(job: tuple[int, int]) -> float:
+    """Until a step of one sigma is noticed; infinite if an alarm came before it, or none after."""
+    before, seed = job
+    one, random = machine(), np.random.default_rng([10, before, seed])
+    step = one_sigma(before, seed % len(one.causes.legs))
+    watch = DriftWatch(one.causes)
+    for number, run in enumerate(one.runs(random, before + LONGEST, step, before)):
+        if watch.add(run) is not None:
+            return float(number - before) if number > before else np.inf
+    return np.inf
+
+
+def crash(seed: int) -> tuple[int, StepAlarm | None]:
+    """The leg that a length of changed after 90 nights, and the first alarm."""
+    one, random = machine(), np.random.default_rng([11, seed])
+    leg = seed % 6 + 1
+    lengths = len(one.causes.legs) - 6
+    step = CRASH_MM * one.causes.by_state[lengths + leg - 1]
+    alarms = watch_runs(one.runs(random, 95, step, 90), one.causes).alarms
+    return leg, alarms[0] if alarms else None
+
+
+def on_all_cores(act: Callable[[Job], Outcome], jobs: Iterable[Job]) -> list[Outcome]:
+    machine()  # once, before there are more processes
+    with ProcessPoolExecutor(mp_context=get_context("fork")) as pool:
+        return list(pool.map(act, jobs))
+
+
+def test_unchanged_cells_raise_few_alarms(say):
+    found = sum(on_all_cores(false_alarms, range(CELLS)))
+    years = CELLS * YEARS
+    say(f"false alarms of all parameters in {years} cell-years", f"{found}", f"at most {years / 10:g}")
+    assert found <= CELLS + 3.0 * np.sqrt(CELLS)
+
+
+@pytest.mark.parametrize("before", BEFORE)
+def test_a_step_of_one_sigma_is_found(say, before):
+    found = on_all_cores(nights_to_alarm, [(before, seed) for seed in range(STEPS)])
+    median, most = np.quantile(found, [0.5, 0.9], method="nearest")
+    target = "22" if before == max(BEFORE) else "-"
+    say(f"a step of one sigma after {before} nights: found after, median", f"{median:.0f} nights", target)
+    say("  after nine of ten", f"{most:.0f} nights", "-")
+    assert median <= 22 or before < max(BEFORE)
+
+
+def test_a_crash_is_located(say):
+    found = on_all_cores(crash, range(STEPS))
+    same_night = sum(alarm is not None and (alarm.first, alarm.last) == (91, 91) for _, alarm in found)
+    named = sum(alarm is not None and alarm.leg == leg for leg, alarm in found)
+    alone = sum(alarm is not None and not alarm.other_legs for _, alarm in found)
+    say(f"a leg {CRASH_MM} mm longer after 90 nights, {STEPS}: the night is known", f"{same_night}", "-")
+    say("  the leg is named; no other is", f"{named}; {alone}", "-")
+    assert min(same_night, named, alone) >= 0.95 * STEPS - 1

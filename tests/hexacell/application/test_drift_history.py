@@ -1,0 +1,116 @@
+"""The watch over recorded runs: calibrations and checks enter, a crash is told with leg and time."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hexacell.application import drift_history as module
+from hexacell.application.drift_history import DriftHistory, drift_history
+from hexacell.application.run_evidence_document import EvidenceDocument, evidence_document
+from hexacell.cell.loader import Cell, load_cell
+from hexacell.presentation.history import change_sentence, watch_text
+from hexacell.runs.run_folder import RunFolder
+from tests.hexacell.application.proposed_runs import a_cell
+from tests.hexacell.application.recorded_nights import Nights
+
+CRASH = {"l4": 0.31}
+
+
+@pytest.fixture
+def nights(tmp_path: Path) -> Nights:
+    return Nights(a_cell(tmp_path))
+
+
+def after(nights: Nights, *numbers: int, crash: dict[str, float]) -> DriftHistory:
+    """A calibration, some checks, a crash, and more checks."""
+    nights.calibrate()
+    for number in numbers:
+        for _ in range(number):
+            nights.check()
+        nights.changes = nights.changes | crash
+    return drift_history(nights.cell)
+
+
+def test_a_cell_without_runs_has_none(nights) -> None:
+    assert drift_history(nights.cell) == DriftHistory((), (), ())
+    assert watch_text(drift_history(nights.cell)) == ""
+
+
+def test_an_unchanged_robot_raises_no_alarm(nights) -> None:
+    found = after(nights, 12, crash={})
+    assert (len(found.runs), found.changes) == (13, ())
+    assert [name for name, _ in found.shares] == list(nights.robot.mechanism.parameters.names)
+    assert 0.0 < max(share for _, share in found.shares) < 1.0
+    assert watch_text(found).startswith("13 runs from 2026-03-01 to 2026-03-13: no leg has moved:")
+
+
+def test_a_crash_is_told_with_its_leg_size_and_time(nights) -> None:
+    found = after(nights, 8, 2, crash=CRASH)
+    (change,) = found.changes
+    assert (change.leg, change.other_legs) == (4, ())
+    assert (change.after.day, change.before.day, change.noticed.day) == (9, 10, 10)
+    assert abs(abs(change.change) - 0.31) < 4 * change.sigma + 0.05
+    sentence = change_sentence(change)
+    assert sentence.startswith("leg 4 moved 0.3")
+    assert "between 2026-03-09 02:30 and 2026-03-10 02:30; the others did not." in sentence
+    text = watch_text(found)
+    assert max(map(len, text.splitlines())) <= 80
+    assert "since then" in text
+
+
+def test_records_that_were_left_out_and_checks_that_do_not_hold_do_not_count(nights) -> None:
+    nights.calibrate()
+    for _ in range(3):
+        nights.check()
+    nights.check(spoilt=True, left_out=((1, 5),))
+    nights.check(spoilt=True, is_consistent=False)
+    found = drift_history(nights.cell)
+    assert (len(found.runs), found.changes) == (5, ())
+    nights.check(spoilt=True)
+    assert drift_history(nights.cell).changes
+
+
+def test_each_run_is_computed_once_for_what_the_cell_file_states(nights, monkeypatch) -> None:
+    computed: list[str] = []
+
+    def noted(settings, folder: RunFolder) -> EvidenceDocument | None:
+        computed.append(folder.path.name)
+        return evidence_document(settings, folder)
+
+    monkeypatch.setattr(module, "evidence_document", noted)
+    after(nights, 2, crash={})
+    assert len(computed) == 3
+    nights.check()
+    assert len(drift_history(nights.cell).runs) == 4
+    assert len(computed) == 4
+    drift_history(with_other_noise(nights.cell))
+    assert len(computed) == 8
+
+
+def with_other_noise(cell: Cell) -> Cell:
+    text = cell.path.read_text()
+    cell.path.write_text(text.replace("gauge_mm = 0.01", "gauge_mm = 0.02"))
+    assert cell.path.read_text() != text
+    return load_cell(cell.path)
+
+
+def test_a_document_is_the_evidence_again(nights) -> None:
+    document = evidence_document(nights.cell.settings, nights.calibrate())
+    assert document is not None
+    again = EvidenceDocument.model_validate_json(document.model_dump_json())
+    evidence = again.evidence
+    np.testing.assert_array_equal(evidence.information, evidence.information.T)
+    np.testing.assert_array_equal(evidence.information, document.evidence.information)
+    found = np.linalg.solve(evidence.information, evidence.weighted)
+    sigma = np.sqrt(np.diag(np.linalg.inv(evidence.information)))
+    assert (np.abs(found - nights.robot.free_parameters) / sigma).max() < 4.0
+
+
+def test_runs_that_tell_nothing_have_no_evidence(nights) -> None:
+    folder = nights.check()
+    folder.journal.write_bytes(b"rubbish\nrubbish\n")
+    assert evidence_document(nights.cell.settings, folder) is None
+    assert drift_history(nights.cell).runs == ()

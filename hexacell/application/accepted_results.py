@@ -22,7 +22,9 @@ from hexacell.runs.run_folder import RunFolder, runs_folder
 from procedures.calibration.workflow import Calibration, Mode
 from procedures.journal.journal import read_entries
 from procedures.run import events
+from procedures.run.leg_temperatures import mean_leg_temperatures
 from procedures.run.state import RunState
+from procedures.run.steps import Phase
 
 
 def last_accepted_result(cell: Cell) -> AcceptedResult | None:
@@ -98,6 +100,9 @@ def _result(cell: Cell, accepted: _AcceptedRun) -> AcceptedResult:
         covariance=accepted.identified.result.covariance,
         effects=_effects(cell, accepted.state),
         length=_length(accepted.state),
+        leg_temperatures_c=mean_leg_temperatures(
+            cell.settings.thermometers, accepted.state.samples(Phase.IDENTIFY)
+        ),
     )
 
 

@@ -44,11 +44,13 @@ class DriftHistory:
 
     Attributes:
         runs: when each run ended that counts, oldest first.
+        celsius: the mean of the thermometers in each of them; none without.
         changes: oldest first.
         shares: the cumulative sum of each parameter of the machine, as a share of its limit.
     """
 
     runs: tuple[datetime, ...]
+    celsius: tuple[float | None, ...]
     changes: tuple[FoundChange, ...]
     shares: tuple[tuple[str, float], ...]
 
@@ -61,14 +63,14 @@ def drift_history(cell: Cell, index: RunIndex | None = None) -> DriftHistory:
     """
     runs = _counted_runs(cell, index or RunIndex(cell))
     if not runs:
-        return DriftHistory((), (), ())
+        return DriftHistory((), (), (), ())
     causes = machine_causes(robot_of(cell), len(runs[-1].evidence.weighted))
     watched = watch_runs([run.evidence for run in runs], causes)
     parameters = cell.settings.mechanism.parameters
     ended = tuple(run.at for run in runs)
     changes = tuple(_change(alarm, ended, parameters.parameters) for alarm in watched.alarms)
     shares = zip(parameters.names, watched.share_of_limit.tolist(), strict=True)
-    return DriftHistory(ended, changes, tuple(shares))
+    return DriftHistory(ended, tuple(run.celsius for run in runs), changes, tuple(shares))
 
 
 def _counted_runs(cell: Cell, index: RunIndex) -> list[EvidenceDocument]:
@@ -79,9 +81,8 @@ def _counted_runs(cell: Cell, index: RunIndex) -> list[EvidenceDocument]:
         return evidence_document(settings, folder)
 
     # What the noise or the effects are stated to be decides what the records say.
-    stated = sha256(
-        settings.model_dump_json(include={"robot", "noise", "uncertainty", "stations"}).encode()
-    )
+    deciding = {"robot", "noise", "uncertainty", "stations", "thermometers"}
+    stated = sha256(settings.model_dump_json(include=deciding).encode())
     found = index.documents(DocumentKind.EVIDENCE, EvidenceDocument, read, context=stated[:16])
     runs = sorted(found.values(), key=lambda run: run.at)
     return [run for run in runs if len(run.weighted) == len(runs[-1].weighted)]

@@ -11,36 +11,51 @@ import numpy as np
 
 from hexacell.application.journal_soundness import require_sound
 from hexacell.campaign.change_alarm import machine_records
+from hexacell.campaign.leg_expansion import leg_expansion
 from hexacell.cell.fields import Frozen
 from hexacell.cell.model import CellSettings
 from hexacell.change_detection.run_evidence import RunEvidence
 from hexacell.errors import HexacellError
+from hexacell.kinematics.parameters import LEGS
 from hexacell.kinematics.rotations import Array
 from hexacell.measurements.records import MeasurementSet, RecordId
 from hexacell.robot_model import robot_of_start
 from hexacell.runs.run_folder import RunFolder
 from procedures.calibration.workflow import Calibration, Mode
 from procedures.journal.journal import read_entries
-from procedures.run.state import RunState
+from procedures.run import events
+from procedures.run.leg_temperatures import legs_warmer, mean_temperature
+from procedures.run.state import RunState, record
+from procedures.run.steps import Phase
+
+REFERENCE_C = 20.0
+"""The temperature at which legs with thermometers have the lengths that runs are compared by."""
 
 
 class EvidenceDocument(Frozen):
     """The evidence of one run, which ended ``at``; arrays as base64 of IEEE 754 doubles, little endian.
 
     ``information`` has the upper triangle, row by row. The first ``free`` numbers of the state are the free
-    parameters, the others shared causes.
+    parameters, the others shared causes. ``celsius`` is the mean of all thermometers.
     """
 
     at: datetime
+    celsius: float | None
     free: int
     information: str
     weighted: str
 
     @classmethod
-    def of(cls, at: datetime, free: int, evidence: RunEvidence) -> Self:
+    def of(cls, at: datetime, celsius: float | None, free: int, evidence: RunEvidence) -> Self:
         """The document of an evidence."""
         upper = evidence.information[np.triu_indices(len(evidence.weighted))]
-        return cls(at=at, free=free, information=_encoded(upper), weighted=_encoded(evidence.weighted))
+        return cls(
+            at=at,
+            celsius=celsius,
+            free=free,
+            information=_encoded(upper),
+            weighted=_encoded(evidence.weighted),
+        )
 
     @property
     def evidence(self) -> RunEvidence:
@@ -55,19 +70,24 @@ def evidence_document(settings: CellSettings, folder: RunFolder) -> EvidenceDocu
     """The evidence of a run by the settings that the cell has now.
 
     None where it has none: it is not over, measured no geometry, its residuals do not agree with the noise,
-    it started from a drawing, or its journal cannot be read.
+    it started from a drawing, a thermometer on a leg never answered, or its journal cannot be read.
     """
     try:
         entries = read_entries(folder.journal)
-        events = (entry.event for entry in entries)
-        state = require_sound(events, settings, folder.journal, follows_plan=False)
+        history = (entry.event for entry in entries)
+        state = require_sound(history, settings, folder.journal, follows_plan=False)
         counted = _counted_calibration(settings, state) or _counted_check(settings, state)
-        if counted is None or not counted.measurements.records:
+        if counted is None or not counted.samples:
             return None
-        records = machine_records(counted.calibration.robot_of(state), counted.measurements, counted.free)
+        expansion = _expansion(settings, counted)
+        if np.isnan(expansion).any():
+            return None
+        robot, free = counted.calibration.robot_of(state), counted.free
+        records = machine_records(robot, counted.measurements, free, expansion)
     except (HexacellError, np.linalg.LinAlgError):  # records that fit no robot near this one
         return None
-    return EvidenceDocument.of(entries[-1].at, len(counted.free), records.evidence)
+    celsius = mean_temperature(counted.samples)
+    return EvidenceDocument.of(entries[-1].at, celsius, len(free), records.evidence)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -75,8 +95,13 @@ class _CountedRun:
     """A run that counts, its records without false ones, and where they are linearized."""
 
     calibration: Calibration
-    measurements: MeasurementSet
+    samples: tuple[events.RecordTaken, ...]
     free: Array
+
+    @property
+    def measurements(self) -> MeasurementSet:
+        """The records."""
+        return MeasurementSet(tuple(map(record, self.samples)))
 
 
 def _counted_calibration(settings: CellSettings, state: RunState) -> _CountedRun | None:
@@ -112,8 +137,16 @@ def _calibration(settings: CellSettings, state: RunState, mode: Mode) -> Calibra
     return Calibration(settings, robot, mode, accepted=started.accepted)
 
 
-def _without(state: RunState, false: set[RecordId]) -> MeasurementSet:
-    return MeasurementSet(tuple(one for one in state.measurements().records if one.id not in false))
+def _without(state: RunState, false: set[RecordId]) -> tuple[events.RecordTaken, ...]:
+    samples = state.samples(Phase.IDENTIFY)
+    return tuple(one for one in samples if (one.at.point, one.orientation) not in false)
+
+
+def _expansion(settings: CellSettings, counted: _CountedRun) -> Array:
+    """By how much the legs were longer (n, P) than at the reference temperature, by their thermometers."""
+    geometry = settings.mechanism.convention.geometry(counted.free)
+    warmer = legs_warmer(settings.thermometers, counted.samples, [REFERENCE_C] * LEGS)
+    return leg_expansion(geometry, settings.uncertainty.expansion_legs_um_m_k, warmer)
 
 
 def _encoded(values: Array) -> str:

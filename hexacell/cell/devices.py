@@ -14,6 +14,7 @@ NodeId = Annotated[int, Field(ge=1, le=127)]
 Unsigned = Annotated[int, Field(ge=0, le=2**32 - 1)]
 Direction = Literal[1, -1]
 StartupWord = Literal["reset-estop", "switch-on", "home"]
+LegNumber = Annotated[int, Field(ge=1, le=6)]
 STARTUP_WORDS: tuple[StartupWord, ...] = ("reset-estop", "switch-on", "home")
 
 
@@ -157,5 +158,10 @@ class ThermometerSettings(Section):
         min_length=1,
         description="sysfs: the file with the temperature in millidegrees, such as "
         "/sys/bus/w1/devices/28-.../temperature",
+    )
+    legs: tuple[LegNumber, ...] = Field(
+        (),
+        max_length=6,
+        description="legs that it is on, from 1: their expansion is no drift",
     )
     timeout_s: Positive = Field(2.0, description="longest wait for a reading")

@@ -149,6 +149,9 @@ class CellSettings(Section):
     ) -> tuple[ThermometerSettings, ...]:
         if len({thermometer.name for thermometer in thermometers}) != len(thermometers):
             raise broken_rule("two thermometers have the same name", "Give each another name")
+        legs = [leg for thermometer in thermometers for leg in thermometer.legs]
+        if len(set(legs)) != len(legs):
+            raise broken_rule("two thermometers are on the same leg", "Name each leg once")
         return thermometers
 
     @model_validator(mode="after")

@@ -212,6 +212,7 @@ def drift_document(found: Sequence[ParameterTrend], watched: DriftHistory) -> di
     return {
         "parameters": [{**asdict(one), "walking": one.is_walking} for one in found],
         "runs": [at.isoformat() for at in watched.runs],
+        "temperatures_c": list(watched.celsius),
         "changes": [_change_document(one) for one in watched.changes],
         "shares_of_limit": dict(watched.shares),
     }

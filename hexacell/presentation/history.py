@@ -102,7 +102,9 @@ def watch_text(found: DriftHistory) -> str:
     runs = f"{len(found.runs)} runs from {found.runs[0]:%Y-%m-%d} to {found.runs[-1]:%Y-%m-%d}"
     quiet = "" if found.changes else "no leg has moved: "
     rest = f"{runs}: {quiet}{since}the largest sum of innovations is {share:.0%} of its limit ({name})."
-    return "\n".join([*lines, wrapped(rest, indent=2)])
+    shown = [one for one in found.celsius if one is not None]
+    warmth = [f"Their thermometers showed {min(shown):.1f} to {max(shown):.1f} deg C."] if shown else []
+    return "\n".join([*lines, wrapped(rest, indent=2), *warmth])
 
 
 def change_sentence(found: FoundChange) -> str:

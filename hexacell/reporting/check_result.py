@@ -7,13 +7,15 @@ from datetime import datetime
 
 import numpy as np
 
-from hexacell.campaign.change_alarm import FIRST_RECORDS
+from hexacell.campaign.change_alarm import FIRST_RECORDS, ChangeTest
 from hexacell.campaign.check import Check
 from hexacell.campaign.check_statement import CheckStatement
+from hexacell.campaign.leg_expansion import leg_expansion
 from hexacell.campaign.recursive_estimator import OnlineEstimate
 from hexacell.cell.fields import Frozen
 from hexacell.decision import Verdict
 from hexacell.identification.diagnostics.tolerance_check import SIGNIFICANT_SIGMAS
+from hexacell.kinematics.rotations import Array
 from hexacell.measurements.records import MeasurementSet, RecordId
 from hexacell.reporting.length_result import LengthResult
 from hexacell.reporting.result import AcceptedResult
@@ -101,10 +103,12 @@ def check_result(
     measurements: MeasurementSet,
     earlier: AcceptedResult | None,
     effects: tuple[Effect, ...],
+    warmer: Array | None = None,
 ) -> CheckResult:
     """The result of a check that has ended.
 
-    ``earlier`` is what it started from; ``effects`` are the systematic ones.
+    ``earlier`` is what it started from; ``effects`` are the systematic ones. ``warmer`` (n, 6), K, is each
+    leg at each record than at ``earlier``; NaN where that is not known: then no change is looked for.
 
     Raises:
         IdentifiabilityError: the records do not belong to this robot.
@@ -125,24 +129,38 @@ def check_result(
         drift_scale=stated.drift_scale,
         changes=tuple(_changes(stated.estimate)),
         left_out=tuple(sorted(check.false_records(measurements))),
-        alarm=change_alarm(check, measurements),
+        alarm=_alarm(check, measurements, warmer),
     )
 
 
-def change_alarm(check: Check, measurements: MeasurementSet) -> ChangeAlarm | None:
+def _alarm(check: Check, measurements: MeasurementSet, warmer: Array | None) -> ChangeAlarm | None:
+    """The alarm, where it is known how much longer the legs are than at the accepted result."""
+    if warmer is None or not warmer.any():
+        return change_alarm(check, measurements)
+    if np.isnan(warmer).any():
+        return None
+    by_kelvin = check.settings.uncertainty.expansion_legs_um_m_k
+    return change_alarm(check, measurements, leg_expansion(check.robot.commanding, by_kelvin, warmer))
+
+
+def change_alarm(
+    check: Check, measurements: MeasurementSet, expansion: Array | None = None
+) -> ChangeAlarm | None:
     """Whether the first records raise an alarm, and which leg all of them name.
 
-    Records that the others prove false are not tested.
+    Records that the others prove false are not tested. ``expansion`` (n, P) is by how much the parameters
+    differ at each record from those of the result before.
 
     Raises:
         IdentifiabilityError: the records do not belong to this robot.
     """
     false = check.false_records(measurements)
-    sound = [one for one in measurements.records if one.id not in false]
-    first = check.change_test(MeasurementSet(tuple(sound[:FIRST_RECORDS])))
+    sound = [row for row, one in enumerate(measurements.records) if one.id not in false]
+    first, every = (
+        _tested(check, measurements, rows, expansion) for rows in (sound[:FIRST_RECORDS], sound)
+    )
     if first is None or len(sound) < FIRST_RECORDS:
         return None
-    every = check.change_test(MeasurementSet(tuple(sound)))
     assert every is not None  # noqa: S101 - the first records had a test
     parameter = check.robot.mechanism.parameters.parameters[every.cause]
     return ChangeAlarm(
@@ -155,6 +173,13 @@ def change_alarm(check: Check, measurements: MeasurementSet) -> ChangeAlarm | No
         change=float(every.test.changes[every.cause]),
         sigma=float(every.test.sigmas[every.cause]),
     )
+
+
+def _tested(
+    check: Check, measurements: MeasurementSet, rows: list[int], expansion: Array | None
+) -> ChangeTest | None:
+    records = MeasurementSet(tuple(measurements.records[row] for row in rows))
+    return check.change_test(records, None if expansion is None else expansion[rows]) if rows else None
 
 
 def check_line(result: CheckResult) -> str:

@@ -148,6 +148,8 @@ class AcceptedResult(Frozen):
         effects: what one unit of each cause of a systematic effect did to the free parameters: by the
             name of the effect, a row a cause.
         length: what the length check of its run found; none without one.
+        leg_temperatures_c: mean temperature of each leg while the geometry was measured; none of a leg
+            without a thermometer that answered; empty in older runs.
     """
 
     run: str
@@ -155,6 +157,7 @@ class AcceptedResult(Frozen):
     covariance: tuple[tuple[float, ...], ...]
     effects: dict[str, tuple[tuple[float, ...], ...]] = Field(default_factory=dict)
     length: LengthResult | None = None
+    leg_temperatures_c: tuple[float | None, ...] = ()
 
     @property
     def parameter_columns(self) -> dict[str, Array]:

@@ -25,6 +25,7 @@ from procedures.calibration.noise_steps import noise_readings
 from procedures.calibration.workflow import Calibration, Mode
 from procedures.engine.config_transactions import ConfigTransactions
 from procedures.run import events
+from procedures.run.leg_temperatures import legs_warmer
 from procedures.run.state import RunState, apply, record
 from procedures.run.steps import Phase
 
@@ -116,7 +117,10 @@ class Computations:
         write_measurements(self.folder.measurements, measurements)
         calibration = self.calibration.informed(state)
         effects = calibration.robot_of(state).effects
-        found = check_result(calibration.check, measurements, calibration.accepted, effects)
+        accepted, thermometers = calibration.accepted, self.cell.settings.thermometers
+        before = () if accepted is None else accepted.leg_temperatures_c
+        warmer = legs_warmer(thermometers, state.samples(Phase.IDENTIFY), before)
+        found = check_result(calibration.check, measurements, accepted, effects, warmer)
         return events.ResultValidated(verdict=found.verdict, line=check_line(found), check=found)
 
     def _judge_length(self, state: RunState) -> events.ResultValidated:

@@ -2,7 +2,9 @@
 
 Table 1's robot is calibrated once (0.01 mm noise on joint variables and deviations). Its true geometry is
 drawn about the result by the result's covariance; then nothing changes, or the length of one leg does. The
-poses are those that a check chooses. ``RUNS`` in the environment says how many robots there are of each.
+poses are those that a check chooses. The same through a day of +-7 K: legs of steel follow the room, each
+in its own time, and a thermometer on each tells its temperature to 0.05 K. ``RUNS`` in the environment says
+how many robots there are of each.
 """
 
 from __future__ import annotations
@@ -16,9 +18,13 @@ from multiprocessing import get_context
 import numpy as np
 import pytest
 
+from hexacell.campaign.check import Check
 from hexacell.campaign.dry_run import VirtualCampaign
+from hexacell.campaign.leg_expansion import leg_expansion
 from hexacell.kinematics.frame_derivatives import free_parameter_derivatives
+from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.rotations import Array
+from hexacell.measurements.records import MeasurementSet
 from hexacell.reporting.check_result import ChangeAlarm, change_alarm
 from hexacell.virtual_robot import VirtualRobot
 from tests.benchmarks.test_check import Calibrated, calibrated
@@ -34,6 +40,11 @@ ALLOWANCE = 1.5 / np.sqrt(RUNS)
 """Of a share: three standard deviations of one half."""
 
 
+STEEL_UM_M_K = 11.5
+SWING_K, DAY_H, RECORD_H = 7.0, 24.0, 0.01
+THERMOMETER_K = 0.05
+
+
 @dataclass(frozen=True)
 class Robot:
     """One that was checked: the leg that changed, 0 for none, and the alarm by so many records."""
@@ -42,8 +53,22 @@ class Robot:
     alarms: dict[int, ChangeAlarm]
 
 
-def checked(job: tuple[int, int]) -> Robot:
-    leg, number = job
+@dataclass(frozen=True, eq=False)
+class Weather:
+    """How much warmer each leg is than at the calibration."""
+
+    at_first_h: float
+    lag_h: Array
+    swing_k: float
+
+    def warmer(self, record: int) -> Array:
+        hour = self.at_first_h + RECORD_H * record - self.lag_h
+        warmer: Array = self.swing_k * np.sin(2.0 * np.pi * hour / DAY_H)
+        return warmer
+
+
+def checked(job: tuple[int, int, float]) -> Robot:
+    leg, number, swing_k = job
     known = calibrated()
     check, random = known.check(), np.random.default_rng([8, leg, number])
     assert check.before is not None
@@ -51,16 +76,31 @@ def checked(job: tuple[int, int]) -> Robot:
     change = factor @ random.standard_normal(len(factor))
     if leg:
         change = change + random.choice([-1.0, 1.0]) * CHANGE_MM * by_length(known, leg)
-    convention = check.robot.mechanism.convention
-    truth = convention.geometry(check.robot.free_parameters + change)
-    # Longer than a check that is decided, to see what more records say.
-    plan = replace(check.plan, with_forecast=False, goal=None)
-    campaign = VirtualCampaign(plan, VirtualRobot(check.robot, truth, random))
-    while len(campaign.measurements) < max(RECORDS):
+    weather = Weather(random.uniform(0.0, DAY_H), random.uniform(0.0, 3.0, 6), swing_k)
+    measured, expansion = records_of(check, change, weather, random)
+    alarms = {n: change_alarm(check, MeasurementSet(measured.records[:n]), expansion[:n]) for n in RECORDS}
+    return Robot(leg, {n: alarm for n, alarm in alarms.items() if alarm is not None})
+
+
+def records_of(
+    check: Check, change: Array, weather: Weather, random: np.random.Generator
+) -> tuple[MeasurementSet, Array]:
+    """Records of a robot whose free parameters differ by (p,), and its legs' expansion as it is told.
+
+    More records than a check takes that is decided, to see what they say.
+    """
+    mechanism, plan = check.robot.mechanism, replace(check.plan, with_forecast=False, goal=None)
+    cold = mechanism.convention.geometry(check.robot.free_parameters + change)
+    virtual, told = VirtualRobot(check.robot, cold, random), []
+    campaign = VirtualCampaign(plan, virtual)
+    while (record := len(campaign.measurements)) < max(RECORDS):
+        warmer = weather.warmer(record)
+        expansion = leg_expansion(cold, STEEL_UM_M_K, warmer[None])[0]
+        virtual.truth = mechanism.normalize_frames(Geometry(cold.parameters, cold.vector + expansion))[0]
         campaign.step()
-    records = campaign.measurements.records
-    found = {n: change_alarm(check, type(campaign.measurements)(records[:n])) for n in RECORDS}
-    return Robot(leg, {n: alarm for n, alarm in found.items() if alarm is not None})
+        if len(campaign.measurements) > record:
+            told.append(warmer + THERMOMETER_K * random.standard_normal(6))
+    return campaign.measurements, leg_expansion(check.robot.commanding, STEEL_UM_M_K, np.array(told))
 
 
 def by_length(known: Calibrated, leg: int) -> Array:
@@ -71,12 +111,12 @@ def by_length(known: Calibrated, leg: int) -> Array:
     return row
 
 
-@pytest.fixture(scope="module")
-def robots() -> list[Robot]:
+@pytest.fixture(scope="module", params=[0.0, SWING_K], ids=["constant", "a day of +-7 K"])
+def robots(request: pytest.FixtureRequest) -> list[Robot]:
     calibrated()  # once, before there are more processes
     legs = [0] * RUNS + [number % 6 + 1 for number in range(RUNS)]
-    with ProcessPoolExecutor(2, mp_context=get_context("fork")) as pool:
-        return list(pool.map(checked, [(leg, number) for number, leg in enumerate(legs)]))
+    with ProcessPoolExecutor(mp_context=get_context("fork")) as pool:
+        return list(pool.map(checked, [(leg, number, request.param) for number, leg in enumerate(legs)]))
 
 
 def share(values: list[bool]) -> float:

@@ -37,6 +37,7 @@ class Nights:
     seed: int = 0
     number: int = 0
     changes: dict[str, float] = field(default_factory=dict)
+    celsius: dict[str, float | None] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self.random = np.random.default_rng(self.seed)
@@ -103,7 +104,7 @@ class Nights:
             devices=(),
             accepted=accepted,
         )
-        history = [started, *map(self._taken, records), result, events.Ended(exit_code=0, line="over")]
+        history = [started, *map(self.taken, records), result, events.Ended(exit_code=0, line="over")]
         at = FIRST_NIGHT + timedelta(days=self.number)
         self.number += 1
         folder = RunFolder(runs_folder(self.cell) / at.strftime("%Y-%m-%dT%H%M%SZ"))
@@ -112,7 +113,7 @@ class Nights:
         folder.journal.write_bytes(b"".join(lines))
         return folder
 
-    def _taken(self, record: Record) -> events.RecordTaken:
+    def taken(self, record: Record) -> events.RecordTaken:
         pose = record.pose.as_tuple()
         reading = events.Reading(
             gauges_mm=record.deviation,
@@ -120,6 +121,7 @@ class Nights:
             joints_mm=record.joints,
             answers=(),
             counts=((0,) * 6,),
+            temperatures=tuple(events.Temperature(name=n, celsius=c) for n, c in self.celsius.items()),
         )
         return events.RecordTaken(
             at=SetKey(phase=Phase.IDENTIFY, point=record.point),

@@ -18,6 +18,7 @@ from hexacell.reporting.verification import ModelTest, Verification
 from hexacell.runs.run_folder import RunFolder, runs_folder
 from procedures.journal.journal import Journal
 from procedures.run import events
+from tests.hexacell.application.recorded_nights import Nights
 from tests.procedures.identified import an_identification
 
 IDENTIFIED = events.Identified(result=an_identification(), held_out=())
@@ -120,3 +121,15 @@ def test_runs_that_cannot_be_read_are_left_out(cell: Cell) -> None:
     found = last_accepted_result(cell)
     assert found is not None
     assert found.run == str(readable.path)
+
+
+def test_it_knows_how_warm_the_legs_were(cell: Cell, tmp_path: Path) -> None:
+    section = '[[thermometers]]\nname = "x"\npath = "/x"\nlegs = [2, 3]\n'
+    cell.path.write_text(f"{cell.path.read_text()}\n{section}")
+    told = load_cell(cell.path)
+    nights = Nights(told, celsius={"x": 23.5})
+    sampled = [nights.taken(record) for record in nights.measured(1, [(0, 0, 0), (5, 0, 0)])]
+    run(told, "2026-11-20T120000Z", *sampled, IDENTIFIED, PASSED)
+    found = last_accepted_result(told)
+    assert found is not None
+    assert found.leg_temperatures_c == (None, 23.5, 23.5, None, None, None)

@@ -35,7 +35,7 @@ def after(nights: Nights, *numbers: int, crash: dict[str, float]) -> DriftHistor
 
 
 def test_a_cell_without_runs_has_none(nights) -> None:
-    assert drift_history(nights.cell) == DriftHistory((), (), ())
+    assert drift_history(nights.cell) == DriftHistory((), (), (), ())
     assert watch_text(drift_history(nights.cell)) == ""
 
 
@@ -114,3 +114,66 @@ def test_runs_that_tell_nothing_have_no_evidence(nights) -> None:
     folder.journal.write_bytes(b"rubbish\nrubbish\n")
     assert evidence_document(nights.cell.settings, folder) is None
     assert drift_history(nights.cell).runs == ()
+
+
+STEEL_UM_M_K = 11.5
+THERMOMETERS = "".join(
+    f'[[thermometers]]\nname = "leg {leg}"\npath = "/nowhere/{leg}"\nlegs = [{leg}]\n\n'
+    for leg in range(1, 7)
+)
+
+
+def with_thermometers(cell: Cell) -> Cell:
+    """The cell with a thermometer on each leg, and legs of steel."""
+    text = cell.path.read_text().replace(
+        "[uncertainty]", f"[uncertainty]\nexpansion_legs_um_m_k = {STEEL_UM_M_K}"
+    )
+    cell.path.write_text(f"{text}\n{THERMOMETERS}")
+    found = load_cell(cell.path)
+    assert found.settings.uncertainty.expansion_legs_um_m_k == STEEL_UM_M_K
+    return found
+
+
+def warm(nights: Nights, *kelvin: float) -> None:
+    """Legs that are so much warmer than 20 deg C, and longer by it."""
+    lengths = nights.cell.settings.robot.nominal.model_dump()["l"]
+    nights.celsius = {f"leg {leg}": 20.0 + one for leg, one in enumerate(kelvin, start=1)}
+    nights.changes = {
+        f"l{leg}": 1e-6 * STEEL_UM_M_K * length * one
+        for leg, (length, one) in enumerate(zip(lengths, kelvin, strict=True), start=1)
+    }
+
+
+def a_week_of_weather(nights: Nights) -> None:
+    warm(nights, *[0.0] * 6)
+    nights.calibrate()
+    for number in range(8):
+        warm(nights, *(7.0 * np.sin(0.7 * number + np.arange(6))).tolist())
+        nights.check()
+
+
+def test_the_expansion_of_legs_with_thermometers_is_no_drift(nights) -> None:
+    bare = nights.cell
+    nights.cell = with_thermometers(nights.cell)
+    a_week_of_weather(nights)
+    found = drift_history(nights.cell)
+    assert (len(found.runs), found.changes) == (9, ())
+    assert "Their thermometers showed" in watch_text(found)
+    assert drift_history(bare).changes
+
+
+def test_a_leg_that_moved_is_found_through_the_weather(nights) -> None:
+    nights.cell = with_thermometers(nights.cell)
+    a_week_of_weather(nights)
+    nights.changes["l4"] += 0.31
+    nights.check()
+    (change,) = drift_history(nights.cell).changes
+    assert (change.leg, change.other_legs) == (4, ())
+
+
+def test_a_run_whose_thermometer_on_a_leg_was_silent_does_not_count(nights) -> None:
+    nights.cell = with_thermometers(nights.cell)
+    a_week_of_weather(nights)
+    nights.celsius["leg 3"] = None
+    nights.check()
+    assert len(drift_history(nights.cell).runs) == 9

@@ -95,3 +95,22 @@ def test_the_result_of_a_check_has_it_and_the_verdict_does_not_heed_it(check) ->
     assert result.left_out == ()
     assert "Repeat the check" in " ".join(check_text(result).split())
     assert max(map(len, check_text(result).splitlines())) <= 80
+
+
+def test_the_expansion_of_the_legs_raises_no_alarm(check) -> None:
+    """One leg is warmer than at the calibration, and longer by it; a thermometer on it tells."""
+    kelvin, leg = 8.0, 5
+    parameters = check.robot.mechanism.parameters
+    length = check.robot.commanding.vector[parameters.names.index(f"l{leg}")]
+    longer = 1e-6 * check.settings.uncertainty.expansion_legs_um_m_k * length * kelvin
+    records = measured(check, f"l{leg}", longer)
+    warmer = np.zeros((len(records), 6))
+    naive = check_result(check, records, None, (), warmer)
+    warmer[:, leg - 1] = kelvin
+    known = check_result(check, records, None, (), warmer)
+    assert naive.alarm is not None
+    assert known.alarm is not None
+    assert naive.alarm.is_raised
+    assert not known.alarm.is_raised
+    unknown = check_result(check, records, None, (), np.full((len(records), 6), np.nan))
+    assert unknown.alarm is None

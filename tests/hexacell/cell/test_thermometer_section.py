@@ -29,6 +29,9 @@ def test_settings_of_a_thermometer(load_text, cell_text) -> None:
         (ROOM + ROOM, "two thermometers have the same name"),
         (ROOM.replace("path", "file"), "'path'"),
         (ROOM.replace("room", ""), "text that is not empty"),
+        (ROOM + "legs = [7]\n", "legs"),
+        (ROOM + "legs = [4, 4]\n", "two thermometers are on the same leg"),
+        (ROOM + "legs = [4]\n" + ROOM.replace("room", "other") + "legs = [4]\n", "on the same leg"),
     ],
 )
 def test_mistakes_are_reported_with_their_line(load_text, cell_text, section: str, words: str) -> None:

@@ -1,0 +1,63 @@
+"""The temperatures of the legs at the records of a run, by the thermometers that are on them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+
+from hexacell.cell.devices import ThermometerSettings
+from hexacell.kinematics.parameters import LEGS
+from hexacell.kinematics.rotations import Array
+from procedures.run import events
+
+
+def legs_warmer(
+    thermometers: Iterable[ThermometerSettings],
+    samples: Sequence[events.RecordTaken],
+    before: Sequence[float | None],
+) -> Array:
+    """By how much each leg (n, 6), K, was warmer at n records than ``before``, deg C a leg.
+
+    0 of a leg without a thermometer. NaN of one whose thermometer never answered, or that has no
+    temperature of before. Where a thermometer once did not answer, the mean of what it showed counts.
+    """
+    warmer = np.zeros((len(samples), LEGS))
+    reference = [*before, *[None] * LEGS][:LEGS]
+    for thermometer in thermometers:
+        shown = _shown(thermometer.name, samples)
+        for leg in thermometer.legs:
+            at_first = reference[leg - 1]
+            warmer[:, leg - 1] = shown - (np.nan if at_first is None else at_first)
+    return warmer
+
+
+def mean_leg_temperatures(
+    thermometers: Iterable[ThermometerSettings], samples: Sequence[events.RecordTaken]
+) -> tuple[float | None, ...]:
+    """The mean temperature of each leg, deg C; none of a leg that has no thermometer, or a silent one."""
+    means: list[float | None] = [None] * LEGS
+    for thermometer in thermometers:
+        shown = _shown(thermometer.name, samples)
+        for leg in thermometer.legs:
+            means[leg - 1] = None if np.isnan(shown).any() or not len(shown) else float(shown.mean())
+    return tuple(means)
+
+
+def mean_temperature(samples: Iterable[events.RecordTaken]) -> float | None:
+    """The mean, deg C, of all that thermometers showed at some records; none if there was nothing."""
+    every = [one.celsius for sample in samples for one in sample.reading.temperatures]
+    shown = [celsius for celsius in every if celsius is not None]
+    return float(np.mean(shown)) if shown else None
+
+
+def _shown(name: str, samples: Sequence[events.RecordTaken]) -> Array:
+    """What a thermometer showed at n records, gaps filled with the mean; NaN if it never answered."""
+    by_record = [
+        {one.name: one.celsius for one in sample.reading.temperatures}.get(name) for sample in samples
+    ]
+    shown = np.array([np.nan if celsius is None else celsius for celsius in by_record])
+    if np.isnan(shown).all():
+        return shown
+    filled: Array = np.where(np.isnan(shown), np.nanmean(shown), shown)
+    return filled

@@ -63,6 +63,7 @@ def make_parser() -> Parser:
     _rollback(commands)
     _history(commands)
     _report(commands)
+    _schedule(commands)
     _cell(commands)
     return parser
 
@@ -308,6 +309,39 @@ def _report(commands: Any) -> None:  # noqa: ANN401
     parser.add_argument(
         "--compare", type=Path, metavar="RUN", help="say also what has changed since this run, a folder"
     )
+    _add_json(parser)
+
+
+def _schedule(commands: Any) -> None:  # noqa: ANN401
+    parser = _command(commands, "schedule", "have a cell checked each day: systemd units or a crontab line")
+    _add_cell(parser)
+    what = parser.add_mutually_exclusive_group()
+    what.add_argument("--daily", metavar="HH:MM", help="write the units: a run each day at this time")
+    what.add_argument("--show", action="store_true", help="show the units of this cell")
+    what.add_argument("--remove", action="store_true", help="remove them")
+    parser.add_argument(
+        "--mode",
+        choices=("check", "optimise"),
+        default="check",
+        help="check: change nothing (default); optimise: recalibrate, and apply only within the limits",
+    )
+    for option, default, meaning in (
+        ("--longest", 120, "stop a run in place after so long"),
+        ("--retry", 15, "wait before another try"),
+    ):
+        parser.add_argument(
+            option, type=int, default=default, metavar="MINUTES", help=f"{meaning} (default: %(default)s)"
+        )
+    parser.add_argument(
+        "--retries",
+        type=_count,
+        default=3,
+        metavar="N",
+        help="how often, where a device or the lock is not there (default: %(default)s)",
+    )
+    parser.add_argument("--on-failure", metavar="UNIT", help="unit that systemd starts after a failure")
+    parser.add_argument("--cron", action="store_true", help="print a crontab line instead")
+    parser.add_argument("--folder", type=Path, metavar="FOLDER", help="where the units are, if elsewhere")
     _add_json(parser)
 
 

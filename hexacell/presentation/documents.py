@@ -13,6 +13,7 @@ from hexacell.application.drift_history import DriftHistory, FoundChange
 from hexacell.application.history import PastRun
 from hexacell.application.offline import NextPose, PlanTrial
 from hexacell.application.proposals import AppliedProposal
+from hexacell.application.schedules import Schedule
 from hexacell.campaign.decisions import Finished, Forecast, MeasurePose, StartPoint
 from hexacell.presentation.run_story import run_story
 from hexacell.presentation.teaching import teaching_sentence
@@ -229,6 +230,17 @@ def _change_document(found: FoundChange) -> dict[str, Any]:
         "change": found.change,
         "sigma": found.sigma,
         "other_legs": list(found.other_legs),
+    }
+
+
+def schedule_document(schedule: Schedule | None) -> dict[str, Any]:
+    """What ``schedule --json`` prints."""
+    if schedule is None:
+        return {"unit": None, "files": [], "complaints": []}
+    return {
+        "unit": schedule.unit,
+        "files": list(map(str, schedule.files)),
+        "complaints": list(schedule.complaints),
     }
 
 

@@ -28,6 +28,7 @@ COMMANDS = (
     "rollback",
     "history",
     "report",
+    "schedule",
     "cell",
 )
 PAGES = [

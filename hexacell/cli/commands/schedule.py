@@ -1,0 +1,58 @@
+"""``hexacell schedule``: a cell is checked or recalibrated each day, by systemd or cron."""
+
+from __future__ import annotations
+
+import argparse
+
+from hexacell.application.schedules import (
+    ScheduleRequest,
+    present_schedule,
+    remove_schedule,
+    scheduled_run,
+    write_schedule,
+)
+from hexacell.cell.loader import Cell
+from hexacell.cli.cell_argument import cell_at
+from hexacell.cli.console import Console
+from hexacell.errors import ExitCode, UsageError
+from hexacell.presentation.documents import schedule_document
+from hexacell.presentation.schedules import (
+    crontab_text,
+    present_schedule_text,
+    removed_schedule_text,
+    written_schedule_text,
+)
+from hexacell.scheduling.crontab import crontab_line
+
+
+def main(options: argparse.Namespace) -> ExitCode:
+    """Write, show or remove a schedule; nothing is started or stopped."""
+    console = Console(options.json)
+    cell = cell_at(options.cell, console)
+    if options.show:
+        present = present_schedule(cell, options.folder)
+        console.document(schedule_document(present))
+        console.print(present_schedule_text(present))
+    elif options.remove:
+        removed = remove_schedule(cell, options.folder)
+        console.document(schedule_document(removed))
+        console.print(removed_schedule_text(removed))
+    elif options.daily is None:
+        raise UsageError("when?", action="Give --daily 02:30, --show or --remove")
+    else:
+        _write(cell, options, console)
+    return ExitCode.DONE
+
+
+def _write(cell: Cell, options: argparse.Namespace, console: Console) -> None:
+    request = ScheduleRequest(
+        options.daily, options.mode, options.longest, options.retry, options.retries, options.on_failure
+    )
+    if options.cron:
+        line = crontab_line(scheduled_run(cell, request))
+        console.document({"crontab": line})
+        console.print(crontab_text(line))
+        return
+    written = write_schedule(cell, request, options.folder)
+    console.document(schedule_document(written))
+    console.print(written_schedule_text(written, request))

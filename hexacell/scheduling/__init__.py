@@ -1,0 +1,1 @@
+"""Runs without a person: when they begin, and what starts them."""

@@ -1,0 +1,95 @@
+"""``hexacell schedule``: writes, shows and removes units of its own, and no others."""
+
+from __future__ import annotations
+
+import pytest
+
+UNITS = ["hexacell-simulated-hexaglide.service", "hexacell-simulated-hexaglide.timer"]
+
+
+@pytest.fixture
+def units(tmp_path):
+    return tmp_path / "units"
+
+
+@pytest.fixture
+def schedule(typed_here, cell_folder, units):
+    return lambda *words: typed_here("schedule", cell_folder.cell, *words, "--folder", units)
+
+
+def test_written_shown_and_removed(schedule, cell_folder, units) -> None:
+    before = cell_folder.snapshot()
+    written = schedule("--daily", "02:30")
+    assert written.code == 0, written.err
+    assert sorted(path.name for path in units.iterdir()) == UNITS
+    assert "Each day at 02:30 a check begins. It measures a few records and changes nothing." in written.out
+    assert "enable --now hexacell-simulated-hexaglide.timer" in written.out
+    assert "systemd:" not in written.out
+    shown = schedule("--show")
+    assert "OnCalendar=*-*-* 02:30:00" in shown.out
+    assert schedule("--daily", "03:00", "--mode", "optimise").code == 0
+    assert "OnCalendar=*-*-* 03:00:00" in schedule("--show").out
+    (units / "timers.target.wants").mkdir()
+    (units / "timers.target.wants" / UNITS[1]).symlink_to(units / UNITS[1])
+    assert schedule("--remove").code == 0
+    assert [path for path in units.rglob("*") if not path.is_dir()] == []
+    for again in ("--remove", "--show"):
+        assert "This cell has no schedule." in schedule(again).out
+    assert cell_folder.snapshot() == before
+
+
+def test_as_a_document(schedule, units) -> None:
+    assert schedule("--daily", "02:30", "--json").document == {
+        "unit": "hexacell-simulated-hexaglide",
+        "files": [str(units / name) for name in UNITS],
+        "complaints": [],
+    }
+
+
+def test_for_cron_a_line_is_printed_and_nothing_written(schedule, cell_folder, units) -> None:
+    outcome = schedule("--daily", "02:30", "--cron")
+    assert outcome.out.splitlines()[-1].startswith("30 2 * * * cd ")
+    assert str(cell_folder.cell) in outcome.out
+    assert not units.exists()
+
+
+@pytest.mark.parametrize(
+    "content", ["[Unit]\n", "# Written by `hexacell schedule` for /elsewhere/cell.toml\n"]
+)
+def test_units_of_others_are_left_alone(schedule, units, content) -> None:
+    units.mkdir()
+    other = units / UNITS[0]
+    other.write_text(content)
+    outcome = schedule("--daily", "02:30")
+    assert outcome.code == 2
+    assert str(other) in outcome.err
+    schedule("--remove")
+    assert [(path.name, path.read_text()) for path in units.iterdir()] == [(UNITS[0], content)]
+
+
+def test_a_cell_that_needs_a_person_is_not_scheduled(schedule, cell_folder, units) -> None:
+    cell_folder.edit(('placement = "fixed"', 'placement = "by-hand"'))
+    outcome = schedule("--daily", "02:30")
+    assert outcome.code == 2
+    assert "unattended running is not possible: the gauges are put at each point by hand" in outcome.err
+    assert not units.exists()
+
+
+@pytest.mark.parametrize(
+    ("words", "problem"),
+    [
+        (["--daily", "25:00"], "'25:00' is no time of day"),
+        ([], "when?"),
+        (["--daily", "02:30", "--longest", "0"], "--longest 0 is no duration"),
+        (["--daily", "02:30", "--retry", "100000"], "--retry 100000 is no duration"),
+        (["--daily", "02:30", "--longest", "600"], "all tries together last longer than a day"),
+        (["--daily", "02:30", "--retries", "-1"], "--retries"),
+        (["--daily", "02:30", "--on-failure", "a\nUser=root"], "is no name of a unit"),
+        (["--daily", "02:30", "--show"], "not allowed with"),
+    ],
+)
+def test_what_makes_no_sense_is_refused(schedule, units, words, problem) -> None:
+    outcome = schedule(*words)
+    assert outcome.code == 2
+    assert problem in outcome.err
+    assert not units.exists()

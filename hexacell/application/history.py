@@ -150,6 +150,14 @@ def parameter_trends(
     return trends(cell.settings.mechanism.parameters, results)
 
 
+def is_applied_later(folder: RunFolder) -> bool:
+    """Whether a run's proposal was applied after it; also where the note of that is damaged."""
+    try:
+        return later_approval(folder) is not None
+    except HexacellError:
+        return True
+
+
 def _result_of(run: PastRun) -> IdentificationResult:
     result = _result(run.folder)
     if result is None:
@@ -189,7 +197,7 @@ def _last_line(entries: Sequence[Entry], state: RunState) -> str:
 def _has_open_proposal(folder: RunFolder, state: RunState) -> bool:
     """Whether what a run proposed was not written, or undone by the run itself."""
     is_in_use = state.committed is not None and not state.rolled_back
-    is_applied = is_in_use or later_approval(folder) is not None
+    is_applied = is_in_use or is_applied_later(folder)
     return state.proposed is not None and folder.proposal.is_file() and not is_applied
 
 

@@ -288,7 +288,14 @@ def _history(commands: Any) -> None:  # noqa: ANN401
         help="what changed from one calibration to another, parameter by parameter",
     )
     what.add_argument("--show", metavar="RUN", help="what happened in a run, and when")
+    what.add_argument(
+        "--keep",
+        type=float,
+        metavar="DAYS",
+        help="which runs that ended before may be deleted; those that wrote the config never may",
+    )
     what.add_argument("--drift", action="store_true", help="the trend of every parameter over all runs")
+    parser.add_argument("--delete", action="store_true", help="with --keep: delete those")
     parser.add_argument(
         "--archive",
         metavar="URL",

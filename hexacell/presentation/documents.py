@@ -13,6 +13,7 @@ from hexacell.application.drift_history import DriftHistory, FoundChange
 from hexacell.application.history import PastRun
 from hexacell.application.offline import NextPose, PlanTrial
 from hexacell.application.proposals import AppliedProposal
+from hexacell.application.retention import Retention
 from hexacell.application.schedules import Schedule
 from hexacell.campaign.decisions import Finished, Forecast, MeasurePose, StartPoint
 from hexacell.presentation.run_story import run_story
@@ -241,6 +242,16 @@ def schedule_document(schedule: Schedule | None) -> dict[str, Any]:
         "unit": schedule.unit,
         "files": list(map(str, schedule.files)),
         "complaints": list(schedule.complaints),
+    }
+
+
+def retention_document(found: Retention, *, is_deleted: bool) -> dict[str, Any]:
+    """What ``history --keep --json`` prints."""
+    return {
+        "before": found.before.isoformat(),
+        "deleted": is_deleted,
+        "runs": [str(run.folder.path) for run in found.leaving],
+        "kept": [{"run": str(run.folder.path), "reason": reason.value} for run, reason in found.kept],
     }
 
 

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from hexacell.application.drift_history import DriftHistory, FoundChange
 from hexacell.application.history import PastRun
+from hexacell.application.retention import Retention
 from hexacell.presentation.layout import wrapped
 from hexacell.reporting.run_comparison import ParameterDifference, ParameterTrend, RunComparison
 
@@ -105,6 +106,18 @@ def watch_text(found: DriftHistory) -> str:
     shown = [one for one in found.celsius if one is not None]
     warmth = [f"Their thermometers showed {min(shown):.1f} to {max(shown):.1f} deg C."] if shown else []
     return "\n".join([*lines, wrapped(rest, indent=2), *warmth])
+
+
+def retention_text(found: Retention, *, is_deleted: bool) -> str:
+    """Which old runs go, and why the others stay."""
+    verb = "were deleted" if is_deleted else "may be deleted"
+    counted = f"{len(found.leaving)} of {len(found.leaving) + len(found.kept)} runs"
+    lines = [f"{counted} from before {found.before:%Y-%m-%d} {verb}."]
+    lines += [f"  {run.name}" for run in found.leaving]
+    lines += [f"  {run.name} stays: {reason}" for run, reason in found.kept]
+    if found.leaving and not is_deleted:
+        lines.append("Add --delete to delete them; what they say of drift goes with them.")
+    return "\n".join(lines)
 
 
 def change_sentence(found: FoundChange) -> str:

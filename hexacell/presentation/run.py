@@ -24,6 +24,10 @@ from procedures.run.questions import (
     WrittenResult,
 )
 
+REPEATED = "The check raised an alarm, which one unchanged machine in 100 does: it is made once more."
+REPEATED_ALARM = "The alarm was raised again: the machine has changed."
+NOT_REPEATED_ALARM = "The alarm was not raised again."
+
 UNVERIFIED = (
     "The controller's config holds the new geometry, which is not verified yet: resuming "
     "verifies it, or restores the old one."

@@ -12,6 +12,8 @@ from hexacell.storage.atomic_files import os_error_to_file_error
 def folder_stamps(folder: Path) -> dict[str, str]:
     """The stamp of each run folder in ``folder``, by name; none where ``folder`` does not exist.
 
+    Hidden folders are no runs.
+
     A journal only grows, and every other file of a run is put in its place by a rename, which changes the
     time of its folder. The times of status changes count, which no program can set.
 
@@ -20,7 +22,7 @@ def folder_stamps(folder: Path) -> dict[str, str]:
     """
     try:
         with os.scandir(folder) as found:
-            return {entry.name: _stamp(entry) for entry in found if entry.is_dir()}
+            return {one.name: _stamp(one) for one in found if one.is_dir() and not one.name.startswith(".")}
     except FileNotFoundError:
         return {}
     except OSError as error:

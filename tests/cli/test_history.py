@@ -104,3 +104,16 @@ def test_a_leg_that_moved_is_told_with_the_night(cell, typed_here) -> None:
     }  # fmt: skip
     assert (change["leg"], change["before"]) == (4, "2026-03-06T02:30:00+00:00")
     json.dumps(document, allow_nan=False)
+
+
+def test_old_runs_are_listed_and_deleted_if_asked_for(cell, typed_here) -> None:
+    nights = Nights(cell)
+    folder = nights.check()
+    listed = typed_here("history", cell.path, "--keep", "30")
+    assert (listed.code, folder.path.name in listed.out, folder.path.exists()) == (0, True, True)
+    document = typed_here("history", cell.path, "--keep", "30", "--delete", "--json").document
+    assert (document["deleted"], document["runs"], document["kept"]) == (True, [str(folder.path)], [])
+    assert not folder.path.exists()
+    assert typed_here("history", cell.path, "--delete").code == 2
+    assert typed_here("history", cell.path, "--keep", "-1").code == 2
+    assert typed_here("history", cell.path, "--keep", "nan").code == 2

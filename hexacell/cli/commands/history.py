@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 from hexacell.application.drift_history import drift_history
 from hexacell.application.history import compare_runs, parameter_trends, past_runs
+from hexacell.application.retention import delete_runs, retention
 from hexacell.application.run_index import RunIndex
 from hexacell.cell.archive import mistake_in_url
 from hexacell.cell.loader import Cell
@@ -17,17 +18,28 @@ from hexacell.presentation.documents import (
     comparison_document,
     drift_document,
     history_document,
+    retention_document,
     story_document,
 )
-from hexacell.presentation.history import comparison_text, drift_text, history_text, watch_text
+from hexacell.presentation.history import (
+    comparison_text,
+    drift_text,
+    history_text,
+    retention_text,
+    watch_text,
+)
 from hexacell.presentation.run_story import story_text
 from hexacell.runs.run_folder import find_run
 from procedures.journal.journal import read_entries
 
+MOST_DAYS = 36525.0
+
 
 def main(options: argparse.Namespace) -> ExitCode:
-    """List, compare, or look for drift; nothing is changed."""
+    """List, compare, or look for drift; nothing is changed but by ``--delete``."""
     console = Console(options.json)
+    if options.delete and options.keep is None:
+        raise UsageError("--delete needs --keep DAYS", action="Say how old the runs are that may go")
     cell = cell_at(options.cell, console)
     if options.compare is not None:
         _compare(cell, options.compare, console)
@@ -35,6 +47,8 @@ def main(options: argparse.Namespace) -> ExitCode:
         entries = read_entries(find_run(cell, options.show).journal)
         console.document(story_document(entries))
         console.print(story_text(entries))
+    elif options.keep is not None:
+        _keep(cell, options, console)
     elif options.drift:
         index = _index(cell, options, console)
         found, watched = parameter_trends(cell, past_runs(cell, index), index), drift_history(cell, index)
@@ -53,6 +67,17 @@ def _index(cell: Cell, options: argparse.Namespace, console: Console) -> RunInde
     if mistake is not None:
         raise UsageError(mistake[0], subject="--archive", action=mistake[1])
     return RunIndex(cell, options.archive, console.warn)
+
+
+def _keep(cell: Cell, options: argparse.Namespace, console: Console) -> None:
+    """Say which old runs may go, and delete them if that is asked for."""
+    if not 0.0 <= options.keep <= MOST_DAYS:
+        raise UsageError("--keep takes a number of days", action=f"Write one from 0 to {MOST_DAYS:g}")
+    found = retention(cell, options.keep, _index(cell, options, console))
+    if options.delete:
+        delete_runs(cell, found.leaving)
+    console.document(retention_document(found, is_deleted=options.delete))
+    console.print(retention_text(found, is_deleted=options.delete))
 
 
 def _compare(cell: Cell, named: Sequence[str], console: Console) -> None:

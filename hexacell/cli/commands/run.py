@@ -7,6 +7,7 @@ import sys
 from dataclasses import replace
 
 from hexacell.application.calibration_run import RunRequest, calibrate, is_unverified
+from hexacell.application.check_repetition import raised_alarm, repetition
 from hexacell.application.demo import prepare_demo
 from hexacell.application.interrupted_runs import run_to_resume
 from hexacell.attach.run_device_watch import RunDeviceWatch
@@ -24,7 +25,16 @@ from hexacell.cli.terminal import KeyboardCommands, TerminalOperator, is_interac
 from hexacell.errors import ExitCode, HexacellError, UsageError
 from hexacell.presentation.documents import run_document
 from hexacell.presentation.line_face import LETTERS
-from hexacell.presentation.run import UNVERIFIED, clock_notice, closing_lines, demo_opening, resume_hint
+from hexacell.presentation.run import (
+    NOT_REPEATED_ALARM,
+    REPEATED,
+    REPEATED_ALARM,
+    UNVERIFIED,
+    clock_notice,
+    closing_lines,
+    demo_opening,
+    resume_hint,
+)
 from hexacell.runs.run_folder import new_run
 from procedures.calibration.workflow import Mode, expected_records
 from procedures.engine.engine import Listener
@@ -106,6 +116,12 @@ def _run_to_end(request: RunRequest, console: Console) -> ExitCode:
         console.print(clock_notice(factor))
     ended = execute_run(request, console)
     state = fold(read_journal(request.folder.journal))
+    again = repetition(request, state)
+    if again is not None:
+        console.print(REPEATED)
+        ended = execute_run(again, console)
+        state, request = fold(read_journal(again.folder.journal)), again
+        console.print(REPEATED_ALARM if raised_alarm(state) else NOT_REPEATED_ALARM)
     console.document(run_document(request, ended, state))
     for line in closing_lines(request, ended):
         console.print(line)

@@ -37,6 +37,7 @@ class ScheduleRequest:
     retry_minutes: int = 15
     retries: int = 3
     on_failure: str | None = None
+    metrics: Path | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,6 +65,7 @@ def scheduled_run(cell: Cell, request: ScheduleRequest) -> ScheduledRun:
     hour, minute = time_of_day(request.daily)
     path = cell.path.resolve()
     config = cell.config_path.resolve().parent
+    metrics = None if request.metrics is None else request.metrics.resolve()
     return ScheduledRun(
         cell=path,
         name=cell.settings.name,
@@ -74,7 +76,10 @@ def scheduled_run(cell: Cell, request: ScheduleRequest) -> ScheduledRun:
         longest_minutes=request.longest_minutes,
         retry_minutes=request.retry_minutes,
         retries=request.retries,
-        writable=tuple(dict.fromkeys((path.parent, config))),
+        metrics=metrics,
+        writable=tuple(
+            dict.fromkeys((path.parent, config, *([] if metrics is None else [metrics.parent])))
+        ),
     )
 
 

@@ -109,6 +109,7 @@ class AcceptanceSettings(Section):
     )
     largest_change_mm: Positive = Field(15.0, description="of a parameter, if no person approves")
     drift_mm: Positive = Field(0.1, description="of a point's reference, from its zeroing to its end")
+    valid_days: Positive | None = Field(None, description="after which the next calibration is due")
     approval: Literal["ask", "automatic"] = Field(
         "ask", description="automatic: apply within the limits above without asking"
     )

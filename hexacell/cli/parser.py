@@ -64,6 +64,7 @@ def make_parser() -> Parser:
     _history(commands)
     _report(commands)
     _schedule(commands)
+    _status(commands)
     _cell(commands)
     return parser
 
@@ -347,8 +348,20 @@ def _schedule(commands: Any) -> None:  # noqa: ANN401
         help="how often, where a device or the lock is not there (default: %(default)s)",
     )
     parser.add_argument("--on-failure", metavar="UNIT", help="unit that systemd starts after a failure")
+    parser.add_argument(
+        "--metrics", type=Path, metavar="FILE", help="write metrics of the cell there after each run"
+    )
     parser.add_argument("--cron", action="store_true", help="print a crontab line instead")
     parser.add_argument("--folder", type=Path, metavar="FOLDER", help="where the units are, if elsewhere")
+    _add_json(parser)
+
+
+def _status(commands: Any) -> None:  # noqa: ANN401
+    parser = _command(commands, "status", "all cells at a glance: latest verdicts, what waits for a person")
+    parser.add_argument("cells", type=Path, nargs="+", metavar="CELL", help="cell files (TOML)")
+    parser.add_argument(
+        "--metrics", type=Path, metavar="FILE", help="write it as metrics for Prometheus' node exporter too"
+    )
     _add_json(parser)
 
 

@@ -10,6 +10,7 @@ from hexacell.scheduling.scheduled_run import ScheduledRun
 def crontab_line(run: ScheduledRun) -> str:
     """The line. Cron takes % for a line's end, has no retries, and mails what is printed."""
     longest = ("timeout", "--signal=TERM", "--kill-after=120", f"{run.longest_minutes}m")
-    command = f"cd {shlex.quote(str(run.cell.parent))} && {shlex.join([*longest, *run.words])} </dev/null"
+    begun = f"cd {shlex.quote(str(run.cell.parent))} && {shlex.join([*longest, *run.words])} </dev/null"
+    command = f"{begun}; {shlex.join(run.words_afterwards)}" if run.metrics else begun
     escaped = command.replace("%", "\\%")
     return f"{run.minute} {run.hour} * * * {escaped}"

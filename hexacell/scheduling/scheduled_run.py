@@ -25,7 +25,8 @@ class ScheduledRun:
         longest_minutes: after so long it is ended in place, and can be resumed.
         retry_minutes: so long after a failure that may pass (a device, the lock) it is tried again.
         retries: how often.
-        writable: the folders that it writes into: of the cell and of the controller's config.
+        writable: the folders that it writes into: of the cell, of the controller's config, of metrics.
+        metrics: the file that they are written to after each run; none without.
     """
 
     cell: Path
@@ -38,11 +39,19 @@ class ScheduledRun:
     retry_minutes: int
     retries: int
     writable: tuple[Path, ...]
+    metrics: Path | None = None
 
     @property
     def words(self) -> tuple[str, ...]:
         """The command and its arguments."""
         return (*self.program, "run", str(self.cell), "--unattended", "--mode", self.mode)
+
+    @property
+    def words_afterwards(self) -> tuple[str, ...]:
+        """The command that writes the metrics; none without."""
+        if self.metrics is None:
+            return ()
+        return (*self.program, "status", str(self.cell), "--metrics", str(self.metrics))
 
     @property
     def unit(self) -> str:

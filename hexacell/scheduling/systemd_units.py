@@ -51,7 +51,8 @@ def service_text(run: ScheduledRun, user: str | None, groups: Sequence[str], on_
     service = [
         "[Service]",
         "Type=oneshot",
-        f"ExecStart={' '.join(map(_word, run.words))}",
+        f"ExecStart={_command(run.words)}",
+        *([f"ExecStopPost={_command(run.words_afterwards)}"] if run.metrics else []),
         f"WorkingDirectory={_path(run.cell.parent)}",
         f"TimeoutStartSec={run.longest_minutes}min",
         f"TimeoutStopSec={STOPPING_S}",
@@ -122,6 +123,10 @@ def _plain(text: str) -> str:
 
 def _path(path: Path) -> str:
     return _plain(str(path))
+
+
+def _command(words: Sequence[str]) -> str:
+    return " ".join(map(_word, words))
 
 
 def _word(text: str) -> str:

@@ -37,6 +37,7 @@ from hexacell.storage import atomic_files
 
 _LONGEST_NOTE = 4096
 _MODE = 0o644
+_UNKNOWN = "another process"
 # O_NOFOLLOW: in a shared folder a link must not turn the holder's note into a write to another file.
 # O_NONBLOCK: a pipe in the place of the file would be waited for.
 _FLAGS = os.O_NOFOLLOW | os.O_NONBLOCK
@@ -63,6 +64,28 @@ def cell_lock(config: Path) -> Iterator[None]:
             fcntl.flock(descriptor, fcntl.LOCK_UN)
     finally:
         os.close(descriptor)
+
+
+def lock_holder(config: Path) -> str | None:
+    """Who holds the cell, by the note in its lock; none if nobody does, or could not leave one.
+
+    The lock itself is not tried: who takes it at that moment would find it held.
+
+    Raises:
+        FileError: the lock file cannot be read.
+    """
+    path = lock_path(config)
+    try:
+        descriptor = os.open(path, _FLAGS | os.O_RDONLY)
+    except FileNotFoundError:
+        return None
+    except OSError as error:
+        raise _cannot_open(path, error) from error
+    try:
+        holder = _holder(descriptor)
+    finally:
+        os.close(descriptor)
+    return None if holder == _UNKNOWN else holder
 
 
 def lock_path(config: Path) -> Path:
@@ -131,9 +154,9 @@ def _holder(descriptor: int) -> str:
     try:
         note = json.loads(os.pread(descriptor, _LONGEST_NOTE, 0).splitlines()[0])
         words = "process {pid} of {user} on {host} since {since}".format(**note)
-        return words if _is_alive(note) else "another process"
+        return words if _is_alive(note) else _UNKNOWN
     except (OSError, LookupError, TypeError, ValueError, OverflowError):
-        return "another process"
+        return _UNKNOWN
 
 
 def _is_alive(note: dict[str, object]) -> bool:

@@ -29,6 +29,7 @@ COMMANDS = (
     "history",
     "report",
     "schedule",
+    "status",
     "cell",
 )
 PAGES = [

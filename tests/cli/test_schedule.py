@@ -46,6 +46,13 @@ def test_as_a_document(schedule, units) -> None:
     }
 
 
+def test_metrics_may_be_written_into_their_folder(schedule, units, tmp_path) -> None:
+    assert schedule("--daily", "02:30", "--metrics", tmp_path / "metrics" / "cell.prom").code == 0
+    service = (units / UNITS[0]).read_text()
+    assert f'--metrics" "{tmp_path}/metrics/cell.prom"' in service
+    assert f'ReadWritePaths="{tmp_path}/metrics"' in service or "ReadWritePaths" not in service
+
+
 def test_for_cron_a_line_is_printed_and_nothing_written(schedule, cell_folder, units) -> None:
     outcome = schedule("--daily", "02:30", "--cron")
     assert outcome.out.splitlines()[-1].startswith("30 2 * * * cd ")

@@ -46,7 +46,13 @@ def main(options: argparse.Namespace) -> ExitCode:
 
 def _write(cell: Cell, options: argparse.Namespace, console: Console) -> None:
     request = ScheduleRequest(
-        options.daily, options.mode, options.longest, options.retry, options.retries, options.on_failure
+        options.daily,
+        options.mode,
+        options.longest,
+        options.retry,
+        options.retries,
+        options.on_failure,
+        options.metrics,
     )
     if options.cron:
         line = crontab_line(scheduled_run(cell, request))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import shlex
 import shutil
 import subprocess
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -52,6 +53,16 @@ def test_a_night_is_a_check_once_and_what_may_pass_is_tried_again() -> None:
     assert found["ReadWritePaths"] == '"/cells/my-robot"'
     timer = settings_of(timer_text(scheduled()))
     assert (timer["OnCalendar"], timer["Persistent"]) == ("*-*-* 02:30:00", "yes")
+
+
+def test_metrics_are_written_after_each_run_whatever_came_of_it() -> None:
+    run = replace(scheduled(), metrics=Path("/metrics/a b.prom"))
+    found = settings_of(service_text(run, "robot", [], None))
+    assert words_of(found["ExecStopPost"])[3:] == [
+        "status", "/cells/my-robot/cell.toml", "--metrics", "/metrics/a b.prom",
+    ]  # fmt: skip
+    assert crontab_line(run).endswith("; " + shlex.join(run.words_afterwards))
+    assert "ExecStopPost" not in service_text(scheduled(), "robot", [], None)
 
 
 def test_the_service_of_a_user_asks_for_nothing_that_only_root_may() -> None:

@@ -1,0 +1,98 @@
+"""``hexacell status``: cells at a glance, and metrics that Prometheus' own parser reads."""
+
+from __future__ import annotations
+
+import shutil
+
+import pytest
+from prometheus_client.parser import text_string_to_metric_families
+
+from hexacell.storage.cell_lock import cell_lock
+
+
+@pytest.fixture
+def calibrated(demo, tmp_path):
+    """A copy of the demo's cell with its run."""
+    folder = tmp_path / "calibrated"
+    shutil.copytree(demo.folder, folder)
+    return folder / demo.cell.name
+
+
+def samples(path) -> dict[tuple[str, ...], float]:
+    """By name and labels other than the cell."""
+    families = text_string_to_metric_families(path.read_text())
+    found = {}
+    for family in families:
+        assert family.documentation
+        for sample in family.samples:
+            further = sorted(text for name, text in sample.labels.items() if name != "cell")
+            found[(sample.name.removeprefix("hexacell_"), *further)] = sample.value
+    return found
+
+
+def test_a_calibrated_cell_and_one_without_runs(typed_here, demo, calibrated, cell_folder) -> None:
+    before = cell_folder.snapshot()
+    outcome = typed_here("status", calibrated, cell_folder.cell, "--json")
+    assert outcome.code == 0, outcome.err
+    first, second = outcome.document["cells"]
+    accuracy = demo.outcome.document["verification"]["accuracy"]["position"]
+    assert (first["verdict"], second["verdict"]) == ("pass", None)
+    assert (first["position_mm"], first["expanded_mm"]) == (accuracy["value"], accuracy["expanded"])
+    assert first["passed_at"] == first["judged_at"] is not None
+    assert (first["in_use_by"], first["proposal"], first["changes"]) == (None, None, 0)
+    assert second["in_force"] is None
+    lines = outcome.err.splitlines()
+    assert lines[1].split()[:2] == ["simulated-hexaglide", "pass"]
+    assert lines[2].split() == ["simulated-hexaglide", "-", "-", "-", "no"]
+    assert cell_folder.snapshot() == before
+
+
+def test_metrics_are_those_of_the_latest_verdict(typed_here, demo, calibrated, tmp_path) -> None:
+    target = tmp_path / "hexacell.prom"
+    target.write_text("of yesterday")
+    assert typed_here("status", calibrated, "--metrics", target).code == 0
+    found = samples(target)
+    accuracy = demo.outcome.document["verification"]["accuracy"]["position"]
+    assert found[("position_error_mm",)] == accuracy["value"]
+    assert found[("position_limit_mm",)] == 0.25
+    assert (found[("last_verdict", "pass")], found[("last_verdict", "fail")]) == (1.0, 0.0)
+    assert found[("last_run_passed",)] == 1.0
+    assert found[("last_pass_timestamp_seconds",)] == found[("last_run_timestamp_seconds",)] > 1.7e9
+    assert (found[("in_use",)], found[("open_proposal",)], found[("changes_found",)]) == (0.0, 0.0, 0.0)
+    assert ("calibration_due_timestamp_seconds",) not in found
+
+
+def test_when_the_next_calibration_is_due(typed_here, calibrated, tmp_path) -> None:
+    text = calibrated.read_text()
+    calibrated.write_text(text.replace("[acceptance]\n", "[acceptance]\nvalid_days = 30\n", 1))
+    target = tmp_path / "hexacell.prom"
+    outcome = typed_here("status", calibrated, "--metrics", target)
+    found = samples(target)
+    lasts = found[("calibration_due_timestamp_seconds",)] - found[("calibration_timestamp_seconds",)]
+    assert lasts == pytest.approx(30 * 86_400)
+    assert "calibration due on " in outcome.out
+
+
+def test_who_holds_a_cell_is_told_and_nobody_is_kept_out(typed_here, cell_folder) -> None:
+    with cell_lock(cell_folder.controller):
+        used = typed_here("status", cell_folder.cell)
+    assert "by process " in used.out
+    assert typed_here("status", cell_folder.cell).out.splitlines()[1].endswith(" no")
+    with cell_lock(cell_folder.controller):
+        pass
+
+
+def test_names_with_quotes_stay_names(typed_here, cell_folder, tmp_path) -> None:
+    cell_folder.edit(('name = "simulated-hexaglide"', 'name = "Zelle (3) #+"'))
+    target = tmp_path / "hexacell.prom"
+    assert typed_here("status", cell_folder.cell, "--metrics", target).code == 0
+    labels = {
+        s.labels["cell"] for f in text_string_to_metric_families(target.read_text()) for s in f.samples
+    }
+    assert labels == {"Zelle (3) #+"}
+
+
+def test_a_cell_file_with_a_mistake_is_named(typed_here, cell_folder, tmp_path) -> None:
+    outcome = typed_here("status", cell_folder.cell, tmp_path / "nowhere.toml")
+    assert outcome.code == 2
+    assert "nowhere.toml" in outcome.err

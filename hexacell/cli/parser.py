@@ -290,6 +290,9 @@ def _history(commands: Any) -> None:  # noqa: ANN401
     )
     what.add_argument("--show", metavar="RUN", help="what happened in a run, and when")
     what.add_argument(
+        "--refit", metavar="RUN", help="identify a calibration again, with today's cell file and program"
+    )
+    what.add_argument(
         "--keep",
         type=float,
         metavar="DAYS",

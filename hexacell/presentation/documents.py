@@ -13,6 +13,7 @@ from hexacell.application.drift_history import DriftHistory, FoundChange
 from hexacell.application.history import PastRun
 from hexacell.application.offline import NextPose, PlanTrial
 from hexacell.application.proposals import AppliedProposal
+from hexacell.application.refit import RefittedRun
 from hexacell.application.retention import Retention
 from hexacell.application.schedules import Schedule
 from hexacell.campaign.decisions import Finished, Forecast, MeasurePose, StartPoint
@@ -242,6 +243,19 @@ def schedule_document(schedule: Schedule | None) -> dict[str, Any]:
         "unit": schedule.unit,
         "files": list(map(str, schedule.files)),
         "complaints": list(schedule.complaints),
+    }
+
+
+def refit_document(found: RefittedRun) -> dict[str, Any]:
+    """What ``history --refit --json`` prints."""
+    return {
+        "run": str(found.folder.path),
+        "frame": found.today.frame,
+        **{
+            name: {"chi2": one.chi2, "dof": one.dof, "records": one.records, "converged": one.converged}
+            for name, one in (("then", found.then), ("today", found.today))
+        },
+        "parameters": [{**asdict(one), "change": one.change} for one in found.parameters],
     }
 
 

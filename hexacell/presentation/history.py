@@ -6,8 +6,10 @@ from collections.abc import Sequence
 
 from hexacell.application.drift_history import DriftHistory, FoundChange
 from hexacell.application.history import PastRun
+from hexacell.application.refit import RefittedRun
 from hexacell.application.retention import Retention
 from hexacell.presentation.layout import wrapped
+from hexacell.reporting.result import IdentificationResult
 from hexacell.reporting.run_comparison import ParameterDifference, ParameterTrend, RunComparison
 
 NO_RUNS = "This cell has no runs yet."
@@ -81,6 +83,26 @@ def comparison_sentence(compared: RunComparison) -> str:
         return f"{ratio}, by several parameters together."
     most = compared.significant[0]
     return f"{ratio}; most of all {most.name}, by {most.change:+.3f} {most.unit} (sigma {most.sigma:.3f})."
+
+
+def refit_text(found: RefittedRun) -> str:
+    """How far a run's result is from what its records give today, then every free parameter."""
+    then, today, most = found.then, found.today, found.largest
+    sentence = (
+        f"{found.folder.path.name}, identified again with the cell file and the program of today: "
+        f"{_fit_words(then)} then, {_fit_words(today)} now; most differs {most.name}, "
+        f"by {most.change:+.4f} {most.unit} ({abs(most.change) / most.sigma:.1f} sigma)."
+    )
+    head = f"{'':5}{'then':>15}{'today':>15}{'difference':>11}{'sigma':>9}"
+    return "\n".join([wrapped(sentence), head, *map(_refit_line, found.parameters)])
+
+
+def _refit_line(one: ParameterDifference) -> str:
+    return f"{one.name:5}{one.before:15.4f}{one.after:15.4f}{one.change:+11.4f}{one.sigma:9.4f}"
+
+
+def _fit_words(result: IdentificationResult) -> str:
+    return f"chi-square {result.chi2:.0f} of {result.dof} from {result.records} records"
 
 
 def drift_text(found: Sequence[ParameterTrend]) -> str:

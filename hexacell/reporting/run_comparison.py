@@ -24,6 +24,9 @@ LEAST_RUNS = 3
 
 DAY_S = 86_400.0
 
+TIED = 1e-12
+"""Of the largest variance of a combination of parameters: one with less has none but rounding."""
+
 
 @dataclass(frozen=True, slots=True)
 class ParameterDifference:
@@ -98,12 +101,27 @@ def compare_results(
     change = parameters.vector(after.geometry) - parameters.vector(before.geometry)
     covariance = np.array(before.covariance) + np.array(after.covariance)
     free = np.flatnonzero(np.diag(covariance) > 0.0)
-    weights = np.linalg.pinv(covariance[np.ix_(free, free)], hermitian=True)
-    chi2 = float(change[free] @ weights @ change[free])
+    # The convention ties some parameters to each other: their covariance has a lower rank.
+    values, axes = np.linalg.eigh(covariance[np.ix_(free, free)])
+    is_own = values > TIED * values.max()
+    chi2 = float(np.sum((change[free] @ axes[:, is_own]) ** 2 / values[is_own]))
     differences = _differences(parameters, before, after, np.sqrt(np.diag(covariance)))
     return RunComparison(
-        after.frame, tuple(differences[row] for row in free), ChiSquareTest(chi2, float(len(free)))
+        after.frame, tuple(differences[row] for row in free), ChiSquareTest(chi2, float(is_own.sum()))
     )
+
+
+def result_differences(
+    parameters: ParameterSet, before: IdentificationResult, after: IdentificationResult
+) -> tuple[ParameterDifference, ...]:
+    """The changes of the free parameters from one result of some records to another of the same ones.
+
+    Sigma is that of ``after``. Raises ``UsageError`` if the frame conventions differ.
+    """
+    _require_same_frame((before, after))
+    sigma = parameters.vector(after.sigma)
+    found = _differences(parameters, before, after, sigma)
+    return tuple(found[row] for row in np.flatnonzero(sigma > 0.0).tolist())
 
 
 def trends(

@@ -117,3 +117,12 @@ def test_old_runs_are_listed_and_deleted_if_asked_for(cell, typed_here) -> None:
     assert typed_here("history", cell.path, "--delete").code == 2
     assert typed_here("history", cell.path, "--keep", "-1").code == 2
     assert typed_here("history", cell.path, "--keep", "nan").code == 2
+
+
+def test_an_old_run_is_identified_again(cell, typed_here) -> None:
+    folder = Nights(cell).calibrate()
+    told = typed_here("history", cell.path, "--refit", folder.path.name)
+    assert (told.code, told.out.startswith(f"{folder.path.name}, identified again")) == (0, True)
+    document = typed_here("history", cell.path, "--refit", folder.path, "--json").document
+    assert set(document) == {"run", "frame", "then", "today", "parameters"}
+    assert document["then"]["records"] == document["today"]["records"] == 55

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 from hexacell.application.drift_history import drift_history
 from hexacell.application.history import compare_runs, parameter_trends, past_runs
+from hexacell.application.refit import refit_run
 from hexacell.application.retention import delete_runs, retention
 from hexacell.application.run_index import RunIndex
 from hexacell.cell.archive import mistake_in_url
@@ -18,6 +19,7 @@ from hexacell.presentation.documents import (
     comparison_document,
     drift_document,
     history_document,
+    refit_document,
     retention_document,
     story_document,
 )
@@ -25,6 +27,7 @@ from hexacell.presentation.history import (
     comparison_text,
     drift_text,
     history_text,
+    refit_text,
     retention_text,
     watch_text,
 )
@@ -47,6 +50,10 @@ def main(options: argparse.Namespace) -> ExitCode:
         entries = read_entries(find_run(cell, options.show).journal)
         console.document(story_document(entries))
         console.print(story_text(entries))
+    elif options.refit is not None:
+        refitted = refit_run(cell, options.refit)
+        console.document(refit_document(refitted))
+        console.print(refit_text(refitted))
     elif options.keep is not None:
         _keep(cell, options, console)
     elif options.drift:

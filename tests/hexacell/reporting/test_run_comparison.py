@@ -11,6 +11,7 @@ import pytest
 from hexacell.errors import UsageError
 from hexacell.identification.solver.levenberg_marquardt import Termination
 from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS as PARAMETERS
+from hexacell.kinematics.mechanisms.hexaglide import Hexaglide
 from hexacell.reporting.result import IdentificationResult
 from hexacell.reporting.run_comparison import compare_results, trends
 
@@ -129,3 +130,18 @@ def test_a_slope_has_the_spread_that_is_stated() -> None:
 @pytest.mark.parametrize("days", [(), (0,), (0, 10), (0, 0, 0)])
 def test_too_few_runs_tell_no_trend(days: tuple[int, ...]) -> None:
     assert trends(PARAMETERS, [(NOON + timedelta(days=day), result(np.zeros(42))) for day in days]) == ()
+
+
+def test_parameters_that_the_convention_ties_count_once() -> None:
+    """B2z, B3z and B5z are one number, as are B2y and B5y: of 38 that change 35 are free."""
+    basis = Hexaglide().convention.basis()
+    random = np.random.default_rng(4)
+    factor = 0.01 * random.standard_normal((35, 35))
+    free = factor @ factor.T
+    change = random.multivariate_normal(np.zeros(35), 2.0 * free)
+    tied = basis @ free @ basis.T
+    values = np.full(42, 100.0)
+    found = compare_results(PARAMETERS, result(values, tied), result(values + basis @ change, tied))
+    assert len(found.parameters) == 38
+    assert found.test.expected == 35.0
+    assert found.test.chi2 == pytest.approx(change @ np.linalg.solve(2.0 * free, change), rel=1e-4)

@@ -130,6 +130,15 @@ def compare_runs(cell: Cell, before: str, after: str) -> tuple[PastRun, PastRun,
     return one, other, compare_results(parameters, _result_of(one), _result_of(other))
 
 
+def have_results(cell: Cell, named: Iterable[str]) -> bool:
+    """Whether all of these runs, by folder or name, identified a geometry of their own.
+
+    Raises:
+        UsageError: there is no such run.
+    """
+    return all(_result(find_run(cell, one)) is not None for one in named)
+
+
 def parameter_trends(
     cell: Cell, runs: Iterable[PastRun], index: RunIndex | None = None
 ) -> tuple[ParameterTrend, ...]:

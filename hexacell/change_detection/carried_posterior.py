@@ -18,6 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from hexacell.change_detection.largest_score import largest_by_chance
 from hexacell.change_detection.run_evidence import RunEvidence
 from hexacell.kinematics.rotations import Array
 
@@ -55,13 +56,25 @@ class CarriedPosterior:
 
         They are standard normal, and independent of all before, if the robot has not changed.
         """
-        information = self.evidence.information
-        share = np.linalg.solve(information + run.information, information).T
+        share = self._share(run)
         score = causes @ (share @ run.gradient(self.state))
         variance = np.einsum("ms,st,mt->m", causes, share @ run.information, causes)
         own = np.einsum("ms,st,mt->m", causes, run.information, causes)
         is_seen = variance > LEAST_SHARE * own
         return np.where(is_seen, score / np.sqrt(np.where(is_seen, variance, 1.0)), np.nan)
+
+    def largest_score_by_chance(self, run: RunEvidence, causes: Array) -> float:
+        """What the largest score of a run by causes (m, s), all seen, exceeds by chance."""
+        covariance = causes @ self._share(run) @ run.information @ causes.T
+        sigma = np.sqrt(np.diag(covariance))
+        values, vectors = np.linalg.eigh(covariance / np.outer(sigma, sigma))
+        return largest_by_chance(np.sqrt(np.maximum(values, 0.0))[:, None] * vectors.T)
+
+    def _share(self, run: RunEvidence) -> Array:
+        """``L (L + N)^-1``."""
+        information = self.evidence.information
+        share: Array = np.linalg.solve(information + run.information, information).T
+        return share
 
     def forgetting(self, cause: Array) -> CarriedPosterior:
         """The same when the robot may have changed by any amount along a cause (s,), now."""

@@ -20,14 +20,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from hexacell.change_detection.largest_score import largest_by_chance
 from hexacell.change_detection.run_evidence import WhitenedRecords
 from hexacell.kinematics.rotations import Array
-
-FALSE_ALARMS = 0.01
-"""Probability of an alarm for an unchanged robot."""
-
-DRAWS = 40_000
-"""Of the scores; the probability of a false alarm is then known to 5 % of itself."""
 
 SEEN_SHARE = 1e-9
 """Of the largest information on a parameter: one with less is not seen at all."""
@@ -80,13 +75,5 @@ def single_cause_test(records: WhitenedRecords, covariance: Array, causes: Array
         scores=np.where(is_seen, found / root, 0.0),
         changes=np.where(is_seen, found / root**2, 0.0),
         sigmas=np.where(is_seen, 1.0 / root, np.inf),
-        limit=_largest_by_chance(unit),
+        limit=largest_by_chance(unit),
     )
-
-
-def _largest_by_chance(unit: Array) -> float:
-    """What the largest of correlated scores, with columns (r, m) of length 1, exceeds by chance."""
-    draws = np.random.default_rng(0).standard_normal((DRAWS, min(unit.shape)))
-    factor = np.linalg.qr(unit)[1] if len(unit) > unit.shape[1] else unit
-    largest = np.concatenate([np.abs(part @ factor).max(axis=1) for part in np.array_split(draws, 10)])
-    return float(np.quantile(largest, 1.0 - FALSE_ALARMS))

@@ -10,6 +10,7 @@ from drivers.interfaces import DeviceIdentity
 from hexacell.application.calibration_run import RunRequest
 from hexacell.application.config_rollback import ConfigRollback
 from hexacell.application.drift_history import DriftHistory, FoundChange
+from hexacell.application.evidence_comparison import EvidenceComparison
 from hexacell.application.history import PastRun
 from hexacell.application.offline import NextPose, PlanTrial
 from hexacell.application.proposals import AppliedProposal
@@ -207,6 +208,18 @@ def comparison_document(before: PastRun, after: PastRun, compared: RunComparison
             {**asdict(one), "change": one.change, "significant": one.is_significant}
             for one in compared.parameters
         ],
+    }
+
+
+def evidence_comparison_document(found: EvidenceComparison) -> dict[str, Any]:
+    """What ``history --compare --json`` prints where one of the runs has no geometry of its own."""
+    return {
+        "before": str(found.before.path),
+        "after": str(found.after.path),
+        "changed": found.is_changed,
+        "leg": found.leg if found.is_changed else None,
+        "limit": found.limit,
+        "causes": [asdict(one) for one in found.causes],
     }
 
 

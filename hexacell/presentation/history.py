@@ -4,12 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from hexacell.application.drift_history import DriftHistory, FoundChange
 from hexacell.application.history import PastRun
-from hexacell.application.refit import RefittedRun
-from hexacell.application.retention import Retention
 from hexacell.presentation.layout import wrapped
-from hexacell.reporting.result import IdentificationResult
 from hexacell.reporting.run_comparison import ParameterDifference, ParameterTrend, RunComparison
 
 NO_RUNS = "This cell has no runs yet."
@@ -85,26 +81,6 @@ def comparison_sentence(compared: RunComparison) -> str:
     return f"{ratio}; most of all {most.name}, by {most.change:+.3f} {most.unit} (sigma {most.sigma:.3f})."
 
 
-def refit_text(found: RefittedRun) -> str:
-    """How far a run's result is from what its records give today, then every free parameter."""
-    then, today, most = found.then, found.today, found.largest
-    sentence = (
-        f"{found.folder.path.name}, identified again with the cell file and the program of today: "
-        f"{_fit_words(then)} then, {_fit_words(today)} now; most differs {most.name}, "
-        f"by {most.change:+.4f} {most.unit} ({abs(most.change) / most.sigma:.1f} sigma)."
-    )
-    head = f"{'':5}{'then':>15}{'today':>15}{'difference':>11}{'sigma':>9}"
-    return "\n".join([wrapped(sentence), head, *map(_refit_line, found.parameters)])
-
-
-def _refit_line(one: ParameterDifference) -> str:
-    return f"{one.name:5}{one.before:15.4f}{one.after:15.4f}{one.change:+11.4f}{one.sigma:9.4f}"
-
-
-def _fit_words(result: IdentificationResult) -> str:
-    return f"chi-square {result.chi2:.0f} of {result.dof} from {result.records} records"
-
-
 def drift_text(found: Sequence[ParameterTrend]) -> str:
     """A line a parameter: first and last value, change in 30 days, and whether it walks."""
     if not found:
@@ -113,46 +89,6 @@ def drift_text(found: Sequence[ParameterTrend]) -> str:
     verdict = f"Walking: {', '.join(walking)}." if walking else "No parameter walks."
     head = f"{'':5}{'first':>15}{'last':>15}{'in 30 days':>14}{'sigma':>10}"
     return "\n".join([wrapped(verdict), head, *map(_trend_line, found)])
-
-
-def watch_text(found: DriftHistory) -> str:
-    """What changed and when, and how near the largest sum is to an alarm; empty without runs."""
-    if not found.runs:
-        return ""
-    lines = [wrapped(change_sentence(one), indent=2) for one in found.changes]
-    name, share = max(found.shares, key=lambda one: one[1])
-    since = "since then " if found.changes else ""
-    runs = f"{len(found.runs)} runs from {found.runs[0]:%Y-%m-%d} to {found.runs[-1]:%Y-%m-%d}"
-    quiet = "" if found.changes else "no leg has moved: "
-    rest = f"{runs}: {quiet}{since}the largest sum of innovations is {share:.0%} of its limit ({name})."
-    shown = [one for one in found.celsius if one is not None]
-    warmth = [f"Their thermometers showed {min(shown):.1f} to {max(shown):.1f} deg C."] if shown else []
-    return "\n".join([*lines, wrapped(rest, indent=2), *warmth])
-
-
-def retention_text(found: Retention, *, is_deleted: bool) -> str:
-    """Which old runs go, and why the others stay."""
-    verb = "were deleted" if is_deleted else "may be deleted"
-    counted = f"{len(found.leaving)} of {len(found.leaving) + len(found.kept)} runs"
-    lines = [f"{counted} from before {found.before:%Y-%m-%d} {verb}."]
-    lines += [f"  {run.name}" for run in found.leaving]
-    lines += [f"  {run.name} stays: {reason}" for run, reason in found.kept]
-    if found.leaving and not is_deleted:
-        lines.append("Add --delete to delete them; what they say of drift goes with them.")
-    return "\n".join(lines)
-
-
-def change_sentence(found: FoundChange) -> str:
-    """A change that was found: which leg, by how much, when, and whether others changed as well."""
-    unit = found.parameter.kind.unit.value
-    others = " and ".join(str(leg) for leg in found.other_legs)
-    size = f"{abs(found.change):.3f} +- {found.sigma:.3f} {unit}"
-    rest = f"legs {others} moved as well" if len(found.other_legs) > 1 else f"leg {others} moved as well"
-    return (
-        f"leg {found.leg} moved {size} (as {found.parameter.name} by {found.change:+.3f}) "
-        f"between {found.after:%Y-%m-%d %H:%M} and {found.before:%Y-%m-%d %H:%M}; "
-        f"{rest if others else 'the others did not'}. Noticed {found.noticed:%Y-%m-%d}."
-    )
 
 
 def _columns(name: str, mode: str, verdict: str, error: str, what: str) -> str:

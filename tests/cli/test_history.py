@@ -126,3 +126,14 @@ def test_an_old_run_is_identified_again(cell, typed_here) -> None:
     document = typed_here("history", cell.path, "--refit", folder.path, "--json").document
     assert set(document) == {"run", "frame", "then", "today", "parameters"}
     assert document["then"]["records"] == document["today"]["records"] == 55
+
+
+def test_a_check_is_compared_by_its_records(cell, typed_here) -> None:
+    nights = Nights(cell)
+    before, after = nights.calibrate().path.name, nights.check().path.name
+    told = typed_here("history", cell.path, "--compare", before, after)
+    assert (told.code, told.out.startswith(f"{before} -> {after}:")) == (0, True)
+    document = typed_here("history", cell.path, "--compare", before, after, "--json").document
+    assert set(document) == {"before", "after", "changed", "leg", "limit", "causes"}
+    assert set(document["causes"][0]) == {"name", "unit", "leg", "change", "sigma", "score"}
+    json.dumps(document, allow_nan=False)

@@ -6,7 +6,8 @@ import argparse
 from collections.abc import Sequence
 
 from hexacell.application.drift_history import drift_history
-from hexacell.application.history import compare_runs, parameter_trends, past_runs
+from hexacell.application.evidence_comparison import compare_evidence
+from hexacell.application.history import compare_runs, have_results, parameter_trends, past_runs
 from hexacell.application.refit import refit_run
 from hexacell.application.retention import delete_runs, retention
 from hexacell.application.run_index import RunIndex
@@ -15,22 +16,18 @@ from hexacell.cell.loader import Cell
 from hexacell.cli.cell_argument import cell_at
 from hexacell.cli.console import Console
 from hexacell.errors import ExitCode, UsageError
+from hexacell.presentation.changes import evidence_comparison_text, watch_text
 from hexacell.presentation.documents import (
     comparison_document,
     drift_document,
+    evidence_comparison_document,
     history_document,
     refit_document,
     retention_document,
     story_document,
 )
-from hexacell.presentation.history import (
-    comparison_text,
-    drift_text,
-    history_text,
-    refit_text,
-    retention_text,
-    watch_text,
-)
+from hexacell.presentation.history import comparison_text, drift_text, history_text
+from hexacell.presentation.old_runs import refit_text, retention_text
 from hexacell.presentation.run_story import story_text
 from hexacell.runs.run_folder import find_run
 from procedures.journal.journal import read_entries
@@ -89,6 +86,11 @@ def _keep(cell: Cell, options: argparse.Namespace, console: Console) -> None:
 
 def _compare(cell: Cell, named: Sequence[str], console: Console) -> None:
     before, after = named
-    compared = compare_runs(cell, before, after)
-    console.document(comparison_document(*compared))
-    console.print(comparison_text(*compared))
+    if have_results(cell, named):
+        compared = compare_runs(cell, before, after)
+        console.document(comparison_document(*compared))
+        console.print(comparison_text(*compared))
+    else:
+        by_records = compare_evidence(cell, before, after)
+        console.document(evidence_comparison_document(by_records))
+        console.print(evidence_comparison_text(by_records))

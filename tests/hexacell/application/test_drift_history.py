@@ -11,7 +11,7 @@ from hexacell.application import drift_history as module
 from hexacell.application.drift_history import DriftHistory, drift_history
 from hexacell.application.run_evidence_document import EvidenceDocument, evidence_document
 from hexacell.cell.loader import Cell, load_cell
-from hexacell.presentation.history import change_sentence, watch_text
+from hexacell.presentation.changes import change_sentence, watch_text
 from hexacell.runs.run_folder import RunFolder
 from tests.hexacell.application.proposed_runs import a_cell
 from tests.hexacell.application.recorded_nights import Nights

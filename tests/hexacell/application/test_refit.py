@@ -9,7 +9,7 @@ import pytest
 from hexacell.application.refit import refit_run
 from hexacell.cell.loader import load_cell
 from hexacell.errors import UsageError
-from hexacell.presentation.history import refit_text
+from hexacell.presentation.old_runs import refit_text
 from tests.hexacell.application.proposed_runs import a_cell
 from tests.hexacell.application.recorded_nights import Nights
 

@@ -12,7 +12,7 @@ from hexacell.application.retention import LEAVING, KeptFor, delete_runs, retent
 from hexacell.cell.loader import Cell
 from hexacell.controller_config.write_back import commit
 from hexacell.errors import CellBusy
-from hexacell.presentation.history import retention_text
+from hexacell.presentation.old_runs import retention_text
 from hexacell.runs.run_folder import RunFolder, runs_folder
 from hexacell.storage.cell_lock import cell_lock
 from procedures.journal.journal import read_journal

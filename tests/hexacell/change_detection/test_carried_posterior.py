@@ -91,3 +91,14 @@ def test_shared_causes_cancel_between_runs() -> None:
     unaware = CarriedPosterior.diffuse(6, 0).after(evidence(rows[0], 6))
     assert np.abs(aware.scores(evidence(rows[1], 8), causes)).max() < 3.5
     assert np.abs(unaware.scores(evidence(rows[1], 6), np.eye(6))).max() > 4.5
+
+
+def test_the_largest_score_exceeds_its_limit_as_seldom_as_stated() -> None:
+    above = []
+    for seed in range(500):
+        calibration, night = LinearRobot(seed).runs(1)
+        before = CarriedPosterior.diffuse(6, 0).after(calibration)
+        limit = before.largest_score_by_chance(night, CAUSES.by_state)
+        above.append(np.abs(before.scores(night, CAUSES.by_state)).max() > limit)
+    assert sum(above) < 5 + 4 * np.sqrt(5)
+    assert 2.5 < limit < 3.3

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from hexacell.change_detection.largest_score import FALSE_ALARMS
 from hexacell.change_detection.run_evidence import WhitenedRecords
-from hexacell.change_detection.single_cause import FALSE_ALARMS, SingleCauseTest, single_cause_test
+from hexacell.change_detection.single_cause import SingleCauseTest, single_cause_test
 from tests.hexacell.change_detection.synthetic_runs import CAUSES, LinearRobot
 
 COVARIANCE = 0.3 * np.eye(6)

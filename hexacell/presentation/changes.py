@@ -1,0 +1,52 @@
+"""Text for what changed between runs: two of them compared by their records, and the watch over all."""
+
+from __future__ import annotations
+
+from hexacell.application.drift_history import DriftHistory, FoundChange
+from hexacell.application.evidence_comparison import EvidenceComparison
+from hexacell.presentation.layout import wrapped
+
+
+def evidence_comparison_text(found: EvidenceComparison) -> str:
+    """Whether the records of two runs contradict an unchanged machine, and each parameter taken alone."""
+    most = found.likeliest
+    largest = max(abs(one.score) for one in found.causes)
+    verdict = "nothing changed by more than the noise of the records explains"
+    if found.is_changed:
+        verdict = (
+            f"leg {found.leg} changed, as {most.name} by {most.change:+.3f} +- {most.sigma:.3f} {most.unit}"
+        )
+    score = f"the largest score is {largest:.1f}, by chance {found.limit:.1f} in 1 of 100"
+    head = f"{'':5}{'change':>11}{'sigma':>9}{'score':>8}"
+    rows = [f"{one.name:5}{one.change:+11.4f}{one.sigma:9.4f}{one.score:+8.1f}" for one in found.causes]
+    note = "Each parameter is taken alone, as if only it had changed; what the runs do not see is left out."
+    names = f"{found.before.path.name} -> {found.after.path.name}"
+    return "\n".join([wrapped(f"{names}: {verdict} ({score})."), head, *rows, wrapped(note)])
+
+
+def watch_text(found: DriftHistory) -> str:
+    """What changed and when, and how near the largest sum is to an alarm; empty without runs."""
+    if not found.runs:
+        return ""
+    lines = [wrapped(change_sentence(one), indent=2) for one in found.changes]
+    name, share = max(found.shares, key=lambda one: one[1])
+    since = "since then " if found.changes else ""
+    runs = f"{len(found.runs)} runs from {found.runs[0]:%Y-%m-%d} to {found.runs[-1]:%Y-%m-%d}"
+    quiet = "" if found.changes else "no leg has moved: "
+    rest = f"{runs}: {quiet}{since}the largest sum of innovations is {share:.0%} of its limit ({name})."
+    shown = [one for one in found.celsius if one is not None]
+    warmth = [f"Their thermometers showed {min(shown):.1f} to {max(shown):.1f} deg C."] if shown else []
+    return "\n".join([*lines, wrapped(rest, indent=2), *warmth])
+
+
+def change_sentence(found: FoundChange) -> str:
+    """A change that was found: which leg, by how much, when, and whether others changed as well."""
+    unit = found.parameter.kind.unit.value
+    others = " and ".join(str(leg) for leg in found.other_legs)
+    size = f"{abs(found.change):.3f} +- {found.sigma:.3f} {unit}"
+    rest = f"legs {others} moved as well" if len(found.other_legs) > 1 else f"leg {others} moved as well"
+    return (
+        f"leg {found.leg} moved {size} (as {found.parameter.name} by {found.change:+.3f}) "
+        f"between {found.after:%Y-%m-%d %H:%M} and {found.before:%Y-%m-%d %H:%M}; "
+        f"{rest if others else 'the others did not'}. Noticed {found.noticed:%Y-%m-%d}."
+    )

@@ -135,6 +135,12 @@ def _run(commands: Any) -> None:  # noqa: ANN401
         "has it if it was begun with it",
     )
     parser.add_argument(
+        "--events",
+        type=Path,
+        metavar="FILE",
+        help="write each event there, as a line of JSON, as it happens",
+    )
+    parser.add_argument(
         "--detachable",
         action="store_true",
         help="in a process of its own, which goes on when this terminal is left (see attach)",

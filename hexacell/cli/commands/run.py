@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import argparse
 import sys
+from collections.abc import Sequence
+from contextlib import closing
 from dataclasses import replace
 
 from hexacell.application.calibration_run import RunRequest, calibrate, is_unverified
 from hexacell.application.check_repetition import raised_alarm, repetition
 from hexacell.application.demo import prepare_demo
+from hexacell.application.event_stream import EventStream
 from hexacell.application.interrupted_runs import run_to_resume
 from hexacell.attach.run_device_watch import RunDeviceWatch
 from hexacell.campaign.pose_list import pose_list_of
@@ -63,8 +66,13 @@ def main(options: argparse.Namespace) -> ExitCode:
                 "a run that terminals attach to needs somebody at a terminal, and prints no document",
                 action="Leave --detachable away",
             )
+        if options.events is not None:
+            raise UsageError("a run that terminals attach to writes no events", action="Read its journal")
         return run_detachable(request, console)
-    return _run_to_end(request, console)
+    if options.events is None:
+        return _run_to_end(request, console)
+    with closing(EventStream(options.events, console.warn)) as stream:
+        return _run_to_end(request, console, stream)
 
 
 def _removed(request: RunRequest, console: Console) -> RemovedPoses:
@@ -109,17 +117,17 @@ def _mode(options: argparse.Namespace) -> Mode:
     return Mode.CHECK if options.unattended else Mode.OPTIMISE
 
 
-def _run_to_end(request: RunRequest, console: Console) -> ExitCode:
-    """Carry out a run and print its outcome."""
+def _run_to_end(request: RunRequest, console: Console, stream: EventStream | None = None) -> ExitCode:
+    """Carry out a run, its events copied to a ``stream`` if there is one, and print its outcome."""
     factor = request.cell.settings.timing.clock_factor
     if factor != 1.0:
         console.print(clock_notice(factor))
-    ended = execute_run(request, console)
+    ended = execute_run(request, console, _copied(request, stream))
     state = fold(read_journal(request.folder.journal))
     again = repetition(request, state)
     if again is not None:
         console.print(REPEATED)
-        ended = execute_run(again, console)
+        ended = execute_run(again, console, _copied(again, stream))
         state, request = fold(read_journal(again.folder.journal)), again
         console.print(REPEATED_ALARM if raised_alarm(state) else NOT_REPEATED_ALARM)
     console.document(run_document(request, ended, state))
@@ -128,8 +136,12 @@ def _run_to_end(request: RunRequest, console: Console) -> ExitCode:
     return ExitCode(ended.exit_code)
 
 
-def execute_run(request: RunRequest, console: Console) -> events.Ended:
-    """Carry out a run with a progress bar.
+def _copied(request: RunRequest, stream: EventStream | None) -> list[Listener]:
+    return [] if stream is None else [stream.listener(request.folder.journal)]
+
+
+def execute_run(request: RunRequest, console: Console, further: Sequence[Listener] = ()) -> events.Ended:
+    """Carry out a run with a progress bar, which ``further`` listeners are told of too.
 
     Ctrl-C, SIGTERM or SIGHUP ends it after the step in progress, a second Ctrl-C at once.
 
@@ -144,7 +156,7 @@ def execute_run(request: RunRequest, console: Console) -> events.Ended:
     signals = SignalCommands(console)
     try:
         with progress.bar:
-            return signals.run(_calibrate(request, console, progress, signals.queue))
+            return signals.run(_calibrate(request, console, progress, signals.queue, further))
     except HexacellError as error:
         if may_still_move(error):  # before anything else is said
             console.error(str(error).partition("\n")[0])
@@ -156,11 +168,15 @@ def execute_run(request: RunRequest, console: Console) -> events.Ended:
 
 
 async def _calibrate(
-    request: RunRequest, console: Console, progress: RunProgress, queue: CommandQueue
+    request: RunRequest,
+    console: Console,
+    progress: RunProgress,
+    queue: CommandQueue,
+    further: Sequence[Listener],
 ) -> events.Ended:
     """Calibrate; a person at a terminal may also type commands."""
     if not isinstance(request.operator, TerminalOperator):
-        return await calibrate(request, [progress], queue)
+        return await calibrate(request, [*further, progress], queue)
     watching, status = RunDeviceWatch(request.cell.settings.gauges), RunStatus(progress.expected)
     telling = Telling(console, watching)
     tell = {"g": telling.gauges, "s": lambda: console.print(status.text())}
@@ -168,7 +184,7 @@ async def _calibrate(
     request.operator.before_question, request.operator.after_question = progress.hide, keys.listen
     request.operator.type_command = keys.take
     console.print(LETTERS)
-    listeners: list[Listener] = [progress, keys, status, watching.note]
+    listeners: list[Listener] = [*further, progress, keys, status, watching.note]
     run = calibrate(request, listeners, queue, watching.live, watching.follow)
     async with telling:
         return await keys.listen_during(run)

@@ -1,0 +1,92 @@
+"""The events of a run for another program: the lines of its journal, copied as each of them lands.
+
+The run never waits for who reads them. A target that cannot take a line is given up, and the run goes on.
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+import stat
+from collections.abc import Callable
+from pathlib import Path
+
+from hexacell.errors import FileError, UsageError
+from hexacell.storage.atomic_files import os_error_to_file_error
+from procedures.engine.engine import Listener
+from procedures.run import events
+from procedures.run.state import RunState
+
+CHUNK = 1 << 16
+
+
+class EventStream:
+    """Copies journals, each from its beginning, to a file or a pipe.
+
+    Args:
+        target: is replaced, if it is a file.
+        warn: is told once if the target takes no more.
+
+    Raises:
+        UsageError: nobody reads the pipe.
+        FileError: the target cannot be written.
+    """
+
+    def __init__(self, target: Path, warn: Callable[[str], None]) -> None:
+        self._target = target
+        self._warn = warn
+        self._descriptor: int | None = _opened(target)
+
+    def listener(self, journal: Path) -> Listener:
+        """What a run with this journal tells its events; the file need not exist yet."""
+        copied = 0
+
+        def listen(_: events.Event, __: RunState) -> None:
+            nonlocal copied
+            try:
+                copied = self._copy(journal, copied)
+            except OSError as error:
+                self._warn(f"{self._target}: no more events are written there: {error.strerror}")
+                self.close()
+
+        return listen
+
+    def close(self) -> None:
+        """Write no more."""
+        if self._descriptor is not None:
+            os.close(self._descriptor)
+            self._descriptor = None
+
+    def _copy(self, path: Path, copied: int) -> int:
+        """Copy what has landed since; gives how much there is of the journal now."""
+        if self._descriptor is None:
+            return copied
+        with path.open("rb") as journal:
+            journal.seek(copied)
+            while data := journal.read(CHUNK):
+                taken = os.write(self._descriptor, data)
+                copied += taken
+                if taken < len(data):
+                    raise BlockingIOError(errno.EAGAIN, "its reader is too slow")
+        return copied
+
+
+def _opened(target: Path) -> int:
+    flags = os.O_WRONLY | os.O_CREAT | os.O_NONBLOCK | os.O_CLOEXEC
+    try:
+        descriptor = os.open(target, flags, 0o600)
+        if stat.S_ISREG(os.fstat(descriptor).st_mode):
+            os.ftruncate(descriptor, 0)
+    except OSError as error:
+        raise _not_opened(target, error) from error
+    return descriptor
+
+
+def _not_opened(target: Path, error: OSError) -> FileError | UsageError:
+    try:
+        is_pipe = target.is_fifo()
+    except OSError:
+        is_pipe = False
+    if is_pipe:
+        return UsageError("nobody reads this pipe", subject=target, action="Start its reader first")
+    return os_error_to_file_error("events cannot be written", target, error)

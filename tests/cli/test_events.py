@@ -1,0 +1,67 @@
+"""``run --events FILE``: the journal's lines for another program, which the run never waits for."""
+
+from __future__ import annotations
+
+import os
+import threading
+
+from procedures.journal.journal import read_entries
+
+CHECK = ("--mode", "check", "--unattended")
+
+
+def test_each_event_is_a_line_as_in_the_journal(typed_here, quick_cell, few_candidates, tmp_path) -> None:
+    target = tmp_path / "events.jsonl"
+    target.write_text("of yesterday\n")
+    typed_here("run", quick_cell.cell, *CHECK, "--events", target)
+    written = b"".join((run / "journal.jsonl").read_bytes() for run in quick_cell.runs())
+    assert target.read_bytes() == written
+    assert len(written.splitlines()) > 50
+    assert target.stat().st_mode & 0o077 == 0o044 or target.stat().st_mode & 0o077 == 0
+
+
+def test_a_pipe_that_nobody_reads_is_refused_before_anything_moves(
+    typed_here, quick_cell, tmp_path
+) -> None:
+    os.mkfifo(tmp_path / "pipe")
+    outcome = typed_here("run", quick_cell.cell, *CHECK, "--events", tmp_path / "pipe")
+    assert outcome.code == 2
+    assert "nobody reads this pipe" in outcome.err
+    assert quick_cell.runs() == []
+
+
+def test_a_reader_that_leaves_does_not_end_the_run(
+    typed_here, quick_cell, few_candidates, tmp_path
+) -> None:
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    ready = threading.Event()
+
+    def read_one_line() -> None:
+        descriptor = os.open(pipe, os.O_RDONLY | os.O_NONBLOCK)
+        ready.set()
+        os.set_blocking(descriptor, True)
+        opened.wait()
+        os.read(descriptor, 10)
+        os.close(descriptor)
+
+    opened = threading.Event()
+    reader = threading.Thread(target=read_one_line)
+    reader.start()
+    ready.wait()
+    holder = os.open(pipe, os.O_WRONLY)  # until the run has opened it, the reader would see its end
+    opened.set()
+    try:
+        outcome = typed_here("run", quick_cell.cell, *CHECK, "--events", pipe)
+    finally:
+        os.close(holder)
+        reader.join()
+    assert "pipe: no more events are written there: Broken pipe" in outcome.err
+    assert read_entries(quick_cell.runs()[0] / "journal.jsonl")[-1].event.kind == "ended"
+
+
+def test_a_place_that_cannot_be_written_is_told(typed_here, quick_cell, tmp_path) -> None:
+    outcome = typed_here("run", quick_cell.cell, *CHECK, "--events", tmp_path / "nowhere" / "events")
+    assert outcome.code == 2
+    assert "events cannot be written" in outcome.err
+    assert quick_cell.runs() == []

@@ -29,11 +29,14 @@ from sqlalchemy import (
     Table,
     bindparam,
     create_engine,
+    inspect,
     make_url,
     select,
 )
+from sqlalchemy.dialects import postgresql, sqlite
 from sqlalchemy.exc import DBAPIError, SQLAlchemyError
 from sqlalchemy.pool import NullPool
+from sqlalchemy.schema import CreateTable
 
 from hexacell.errors import FileError
 from hexacell.storage.atomic_files import NOT_FOR_OTHERS
@@ -55,7 +58,7 @@ _TABLE = Table(
     Column("place", String(1024), primary_key=True),
     Column("run", String(255), primary_key=True),
     Column("kind", String(16), primary_key=True),
-    Column("cell", String(64), nullable=False, index=True),
+    Column("cell", String(64), nullable=False),
     Column("stamp", String(255), nullable=False),
     Column("content", LargeBinary, nullable=False),
 )
@@ -147,16 +150,13 @@ class Archive:
             for run, one in documents.items()
         ]
 
+        # Another process may keep the same document meanwhile.
+        insert = (sqlite.insert if self._file is not None else postgresql.insert)(_TABLE)
+        fresh = {name: insert.excluded[name] for name in ("cell", "stamp", "content")}
+        upsert = insert.on_conflict_do_update(index_elements=["place", "run", "kind"], set_=fresh)
+
         def write(connection: Connection) -> None:
-            connection.execute(
-                _TABLE.delete().where(
-                    _TABLE.c.place == self._place,
-                    _TABLE.c.kind == kind.value,
-                    _TABLE.c.run == bindparam("of_run"),
-                ),
-                [{"of_run": run} for run in documents],
-            )
-            connection.execute(_TABLE.insert(), rows)
+            connection.execute(upsert, rows)
 
         if rows:
             self._transact(write)
@@ -196,7 +196,7 @@ class Archive:
             _make_file(self._file)
         with self._engine.begin() as connection:
             if not self._is_ready:
-                _TABLE.metadata.create_all(connection)
+                _make_table(connection)
                 self._is_ready = True
             return act(connection)
 
@@ -222,6 +222,12 @@ def _engine(url: URL) -> Engine:
         return create_engine(url, poolclass=NullPool, connect_args={"timeout": PATIENCE_S})
     with_driver = url.set(drivername="postgresql+psycopg")
     return create_engine(with_driver, poolclass=NullPool, connect_args={"connect_timeout": PATIENCE_S})
+
+
+def _make_table(connection: Connection) -> None:
+    """Make the table, unless it is there or another process makes it at this moment."""
+    if not inspect(connection).has_table(_TABLE.name):
+        connection.execute(CreateTable(_TABLE, if_not_exists=True))
 
 
 def _make_file(path: Path | None) -> None:

@@ -31,7 +31,7 @@ def running_server(programs: Path) -> Iterator[str]:
 
     A server does not run as root, who has it run as another user.
     """
-    user = "postgres" if os.geteuid() == 0 else None
+    user = "nobody" if os.geteuid() == 0 else None
     with tempfile.TemporaryDirectory(prefix="hexacell-pg-") as name:
         folder = Path(name)
         if user is not None:

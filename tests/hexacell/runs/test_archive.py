@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import sqlite3
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing, contextmanager
 from pathlib import Path
 
@@ -124,3 +125,24 @@ def test_every_change_of_a_folder_shows(tmp_path) -> None:
     assert len(set(seen)) == len(seen)
     assert folder_stamps(tmp_path)["a"] == seen[-1]
     assert folder_stamps(tmp_path / "none") == {}
+
+
+def test_what_is_no_file_is_left_alone(tmp_path) -> None:
+    (tmp_path / INDEX).mkdir()
+    with opened(tmp_path) as archive, pytest.raises(ArchiveUnavailable):
+        archive.documents(SUMMARY)
+    assert (tmp_path / INDEX).is_dir()
+
+
+def test_several_processes_may_keep_the_same_at_once(tmp_path) -> None:
+    def fill(number: int) -> dict[str, StampedDocument]:
+        with opened(tmp_path) as archive:
+            for count in range(5):
+                archive.store(SUMMARY, {name: StampedDocument(str(count), b"x") for name in "abcdef"})
+            return archive.documents(SUMMARY)
+
+    with ThreadPoolExecutor(4) as pool:
+        found = list(pool.map(fill, range(4)))
+    assert all(set(one) == set("abcdef") for one in found)
+    with opened(tmp_path) as archive:
+        assert {one.stamp for one in archive.documents(SUMMARY).values()} == {"4"}

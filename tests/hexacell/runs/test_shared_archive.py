@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
 from pathlib import Path
 
@@ -55,3 +56,15 @@ def test_a_history_is_served_by_it(server, tmp_path: Path) -> None:
         assert list(archive.documents(SUMMARY)) == ["a"]
     assert not (runs_folder(cell) / INDEX).exists()
     assert warnings == []
+
+
+def test_several_machines_may_keep_the_same_at_once(server, tmp_path: Path) -> None:
+    def fill(number: int) -> None:
+        with closing(Archive(tmp_path, "cell", server)) as archive:
+            for count in range(5):
+                archive.store(SUMMARY, {name: StampedDocument(str(count), b"x") for name in "abcdef"})
+
+    with ThreadPoolExecutor(4) as pool:
+        list(pool.map(fill, range(4)))
+    with closing(Archive(tmp_path, "cell", server)) as archive:
+        assert set(archive.documents(SUMMARY)) == set("abcdef")

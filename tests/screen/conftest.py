@@ -20,6 +20,7 @@ from hexacell.screen.key_map import ScreenPreferences
 from hexacell.screen.session import ScreenSession
 from hexacell.screen.widgets.text_panel import TextList
 from procedures.run.events import Event
+from tests.screen.drawing import is_all_drawn
 from tests.screen.told_run import ToldWorkplace
 from tests.waiting import until
 
@@ -27,9 +28,6 @@ HERE = Path(__file__).parent
 SNAPSHOTS = HERE / "snapshots"
 UPDATE = "HEXACELL_UPDATE_SNAPSHOTS"
 """In the environment: pictures are written instead of compared."""
-
-MOST_DRAWINGS = 20
-"""A busy machine may need several until all is drawn; what is wrong stays wrong."""
 
 Opened = Callable[..., AbstractAsyncContextManager[Pilot[int]]]
 
@@ -80,12 +78,18 @@ async def settled(pilot: Pilot[int]) -> None:
     assert isinstance(app, TechnicianApp)
     await pilot.pause()
     app.draw()
-    await pilot.pause()
+    await _until_drawn(pilot)
     # At its anchor a list moves its scroll bar without drawing it.
     for screen in app.screen_stack:
         for one in screen.query(TextList):
             one.vertical_scrollbar.refresh()
+    await _until_drawn(pilot)
+
+
+async def _until_drawn(pilot: Pilot[int]) -> None:
     await pilot.pause()
+    while not is_all_drawn(pilot.app):
+        await pilot.pause()
 
 
 def picture_of(app: TechnicianApp) -> str:
@@ -101,15 +105,10 @@ async def compare_with_snapshot(name: str, pilot: Pilot[int]) -> None:
     assert isinstance(app, TechnicianApp)
     await settled(pilot)
     if UPDATE in os.environ:
-        for _ in range(5):  # scroll bars come last
-            await settled(pilot)
         path.parent.mkdir(exist_ok=True)
         path.write_text(picture_of(app))
         return
-    kept = path.read_text()
-    for _ in range(MOST_DRAWINGS):
-        if picture_of(app) == kept:
-            return
-        await settled(pilot)
+    if picture_of(app) == path.read_text():
+        return
     (path.parent / f"{name}.now.svg").write_text(picture_of(app))
     pytest.fail(f"{name} looks different, see {name}.now.svg; {UPDATE}=1 keeps it so")

@@ -27,7 +27,7 @@ from procedures.engine.config_transactions import holds_provisional
 from procedures.journal.journal import read_journal
 from procedures.journal.line_format import RESTORE, now
 from procedures.run import events
-from procedures.run.questions import Operator, ask_approval
+from procedures.run.questions import Operator, Question, ask_approval
 from procedures.run.state import RunState, fold
 
 COMMAND = "the command"
@@ -98,8 +98,24 @@ def read_proposal(folder: RunFolder) -> Proposal:
     )
 
 
-async def apply_proposal(proposal: Proposal, operator: Operator) -> AppliedProposal:
+def approval_question(proposal: Proposal) -> Question:
+    """What a person is asked before it is written, with the gates that may refuse it."""
+    state = proposal.state
+    improvement = state.identified.improvement if state.identified else None
+    return ask_approval(
+        proposal.gates, proposal.change.diff, proposal.displacement, improvement, cell=proposal.cell
+    )
+
+
+async def apply_proposal(
+    proposal: Proposal, operator: Operator, *, typed_by: str = COMMAND
+) -> AppliedProposal:
     """Write a proposal into the controller's config, once a person has accepted what needs one.
+
+    Args:
+        proposal: of a run of the cell.
+        operator: who is asked where a gate needs a person.
+        typed_by: who approves where none does.
 
     Raises:
         LimitError: a gate refuses it, or the person declined.
@@ -112,7 +128,7 @@ async def apply_proposal(proposal: Proposal, operator: Operator) -> AppliedPropo
         if atomic_files.sha256(atomic_files.read_bytes(change.path)) == change.sha256_after:
             return AppliedProposal(proposal, "")
         _require_unedited(proposal)
-        by = await _approval(proposal, operator)
+        by = await _approval(proposal, operator, typed_by)
         approval = LaterApproval(by=by, at=now()[0], sha256_after=change.sha256_after)
         approval.save(_approval_path(proposal.folder), like=change.path)
         try:
@@ -133,18 +149,13 @@ def _approval_path(folder: RunFolder) -> Path:
     return folder.path / "applied.json"
 
 
-async def _approval(proposal: Proposal, operator: Operator) -> str:
+async def _approval(proposal: Proposal, operator: Operator, typed_by: str) -> str:
     failed = [gate for gate in proposal.gates if not gate.passed]
     if refused := [gate.sentence for gate in failed if not gate.needs_person]:
         raise LimitError("the new geometry is refused: " + " ".join(refused))
     if not failed:
-        return COMMAND
-    state = proposal.state
-    improvement = state.identified.improvement if state.identified else None
-    question = ask_approval(
-        proposal.gates, proposal.change.diff, proposal.displacement, improvement, cell=proposal.cell
-    )
-    if (name := await operator.ask(question)) is None:
+        return typed_by
+    if (name := await operator.ask(approval_question(proposal))) is None:
         raise LimitError("the new geometry was declined; nothing was applied")
     return name
 

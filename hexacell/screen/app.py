@@ -204,14 +204,17 @@ class TechnicianApp(App[int]):
 
     async def _confirmed(self, backend: Backend, action: ScreenAction, argument: str) -> str:
         """Do something, once a person has confirmed it where that is needed."""
-        question = await backend.confirmation(action, argument)
-        if question and not await self.push_screen_wait(ConfirmOverlay(question)):
+        question = await backend.confirmation(action, argument) if backend.allows(action) else None
+        if question is not None and not await self.push_screen_wait(ConfirmOverlay(question)):
             return ""
         return await backend.perform(action, argument)
 
     def action_answer(self) -> None:
-        """Show the open question again."""
+        """Show the open question again, or ask whether to write what the run in front has proposed."""
         self._question_seen = 0
+        backend = self._backend
+        if backend is not None and backend.question() is None and backend.proposing_run:
+            self.action_perform("apply", backend.proposing_run)
 
     def action_digits(self) -> None:
         """Show the gauges in large figures."""

@@ -20,6 +20,9 @@ from hexacell.presentation.screens.views import (
 RESUME = "resume"
 """In the place of a mode: go on with the latest run that was interrupted."""
 
+WITH_LENGTH = "optimise with length check"
+"""In the place of a mode: a calibration which checks the length scale before its verdict."""
+
 
 ONCE = "once"
 """The plan is not tried again where it was, or is being tried."""
@@ -40,6 +43,7 @@ class ScreenAction(StrEnum):
     TAKE_OUT = "take out"
     COMPARE = "compare"
     ROLL_BACK = "roll back"
+    APPLY = "apply"
     OPEN = "open"
     DRIFT = "drift"
     STEP = "step"
@@ -70,6 +74,11 @@ class Backend(Protocol):
     @property
     def may_leave_run(self) -> bool:
         """Whether a run goes on that can be stopped or left."""
+        ...
+
+    @property
+    def proposing_run(self) -> str:
+        """The recorded run in front, if its proposal can be applied; else empty."""
         ...
 
     def header(self) -> HeaderView:
@@ -116,8 +125,8 @@ class Backend(Protocol):
         """Do what was asked for; what there is to say about it. Raises ``HexacellError``."""
         ...
 
-    async def confirmation(self, action: ScreenAction, argument: str) -> str:
-        """What a person must confirm before an action; empty if nothing. Raises ``HexacellError``."""
+    async def confirmation(self, action: ScreenAction, argument: str) -> QuestionView | None:
+        """What a person must consent to before an action; none if to nothing. Raises ``HexacellError``."""
         ...
 
     async def answer(self, value: str | None) -> None:

@@ -10,6 +10,7 @@ from hexacell.application.config_rollback import roll_back_config
 from hexacell.application.history import PastRun, compare_runs, parameter_trends, past_runs
 from hexacell.application.interrupted_runs import LATEST, run_to_resume
 from hexacell.application.plan_draft import PlanPreview
+from hexacell.application.proposals import apply_proposal, approval_question, read_proposal
 from hexacell.application.security_warnings import exposure_warnings
 from hexacell.attach.client import connect_to_run, start_host
 from hexacell.attach.connection import RunConnection
@@ -21,17 +22,34 @@ from hexacell.campaign.removed_poses import RemovedPoses
 from hexacell.cell.loader import Cell, load_cell
 from hexacell.cell.passwords import password_warnings
 from hexacell.errors import UsageError
-from hexacell.presentation.config_changes import rollback_text
+from hexacell.presentation.config_changes import applied_text, rollback_text
 from hexacell.presentation.history import comparison_text, drift_text
 from hexacell.presentation.screens.past import history_entries
 from hexacell.presentation.screens.views import ChecklistItem, HistoryEntry, Mark
 from hexacell.runs.run_folder import find_run, new_run
-from hexacell.screen.backend import RESUME
+from hexacell.screen.backend import RESUME, WITH_LENGTH
 from hexacell.screen.child_process import run_child
 from hexacell.screen.workplace import Preflight, TriedPlan
 from procedures.calibration.workflow import Mode
 from procedures.journal.journal import read_journal
 from procedures.run.events import RunStarted
+from procedures.run.questions import Question
+
+
+def mode_of(what: str) -> Mode:
+    """The mode of what a person starts; what is resumed is looked at as a calibration."""
+    return Mode.OPTIMISE if what in {RESUME, WITH_LENGTH} else Mode(what)
+
+
+class ConsentGiven:
+    """A person who has been asked already and has consented."""
+
+    def __init__(self, by: str) -> None:
+        self._by = by
+
+    async def ask(self, question: Question) -> str | None:  # noqa: ARG002 - it was answered on the screen
+        """Who has consented."""
+        return self._by
 
 
 class CellWorkplace:
@@ -62,13 +80,14 @@ class CellWorkplace:
             mode = started.mode if isinstance(started, RunStarted) else Mode.OPTIMISE.value
             more = ["--resume"]
         else:
-            folder, mode, more = new_run(self.cell), Mode(what).value, []
+            folder, mode = new_run(self.cell), mode_of(what).value
+            more = ["--length-check"] if what == WITH_LENGTH else []
         arguments = [str(self.cell.path), "--mode", mode, "--folder", str(folder.path), *more]
         return await start_host(socket_path(self.cell), arguments, removed)
 
-    async def check(self) -> Preflight:
+    async def check(self, what: str) -> Preflight:
         """See :class:`Workplace`."""
-        found = await run_child("hexacell.screen.preflight_child", self.cell.path)
+        found = await run_child("hexacell.screen.preflight_child", self.cell.path, mode_of(what).value)
         items = tuple(ChecklistItem(**{**one, "mark": Mark(one["mark"])}) for one in found["items"])
         return Preflight(items, bool(found["is_ready"]))
 
@@ -99,6 +118,18 @@ class CellWorkplace:
     async def is_in_controller(self, run: str) -> bool:
         """See :class:`Workplace`."""
         return any(one.name == run and one.is_in_controller for one in await self._past_runs())
+
+    async def approval(self, run: str) -> Question:
+        """See :class:`Workplace`."""
+        if not any(one.name == run and one.summary.has_proposal for one in await self._past_runs()):
+            raise UsageError(f"{run} has no proposal that could be written", action="Choose one that has")
+        return approval_question(read_proposal(find_run(self.cell, run)))
+
+    async def apply(self, run: str, by: str) -> tuple[str, ...]:
+        """See :class:`Workplace`."""
+        proposal = await asyncio.to_thread(read_proposal, find_run(self.cell, run))
+        applied = await apply_proposal(proposal, ConsentGiven(by), typed_by=by)
+        return tuple(applied_text(applied).splitlines())
 
     async def roll_back(self, run: str) -> tuple[str, ...]:
         """See :class:`Workplace`."""

@@ -21,8 +21,11 @@ class HistoryScreen(TabScreen):
     BINDINGS: ClassVar[list[BindingType]] = [
         Binding("v", "about('compare')", "Compare with the one before", show=False),
         Binding("b", "about('roll back')", "Go back to its config, or undo it", show=False),
+        Binding("w", "write", "Write its proposal", show=False),
         Binding("o", "app.perform('drift')", "Drift over all runs", show=False),
     ]
+
+    is_asked = False
 
     def compose_body(self) -> ComposeResult:
         """See the class."""
@@ -33,6 +36,7 @@ class HistoryScreen(TabScreen):
 
     def draw_body(self, backend: Backend) -> None:
         """Show the runs."""
+        self.is_asked = backend.question() is not None
         view = backend.history()
         self.query_one("#history-header", TextPanel).show(view.note or view.header)
         self.query_one("#comparison", TextList).show(view.comparison)
@@ -42,6 +46,13 @@ class HistoryScreen(TabScreen):
         """Do something about the run that is chosen."""
         if (run := self.query_one(RowList).chosen) is not None:
             await self.run_action(f"app.perform({what!r}, {run!r})")
+
+    async def action_write(self) -> None:
+        """Write the proposal of the chosen run; a question that waits comes first, as on every screen."""
+        if self.is_asked:
+            await self.run_action("app.answer")
+        else:
+            await self.action_about("apply")
 
     async def on_option_list_option_selected(self) -> None:
         """Open the run."""

@@ -17,15 +17,15 @@ from hexacell.presentation.screens.views import ChecklistItem
 from procedures.calibration.workflow import Mode
 
 
-def found_items(path: Path) -> tuple[tuple[ChecklistItem, ...], bool]:
+def found_items(path: Path, mode: Mode) -> tuple[tuple[ChecklistItem, ...], bool]:
     """What a preflight finds, and whether a run may begin."""
     try:
-        devices = asyncio.run(preflight(load_cell(path), Mode.OPTIMISE, unattended=False))
+        devices = asyncio.run(preflight(load_cell(path), mode, unattended=False))
     except HexacellError as error:
         return failed_items(error), False
     return passed_items([device_line(one) for one in devices]), True
 
 
 if __name__ == "__main__":
-    items, is_ready = found_items(Path(sys.argv[1]))
+    items, is_ready = found_items(Path(sys.argv[1]), Mode(sys.argv[2]))
     sys.stdout.write(json.dumps({"items": [asdict(item) for item in items], "is_ready": is_ready}))

@@ -8,7 +8,7 @@ from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
 
 from hexacell.presentation.screens.lines import checklist_lines
-from hexacell.screen.backend import Backend
+from hexacell.screen.backend import WITH_LENGTH, Backend
 from hexacell.screen.tab_screen import TabScreen
 from hexacell.screen.widgets.text_panel import TextList, TextPanel
 
@@ -24,6 +24,8 @@ class PreflightScreen(TabScreen):
         Binding("x", "app.plan", "Take poses out of the plan", show=False),
         Binding("s", "app.perform('start', 'optimise')", "Start a calibration", show=False),
         Binding("k", "app.perform('start', 'check')", "Start a check", show=False),
+        Binding("l", "app.perform('start', 'length')", "Start a length check", show=False),
+        Binding("L", f"app.perform('start', '{WITH_LENGTH}')", "Calibrate, check the length", show=False),
         Binding("r", "app.perform('start', 'resume')", "Resume the latest run", show=False),
     ]
 

@@ -13,7 +13,7 @@ from hexacell.presentation.screens.faults import fault_view
 from hexacell.presentation.screens.headers import header_view
 from hexacell.presentation.screens.live import live_view
 from hexacell.presentation.screens.measuring import measure_view
-from hexacell.presentation.screens.past import history_view, rollback_question
+from hexacell.presentation.screens.past import PROPOSAL_WAITS, history_view, rollback_question
 from hexacell.presentation.screens.planned_poses import plan_view
 from hexacell.presentation.screens.questions import question_view
 from hexacell.presentation.screens.reviewing import review_view
@@ -69,6 +69,16 @@ class ScreenSession:
         """See :class:`~hexacell.screen.backend.Backend`."""
         return self._actions.is_running and self._run.picture.may_command
 
+    @property
+    def proposing_run(self) -> str:
+        """See :class:`~hexacell.screen.backend.Backend`."""
+        described = self._run.picture.described
+        if described is None or not described.is_recorded:
+            return ""
+        entries = self._actions.findings.entries or ()
+        name = described.folder.name
+        return name if any(one.name == name and one.has_proposal for one in entries) else ""
+
     def header(self) -> HeaderView:
         """The first line of every screen."""
         return header_view(self._workplace.cell.settings.name, self._run.picture)
@@ -96,6 +106,7 @@ class ScreenSession:
             self._actions.plan.lines,
             is_checking=found.is_checking,
             refusal=RUNNING if is_running else STARTING if found.is_starting else "",
+            has_fixture=self._workplace.cell.settings.length_check is not None,
         )
 
     def plan(self) -> PlanView:
@@ -115,7 +126,10 @@ class ScreenSession:
         if self._reviewed is None or self._reviewed[0] != (id(picture.state), id(picture.question)):
             view = review_view(picture, self._workplace.cell.settings)
             self._reviewed = ((id(picture.state), id(picture.question)), view)
-        return self._reviewed[1]
+        shown = self._reviewed[1]
+        if not self.proposing_run:
+            return shown
+        return replace(shown, approval=f"{shown.approval} {PROPOSAL_WAITS}")
 
     def history(self) -> HistoryView:
         """The runs of the cell."""
@@ -141,12 +155,16 @@ class ScreenSession:
         """Do what was asked for; what there is to say about it. Raises ``HexacellError``."""
         return await self._actions.perform(action, argument)
 
-    async def confirmation(self, action: ScreenAction, argument: str) -> str:
-        """What a person must confirm before an action; empty if nothing. Raises ``HexacellError``."""
-        if action is not ScreenAction.ROLL_BACK:
-            return ""
-        is_there = await self._workplace.is_in_controller(argument)
-        return rollback_question(argument, is_in_controller=is_there)
+    async def confirmation(self, action: ScreenAction, argument: str) -> QuestionView | None:
+        """What a person must consent to before an action; none if to nothing. Raises ``HexacellError``."""
+        match action:
+            case ScreenAction.APPLY:
+                return question_view(await self._workplace.approval(argument), None)
+            case ScreenAction.ROLL_BACK:
+                is_there = await self._workplace.is_in_controller(argument)
+                return rollback_question(argument, is_in_controller=is_there)
+            case _:
+                return None
 
     async def answer(self, value: str | None) -> None:
         """Answer the question. Raises ``HexacellError``."""

@@ -11,12 +11,14 @@ from hexacell.attach.recorded import RecordedRun
 from hexacell.controller_config.three_way import ConfigEditedSince
 from hexacell.errors import HexacellError, UsageError
 from hexacell.presentation.config_changes import versions_text
+from hexacell.presentation.screens.questions import PERSON
 from hexacell.presentation.screens.views import ChecklistItem, HistoryEntry
 from hexacell.screen.backend import ONCE, ScreenAction
 from hexacell.screen.device_watcher import DeviceWatcher
 from hexacell.screen.plan_trials import PlanTrials
 from hexacell.screen.run_follower import RunFollower
 from hexacell.screen.workplace import Workplace
+from procedures.calibration.workflow import Mode
 from procedures.engine.command_loop import Status
 from procedures.run.commands import Abort, Command, MeasureAgain, Pause, Resume, Undo
 
@@ -28,6 +30,9 @@ OF_A_RUN = frozenset(
         ScreenAction.MEASURE_AGAIN,
         ScreenAction.ABORT,
     }
+)
+WITHOUT_A_RUN = frozenset(
+    {ScreenAction.CHECK, ScreenAction.START, ScreenAction.ROLL_BACK, ScreenAction.APPLY}
 )
 OF_A_RECORDING = frozenset({ScreenAction.STEP, ScreenAction.PLAY})
 SPEEDS = (0.0, 1.0, 10.0, 60.0, 600.0)
@@ -71,6 +76,7 @@ class SessionActions:
             ScreenAction.TAKE_OUT: self._take_out,
             ScreenAction.COMPARE: self._compare,
             ScreenAction.ROLL_BACK: self._roll_back,
+            ScreenAction.APPLY: self._apply,
             ScreenAction.OPEN: self._open,
             ScreenAction.DRIFT: self._drift,
             ScreenAction.STEP: self._step,
@@ -97,7 +103,7 @@ class SessionActions:
             return self.recording is not None
         if action is ScreenAction.TAKE_CONTROL:
             return self.is_running and not self._run.picture.may_command
-        if action in {ScreenAction.CHECK, ScreenAction.START, ScreenAction.ROLL_BACK}:
+        if action in WITHOUT_A_RUN:
             return not (self.is_running or self.findings.is_checking or self.findings.is_starting)
         return True
 
@@ -126,12 +132,12 @@ class SessionActions:
             await self._run.connection.take_control()
         return ""
 
-    async def _check(self, _: str) -> str:
+    async def _check(self, what: str) -> str:
         found = self.findings
         found.checked, found.is_ready, found.is_checking = None, False, True
         try:
             async with self._devices.released():
-                preflight = await self._workplace.check()
+                preflight = await self._workplace.check(what or Mode.OPTIMISE)
             found.checked, found.is_ready = preflight.items, preflight.is_ready
         finally:
             found.is_checking = False
@@ -139,7 +145,7 @@ class SessionActions:
 
     async def _start(self, what: str) -> str:
         """Checked again, as anything may have changed since somebody looked."""
-        await self._check("")
+        await self._check(what)
         if not self.findings.is_ready:
             raise UsageError("not everything holds that must hold", action="Look at 2 Preflight")
         await self._devices.stop()
@@ -169,10 +175,16 @@ class SessionActions:
         return ""
 
     async def _roll_back(self, run: str) -> str:
+        return await self._change_config(partial(self._workplace.roll_back, run))
+
+    async def _apply(self, run: str) -> str:
+        return await self._change_config(partial(self._workplace.apply, run, PERSON))
+
+    async def _change_config(self, change: Callable[[], Awaitable[tuple[str, ...]]]) -> str:
         """Where somebody has edited the config since, the three versions are shown."""
         try:
             async with self._devices.released():
-                self.findings.compared = await self._workplace.roll_back(run)
+                self.findings.compared = await change()
         except ConfigEditedSince as edited:
             self.findings.compared = tuple(versions_text(edited.versions).splitlines())
             raise

@@ -12,6 +12,7 @@ from hexacell.attach.snapshots import LiveSnapshot
 from hexacell.campaign.removed_poses import RemovedPoses
 from hexacell.cell.loader import Cell
 from hexacell.presentation.screens.views import ChecklistItem, HistoryEntry
+from procedures.run.questions import Question
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,8 +59,8 @@ class Workplace(Protocol):
         """
         ...
 
-    async def check(self) -> Preflight:
-        """Look at everything that must hold before motion; needs the devices."""
+    async def check(self, what: str) -> Preflight:
+        """Look at everything that must hold before the motion of a mode; needs the devices."""
         ...
 
     async def preview(self, removed: RemovedPoses) -> TriedPlan:
@@ -80,6 +81,23 @@ class Workplace(Protocol):
 
     async def is_in_controller(self, run: str) -> bool:
         """Whether the controller's config is the one that a run wrote."""
+        ...
+
+    async def approval(self, run: str) -> Question:
+        """What a person is asked before the open proposal of a run is written.
+
+        Raises:
+            UsageError: it has none.
+        """
+        ...
+
+    async def apply(self, run: str, by: str) -> tuple[str, ...]:
+        """Write the proposal of a run, which a person has approved; what was done.
+
+        Raises:
+            ConfigEditedSince: somebody has edited the config since.
+            LimitError: a gate refuses it.
+        """
         ...
 
     async def roll_back(self, run: str) -> tuple[str, ...]:

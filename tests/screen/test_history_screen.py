@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 from textual.pilot import Pilot
 
+from hexacell.acceptance import AcceptanceGate
 from hexacell.attach.snapshots import LiveSnapshot
 from hexacell.cell.loader import Cell
 from hexacell.controller_config.write_back import commit
@@ -138,3 +139,105 @@ async def test_a_recorded_run_is_watched_again_with_its_cursor(cell: Cell, runs:
         await until_shown(pilot, " 2/")
         await press(pilot, "left", "end")
         await until(lambda: shown(pilot) == last)
+
+
+@pytest.fixture
+def left(cell: Cell) -> ProposedRun:
+    """A calibration that nobody was there to approve."""
+    return propose_run(cell, "2026-11-22T100000Z", verdict=None)
+
+
+def latest_line(pilot: Pilot[int]) -> str:
+    app = pilot.app
+    assert isinstance(app, TechnicianApp)
+    assert app.backend is not None
+    return app.backend.history().entries[0].line
+
+
+async def until_asked(pilot: Pilot[int]) -> None:
+    await until(lambda: isinstance(pilot.app.screen, ConfirmOverlay))
+    await settled(pilot)
+
+
+async def test_an_open_proposal_is_written_once_it_is_approved(cell: Cell, left: ProposedRun) -> None:
+    async with opened_history(cell) as pilot:
+        assert latest_line(pilot).endswith("proposal")
+        await pilot.press("w")
+        await until_asked(pilot)
+        assert "No held-out record has verified it." in shown(pilot)
+        assert cell.config_path.read_bytes() == left.before
+        await press(pilot, "y")
+        await until_shown(pilot, "approved by a person at the screen.")
+        assert "Restart or reload the controller" in shown(pilot)
+        await until(lambda: latest_line(pilot).endswith("in controller"))
+        await press(pilot, "w")
+        await until(lambda: isinstance(pilot.app.screen, FaultOverlay))
+        await until_shown(pilot, "has no proposal that could be written")
+    assert cell.config_path.read_bytes() == left.after
+
+
+async def test_a_run_that_is_looked_at_again_is_approved_from_its_review(
+    cell: Cell, left: ProposedRun
+) -> None:
+    async with opened_history(cell) as pilot:
+        await press(pilot, "enter")
+        await until_shown(pilot, "recorded calibration 2026-11-22T100000Z")
+        await press(pilot, "4")
+        await until_shown(pilot, "Its proposal can still be written: w asks for it")
+        await press(pilot, "w")
+        await until_asked(pilot)
+        await press(pilot, "n")
+        assert cell.config_path.read_bytes() == left.before
+        await press(pilot, "w")
+        await until_asked(pilot)
+        await press(pilot, "y")
+        await until(lambda: cell.config_path.read_bytes() == left.after)
+        await until(lambda: latest_line(pilot).endswith("in controller"))
+        await settled(pilot)
+        assert "can still be written" not in shown(pilot)
+
+
+async def test_a_grave_change_needs_the_name_of_the_cell(cell: Cell) -> None:
+    grave = AcceptanceGate(
+        name="within tolerance",
+        passed=False,
+        sentence="It is 20 mm.",
+        needs_person=True,
+        needs_cell_name=True,
+    )
+    left = propose_run(cell, "2026-11-22T100000Z", gates=(grave,), verdict=None)
+    name = ["minus" if letter == "-" else letter for letter in cell.settings.name]
+    async with opened_history(cell) as pilot:
+        await pilot.press("w")
+        await until_asked(pilot)
+        await press(pilot, "y", "enter")
+        assert isinstance(pilot.app.screen, ConfirmOverlay)
+        assert cell.config_path.read_bytes() == left.before
+        await press(pilot, "backspace", *name, "enter")
+        await until(lambda: cell.config_path.read_bytes() == left.after)
+
+
+async def test_what_a_gate_refuses_cannot_be_written(cell: Cell) -> None:
+    gate = AcceptanceGate(name="converged", passed=False, sentence="The solver ended badly.")
+    left = propose_run(cell, "2026-11-22T100000Z", gates=(gate,), verdict=None)
+    async with opened_history(cell) as pilot:
+        await pilot.press("w")
+        await until_asked(pilot)
+        assert "It cannot be approved. The solver ended badly." in shown(pilot)
+        await press(pilot, "y")
+        assert isinstance(pilot.app.screen, ConfirmOverlay)
+        await press(pilot, "escape")
+    assert cell.config_path.read_bytes() == left.before
+
+
+async def test_a_proposal_for_an_edited_config_is_not_written(cell: Cell, left: ProposedRun) -> None:
+    edited = left.before + b"# by hand\n"
+    cell.config_path.write_bytes(edited)
+    async with opened_history(cell) as pilot:
+        await pilot.press("w")
+        await until_asked(pilot)
+        await press(pilot, "y")
+        await until(lambda: isinstance(pilot.app.screen, FaultOverlay))
+        await press(pilot, "enter")
+        await until_shown(pilot, "+# by hand")
+    assert cell.config_path.read_bytes() == edited

@@ -327,7 +327,16 @@ async def test_quitting_may_stop_the_run(
         await until(lambda: run.left == [False])
 
 
-@pytest.mark.parametrize(("key", "what"), [("s", "optimise"), ("k", "check"), ("r", "resume")])
+@pytest.mark.parametrize(
+    ("key", "what"),
+    [
+        ("s", "optimise"),
+        ("k", "check"),
+        ("r", "resume"),
+        ("l", "length"),
+        ("L", "optimise with length check"),
+    ],
+)
 async def test_a_run_begins_only_after_everything_was_looked_at(
     key: str, what: str, cell: Cell, run: ToldRun, opened: Opened
 ) -> None:
@@ -337,6 +346,7 @@ async def test_a_run_begins_only_after_everything_was_looked_at(
         await press(pilot, "2", key)
         await until_shown(pilot, "calibration")
         assert workplace.begun == [what]
+        assert workplace.checked == [what]
         assert pilot.app.current_mode == "measure"
 
 

@@ -149,6 +149,7 @@ class ToldWorkplace:
     started: RunConnection | None = None
     opened: RunConnection | None = None
     begun: list[str] = field(default_factory=list)
+    checked: list[str] = field(default_factory=list)
     removed: list[RemovedPoses] = field(default_factory=list)
     rolled_back: list[str] = field(default_factory=list)
 
@@ -166,7 +167,8 @@ class ToldWorkplace:
         self.removed.append(removed)
         return self.started
 
-    async def check(self) -> Preflight:
+    async def check(self, what: str) -> Preflight:
+        self.checked.append(what)
         return self.preflight
 
     async def preview(self, removed: RemovedPoses) -> TriedPlan:
@@ -184,6 +186,12 @@ class ToldWorkplace:
 
     async def is_in_controller(self, run: str) -> bool:
         return run == self.entries[0].name
+
+    async def approval(self, run: str) -> Question:
+        raise NotImplementedError
+
+    async def apply(self, run: str, by: str) -> tuple[str, ...]:
+        raise NotImplementedError
 
     async def roll_back(self, run: str) -> tuple[str, ...]:
         self.rolled_back.append(run)

@@ -12,6 +12,7 @@ PRESS_CHECK = (
     "Enter looks at everything, v tries the plan, x takes poses out of it. "
     "s starts a calibration, k a check, r resumes the latest run."
 )
+PRESS_LENGTH = "l checks the length scale with the fixture, L calibrates and checks it."
 CHECKING = "Looking at everything: this takes some seconds, and nothing moves."
 RUNNING = "A run goes on: see 3 Measure. Its checks are made again before each step that depends on them."
 STARTING = "The run is being started: a process of its own connects to the devices."
@@ -80,10 +81,15 @@ def checklist_view(
     *,
     is_checking: bool = False,
     refusal: str = "",
+    has_fixture: bool = False,
 ) -> ChecklistView:
-    """The whole list; ``checked`` is what the preflight found, none before it."""
+    """The whole list; ``checked`` is what the preflight found, none before it.
+
+    ``has_fixture`` is whether the cell can check its length scale.
+    """
     if checked is None:
         mark = Mark.BUSY if is_checking else Mark.OPEN
         checked = tuple(ChecklistItem(mark, name) for name in NOT_CHECKED_YET)
-    instruction = CHECKING if is_checking else refusal or PRESS_CHECK
+    press = f"{PRESS_CHECK} {PRESS_LENGTH}" if has_fixture else PRESS_CHECK
+    instruction = CHECKING if is_checking else refusal or press
     return ChecklistView((*live_items(live), *checked), plan or (PLAN_UNKNOWN,), instruction, refusal)

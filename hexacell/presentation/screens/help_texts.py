@@ -16,7 +16,8 @@ Everything that must hold before the robot moves, one line each:
 Enter looks at all of it; nothing moves. v tries the plan on simulated robots and says how many records and
 minutes it takes and how accurate the robot will be. x shows its poses: take out what the robot must not be
 sent to, for the next run. s starts a calibration, k a check that changes nothing,
-r goes on with the latest run that was interrupted. Everything is looked at again before the first move.""",
+r goes on with the latest run that was interrupted. In a cell with a fixture of known length, l checks the
+length scale, and L calibrates and checks it before the verdict. Everything is looked at again before the first move.""",
     "measure": """\
 What happens now, what is next, how long it takes, and how to stop. Each gauge shows its reading, the
 deviation d from the zero of the set, the age of the reading, its noise, and where its plunger stands in its
@@ -37,9 +38,10 @@ All runs of this cell, the latest first. The arrows choose one.
   v      compare it with the one before it
   o      the drift of each parameter over all runs, with its sigma
   b      go back to the config that it wrote, or undo it if the controller has it
+  w      write the proposal of a run that nobody has approved yet
 
-Going back asks first. It is refused where somebody has edited the file since; then all three versions are
-shown.""",
+Going back and writing ask first. They are refused where somebody has edited the file since; then all three versions are
+shown. A proposal is written under the gates of its run.""",
 }
 
 REPLAY_HELP = """\

@@ -6,19 +6,22 @@ from collections.abc import Sequence
 
 from hexacell.application.history import PastRun
 from hexacell.presentation.history import NO_RUNS, history_head, history_line
-from hexacell.presentation.screens.views import HistoryEntry, HistoryView
+from hexacell.presentation.screens.questions import PERSON
+from hexacell.presentation.screens.views import Choice, HistoryEntry, HistoryView, QuestionView
 
+PROPOSAL_WAITS = "Its proposal can still be written: w asks for it, with the change."
 READING = "Reading the runs of this cell ..."
 WHAT_TO_PRESS = (
     "Enter  watch the chosen run again      v  compare it with the one before it",
     "b      go back to the config that it wrote; on the one in the controller: undo it",
+    "w      write its proposal, where it has one, into the controller's config",
     "o      the drift of each parameter over all runs",
 )
 
 
 def history_entries(runs: Sequence[PastRun]) -> tuple[HistoryEntry, ...]:
     """A line for each run, in their order."""
-    return tuple(HistoryEntry(run.name, history_line(run)) for run in runs)
+    return tuple(HistoryEntry(run.name, history_line(run), run.summary.has_proposal) for run in runs)
 
 
 def history_view(entries: tuple[HistoryEntry, ...] | None, compared: tuple[str, ...]) -> HistoryView:
@@ -29,8 +32,10 @@ def history_view(entries: tuple[HistoryEntry, ...] | None, compared: tuple[str, 
     return HistoryView(history_head(), entries, (*WHAT_TO_PRESS, "", *compared), note)
 
 
-def rollback_question(run: str, *, is_in_controller: bool) -> str:
+def rollback_question(run: str, *, is_in_controller: bool) -> QuestionView:
     """What a person confirms before the controller's config is changed."""
+    title = f"Go back to the controller's config that {run} wrote?"
     if is_in_controller:
-        return f"Undo {run}: put back the controller's config of before it?"
-    return f"Go back to the controller's config that {run} wrote?"
+        title = f"Undo {run}: put back the controller's config of before it?"
+    consent = Choice("y", "yes, replace the config, bit for bit", PERSON, is_consent=True)
+    return QuestionView(title, (), "Press y or n.", (consent, Choice("n", "no, leave it as it is", None)))

@@ -284,10 +284,14 @@ class FirstQuestionView:
 
 @dataclass(frozen=True, slots=True)
 class HistoryEntry:
-    """One run of the cell: the name of its folder, and a line of text."""
+    """One run of the cell: the name of its folder, and a line of text.
+
+    ``has_proposal`` is whether it proposed a change that can still be written.
+    """
 
     name: str
     line: str
+    has_proposal: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,31 +1,19 @@
-"""One question of the screen itself, answered by yes or no."""
+"""A question of the screen itself, before it changes something."""
 
 from __future__ import annotations
 
 from typing import ClassVar
 
-from textual.app import ComposeResult
 from textual.binding import BindingType
-from textual.containers import Vertical
-from textual.screen import ModalScreen
 
-from hexacell.screen.widgets.text_panel import TextPanel
+from hexacell.screen.overlays.answer_overlay import AnswerOverlay
 
 
-class ConfirmOverlay(ModalScreen[bool]):
-    """Gives whether the answer was yes."""
+class ConfirmOverlay(AnswerOverlay[bool]):
+    """Gives whether the person consented."""
 
-    BINDINGS: ClassVar[list[BindingType]] = [
-        ("y", "dismiss(True)", "Yes"),
-        ("n,escape", "dismiss(False)", "No"),
-    ]
+    BINDINGS: ClassVar[list[BindingType]] = [("escape", "dismiss(False)", "No")]
 
-    def __init__(self, question: str) -> None:
-        super().__init__()
-        self._question = question
-
-    def compose(self) -> ComposeResult:
-        """The question."""
-        with Vertical(id="confirming", classes="overlay"):
-            yield TextPanel(self._question)
-            yield TextPanel("Press y or n.", classes="hint")
+    async def give(self, value: str | None) -> None:
+        """See :class:`AnswerOverlay`."""
+        self.dismiss(value is not None)

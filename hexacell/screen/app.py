@@ -14,7 +14,6 @@ from textual.app import App, SystemCommand
 from textual.binding import BindingType
 from textual.css.query import NoMatches
 from textual.screen import Screen
-from textual.widgets._footer import FooterKey
 
 from hexacell.errors import HexacellError
 from hexacell.presentation.screens.views import FaultView
@@ -35,6 +34,7 @@ from hexacell.screen.preflight_screen import PreflightScreen
 from hexacell.screen.review_screen import ReviewScreen
 from hexacell.screen.tab_screen import TabScreen
 from hexacell.screen.themes import SCREEN_THEMES
+from hexacell.screen.widgets.key_line import KeyLine
 
 DRAWN_EVERY_S = 0.1
 LEAVING_TAKES_S = 0.4
@@ -79,7 +79,6 @@ class TechnicianApp(App[int]):
         self._load, self._first_cell = load, first_cell
         self._backend: Backend | None = None
         self._question_seen, self._fault_seen, self._runs_seen = 0, 0, 0
-        self._allowed: frozenset[ScreenAction] = frozenset()
         super().__init__()
         for theme in SCREEN_THEMES:
             self.register_theme(theme)
@@ -109,9 +108,17 @@ class TechnicianApp(App[int]):
             self._backend = await asyncio.to_thread(self._load)
             self.draw()
             self.set_interval(DRAWN_EVERY_S, self.draw)
+            self.run_worker(self._make_screens(), exit_on_error=False, group="make")
             await self._backend.attend()
         except HexacellError as error:
             self._tell(error)
+
+    async def _make_screens(self) -> None:
+        """Make the screens behind the first one before somebody wants them, one at a time."""
+        for screen in SCREENS:
+            # To Textual it is as if one had gone there and come back, without a frame in between.
+            await self._init_mode(screen.TAB)
+            await asyncio.sleep(DRAWN_EVERY_S)
 
     async def _has_cell(self) -> bool:
         """Whether there is a cell file, once the first-time assistant was used if it is needed."""
@@ -123,7 +130,7 @@ class TechnicianApp(App[int]):
 
     def draw(self) -> None:
         """Show what is so now in the screen in front, and in what lies below it."""
-        if self._backend is None:
+        if self._backend is None or not self.screen_stack:  # it is loading, or being closed
             return
         for screen in self.screen_stack:
             if isinstance(screen, TabScreen | DigitsScreen | PlanScreen | QuestionOverlay):
@@ -132,15 +139,11 @@ class TechnicianApp(App[int]):
         if not self._goes_to_new_run(self._backend) and self._is_whole:
             self._overlay_question(self._backend)
             self._overlay_fault(self._backend)
-        allowed = frozenset(action for action in ScreenAction if self._backend.allows(action))
-        if allowed != self._allowed:
-            self._allowed = allowed
-            self.refresh_bindings()
 
     @property
     def _is_whole(self) -> bool:
         """Whether the screen in front is made to its last line; nothing is laid above it before."""
-        return not isinstance(self.screen, TabScreen) or bool(self.screen.query(FooterKey))
+        return not isinstance(self.screen, TabScreen) or bool(self.screen.query(KeyLine))
 
     def _goes_to_new_run(self, backend: Backend) -> bool:
         """Whether the screen changes because a run is followed anew; overlays come after that."""
@@ -188,14 +191,15 @@ class TechnicianApp(App[int]):
         self.push_screen(FaultOverlay(FaultView("That did not work", cause, error.action or "")))
 
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
-        """Grey what has no effect now."""
-        if action != "perform" or not parameters:
+        """Whether a key has an effect now."""
+        if action != "perform" or not parameters or self._backend is None:
             return True
-        return True if ScreenAction(str(parameters[0])) in self._allowed else None
+        return True if self._backend.allows(ScreenAction(str(parameters[0]))) else None
 
     def action_show(self, tab: str) -> None:
         """Go to another screen."""
         self.switch_mode(tab)
+        self.draw()
 
     def action_perform(self, action: str, argument: str = "") -> None:
         """Ask for something."""

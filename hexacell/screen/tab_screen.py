@@ -7,9 +7,9 @@ from typing import ClassVar
 
 from textual.app import ComposeResult
 from textual.screen import Screen
-from textual.widgets import Footer
 
 from hexacell.screen.backend import Backend
+from hexacell.screen.widgets.key_line import KeyLine
 from hexacell.screen.widgets.top_line import TabLine, TopLine
 
 
@@ -27,7 +27,7 @@ class TabScreen(Screen[None]):
         yield TopLine()
         yield TabLine(self.TAB, self._keys)
         yield from self.compose_body()
-        yield Footer()
+        yield KeyLine(self._keys)
 
     def compose_body(self) -> ComposeResult:
         """What this screen has of its own."""
@@ -37,6 +37,7 @@ class TabScreen(Screen[None]):
         """Show what is so now."""
         self.query_one(TopLine).show(backend.header())
         self.draw_body(backend)
+        self.query_one(KeyLine).show(backend.allows)
 
     def draw_body(self, backend: Backend) -> None:
         """The same for what it has of its own."""

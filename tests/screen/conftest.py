@@ -18,7 +18,6 @@ from hexacell.cell.loader import Cell, load_cell
 from hexacell.screen.app import TechnicianApp
 from hexacell.screen.key_map import ScreenPreferences
 from hexacell.screen.session import ScreenSession
-from hexacell.screen.widgets.text_panel import TextList
 from procedures.run.events import Event
 from tests.screen.drawing import is_all_drawn
 from tests.screen.told_run import ToldWorkplace
@@ -78,11 +77,6 @@ async def settled(pilot: Pilot[int]) -> None:
     assert isinstance(app, TechnicianApp)
     await pilot.pause()
     app.draw()
-    await _until_drawn(pilot)
-    # At its anchor a list moves its scroll bar without drawing it.
-    for screen in app.screen_stack:
-        for one in screen.query(TextList):
-            one.vertical_scrollbar.refresh()
     await _until_drawn(pilot)
 
 

@@ -110,6 +110,10 @@ def scene_measure(cell: Cell, history: tuple[events.Event, ...]) -> tuple[ToldWo
     return workplace, ("3",)
 
 
+def scene_begun(cell: Cell, history: tuple[events.Event, ...]) -> tuple[ToldWorkplace, tuple[str, ...]]:
+    return running(cell, history, 16)[1], ("3",)
+
+
 def scene_review(cell: Cell, history: tuple[events.Event, ...]) -> tuple[ToldWorkplace, tuple[str, ...]]:
     run, workplace = running(cell, history, len(history))
     run.tell(StatusChanged(status=Status.ENDED))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import gc
 import os
 import sys
 from functools import partial
@@ -57,4 +58,6 @@ def _session(path: Path) -> Backend:
     from hexacell.screen.cell_workplace import CellWorkplace  # noqa: PLC0415
     from hexacell.screen.session import ScreenSession  # noqa: PLC0415
 
-    return ScreenSession(CellWorkplace(path))
+    session = ScreenSession(CellWorkplace(path))
+    gc.freeze()  # all these modules stay: to look through them for garbage would delay keys by a tenth of a second
+    return session

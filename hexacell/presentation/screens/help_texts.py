@@ -17,7 +17,8 @@ Enter looks at all of it; nothing moves. v tries the plan on simulated robots an
 minutes it takes and how accurate the robot will be. x shows its poses: take out what the robot must not be
 sent to, for the next run. s starts a calibration, k a check that changes nothing,
 r goes on with the latest run that was interrupted. In a cell with a fixture of known length, l checks the
-length scale, and L calibrates and checks it before the verdict. Everything is looked at again before the first move.""",
+length scale, and L calibrates and checks it before the verdict. Everything is looked at again before the
+first move.""",
     "measure": """\
 What happens now, what is next, how long it takes, and how to stop. Each gauge shows its reading, the
 deviation d from the zero of the set, the age of the reading, its noise, and where its plunger stands in its
@@ -40,8 +41,8 @@ All runs of this cell, the latest first. The arrows choose one.
   b      go back to the config that it wrote, or undo it if the controller has it
   w      write the proposal of a run that nobody has approved yet
 
-Going back and writing ask first. They are refused where somebody has edited the file since; then all three versions are
-shown. A proposal is written under the gates of its run.""",
+Going back and writing ask first. They are refused where somebody has edited the file since; then all three
+versions are shown. A proposal is written under the gates of its run.""",
 }
 
 REPLAY_HELP = """\

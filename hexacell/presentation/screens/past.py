@@ -13,7 +13,7 @@ PROPOSAL_WAITS = "Its proposal can still be written: w asks for it, with the cha
 READING = "Reading the runs of this cell ..."
 WHAT_TO_PRESS = (
     "Enter  watch the chosen run again      v  compare it with the one before it",
-    "b      go back to the config that it wrote; on the one in the controller: undo it",
+    "b      go back to the config that it wrote; if the controller has it: undo it",
     "w      write its proposal, where it has one, into the controller's config",
     "o      the drift of each parameter over all runs",
 )

@@ -24,6 +24,7 @@ class PlotPanel(Vertical):
             self._view = view
             self._title.show(view.title)
             self._legend.show(view.note if view.is_empty else view.legend)
+            self._drawing.display = not view.is_empty
             self._drawing.draw(view)
 
 

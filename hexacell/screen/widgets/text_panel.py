@@ -45,11 +45,16 @@ class TextList(VerticalScroll):
         """What it shows, scrolled out of sight or not."""
         return self._panel.text
 
-    def on_mount(self) -> None:
-        """Stay at the end until somebody scrolls."""
-        if self._follows:
-            self.anchor()
-
     def show(self, lines: Sequence[str]) -> None:
-        """Show these lines."""
-        self._panel.show("\n".join(lines))
+        """Show these lines; one that follows stays at the end until somebody scrolls."""
+        text = "\n".join(lines)
+        if text != self._panel.text:
+            is_at_end = self.scroll_offset.y >= self.max_scroll_y
+            self._panel.show(text)
+            if self._follows and is_at_end:
+                self.scroll_end(animate=False)
+
+    def on_resize(self) -> None:
+        """What was the end is shown again where there is less room now."""
+        if self._follows:
+            self.scroll_end(animate=False)

@@ -116,9 +116,10 @@ class TechnicianApp(App[int]):
     async def _make_screens(self) -> None:
         """Make the screens behind the first one before somebody wants them, one at a time."""
         for screen in SCREENS:
-            # To Textual it is as if one had gone there and come back, without a frame in between.
-            await self._init_mode(screen.TAB)
-            await asyncio.sleep(DRAWN_EVERY_S)
+            if self.is_running:  # what is being closed must not grow
+                # To Textual it is as if one had gone there and come back, without a frame in between.
+                await self._init_mode(screen.TAB)
+                await asyncio.sleep(DRAWN_EVERY_S)
 
     async def _has_cell(self) -> bool:
         """Whether there is a cell file, once the first-time assistant was used if it is needed."""

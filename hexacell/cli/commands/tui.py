@@ -59,5 +59,5 @@ def _session(path: Path) -> Backend:
     from hexacell.screen.session import ScreenSession  # noqa: PLC0415
 
     session = ScreenSession(CellWorkplace(path))
-    gc.freeze()  # all these modules stay: to look through them for garbage would delay keys by a tenth of a second
+    gc.freeze()  # what is loaded stays: to look through it for garbage would keep a key waiting for 0.1 s
     return session

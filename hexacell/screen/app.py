@@ -144,7 +144,9 @@ class TechnicianApp(App[int]):
     @property
     def _is_whole(self) -> bool:
         """Whether the screen in front is made to its last line; nothing is laid above it before."""
-        return not isinstance(self.screen, TabScreen) or bool(self.screen.query(KeyLine))
+        if not isinstance(self.screen, TabScreen):
+            return True
+        return any(line.outer_size.width == self.size.width for line in self.screen.query(KeyLine))
 
     def _goes_to_new_run(self, backend: Backend) -> bool:
         """Whether the screen changes because a run is followed anew; overlays come after that."""
@@ -245,6 +247,17 @@ class TechnicianApp(App[int]):
             self.push_screen(QuitOverlay(), self._leave)
         else:
             self._leave("leave")
+
+    async def action_quit(self) -> None:
+        """The same for Textual's own key, ctrl+q."""
+        if not isinstance(self.screen, QuitOverlay):
+            self.action_leave()
+
+    def action_help_quit(self) -> None:
+        """Say how to leave where somebody presses ctrl+c."""
+        self.notify(
+            f"{self.keys_in_use['quit']} leaves; what becomes of a run that goes on is asked first."
+        )
 
     def _leave(self, leaving: Leaving | None) -> None:
         if leaving in {"stop", "leave"}:

@@ -23,7 +23,7 @@ class PlanScreen(Screen[None]):
 
     AUTO_FOCUS = "#poses"
     BINDINGS: ClassVar[list[BindingType]] = [
-        Binding("x,enter,space,delete", "take_out", "Take out or put back", show=False, priority=True),
+        Binding("x,space,delete", "take_out", "Take out or put back", show=False),
         Binding("v", "app.perform('preview')", "Try the plan", show=False),
         Binding("escape", "dismiss", "Back", show=False),
     ]
@@ -40,6 +40,10 @@ class PlanScreen(Screen[None]):
         view = backend.plan()
         self.query_one("#plan-note", TextPanel).show(view.note)
         self.query_one(RowList).show(view.rows)
+
+    async def on_option_list_option_selected(self) -> None:
+        """Enter does the same."""
+        await self.action_take_out()
 
     async def action_take_out(self) -> None:
         """Take out what is chosen, or put it back."""

@@ -18,6 +18,7 @@ from hexacell.cell.loader import Cell, load_cell
 from hexacell.screen.app import TechnicianApp
 from hexacell.screen.key_map import ScreenPreferences
 from hexacell.screen.session import ScreenSession
+from hexacell.screen.widgets.text_panel import TextList
 from procedures.run.events import Event
 from tests.screen.drawing import is_all_drawn
 from tests.screen.told_run import ToldWorkplace
@@ -78,11 +79,16 @@ async def settled(pilot: Pilot[int]) -> None:
     await pilot.pause()
     app.draw()
     await _until_drawn(pilot)
+    # At its anchor a list moves its scroll bar without drawing it.
+    for screen in app.screen_stack:
+        for one in screen.query(TextList):
+            one.vertical_scrollbar.refresh()
+    await _until_drawn(pilot)
 
 
 async def _until_drawn(pilot: Pilot[int]) -> None:
     await pilot.pause()
-    while not is_all_drawn(pilot.app):
+    while not (is_all_drawn(pilot.app) or pilot.app._exit):
         await pilot.pause()
 
 
@@ -98,6 +104,10 @@ async def compare_with_snapshot(name: str, pilot: Pilot[int]) -> None:
     path, app = SNAPSHOTS / f"{name}.svg", pilot.app
     assert isinstance(app, TechnicianApp)
     await settled(pilot)
+    before = ""
+    while before != (now := picture_of(app)):  # what was just made is drawn next
+        before = now
+        await settled(pilot)
     if UPDATE in os.environ:
         path.parent.mkdir(exist_ok=True)
         path.write_text(picture_of(app))

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import asyncio
 
+from textual.events import Key
+
 from hexacell.application.plan_draft import PlannedPose, PlanPreview
 from hexacell.campaign.removed_poses import NOTHING_REMOVED, RemovedPoses
 from hexacell.cell.loader import Cell
@@ -95,6 +97,17 @@ async def test_the_latest_trial_counts_and_keys_are_heard_meanwhile(cell: Cell, 
         assert "Left out" not in shown(pilot)
         await press(pilot, "escape")
         await until_shown(pilot, "15 records give 0.076 mm.")
+
+
+async def test_keys_that_are_typed_fast_are_taken_in_their_order(cell: Cell, opened: Opened) -> None:
+    workplace = ToldWorkplace(cell, live=[snapshot()], plan=tried(cell))
+    async with opened(workplace) as pilot:
+        await press(pilot, "2", "x")
+        await until(lambda: bool(pilot.app.screen.query_one(RowList).option_count))
+        for key in ("down", "down", "enter"):
+            pilot.app.post_message(Key(key, None))
+        await until_shown(pilot, "Left out: 1 pose.")
+        assert [one.pose[3] for one in workplace.removed[-1].poses] == [12.0]
 
 
 async def test_a_plan_that_cannot_be_tried_says_why(cell: Cell, opened: Opened) -> None:

@@ -38,6 +38,7 @@ class TextList(VerticalScroll):
 
     def __init__(self, *, id: str | None = None, classes: str | None = None, follows: bool = False) -> None:  # noqa: A002 - as in every widget
         self._panel, self._follows = TextPanel(), follows
+        self._count, self._is_at_end = 0, False
         super().__init__(self._panel, id=id, classes=classes)
 
     @property
@@ -46,15 +47,14 @@ class TextList(VerticalScroll):
         return self._panel.text
 
     def show(self, lines: Sequence[str]) -> None:
-        """Show these lines; one that follows stays at the end until somebody scrolls."""
-        text = "\n".join(lines)
-        if text != self._panel.text:
-            is_at_end = self.scroll_offset.y >= self.max_scroll_y
-            self._panel.show(text)
-            if self._follows and is_at_end:
-                self.scroll_end(animate=False)
+        """Show these lines."""
+        self._panel.show("\n".join(lines))
+        self._count = len(lines)
+        self.on_resize()
 
     def on_resize(self) -> None:
-        """What was the end is shown again where there is less room now."""
-        if self._follows:
-            self.scroll_end(animate=False)
+        """Stay at the end until somebody scrolls; lines that all have room begin at the top."""
+        is_long = self._follows and self._count > self.size.height > 0
+        if is_long != self._is_at_end:
+            self._is_at_end = is_long
+            self.anchor(is_long)

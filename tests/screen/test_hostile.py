@@ -1,0 +1,132 @@
+"""Who presses every key, pastes whole files and resizes the terminal breaks nothing."""
+
+from __future__ import annotations
+
+import string
+from pathlib import Path
+
+import pytest
+from textual.events import Paste
+from textual.pilot import Pilot
+from textual.widgets import Input
+
+from hexacell.acceptance import AcceptanceGate
+from hexacell.cell.loader import Cell
+from hexacell.screen.app import FirstCell, TechnicianApp
+from hexacell.screen.assistant import FirstCellAssistant
+from hexacell.screen.assistant_screen import AssistantScreen
+from hexacell.screen.overlays.question_overlay import QuestionOverlay
+from hexacell.screen.overlays.quit_overlay import QuitOverlay
+from procedures.run import events
+from procedures.run.questions import ask_approval
+from tests.screen.conftest import Opened, settled
+from tests.screen.test_job import press, shown, until_shown, workplace_of
+from tests.screen.test_plan_screen import tried
+from tests.screen.test_snapshots import idle
+from tests.screen.told_run import ToldRun, ToldWorkplace
+from tests.waiting import until
+
+NAMED = ("enter", "escape", "tab", "shift+tab", "up", "down", "left", "right", "home", "end", "pageup")
+MORE = (
+    "pagedown",
+    "backspace",
+    "delete",
+    "insert",
+    "space",
+    "f1",
+    "f5",
+    "ctrl+a",
+    "ctrl+c",
+    "ctrl+z",
+    "ctrl+d",
+)
+QUITTING = "q"
+KEYS = (*(set(string.ascii_letters + string.digits) - {QUITTING}), "question_mark", "plus", *NAMED, *MORE)
+SIZES = ((40, 10), (300, 100), (80, 24))
+
+
+async def press_everything(pilot: Pilot[int], tab: str) -> None:
+    """Every key twice on one screen, going back to it from wherever that leads."""
+    for number, key in enumerate(sorted(KEYS)):
+        if number % 10 == 0:
+            await pilot.resize_terminal(*SIZES[number // 10 % len(SIZES)])
+        await pilot.press(key, key)
+        for _ in range(len(pilot.app.screen_stack)):
+            await pilot.press("escape")
+        await pilot.press(tab)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("tab", list("12345"))
+@pytest.mark.parametrize("is_running", [False, True], ids=["idle", "running"])
+async def test_every_key_on_every_screen_twice(
+    tab: str, is_running: bool, cell: Cell, history: tuple[events.Event, ...], opened: Opened
+) -> None:
+    run = ToldRun()
+    workplace = workplace_of(cell, run, history[:300]) if is_running else idle(cell)
+    workplace.plan, workplace.opened = tried(cell), ToldRun()
+    async with opened(workplace) as pilot:
+        await press_everything(pilot, tab)
+        await settled(pilot)
+        assert pilot.app.is_running
+        assert "Preflight" in "".join(str(one.render()) for one in pilot.app.screen.query("TabLine"))
+
+
+async def test_what_is_pasted_into_a_name_is_no_consent(
+    cell: Cell, history: tuple[events.Event, ...], opened: Opened
+) -> None:
+    grave = AcceptanceGate(
+        name="within tolerance", passed=False, sentence="Far.", needs_person=True, needs_cell_name=True
+    )
+    run = ToldRun()
+    async with opened(workplace_of(cell, run, history[:300])) as pilot:
+        run.ask(ask_approval((grave,), "-old\n+new", cell=cell.settings.name))
+        await until(lambda: isinstance(pilot.app.screen, QuestionOverlay))
+        await settled(pilot)
+        field = pilot.app.screen.query_one(Input)
+        field.post_message(Paste("y\n" * 2500))
+        for size in SIZES:
+            await pilot.resize_terminal(*size)
+        await press(pilot, "enter")
+        assert run.given == []
+        field.value = ""
+        field.post_message(Paste(f"{cell.settings.name}\n"))
+        await press(pilot, "enter")
+        await until(lambda: len(run.given) == 1)
+
+
+async def test_what_is_pasted_into_the_assistant_is_refused_with_a_reason(tmp_path: Path) -> None:
+    path = tmp_path / "cell.toml"
+    first = FirstCell(path, lambda: FirstCellAssistant(path))
+    app = TechnicianApp(lambda: pytest.fail("there is no cell"), first_cell=first)
+    async with app.run_test(size=(80, 24)) as pilot:
+        await until(lambda: isinstance(app.screen, AssistantScreen))
+        await until_shown(pilot, "Question 1 of")
+        app.screen.query_one(Input).post_message(Paste("x" * 5000))
+        await pilot.press("enter")
+        await until_shown(pilot, "must be text of 64 letters or fewer")
+        for size in SIZES:
+            await pilot.resize_terminal(*size)
+        assert "Question 1 of" in shown(pilot)
+
+
+@pytest.mark.parametrize("key", ["q", "ctrl+q"])
+async def test_each_way_to_quit_asks_about_the_run(
+    key: str, cell: Cell, history: tuple[events.Event, ...], opened: Opened
+) -> None:
+    run = ToldRun()
+    async with opened(workplace_of(cell, run, history[:300])) as pilot:
+        await until_shown(pilot, "point 5")
+        await press(pilot, key, key)
+        await until(lambda: isinstance(pilot.app.screen, QuitOverlay))
+        assert [type(one) for one in pilot.app.screen_stack].count(QuitOverlay) == 1
+        await press(pilot, "escape")
+        assert run.left == []
+
+
+async def test_ctrl_c_says_how_to_leave_and_ends_nothing(cell: Cell, opened: Opened) -> None:
+    async with opened(ToldWorkplace(cell)) as pilot:
+        await press(pilot, "ctrl+c")
+        assert [one.message for one in pilot.app._notifications] == [
+            "q leaves; what becomes of a run that goes on is asked first."
+        ]

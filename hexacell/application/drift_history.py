@@ -12,7 +12,7 @@ from hexacell.cell.loader import Cell
 from hexacell.change_detection.drift_watch import StepAlarm, watch_runs
 from hexacell.kinematics.parameters import GeometricParameter
 from hexacell.robot_model import robot_of
-from hexacell.runs.archive import DocumentKind
+from hexacell.runs.archived_documents import DocumentKind
 from hexacell.runs.run_folder import RunFolder
 from hexacell.storage.atomic_files import sha256
 

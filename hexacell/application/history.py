@@ -20,7 +20,7 @@ from hexacell.errors import HexacellError, UsageError
 from hexacell.reporting.result import IdentificationResult
 from hexacell.reporting.run_comparison import ParameterTrend, RunComparison, compare_results, trends
 from hexacell.reporting.verification import VerifiedAccuracy
-from hexacell.runs.archive import DocumentKind
+from hexacell.runs.archived_documents import DocumentKind
 from hexacell.runs.run_folder import RunFolder, find_run, runs_folder
 from procedures.journal.journal import read_entries, read_journal
 from procedures.journal.line_format import Entry

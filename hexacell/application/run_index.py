@@ -8,14 +8,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import closing
-from typing import TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 from pydantic import BaseModel, ValidationError
 
 from hexacell.cell.loader import Cell
-from hexacell.runs.archive import Archive, ArchiveUnavailable, DocumentKind, StampedDocument
+from hexacell.runs.archived_documents import ArchiveUnavailable, DocumentKind, StampedDocument
 from hexacell.runs.folder_stamps import folder_stamps
 from hexacell.runs.run_folder import RunFolder, runs_folder
+
+if TYPE_CHECKING:
+    from hexacell.runs.archive import Archive
 
 BATCH = 100
 """Of runs that are kept at once, so that an interrupted reading of thousands of folders is not lost."""
@@ -61,6 +64,8 @@ class RunIndex:
         wanted = {name: stamps[name] for name in (stamps if runs is None else runs) if name in stamps}
         if not wanted:
             return {}
+        from hexacell.runs.archive import Archive  # noqa: PLC0415 - SQLAlchemy only where it is read
+
         with closing(Archive(self._folder, self._cell.settings.name, self._url)) as archive:
             known = self._known(archive, kind, stamps)
             found = {name: _decoded(model, known.get(name), stamp) for name, stamp in wanted.items()}

@@ -13,7 +13,6 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.linalg import solve_triangular
 
 from hexacell.identification.problem.problem import Problem
 from hexacell.identification.problem.systematic_errors import SystematicModel, no_systematic_errors
@@ -111,5 +110,7 @@ def _whitened(causes: Array, values: Array) -> Array:
     if not causes.shape[1]:
         return values
     factor = np.linalg.cholesky(np.eye(len(causes)) + causes @ causes.T)
+    from scipy.linalg import solve_triangular  # noqa: PLC0415 - a tenth of a second
+
     whitened: Array = solve_triangular(factor, values, lower=True)
     return whitened

@@ -12,8 +12,6 @@ import socket
 import sqlite3
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
-from enum import StrEnum
 from functools import cached_property
 from pathlib import Path
 from typing import TypeVar
@@ -38,7 +36,7 @@ from sqlalchemy.exc import DBAPIError, SQLAlchemyError
 from sqlalchemy.pool import NullPool
 from sqlalchemy.schema import CreateTable
 
-from hexacell.errors import FileError
+from hexacell.runs.archived_documents import ArchiveUnavailable, DocumentKind, StampedDocument
 from hexacell.storage.atomic_files import NOT_FOR_OTHERS
 
 VERSION = 1
@@ -74,26 +72,6 @@ _READ_ONLY_OR_BUSY = frozenset(
         sqlite3.SQLITE_AUTH,
     }
 )
-
-
-class DocumentKind(StrEnum):
-    """What the archive keeps of a run."""
-
-    SUMMARY = "summary"
-    RESULT = "result"
-    EVIDENCE = "evidence"
-
-
-@dataclass(frozen=True, slots=True)
-class StampedDocument:
-    """A document that was derived from a run folder when that had the ``stamp``."""
-
-    stamp: str
-    content: bytes
-
-
-class ArchiveUnavailable(FileError):
-    """The archive cannot be used; what is asked of it must be read from the folders."""
 
 
 class Archive:

@@ -13,6 +13,7 @@ from hexacell.cli.app import main
 from hexacell.cli.parser import make_parser
 
 SLOW_TO_IMPORT = {"numpy", "scipy", "textual", "matplotlib", "pydantic", "rich", "asyncio"}
+UNNEEDED_AT_START = {"sqlalchemy", "matplotlib", "textual", "scipy.stats", "scipy.optimize", "scipy.linalg"}
 COMMANDS = (
     "demo",
     "run",
@@ -55,6 +56,12 @@ def test_help_imports_nothing_slow(tmp_path, arguments):
     modules = imported(tmp_path, *arguments)
     assert "hexacell" in modules
     assert modules.isdisjoint(SLOW_TO_IMPORT)
+
+
+def test_a_run_begins_without_what_it_does_not_need():
+    code = f"import sys, hexacell.cli.commands.run; print(*{UNNEEDED_AT_START!r} & set(sys.modules))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == []
 
 
 @pytest.mark.parametrize("page", PAGES, ids=" ".join)

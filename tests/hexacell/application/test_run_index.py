@@ -12,7 +12,8 @@ from hexacell.application.history import PastRun, past_runs
 from hexacell.application.run_index import RunIndex
 from hexacell.cell.loader import Cell
 from hexacell.controller_config.write_back import commit
-from hexacell.runs.archive import INDEX, Archive, DocumentKind, StampedDocument
+from hexacell.runs.archive import INDEX, Archive
+from hexacell.runs.archived_documents import DocumentKind, StampedDocument
 from hexacell.runs.run_folder import RunFolder, runs_folder
 from procedures.journal.journal import Journal, read_entries
 from procedures.journal.line_format import Entry

@@ -11,7 +11,8 @@ import pytest
 
 from hexacell.application.history import past_runs
 from hexacell.application.run_index import RunIndex
-from hexacell.runs.archive import INDEX, Archive, DocumentKind, StampedDocument
+from hexacell.runs.archive import INDEX, Archive
+from hexacell.runs.archived_documents import DocumentKind, StampedDocument
 from hexacell.runs.run_folder import runs_folder
 from tests.hexacell.application.proposed_runs import a_cell, propose_run
 from tests.hexacell.runs.postgresql_server import HOW_TO, installed_programs, running_server

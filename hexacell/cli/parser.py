@@ -288,7 +288,8 @@ def _history(commands: Any) -> None:  # noqa: ANN401
     parser = _command(commands, "history", "list the runs of a cell, compare two, see what drifts")
     parser.usage = (
         "hexacell history [-h] [--compare RUN RUN | --show RUN | --refit RUN |\n"
-        "                        --keep DAYS [--delete] | --drift] [--archive URL] [--json] CELL"
+        "                        --keep DAYS [--delete] | --drift] [--archive URL]\n"
+        "                        [--json] CELL"
     )  # argparse does not break a group
     _add_cell(parser)
     what = parser.add_mutually_exclusive_group()

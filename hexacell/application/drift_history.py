@@ -5,12 +5,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 from datetime import datetime
 
+import numpy as np
+
 from hexacell.application.run_evidence_document import EvidenceDocument, evidence_document
 from hexacell.application.run_index import RunIndex
 from hexacell.campaign.change_alarm import machine_causes
 from hexacell.cell.loader import Cell
-from hexacell.change_detection.drift_watch import StepAlarm, watch_runs
+from hexacell.change_detection.drift_watch import Causes, StepAlarm, WatchResult, watch_runs
+from hexacell.change_detection.steady_drift import steady_drift
 from hexacell.kinematics.parameters import GeometricParameter
+from hexacell.reporting.run_comparison import DAY_S
 from hexacell.robot_model import robot_of
 from hexacell.runs.archived_documents import DocumentKind
 from hexacell.runs.run_folder import RunFolder
@@ -39,6 +43,17 @@ class FoundChange:
 
 
 @dataclass(frozen=True, slots=True)
+class ParameterRate:
+    """How fast a parameter changes steadily, if it alone does, in its unit a day; ``is_steady``: surely."""
+
+    name: str
+    unit: str
+    per_day: float
+    sigma_per_day: float
+    is_steady: bool
+
+
+@dataclass(frozen=True, slots=True)
 class DriftHistory:
     """What all runs of a cell say of changes.
 
@@ -46,6 +61,7 @@ class DriftHistory:
         runs: when each run ended that counts, oldest first.
         celsius: the mean of the thermometers in each of them; none without.
         changes: oldest first.
+        rates: since the last change, of the parameters that the runs see.
         shares: the cumulative sum of each parameter of the machine, as a share of its limit.
     """
 
@@ -53,6 +69,7 @@ class DriftHistory:
     celsius: tuple[float | None, ...]
     changes: tuple[FoundChange, ...]
     shares: tuple[tuple[str, float], ...]
+    rates: tuple[ParameterRate, ...] = ()
 
 
 def drift_history(cell: Cell, index: RunIndex | None = None) -> DriftHistory:
@@ -70,7 +87,28 @@ def drift_history(cell: Cell, index: RunIndex | None = None) -> DriftHistory:
     ended = tuple(run.at for run in runs)
     changes = tuple(_change(alarm, ended, parameters.parameters) for alarm in watched.alarms)
     shares = zip(parameters.names, watched.share_of_limit.tolist(), strict=True)
-    return DriftHistory(ended, tuple(run.celsius for run in runs), changes, tuple(shares))
+    return DriftHistory(
+        ended,
+        tuple(run.celsius for run in runs),
+        changes,
+        tuple(shares),
+        _rates(cell, runs, causes, watched),
+    )
+
+
+def _rates(
+    cell: Cell, runs: list[EvidenceDocument], causes: Causes, watched: WatchResult
+) -> tuple[ParameterRate, ...]:
+    """The rates that the runs since the last change see."""
+    unchanged = runs[watched.unchanged_from :]
+    days = np.array([(run.at - unchanged[0].at).total_seconds() / DAY_S for run in unchanged])
+    found = steady_drift(watched.before, [run.evidence for run in unchanged], days, causes.by_state)
+    is_steady = np.abs(found.scores) > found.limit
+    numbers = zip(found.rates.tolist(), found.sigmas.tolist(), is_steady.tolist(), strict=True)
+    named = zip(cell.settings.mechanism.parameters.parameters, numbers, strict=True)
+    return tuple(
+        ParameterRate(one.name, one.kind.unit.value, *each) for one, each in named if np.isfinite(each[1])
+    )
 
 
 def _counted_runs(cell: Cell, index: RunIndex) -> list[EvidenceDocument]:

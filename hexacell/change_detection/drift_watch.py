@@ -68,10 +68,15 @@ class StepAlarm:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class WatchResult:
-    """What the watch found, and its sums (m,) in the end, as shares of the limit."""
+    """What the watch found, and its sums (m,) in the end, as shares of the limit.
+
+    ``unchanged_from`` is the index of the first run after the last step, ``before`` what was known before.
+    """
 
     alarms: tuple[StepAlarm, ...]
     share_of_limit: Array
+    unchanged_from: int
+    before: CarriedPosterior
 
 
 @cache
@@ -81,13 +86,17 @@ def alarm_limit(streams: int) -> float:
 
 
 class DriftWatch:
-    """Takes the runs of a robot one after the other."""
+    """Takes the runs of a robot one after the other.
+
+    Attributes:
+        before: what is known before the first run after the last step.
+    """
 
     def __init__(self, causes: Causes) -> None:
         self._causes = causes
         shared = causes.by_state.shape[1] - causes.free
-        self._before = CarriedPosterior.diffuse(causes.free, shared)
-        self._posterior = self._before
+        self.before = CarriedPosterior.diffuse(causes.free, shared)
+        self._posterior = self.before
         self._since: list[RunEvidence] = []
         self._sums = CumulativeSums.at_rest(len(causes.legs))
         self._runs = 0
@@ -107,12 +116,17 @@ class DriftWatch:
         shares: Array = self._sums.largest / alarm_limit(len(self._causes.legs))
         return shares
 
+    @property
+    def unchanged_from(self) -> int:
+        """Index of the first run after the last step."""
+        return self._runs - len(self._since)
+
     def _located(self) -> StepAlarm:
         """Where the step was; the watch goes on from there."""
-        gains = step_gains(self._before, self._since, self._causes.by_state)
+        gains = step_gains(self.before, self._since, self._causes.by_state)
         place, leg, cause = self._likeliest(gains)
         first, last = gains.likely_runs(cause)
-        offset = self._runs - len(self._since)
+        offset = self.unchanged_from
         self._begin_anew(place, cause)
         return StepAlarm(
             run=self._runs - 1,
@@ -134,19 +148,19 @@ class DriftWatch:
         return int(at), leg, int(cause)
 
     def _begin_anew(self, place: int, cause: int) -> None:
-        before = self._before
+        before = self.before
         for run in self._since[:place]:
             before = before.after(run)
-        self._before = before.forgetting(self._causes.by_state[cause])
+        self.before = before.forgetting(self._causes.by_state[cause])
         self._since = self._since[place:]
-        self._posterior = self._before
+        self._posterior = self.before
         for run in self._since:
             self._posterior = self._posterior.after(run)
         self._sums = CumulativeSums.at_rest(len(self._causes.legs))
 
     def _other_legs(self, leg: int) -> tuple[int, ...]:
         """Those for which there is evidence of a step beside the one that was found."""
-        gains = step_gains(self._before, self._since, self._causes.by_state).gains.max(axis=0)
+        gains = step_gains(self.before, self._since, self._causes.by_state).gains.max(axis=0)
         others = self._causes.legs[gains > OTHER_LEG_GAIN]
         return tuple(sorted({int(one) for one in others} - {leg}))
 
@@ -155,4 +169,4 @@ def watch_runs(runs: Iterable[RunEvidence], causes: Causes) -> WatchResult:
     """The alarms of a series of runs, oldest first."""
     watch = DriftWatch(causes)
     found = [alarm for run in runs if (alarm := watch.add(run)) is not None]
-    return WatchResult(tuple(found), watch.share_of_limit)
+    return WatchResult(tuple(found), watch.share_of_limit, watch.unchanged_from, watch.before)

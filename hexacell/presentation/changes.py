@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from hexacell.application.drift_history import DriftHistory, FoundChange
+from hexacell.application.drift_history import DriftHistory, FoundChange, ParameterRate
 from hexacell.application.evidence_comparison import EvidenceComparison
+from hexacell.presentation.history import TREND_DAYS
 from hexacell.presentation.layout import wrapped
 
 
@@ -36,7 +37,22 @@ def watch_text(found: DriftHistory) -> str:
     rest = f"{runs}: {quiet}{since}the largest sum of innovations is {share:.0%} of its limit ({name})."
     shown = [one for one in found.celsius if one is not None]
     warmth = [f"Their thermometers showed {min(shown):.1f} to {max(shown):.1f} deg C."] if shown else []
-    return "\n".join([*lines, wrapped(rest, indent=2), *warmth])
+    return "\n".join([*lines, wrapped(rest, indent=2), *_rate_lines(found), *warmth])
+
+
+def _rate_lines(found: DriftHistory) -> list[str]:
+    """The parameter that moves most surely by all runs since the last change."""
+    if not found.rates:
+        return []
+    most = max(found.rates, key=lambda one: abs(one.per_day) / one.sigma_per_day)
+    if most.is_steady:
+        return [wrapped(f"Moving steadily: {_rate_words(most)}, if it alone moves.", indent=2)]
+    return [wrapped(f"No parameter moves steadily; nearest to it is {_rate_words(most)}.", indent=2)]
+
+
+def _rate_words(rate: ParameterRate) -> str:
+    change, sigma = TREND_DAYS * rate.per_day, TREND_DAYS * rate.sigma_per_day
+    return f"{rate.name} by {change:+.3f} +- {sigma:.3f} {rate.unit} in {TREND_DAYS:.0f} days"
 
 
 def change_sentence(found: FoundChange) -> str:

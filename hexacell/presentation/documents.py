@@ -231,6 +231,7 @@ def drift_document(found: Sequence[ParameterTrend], watched: DriftHistory) -> di
         "temperatures_c": list(watched.celsius),
         "changes": [_change_document(one) for one in watched.changes],
         "shares_of_limit": dict(watched.shares),
+        "rates": [asdict(one) for one in watched.rates],
     }
 
 

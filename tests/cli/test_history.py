@@ -97,7 +97,7 @@ def test_a_leg_that_moved_is_told_with_the_night(cell, typed_here) -> None:
     told = typed_here("history", cell.path, "--drift")
     assert (told.code, told.out.startswith("leg 4 moved 0.3")) == (0, True)
     document = typed_here("history", cell.path, "--drift", "--json").document
-    assert set(document) == {"parameters", "runs", "temperatures_c", "changes", "shares_of_limit"}
+    assert set(document) == {"parameters", "runs", "temperatures_c", "changes", "shares_of_limit", "rates"}
     (change,) = document["changes"]
     assert set(change) == {
         "leg", "after", "before", "noticed", "parameter", "unit", "change", "sigma", "other_legs",

@@ -17,6 +17,8 @@ from tests.hexacell.application.proposed_runs import a_cell
 from tests.hexacell.application.recorded_nights import Nights
 
 CRASH = {"l4": 0.31}
+DRIFT_MM = 0.0012
+"""A night: in twelve of them too little for an alarm."""
 
 
 @pytest.fixture
@@ -177,3 +179,26 @@ def test_a_run_whose_thermometer_on_a_leg_was_silent_does_not_count(nights) -> N
     nights.celsius["leg 3"] = None
     nights.check()
     assert len(drift_history(nights.cell).runs) == 9
+
+
+def test_a_steady_drift_is_told_by_calibrations_and_checks_together(nights) -> None:
+    nights.calibrate()
+    for number in range(12):
+        nights.changes = {"l4": DRIFT_MM * number}
+        nights.check()
+    found = drift_history(nights.cell)
+    assert found.changes == ()
+    rates = {one.name: one for one in found.rates}
+    assert abs(rates["l4"].per_day - DRIFT_MM) < 4 * rates["l4"].sigma_per_day
+    most = max(found.rates, key=lambda one: abs(one.per_day) / one.sigma_per_day)
+    assert most.is_steady
+    assert "4" in most.name
+    assert "Moving steadily" in watch_text(found)
+
+
+def test_rates_are_of_the_time_since_the_last_change(nights) -> None:
+    found = after(nights, 6, 6, crash=CRASH)
+    assert len(found.changes) == 1
+    assert found.rates
+    assert not any(one.is_steady for one in found.rates)
+    assert "No parameter moves steadily" in watch_text(found)

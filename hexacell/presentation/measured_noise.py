@@ -26,6 +26,11 @@ def measured_noise_text(measured: MeasuredNoise) -> str:
     return _paragraphs([*_summary(measured), *_warnings(measured)])
 
 
+def measured_noise_lines(measured: MeasuredNoise) -> tuple[str, ...]:
+    """The same, each sentence as one line without indentation."""
+    return tuple(" ".join(line.split()) for line in [*_summary(measured), *_warnings(measured)])
+
+
 def noise_and_averaging_text(measured: MeasuredNoise) -> str:
     """The same, and what means of more readings gain."""
     return _paragraphs([*_summary(measured), *_warnings(measured), *_averaging(measured)])

@@ -9,7 +9,7 @@ from drivers.interfaces import DeviceIdentity
 from hexacell.application.reported_run import ReportedRun
 from hexacell.cell.certificates import CertificateSettings
 from hexacell.presentation.calibration_report.blocks import Chapter, Facts, Paragraph, Table
-from hexacell.presentation.measured_noise import measured_noise_text
+from hexacell.presentation.measured_noise import measured_noise_lines
 
 NOT_STATED = "not stated"
 
@@ -22,8 +22,8 @@ def conditions_chapter(run: ReportedRun) -> Chapter:
     if len(pairs) == 1:
         pairs.append(("Temperature", "not measured"))
     pairs += [("Sets measured again", str(state.invalidated))] if state.invalidated else []
-    noise = () if state.noise is None else (Paragraph(_one_line(measured_noise_text(state.noise.noise))),)
-    return Chapter("Conditions", (Facts(tuple(pairs)), *noise))
+    noise = () if state.noise is None else measured_noise_lines(state.noise.noise)
+    return Chapter("Conditions", (Facts(tuple(pairs)), *map(Paragraph, noise)))
 
 
 def traceability_chapter(run: ReportedRun) -> Chapter:
@@ -57,10 +57,6 @@ def authorisation_chapter(run: ReportedRun) -> Chapter:
         "was measured."
     )
     return Chapter("Authorisation", (Facts(pairs), Paragraph(text)))
-
-
-def _one_line(text: str) -> str:
-    return "; ".join(" ".join(line.split()) for line in text.splitlines())
 
 
 def _temperatures(run: ReportedRun) -> Iterator[tuple[str, str]]:

@@ -35,6 +35,14 @@ MODES = {
 }
 
 
+MODELS = {
+    "optimise": "Held-out poses, which took no part, test the model.",
+    "check": "What was known from the last accepted result, or from the drawing, takes part.",
+    "length": "The ball in two seats at a certified distance tells the scale of the encoders.",
+}
+"""What distinguishes the method of each kind of work."""
+
+
 def verdict_of(run: ReportedRun) -> Verdict | None:
     """The verdict; none where the run ended before there was one."""
     return None if run.state.judged is None else run.state.judged.verdict
@@ -83,9 +91,8 @@ def method_chapter(run: ReportedRun) -> Chapter:
     method = (
         "A ball on the platform is held between three dial gauges. At each point they are zeroed, the same "
         "point is commanded in other orientations, and what the gauges and the encoders of the joints then "
-        "show is recorded. The geometry is identified from the records by weighted least squares with "
-        "its covariance (after Abtahi, Pendar, Alasty and Vossoughi, 2010). Held-out poses, which took no "
-        "part, test the model."
+        "show is recorded. From the records the geometry follows by weighted least squares, with its "
+        f"covariance (after Abtahi, Pendar, Alasty and Vossoughi, 2010). {MODELS[started.mode]}"
     )
     return Chapter("Subject and method", (Facts(facts), Paragraph(method)))
 

@@ -109,9 +109,11 @@ def opened(cell: Path) -> Iterator[Screen]:
     if not process:
         os.environ["TERM"] = "xterm-256color"
         os.execv(sys.executable, [sys.executable, "-m", "hexacell", "tui", str(cell)])
-    yield Screen(terminal, begun)
-    os.waitpid(process, 0)
-    os.close(terminal)
+    try:
+        yield Screen(terminal, begun)
+    finally:
+        os.close(terminal)  # which ends it, if nothing has
+        os.waitpid(process, 0)
 
 
 @dataclass(frozen=True)

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import os
+import pty
+import signal
 import subprocess
 import sys
 from pathlib import Path
 
 from hexacell.cell.bundled import bundled_config
+from tests.waiting import wait_until
 
 
 def test_without_a_terminal_it_is_a_usage_error(tmp_path: Path) -> None:
@@ -44,3 +47,28 @@ def test_a_dumb_terminal_is_a_usage_error(tmp_path: Path) -> None:
     )
     assert ended.returncode == 2
     assert "this terminal cannot draw a screen (TERM is dumb). Use `hexacell run`" in ended.stdout
+
+
+def test_it_ends_with_its_terminal_though_no_signal_says_so(tmp_path: Path) -> None:
+    """As where a connection is lost below nohup, or another process had the terminal first."""
+    master, slave = pty.openpty()
+    process = subprocess.Popen(
+        [sys.executable, "-m", "hexacell", "tui", "cell.toml"],
+        cwd=tmp_path,
+        env={**os.environ, "TERM": "xterm-256color"},
+        stdin=slave,
+        stdout=slave,
+        stderr=slave,
+        preexec_fn=lambda: signal.signal(signal.SIGHUP, signal.SIG_IGN),  # noqa: PLW1509 - it is one call
+    )
+    os.close(slave)
+    try:
+        shown = b""
+        while b"Question 1 of" not in shown:
+            shown += os.read(master, 65536)
+        os.close(master)
+        wait_until(lambda: process.poll() is not None)
+        assert process.returncode == 130
+    finally:
+        process.kill()
+        process.wait()

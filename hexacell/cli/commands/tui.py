@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 from hexacell.errors import ExitCode, UsageError
 from hexacell.screen.app import FirstCell, TechnicianApp
 from hexacell.screen.key_map import preferences_path, read_preferences
+from hexacell.screen.terminal_watch import end_with_terminal
 
 if TYPE_CHECKING:
     from hexacell.screen.assistant_screen import Assistant
@@ -27,6 +28,7 @@ def main(options: argparse.Namespace) -> ExitCode:
         FileError: the key map cannot be read.
     """
     _require_terminal()
+    end_with_terminal(sys.stdin.fileno())
     path: Path = options.cell
     first = None if path.exists() else FirstCell(path, partial(_assistant, path))
     app = TechnicianApp(partial(_session, path), read_preferences(preferences_path()), first_cell=first)

@@ -68,7 +68,9 @@ def _now(picture: RunPicture) -> str:
     if picture.status is Status.ENDED:
         return f"ended early: {_reason(picture)}"
     if picture.question is not None:
-        return "a question waits for you"
+        return (
+            "a question waits for you" if picture.may_command else "a question waits for who is in control"
+        )
     if picture.status is Status.PAUSED:
         return "paused: the robot stands still"
     pausing = ", then it pauses" if picture.status is Status.PAUSING else ""

@@ -100,9 +100,11 @@ def approval_refusal(gates: tuple[AcceptanceGate, ...]) -> str:
     return f"It cannot be approved. {' '.join(failed)}" if failed else ""
 
 
-def _consenting(question: Question, what: str, title: str) -> QuestionView:
+def _consenting(
+    question: Question, what: str, title: str, otherwise: str = "leave the config as it is"
+) -> QuestionView:
     """A question of consent: by one key, or by the cell's name where it is grave."""
-    decline = Choice("n", "no, leave the config as it is", None)
+    decline = Choice("n", f"no, {otherwise}", None)
     if question.consent == "yes":
         consent = Choice("y", f"yes, {what}", PERSON, is_consent=True)
         return QuestionView(title, (), "Press y or n; page up and page down scroll.", (consent, decline))
@@ -116,7 +118,8 @@ def _consenting(question: Question, what: str, title: str) -> QuestionView:
 def _keeping(question: Question, result: WrittenResult) -> QuestionView:
     taught = "" if result.displacement is None else teaching_sentence(result.displacement)
     stands = "The new geometry is in the controller's config. Without your word the old one is put back."
-    view = _consenting(question, "keep it", "The result did not pass. Keep it all the same?")
+    title = "The result did not pass. Keep it all the same?"
+    view = _consenting(question, "keep it", title, "put the old config back")
     shown = tuple(text for text in (f"{result.line}.", taught, stands) if text)
     return replace(view, paragraphs=shown, urgency=Urgency.ALARM)
 

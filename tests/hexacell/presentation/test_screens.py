@@ -13,6 +13,7 @@ from hexacell.attach.messages import (
     EventRecorded,
     HostFailed,
     HostMessage,
+    QuestionOpened,
     RunDescribed,
     StatusChanged,
 )
@@ -30,9 +31,10 @@ from hexacell.presentation.screens.reviewing import review_view
 from hexacell.presentation.screens.run_picture import RunPicture, picture_after
 from hexacell.presentation.screens.views import Urgency
 from hexacell.reporting.check_result import CheckResult, ParameterChange
+from hexacell.reporting.verification import Verification
 from procedures.engine.command_loop import Status
 from procedures.run import events
-from procedures.run.questions import ask_mounting, ask_startup
+from procedures.run.questions import ask_acceptance, ask_mounting, ask_startup
 from procedures.run.state import fold
 from procedures.run.steps import Expectation, Move, Phase, SetKey
 from tests.procedures.story import Story
@@ -171,6 +173,14 @@ def test_the_time_that_is_left_follows_from_the_pace() -> None:
 def test_who_watches_is_told_who_is_in_control() -> None:
     picture = pictured(described(), ControlChanged(is_in_control=False, who="grace"))
     assert guidance(picture, None).stopping == "you only watch: grace is in control; c takes over"
+    asked = picture_after(picture, QuestionOpened(question=ask_mounting(1, 1, Pose(0.0, 0.0, 0.0))), 0.0)
+    assert guidance(asked, None).now == "a question waits for who is in control"
+
+
+def test_who_does_not_keep_a_result_knows_that_the_old_config_comes_back() -> None:
+    verification = Verification(verdict=Verdict.CONDITIONAL_PASS, before_mm=3.0, after_mm=0.1)
+    view = question_view(ask_acceptance("0.1 mm", verification), None)
+    assert [choice.label for choice in view.choices] == ["yes, keep it", "no, put the old config back"]
 
 
 def test_a_record_has_its_largest_residual_and_how_many_sigma_that_is() -> None:

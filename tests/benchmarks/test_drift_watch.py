@@ -40,6 +40,8 @@ YEARS, NIGHTS = 10, 3650
 RECORDS = 16
 BEFORE = (30, 90, 365)
 LONGEST = 200
+ALLOWANCE = 12.0 / np.sqrt(STEPS)
+"""Nights: one standard deviation of the median of so many steps."""
 CRASH_MM = 0.31
 
 
@@ -141,7 +143,7 @@ def test_a_step_of_one_sigma_is_found(say, before):
     target = "22" if before == max(BEFORE) else "-"
     say(f"a step of one sigma after {before} nights: found after, median", f"{median:.0f} nights", target)
     say("  after nine of ten", f"{most:.0f} nights", "-")
-    assert median <= 22 or before < max(BEFORE)
+    assert median <= 22 + ALLOWANCE or before < max(BEFORE)
 
 
 def test_a_crash_is_located(say):

@@ -10,7 +10,7 @@ from hexacell.attach.connection import RunConnection
 from hexacell.attach.recorded import RecordedRun
 from hexacell.controller_config.three_way import ConfigEditedSince
 from hexacell.errors import HexacellError, UsageError
-from hexacell.presentation.config_changes import versions_text
+from hexacell.presentation.config_changes import RELOAD, versions_text
 from hexacell.presentation.screens.questions import PERSON
 from hexacell.presentation.screens.views import ChecklistItem, HistoryEntry
 from hexacell.screen.backend import ONCE, ScreenAction
@@ -189,7 +189,8 @@ class SessionActions:
             self.findings.compared = tuple(versions_text(edited.versions).splitlines())
             raise
         await self.read_history()
-        return self.findings.compared[-1]
+        said = " ".join(self.findings.compared)
+        return RELOAD if RELOAD in said else self.findings.compared[-1]
 
     async def _drift(self, _: str) -> str:
         self.findings.compared = await self._workplace.drift()

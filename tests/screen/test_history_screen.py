@@ -14,6 +14,7 @@ from hexacell.acceptance import AcceptanceGate
 from hexacell.attach.snapshots import LiveSnapshot
 from hexacell.cell.loader import Cell
 from hexacell.controller_config.write_back import commit
+from hexacell.presentation.config_changes import RELOAD
 from hexacell.screen.app import TechnicianApp
 from hexacell.screen.cell_workplace import CellWorkplace
 from hexacell.screen.overlays.confirm_overlay import ConfirmOverlay
@@ -67,6 +68,7 @@ async def test_the_config_of_before_the_latest_run_is_put_back(cell: Cell, runs:
         assert "Undo 2026-11-21T100000Z" in shown(pilot)
         await press(pilot, "y")
         await until_shown(pilot, "again, bit for bit, which undoes the run 2026-11-21T100000Z")
+        await until(lambda: [one.message for one in pilot.app._notifications] == [RELOAD])
     assert cell.config_path.read_bytes() == runs[1].before
 
 

@@ -202,8 +202,10 @@ def test_with_a_gauge_that_does_not_answer(served: Path, say: Say) -> None:
     silent, port = pty.openpty()
     text = served.read_text()
     served.write_text(re.sub(r'port = ".*?"', f'port = "{os.ttyname(port)}"', text, count=1))
-    with opened(served) as screen:
-        screen.seen_at(rb"NO READING")
-        judge(say, "with a silent gauge", keys_answered(screen), screen.quit_s("q"))
-    os.close(silent)
-    os.close(port)
+    try:
+        with opened(served) as screen:
+            screen.seen_at(rb"NO READING")
+            judge(say, "with a silent gauge", keys_answered(screen), screen.quit_s("q"))
+    finally:
+        os.close(silent)
+        os.close(port)

@@ -8,15 +8,26 @@ from dataclasses import dataclass
 from hexacell.campaign.speed_limits import speed_limits
 from hexacell.cell.model import CellSettings
 
-MOVES = 4.7
-MOVES_PROVISIONAL = 1.9
-"""Moves a selected record takes, waypoints included: means over six random robots with 55 records each.
-Most waypoints are needed because the controller commands with its own, wrong geometry."""
+
+@dataclass(frozen=True, slots=True)
+class UsualMoves:
+    """What a selected record takes: means over six random robots with 55 records each.
+
+    Attributes:
+        moves: waypoints and ways back included.
+        joint_mm, edge_mm: how far the fastest slider and the fastest point of the platform would come at
+            their largest speed for the duration of a move.
+    """
+
+    moves: float
+    joint_mm: float
+    edge_mm: float
 
 
-USUAL_JOINT_MM, USUAL_EDGE_MM = 115.0, 60.0
-"""How far the fastest slider and the fastest point of the platform would come at their largest speed for
-the duration of a move: means over 657 moves of two calibrations of the bundled Hexaglide."""
+COMMANDED = UsualMoves(2.6, 62.0, 57.0)
+"""Most waypoints are needed because the controller commands with its own, wrong geometry."""
+
+COMMANDED_PROVISIONALLY = UsualMoves(1.3, 153.0, 118.0)
 
 MOVE_OVERHEAD_S = 0.3
 """To speed up, to slow down, and to be acknowledged."""
@@ -47,8 +58,8 @@ def usual_move_seconds(settings: CellSettings) -> float:
     """Of a move between poses with gauges at the ball, as stated or by its largest speeds."""
     if settings.timing.move_s is not None:
         return settings.timing.move_s
-    limits = speed_limits(settings.speed, at_gauges=True)
-    return MOVE_OVERHEAD_S + max(USUAL_JOINT_MM / limits.joint_mm_s, USUAL_EDGE_MM / limits.edge_mm_s)
+    limits, usual = speed_limits(settings.speed, at_gauges=True), _usual(settings)
+    return MOVE_OVERHEAD_S + max(usual.joint_mm / limits.joint_mm_s, usual.edge_mm / limits.edge_mm_s)
 
 
 def noise_minutes(settings: CellSettings) -> float:
@@ -61,7 +72,11 @@ def noise_minutes(settings: CellSettings) -> float:
 def _usual_moves(settings: CellSettings) -> float:
     if settings.identification.poses is not None:
         return 1.0
-    return MOVES_PROVISIONAL if settings.identification.provisional else MOVES
+    return _usual(settings).moves
+
+
+def _usual(settings: CellSettings) -> UsualMoves:
+    return COMMANDED_PROVISIONALLY if settings.identification.provisional else COMMANDED
 
 
 @dataclass(frozen=True, slots=True)

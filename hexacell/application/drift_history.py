@@ -20,6 +20,9 @@ from hexacell.runs.archived_documents import DocumentKind
 from hexacell.runs.run_folder import RunFolder
 from hexacell.storage.atomic_files import sha256
 
+LEAST_DAYS = 3.0
+"""Between the first and the last of some runs: what they say of shorter times is not said of a month."""
+
 
 @dataclass(frozen=True, slots=True)
 class FoundChange:
@@ -99,9 +102,11 @@ def drift_history(cell: Cell, index: RunIndex | None = None) -> DriftHistory:
 def _rates(
     cell: Cell, runs: list[EvidenceDocument], causes: Causes, watched: WatchResult
 ) -> tuple[ParameterRate, ...]:
-    """The rates that the runs since the last change see."""
+    """The rates that the runs since the last change see, if these span some days."""
     unchanged = runs[watched.unchanged_from :]
     days = np.array([(run.at - unchanged[0].at).total_seconds() / DAY_S for run in unchanged])
+    if np.ptp(days) < LEAST_DAYS:
+        return ()
     found = steady_drift(watched.before, [run.evidence for run in unchanged], days, causes.by_state)
     is_steady = np.abs(found.scores) > found.limit
     numbers = zip(found.rates.tolist(), found.sigmas.tolist(), is_steady.tolist(), strict=True)

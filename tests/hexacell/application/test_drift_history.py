@@ -202,3 +202,9 @@ def test_rates_are_of_the_time_since_the_last_change(nights) -> None:
     assert found.rates
     assert not any(one.is_steady for one in found.rates)
     assert "No parameter moves steadily" in watch_text(found)
+
+
+def test_runs_of_two_days_tell_no_rate(nights) -> None:
+    found = after(nights, 2, crash={})
+    assert (len(found.runs), found.rates) == (3, ())
+    assert "moves steadily" not in watch_text(found)

@@ -187,6 +187,7 @@ def test_while_the_run_identifies_and_a_plan_is_tried(served: Path, say: Say) ->
         begin_run(screen)
         screen.answered_s("2")
         screen.press("v")
+        screen.answered_s("1")
         [run] = (served.parent / "runs" / NAME).iterdir()
 
         def computes() -> bool:

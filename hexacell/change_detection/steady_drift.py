@@ -15,7 +15,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import norm
+from scipy.special import ndtri
 
 from hexacell.change_detection.carried_posterior import LEAST_SHARE, CarriedPosterior
 from hexacell.change_detection.largest_score import FALSE_ALARMS
@@ -42,7 +42,7 @@ class SteadyDrift:
     @property
     def limit(self) -> float:
         """What the largest score exceeds by chance in one case of a hundred, at most."""
-        return float(norm.isf(0.5 * FALSE_ALARMS / len(self.rates)))
+        return float(-ndtri(0.5 * FALSE_ALARMS / len(self.rates)))
 
 
 def steady_drift(

@@ -30,7 +30,7 @@ def checks(monkeypatch: pytest.MonkeyPatch) -> list[tuple[float, Verdict]]:
     """The scores and verdicts of the checks that will be made, in their order; those made are removed."""
     coming: list[tuple[float, Verdict]] = []
 
-    def execute(request: RunRequest, _: object) -> events.Ended:
+    def execute(request: RunRequest, *_: object) -> events.Ended:
         score, verdict = coming.pop(0)
         code = ExitCode.DONE if verdict is Verdict.PASS else ExitCode.OUT_OF_LIMITS
         ended = events.Ended(exit_code=code, line=verdict.value)

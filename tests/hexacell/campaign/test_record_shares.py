@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hexacell.campaign.decisions import CampaignState
-from hexacell.campaign.record_shares import shared_sizes
+from hexacell.campaign.record_shares import MOST, shared_sizes
 from hexacell.kinematics.pose import Pose
 from hexacell.measurements.records import MeasurementSet, Record
 
@@ -41,9 +41,14 @@ def test_the_last_point_gets_what_is_left() -> None:
     assert shared_sizes(PLANNED, measured({1: 11}, {1, 2, 3, 4, 5}), set()) == PLANNED
 
 
-def test_a_point_that_is_in_reach_again_gets_what_is_left() -> None:
+def test_a_point_that_is_in_reach_again_gets_what_was_planned_for_it() -> None:
     state = measured({1: 11, 2: 14, 3: 14}, {1, 2, 3}, 4)
-    assert shared_sizes(PLANNED, state, set())[4] == 8
+    assert shared_sizes(PLANNED, state, set()) == PLANNED
+    assert shared_sizes(PLANNED, measured({1: 22}, {1}), set()) == PLANNED
+
+
+def test_one_point_does_not_take_the_place_of_all() -> None:
+    assert shared_sizes(PLANNED, measured({1: 4}, set(), 1), {2, 3, 4, 5})[1] == 22
 
 
 @given(
@@ -51,10 +56,14 @@ def test_a_point_that_is_in_reach_again_gets_what_is_left() -> None:
     st.sets(st.integers(1, 5)),
     st.sets(st.integers(1, 5)),
 )
-def test_never_more_than_planned_is_asked_for(counts: list[int], done: set[int], left: set[int]) -> None:
+def test_no_point_gets_fewer_than_planned_and_all_together_no_more(
+    counts: list[int], done: set[int], left: set[int]
+) -> None:
     state = measured(dict(zip(PLANNED, counts, strict=True)), done)
     sizes = shared_sizes(PLANNED, state, left)
     waiting = set(PLANNED) - done - left
+    assert all(PLANNED[point] <= sizes[point] <= MOST * PLANNED[point] for point in PLANNED)
     asked = sum(sizes[point] for point in waiting)
     taken = sum(state.records_at(point) for point in set(PLANNED) - waiting)
-    assert not waiting or sum(PLANNED.values()) - len(waiting) < asked + taken <= sum(PLANNED.values())
+    planned = sum(PLANNED[point] for point in waiting)
+    assert asked == planned or asked + taken <= sum(PLANNED.values())

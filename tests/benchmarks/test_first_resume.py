@@ -76,13 +76,19 @@ def hexacell(cell: Path, *arguments: str, dies_after_s: float | None = None) -> 
     return Ended(process.returncode, time.monotonic() - begun, said)
 
 
+def is_over(folder: Path) -> bool:
+    """Whether the run came to its end; what was killed then is only its process."""
+    histories = [read_journal(journal) for journal in folder.glob("runs/*/*/journal.jsonl")]
+    return any(history and history[-1].kind == "ended" for history in histories)
+
+
 def killed(folder: Path, seed: int, share: float, duration_s: float) -> tuple[Path, float]:
     """A cell whose run was killed at a share of its duration, once it was begun and before it was over."""
     while True:
         shutil.rmtree(folder, ignore_errors=True)
         cell = site(folder, seed)
         ended = hexacell(cell, dies_after_s=share * duration_s)
-        if ended.code != -signal.SIGKILL:
+        if ended.code != -signal.SIGKILL or is_over(folder):
             duration_s = SOONER * min(duration_s, ended.seconds)
         elif any(journal.read_bytes().count(b"\n") for journal in folder.glob("runs/*/*/journal.jsonl")):
             return cell, duration_s

@@ -13,6 +13,7 @@ from hexacell.cell.loader import load_cell
 from hexacell.cell.model import CellSettings
 from hexacell.controller_config.write_back import AFTER, BEFORE
 from hexacell.errors import FileError, UsageError
+from hexacell.kinematics.geometry import Geometry
 from hexacell.runs.run_folder import JOURNAL, RunFolder
 from hexacell.storage import atomic_files
 from procedures.journal.journal import read_entries
@@ -50,6 +51,13 @@ class ReportedRun:
         """The first event."""
         assert self.state.started is not None  # noqa: S101 - checked when it is read
         return self.state.started
+
+    @property
+    def geometry_before(self) -> Geometry:
+        """That of the controller when the run began, in the mechanism's frame convention."""
+        mechanism = self.settings.mechanism
+        before = Geometry.of(mechanism.parameters, self.started.controller)
+        return mechanism.normalize_frames(before)[0]
 
     @property
     def identifier(self) -> str:

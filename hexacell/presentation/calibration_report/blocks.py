@@ -4,6 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from datetime import date
+from enum import StrEnum
+
+
+class Tone(StrEnum):
+    """How a verdict is coloured."""
+
+    GOOD = "good"
+    OPEN = "open"
+    BAD = "bad"
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,11 +32,11 @@ class Facts:
 
 @dataclass(frozen=True, slots=True)
 class Table:
-    """Rows of as many cells as there are columns; from ``numbers_from`` on they are numbers."""
+    """Rows of as many cells as there are columns; from ``numbers_from`` on they are numbers, if any are."""
 
     columns: tuple[str, ...]
     rows: tuple[tuple[str, ...], ...]
-    numbers_from: int = 1
+    numbers_from: int | None = 1
     caption: str = ""
 
 
@@ -58,12 +67,12 @@ class Report:
         identifier: unique; stands on each page.
         issued: the day that stands for the report: that on which the run ended.
         verdict: in a few words, below the title.
-        tone: of the verdict: ``good``, ``open`` or ``bad``; never the only sign of it.
+        tone: of the verdict; never the only sign of it.
     """
 
     title: str
     identifier: str
     issued: date
     verdict: str
-    tone: str
+    tone: Tone
     chapters: tuple[Chapter, ...]

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from hexacell.application.reported_run import ReportedRun
-from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.rotations import Array
 from hexacell.presentation.calibration_report.blocks import Chapter, Picture
+from hexacell.uncertainty.statement import COVERAGE_FACTOR
 from procedures.run.steps import Phase
 
 SMALLEST_MM = 1e-4
@@ -67,7 +67,7 @@ def _changes(run: ReportedRun) -> Picture | None:
         return None
     mechanism = run.settings.mechanism
     parameters = mechanism.parameters
-    old = mechanism.normalize_frames(Geometry.of(parameters, run.started.controller))[0].vector
+    old = run.geometry_before.vector
     sigma = parameters.vector(identified.result.sigma)
     rows = np.flatnonzero(sigma > 0.0)
     change = (parameters.vector(identified.result.geometry) - old)[rows]
@@ -75,7 +75,7 @@ def _changes(run: ReportedRun) -> Picture | None:
     axes.errorbar(
         np.arange(len(rows)),
         change,
-        yerr=2.0 * sigma[rows],
+        yerr=COVERAGE_FACTOR * sigma[rows],
         fmt="o",
         color=AFTER,
         markersize=3.5,

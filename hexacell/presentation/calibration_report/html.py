@@ -99,5 +99,6 @@ def _table(table: Table) -> str:
 
 
 def _cell(tag: str, text: str, column: int, table: Table) -> str:
-    kind = ' class="number"' if column >= table.numbers_from else ""
+    is_number = table.numbers_from is not None and column >= table.numbers_from
+    kind = ' class="number"' if is_number else ""
     return f"<{tag}{kind}>{escape(text)}</{tag}>"

@@ -15,6 +15,7 @@ from hexacell.presentation.calibration_report.blocks import (
     Picture,
     Report,
     Table,
+    Tone,
 )
 
 STANDARD: Final = "a-2b"
@@ -39,7 +40,7 @@ PREAMBLE = """
 #block(width: 100%, inset: 9pt, stroke: (left: 5pt + {colour}), text(17pt, weight: "bold", {verdict}))
 """
 
-COLOURS = {"good": 'rgb("#1b7837")', "bad": 'rgb("#b2182b")', "open": 'rgb("#b8860b")'}
+COLOURS = {Tone.GOOD: 'rgb("#1b7837")', Tone.BAD: 'rgb("#b2182b")', Tone.OPEN: 'rgb("#b8860b")'}
 
 
 def pdf_of(report: Report) -> bytes:
@@ -103,9 +104,9 @@ def _block(block: Block) -> str:
 
 def _table(table: Table) -> str:
     count = len(table.columns)
-    has_numbers = count > table.numbers_from
-    widths = ", ".join(["auto"] * count if has_numbers else ["auto", *["1fr"] * (count - 1)])
-    align = ", ".join("right" if column >= table.numbers_from else "left" for column in range(count))
+    first = table.numbers_from
+    widths = ", ".join(["auto"] * count if first is not None else ["auto", *["1fr"] * (count - 1)])
+    align = ", ".join("left" if first is None or column < first else "right" for column in range(count))
     head = ", ".join(f"strong({_text(name)})" for name in table.columns)
     cells = ", ".join(_text(text) for row in table.rows for text in row)
     return f"#table(columns: ({widths}), align: ({align}), table.header({head}), {cells})"

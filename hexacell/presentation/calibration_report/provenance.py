@@ -32,7 +32,7 @@ def traceability_chapter(run: ReportedRun) -> Chapter:
     rows = tuple(_instrument_row(run, device, day) for device in run.started.devices)
     expired = run.settings.expired_on(day)
     text = f"Expired on the day of the run: {', '.join(expired)}." if expired else ""
-    table = Table(("Instrument", "kind", "serial number", "certificate", "due"), rows, 9)
+    table = Table(("Instrument", "kind", "serial number", "certificate", "due"), rows, None)
     return Chapter(
         "Instruments and traceability", (table, *([Paragraph(text, is_strong=True)] if text else []))
     )
@@ -45,7 +45,7 @@ def integrity_chapter(run: ReportedRun) -> Chapter:
         "`hexacell replay` repeats its decisions and results."
     )
     rows = tuple((name, digest) for name, digest in sorted(run.fingerprints.items()))
-    return Chapter("Files", (Paragraph(text), Table(("File", "SHA-256"), rows, 9)))
+    return Chapter("Files", (Paragraph(text), Table(("File", "SHA-256"), rows, None)))
 
 
 def authorisation_chapter(run: ReportedRun) -> Chapter:

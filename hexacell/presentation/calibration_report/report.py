@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from hexacell.application.reported_run import ReportedRun
-from hexacell.presentation.calibration_report.blocks import Report
+from hexacell.presentation.calibration_report.blocks import Report, Tone
 from hexacell.presentation.calibration_report.figures import figure_chapter
 from hexacell.presentation.calibration_report.provenance import (
     authorisation_chapter,
@@ -59,6 +59,6 @@ def report_of(run: ReportedRun, earlier: ReportedRun | None = None) -> Report:
         identifier=run.identifier,
         issued=run.ended.date(),
         verdict=NO_VERDICT if verdict is None else verdict.value.upper(),
-        tone="open" if verdict is None else TONES.get(verdict, "open"),
+        tone=Tone.OPEN if verdict is None else TONES.get(verdict, Tone.OPEN),
         chapters=tuple(chapter for chapter in chapters if chapter is not None),
     )

@@ -9,7 +9,6 @@ import numpy as np
 
 from hexacell.application.reported_run import ReportedRun
 from hexacell.errors import UsageError
-from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.parameters import ParameterUnit
 from hexacell.presentation.calibration_report.blocks import Block, Chapter, Paragraph, Table
 from hexacell.reporting.check_result import ParameterChange
@@ -112,7 +111,7 @@ def _parameter_rows(run: ReportedRun) -> Iterator[tuple[str, ...]]:
     identified, mechanism = run.state.identified, run.settings.mechanism
     assert identified is not None  # noqa: S101 - asked only then
     parameters = mechanism.parameters
-    old = mechanism.normalize_frames(Geometry.of(parameters, run.started.controller))[0].vector
+    old = run.geometry_before.vector
     new = parameters.vector(identified.result.geometry)
     sigma = parameters.vector(identified.result.sigma)
     for row in np.flatnonzero(sigma > 0.0):

@@ -8,7 +8,7 @@ from __future__ import annotations
 from hexacell.application.reported_run import ReportedRun
 from hexacell.campaign.teaching import TaskDisplacement
 from hexacell.decision import Verdict
-from hexacell.presentation.calibration_report.blocks import Block, Chapter, Facts, Paragraph, Table
+from hexacell.presentation.calibration_report.blocks import Block, Chapter, Facts, Paragraph, Table, Tone
 from hexacell.presentation.length import NOT_CHECKED, scale_lines
 from hexacell.presentation.teaching import teaching_sentence
 from hexacell.reporting.verification import JudgedError, ModelTest, VerifiedAccuracy
@@ -25,7 +25,7 @@ MEANINGS = {
     Verdict.NOT_EVALUATED: "The records do not decide it.",
 }
 
-TONES = {Verdict.PASS: "good", Verdict.FAIL: "bad"}
+TONES = {Verdict.PASS: Tone.GOOD, Verdict.FAIL: Tone.BAD}
 """Of all others: open."""
 
 MODES = {
@@ -137,7 +137,7 @@ def _reasons(run: ReportedRun) -> tuple[Block, ...]:
         return (Paragraph(f"How it ended: {reason}."),)
     if judged.verification is not None and judged.verification.tests:
         return (
-            Table(("Test of the model", "result"), tuple(map(_test_row, judged.verification.tests)), 9),
+            Table(("Test of the model", "result"), tuple(map(_test_row, judged.verification.tests)), None),
         )
     return (Paragraph(judged.line),)
 

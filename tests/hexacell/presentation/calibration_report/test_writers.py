@@ -17,6 +17,7 @@ from hexacell.presentation.calibration_report.blocks import (
     Picture,
     Report,
     Table,
+    Tone,
 )
 from hexacell.presentation.calibration_report.html import html_of
 from hexacell.presentation.calibration_report.pdf import pdf_of, typst_of
@@ -32,7 +33,7 @@ def report(text: str) -> Report:
         Table((text, text), ((text, text),)),
         Picture(SVG, text),
     )
-    return Report(text, text, date(2026, 11, 23), text, "good", (Chapter(text, blocks),))
+    return Report(text, text, date(2026, 11, 23), text, Tone.GOOD, (Chapter(text, blocks),))
 
 
 class Reader(HTMLParser):

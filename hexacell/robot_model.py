@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -50,6 +50,8 @@ class Robot:
             while measuring.
         uses_provisional: whether it commands with the last of them now.
         known: what is known before measuring, if that is more than the drawing with its tolerances.
+        known_effects: what the systematic effects did to that, as errors (p, k) of the free parameters by
+            the name of the effect.
         taught: the geometry with which points and frames were taught last, in the frames of that time; none
             in runs of before there was a choice of frames, which wrote a geometry in the convention's.
         earlier: geometries that may have commanded older records: the drawing, the taught one, and those
@@ -70,6 +72,7 @@ class Robot:
     provisional: tuple[Geometry, ...] = ()
     uses_provisional: bool = False
     known: Prior | None = None
+    known_effects: Mapping[str, Array] = field(default_factory=dict)
     taught: Geometry | None = None
     earlier: tuple[CommandingGeometry, ...] = ()
     work_frame: str = "xyz"

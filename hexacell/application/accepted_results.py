@@ -107,10 +107,12 @@ def _result(cell: Cell, accepted: _AcceptedRun) -> AcceptedResult:
 
 
 def _length(state: RunState) -> LengthResult | None:
-    """What the length check of a run found."""
+    """What the length check of a run found, or, if it had none, of that which it started from."""
     verification = None if state.judged is None else state.judged.verification
     accuracy = None if verification is None else verification.accuracy
-    return None if accuracy is None else accuracy.length
+    found = None if accuracy is None else accuracy.length
+    before = None if state.started is None else state.started.accepted
+    return found or (None if before is None else before.length)
 
 
 def _effects(cell: Cell, state: RunState) -> dict[str, tuple[tuple[float, ...], ...]]:
@@ -121,12 +123,12 @@ def _effects(cell: Cell, state: RunState) -> dict[str, tuple[tuple[float, ...], 
     start = robot_of_start(
         settings, started.controller, started.branch, started.taught, started.joint_ranges
     )
-    robot = Calibration(settings, start, Mode.OPTIMISE).robot_of(state)
+    robot = Calibration(settings, start, Mode(started.mode), accepted=started.accepted).robot_of(state)
     effects = [one for one in with_measured_scale(robot.effects, _length(state)) if one.size]
     if not effects:
         return {}
     found = identify(robot.problem(state.measurements()))
     belief = robot.belief(found)
-    budget = Task.of(settings, robot, belief).budget(found, belief, effects)
+    budget = Task.of(settings, robot, belief).budget(found, belief, effects, robot.known_effects)
     columns = {} if budget is None else budget.parameter_columns
     return {name: tuple(map(tuple, each.T.tolist())) for name, each in columns.items()}

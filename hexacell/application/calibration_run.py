@@ -77,7 +77,7 @@ async def preflight(cell: Cell, mode: Mode, *, unattended: bool) -> tuple[Device
     Raises:
         HexacellError: every failure, in one report.
     """
-    calibration = _new_calibration(cell, mode)
+    calibration = new_calibration(cell, mode)
     with cell_lock(cell.config_path):
         async with _checked_devices(cell, calibration, runs_folder(cell), unattended) as connected:
             raise_all(await _position_failures(cell, connected))
@@ -111,7 +111,7 @@ async def calibrate(
         if started is None:
             _require_own_geometry(cell)
             require_enough(request.removed, len(cell.settings.identification.points))
-            whole = _new_calibration(cell, request.mode, length_check=request.length_check)
+            whole = new_calibration(cell, request.mode, length_check=request.length_check)
             calibration = whole.without(request.removed)
         else:
             calibration = calibration_of_run(cell, started)
@@ -296,7 +296,7 @@ def calibration_of_run(cell: Cell, started: events.RunStarted) -> Calibration:
     ).without(started.removed)
 
 
-def _new_calibration(cell: Cell, mode: Mode, *, length_check: bool = False) -> Calibration:
+def new_calibration(cell: Cell, mode: Mode, *, length_check: bool = False) -> Calibration:
     """The calibration or check of a cell as it is now.
 
     Raises:
@@ -309,6 +309,12 @@ def _new_calibration(cell: Cell, mode: Mode, *, length_check: bool = False) -> C
             action="Add [length_check] with first_seat, distance_mm and uncertainty_mm",
         )
     accepted = None if mode is Mode.OPTIMISE else last_accepted_result(cell)
+    if mode is Mode.QUICK and accepted is None:
+        raise UsageError(
+            "no accepted result has this config: the quick level carries on from one",
+            subject=cell.config_path,
+            action="Calibrate the robot with `hexacell run CELL --mode optimise`",
+        )
     if mode is Mode.LENGTH and accepted is None:
         raise UsageError(
             "no accepted result has this config: a length check needs a calibrated machine",

@@ -33,11 +33,11 @@ class RunSummary(Frozen):
 
     Attributes:
         began, ended: when its first and its last event were written, UTC.
-        mode: check, optimise or length; empty where its journal cannot be read.
+        mode: check, quick, optimise or length; empty where its journal cannot be read.
         verdict: none where there is none.
         accuracy: the errors at the task poses that the verdict is on; none where there is no such verdict.
         line: how it ended, in words; why its journal cannot be read, if it cannot.
-        has_result: whether it identified a geometry.
+        has_result: whether it identified a geometry of its own, with which no other result took part.
         is_over: whether it has ended; one that has not can be resumed.
         written_sha256: fingerprint of the controller's config as it wrote it; none where it wrote none.
         has_written: whether it wrote the config at all, whatever was undone.
@@ -109,7 +109,7 @@ def _summary(folder: RunFolder) -> RunSummary:
         verdict=None if state.judged is None else state.judged.verdict,
         accuracy=_accuracy(state.judged),
         line=_last_line(entries, state),
-        has_result=state.identified is not None,
+        has_result=_has_own_result(state),
         is_over=state.ended is not None,
         written_sha256=_written_sha256(folder),
         has_written=(folder.path / RECEIPT).is_file(),
@@ -170,7 +170,9 @@ def is_applied_later(folder: RunFolder) -> bool:
 def _result_of(run: PastRun) -> IdentificationResult:
     result = _result(run.folder)
     if result is None:
-        raise UsageError(f"the run {run.name} identified no geometry", action="Name calibrations, which do")
+        raise UsageError(
+            f"the run {run.name} identified no geometry of its own", action="Name calibrations, which do"
+        )
     return result
 
 
@@ -179,7 +181,13 @@ def _result(folder: RunFolder) -> IdentificationResult | None:
         state = fold(read_journal(folder.journal))
     except HexacellError:
         return None
-    return None if state.identified is None else state.identified.result
+    return state.identified.result if _has_own_result(state) and state.identified else None
+
+
+def _has_own_result(state: RunState) -> bool:
+    """The quick level's has the errors of the result that it started from: the two are no two witnesses."""
+    is_quick = state.started is not None and state.started.mode == "quick"
+    return state.identified is not None and not is_quick
 
 
 def _age_rank(run: PastRun) -> tuple[bool, float, str]:

@@ -66,5 +66,5 @@ def _identified(cell: Cell, state: RunState) -> IdentificationResult:
     robot = robot_of_start(
         cell.settings, started.controller, started.branch, started.taught, started.joint_ranges
     )
-    known = Calibration(cell.settings, robot, Mode.OPTIMISE).robot_of(state)
+    known = Calibration(cell.settings, robot, Mode(started.mode), accepted=started.accepted).robot_of(state)
     return IdentificationResult.of(identify(known.problem(state.measurements())))

@@ -58,7 +58,7 @@ class RunDescribed(Frozen):
     cell: str
     cell_file: Path
     folder: Path
-    mode: Literal["check", "optimise", "length"]
+    mode: Literal["check", "quick", "optimise", "length"]
     expected_records: int = 0
     is_recorded: bool = False
 

@@ -138,6 +138,17 @@ class CheckSettings(Section):
     budget_records: int = Field(40, ge=4, le=MOST_RECORDS, description="most records, references included")
 
 
+class QuickSettings(Section):
+    """The quick level: a check carried on until the robot is known as well as after its calibration."""
+
+    budget_records: int = Field(
+        24,
+        ge=4,
+        le=MOST_RECORDS,
+        description="most records, references included; held-out poses come on top",
+    )
+
+
 class TaskSettings(Section):
     """The robot's task: poses for which its accuracy is predicted, and the frames that can be taught."""
 

@@ -30,6 +30,7 @@ from hexacell.cell.measuring import (
     GuardSettings,
     IdentificationSettings,
     NoiseSettings,
+    QuickSettings,
     StationSettings,
     TaskSettings,
     TimingSettings,
@@ -82,6 +83,7 @@ class CellSettings(Section):
     verification: VerificationSettings
     acceptance: AcceptanceSettings = AcceptanceSettings()
     check: CheckSettings = CheckSettings()
+    quick: QuickSettings = QuickSettings()
     length_check: LengthCheckSettings | None = None
     recovery: RecoverySettings = RecoverySettings()
     archive: ArchiveSettings = ArchiveSettings()

@@ -119,8 +119,9 @@ def _run(commands: Any) -> None:  # noqa: ANN401
     parser.add_argument("--unattended", action="store_true", help="no person can place gauges or approve")
     parser.add_argument(
         "--mode",
-        choices=("check", "optimise"),
+        choices=("check", "quick", "optimise"),
         help="check: measure until the error is decided, change nothing (default if unattended); "
+        "quick: carry a check on to the accuracy of the last calibration, and write back; "
         "optimise: calibrate and write back (default otherwise)",
     )
     parser.add_argument(
@@ -182,6 +183,12 @@ def _preflight(commands: Any) -> None:  # noqa: ANN401
     parser = _command(commands, "preflight", "check everything that must hold before motion; moves nothing")
     _add_cell(parser)
     parser.add_argument("--unattended", action="store_true", help="check also that no person is needed")
+    parser.add_argument(
+        "--mode",
+        choices=("quick", "optimise"),
+        default="optimise",
+        help="of the run: a calibration (default), or the quick level from the last result on",
+    )
     _add_json(parser)
 
 
@@ -202,7 +209,7 @@ def _host(commands: Any) -> None:  # noqa: ANN401
     parser.set_defaults(target="host.main")
     _add_cell(parser)
     parser.add_argument("--folder", type=Path, required=True)
-    parser.add_argument("--mode", choices=("check", "optimise", "length"), required=True)
+    parser.add_argument("--mode", choices=("check", "quick", "optimise", "length"), required=True)
     parser.add_argument("--resume", action="store_true")
     parser.add_argument("--length-check", action="store_true")
     parser.add_argument("--removed", type=Path, required=True)
@@ -343,9 +350,10 @@ def _schedule(commands: Any) -> None:  # noqa: ANN401
     what.add_argument("--remove", action="store_true", help="remove them")
     parser.add_argument(
         "--mode",
-        choices=("check", "optimise"),
+        choices=("check", "quick", "optimise"),
         default="check",
-        help="check: change nothing (default); optimise: recalibrate, and apply only within the limits",
+        help="check: change nothing (default); quick: correct what has drifted, optimise: recalibrate, "
+        "and apply only within the limits",
     )
     for option, default, meaning in (
         ("--longest", 120, "stop a run in place after so long"),

@@ -18,6 +18,7 @@ from hexacell.application.refit import RefittedRun
 from hexacell.application.retention import Retention
 from hexacell.application.schedules import Schedule
 from hexacell.campaign.decisions import Finished, Forecast, MeasurePose, StartPoint
+from hexacell.campaign.quick_trial import QuickTrial
 from hexacell.presentation.run_story import run_story
 from hexacell.presentation.teaching import teaching_sentence
 from hexacell.reporting.run_comparison import ParameterTrend, RunComparison
@@ -100,9 +101,22 @@ def preflight_document(devices: Sequence[DeviceIdentity], trial: PlanTrial) -> d
     }
 
 
+def quick_preflight_document(devices: Sequence[DeviceIdentity], trial: QuickTrial) -> dict[str, Any]:
+    """What ``preflight --mode quick --json`` prints."""
+    return {
+        "ready": True,
+        "devices": [asdict(identity) for identity in devices],
+        "expected": {
+            "points": trial.points,
+            "minutes": trial.minutes,
+            "quick": trial.accuracy and trial.accuracy.model_dump(mode="json"),
+        },
+    }
+
+
 def run_document(request: RunRequest, ended: events.Ended, state: RunState) -> dict[str, Any]:
     """What ``run --json`` and ``demo --json`` print."""
-    judged, noise = state.judged, state.noise
+    judged, noise, found = state.judged, state.noise, state.identified
     measurements, moved = request.folder.measurements, ended.displacement
     return {
         "exit_code": ended.exit_code,
@@ -110,6 +124,7 @@ def run_document(request: RunRequest, ended: events.Ended, state: RunState) -> d
         "verdict": judged and judged.verdict.value,
         "verification": judged and judged.verification and judged.verification.model_dump(mode="json"),
         "check": judged and judged.check and judged.check.model_dump(mode="json"),
+        "quick": found and found.quick and found.quick.model_dump(mode="json"),
         "length": judged and judged.length and judged.length.model_dump(mode="json"),
         "measured_noise": noise and noise.noise.model_dump(mode="json"),
         "displacement": moved and moved.model_dump(mode="json"),

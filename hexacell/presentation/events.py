@@ -10,6 +10,7 @@ from hexacell.presentation.length import length_text
 from hexacell.presentation.measured_noise import noise_and_averaging_text
 from hexacell.presentation.plan_draft import removed_summary
 from hexacell.presentation.planning import run_forecast_line
+from hexacell.presentation.quick_level import quick_accuracy_text, quick_start_text
 from hexacell.presentation.verification import check_start_text, check_text, verification_text
 from procedures.run import events
 from procedures.run.state import RunState
@@ -106,7 +107,8 @@ def event_text(event: events.Event, state: RunState) -> str | None:
 def _basis_or_verdict(event: events.RunStarted | events.ResultValidated) -> str | None:
     """What a check starts from, and the verdict of any run."""
     if isinstance(event, events.RunStarted):
-        basis = None if event.mode == "optimise" else check_start_text(event.accepted)
+        quick = quick_start_text(event.accepted) if event.mode == "quick" else None
+        basis = quick if event.mode in {"quick", "optimise"} else check_start_text(event.accepted)
         removed = removed_summary(event.removed)
         told = f"left out of the plan: {removed}" if removed else None
         return "\n".join(filter(None, (basis, told))) or None
@@ -118,10 +120,12 @@ def _basis_or_verdict(event: events.RunStarted | events.ResultValidated) -> str 
 
 
 def _finding_text(event: events.Event) -> str | None:
-    """What a start, the measured noise or a verdict reports."""
+    """What a start, the measured noise, the quick level or a verdict reports."""
     match event:
         case events.RunStarted() | events.ResultValidated():
             return _basis_or_verdict(event)
+        case events.Identified(quick=quick):
+            return None if quick is None else quick_accuracy_text(quick)
         case events.NoiseMeasured():
             return noise_and_averaging_text(event.noise)
         case _:

@@ -24,7 +24,7 @@ DETACHABLE_LETTERS = f"{LETTERS}\nq leave, and the run goes on; t take control f
 def attached_resume_hint(run: RunDescribed) -> str:
     """How to resume a run that ended early in a process of its own."""
     command = "length" if run.mode == "length" else "run"
-    mode = ["--mode", "check"] if run.mode == "check" else []
+    mode = ["--mode", run.mode] if run.mode in {"check", "quick"} else []
     words = ["hexacell", command, str(run.cell_file), "--resume", str(run.folder), *mode]
     return f"What was measured is kept. To continue:\n  {shlex.join(words)}"
 

@@ -59,7 +59,7 @@ def resume_hint(request: RunRequest) -> str:
 def resume_command(request: RunRequest) -> str:
     """The shell command that resumes a run with a person at the terminal."""
     command = "length" if request.mode is Mode.LENGTH else "run"
-    mode = ["--mode", "check"] if request.mode is Mode.CHECK else []
+    mode = ["--mode", request.mode.value] if request.mode in {Mode.CHECK, Mode.QUICK} else []
     words = ["hexacell", command, str(request.cell.path), "--resume", str(request.folder.path), *mode]
     return shlex.join(words)
 

@@ -7,6 +7,8 @@ from hexacell.presentation.layout import wrapped
 
 MEANING = {
     "check": "It measures a few records and changes nothing.",
+    "quick": "It corrects what has drifted since the last result; the config is changed only if every gate "
+    "is passed.",
     "optimise": "It recalibrates; the config is changed only if every gate is passed.",
 }
 

@@ -129,7 +129,7 @@ def assess(
         task=tuple(robot.to_command(task.poses.pose(row)) for row in range(len(task.poses))),
         task_named=bool(settings.task.poses),
         accuracy=accuracy and replace(accuracy, after=accuracy.after.times(found.goodness.noise_factor)),
-        budget=task.budget(found, belief, robot.effects),
+        budget=task.budget(found, belief, robot.effects, robot.known_effects),
         tolerance_violations=robot.tolerance_violations(found.estimate),
         possible_causes=possible_causes(found) if _is_doubtful(found) else (),
         measured_noise=measured_noise,

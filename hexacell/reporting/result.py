@@ -50,7 +50,11 @@ class OutlierRecord(Frozen):
 
 
 class IdentificationResult(Frozen):
-    """The identified geometry and its uncertainty: the first part of ``result.json``."""
+    """The identified geometry and its uncertainty: the first part of ``result.json``.
+
+    ``expected_chi2`` is the mean of ``chi2`` if model and noise are right, where an earlier result takes
+    part in the estimate; where only the drawing does, it is none, and that mean is ``dof``.
+    """
 
     converged: bool
     termination: Termination
@@ -66,6 +70,7 @@ class IdentificationResult(Frozen):
     undetermined: tuple[str, ...]
     outliers: tuple[OutlierRecord, ...]
     frame: str
+    expected_chi2: float | None = None
 
     @classmethod
     def of(cls, found: Identification) -> Self:
@@ -86,6 +91,7 @@ class IdentificationResult(Frozen):
             undetermined=found.undetermined,
             outliers=tuple(OutlierRecord.of(record, fault) for record, fault in found.left_out),
             frame=found.problem.mechanism.convention.name,
+            expected_chi2=found.goodness.expected if found.problem.prior.is_estimate else None,
         )
 
     def document(self, parameters: ParameterSet) -> dict[str, Any]:
@@ -118,8 +124,10 @@ class IdentificationResult(Frozen):
 
     @property
     def residuals(self) -> ChiSquareTest:
-        """The chi-square test of the residuals, of which all parameters are determined."""
-        return ChiSquareTest(self.chi2, float(self.dof))
+        """The chi-square test of the residuals."""
+        return ChiSquareTest(
+            self.chi2, float(self.dof) if self.expected_chi2 is None else self.expected_chi2
+        )
 
     def identified(self, parameters: ParameterSet) -> Geometry:
         """The geometry in the mechanism's frame convention."""

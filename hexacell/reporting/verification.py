@@ -224,13 +224,15 @@ def verified_accuracy(
     """The error that the geometry of ``found`` makes at the task poses, by the updated estimate."""
     belief = robot.belief(updated)
     task = Task.of(settings, robot, belief).reachable(belief)
-    budget = task.budget(updated, belief, robot.effects)
+    budget = task.budget(updated, belief, robot.effects, robot.known_effects)
     if budget is None:
         return None
     check = measured and _length_check(settings, robot, updated, budget, measured)
     length = check and LengthResult.of(check, settings.uncertainty.common_encoder_scale_um_m)
     if check and length and length.replaces_stated:
-        budget = task.budget(updated, belief, robot.effects, scale=check.observation) or budget
+        budget = (
+            task.budget(updated, belief, robot.effects, robot.known_effects, check.observation) or budget
+        )
     errors = budget.errors_of(found.free - updated.free)
     limits = settings.acceptance
     factor = limits.guard_band_factor

@@ -20,7 +20,7 @@ class ScheduledRun:
         cell: the cell file, absolute.
         name: of the cell.
         program: the words that start hexacell, absolute.
-        mode: ``check`` or ``optimise``.
+        mode: ``check``, ``quick`` or ``optimise``.
         hour, minute: when it begins, in the computer's time zone.
         longest_minutes: after so long it is ended in place, and can be resumed.
         retry_minutes: so long after a failure that may pass (a device, the lock) it is tried again.

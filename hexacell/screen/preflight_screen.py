@@ -24,6 +24,7 @@ class PreflightScreen(TabScreen):
         Binding("x", "app.plan", "Take poses out of the plan", show=False),
         Binding("s", "app.perform('start', 'optimise')", "Start a calibration", show=False),
         Binding("k", "app.perform('start', 'check')", "Start a check", show=False),
+        Binding("K", "app.perform('start', 'quick')", "Start a quick level", show=False),
         Binding("l", "app.perform('start', 'length')", "Start a length check", show=False),
         Binding("L", f"app.perform('start', '{WITH_LENGTH}')", "Calibrate, check the length", show=False),
         Binding("r", "app.perform('start', 'resume')", "Resume the latest run", show=False),

@@ -39,7 +39,7 @@ class IdentifiedBefore:
     def prior(self, scale: float) -> Prior:
         """What is known of the geometry now, with the drift ``scale`` times as large as usual."""
         free = self.mechanism.convention.free_parameters(self.geometry)
-        return Prior(self.geometry, free, self.covariance + scale**2 * self.drift)
+        return Prior(self.geometry, free, self.covariance + scale**2 * self.drift, is_estimate=True)
 
 
 def drift_covariance(mechanism: Mechanism, geometry: Geometry, sigma: Array) -> Array:

@@ -35,13 +35,14 @@ def _plan_failures(calibration: Calibration, *, unattended: bool) -> Iterator[li
     if calibration.mode is Mode.LENGTH:
         return
     is_check = calibration.mode is Mode.CHECK
+    is_known = is_check or calibration.mode is Mode.QUICK
     failures = [*feasibility.reach_failures(calibration.plan)]
     failures += [] if is_check else _held_out_failures(calibration)
     yield failures
     too_few = [] if is_check else [*feasibility.too_few_records(calibration.plan)]
     yield too_few
     if not failures and not too_few:
-        find = feasibility.measuring_failures if is_check else feasibility.optimisation_failures
+        find = feasibility.measuring_failures if is_known else feasibility.optimisation_failures
         yield from find(calibration.plan)
     if unattended and calibration.settings.stations.placement == "by-hand":
         yield [

@@ -3,7 +3,8 @@
 The points are measured (:mod:`~procedures.calibration.identification_steps`) and the geometry is
 identified. The held-out points are measured (:mod:`~procedures.calibration.held_out_steps`), the geometry
 is written to the controller, and the held-out points are measured again. A check measures points, until
-they decide, and nothing else (:mod:`~hexacell.campaign.check`). A length check, of its own or before the
+they decide, and nothing else (:mod:`~hexacell.campaign.check`); the quick level carries a check on to a
+geometry (:mod:`~hexacell.campaign.quick_level`). A length check, of its own or before the
 verdict on a calibration, measures two seats (:mod:`~procedures.calibration.length_steps`). Nothing here
 uses hardware or files, so a run, its resumption and its replay decide alike.
 """
@@ -21,6 +22,7 @@ from hexacell.campaign.check import Check, identified_before
 from hexacell.campaign.measured_noise import MeasuredNoise, with_measured_noise
 from hexacell.campaign.planner import Plan
 from hexacell.campaign.pose_list import PoseList
+from hexacell.campaign.quick_level import QuickLevel
 from hexacell.campaign.removed_poses import NOTHING_REMOVED, RemovedPoses
 from hexacell.campaign.teaching import WrittenGeometry, as_written
 from hexacell.cell.model import CellSettings
@@ -52,6 +54,7 @@ class Mode(StrEnum):
 
     OPTIMISE = "optimise"
     CHECK = "check"
+    QUICK = "quick"
     LENGTH = "length"
 
 
@@ -69,7 +72,8 @@ def expected_records(
     if mode is Mode.CHECK:
         return settings.check.budget_records + len(plan.points)
     records = len(plan.points) * plan.orientations if listed is None else len(listed)
-    identification = min(records, plan.budget_records or records) + len(plan.points)
+    budget = settings.quick.budget_records if mode is Mode.QUICK else plan.budget_records
+    identification = min(records, budget or records) + len(plan.points)
     calibration = identification + 2 * verification + points * (held_out.orientations - 1)
     return calibration + (length if length_check else 0)
 
@@ -98,7 +102,7 @@ class Calibration:
     Attributes:
         listed: the poses to measure, if a file lists them.
         accepted: the result that the controller has, of which a check starts; none where that is the
-            drawing. A length check has one.
+            drawing. A length check and the quick level have one.
         measured_noise: what settings and robot contain of it; none before it is measured.
         length_check: whether the length scale of a calibration is checked.
         removed: what a person took out of the plan; see :meth:`without`.
@@ -159,6 +163,11 @@ class Calibration:
             frozenset(self.removed.points),
         )
 
+    @cached_property
+    def quick(self) -> QuickLevel:
+        """The quick level, from the accepted result on."""
+        return QuickLevel(self.check, self.settings.quick.budget_records)
+
     def informed(self, state: RunState) -> Calibration:
         """The same with what the run has learnt: its noise, and poses that are not commanded."""
         known = self._with_measured_noise(state)
@@ -208,7 +217,11 @@ class Calibration:
     def robot_of(self, state: RunState) -> Robot:
         """The robot with all geometries that commanded the records of the identification."""
         informed = self.informed(state)
-        return informed._at_temperatures(informed._identifying(state).robot, state.temperature_range_k)
+        if self.mode is Mode.QUICK:
+            robot = informed.quick.robot_after(state.measurements())
+        else:
+            robot = informed._identifying(state).robot
+        return informed._at_temperatures(robot, state.temperature_range_k)
 
     def as_written(self, identified: Geometry) -> WrittenGeometry:
         """What the controller gets of a geometry in the frame convention."""
@@ -225,7 +238,10 @@ class Calibration:
         """The robot with the effects of temperatures read while measuring, and a scale measured before."""
         effects = stated_effects(self.settings, range_k)
         length = None if self.accepted is None else self.accepted.length
-        return replace(robot, effects=with_measured_scale(effects, length))
+        known = (
+            {} if self.accepted is None or self.mode is not Mode.QUICK else self.accepted.parameter_columns
+        )
+        return replace(robot, effects=with_measured_scale(effects, length), known_effects=known)
 
     def provisional_geometry(self, state: RunState) -> Geometry:
         """The estimate by now, or the provisional geometry that the run applied before an interruption.
@@ -322,8 +338,8 @@ class Calibration:
 
     @cached_property
     def _at_start(self) -> _Measuring:
-        if self.mode is Mode.CHECK:
-            return _Measuring(self.check.plan)
+        if self.mode in {Mode.CHECK, Mode.QUICK}:
+            return _Measuring((self.check if self.mode is Mode.CHECK else self.quick).plan)
         return _Measuring(self._calibrating(self.robot_checked if self.mode is Mode.LENGTH else self.robot))
 
     def _calibrating(self, robot: Robot) -> Plan:

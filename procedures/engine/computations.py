@@ -56,12 +56,12 @@ class Computations:
         settings, noise = calibration.settings, calibration.measured_noise
         assessed = assess(settings, robot, measurements, identified, noise)
         self.folder.write_result(fit_document(assessed))
-        result = IdentificationResult.of(identified)
         return events.Identified(
-            result=result,
+            result=IdentificationResult.of(identified),
             held_out=calibration.held_out_poses(identified),
             held_out_after=calibration.held_out_poses_after(identified),
             improvement=assessed.improvement,
+            quick=calibration.quick.accuracy(measurements) if calibration.mode is Mode.QUICK else None,
         )
 
     def with_replacements(self, refusal: events.PoseExcluded, state: RunState) -> events.PoseExcluded:

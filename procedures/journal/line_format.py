@@ -23,13 +23,13 @@ from hexacell.cell.fields import first_mistake
 from hexacell.errors import FileError
 from procedures.run.events import Event
 
-VERSION = 9
+VERSION = 10
 """What this program writes; it reads this and all before. Version 1 had neither version nor ``s``, and
 versions 1 and 2 no verification; checks of version 3 measured held-out points; up to version 5 no noise was
 measured. Versions up to 6 had no length check. Up to 8 only the controller's pose was read where the robot
 was located, its guard tripped on an emergency stop, gauges were not tried, the place of their plungers
 did not count, the minutes of a forecast knew no durations of moves, and commands kept fewer limits. So a
-run of them was decided by other rules."""
+run of them was decided by other rules. Up to 9 there was no quick level."""
 
 RULES_SINCE = 9
 """The version since which runs are decided by the present rules; older ones are not resumed."""

@@ -332,6 +332,7 @@ async def test_quitting_may_stop_the_run(
     [
         ("s", "optimise"),
         ("k", "check"),
+        ("K", "quick"),
         ("r", "resume"),
         ("l", "length"),
         ("L", "optimise with length check"),

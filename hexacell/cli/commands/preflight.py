@@ -5,14 +5,16 @@ from __future__ import annotations
 import argparse
 import asyncio
 
-from hexacell.application.calibration_run import preflight
+from hexacell.application.calibration_run import new_calibration, preflight
 from hexacell.application.offline import try_plan
+from hexacell.campaign.quick_trial import try_quick_level
 from hexacell.cli.cell_argument import cell_with_devices_at
 from hexacell.cli.console import Console
 from hexacell.errors import ExitCode
-from hexacell.presentation.documents import preflight_document
+from hexacell.presentation.documents import preflight_document, quick_preflight_document
 from hexacell.presentation.layout import wrapped
 from hexacell.presentation.planning import plan_trial_lines, preflight_lines
+from hexacell.presentation.quick_level import quick_trial_text
 from procedures.calibration.workflow import Mode
 
 
@@ -20,9 +22,15 @@ def main(options: argparse.Namespace) -> ExitCode:
     """Report every failure at once, move nothing; then predict what the plan gives."""
     console = Console(options.json)
     cell = cell_with_devices_at(options.cell, console)
-    devices = asyncio.run(preflight(cell, Mode.OPTIMISE, unattended=options.unattended))
+    mode = Mode(options.mode)
+    devices = asyncio.run(preflight(cell, mode, unattended=options.unattended))
     for line in preflight_lines(devices):
         console.print(wrapped(line, indent=6))
+    if mode is Mode.QUICK:
+        tried = try_quick_level(new_calibration(cell, mode).quick)
+        console.document(quick_preflight_document(devices, tried))
+        console.print(wrapped(quick_trial_text(tried)))
+        return ExitCode.DONE
     trial = try_plan(cell)
     console.document(preflight_document(devices, trial))
     for line in plan_trial_lines(trial):

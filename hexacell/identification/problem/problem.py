@@ -120,12 +120,14 @@ class Prior:
         covariance: (p, p) of the free parameters, mm^2.
         tolerance_sigma: (p,) their standard deviations by their own tolerances, mm, without those of the
             parameters that define the frames; none where the prior is no drawing.
+        is_estimate: whether it is an earlier estimate, with what may have drifted since.
     """
 
     centre: Geometry
     free: Array
     covariance: Array
     tolerance_sigma: Array | None = None
+    is_estimate: bool = False
 
     @classmethod
     def of(cls, mechanism: Mechanism, drawing: Geometry, tolerances: Tolerances) -> Prior:

@@ -28,6 +28,7 @@ from hexacell.presentation.calibration_report.statement import (
 
 TITLES = {
     "optimise": "Calibration report",
+    "quick": "Calibration report (quick level)",
     "check": "Report of a check",
     "length": "Report of a length check",
 }

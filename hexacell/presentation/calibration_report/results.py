@@ -11,6 +11,7 @@ from hexacell.application.reported_run import ReportedRun
 from hexacell.errors import UsageError
 from hexacell.kinematics.parameters import ParameterUnit
 from hexacell.presentation.calibration_report.blocks import Block, Chapter, Paragraph, Table
+from hexacell.presentation.quick_level import quick_accuracy_sentences
 from hexacell.reporting.check_result import ParameterChange
 from hexacell.reporting.run_comparison import ParameterDifference, compare_results
 from hexacell.uncertainty.statement import COVERAGE_FACTOR
@@ -57,8 +58,10 @@ def comparison_chapter(earlier: ReportedRun, run: ReportedRun) -> Chapter:
         UsageError: one of them identified nothing, or their frames differ.
     """
     then, now = earlier.state.identified, run.state.identified
-    if then is None or now is None:
-        raise UsageError("one of the runs identified no geometry", action="Name calibrations, which do")
+    is_own = "quick" not in {earlier.started.mode, run.started.mode}
+    if then is None or now is None or not is_own:
+        action = "Name calibrations, which do"
+        raise UsageError("one of the runs identified no geometry of its own", action=action)
     compared = compare_results(run.settings.mechanism.parameters, then.result, now.result)
     rows = tuple(map(_difference_row, compared.parameters))
     columns = ("Parameter", "unit", "then", "now", "change", "U (k = 2)", "")
@@ -77,10 +80,12 @@ def observability_chapter(run: ReportedRun) -> Chapter | None:
     if state.identified is None:
         return None
     result = state.identified.result
+    expected, quick = result.residuals.expected, state.identified.quick
     undetermined = ", ".join(result.undetermined) or "none"
     sentences = [
         f"{result.records} records at {result.points} points.",
-        f"Residuals {1e3 * result.residual_rms_mm:.1f} um (rms), chi2 {result.chi2:.1f} of {result.dof}.",
+        f"Residuals {1e3 * result.residual_rms_mm:.1f} um (rms), chi2 {result.chi2:.1f} of {expected:.0f}.",
+        *([] if quick is None else [quick_accuracy_sentences(quick)]),
         f"Parameters that the records do not determine: {undetermined}.",
         f"Records left out as false: {_left_out(run)}.",
     ]

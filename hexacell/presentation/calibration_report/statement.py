@@ -30,6 +30,7 @@ TONES = {Verdict.PASS: Tone.GOOD, Verdict.FAIL: Tone.BAD}
 
 MODES = {
     "optimise": "calibration: measured, identified, written to the controller, verified",
+    "quick": "quick level: carried on from the last result, written to the controller, verified",
     "check": "check: measured; nothing was changed",
     "length": "check of the length scale; nothing was changed",
 }
@@ -37,6 +38,7 @@ MODES = {
 
 MODELS = {
     "optimise": "Held-out poses, which took no part, test the model.",
+    "quick": "The last accepted result takes part, with what may have drifted; held-out poses test it.",
     "check": "What was known from the last accepted result, or from the drawing, takes part.",
     "length": "The ball in two seats at a certified distance tells the scale of the encoders.",
 }
@@ -187,7 +189,7 @@ def _error_row(run: ReportedRun) -> tuple[str, ...] | None:
 
 def _left(run: ReportedRun) -> str:
     state = run.state
-    if state.started is not None and state.started.mode != "optimise":
+    if state.started is not None and state.started.mode not in {"quick", "optimise"}:
         return "Nothing was changed: the robot is left as it was found."
     if state.rolled_back:
         return "The config of before was put back: the robot is left as it was found."

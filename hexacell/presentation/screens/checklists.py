@@ -10,7 +10,7 @@ from hexacell.presentation.screens.views import ChecklistItem, ChecklistView, Ma
 
 PRESS_CHECK = (
     "Enter looks at everything, v tries the plan, x takes poses out of it. "
-    "s starts a calibration, k a check, r resumes the latest run."
+    "s starts a calibration, k a check, K the quick level, r resumes the latest run."
 )
 PRESS_LENGTH = "l checks the length scale with the fixture, L calibrates and checks it."
 CHECKING = "Looking at everything: this takes some seconds, and nothing moves."

@@ -6,7 +6,7 @@ from hexacell.presentation.screens.run_picture import RunPicture
 from hexacell.presentation.screens.views import HeaderView, Urgency
 from procedures.engine.command_loop import Status
 
-MODES = {"optimise": "calibration", "check": "check", "length": "length check"}
+MODES = {"optimise": "calibration", "quick": "quick level", "check": "check", "length": "length check"}
 URGENT = {
     Status.FAULTED: Urgency.ALARM,
     Status.AWAITING_OPERATOR: Urgency.ATTENTION,

@@ -16,9 +16,9 @@ Everything that must hold before the robot moves, one line each:
 Enter looks at all of it; nothing moves. v tries the plan on simulated robots and says how many records and
 minutes it takes and how accurate the robot will be. x shows its poses: take out what the robot must not be
 sent to, for the next run. s starts a calibration, k a check that changes nothing,
-r goes on with the latest run that was interrupted. In a cell with a fixture of known length, l checks the
-length scale, and L calibrates and checks it before the verdict. Everything is looked at again before the
-first move.""",
+K the quick level, which corrects with fewer records what has drifted since the last result, r goes on with
+the latest run that was interrupted. In a cell with a fixture of known length, l checks the length scale,
+and L calibrates and checks it before the verdict. Everything is looked at again before the first move.""",
     "measure": """\
 What happens now, what is next, how long it takes, and how to stop. Each gauge shows its reading, the
 deviation d from the zero of the set, the age of the reading, its noise, and where its plunger stands in its

@@ -82,7 +82,7 @@ def _approval(picture: RunPicture) -> str:
 
 
 def _missing(state: RunState) -> str:
-    if state.started is not None and state.started.mode != "optimise":
+    if state.started is not None and state.started.mode not in {"quick", "optimise"}:
         return "this run changes nothing"
     if state.identified is None:
         return "the geometry is not identified"

@@ -19,8 +19,9 @@ class RunStarted(Frozen):
     """The first event of a run.
 
     ``taught`` is the geometry with which the robot was taught last, in frames of its own. Without it the
-    result is written in frames by the mechanism's convention. ``accepted`` is the result that a check or a
-    length check starts from, if there is one. ``length_check`` is whether a calibration has one.
+    result is written in frames by the mechanism's convention. ``accepted`` is the result that a check, the
+    quick level or a length check starts from, if there is one. ``length_check`` is whether a calibration
+    has one.
     ``joint_ranges`` are those of cell file and config together, mm; none in runs of older versions.
     ``removed`` is what a person took out of the plan: it is neither measured nor commanded.
     ``expired`` are the instruments whose certificate had expired on the day it began.
@@ -30,7 +31,7 @@ class RunStarted(Frozen):
     software: str
     cell: str
     cell_text: str
-    mode: Literal["check", "optimise", "length"]
+    mode: Literal["check", "quick", "optimise", "length"]
     config: str
     config_sha256: str
     controller: GeometryDocument

@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 from pydantic import BeforeValidator
 
 from hexacell.acceptance import AcceptanceGate
+from hexacell.campaign.quick_level import QuickAccuracy
 from hexacell.campaign.teaching import TaskDisplacement
 from hexacell.cell.fields import Frozen, GeometryDocument
 from hexacell.decision import Verdict
@@ -40,7 +41,7 @@ class Identified(Frozen):
 
     ``held_out`` are measured at each point before and after, ``held_out_after`` only after: the robot
     cannot take them safely before it is calibrated. ``improvement`` is none where the robot can reach none
-    of the task poses.
+    of the task poses. ``quick`` is how well the quick level knows the robot; none in other runs.
     """
 
     kind: Literal["identified"] = "identified"
@@ -48,6 +49,7 @@ class Identified(Frozen):
     held_out: tuple[tuple[SixNumbers, ...], ...]
     held_out_after: tuple[tuple[SixNumbers, ...], ...] = ()
     improvement: ExpectedImprovement | None = None
+    quick: QuickAccuracy | None = None
 
 
 class Proposed(Frozen):

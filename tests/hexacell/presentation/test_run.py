@@ -38,7 +38,8 @@ def test_the_resume_command_parses_to_the_same_request(request_of, mode):
     assert program == "hexacell"
     assert (options.cell, options.resume) == (request.cell.path, str(request.folder.path))
     assert options.target == ("run.length" if mode is Mode.LENGTH else "run.main")
-    assert getattr(options, "mode", None) == ("check" if mode is Mode.CHECK else None)
+    named = mode.value if mode in {Mode.CHECK, Mode.QUICK} else None
+    assert getattr(options, "mode", None) == named
     assert resume_hint(request).splitlines()[1].strip() == resume_command(request)
 
 

@@ -16,6 +16,7 @@ KEYS = {
     "converged", "iterations", "records", "points", "residual_rms_mm", "chi2", "dof", "geometry",
     "sigma",
     "parameters", "covariance", "undetermined", "outliers", "frame", "termination",
+    "expected_chi2",
 }  # fmt: skip
 
 
@@ -36,6 +37,7 @@ def test_the_document_has_the_keys_of_the_interface(document):
     assert document["records"] == 55
     assert document["points"] == 5
     assert document["dof"] == 115
+    assert document["expected_chi2"] is None
     assert document["converged"] is True
     assert document["undetermined"] == []
     assert document["outliers"] == []

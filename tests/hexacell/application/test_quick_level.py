@@ -1,0 +1,111 @@
+"""The quick level from the cell file to its end: through real drivers and files."""
+
+from __future__ import annotations
+
+import shutil
+
+import pytest
+
+from hexacell.application.accepted_results import last_accepted_result
+from hexacell.application.calibration_run import calibrate
+from hexacell.application.replay_run import replay
+from hexacell.cell.loader import Cell
+from hexacell.controller_config.change import fingerprint
+from hexacell.decision import Verdict
+from hexacell.errors import ExitCode, UsageError
+from hexacell.runs.run_folder import RunFolder, runs_folder
+from procedures.calibration.workflow import Mode
+from procedures.journal.journal import read_journal
+from procedures.run import events
+from procedures.run.state import RunState, fold
+from tests.hexacell.application.conftest import order_of
+
+BUDGET = 20
+DRIFT_MM = 0.1
+
+
+@pytest.fixture
+def drifted(make_cell, finished) -> Cell:
+    """The cell that was calibrated, of whose robot one leg has become longer since."""
+    truth = finished.cell.settings.simulation.geometry.model_dump()
+    lengths = list(truth["l"])
+    lengths[3] += DRIFT_MM
+    geometry = finished.cell.settings.simulation.geometry.model_copy(update={"l": tuple(lengths)})
+    cell: Cell = make_cell(simulation__geometry=geometry, quick__budget_records=BUDGET)
+    cell.config_path.write_bytes(finished.cell.config_path.read_bytes())
+    shutil.copytree(runs_folder(finished.cell), runs_folder(cell))
+    return cell
+
+
+async def a_quick_run(cell: Cell, name: str = "quick") -> tuple[events.Ended, RunState, RunFolder]:
+    folder = RunFolder(runs_folder(cell) / name)
+    ended = await calibrate(order_of(cell, folder, mode=Mode.QUICK))
+    return ended, fold(read_journal(folder.journal)), folder
+
+
+async def test_a_robot_that_drifted_is_corrected_by_few_records(drifted, finished) -> None:
+    before = last_accepted_result(drifted)
+    assert before is not None
+    ended, state, folder = await a_quick_run(drifted)
+    assert ended.exit_code == ExitCode.DONE
+    assert state.judged is not None
+    assert state.judged.verdict is Verdict.PASS
+    assert state.judged.verification is not None
+    means = state.judged.verification.before_mm, state.judged.verification.after_mm
+    assert means[0] is not None
+    assert means[1] is not None
+    assert means[0] > 2.0 * means[1]
+    assert state.identified is not None
+    assert state.identified.quick is not None
+    assert state.identified.quick.records == len(state.measurements()) <= BUDGET
+    # What it wrote is what the next run starts from, with a covariance of its own.
+    after = last_accepted_result(drifted)
+    assert after is not None
+    assert after.run == str(folder.path)
+    assert fingerprint(drifted.config_path) != fingerprint(finished.cell.config_path)
+    assert (await replay(folder.path)).differences == []
+
+
+async def test_its_residuals_are_judged_by_what_was_known_before(drifted) -> None:
+    """Where an earlier result holds some parameters, fewer are taken from the residuals than there are."""
+    _, state, _ = await a_quick_run(drifted)
+    assert state.identified is not None
+    result = state.identified.result
+    assert result.expected_chi2 is not None
+    assert result.expected_chi2 >= result.dof
+    assert result.residuals.is_explained
+    assert result.undetermined == ()
+    assert state.proposed is not None
+    assert all(gate.passed for gate in state.proposed.gates)
+
+
+async def test_the_next_check_starts_from_it(drifted) -> None:
+    await a_quick_run(drifted)
+    folder = RunFolder(runs_folder(drifted) / "check")
+    ended = await calibrate(order_of(drifted, folder, mode=Mode.CHECK))
+    assert ended.exit_code == ExitCode.DONE
+    state = fold(read_journal(folder.journal))
+    assert state.judged is not None
+    assert state.judged.check is not None
+    assert state.judged.check.drift_scale == 1.0
+    assert state.judged.check.earlier_run == str(runs_folder(drifted) / "quick")
+
+
+async def test_without_an_accepted_result_it_says_what_to_do(make_cell, tmp_path) -> None:
+    cell = make_cell()
+    with pytest.raises(UsageError, match="no accepted result has this config") as refusal:
+        await calibrate(order_of(cell, RunFolder(tmp_path / "run"), mode=Mode.QUICK))
+    assert "--mode optimise" in str(refusal.value)
+    assert not (tmp_path / "run").exists()
+
+
+async def test_it_is_resumed_in_its_mode(drifted) -> None:
+    _, _, folder = await a_quick_run(drifted)
+    lines = folder.journal.read_bytes().splitlines(keepends=True)
+    history = read_journal(folder.journal)
+    until = next(n for n, event in enumerate(history) if isinstance(event, events.Proposed))
+    again = RunFolder(runs_folder(drifted) / "again")
+    shutil.copytree(folder.path, again.path)
+    again.journal.write_bytes(b"".join(lines[:until]))
+    with pytest.raises(UsageError, match="begun in the mode quick"):
+        await calibrate(order_of(drifted, again, mode=Mode.OPTIMISE, resume=True))

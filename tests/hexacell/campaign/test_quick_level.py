@@ -1,0 +1,149 @@
+"""The quick level of a robot that drifted, without hardware."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from hexacell.campaign.check import Check, identified_before
+from hexacell.campaign.decisions import CampaignState
+from hexacell.campaign.dry_run import VirtualCampaign
+from hexacell.campaign.quick_level import AS_ACCURATE, QuickLevel
+from hexacell.campaign.quick_trial import try_quick_level
+from hexacell.decision import ErrorLimits
+from hexacell.identification.estimator import identify
+from hexacell.kinematics.frame_derivatives import free_parameter_derivatives
+from hexacell.measurements.records import MeasurementSet
+from hexacell.virtual_robot import VirtualRobot
+
+LIMITS = ErrorLimits(position_mm=0.15, orientation_deg=0.05)
+CALIBRATED_MM = 0.02
+"""Of each parameter by the calibration."""
+
+DRIFT_MM = 0.05
+MakeQuick = Callable[..., QuickLevel]
+
+
+@pytest.fixture(scope="module")
+def make_quick(make_plan, paper) -> MakeQuick:
+    def make(*, budget: int = 24, calibrated_mm: float = CALIBRATED_MM) -> QuickLevel:
+        plan = make_plan(noise__encoder_mm=0.002, noise__gauge_mm=0.002)
+        normal, frames = plan.robot.mechanism.normalize_frames(paper.actual)
+        robot = replace(plan.robot, controller=normal, frames=frames)
+        covariance = calibrated_mm**2 * np.eye(len(robot.mechanism.parameters))
+        before = identified_before(robot, covariance, DRIFT_MM)
+        return QuickLevel(Check(plan.settings, robot, before, LIMITS, budget, candidates=32), budget)
+
+    return make
+
+
+def carried_out(
+    quick: QuickLevel, seed: int = 1, drift_mm: float = DRIFT_MM
+) -> tuple[CampaignState, np.ndarray]:
+    """On a robot that drifted; and its free parameters."""
+    robot, random = quick.check.robot, np.random.default_rng(seed)
+    convention = robot.mechanism.convention
+    by_every = free_parameter_derivatives(robot.mechanism, robot.commanding)
+    free = convention.free_parameters(robot.commanding)
+    free = free + drift_mm * random.standard_normal(len(by_every)) @ by_every
+    virtual = VirtualRobot(robot, convention.geometry(free), random)
+    campaign = VirtualCampaign(replace(quick.plan, with_forecast=False), virtual)
+    campaign.carry_out()
+    assert campaign.outside == 0
+    return campaign.state, free
+
+
+@pytest.fixture(scope="module")
+def measured(make_quick) -> tuple[QuickLevel, CampaignState, np.ndarray]:
+    quick = make_quick()
+    return quick, *carried_out(quick)
+
+
+def test_the_budget_is_kept_and_said(measured) -> None:
+    quick, state, _ = measured
+    said = quick.accuracy(state.measurements)
+    assert said is not None
+    assert said.records == len(state.measurements) <= quick.budget
+    errors = [said.error_mm, *(one.error_mm for one in said.further)]
+    assert errors == sorted(errors, reverse=True)
+    assert said.calibrated_mm == quick.calibrated_mm
+
+
+def test_few_records_are_worth_half_a_calibration(make_plan, paper) -> None:
+    """A sample of ``tests/benchmarks/test_quick_level.py``: one machine that drifted by 0.2 mm."""
+    plan = make_plan()
+    normal, frames = plan.robot.mechanism.normalize_frames(paper.actual)
+    robot = replace(plan.robot, controller=normal, frames=frames)
+    whole = VirtualCampaign(
+        replace(plan, robot=robot, with_forecast=False),
+        VirtualRobot(robot, normal, np.random.default_rng(3)),
+    )
+    whole.carry_out()
+    calibrated = identify(robot.problem(whole.measurements))
+    before = identified_before(robot, calibrated.covariance, 0.02)
+    quick = QuickLevel(Check(plan.settings, robot, before, LIMITS, 24, candidates=32), 24)
+    state, _ = carried_out(quick, drift_mm=0.2)
+    said = quick.accuracy(state.measurements)
+    assert said is not None
+    assert said.records == 24
+    assert len(whole.measurements) == 55
+    assert said.ratio <= 2.0
+    assert said.drift_scale > 1.0
+
+
+def test_it_ends_when_the_robot_is_known_as_well_as_before(make_quick) -> None:
+    """The larger the errors that the calibration left, the fewer records are as good."""
+    quick = make_quick(budget=60, calibrated_mm=0.3)
+    state, _ = carried_out(quick)
+    said = quick.accuracy(state.measurements)
+    assert said is not None
+    assert said.error_mm <= AS_ACCURATE * said.calibrated_mm
+    assert said.records_to_calibrated == 0
+    assert len(state.measurements) < quick.budget
+    # One record fewer would not have been enough, or would have determined no geometry.
+    assert quick.reached(state.measurements) is not None
+    few = MeasurementSet(state.measurements.records[:10])
+    assert quick.reached(few) is None
+
+
+def test_the_geometry_is_found_within_its_uncertainty(measured) -> None:
+    quick, state, free = measured
+    robot = quick.robot_after(state.measurements)
+    found = identify(robot.problem(state.measurements))
+    off = found.free - free
+    squares = float(off @ np.linalg.solve(found.free_covariance, off))
+    assert squares < 70.0  # of 35, by chance more in one case of 2,000
+    before = robot.mechanism.convention.free_parameters(robot.commanding) - free
+    assert np.linalg.norm(off) < np.linalg.norm(before)
+
+
+def test_what_was_known_before_counts(measured) -> None:
+    """By the records alone the same robot is known worse."""
+    quick, state, _ = measured
+    robot = quick.robot_after(state.measurements)
+    with_it, without = (
+        identify(one.problem(state.measurements)) for one in (robot, replace(robot, known=None))
+    )
+    error = quick.plan.task.error(robot.belief(with_it))
+    assert error is not None
+    assert error.worst(with_it.free_covariance) < 0.9 * error.worst(without.free_covariance)
+
+
+def test_parameters_are_undetermined_by_the_drawing_and_not_by_the_last_result(measured) -> None:
+    quick, state, _ = measured
+    found = identify(quick.robot_after(state.measurements).problem(state.measurements))
+    assert found.undetermined == ()
+    known = replace(quick.robot_after(state.measurements), known=quick.expected)
+    assert identify(known.problem(state.measurements)).undetermined != ()
+
+
+def test_a_trial_predicts_what_a_run_gives(make_quick, measured) -> None:
+    _, state, _ = measured
+    tried = try_quick_level(make_quick())
+    assert tried.accuracy is not None
+    assert abs(tried.accuracy.records - len(state.measurements)) <= 8
+    assert tried.points >= 2
+    assert tried.minutes > 0.0

@@ -107,7 +107,7 @@ def _summary(folder: RunFolder) -> RunSummary:
         mode="" if state.started is None else state.started.mode,
         records=sum(len(measured.samples) for measured in state.sets.values()),
         verdict=None if state.judged is None else state.judged.verdict,
-        accuracy=_accuracy(state.judged),
+        accuracy=judged_accuracy(state.judged),
         line=_last_line(entries, state),
         has_result=_has_own_result(state),
         is_over=state.ended is not None,
@@ -195,7 +195,8 @@ def _age_rank(run: PastRun) -> tuple[bool, float, str]:
     return ended is not None, 0.0 if ended is None else ended.timestamp(), run.name
 
 
-def _accuracy(judged: events.ResultValidated | None) -> VerifiedAccuracy | None:
+def judged_accuracy(judged: events.ResultValidated | None) -> VerifiedAccuracy | None:
+    """The errors at the task poses that a verdict is on; none where there is no such verdict."""
     if judged is None:
         return None
     if judged.verification is not None:

@@ -36,6 +36,7 @@ from hexacell.cell.measuring import (
     TimingSettings,
     VerificationSettings,
 )
+from hexacell.cell.notifications import MOST_NOTIFICATIONS, NotificationSettings
 from hexacell.cell.recovery import RecoverySettings
 from hexacell.cell.simulation import SimulationSettings
 from hexacell.cell.speed import SpeedSettings
@@ -87,6 +88,7 @@ class CellSettings(Section):
     length_check: LengthCheckSettings | None = None
     recovery: RecoverySettings = RecoverySettings()
     archive: ArchiveSettings = ArchiveSettings()
+    notifications: tuple[NotificationSettings, ...] = Field((), max_length=MOST_NOTIFICATIONS)
     task: TaskSettings = TaskSettings()
     report: ReportSettings = ReportSettings()
     simulation: SimulationSettings | None = None
@@ -143,6 +145,15 @@ class CellSettings(Section):
         if refusals:
             raise ValidationError.from_exception_data(self.name, refusals)
         return self
+
+    @field_validator("notifications")
+    @classmethod
+    def _notifications_differ(
+        cls, notifications: tuple[NotificationSettings, ...]
+    ) -> tuple[NotificationSettings, ...]:
+        if len({one.name for one in notifications}) != len(notifications):
+            raise broken_rule("two notifications have the same name", "Give each another name")
+        return notifications
 
     @field_validator("thermometers")
     @classmethod

@@ -15,7 +15,7 @@ from pydantic import SecretStr
 
 from hexacell.cell.devices import ControllerSettings
 from hexacell.cell.fields import LONGEST_TEXT, Password, Section
-from hexacell.cell.loader import Cell, validated
+from hexacell.cell.loader import Cell, SectionType, validated
 from hexacell.cell.model import CellSettings
 from hexacell.errors import FileError, UsageError
 from hexacell.storage.atomic_files import os_error_to_file_error, read_text
@@ -86,10 +86,17 @@ def _in_file(controller: ControllerSettings, folder: Path) -> dict[str, SecretSt
     path = password_path(controller, folder)
     if path is None:
         return {}
+    return {name: value for name, value in private_content(path, PasswordFile) if value is not None}
+
+
+def private_content(path: Path, model: type[SectionType]) -> SectionType:
+    """The content of a TOML file that others can neither read nor change.
+
+    Raises:
+        FileError: it cannot be read, has another content, or others can read or change it.
+    """
     _require_private(path)
-    document = TomlDocument.parse(read_text(path, LARGEST_FILE_BYTES), path)
-    content = validated(document, PasswordFile, path)
-    return {name: value for name, value in content if value is not None}
+    return validated(TomlDocument.parse(read_text(path, LARGEST_FILE_BYTES), path), model, path)
 
 
 def _require_private(path: Path) -> None:

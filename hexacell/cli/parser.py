@@ -65,6 +65,7 @@ def make_parser() -> Parser:
     _report(commands)
     _schedule(commands)
     _status(commands)
+    _notify(commands)
     _cell(commands)
     return parser
 
@@ -384,6 +385,15 @@ def _status(commands: Any) -> None:  # noqa: ANN401
     parser.add_argument(
         "--metrics", type=Path, metavar="FILE", help="write it as metrics for Prometheus' node exporter too"
     )
+    _add_json(parser)
+
+
+def _notify(commands: Any) -> None:  # noqa: ANN401
+    parser = _command(commands, "notify", "who is told of unattended runs: list, try, send what waits")
+    _add_cell(parser)
+    what = parser.add_mutually_exclusive_group()
+    what.add_argument("--test", action="store_true", help="tell everybody something now")
+    what.add_argument("--send", action="store_true", help="send what earlier runs could not")
     _add_json(parser)
 
 

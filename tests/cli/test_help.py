@@ -31,6 +31,7 @@ COMMANDS = (
     "report",
     "schedule",
     "status",
+    "notify",
     "cell",
 )
 PAGES = [

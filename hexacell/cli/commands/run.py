@@ -13,6 +13,7 @@ from hexacell.application.check_repetition import raised_alarm, repetition
 from hexacell.application.demo import prepare_demo
 from hexacell.application.event_stream import EventStream
 from hexacell.application.interrupted_runs import run_to_resume
+from hexacell.application.run_notices import RunEnd
 from hexacell.attach.run_device_watch import RunDeviceWatch
 from hexacell.campaign.pose_list import pose_list_of
 from hexacell.campaign.removed_poses import RemovedPoses
@@ -25,6 +26,7 @@ from hexacell.cli.run_status import RunStatus
 from hexacell.cli.signal_commands import SignalCommands
 from hexacell.cli.telling import Telling
 from hexacell.cli.terminal import KeyboardCommands, TerminalOperator, is_interactive
+from hexacell.cli.told_afterwards import told_afterwards
 from hexacell.errors import ExitCode, HexacellError, UsageError
 from hexacell.presentation.documents import run_document
 from hexacell.presentation.line_face import LETTERS
@@ -122,18 +124,26 @@ def _run_to_end(request: RunRequest, console: Console, stream: EventStream | Non
     factor = request.cell.settings.timing.clock_factor
     if factor != 1.0:
         console.print(clock_notice(factor))
+    with told_afterwards(request, console) as news:
+        news.end = end = _run_and_repeat(request, console, stream)
+    console.document(run_document(end.request, end.ended, end.state))
+    for line in closing_lines(end.request, end.ended):
+        console.print(line)
+    return ExitCode(end.ended.exit_code)
+
+
+def _run_and_repeat(request: RunRequest, console: Console, stream: EventStream | None) -> RunEnd:
+    """Carry out a run, and the check that its alarm asks for."""
     ended = execute_run(request, console, _copied(request, stream))
     state = fold(read_journal(request.folder.journal))
     again = repetition(request, state)
-    if again is not None:
-        console.print(REPEATED)
-        ended = execute_run(again, console, _copied(again, stream))
-        state, request = fold(read_journal(again.folder.journal)), again
-        console.print(REPEATED_ALARM if raised_alarm(state) else NOT_REPEATED_ALARM)
-    console.document(run_document(request, ended, state))
-    for line in closing_lines(request, ended):
-        console.print(line)
-    return ExitCode(ended.exit_code)
+    if again is None:
+        return RunEnd(request, ended, state)
+    console.print(REPEATED)
+    ended = execute_run(again, console, _copied(again, stream))
+    state = fold(read_journal(again.folder.journal))
+    console.print(REPEATED_ALARM if raised_alarm(state) else NOT_REPEATED_ALARM)
+    return RunEnd(again, ended, state)
 
 
 def _copied(request: RunRequest, stream: EventStream | None) -> list[Listener]:

@@ -1,0 +1,50 @@
+"""A run that nobody watches, and whoever is told of it afterwards. Its outcome stays what it is."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+from hexacell.application.calibration_run import RunRequest
+from hexacell.application.run_notices import RunEnd, notice_of_end, notice_of_failure
+from hexacell.application.telling_people import tell_people
+from hexacell.cli.console import Console
+from hexacell.presentation.notices import telling_line
+
+
+@dataclass
+class RunNews:
+    """What is told: the end of the last run, if there was one."""
+
+    end: RunEnd | None = None
+
+
+@contextmanager
+def told_afterwards(request: RunRequest, console: Console) -> Iterator[RunNews]:
+    """Tell, after an unattended run, what its ``end`` was set to, or what error ended it."""
+    news = RunNews()
+    try:
+        yield news
+    except Exception as error:
+        _tell(request, console, news, error)
+        raise
+    _tell(request, console, news, None)
+
+
+def _tell(request: RunRequest, console: Console, news: RunNews, error: Exception | None) -> None:
+    """Whatever goes wrong here is said in one line, and changes nothing else."""
+    if not request.unattended or not request.cell.settings.notifications:
+        return
+    try:
+        if error is not None:
+            notice = notice_of_failure(request, error)
+        elif news.end is not None:
+            notice = notice_of_end(news.end)
+        else:
+            return
+        line = telling_line(tell_people(request.cell, notice))
+    except Exception as fault:
+        line = f"not told: a fault of the program ({type(fault).__name__})"
+    if line is not None:
+        console.warn(line)

@@ -1,0 +1,70 @@
+"""Telling one notice to one address: by what its scheme says, tried again, within a bounded time."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from queue import SimpleQueue
+
+from hexacell.cell.notifications import BROKERS, WEBHOOKS, scheme_of
+from hexacell.notices.address import NoticeAddress
+from hexacell.notices.apprise_services import send_by_apprise
+from hexacell.notices.mqtt import publish_by_mqtt
+from hexacell.notices.notice import Notice
+from hexacell.notices.undelivered import NoticeUndelivered
+from hexacell.notices.webhook import post_to_webhook
+
+ATTEMPTS = 2
+TIMEOUT_S = 10.0
+"""Of each wait within an attempt."""
+
+LONGEST_ATTEMPT_S = 25.0
+"""Of one attempt, also where a server answers a byte at a time."""
+
+Sender = Callable[[NoticeAddress, Notice, float], None]
+
+
+def deliver(address: NoticeAddress, notice: Notice, longest_s: float = LONGEST_ATTEMPT_S) -> None:
+    """Tell it, at once or at the second attempt.
+
+    Raises:
+        NoticeUndelivered: with the reason of the last attempt.
+    """
+    for left in reversed(range(ATTEMPTS)):
+        try:
+            return _attempt(address, notice, longest_s)
+        except NoticeUndelivered:
+            if not left:
+                raise
+    return None
+
+
+def _attempt(address: NoticeAddress, notice: Notice, longest_s: float) -> None:
+    """In a thread that nobody waits for longer than that, and that ends with the process."""
+    ended: SimpleQueue[str | None] = SimpleQueue()  # no error, whose traceback would keep connections open
+
+    def act() -> None:
+        try:
+            _sender(address)(address, notice, min(TIMEOUT_S, longest_s))
+        except NoticeUndelivered as error:
+            ended.put(str(error))
+        except Exception as error:
+            ended.put(f"{type(error).__name__}: {address.masked(str(error))}")
+        else:
+            ended.put(None)
+
+    worker = threading.Thread(target=act, daemon=True, name=f"notice to {address.name}")
+    worker.start()
+    worker.join(longest_s)
+    if worker.is_alive():
+        raise NoticeUndelivered(f"not taken within {longest_s:g} s")
+    problem = ended.get_nowait()
+    if problem is not None:
+        raise NoticeUndelivered(problem)
+
+
+def _sender(address: NoticeAddress) -> Sender:
+    scheme = scheme_of(address.url)
+    if scheme in WEBHOOKS:
+        return post_to_webhook
+    return publish_by_mqtt if scheme in BROKERS else send_by_apprise

@@ -1,0 +1,100 @@
+"""Unattended runs tell who the cell file names; and ``hexacell notify`` lists, tries and sends."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from hexacell.storage.cell_lock import cell_lock
+from tests.hexacell.notices.local_servers import broker, closed_port, webhook
+
+CHECK = ("--mode", "check", "--unattended")
+TOKEN = "hidden-token-7"
+
+
+@pytest.fixture(autouse=True)
+def no_proxy(monkeypatch):
+    monkeypatch.setenv("no_proxy", "127.0.0.1")
+
+
+def tell(folder, name: str, url: str, *lines: str) -> None:
+    """Write a notification into the cell file."""
+    further = "".join(f"{line}\n" for line in lines)
+    with folder.cell.open("a") as cell:
+        cell.write(f'\n[[notifications]]\nname = "{name}"\nurl = "{url}"\n{further}')
+
+
+def test_a_check_tells_its_verdict(typed_here, quick_cell, few_candidates, tmp_path, monkeypatch) -> None:
+    monkeypatch.setenv("HEXACELL_NOTIFY_HALL_TOKEN", TOKEN)
+    every = 'on = ["pass", "no-pass", "alarm", "answer-needed", "failure"]'
+    with webhook() as server, broker() as state:
+        tell(quick_cell, "hall", server.url, every)
+        tell(quick_cell, "state", f"mqtt://127.0.0.1:{state.port}", every)
+        tell(quick_cell, "nobody", f"http://127.0.0.1:{closed_port()}/", every)
+        outcome = typed_here("run", quick_cell.cell, *CHECK, "--json")
+    (body,) = server.bodies
+    told = json.loads(body)
+    assert (told["exit_code"], told["verdict"]) == (outcome.code, outcome.document["verdict"])
+    assert told["run"] == quick_cell.runs()[-1].name
+    assert outcome.document["line"] in told["line"]
+    assert server.headers[0]["Authorization"] == f"Bearer {TOKEN}"
+    assert [json.loads(payload) for payload in state.retained.values()] == [told]
+    (line,) = [line for line in outcome.err.splitlines() if "not told" in line]
+    assert "nobody: Connection refused" in line
+    assert "hexacell notify CELL --send" in line
+    for path in quick_cell.path.rglob("*"):
+        assert not path.is_file() or TOKEN.encode() not in path.read_bytes()
+    assert TOKEN not in outcome.err
+
+    assert "waits for nobody" in typed_here("notify", quick_cell.cell).out
+    assert typed_here("notify", quick_cell.cell, "--send").code == 3
+
+
+def test_a_run_that_cannot_begin_is_told_too(typed_here, quick_cell) -> None:
+    with webhook() as server:
+        tell(quick_cell, "hall", server.url)
+        with cell_lock(quick_cell.controller):
+            outcome = typed_here("run", quick_cell.cell, *CHECK)
+    told = json.loads(server.bodies[0])
+    assert (outcome.code, told["exit_code"], told["occasions"]) == (5, 5, ["failure"])
+    assert (told["run"], told["verdict"]) == (None, None)
+    assert "\n" not in told["line"]
+
+
+def test_it_changes_nothing_if_telling_has_a_fault(typed_here, quick_cell, monkeypatch) -> None:
+    def fail(*_: object) -> None:
+        raise RuntimeError(TOKEN)
+
+    monkeypatch.setattr("hexacell.cli.told_afterwards.tell_people", fail)
+    tell(quick_cell, "hall", "http://127.0.0.1:1/")
+    with cell_lock(quick_cell.controller):
+        outcome = typed_here("run", quick_cell.cell, *CHECK)
+    assert outcome.code == 5
+    assert "not told: a fault of the program (RuntimeError)" in outcome.err
+    assert TOKEN not in outcome.err
+
+
+def test_who_is_told_can_be_tried_and_sent_to_later(typed_here, quick_cell, tmp_path) -> None:
+    with webhook() as server:
+        tell(quick_cell, "hall", server.url)
+        server.statuses = [503]
+        with cell_lock(quick_cell.controller):
+            typed_here("run", quick_cell.cell, *CHECK)
+        tried = typed_here("notify", quick_cell.cell, "--test", "--json")
+        assert (tried.code, tried.document["told"][0]["problem"]) == (3, "the server answers 503")
+        server.statuses = [204]
+        server.bodies.clear()
+        assert typed_here("notify", quick_cell.cell, "--test").out == "hall: told (1)\n"
+        assert json.loads(server.bodies[-1])["occasions"] == ["test"]
+        sent = typed_here("notify", quick_cell.cell, "--send")
+        assert (sent.code, sent.out) == (0, "hall: told (1)\n")
+        assert json.loads(server.bodies[-1])["occasions"] == ["failure"]
+        assert typed_here("notify", quick_cell.cell, "--send").out == "nothing waits\n"
+
+
+def test_nobody_to_tell(typed_here, quick_cell) -> None:
+    assert "nobody is told" in typed_here("notify", quick_cell.cell).out
+    outcome = typed_here("notify", quick_cell.cell, "--test")
+    assert outcome.code == 2
+    assert "[[notifications]]" in outcome.err

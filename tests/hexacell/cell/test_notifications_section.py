@@ -1,0 +1,68 @@
+"""[[notifications]] in a cell file."""
+
+from __future__ import annotations
+
+import pytest
+from pydantic import ValidationError
+
+from hexacell.cell.bundled import bundled_config
+from hexacell.cell.loader import load_cell
+from hexacell.cell.notifications import USUAL_OCCASIONS, NotificationSettings, Occasion
+from hexacell.errors import FileError
+
+
+@pytest.mark.parametrize(
+    "url",
+    ["https://host:8443/a/b", "mqtts://broker", "mailto://host:587?from=a@b&to=c@d", "http://user@h/x"],
+)
+def test_addresses_without_secrets_may_stand_there(url) -> None:
+    settings = NotificationSettings(name="one", url=url)
+    assert (settings.url, settings.on) == (url, USUAL_OCCASIONS)
+    assert Occasion.PASS not in USUAL_OCCASIONS
+
+
+@pytest.mark.parametrize(
+    ("url", "reason"),
+    [
+        ("https://user:hidden@host/x", "password does not belong"),
+        ("https://host/x?token=hidden", "password does not belong"),
+        ("mailto://host?to=a@b&pass=hidden", "password does not belong"),
+        ("slack://hidden/hidden/hidden", "may have a token"),
+        ("host/x", "no address"),
+    ],
+)
+def test_secrets_are_refused_and_not_shown(tmp_path, url, reason) -> None:
+    source = load_cell(bundled_config("simulated-hexaglide"))
+    path = tmp_path / source.path.name
+    path.write_text(f'{source.text}\n[[notifications]]\nname = "one"\nurl = "{url}"\n')
+    with pytest.raises(FileError, match=reason) as raised:
+        load_cell(path)
+    assert raised.value.line is not None
+    assert "hidden" not in str(raised.value)
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        {"on": []},
+        {"on": ["test"]},
+        {"on": ["sometimes"]},
+        {"topic": "a/#"},
+        {"topic": "a/b", "url": "https://x/"},
+        {"name": "a/b"},
+    ],
+)
+def test_what_makes_no_sense_is_refused(settings) -> None:
+    with pytest.raises(ValidationError):
+        NotificationSettings.model_validate({"name": "one", "url": "mqtt://x"} | settings)
+
+
+def test_names_differ(tmp_path) -> None:
+    source = load_cell(bundled_config("simulated-hexaglide"))
+    path = tmp_path / source.path.name
+    one = '\n[[notifications]]\nname = "one"\nurl = "mqtt://x"\n'
+    path.write_text(source.text + one)
+    assert load_cell(path).settings.notifications[0].name == "one"
+    path.write_text(source.text + one * 2)
+    with pytest.raises(FileError, match="the same name"):
+        load_cell(path)

@@ -31,6 +31,9 @@ class ReportSettings(Section):
     machine: Text = Field("", description="maker and model of the robot")
     serial_number: Text = Field("", description="of the robot")
     laboratory: Text = Field("", description="who calibrates, with the address")
+    country: Text = Field(
+        "", pattern="^([A-Z]{2})?$", description="of the laboratory, ISO 3166: two letters, as DE"
+    )
     customer: Text = Field("", description="for whom, with the address")
     place: Text = Field("", description="where the robot stands")
     authorised_by: Text = Field("", description="who answers for reports of this cell")

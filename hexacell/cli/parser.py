@@ -334,7 +334,8 @@ def _report(commands: Any) -> None:  # noqa: ANN401
         "--output",
         type=Path,
         metavar="FILE",
-        help="where to (default: report.html in the run folder); .pdf gives PDF/A",
+        help="where to (default: report.html in the run folder); .pdf gives PDF/A, .xml a "
+        "Digital Calibration Certificate",
     )
     parser.add_argument(
         "--compare", type=Path, metavar="RUN", help="say also what has changed since this run, a folder"

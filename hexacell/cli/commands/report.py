@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import argparse
 
-from hexacell.application.reported_run import reported_run
+from hexacell.application.reported_run import ReportedRun, reported_run
 from hexacell.cli.console import Console
 from hexacell.errors import ExitCode
+from hexacell.presentation.calibration_certificate.certificate import certificate_of_run
+from hexacell.presentation.calibration_report.blocks import Report
 from hexacell.presentation.calibration_report.html import html_of
 from hexacell.presentation.calibration_report.pdf import pdf_of
 from hexacell.presentation.calibration_report.report import report_of
@@ -17,9 +19,21 @@ def main(options: argparse.Namespace) -> ExitCode:
     """Write the report; the run folder is only read, unless the report goes into it."""
     console = Console(options.json)
     earlier = None if options.compare is None else reported_run(options.compare)
-    report = report_of(reported_run(options.run), earlier)
+    run = reported_run(options.run)
+    report = report_of(run, earlier)
     target = options.output or options.run / "report.html"
-    write_atomically(target, pdf_of(report) if target.suffix == ".pdf" else html_of(report).encode())
+    write_atomically(target, _written(target.suffix, run, report))
     console.document({"report": str(target), "identifier": report.identifier, "verdict": report.verdict})
     console.print(f"{target}: {report.title.lower()}, {report.verdict}")
     return ExitCode.DONE
+
+
+def _written(suffix: str, run: ReportedRun, report: Report) -> bytes:
+    """As what the name of the file asks for."""
+    match suffix:
+        case ".pdf":
+            return pdf_of(report)
+        case ".xml":
+            return certificate_of_run(run)
+        case _:
+            return html_of(report).encode()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from datetime import date
 
 from drivers.interfaces import DeviceIdentity
@@ -18,7 +17,10 @@ def conditions_chapter(run: ReportedRun) -> Chapter:
     """Temperatures, records, noise: under what the figures were taken."""
     state = run.state
     pairs = [("Records", str(sum(len(measured.samples) for measured in state.sets.values())))]
-    pairs += [(f"Temperature, {name}", shown) for name, shown in _temperatures(run)]
+    pairs += [
+        (f"Temperature, {name}", f"{lowest:.1f} to {highest:.1f} deg C")
+        for name, (lowest, highest) in temperature_ranges(run).items()
+    ]
     if len(pairs) == 1:
         pairs.append(("Temperature", "not measured"))
     pairs += [("Sets measured again", str(state.invalidated))] if state.invalidated else []
@@ -59,30 +61,30 @@ def authorisation_chapter(run: ReportedRun) -> Chapter:
     return Chapter("Authorisation", (Facts(pairs), Paragraph(text)))
 
 
-def _temperatures(run: ReportedRun) -> Iterator[tuple[str, str]]:
+def temperature_ranges(run: ReportedRun) -> dict[str, tuple[float, float]]:
+    """The lowest and highest temperature that each thermometer showed with the records, deg C."""
     shown: dict[str, list[float]] = {}
     for measured in run.state.sets.values():
         for sample in measured.samples:
             for one in sample.reading.temperatures:
                 if one.celsius is not None:
                     shown.setdefault(one.name, []).append(one.celsius)
-    for name, values in shown.items():
-        yield name, f"{min(values):.1f} to {max(values):.1f} deg C"
+    return {name: (min(values), max(values)) for name, values in shown.items()}
 
 
 def _instrument_row(run: ReportedRun, device: DeviceIdentity, day: date) -> tuple[str, ...]:
-    certificate = _certificate_of(run, device)
+    certificate = certificate_of(run, device)
     number = NOT_STATED if certificate is None else certificate.number
     if certificate is not None and certificate.expanded_um is not None:
         number = f"{number} (U {certificate.expanded_um:g} um)"
     due = "" if certificate is None or certificate.due is None else certificate.due.isoformat()
     if certificate is not None and certificate.has_expired(day):
         due = f"{due}: EXPIRED"
-    serial = device.serial_number or _stated_serial(run, device.name) or NOT_STATED
+    serial = serial_number_of(run, device) or NOT_STATED
     return device.name, device.description, serial, number, due
 
 
-def _certificate_of(run: ReportedRun, device: DeviceIdentity) -> CertificateSettings | None:
+def certificate_of(run: ReportedRun, device: DeviceIdentity) -> CertificateSettings | None:
     """A gauge has its own; the encoders have one together."""
     certificates = run.settings.certificates
     if device.name.startswith("encoder"):
@@ -90,5 +92,8 @@ def _certificate_of(run: ReportedRun, device: DeviceIdentity) -> CertificateSett
     return certificates.get(f"gauge {device.name}")
 
 
-def _stated_serial(run: ReportedRun, name: str) -> str:
-    return next((gauge.serial_number for gauge in run.settings.gauges if gauge.name == name), "")
+def serial_number_of(run: ReportedRun, device: DeviceIdentity) -> str:
+    """As it says itself, or else as the cell file does; empty if neither does."""
+    return device.serial_number or next(
+        (gauge.serial_number for gauge in run.settings.gauges if gauge.name == device.name), ""
+    )

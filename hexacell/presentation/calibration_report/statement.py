@@ -5,6 +5,7 @@ In the order and words of ISO/IEC 17025:2017, 7.8, where they apply.
 
 from __future__ import annotations
 
+from hexacell.application.history import judged_accuracy
 from hexacell.application.reported_run import ReportedRun
 from hexacell.campaign.teaching import TaskDisplacement
 from hexacell.decision import Verdict
@@ -52,13 +53,13 @@ def verdict_of(run: ReportedRun) -> Verdict | None:
 
 def statement_chapter(run: ReportedRun) -> Chapter:
     """What may be said of the robot, and what not."""
-    verdict, accuracy = verdict_of(run), _accuracy(run)
+    verdict, accuracy = verdict_of(run), judged_accuracy(run.state.judged)
     blocks: list[Block] = [
         Paragraph(_meaning(run, verdict), is_strong=True),
         *_error_table(accuracy),
         *_reasons(run),
-        Paragraph(_scope(accuracy)),
-        Paragraph(_decision_rule(accuracy)),
+        Paragraph(scope_sentences(accuracy)),
+        Paragraph(decision_rule(accuracy)),
     ]
     return Chapter("Statement of conformity", tuple(blocks))
 
@@ -90,22 +91,17 @@ def method_chapter(run: ReportedRun) -> Chapter:
         ("Begun, ended (UTC)", f"{run.began:%Y-%m-%d %H:%M}, {run.ended:%Y-%m-%d %H:%M}"),
         ("Software", started.software),
     )
-    method = (
+    return Chapter("Subject and method", (Facts(facts), Paragraph(method_sentences(run))))
+
+
+def method_sentences(run: ReportedRun) -> str:
+    """How the geometry follows from what is measured."""
+    return (
         "A ball on the platform is held between three dial gauges. At each point they are zeroed, the same "
         "point is commanded in other orientations, and what the gauges and the encoders of the joints then "
         "show is recorded. From the records the geometry follows by weighted least squares, with its "
-        f"covariance (after Abtahi, Pendar, Alasty and Vossoughi, 2010). {MODELS[started.mode]}"
+        f"covariance (after Abtahi, Pendar, Alasty and Vossoughi, 2010). {MODELS[run.started.mode]}"
     )
-    return Chapter("Subject and method", (Facts(facts), Paragraph(method)))
-
-
-def _accuracy(run: ReportedRun) -> VerifiedAccuracy | None:
-    judged = run.state.judged
-    if judged is None:
-        return None
-    if judged.verification is not None:
-        return judged.verification.accuracy
-    return None if judged.check is None else judged.check.accuracy
 
 
 def _meaning(run: ReportedRun, verdict: Verdict | None) -> str:
@@ -148,7 +144,8 @@ def _test_row(test: ModelTest) -> tuple[str, str]:
     return test.name, f"{'holds' if test.passed else 'FAILS'}: {test.sentence}"
 
 
-def _scope(accuracy: VerifiedAccuracy | None) -> str:
+def scope_sentences(accuracy: VerifiedAccuracy | None) -> str:
+    """What the statement holds for."""
     if accuracy is None:
         return "Nothing is stated of errors at the task."
     where = "the task poses of the cell file" if accuracy.task_named else "poses across the workspace"
@@ -159,7 +156,8 @@ def _scope(accuracy: VerifiedAccuracy | None) -> str:
     )
 
 
-def _decision_rule(accuracy: VerifiedAccuracy | None) -> str:
+def decision_rule(accuracy: VerifiedAccuracy | None) -> str:
+    """By which errors and their uncertainty become a verdict."""
     factor = 1.0 if accuracy is None else accuracy.position.guard_band_factor
     band = "U" if factor == 1.0 else f"{factor:g} U"
     return (
@@ -180,7 +178,7 @@ def _mean_row(run: ReportedRun) -> tuple[str, ...] | None:
 
 
 def _error_row(run: ReportedRun) -> tuple[str, ...] | None:
-    identified, accuracy = run.state.identified, _accuracy(run)
+    identified, accuracy = run.state.identified, judged_accuracy(run.state.judged)
     if identified is None or identified.improvement is None:
         return None
     after = "-" if accuracy is None else f"{accuracy.position.value:.3f}"

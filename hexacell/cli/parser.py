@@ -297,9 +297,11 @@ def _history(commands: Any) -> None:  # noqa: ANN401
     parser.usage = (
         "hexacell history [-h] [--compare RUN RUN | --show RUN | --refit RUN |\n"
         "                        --keep DAYS [--delete] | --drift] [--archive URL]\n"
-        "                        [--json] CELL"
+        "                        [--json] [CELL]"
     )  # argparse does not break a group
-    _add_cell(parser)
+    parser.add_argument(
+        "cell", type=Path, nargs="?", metavar="CELL", help="the cell file; without it all of --archive"
+    )
     what = parser.add_mutually_exclusive_group()
     what.add_argument(
         "--compare",
@@ -382,7 +384,10 @@ def _schedule(commands: Any) -> None:  # noqa: ANN401
 
 def _status(commands: Any) -> None:  # noqa: ANN401
     parser = _command(commands, "status", "all cells at a glance: latest verdicts, what waits for a person")
-    parser.add_argument("cells", type=Path, nargs="+", metavar="CELL", help="cell files (TOML)")
+    parser.add_argument("cells", type=Path, nargs="*", metavar="CELL", help="cell files (TOML)")
+    parser.add_argument(
+        "--archive", metavar="URL", help="instead of cell files: all cells that share this archive"
+    )
     parser.add_argument(
         "--metrics", type=Path, metavar="FILE", help="write it as metrics for Prometheus' node exporter too"
     )

@@ -7,8 +7,11 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 
 from hexacell.application.calibration_run import RunRequest
+from hexacell.application.cell_status import cell_status
 from hexacell.application.run_notices import RunEnd, notice_of_end, notice_of_failure
 from hexacell.application.telling_people import tell_people
+from hexacell.cell.loader import Cell
+from hexacell.cli.archive_argument import publish_or_warn
 from hexacell.cli.console import Console
 from hexacell.presentation.notices import telling_line
 
@@ -28,8 +31,20 @@ def told_afterwards(request: RunRequest, console: Console) -> Iterator[RunNews]:
         yield news
     except Exception as error:
         _tell(request, console, news, error)
+        _publish(request.cell, console)
         raise
     _tell(request, console, news, None)
+    _publish(request.cell, console)
+
+
+def _publish(cell: Cell, console: Console) -> None:
+    """Put how the cell is now into the archive that it shares; whatever goes wrong is said in one line."""
+    if cell.settings.archive.url is None:
+        return
+    try:
+        publish_or_warn(cell_status(cell), console)
+    except Exception as fault:
+        console.warn(f"the shared archive is as it was before this run ({type(fault).__name__})")
 
 
 def _tell(request: RunRequest, console: Console, news: RunNews, error: Exception | None) -> None:

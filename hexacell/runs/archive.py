@@ -50,7 +50,7 @@ PATIENCE_S = 5
 
 Found = TypeVar("Found")
 
-_TABLE = Table(
+ARCHIVE_TABLE = Table(
     f"hexacell_runs_{VERSION}",
     MetaData(),
     Column("place", String(1024), primary_key=True),
@@ -94,7 +94,7 @@ class Archive:
     @cached_property
     def _engine(self) -> Engine:
         try:
-            return _engine(self._url)
+            return open_engine(self._url)
         except ModuleNotFoundError as error:
             action = "Install hexacell[postgresql]. The runs are read from their folders"
             raise ArchiveUnavailable(str(error), subject="PostgreSQL", action=action) from error
@@ -105,8 +105,8 @@ class Archive:
         Raises:
             ArchiveUnavailable: it cannot be read.
         """
-        query = select(_TABLE.c.run, _TABLE.c.stamp, _TABLE.c.content).where(
-            _TABLE.c.place == self._place, _TABLE.c.kind == kind.value
+        query = select(ARCHIVE_TABLE.c.run, ARCHIVE_TABLE.c.stamp, ARCHIVE_TABLE.c.content).where(
+            ARCHIVE_TABLE.c.place == self._place, ARCHIVE_TABLE.c.kind == kind.value
         )
 
         def read(connection: Connection) -> dict[str, StampedDocument]:
@@ -129,7 +129,7 @@ class Archive:
         ]
 
         # Another process may keep the same document meanwhile.
-        insert = (sqlite.insert if self._file is not None else postgresql.insert)(_TABLE)
+        insert = (sqlite.insert if self._file is not None else postgresql.insert)(ARCHIVE_TABLE)
         fresh = {name: insert.excluded[name] for name in ("cell", "stamp", "content")}
         upsert = insert.on_conflict_do_update(index_elements=["place", "run", "kind"], set_=fresh)
 
@@ -145,7 +145,9 @@ class Archive:
         Raises:
             ArchiveUnavailable: it cannot be written.
         """
-        query = _TABLE.delete().where(_TABLE.c.place == self._place, _TABLE.c.run == bindparam("of_run"))
+        query = ARCHIVE_TABLE.delete().where(
+            ARCHIVE_TABLE.c.place == self._place, ARCHIVE_TABLE.c.run == bindparam("of_run")
+        )
         if runs:
             self._transact(lambda connection: connection.execute(query, [{"of_run": run} for run in runs]))
 
@@ -195,7 +197,8 @@ class Archive:
         )
 
 
-def _engine(url: URL) -> Engine:
+def open_engine(url: URL) -> Engine:
+    """Of SQLite, or of a PostgreSQL; connects to nothing yet. Raises ``ModuleNotFoundError``."""
     if url.drivername == "sqlite":
         return create_engine(url, poolclass=NullPool, connect_args={"timeout": PATIENCE_S})
     with_driver = url.set(drivername="postgresql+psycopg")
@@ -204,8 +207,8 @@ def _engine(url: URL) -> Engine:
 
 def _make_table(connection: Connection) -> None:
     """Make the table, unless it is there or another process makes it at this moment."""
-    if not inspect(connection).has_table(_TABLE.name):
-        connection.execute(CreateTable(_TABLE, if_not_exists=True))
+    if not inspect(connection).has_table(ARCHIVE_TABLE.name):
+        connection.execute(CreateTable(ARCHIVE_TABLE, if_not_exists=True))
 
 
 def _make_file(path: Path | None) -> None:

@@ -9,11 +9,12 @@ from hexacell.errors import FileError
 
 
 class DocumentKind(StrEnum):
-    """What the archive keeps of a run."""
+    """What the archive keeps of a run; of a cell, under no run's name, what others are told of it."""
 
     SUMMARY = "summary"
     RESULT = "result"
     EVIDENCE = "evidence"
+    CELL = "cell"
 
 
 @dataclass(frozen=True, slots=True)

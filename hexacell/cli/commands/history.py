@@ -7,12 +7,13 @@ from collections.abc import Sequence
 
 from hexacell.application.drift_history import drift_history
 from hexacell.application.evidence_comparison import compare_evidence
+from hexacell.application.fleet import fleet_runs
 from hexacell.application.history import compare_runs, have_results, parameter_trends, past_runs
 from hexacell.application.refit import refit_run
 from hexacell.application.retention import delete_runs, retention
 from hexacell.application.run_index import RunIndex
-from hexacell.cell.archive import mistake_in_url
 from hexacell.cell.loader import Cell
+from hexacell.cli.archive_argument import archive_url
 from hexacell.cli.cell_argument import cell_at
 from hexacell.cli.console import Console
 from hexacell.errors import ExitCode, UsageError
@@ -26,6 +27,7 @@ from hexacell.presentation.documents import (
     retention_document,
     story_document,
 )
+from hexacell.presentation.fleet import fleet_history_document, fleet_history_text
 from hexacell.presentation.history import comparison_text, drift_text, history_text
 from hexacell.presentation.old_runs import refit_text, retention_text
 from hexacell.presentation.run_story import story_text
@@ -40,6 +42,8 @@ def main(options: argparse.Namespace) -> ExitCode:
     console = Console(options.json)
     if options.delete and options.keep is None:
         raise UsageError("--delete needs --keep DAYS", action="Say how old the runs are that may go")
+    if options.cell is None:
+        return _fleet(options, console)
     cell = cell_at(options.cell, console)
     if options.compare is not None:
         _compare(cell, options.compare, console)
@@ -67,10 +71,19 @@ def main(options: argparse.Namespace) -> ExitCode:
 
 def _index(cell: Cell, options: argparse.Namespace, console: Console) -> RunIndex:
     """Of the archive that the command or the cell file names."""
-    mistake = None if options.archive is None else mistake_in_url(options.archive)
-    if mistake is not None:
-        raise UsageError(mistake[0], subject="--archive", action=mistake[1])
-    return RunIndex(cell, options.archive, console.warn)
+    url = None if options.archive is None else archive_url(options.archive)
+    return RunIndex(cell, url, console.warn)
+
+
+def _fleet(options: argparse.Namespace, console: Console) -> ExitCode:
+    """The runs of all cells of an archive."""
+    others = (options.compare, options.show, options.refit, options.keep, options.drift or None)
+    if options.archive is None or any(one is not None for one in others):
+        raise UsageError("no cell is named", action="Name a cell file, or --archive URL for all")
+    runs = fleet_runs(archive_url(options.archive))
+    console.document(fleet_history_document(runs))
+    console.print(fleet_history_text(runs))
+    return ExitCode.DONE
 
 
 def _keep(cell: Cell, options: argparse.Namespace, console: Console) -> None:

@@ -5,19 +5,39 @@ from __future__ import annotations
 import argparse
 
 from hexacell.application.cell_status import cell_status
+from hexacell.application.fleet import fleet_cells
+from hexacell.cli.archive_argument import archive_url, publish_or_warn
 from hexacell.cli.cell_argument import cell_at
 from hexacell.cli.console import Console
-from hexacell.errors import ExitCode
+from hexacell.errors import ExitCode, UsageError
 from hexacell.presentation.cell_status import metrics_text, status_document, status_text
+from hexacell.presentation.fleet import fleet_document, fleet_text
 from hexacell.storage.atomic_files import write_atomically
 
 
 def main(options: argparse.Namespace) -> ExitCode:
     """Tell; nothing is changed but the file of metrics, which is replaced whole."""
     console = Console(options.json)
+    if not options.cells:
+        return _fleet(options, console)
+    if options.archive is not None:
+        raise UsageError("--archive is for all of its cells", action="Name no cell, or leave it away")
     found = [cell_status(cell_at(path, console)) for path in options.cells]
+    for one in found:
+        publish_or_warn(one, console)
     if options.metrics is not None:
         write_atomically(options.metrics, metrics_text(found).encode())
     console.document(status_document(found))
     console.print(status_text(found))
+    return ExitCode.DONE
+
+
+def _fleet(options: argparse.Namespace, console: Console) -> ExitCode:
+    if options.archive is None:
+        raise UsageError("no cell is named", action="Name cell files, or --archive URL for all")
+    if options.metrics is not None:
+        raise UsageError("metrics are of cells of this computer", action="Name their cell files")
+    found = fleet_cells(archive_url(options.archive))
+    console.document(fleet_document(found))
+    console.print(fleet_text(found))
     return ExitCode.DONE

@@ -30,6 +30,7 @@ MAY_LOOK = {
     "hexacell/runs/run_folder.py": "names a run folder",
     "hexacell/application/calibration_run.py": "says which certificates have expired; a person decides",
     "hexacell/application/retention.py": "says which runs are old; a person deletes them",
+    "hexacell/application/fleet.py": "dates what a cell puts into a shared archive; says what is overdue",
     "hexacell/application/run_notices.py": "dates a notice",
     "hexacell/application/telling_people.py": "gives up notices that were tried and are days old",
     "hexacell/storage/cell_lock.py": "says since when somebody holds a cell",

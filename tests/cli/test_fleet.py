@@ -1,0 +1,140 @@
+"""All cells that share a PostgreSQL, seen from one computer; a real server is started."""
+
+from __future__ import annotations
+
+import shutil
+import socket
+from collections.abc import Iterator
+from datetime import UTC, datetime, timedelta
+
+import pytest
+
+from hexacell.application.fleet import FleetCell
+from hexacell.presentation.fleet import fleet_text
+from hexacell.runs.archive import INDEX
+from hexacell.storage.cell_lock import cell_lock
+from tests.hexacell.runs.postgresql_server import HOW_TO, installed_programs, running_server
+
+
+@pytest.fixture(scope="module")
+def server() -> Iterator[str]:
+    programs = installed_programs()
+    if programs is None:
+        pytest.skip(HOW_TO)
+    with running_server(programs) as url:
+        yield url
+
+
+@pytest.fixture
+def calibrated(demo, tmp_path):
+    """A copy of the demo's cell with its run."""
+    folder = tmp_path / "calibrated"
+    shutil.copytree(demo.folder, folder)
+    for index in folder.rglob(f"{INDEX}*"):
+        index.unlink()
+    return folder / demo.cell.name
+
+
+def share(cell, url: str, name: str, further: str = "") -> None:
+    text = cell.read_text().replace('name = "simulated-hexaglide"', f'name = "{name}"', 1)
+    cell.write_text(f'{text}\n[archive]\nurl = "{url}"\n{further}')
+
+
+def test_two_cells_on_two_computers(typed_here, server, demo, calibrated, cell_folder, monkeypatch) -> None:
+    text = calibrated.read_text().replace("[acceptance]\n", "[acceptance]\nvalid_days = 30\n", 1)
+    calibrated.write_text(text)
+    share(calibrated, server, "cell A")
+    (calibrated.parent / "runs" / "simulated-hexaglide").rename(calibrated.parent / "runs" / "cell A")
+    share(cell_folder.cell, server, "cell B")
+    assert "No cell has put" in typed_here("status", "--archive", server).out
+    for host, cell in (("east", calibrated), ("west", cell_folder.cell)):
+        monkeypatch.setattr(socket, "gethostname", lambda host=host: host)
+        assert typed_here("status", cell).code == 0
+    monkeypatch.setattr(socket, "gethostname", lambda: "office")
+
+    outcome = typed_here("status", "--archive", server, "--json")
+    assert outcome.code == 0, outcome.err
+    first, second = outcome.document["cells"]
+    accuracy = demo.outcome.document["verification"]["accuracy"]["position"]
+    assert (first["name"], first["host"], first["verdict"]) == ("cell A", "east", "pass")
+    assert (first["position_mm"], first["expanded_mm"]) == (accuracy["value"], accuracy["expanded"])
+    assert (first["latest_run"], first["mode"]) == (demo.run.name, "optimise")
+    ended = datetime.fromisoformat(first["latest_at"])
+    assert datetime.fromisoformat(first["due_at"]) == ended + timedelta(days=30)
+    assert (second["name"], second["host"], second["latest_run"], second["verdict"]) == (
+        "cell B",
+        "west",
+        None,
+        None,
+    )
+    lines = outcome.err.splitlines()
+    assert lines[1].split()[:3] == ["cell", "A", "east"]
+    assert lines[2] == f"  calibration due on {ended + timedelta(days=30):%Y-%m-%d}"
+    assert max(map(len, lines)) <= 80
+
+    history = typed_here("history", "--archive", server, "--json")
+    (run,) = history.document["runs"]
+    assert (run["cell"], run["host"], run["run"], run["verdict"]) == (
+        "cell A",
+        "east",
+        demo.run.name,
+        "pass",
+    )
+    assert "cell A" in history.err
+
+
+def test_a_run_puts_its_cell_there(typed_here, server, quick_cell) -> None:
+    share(quick_cell.cell, server, "cell C")
+    with cell_lock(quick_cell.controller):
+        assert typed_here("run", quick_cell.cell, "--unattended").code == 5
+    found = {
+        one["name"]: one for one in typed_here("status", "--archive", server, "--json").document["cells"]
+    }
+    assert found["cell C"]["cell"] == str(quick_cell.cell)
+
+
+def test_an_absent_archive_is_an_error_and_stops_no_run(typed_here, tmp_path, quick_cell) -> None:
+    nowhere = f"postgresql://nobody@/none?host={tmp_path}"
+    for command in ("status", "history"):
+        outcome = typed_here(command, "--archive", nowhere)
+        assert (outcome.code, "cannot be read" in outcome.err) == (2, True)
+    share(quick_cell.cell, nowhere, "cell D")
+    outcome = typed_here("status", quick_cell.cell)
+    assert outcome.code == 0
+    assert len(outcome.err.splitlines()) == 1
+    with cell_lock(quick_cell.controller):
+        outcome = typed_here("run", quick_cell.cell, "--unattended")
+    assert outcome.code == 5
+    assert "warning" in outcome.err
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("status",),
+        ("history",),
+        ("history", "--drift", "--archive", "postgresql://me@host/cells"),
+        ("history", "--keep", "0", "--archive", "postgresql://me@host/cells"),
+        ("status", "--metrics", "x.prom", "--archive", "postgresql://me@host/cells"),
+        ("status", "cell.toml", "--archive", "postgresql://me@host/cells"),
+    ],
+)
+def test_what_needs_a_cell_says_so(typed_here, arguments) -> None:
+    outcome = typed_here(*arguments)
+    assert outcome.code == 2
+    assert "cell" in outcome.err
+
+
+def test_passwords_are_refused_in_the_address(typed_here) -> None:
+    for command in ("status", "history"):
+        refused = typed_here(command, "--archive", "postgresql://me:secret@host/cells")
+        assert (refused.code, "secret" in refused.err) == (2, False)
+
+
+def test_what_is_overdue_is_said() -> None:
+    now = datetime.now(UTC)
+    late = FleetCell(name="late", host="east", cell="x", seen_at=now, due_at=now - timedelta(days=1))
+    fine = FleetCell(name="fine", host="east", cell="x", seen_at=now, due_at=now + timedelta(days=1))
+    assert (late.is_overdue(now), fine.is_overdue(now)) == (True, False)
+    text = fleet_text([late, fine])
+    assert (text.count("OVERDUE"), text.count("due on")) == (1, 1)

@@ -6,6 +6,7 @@ import socket
 from contextlib import closing
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from typing import TYPE_CHECKING
 
 from pydantic import ValidationError
 
@@ -15,7 +16,9 @@ from hexacell.cell.fields import Frozen, Name, Text
 from hexacell.decision import Verdict
 from hexacell.runs.archived_documents import DocumentKind, StampedDocument
 from hexacell.runs.run_folder import runs_folder
-from hexacell.runs.shared_archive import SharedDocument, shared_documents
+
+if TYPE_CHECKING:
+    from hexacell.runs.shared_archive import SharedDocument
 
 OF_THE_CELL = ""
 """Stands for a run's name where a document is of the cell itself."""
@@ -110,7 +113,7 @@ def fleet_cells(url: str) -> tuple[FleetCell, ...]:
     Raises:
         ArchiveUnavailable: it cannot be read.
     """
-    found = (_cell(document) for document in shared_documents(url, DocumentKind.CELL))
+    found = map(_cell, _shared_documents(url, DocumentKind.CELL))
     return tuple(one for one in found if one is not None)
 
 
@@ -120,7 +123,7 @@ def fleet_runs(url: str) -> tuple[FleetRun, ...]:
     Raises:
         ArchiveUnavailable: it cannot be read.
     """
-    found = (_run(document) for document in shared_documents(url, DocumentKind.SUMMARY))
+    found = map(_run, _shared_documents(url, DocumentKind.SUMMARY))
     ended = [one for one in found if one is not None]
     return tuple(sorted(ended, key=lambda one: (_moment(one), one.cell, one.name), reverse=True))
 
@@ -128,6 +131,12 @@ def fleet_runs(url: str) -> tuple[FleetRun, ...]:
 def is_overdue_now(cell: FleetCell) -> bool:
     """Whether its calibration should have been by now, by this computer's clock."""
     return cell.is_overdue(datetime.now(UTC))
+
+
+def _shared_documents(url: str, kind: DocumentKind) -> tuple[SharedDocument, ...]:
+    from hexacell.runs.shared_archive import shared_documents  # noqa: PLC0415 - SQLAlchemy only where used
+
+    return shared_documents(url, kind)
 
 
 def _moment(run: FleetRun) -> float:

@@ -37,6 +37,7 @@ from hexacell.cell.measuring import (
     VerificationSettings,
 )
 from hexacell.cell.notifications import MOST_NOTIFICATIONS, NotificationSettings
+from hexacell.cell.opcua import OpcUaSettings
 from hexacell.cell.recovery import RecoverySettings
 from hexacell.cell.simulation import SimulationSettings
 from hexacell.cell.speed import SpeedSettings
@@ -89,6 +90,7 @@ class CellSettings(Section):
     recovery: RecoverySettings = RecoverySettings()
     archive: ArchiveSettings = ArchiveSettings()
     notifications: tuple[NotificationSettings, ...] = Field((), max_length=MOST_NOTIFICATIONS)
+    opcua: OpcUaSettings | None = None
     task: TaskSettings = TaskSettings()
     report: ReportSettings = ReportSettings()
     simulation: SimulationSettings | None = None

@@ -66,6 +66,7 @@ def make_parser() -> Parser:
     _schedule(commands)
     _status(commands)
     _notify(commands)
+    _serve(commands)
     _cell(commands)
     return parser
 
@@ -401,6 +402,11 @@ def _notify(commands: Any) -> None:  # noqa: ANN401
     what.add_argument("--test", action="store_true", help="tell everybody something now")
     what.add_argument("--send", action="store_true", help="send what earlier runs could not")
     _add_json(parser)
+
+
+def _serve(commands: Any) -> None:  # noqa: ANN401
+    parser = _command(commands, "serve", "serve the results of a cell by OPC UA until interrupted")
+    _add_cell(parser)
 
 
 def _cell(commands: Any) -> None:  # noqa: ANN401

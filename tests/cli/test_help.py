@@ -32,6 +32,7 @@ COMMANDS = (
     "schedule",
     "status",
     "notify",
+    "serve",
     "cell",
 )
 PAGES = [

@@ -1,0 +1,88 @@
+"""One run as other machines are told of it, in the words of OPC 40001-101 (Machinery, Result Transfer)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from datetime import datetime
+from enum import IntEnum
+
+from hexacell.application.history import PastRun
+from hexacell.decision import Verdict
+
+
+class ResultEvaluation(IntEnum):
+    """Whether a result was in tolerance; the values of ResultEvaluationEnum there."""
+
+    UNDEFINED = 0
+    OK = 1
+    NOT_OK = 2
+    NOT_DECIDABLE = 3
+
+
+class ResultState(IntEnum):
+    """How far the measurement went; the values of ResultState there."""
+
+    COMPLETED = 1
+    ABORTED = 3
+
+
+EVALUATIONS = {
+    Verdict.PASS: ResultEvaluation.OK,
+    Verdict.FAIL: ResultEvaluation.NOT_OK,
+    Verdict.CONDITIONAL_PASS: ResultEvaluation.NOT_DECIDABLE,
+    Verdict.CONDITIONAL_FAIL: ResultEvaluation.NOT_DECIDABLE,
+    Verdict.NOT_EVALUATED: ResultEvaluation.NOT_DECIDABLE,
+}
+
+SEVERITIES = {
+    ResultEvaluation.OK: 100,
+    ResultEvaluation.UNDEFINED: 500,
+    ResultEvaluation.NOT_DECIDABLE: 500,
+    ResultEvaluation.NOT_OK: 800,
+}
+"""Of the event, 1 to 1000 (OPC 10000-5, 6.4.2)."""
+
+
+@dataclass(frozen=True, slots=True)
+class PublishedResult:
+    """A run that has ended. Lengths in mm; NaN where nothing was found.
+
+    Attributes:
+        result_id: of this run and no other.
+        details: how it ended, in words.
+    """
+
+    result_id: str
+    created: datetime
+    is_simulated: bool
+    state: ResultState
+    evaluation: ResultEvaluation
+    details: str
+    mode: str
+    verdict: str
+    position_mm: float
+    expanded_mm: float
+    limit_mm: float
+
+
+def published_result(cell: str, run: PastRun, *, is_simulated: bool) -> PublishedResult | None:
+    """What is published of a run; nothing of one that goes on, or that cannot be read."""
+    summary = run.summary
+    if not summary.is_over or summary.ended is None:
+        return None
+    verdict, accuracy = summary.verdict, summary.accuracy
+    position = None if accuracy is None else accuracy.position
+    nothing = float("nan")
+    return PublishedResult(
+        result_id=f"{cell}/{run.name}",
+        created=summary.ended,
+        is_simulated=is_simulated,
+        state=ResultState.ABORTED if verdict is None else ResultState.COMPLETED,
+        evaluation=ResultEvaluation.UNDEFINED if verdict is None else EVALUATIONS[verdict],
+        details=summary.line,
+        mode=summary.mode,
+        verdict="" if verdict is None else verdict.value,
+        position_mm=nothing if position is None else position.value,
+        expanded_mm=nothing if position is None else position.expanded,
+        limit_mm=nothing if position is None else position.limit,
+    )

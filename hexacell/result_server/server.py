@@ -1,0 +1,129 @@
+"""The server: results that are there when it begins, then an event for each new one."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from asyncua import ua
+from asyncua.crypto.permission_rules import User, UserRole
+from asyncua.server.server import Server
+
+from hexacell.application.history import PastRun, past_runs
+from hexacell.cell.loader import Cell
+from hexacell.cell.opcua import OpcUaSettings
+from hexacell.errors import DeviceError, FileError
+from hexacell.result_server.address_space import MOST_RESULTS, ResultNodes
+from hexacell.result_server.credentials import Reader, allowed_reader, ensure_certificate
+from hexacell.result_server.published_result import PublishedResult, published_result
+
+URI = "urn:hexacell:result-server"
+
+
+class _Readers:
+    """Lets the reader in, who can change nothing."""
+
+    def __init__(self, reader: Reader) -> None:
+        self._reader = reader
+
+    def get_user(
+        self,
+        _iserver: Any,  # noqa: ANN401 - as asyncua calls it
+        username: str | None = None,
+        password: str | bytes | None = None,
+        certificate: object = None,  # noqa: ARG002 - likewise
+    ) -> User | None:
+        """The user, or none for whoever is refused."""
+        text = password.decode("utf-8", "replace") if isinstance(password, bytes) else password
+        return User(role=UserRole.User) if self._reader.is_this(username, text) else None
+
+
+async def serve_results(
+    cell: Cell,
+    settings: OpcUaSettings,
+    stop: asyncio.Event,
+    ready: Callable[[str], None],
+    warn: Callable[[str], None],
+) -> None:
+    """Serve until ``stop`` is set; ``ready`` is told the address, ``warn`` why runs cannot be read.
+
+    Raises:
+        FileError: its certificate cannot be read or made.
+        UsageError: nobody may read.
+        DeviceError: the port is taken, or is no port of this computer.
+    """
+    reader = allowed_reader(settings, cell.path.parent)
+    server = await _server(settings, reader, cell.path.parent / settings.folder)
+    nodes = await ResultNodes.of(server, cell.settings.name)
+    try:
+        await server.start()
+    except OSError as error:
+        raise DeviceError(
+            f"cannot be served: {error.strerror or error}",
+            subject=server.endpoint.geturl(),
+            action="Correct host and port in [opcua]",
+        ) from error
+    try:
+        await _follow(cell, settings, nodes, stop, ready=lambda: ready(server.endpoint.geturl()), warn=warn)
+    finally:
+        await server.stop()
+
+
+async def _server(settings: OpcUaSettings, reader: Reader, folder: Path) -> Server:
+    logging.getLogger("asyncua").setLevel(logging.CRITICAL)  # it reports each refused client at length
+    certificate, key = ensure_certificate(folder, URI, settings.host)
+    server = Server(user_manager=_Readers(reader))  # type: ignore[arg-type]  # it needs the one method
+    await server.init()
+    server.set_endpoint(f"opc.tcp://{settings.host}:{settings.port}/hexacell/")
+    server.set_server_name("hexacell results")
+    await server.set_application_uri(URI)
+    server.set_security_policy([ua.SecurityPolicyType.Basic256Sha256_SignAndEncrypt])
+    server.set_identity_tokens([ua.UserNameIdentityToken if reader.user else ua.AnonymousIdentityToken])
+    await server.load_certificate(certificate)
+    await server.load_private_key(key)
+    return server
+
+
+async def _follow(
+    cell: Cell,
+    settings: OpcUaSettings,
+    nodes: ResultNodes,
+    stop: asyncio.Event,
+    *,
+    ready: Callable[[], None],
+    warn: Callable[[str], None],
+) -> None:
+    """Show what there is, then show and tell what is new."""
+    known: set[str] = set()
+    for result in (await _ended(cell, known, warn))[-MOST_RESULTS:]:
+        await nodes.show(result)
+    ready()
+    while not await _is_set_within(stop, settings.poll_s):
+        for result in await _ended(cell, known, warn):
+            await nodes.show(result)
+            await nodes.tell(result)
+
+
+async def _ended(cell: Cell, known: set[str], warn: Callable[[str], None]) -> list[PublishedResult]:
+    """The runs that have ended and are not known yet, the oldest first; they are known then."""
+    try:
+        runs: tuple[PastRun, ...] = await asyncio.to_thread(past_runs, cell)
+    except FileError as error:
+        warn(str(error))
+        return []
+    is_simulated = cell.settings.simulation is not None
+    found = (published_result(cell.settings.name, run, is_simulated=is_simulated) for run in reversed(runs))
+    fresh = [one for one in found if one is not None and one.result_id not in known]
+    known.update(one.result_id for one in fresh)
+    return fresh
+
+
+async def _is_set_within(stop: asyncio.Event, seconds: float) -> bool:
+    try:
+        await asyncio.wait_for(stop.wait(), seconds)
+    except TimeoutError:
+        return False
+    return True

@@ -1,0 +1,257 @@
+"""Results by OPC UA, as asyncua's own client on loopback sees them."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import math
+import socket
+import stat
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+from asyncua import ua
+from asyncua.client.client import Client
+from asyncua.crypto import cert_gen
+from asyncua.crypto.security_policies import SecurityPolicyBasic256Sha256
+from asyncua.ua.uaerrors import UaError
+from cryptography import x509
+from cryptography.hazmat.primitives.serialization import Encoding
+from cryptography.x509.oid import ExtendedKeyUsageOID
+
+from hexacell.cell.loader import Cell
+from hexacell.cell.opcua import OpcUaSettings
+from hexacell.decision import Verdict
+from hexacell.errors import DeviceError, FileError, UsageError
+from hexacell.result_server.address_space import MOST_RESULTS, NAMESPACE
+from hexacell.result_server.credentials import ensure_certificate
+from hexacell.result_server.server import serve_results
+from hexacell.runs.run_folder import runs_folder
+from tests.hexacell.application.proposed_runs import a_cell, propose_run
+from tests.hexacell.notices.local_servers import closed_port
+
+USER, PASSWORD = "line-7", "hidden-password"
+QUIET = logging.getLogger("asyncua")
+
+
+@pytest.fixture(autouse=True)
+def quiet():
+    """The library's words about refused clients are not of the tests."""
+    level = QUIET.level
+    yield
+    QUIET.setLevel(level)
+
+
+@pytest.fixture
+def cell(tmp_path, monkeypatch) -> Cell:
+    monkeypatch.setenv("HEXACELL_OPCUA_USER", USER)
+    monkeypatch.setenv("HEXACELL_OPCUA_PASSWORD", PASSWORD)
+    return a_cell(tmp_path)
+
+
+@pytest.fixture(scope="module")
+def client_files(tmp_path_factory) -> tuple[Path, Path]:
+    folder = tmp_path_factory.mktemp("client")
+    key = cert_gen.generate_private_key()
+    names = [x509.UniformResourceIdentifier("urn:test:client"), x509.DNSName("localhost")]
+    made = cert_gen.generate_self_signed_app_certificate(
+        key, "test", {}, names, extended=[ExtendedKeyUsageOID.CLIENT_AUTH]
+    )
+    (folder / "certificate.der").write_bytes(made.public_bytes(Encoding.DER))
+    (folder / "key.pem").write_bytes(cert_gen.dump_private_key_as_pem(key))
+    return folder / "certificate.der", folder / "key.pem"
+
+
+@asynccontextmanager
+async def serving(
+    cell: Cell, warn: Callable[[str], None] = lambda _: None, **further: Any
+) -> AsyncIterator[str]:
+    """The address of a server that runs."""
+    settings = OpcUaSettings(port=closed_port(), poll_s=0.05, **further)
+    stop, address = asyncio.Event(), asyncio.get_running_loop().create_future()
+    task = asyncio.create_task(serve_results(cell, settings, stop, address.set_result, warn))
+    await asyncio.wait({task, address}, return_when=asyncio.FIRST_COMPLETED)
+    if task.done():
+        task.result()
+    try:
+        yield address.result()
+    finally:
+        stop.set()
+        await task
+
+
+@asynccontextmanager
+async def reading(
+    address: str, files: tuple[Path, Path], user: str | None = USER, password: str = PASSWORD
+) -> AsyncIterator[Client]:
+    client = Client(address)
+    client.application_uri = "urn:test:client"
+    await client.set_security(SecurityPolicyBasic256Sha256, files[0], files[1])
+    if user is not None:
+        client.set_user(user)
+        client.set_password(password)
+    async with client:
+        yield client
+
+
+async def results(client: Client, cell: Cell) -> dict[str, dict[str, Any]]:
+    """All results by their names, with the values of all their variables."""
+    number = await client.get_namespace_index(NAMESPACE)
+    path = [f"{number}:{name}" for name in (cell.settings.name, "ResultManagement", "Results")]
+    folder = await client.nodes.objects.get_child(path)
+    found: dict[str, dict[str, Any]] = {}
+    for node in await folder.get_children():
+        name = (await node.read_browse_name()).Name
+        found[name] = {}
+        for part in await node.get_children():
+            for variable in await part.get_children():
+                found[name][(await variable.read_browse_name()).Name] = await variable.read_value()
+    return found
+
+
+class Heard:
+    """What a subscription is told."""
+
+    def __init__(self) -> None:
+        self.told: asyncio.Queue[Any] = asyncio.Queue()
+
+    def event_notification(self, event: Any) -> None:
+        self.told.put_nowait(event)
+
+
+async def test_results_can_be_read_and_each_new_one_is_told_once(cell, client_files) -> None:
+    propose_run(cell, "2026-11-01T100000Z")
+    going_on = propose_run(cell, "2026-11-01T110000Z").folder.journal
+    going_on.write_bytes(b"".join(going_on.read_bytes().splitlines(keepends=True)[:-1]))
+    name = cell.settings.name
+    async with serving(cell) as address, reading(address, client_files) as client:
+        ((shown, values),) = (await results(client, cell)).items()
+        assert shown == values["ResultId"] == f"{name}/2026-11-01T100000Z"
+        assert (values["ResultEvaluation"], values["ResultState"], values["IsSimulated"]) == (1, 1, True)
+        assert (values["Verdict"], values["Mode"]) == ("pass", "optimise")
+        assert values["ResultEvaluationDetails"] == "over"
+        assert math.isnan(values["PositionErrorMm"])
+
+        number = await client.get_namespace_index(NAMESPACE)
+        kind = await client.nodes.base_event_type.get_child(f"{number}:ResultReadyEventType")
+        management = await client.nodes.objects.get_child(
+            [f"{number}:{name}", f"{number}:ResultManagement"]
+        )
+        heard = Heard()
+        subscription = await client.create_subscription(20, heard)
+        await subscription.subscribe_events(management, kind)
+        days = range(2, MOST_RESULTS + 3)
+        verdicts = [Verdict.FAIL, Verdict.CONDITIONAL_PASS, None, *[Verdict.PASS] * MOST_RESULTS]
+        expected = [(2, 800), (3, 500), (0, 500), *[(1, 100)] * MOST_RESULTS]
+        for day, verdict, (evaluation, severity) in zip(days, verdicts, expected, strict=False):
+            propose_run(cell, f"2026-11-{day:02}T100000Z", verdict=verdict)
+            event = await heard.told.get()
+            assert event.ResultId == f"{name}/2026-11-{day:02}T100000Z"
+            assert (event.ResultEvaluation, event.Severity) == (evaluation, severity)
+            assert event.Message.Text == "over"
+        assert heard.told.empty()
+        left = sorted(await results(client, cell))
+    assert left == [f"{name}/2026-11-{day:02}T100000Z" for day in days][-MOST_RESULTS:]
+
+
+async def test_who_is_not_the_reader_is_refused_and_the_reader_changes_nothing(
+    cell, client_files, monkeypatch
+) -> None:
+    monkeypatch.delenv("HEXACELL_OPCUA_USER")
+    path = cell.path.parent / "reader.toml"
+    path.write_text(f'user = "{USER}"\npassword = "{PASSWORD}"\n')
+    path.chmod(0o600)
+    propose_run(cell, "2026-11-20T100000Z")
+    strangers = [
+        (USER, "wrong"),
+        ("other", PASSWORD),
+        (USER, ""),
+        (None, ""),
+        ("admin", ""),
+        ("Admin", "x"),
+    ]
+    async with serving(cell, password_file=path.name) as address:
+        for user, password in strangers:
+            with pytest.raises(UaError):
+                async with reading(address, client_files, user, password):
+                    pass
+        await _hears_nobody_without_encryption(address)
+        async with reading(address, client_files) as client:
+            await _changes_nothing(client, cell)
+
+
+async def _hears_nobody_without_encryption(address: str) -> None:
+    endpoints = await Client(address).connect_and_get_server_endpoints()
+    assert {(one.SecurityMode, one.SecurityPolicyUri) for one in endpoints} == {
+        (ua.MessageSecurityMode.SignAndEncrypt, SecurityPolicyBasic256Sha256.URI)
+    }
+    client = Client(address)
+    client.set_user(USER)
+    client.set_password(PASSWORD)
+    with pytest.raises(UaError):
+        await client.connect()
+
+
+async def _changes_nothing(client: Client, cell: Cell) -> None:
+    number = await client.get_namespace_index(NAMESPACE)
+    name = cell.settings.name
+    path = (name, "ResultManagement", "Results", f"{name}/2026-11-20T100000Z")
+    node = await client.nodes.objects.get_child([f"{number}:{one}" for one in path])
+    (meta, _) = await node.get_children()
+    (variable, *_) = await meta.get_children()
+    with pytest.raises(UaError):
+        await variable.write_value("another")
+    with pytest.raises(UaError):
+        await node.delete()
+    with pytest.raises(UaError):
+        await node.add_folder(number, "mine")
+    assert (await results(client, cell))[path[-1]]["ResultId"] == path[-1]
+
+
+async def test_anybody_may_read_only_where_the_cell_says_so(cell, client_files, monkeypatch) -> None:
+    for variable in ("HEXACELL_OPCUA_USER", "HEXACELL_OPCUA_PASSWORD"):
+        monkeypatch.delenv(variable)
+    with pytest.raises(UsageError, match="nobody may read"):
+        async with serving(cell):
+            pass
+    runs_folder(cell).parent.mkdir()
+    runs_folder(cell).write_text("no folder")
+    warnings: list[str] = []
+    async with (
+        serving(cell, warnings.append, anonymous=True) as address,
+        reading(address, client_files, None) as client,
+    ):
+        assert await results(client, cell) == {}
+    assert warnings
+
+
+async def test_a_password_that_others_can_read_is_refused(cell, monkeypatch) -> None:
+    monkeypatch.delenv("HEXACELL_OPCUA_USER")
+    path = cell.path.parent / "reader.toml"
+    path.write_text(f'user = "{USER}"\npassword = "{PASSWORD}"\n')
+    path.chmod(0o644)
+    with pytest.raises(FileError, match="chmod 600") as raised:
+        async with serving(cell, password_file=path.name):
+            pass
+    assert PASSWORD not in str(raised.value)
+
+
+def test_its_certificate_stays_and_its_key_is_its_own(tmp_path) -> None:
+    folder = tmp_path / "opcua"
+    first = [path.read_bytes() for path in ensure_certificate(folder, "urn:x", "127.0.0.1")]
+    again = [path.read_bytes() for path in ensure_certificate(folder, "urn:x", "127.0.0.1")]
+    assert first == again
+    assert stat.S_IMODE((folder / "private-key.pem").stat().st_mode) == 0o600
+    assert x509.load_der_x509_certificate(first[0]).not_valid_after_utc.year >= 2036
+
+
+async def test_a_port_that_is_taken_is_named(cell) -> None:
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        settings = OpcUaSettings(port=taken.getsockname()[1])
+        with pytest.raises(DeviceError, match="cannot be served"):
+            await serve_results(cell, settings, asyncio.Event(), lambda _: None, lambda _: None)

@@ -18,6 +18,7 @@ class ExitCode(IntEnum):
     ANSWER_NEEDED = 4
     BUSY = 5
     WRITE_BACK_UNDONE = 6
+    OUT_OF_TIME = 7
     FAULT = 70
     INTERRUPTED = 130
 
@@ -104,6 +105,12 @@ class Interruption(HexacellError):
     """The run was stopped before its end; it can be resumed."""
 
     exit_code = ExitCode.INTERRUPTED
+
+
+class OutOfTime(HexacellError):
+    """A run without a person is not in its time: it would begin in quiet hours, or lasted too long."""
+
+    exit_code = ExitCode.OUT_OF_TIME
 
 
 class WriteBackUndone(HexacellError):

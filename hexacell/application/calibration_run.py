@@ -59,6 +59,7 @@ class RunRequest:
     """One run of a cell, new or resumed, and the folder that keeps it.
 
     ``removed`` is what a person took out of the plan of a new one; a resumed one keeps its own.
+    ``keeps_hours`` is whether the cell's quiet hours, window and longest duration hold for it.
     """
 
     cell: Cell
@@ -69,6 +70,7 @@ class RunRequest:
     resume: bool = False
     length_check: bool = False
     removed: RemovedPoses = NOTHING_REMOVED
+    keeps_hours: bool = False
 
 
 async def preflight(cell: Cell, mode: Mode, *, unattended: bool) -> tuple[DeviceIdentity, ...]:

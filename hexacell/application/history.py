@@ -22,6 +22,7 @@ from hexacell.reporting.run_comparison import ParameterTrend, RunComparison, com
 from hexacell.reporting.verification import VerifiedAccuracy
 from hexacell.runs.archived_documents import DocumentKind
 from hexacell.runs.run_folder import RunFolder, find_run, runs_folder
+from hexacell.runs.start_attempts import StartAttempts, read_attempts
 from procedures.journal.journal import read_entries, read_journal
 from procedures.journal.line_format import Entry
 from procedures.run import events
@@ -42,6 +43,7 @@ class RunSummary(Frozen):
         written_sha256: fingerprint of the controller's config as it wrote it; none where it wrote none.
         has_written: whether it wrote the config at all, whatever was undone.
         has_proposal: whether it has a proposal that is not in the config, and can be applied.
+        has_begun: whether it began at all; one that was refused each time did not.
     """
 
     began: datetime | None = None
@@ -56,6 +58,7 @@ class RunSummary(Frozen):
     written_sha256: str | None = None
     has_written: bool = False
     has_proposal: bool = False
+    has_begun: bool = True
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,6 +98,8 @@ def _past_run(folder: RunFolder, summary: RunSummary, config_sha256: str) -> Pas
 
 def _summary(folder: RunFolder) -> RunSummary:
     try:
+        if not folder.journal.is_file() and (attempts := read_attempts(folder)) is not None:
+            return _summary_of_attempts(attempts)
         entries = read_entries(folder.journal)
     except HexacellError as error:
         return RunSummary(line=str(error))
@@ -114,6 +119,14 @@ def _summary(folder: RunFolder) -> RunSummary:
         written_sha256=_written_sha256(folder),
         has_written=(folder.path / RECEIPT).is_file(),
         has_proposal=_has_open_proposal(folder, state),
+    )
+
+
+def _summary_of_attempts(refused: StartAttempts) -> RunSummary:
+    """Of a run that never began."""
+    first, last = refused.attempts[0].at, refused.last.at
+    return RunSummary(
+        began=first, ended=last, mode=refused.mode, line=refused.line, is_over=True, has_begun=False
     )
 
 

@@ -10,9 +10,11 @@ import subprocess
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
+from math import ceil
 from pathlib import Path
 
 from hexacell.cell.loader import Cell
+from hexacell.cell.unattended import DAY_MINUTES
 from hexacell.errors import FileError, UsageError
 from hexacell.scheduling.scheduled_run import MOST_MINUTES, ScheduledRun, time_of_day
 from hexacell.scheduling.systemd_units import cell_of, service_text, timer_text
@@ -24,6 +26,8 @@ DEVICE_GROUPS = ("dialout",)
 """Who may open serial lines, on Debian and its like; named where it exists."""
 
 VERIFYING_S = 20.0
+SPARE_MINUTES = 10.0
+"""Beside its longest duration, for a run to go back to its reference."""
 _UNIT_NAME = re.compile(r"[A-Za-z0-9:_.@%\\-]+\.[a-z]+")
 
 
@@ -63,6 +67,10 @@ def scheduled_run(cell: Cell, request: ScheduleRequest) -> ScheduledRun:
     """
     _require_possible(cell, request)
     hour, minute = time_of_day(request.daily)
+    _require_not_quiet(cell, hour, minute)
+    longest, retries = _times(cell, request)
+    if (retries + 1) * (longest + request.retry_minutes) > MOST_MINUTES:
+        raise UsageError("all tries together last longer than a day", action="Lower --longest or --retries")
     path = cell.path.resolve()
     config = cell.config_path.resolve().parent
     metrics = None if request.metrics is None else request.metrics.resolve()
@@ -73,9 +81,9 @@ def scheduled_run(cell: Cell, request: ScheduleRequest) -> ScheduledRun:
         mode=request.mode,
         hour=hour,
         minute=minute,
-        longest_minutes=request.longest_minutes,
+        longest_minutes=longest,
         retry_minutes=request.retry_minutes,
-        retries=request.retries,
+        retries=retries,
         metrics=metrics,
         writable=tuple(
             dict.fromkeys((path.parent, config, *([] if metrics is None else [metrics.parent])))
@@ -143,12 +151,35 @@ def _require_possible(cell: Cell, request: ScheduleRequest) -> None:
         if not 1 <= minutes <= MOST_MINUTES:
             action = f"Give 1 to {MOST_MINUTES} minutes"
             raise UsageError(f"--{what} {minutes} is no duration", action=action)
-    if (request.retries + 1) * (request.longest_minutes + request.retry_minutes) > MOST_MINUTES:
-        raise UsageError("all tries together last longer than a day", action="Lower --longest or --retries")
     if request.on_failure is not None and not _UNIT_NAME.fullmatch(request.on_failure):
         raise UsageError(
             f"'{request.on_failure}' is no name of a unit", action="Write it as mail-me@%n.service"
         )
+
+
+def _times(cell: Cell, request: ScheduleRequest) -> tuple[int, int]:
+    """After how many minutes a service is stopped, and how often it is tried again.
+
+    What the cell file says of window and longest duration the run itself keeps: a service must leave it the
+    time for that, and does not try again what was tried for a whole window.
+    """
+    stated = cell.settings.unattended
+    needed = stated.window_minutes + (stated.longest_minutes or request.longest_minutes) + SPARE_MINUTES
+    has_hours = stated.window_minutes > 0.0 or stated.longest_minutes is not None
+    longest = max(request.longest_minutes, ceil(needed)) if has_hours else request.longest_minutes
+    return longest, 0 if stated.window_minutes > 0.0 else request.retries
+
+
+def _require_not_quiet(cell: Cell, hour: int, minute: int) -> None:
+    """Refuse a time at which quiet hours begin or go on, on whatever day."""
+    stated, at = cell.settings.unattended, 60 * hour + minute
+    for begin, length in stated.quiet_spans:
+        if (at - begin) % DAY_MINUTES < length:
+            raise UsageError(
+                f"{hour:02}:{minute:02} is in the quiet hours of the cell",
+                subject=cell.path,
+                action="Choose another time, or change quiet_hours in [unattended]",
+            )
 
 
 def _place(folder: Path | None) -> tuple[Path, bool]:

@@ -25,7 +25,7 @@ from hexacell.attach.outbox import STUCK_S
 from hexacell.attach.run_device_watch import RunDeviceWatch
 from hexacell.campaign.pose_list import pose_list_of
 from hexacell.errors import ExitCode, HexacellError, SeveralErrors
-from procedures.calibration.workflow import expected_records
+from procedures.calibration.expected_records import expected_records
 from procedures.devices.device_set import Devices
 from procedures.engine.command_loop import Status
 from procedures.engine.engine import Engine

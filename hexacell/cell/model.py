@@ -41,6 +41,7 @@ from hexacell.cell.opcua import OpcUaSettings
 from hexacell.cell.recovery import RecoverySettings
 from hexacell.cell.simulation import SimulationSettings
 from hexacell.cell.speed import SpeedSettings
+from hexacell.cell.unattended import UnattendedSettings
 from hexacell.cell.uncertainty import UncertaintySettings
 from hexacell.kinematics.mechanism import Mechanism
 from hexacell.kinematics.parameters import ParameterKind, ParameterSet
@@ -88,6 +89,7 @@ class CellSettings(Section):
     quick: QuickSettings = QuickSettings()
     length_check: LengthCheckSettings | None = None
     recovery: RecoverySettings = RecoverySettings()
+    unattended: UnattendedSettings = UnattendedSettings()
     archive: ArchiveSettings = ArchiveSettings()
     notifications: tuple[NotificationSettings, ...] = Field((), max_length=MOST_NOTIFICATIONS)
     opcua: OpcUaSettings | None = None

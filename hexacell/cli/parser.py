@@ -13,8 +13,9 @@ EXIT_CODES = """exit codes:
   0 done, within limits            4 an answer or approval is needed
   1 out of limits or worse,        5 the cell is in use
     nothing applied                6 write-back failed and was undone
-  2 usage or file error            70 a fault of the program
-  3 hardware or link               130 interrupted"""
+  2 usage or file error            7 out of its time; it can be resumed
+  3 hardware or link               70 a fault of the program
+                                   130 interrupted"""
 
 
 class Parser(argparse.ArgumentParser):

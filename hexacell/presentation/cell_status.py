@@ -19,6 +19,7 @@ LONGEST_NAME = 22
 HELP = {
     "hexacell_in_use": "Whether a process holds the cell.",
     "hexacell_last_run_timestamp_seconds": "When the latest run ended.",
+    "hexacell_last_run_begun": "Whether the latest run began; one that was refused each time did not.",
     "hexacell_last_run_passed": "Whether the latest run with a verdict passed.",
     "hexacell_last_verdict": "1 for the verdict of the latest run that has one.",
     "hexacell_last_pass_timestamp_seconds": "When a run passed last.",
@@ -68,6 +69,8 @@ def _lines(one: CellStatus) -> Iterator[str]:
     yield f"{one.cell.settings.name[:LONGEST_NAME]:{LONGEST_NAME}} {verdict:17} {error:16} {when:17} {used}"
     if one.proposal is not None:
         yield f"  a proposal waits for a person: hexacell apply {one.proposal.folder.path}"
+    if one.latest is not None and not one.latest.summary.has_begun:
+        yield f"  {one.latest.name}: {one.latest.summary.line}"
     if one.latest is not None and not one.latest.summary.is_over:
         yield f"  {one.latest.name} is not over: {one.latest.summary.line}"
     if one.due_at is not None:
@@ -95,6 +98,7 @@ def _document(one: CellStatus) -> dict[str, Any]:
         "in_force": None if one.in_force is None else str(one.in_force.folder.path),
         "due_at": _iso(one.due_at),
         "proposal": None if one.proposal is None else str(one.proposal.folder.path),
+        "not_begun": None if not _is_refused(one) or one.latest is None else one.latest.summary.line,
         "changes": len(one.drift.changes),
         "largest_sum": None if worst is None else {"parameter": worst[0], "ratio": worst[1]},
     }
@@ -104,6 +108,8 @@ def _samples(one: CellStatus) -> Iterator[tuple[str, dict[str, str], str]]:
     yield "hexacell_in_use", {}, _flag(one.in_use_by is not None)
     yield "hexacell_open_proposal", {}, _flag(one.proposal is not None)
     yield "hexacell_changes_found", {}, str(len(one.drift.changes))
+    if one.latest is not None:
+        yield "hexacell_last_run_begun", {}, _flag(not _is_refused(one))
     times = {
         "hexacell_last_run_timestamp_seconds": _ended(one.latest),
         "hexacell_last_pass_timestamp_seconds": one.passed_at,
@@ -125,6 +131,11 @@ def _samples(one: CellStatus) -> Iterator[tuple[str, dict[str, str], str]]:
         yield "hexacell_position_error_mm", {}, repr(accuracy.position.value)
         yield "hexacell_position_expanded_mm", {}, repr(accuracy.position.expanded)
         yield "hexacell_position_limit_mm", {}, repr(accuracy.position.limit)
+
+
+def _is_refused(one: CellStatus) -> bool:
+    """Whether the latest run never began."""
+    return one.latest is not None and not one.latest.summary.has_begun
 
 
 def _ended(run: PastRun | None) -> datetime | None:

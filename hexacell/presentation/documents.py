@@ -202,6 +202,7 @@ def past_run_document(run: PastRun) -> dict[str, Any]:
         "expanded_mm": None if error is None else error.expanded,
         "limit_mm": None if error is None else error.limit,
         "line": was.line,
+        "begun": was.has_begun,
         "over": was.is_over,
         "in_controller": run.is_in_controller,
         "written": was.has_written,

@@ -45,6 +45,8 @@ def standing(run: PastRun) -> str:
     """What became of a run, in a few words."""
     if not run.summary.mode:
         return "unreadable"
+    if not run.summary.has_begun:
+        return "not begun"
     if run.is_in_controller:
         return "in controller" if run.summary.is_over else "unverified!"
     if not run.summary.is_over:

@@ -7,9 +7,10 @@ from pathlib import Path
 
 from hexacell.application.calibration_run import RunRequest
 from hexacell.campaign.teaching import TaskDisplacement
+from hexacell.errors import HexacellError
 from hexacell.kinematics.pose import Pose
 from hexacell.presentation.answers import request_text
-from hexacell.presentation.layout import wrapped
+from hexacell.presentation.layout import duration, wrapped
 from hexacell.presentation.teaching import teaching_line, teaching_sentence
 from hexacell.reporting.result import ExpectedImprovement
 from procedures.calibration.workflow import Mode
@@ -49,6 +50,11 @@ def demo_opening(config: Path) -> str:
 def clock_notice(factor: float) -> str:
     """How fast the clock of a simulated cell runs."""
     return f"The simulated cell's clock runs {factor:g} times as fast as real time."
+
+
+def next_try_text(refusal: HexacellError, wait_s: float) -> str:
+    """Why a run could not begin, and when it is tried again."""
+    return f"{refusal}\nnot begun; tried again in {duration(wait_s / 60.0)}"
 
 
 def resume_hint(request: RunRequest) -> str:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from hexacell.application.schedules import Schedule, ScheduleRequest
+from hexacell.application.schedules import Schedule
+from hexacell.cell.unattended import UnattendedSettings
 from hexacell.presentation.layout import wrapped
+from hexacell.scheduling.scheduled_run import ScheduledRun
 
 MEANING = {
     "check": "It measures a few records and changes nothing.",
@@ -13,18 +15,11 @@ MEANING = {
 }
 
 
-def written_schedule_text(schedule: Schedule, request: ScheduleRequest) -> str:
+def written_schedule_text(schedule: Schedule, run: ScheduledRun, stated: UnattendedSettings) -> str:
     """What was written, in words, and how it is put in force."""
-    again = (
-        f"A device or lock that is not there is tried again {request.retries} times, every "
-        f"{request.retry_minutes} minutes. "
-        if request.retries
-        else ""
-    )
     explanation = (
-        f"Each day at {request.daily} a {request.mode} begins. {MEANING[request.mode]} {again}After "
-        f"{request.longest_minutes} minutes it is stopped in place and can be resumed. A day that the "
-        "computer was off is made up for."
+        f"Each day at {run.hour:02}:{run.minute:02} a {_kind(run)} begins. {MEANING[run.mode]} "
+        f"{_again(run, stated)}{_ending(run, stated)}A day that the computer was off is made up for."
     )
     control = _control(schedule)
     lines = [
@@ -38,6 +33,36 @@ def written_schedule_text(schedule: Schedule, request: ScheduleRequest) -> str:
     if not schedule.is_of_system:
         lines.append("  loginctl enable-linger    # else it runs only while you are logged in")
     return "\n".join([*lines, "To see how it went:", f"  {_log(schedule)}"])
+
+
+def _kind(run: ScheduledRun) -> str:
+    return "quick level" if run.mode == "quick" else run.mode
+
+
+def _again(run: ScheduledRun, stated: UnattendedSettings) -> str:
+    """What is tried again where the run cannot begin."""
+    if stated.window_minutes:
+        return (
+            f"Where it cannot begin (a device, the lock, quiet hours) it is tried again every "
+            f"{stated.retry_minutes:g} minutes, for {stated.window_minutes:g} minutes. "
+        )
+    if not run.retries:
+        return ""
+    return (
+        f"A device or lock that is not there is tried again {run.retries} times, every "
+        f"{run.retry_minutes} minutes. "
+    )
+
+
+def _ending(run: ScheduledRun, stated: UnattendedSettings) -> str:
+    """How it ends when it lasts too long."""
+    stopped = f"{run.longest_minutes} minutes it is stopped in place and can be resumed. "
+    if stated.longest_minutes is None:
+        return f"After {stopped}"
+    return (
+        f"A run that lasts longer than {stated.longest_minutes:g} minutes goes back to its reference and "
+        f"ends; after {stopped}"
+    )
 
 
 def present_schedule_text(schedule: Schedule | None) -> str:
@@ -56,9 +81,10 @@ def removed_schedule_text(schedule: Schedule | None) -> str:
     return "\n".join([*(f"removed {path}" for path in schedule.files), "To put it in force:", stop])
 
 
-def crontab_text(line: str) -> str:
+def crontab_text(line: str, stated: UnattendedSettings) -> str:
     """The line, and where it belongs."""
-    return f"Put this line into `crontab -e`; cron does not try again, and mails what is said:\n{line}"
+    tries = "the run tries again in its window" if stated.window_minutes else "cron does not try again"
+    return f"Put this line into `crontab -e`; {tries}, and cron mails what is said:\n{line}"
 
 
 def _control(schedule: Schedule) -> str:

@@ -28,6 +28,11 @@ class RunFolder:
         return self.path / JOURNAL
 
     @property
+    def attempts(self) -> Path:
+        """The tries to begin it, where it was refused."""
+        return self.path / "not-begun.json"
+
+    @property
     def measurements(self) -> Path:
         """The records as a measurement file, for ``hexacell fit``."""
         return self.path / "measurements.csv"
@@ -89,6 +94,10 @@ def find_run(cell: Cell, named: str) -> RunFolder:
     for path in (Path(named), runs_folder(cell) / named):
         if RunFolder(path).journal.is_file():
             return RunFolder(path)
+        if RunFolder(path).attempts.is_file():
+            raise UsageError(
+                f"the run '{named}' never began", action="`hexacell history CELL --json` says why"
+            )
     raise UsageError(f"there is no run '{named}'", action=f"The cell's runs are in {runs_folder(cell)}")
 
 

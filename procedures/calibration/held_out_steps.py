@@ -46,6 +46,15 @@ class HeldOutSteps:
                 return Locate() if state.position_unknown else self._in_set(state, key)
         return None
 
+    def way_back(self, state: RunState, key: SetKey) -> Step:
+        """The next move to the reference of a set in which the robot is.
+
+        Raises:
+            HexacellError: no safe path leads there.
+        """
+        is_in_order = self.sets.paths.is_in_order(state, key)
+        return reference_move(state, key) if is_in_order else self._to_reference(state, key)
+
     def choose_poses(self, identified: Identification) -> tuple[tuple[SixNumbers, ...], ...]:
         """Poses at each held-out point, in the controller's frames.
 

@@ -94,6 +94,15 @@ class IdentificationSteps:
         step = self.sets.at_reference(state, key)
         return step or self.sets.to_reference(state, key, self._ball(state, key))
 
+    def way_back(self, state: RunState, key: SetKey) -> Step:
+        """The next move to the reference of a set in which the robot is.
+
+        Raises:
+            HexacellError: no safe path leads there.
+        """
+        back = self.sets.paths.back(state, key, self._known(state, key))
+        return back or self.sets.to_reference(state, key, self._ball(state, key))
+
     def _ball(self, state: RunState, key: SetKey) -> Array | None:
         """Where the ball was when the set's gauges were zeroed (3,), mm, if the records determine it."""
         known = self._known(state, key)

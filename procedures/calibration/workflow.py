@@ -27,6 +27,7 @@ from hexacell.campaign.removed_poses import NOTHING_REMOVED, RemovedPoses
 from hexacell.campaign.teaching import WrittenGeometry, as_written
 from hexacell.cell.model import CellSettings
 from hexacell.decision import ErrorLimits, Verdict
+from hexacell.errors import HexacellError
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.pose import Pose
@@ -56,26 +57,6 @@ class Mode(StrEnum):
     CHECK = "check"
     QUICK = "quick"
     LENGTH = "length"
-
-
-def expected_records(
-    settings: CellSettings, mode: Mode, listed: PoseList | None = None, *, length_check: bool = False
-) -> int:
-    """The largest number of settled readings in a whole run, closings of sets included."""
-    fixture = settings.length_check
-    length = 0 if fixture is None else fixture.mountings * (fixture.orientations + 2)
-    if mode is Mode.LENGTH:
-        return length
-    plan, held_out = settings.identification, settings.verification
-    points = len(held_out.points)
-    verification = points * (held_out.orientations + 1)
-    if mode is Mode.CHECK:
-        return settings.check.budget_records + len(plan.points)
-    records = len(plan.points) * plan.orientations if listed is None else len(listed)
-    budget = settings.quick.budget_records if mode is Mode.QUICK else plan.budget_records
-    identification = min(records, budget or records) + len(plan.points)
-    calibration = identification + 2 * verification + points * (held_out.orientations - 1)
-    return calibration + (length if length_check else 0)
 
 
 class _Measuring:
@@ -213,6 +194,22 @@ class Calibration:
             step = measuring.points.next_step(state)
             return step or Compute(kind="take back" if state.provisional_active else "identify")
         return measuring.held_out.next_step(state, Phase.BEFORE) or self._write_back(state)
+
+    def way_back(self, state: RunState) -> Step | None:
+        """The next move back to the reference of the set in which the robot is; none where it is there.
+
+        Nor is there one where the robot is in no set, is lost, or finds no safe path.
+        """
+        informed = self.informed(state)
+        if state.at_pose is None or state.position_unknown or not state.set(state.at_pose[0]).samples:
+            return None
+        key, orientation = state.at_pose
+        measuring = informed._measuring(state)
+        steps = measuring.points if key.phase is Phase.IDENTIFY else measuring.held_out
+        try:
+            return None if orientation == 1 else steps.way_back(state, key)
+        except HexacellError:
+            return None
 
     def robot_of(self, state: RunState) -> Robot:
         """The robot with all geometries that commanded the records of the identification."""

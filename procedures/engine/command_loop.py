@@ -19,6 +19,7 @@ from procedures.run.commands import (
     Answer,
     Command,
     CommandQueue,
+    EndAtReference,
     Invalidation,
     MeasureAgain,
     Pause,
@@ -55,6 +56,7 @@ class EngineFlags:
         asking: a question waits for a person.
         pausing: a pause is wanted, ``at_once`` in mid-step; ``paused``: it has begun.
         stopping: why the run is to end; nothing where it is not.
+        returning: why it is to end as soon as the robot is back at a reference.
     """
 
     begun: bool = False
@@ -65,6 +67,7 @@ class EngineFlags:
     at_once: bool = False
     paused: bool = False
     stopping: str | None = None
+    returning: str | None = None
 
     @property
     def status(self) -> Status:
@@ -72,7 +75,7 @@ class EngineFlags:
         words = (
             (self.fault is not None, Status.FAULTED),
             (self.ended, Status.ENDED),
-            (self.stopping is not None, Status.STOPPING),
+            (self.stopping is not None or self.returning is not None, Status.STOPPING),
             (self.paused, Status.PAUSED),
             (self.asking, Status.AWAITING_OPERATOR),
             (self.pausing, Status.PAUSING),
@@ -174,6 +177,9 @@ class CommandLoop:
         match command:
             case Stop():
                 self.set_flags(stopping=flags.stopping or command.reason)
+                return flags.asking
+            case EndAtReference():
+                self.set_flags(returning=flags.returning or command.reason)
                 return flags.asking
             case Abort():
                 self.set_flags(stopping=command.reason)

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 
 from hexacell.decision import Verdict
-from hexacell.errors import ExitCode, HexacellError, Interruption, SeveralErrors
+from hexacell.errors import ExitCode, HexacellError, Interruption, OutOfTime, SeveralErrors
 from procedures.engine.command_loop import CommandLoop, Status, StepCancelled
 from procedures.engine.config_transactions import Reversal, revert_at_end, revert_unrecorded
 from procedures.engine.recovery import GIVE_UP, Recovery, RecoveryPolicy
@@ -94,6 +94,7 @@ class Engine:
 
         Raises:
             Interruption: a command ended the run early.
+            OutOfTime: it was to end, and the robot is back at a reference.
             WriteBackUndone: a written geometry could not be verified; the config is as before.
             RobotNotStopped: it ended early, and the robot could not be stopped.
             HexacellError: a step failed, and the policy ends the run.
@@ -160,6 +161,8 @@ class Engine:
             await self._record_outcome(await self._commands.run_cancellable(executing))
         except StepCancelled:
             pass
+        except OutOfTime:
+            raise
         except HexacellError as error:
             await self._recovery.recover(error, step, self.state)
         return True
@@ -170,7 +173,14 @@ class Engine:
             self._is_prepared = True
 
     async def _decide(self) -> Step | None:
-        return await asyncio.to_thread(self._executor.calibration.next_step, self.state)
+        """The next step; raises ``OutOfTime`` where the run is to end and the robot is back."""
+        calibration, reason = self._executor.calibration, self._commands.flags.returning
+        if reason is None:
+            return await asyncio.to_thread(calibration.next_step, self.state)
+        step = await asyncio.to_thread(calibration.way_back, self.state)
+        if step is None:
+            raise OutOfTime(f"the run was ended: {reason}", action="Resume it; what was measured is kept")
+        return step
 
     async def _record_outcome(self, event: events.Event) -> None:
         """Journal what a step caused; a change of the config that cannot be journalled is reverted."""

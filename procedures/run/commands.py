@@ -64,7 +64,14 @@ class Abort:
     reason: str = "aborted"
 
 
-Command = Pause | Resume | Undo | MeasureAgain | Answer | Stop | Abort
+@dataclass(frozen=True, slots=True)
+class EndAtReference:
+    """After the step that is being executed go back to the set's reference and end; it can be resumed."""
+
+    reason: str
+
+
+Command = Pause | Resume | Undo | MeasureAgain | Answer | Stop | Abort | EndAtReference
 
 
 class CommandQueue:

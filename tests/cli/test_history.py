@@ -14,7 +14,7 @@ from tests.hexacell.application.test_history import identified
 
 KEYS = {
     "run", "began", "ended", "mode", "records", "verdict", "position_mm", "expanded_mm", "limit_mm", "line",
-    "over", "in_controller", "written", "proposal",
+    "begun", "over", "in_controller", "written", "proposal",
 }  # fmt: skip
 
 

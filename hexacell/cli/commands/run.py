@@ -14,6 +14,7 @@ from hexacell.application.demo import prepare_demo
 from hexacell.application.event_stream import EventStream
 from hexacell.application.interrupted_runs import run_to_resume
 from hexacell.application.run_notices import RunEnd
+from hexacell.application.unattended_runs import ended_in_time
 from hexacell.attach.run_device_watch import RunDeviceWatch
 from hexacell.campaign.pose_list import pose_list_of
 from hexacell.campaign.removed_poses import RemovedPoses
@@ -27,6 +28,7 @@ from hexacell.cli.signal_commands import SignalCommands
 from hexacell.cli.telling import Telling
 from hexacell.cli.terminal import KeyboardCommands, TerminalOperator, is_interactive
 from hexacell.cli.told_afterwards import told_afterwards
+from hexacell.cli.unattended_start import begun_in_window
 from hexacell.errors import ExitCode, HexacellError, UsageError
 from hexacell.presentation.documents import run_document
 from hexacell.presentation.line_face import LETTERS
@@ -41,7 +43,8 @@ from hexacell.presentation.run import (
     resume_hint,
 )
 from hexacell.runs.run_folder import new_run
-from procedures.calibration.workflow import Mode, expected_records
+from procedures.calibration.expected_records import expected_records
+from procedures.calibration.workflow import Mode
 from procedures.engine.engine import Listener
 from procedures.journal.journal import read_journal
 from procedures.run import events
@@ -102,6 +105,7 @@ def _request(options: argparse.Namespace, console: Console, mode: Mode) -> RunRe
         operator=TerminalOperator(console) if attended else UnattendedOperator(),
         unattended=not attended,
         resume=options.resume is not None,
+        keeps_hours=options.unattended,
     )
 
 
@@ -134,7 +138,9 @@ def _run_to_end(request: RunRequest, console: Console, stream: EventStream | Non
 
 def _run_and_repeat(request: RunRequest, console: Console, stream: EventStream | None) -> RunEnd:
     """Carry out a run, and the check that its alarm asks for."""
-    ended = execute_run(request, console, _copied(request, stream))
+    ended = begun_in_window(
+        request, console, lambda: execute_run(request, console, _copied(request, stream))
+    )
     state = fold(read_journal(request.folder.journal))
     again = repetition(request, state)
     if again is None:
@@ -186,7 +192,8 @@ async def _calibrate(
 ) -> events.Ended:
     """Calibrate; a person at a terminal may also type commands."""
     if not isinstance(request.operator, TerminalOperator):
-        return await calibrate(request, [*further, progress], queue)
+        with ended_in_time(request, queue):
+            return await calibrate(request, [*further, progress], queue)
     watching, status = RunDeviceWatch(request.cell.settings.gauges), RunStatus(progress.expected)
     telling = Telling(console, watching)
     tell = {"g": telling.gauges, "s": lambda: console.print(status.text())}

@@ -57,8 +57,9 @@ def _write(cell: Cell, options: argparse.Namespace, console: Console) -> None:
     if options.cron:
         line = crontab_line(scheduled_run(cell, request))
         console.document({"crontab": line})
-        console.print(crontab_text(line))
+        console.print(crontab_text(line, cell.settings.unattended))
         return
     written = write_schedule(cell, request, options.folder)
     console.document(schedule_document(written))
-    console.print(written_schedule_text(written, request))
+    run, stated = scheduled_run(cell, request), cell.settings.unattended
+    console.print(written_schedule_text(written, run, stated))

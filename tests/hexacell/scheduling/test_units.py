@@ -46,7 +46,7 @@ def test_a_night_is_a_check_once_and_what_may_pass_is_tried_again() -> None:
     assert words_of(found["ExecStart"])[3:] == [
         "run", "/cells/my-robot/cell.toml", "--unattended", "--mode", "check",
     ]  # fmt: skip
-    assert found["RestartPreventExitStatus"].split() == ["1", "2", "4", "6", "70", "130", "SIGTERM"]
+    assert found["RestartPreventExitStatus"].split() == ["1", "2", "4", "6", "7", "70", "130", "SIGTERM"]
     assert (found["StartLimitBurst"], found["StartLimitIntervalSec"]) == ("4", "540min")
     assert (found["User"], found["SupplementaryGroups"]) == ("robot", "dialout")
     assert (found["OnFailure"], found["NoNewPrivileges"]) == ("mail@%n.service", "yes")

@@ -20,9 +20,10 @@ from hexacell.errors import AnswerNeeded, HexacellError
 from hexacell.kinematics.pose import Pose
 from hexacell.reporting.length_statement import LengthStatement
 from hexacell.reporting.result import AcceptedResult
+from procedures.calibration.expected_records import expected_records
 from procedures.calibration.length_steps import BESIDE_MM
 from procedures.calibration.preflight import plan_failures
-from procedures.calibration.workflow import Mode, expected_records
+from procedures.calibration.workflow import Mode
 from procedures.devices.device_set import Thermometers
 from procedures.journal.journal import read_journal
 from procedures.run import events

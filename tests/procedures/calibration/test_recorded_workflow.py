@@ -10,7 +10,8 @@ import pytest
 
 from hexacell.campaign import pose_chooser
 from hexacell.motion.paths import find_route
-from procedures.calibration.workflow import Mode, expected_records
+from procedures.calibration.expected_records import expected_records
+from procedures.calibration.workflow import Mode
 from procedures.run import events
 from procedures.run.state import apply, fold
 from procedures.run.steps import Move, Sample

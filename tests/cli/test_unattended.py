@@ -1,0 +1,97 @@
+"""Runs that a scheduler starts: refused nights are explained, tried again, and ended in time."""
+
+from __future__ import annotations
+
+import json
+import signal
+
+import pytest
+
+from hexacell.cell.loader import load_cell
+from hexacell.errors import ExitCode
+from hexacell.storage.cell_lock import cell_lock
+
+pytestmark = pytest.mark.usefixtures("few_candidates")
+
+ALWAYS = 'quiet_hours = ["00:00-12:00", "12:00-00:00"]'
+
+
+def stated(cell_folder, text: str) -> None:
+    cell_folder.cell.write_text(f"{cell_folder.cell.read_text()}\n[unattended]\n{text}\n")
+
+
+def test_in_quiet_hours_no_run_begins_and_the_history_says_why(typed_here, short_cell) -> None:
+    stated(short_cell, ALWAYS)
+    before = short_cell.controller.read_bytes()
+    outcome = typed_here("run", short_cell.cell, "--unattended")
+    assert outcome.code == ExitCode.OUT_OF_TIME
+    assert "these are quiet hours of the cell, until" in outcome.err
+    [night] = typed_here("history", short_cell.cell, "--json").document["runs"]
+    assert (night["mode"], night["begun"], night["over"], night["verdict"]) == ("check", False, True, None)
+    assert "quiet hours" in night["line"]
+    assert "not begun" in typed_here("history", short_cell.cell).out
+    status = typed_here("status", short_cell.cell, "--json").document["cells"][0]
+    assert "quiet hours" in status["not_begun"]
+    assert "not begun: these are quiet hours" in " ".join(typed_here("status", short_cell.cell).out.split())
+    assert short_cell.controller.read_bytes() == before
+
+
+def test_a_person_at_the_machine_may_run_it_in_quiet_hours(typed_here, short_cell) -> None:
+    """The hours are those of ``--unattended``."""
+    stated(short_cell, ALWAYS)
+    outcome = typed_here("run", short_cell.cell, "--mode", "quick")
+    assert outcome.code == ExitCode.USAGE
+    assert "no accepted result" in outcome.err
+    assert typed_here("history", short_cell.cell, "--json").document["runs"] == []
+
+
+def test_a_busy_cell_is_tried_again_until_it_is_free(start, quick_cell) -> None:
+    stated(quick_cell, "window_minutes = 10\nretry_minutes = 0.02")
+    with cell_lock(quick_cell.controller):
+        process = start("run", quick_cell.cell, "--unattended", "--json")
+        process.wait_for("tried again in", lambda: process.err)
+    ended = process.ended()
+    assert ended.code in {ExitCode.DONE, ExitCode.OUT_OF_LIMITS}  # a check from the drawing decides either
+    [run] = [path for path in quick_cell.runs() if path.is_dir()]
+    assert str(run) == ended.document["run"]
+    tries = json.loads((run / "not-begun.json").read_text())["attempts"]
+    assert {one["exit_code"] for one in tries} == {ExitCode.BUSY}
+    assert (run / "journal.jsonl").is_file()
+
+
+def test_a_signal_ends_the_waiting(start, short_cell) -> None:
+    stated(short_cell, f"{ALWAYS}\nwindow_minutes = 600\nretry_minutes = 60")
+    process = start("run", short_cell.cell, "--unattended")
+    process.wait_for("tried again in", lambda: process.err)
+    assert process.stopped(signal.SIGTERM).code == ExitCode.INTERRUPTED
+
+
+def test_a_run_that_lasts_too_long_ends_at_its_reference_and_is_resumed(start, typed, quick_cell) -> None:
+    stated(quick_cell, "longest_minutes = 4")
+    ended = start("run", quick_cell.cell, "--unattended", "--mode", "optimise").ended()
+    assert ended.code == ExitCode.OUT_OF_TIME
+    assert "it lasted longer than longest_minutes = 4" in " ".join(ended.err.split())
+    assert "To continue:" in ended.out
+    cell = load_cell(quick_cell.cell)
+    assert cell.settings.unattended.longest_minutes == 4.0
+    resumed = typed("run", quick_cell.cell, "--resume", "--mode", "optimise")
+    assert resumed.code == ExitCode.DONE, resumed.err
+
+
+def test_a_schedule_leaves_the_run_its_window(typed_here, short_cell, tmp_path) -> None:
+    stated(short_cell, 'quiet_hours = ["05:30-22:00"]\nwindow_minutes = 60\nlongest_minutes = 90.5')
+    units = tmp_path / "units"
+    written = typed_here("schedule", short_cell.cell, "--daily", "02:30", "--folder", units)
+    assert written.code == 0, written.err
+    said = " ".join(written.out.split())
+    assert "is tried again every 10 minutes, for 60 minutes" in said
+    assert "longer than 90.5 minutes goes back to its reference and ends" in said
+    [service] = units.glob("*.service")
+    assert "TimeoutStartSec=161min" in service.read_text()
+    assert "Restart=" not in service.read_text()
+    refused = typed_here("schedule", short_cell.cell, "--daily", "05:30", "--folder", units)
+    assert refused.code == ExitCode.USAGE
+    assert "05:30 is in the quiet hours of the cell" in refused.err
+    line = typed_here("schedule", short_cell.cell, "--daily", "02:30", "--cron")
+    assert "timeout --signal=TERM --kill-after=120 161m" in line.out
+    assert "the run tries again in its window" in line.out

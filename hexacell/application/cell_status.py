@@ -59,13 +59,14 @@ def cell_status(cell: Cell) -> CellStatus:
         judged=next((run for run in runs if run.summary.verdict is not None), None),
         passed_at=next((run.summary.ended for run in runs if run.summary.verdict is Verdict.PASS), None),
         in_force=in_force,
-        due_at=_due_at(cell, in_force),
+        due_at=next_calibration_due(cell, in_force),
         proposal=next((run for run in runs if run.summary.has_proposal), None),
         drift=drift_history(cell, index),
     )
 
 
-def _due_at(cell: Cell, in_force: PastRun | None) -> datetime | None:
+def next_calibration_due(cell: Cell, in_force: PastRun | None) -> datetime | None:
+    """When the geometry that the controller has, from this run, is no longer valid; none if not stated."""
     valid_days = cell.settings.acceptance.valid_days
     if in_force is None or in_force.summary.ended is None or valid_days is None:
         return None

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import socket
 from dataclasses import dataclass
-from datetime import UTC, datetime, timedelta
+from datetime import UTC, datetime
 
 from hexacell.application.calibration_run import RunRequest
+from hexacell.application.cell_status import next_calibration_due
 from hexacell.application.check_repetition import raised_alarm
-from hexacell.application.history import judged_accuracy
+from hexacell.application.history import judged_accuracy, past_runs
 from hexacell.cell.loader import Cell
 from hexacell.cell.notifications import Occasion
 from hexacell.decision import Verdict
@@ -53,7 +54,7 @@ def notice_of_end(end: RunEnd) -> Notice:
         expanded_mm=None if accuracy is None else accuracy.position.expanded,
         limit_mm=None if accuracy is None else accuracy.position.limit,
         changed_leg=None if alarm is None else alarm.leg,
-        due_at=_due_at(end),
+        due_at=_due_at(cell),
     )
 
 
@@ -111,11 +112,15 @@ def _occasions(end: RunEnd) -> tuple[Occasion, ...]:
     return tuple(one for one, is_so in found.items() if is_so) or (Occasion.FAILURE,)
 
 
-def _due_at(end: RunEnd) -> datetime | None:
-    """Of the geometry that this run wrote; a check leaves the date as it was."""
-    days = end.request.cell.settings.acceptance.valid_days
-    is_written = end.state.committed is not None and not end.state.rolled_back
-    return _now() + timedelta(days=days) if days is not None and is_written else None
+def _due_at(cell: Cell) -> datetime | None:
+    """When the next calibration is due; none where the config or the runs cannot be read."""
+    if cell.settings.acceptance.valid_days is None:
+        return None
+    try:
+        in_force = next((run for run in past_runs(cell) if run.is_in_controller), None)
+    except HexacellError:
+        return None
+    return next_calibration_due(cell, in_force)
 
 
 def _now() -> datetime:

@@ -5,10 +5,11 @@ Nothing here fails a run. What went wrong is in the :class:`Telling` of each who
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Iterable, Mapping
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from threading import Thread
 
 from hexacell.cell.loader import Cell
 from hexacell.cell.notifications import NotificationSettings
@@ -20,6 +21,9 @@ from hexacell.notices.outbox import NoticeOutbox
 from hexacell.runs.run_folder import runs_folder
 
 Deliver = Callable[[NoticeAddress, Notice], None]
+
+LONGEST_TELLING_S = 60.0
+"""After so long a run ends, and what is not told waits for the next one."""
 
 OTHER_PROCESS = "another process is sending at this moment"
 
@@ -126,13 +130,23 @@ def _in_parallel(
     queues: Mapping[str, tuple[PendingNotice, ...]],
     act: Callable[[NoticeAddress, PendingNotice], None],
 ) -> dict[str, tuple[int, str | None]]:
-    """How many each was told, and the problem; who does not answer delays nobody else."""
-    if not queues:
-        return {}
+    """How many each was told, and the problem; who does not answer delays nobody else.
+
+    The threads end with the process: neither a stop signal nor the end of a run waits for a slow server.
+    """
     settings = {one.name: one for one in cell.settings.notifications}
-    with ThreadPoolExecutor(len(queues)) as pool:
-        begun = {name: pool.submit(_one_queue, cell, settings[name], queues[name], act) for name in queues}
-        return {name: one.result() for name, one in begun.items()}
+    told: dict[str, tuple[int, str | None]] = {}
+
+    def tell(name: str) -> None:
+        told[name] = _one_queue(cell, settings[name], queues[name], act)
+
+    threads = {name: Thread(target=tell, args=(name,), daemon=True) for name in queues}
+    for thread in threads.values():
+        thread.start()
+    until = time.monotonic() + LONGEST_TELLING_S
+    for thread in threads.values():
+        thread.join(max(0.0, until - time.monotonic()))
+    return {name: told.get(name, (0, f"not finished within {LONGEST_TELLING_S:g} s")) for name in queues}
 
 
 def _one_queue(

@@ -13,7 +13,7 @@ from hexacell.application.telling_people import tell_people
 from hexacell.cell.loader import Cell
 from hexacell.cli.archive_argument import publish_or_warn
 from hexacell.cli.console import Console
-from hexacell.presentation.notices import telling_line
+from hexacell.presentation.notices import NEXT_TIME, telling_line
 
 
 @dataclass
@@ -59,6 +59,8 @@ def _tell(request: RunRequest, console: Console, news: RunNews, error: Exception
         else:
             return
         line = telling_line(tell_people(request.cell, notice))
+    except KeyboardInterrupt:
+        line = f"not told: interrupted ({NEXT_TIME})"
     except Exception as fault:
         line = f"not told: a fault of the program ({type(fault).__name__})"
     if line is not None:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import fcntl
 import os
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from datetime import datetime, timedelta
 from hashlib import sha256
 from pathlib import Path
@@ -83,6 +83,7 @@ class NoticeOutbox:
         for one in waiting:
             if one not in kept:
                 self.forget(one)
+        self._remove_remains(now)
         return len(waiting) - len(kept)
 
     @contextmanager
@@ -99,6 +100,14 @@ class NoticeOutbox:
             yield _locked(descriptor)
         finally:
             os.close(descriptor)
+
+    def _remove_remains(self, now: datetime) -> None:
+        """Files that no program reads, as those of a process that died while it wrote them."""
+        damaged = [path for path in self._folder.glob("*.json") if _read(path) is None]
+        for path in (*self._folder.glob(".hexacell-*.tmp"), *damaged):
+            with suppress(OSError):
+                if path.stat().st_mtime < (now - LONGEST_KEPT).timestamp():
+                    path.unlink()
 
     def _file(self, pending: PendingNotice) -> Path:
         return self._folder / f"{notice_id(pending.notice.id, pending.to)}.json"

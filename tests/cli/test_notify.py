@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import re
+import socket
 
 import pytest
 
@@ -35,6 +37,7 @@ def test_a_check_tells_its_verdict(typed_here, quick_cell, few_candidates, tmp_p
         outcome = typed_here("run", quick_cell.cell, *CHECK, "--json")
     (body,) = server.bodies
     told = json.loads(body)
+    assert told["due_at"] is None
     assert (told["exit_code"], told["verdict"]) == (outcome.code, outcome.document["verdict"])
     assert told["run"] == quick_cell.runs()[-1].name
     assert outcome.document["line"] in told["line"]
@@ -98,3 +101,39 @@ def test_nobody_to_tell(typed_here, quick_cell) -> None:
     outcome = typed_here("notify", quick_cell.cell, "--test")
     assert outcome.code == 2
     assert "[[notifications]]" in outcome.err
+
+
+def test_killed_while_it_is_sent_it_is_sent_later(typed_here, start, quick_cell) -> None:
+    tell(quick_cell, "hall", f"http://127.0.0.1:{closed_port()}/")
+    with cell_lock(quick_cell.controller):
+        typed_here("run", quick_cell.cell, *CHECK)
+    refused = quick_cell.cell.read_text()
+    with socket.socket() as silent:
+        silent.bind(("127.0.0.1", 0))
+        silent.listen()
+        port = silent.getsockname()[1]
+        quick_cell.cell.write_text(re.sub(r"(?<=http://127.0.0.1:)\d+", str(port), refused))
+        process = start("notify", quick_cell.cell, "--send")
+        connection, _ = silent.accept()
+        with connection:
+            assert connection.recv(1)
+            process.popen.kill()
+            process.popen.wait()
+    with webhook() as server:
+        quick_cell.cell.write_text(
+            refused.replace(refused.rpartition('url = "')[2].split('"')[0], server.url)
+        )
+        assert typed_here("notify", quick_cell.cell, "--send").out == "hall: told (1)\n"
+    assert json.loads(server.bodies[0])["occasions"] == ["failure"]
+
+
+def test_a_stop_signal_while_it_is_told_leaves_the_exit_code(typed_here, quick_cell, monkeypatch) -> None:
+    def stopped(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("hexacell.cli.told_afterwards.tell_people", stopped)
+    tell(quick_cell, "hall", "http://127.0.0.1:1/")
+    with cell_lock(quick_cell.controller):
+        outcome = typed_here("run", quick_cell.cell, *CHECK)
+    assert outcome.code == 5
+    assert "not told: interrupted" in outcome.err

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
@@ -20,6 +21,7 @@ from hexacell.notices.undelivered import NoticeUndelivered
 from hexacell.runs.run_folder import runs_folder
 from tests.hexacell.application.proposed_runs import a_cell
 from tests.hexacell.notices.notices import a_notice
+from tests.waiting import wait_until
 
 
 class Post:
@@ -82,16 +84,40 @@ def test_who_is_absent_is_told_later_in_order_and_once(tmp_path, post) -> None:
     assert send_waiting(cell, post).people == ()
 
 
-def test_after_a_power_cut_between_keeping_and_telling(tmp_path, post) -> None:
+def test_after_a_power_cut_between_telling_and_forgetting_it_is_told_again_with_its_id(
+    tmp_path, post, monkeypatch
+) -> None:
     cell = told_cell(tmp_path)
 
-    def cut(address: NoticeAddress, notice: Notice) -> None:
-        raise KeyboardInterrupt
+    def cut(*_: object) -> None:
+        raise FileError("no power")
 
-    with pytest.raises(KeyboardInterrupt):
-        tell_people(cell, now_notice(1), cut)
+    with monkeypatch.context() as patch:
+        patch.setattr(NoticeOutbox, "forget", cut)
+        tell_people(cell, now_notice(1), post)
     assert send_waiting(cell, post).are_all_told
-    assert sorted(post.taken) == [("one", "1"), ("two", "1")]
+    assert sorted(post.taken) == [("one", "1")] * 2 + [("two", "1")] * 2
+    assert waiting_notices(cell) == ()
+
+
+def test_who_is_slow_is_waited_for_only_so_long_and_delays_nobody(tmp_path, post, monkeypatch) -> None:
+    cell = told_cell(tmp_path)
+    answer, ended = threading.Event(), threading.Event()
+
+    def slow(address: NoticeAddress, notice: Notice) -> None:
+        if address.name == "one":
+            answer.wait()
+            ended.set()
+        else:
+            post(address, notice)
+
+    monkeypatch.setattr("hexacell.application.telling_people.LONGEST_TELLING_S", 0.2)
+    problems = {one.name: one.problem for one in tell_people(cell, now_notice(1), slow).people}
+    assert problems == {"one": "not finished within 0.2 s", "two": None}
+    assert [one.to for one in waiting_notices(cell)] == ["one"]
+    answer.set()
+    ended.wait()
+    wait_until(lambda: waiting_notices(cell) == ())
 
 
 def test_the_same_end_told_again_is_one_notice(tmp_path, post) -> None:

@@ -72,6 +72,20 @@ def test_it_is_bounded_in_age_and_number(tmp_path) -> None:
     assert box.pending() == ()
 
 
+def test_what_no_program_reads_goes_when_it_is_old(tmp_path) -> None:
+    box = NoticeOutbox(tmp_path)
+    box.keep(pending(1))
+    remains = [tmp_path / FOLDER / name for name in ("half.json", ".hexacell-1-2.tmp")]
+    (whole,) = (tmp_path / FOLDER).glob("*.json")
+    for path in remains:
+        path.write_bytes(whole.read_bytes() if path.suffix == ".tmp" else b"{")
+    written = datetime.fromtimestamp(remains[0].stat().st_mtime, UTC)
+    box.drop_old(written)
+    assert all(path.exists() for path in remains)
+    box.drop_old(written + LONGEST_KEPT + timedelta(seconds=2))
+    assert list((tmp_path / FOLDER).iterdir()) == []
+
+
 def test_only_one_process_sends(tmp_path) -> None:
     box = NoticeOutbox(tmp_path)
     box.keep(pending(1))

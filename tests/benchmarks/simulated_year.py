@@ -1,0 +1,373 @@
+"""A year of a cell that is checked each night: what the program keeps of it, in its real files.
+
+A robot drifts slowly and crashes once; a gauge is dead for a week, the disk is full one night, the power
+fails in another. Usual nights are carried out without devices: everything is computed, decided, written
+and archived by the program, only motion and instruments are virtual. Nights with a fault run the whole
+program, with drivers and simulated devices, at a clock of their own. A night after a check that failed is a
+quick level.
+"""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager, redirect_stderr, redirect_stdout
+from dataclasses import dataclass, field, replace
+from datetime import UTC, datetime, timedelta
+from functools import cached_property
+from io import StringIO
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from hexacell.acceptance import gates
+from hexacell.application import unattended_runs
+from hexacell.application.calibration_run import new_calibration
+from hexacell.application.drift_history import drift_history
+from hexacell.application.history import past_runs
+from hexacell.campaign import feasibility
+from hexacell.campaign.dry_run import VirtualCampaign
+from hexacell.cell.bundled import bundled_config
+from hexacell.cell.loader import Cell, dump, load_cell
+from hexacell.cell.simulation import SimulatedFault
+from hexacell.cli.app import main
+from hexacell.controller_config.change import fingerprint, propose
+from hexacell.controller_config.write_back import commit, rollback
+from hexacell.decision import Verdict
+from hexacell.identification.estimator import identify
+from hexacell.kinematics.geometry import Geometry
+from hexacell.measurements.records import MeasurementSet, Record
+from hexacell.reporting.check_result import check_line, check_result
+from hexacell.reporting.result import IdentificationResult
+from hexacell.reporting.verification import outcome_line, verify
+from hexacell.robot_model import config_format, robot_of
+from hexacell.runs import run_folder
+from hexacell.runs.run_folder import RunFolder, runs_folder
+from hexacell.virtual_robot import VirtualRobot
+from procedures.calibration.workflow import Calibration, Mode
+from procedures.journal import line_format
+from procedures.journal.line_format import Entry, encode
+from procedures.run import events
+from procedures.run.state import RunState, apply, fold
+from procedures.run.steps import Phase, SetKey
+from tests.benchmarks.virtual_calibration import measured_held_out
+from tests.small_cell import SMALL, changed, choose_among_few
+
+FIRST_NIGHT = datetime(2026, 3, 1, 2, 30, tzinfo=UTC)
+LIMIT_MM, LIMIT_DEG = 0.15, 0.1
+SERVED: dict[str, Any] = {
+    "timing.clock_factor": 500.0,
+    "encoders.timeout_s": 10.0,
+    "encoders.heartbeat_ms": 10_000,
+    "simulation.motion.ringing_mm": 0.05,
+    **{f"speed.{what}_mm_s": 1000.0 for what in ("joint", "edge", "joint_at_gauges", "edge_at_gauges")},
+}
+"""Real drivers are patient with simulated devices on a fast clock."""
+
+MEASURED_AS_BUNDLED = {"identification", "verification"}
+
+DEAD_GAUGE = {"simulation.faults": (SimulatedFault(kind="silent", device="y"),)}
+FULL_DISK = {"guards.free_disk_mb": 1e12}
+POWER_CUT: dict[str, Any] = {}
+
+
+@dataclass
+class Night:
+    """What is known of a night that no archive knows: the truth, and what the program said."""
+
+    number: int
+    mode: Mode
+    error_before_mm: float
+    error_after_mm: float
+    exit_code: int | None = None
+    verdict: Verdict | None = None
+    is_written: bool = False
+    said: str = ""
+
+
+@dataclass
+class Year:
+    """The nights of one cell.
+
+    Attributes:
+        drift_mm: of the length of leg 2, a night.
+        crash_night: in the day before which leg 4 becomes ``crash_mm`` longer.
+        faults: of nights, as changes of the cell file.
+    """
+
+    folder: Path
+    drift_mm: float
+    crash_night: int
+    crash_mm: float
+    faults: dict[int, dict[str, Any]]
+    power_cuts: frozenset[int] = frozenset()
+    nights: list[Night] = field(default_factory=list)
+
+    @cached_property
+    def cell(self) -> Cell:
+        source = load_cell(bundled_config("simulated-hexaglide"))
+        limits = {"acceptance.position_mm": LIMIT_MM, "acceptance.orientation_deg": LIMIT_DEG}
+        patient = tuple(gauge.model_copy(update={"timeout_s": 2.0}) for gauge in source.settings.gauges)
+        small = {key: value for key, value in SMALL.items() if key.split(".")[0] not in MEASURED_AS_BUNDLED}
+        settings = changed(source.settings, small | SERVED | limits | {"gauges": patient})
+        path = self.folder / "cell.toml"
+        path.write_text(dump(settings))
+        shutil.copy(source.config_path, self.folder)
+        return load_cell(path)
+
+    def carry_out(self, nights: int) -> None:
+        """A calibration, and so many nights less one after it."""
+        with few_poses():
+            self._virtual_night(0, Mode.OPTIMISE)
+            for number in range(1, nights):
+                mode = Mode.QUICK if self._has_failed() else Mode.CHECK
+                if number in self.faults or number in self.power_cuts:
+                    self._night_of_the_program(number, mode)
+                else:
+                    self._virtual_night(number, mode)
+
+    def truth(self, number: int) -> Geometry:
+        """The robot in a night, in the mechanism's frame convention."""
+        simulation = self.cell.settings.simulation
+        assert simulation is not None
+        parameters = self.cell.settings.mechanism.parameters
+        vector = Geometry.of(parameters, simulation.geometry.model_dump()).vector.copy()
+        vector[parameters.names.index("l2")] += self.drift_mm * number
+        vector[parameters.names.index("l4")] += self.crash_mm * (number >= self.crash_night)
+        return self.cell.settings.mechanism.normalize_frames(Geometry(parameters, vector))[0]
+
+    def at(self, number: int) -> datetime:
+        """When a night begins."""
+        return FIRST_NIGHT + timedelta(days=number)
+
+    def true_error_mm(self, number: int) -> float:
+        """The largest position error at the task poses with the config of now, best frames taken off."""
+        robot = robot_of(self.cell)
+        calibration = Calibration(self.cell.settings, robot, Mode.OPTIMISE)
+        jacobian = calibration.plan.task.jacobian(robot.belief())
+        assert jacobian is not None
+        free = robot.mechanism.convention.free_parameters(self.truth(number))
+        return float(np.linalg.norm((jacobian @ (free - robot.free_parameters))[:, :3], axis=-1).max())
+
+    def explanations(self) -> dict[int, list[str]]:
+        """What the history says of each night: a verdict, or why there is none."""
+        told: dict[int, list[str]] = {night.number: [] for night in self.nights}
+        for run in past_runs(self.cell):
+            assert run.summary.began is not None, run.summary.line
+            number = (run.summary.began.date() - FIRST_NIGHT.date()).days
+            told[number].append(run.summary.line)
+        return told
+
+    def archive_is_consistent(self) -> bool:
+        """Whether the index gives what the run folders alone give, of runs and of their evidence."""
+        kept = past_runs(self.cell), drift_history(self.cell)
+        for path in runs_folder(self.cell).glob("index.sqlite*"):
+            path.unlink()
+        return kept == (past_runs(self.cell), drift_history(self.cell))
+
+    def _has_failed(self) -> bool:
+        return next(
+            (one.verdict is Verdict.FAIL for one in reversed(self.nights) if one.verdict is not None), False
+        )
+
+    def _virtual_night(self, number: int, mode: Mode) -> None:
+        before = self.true_error_mm(number)
+        run = VirtualNight(self.cell, new_calibration(self.cell, mode), self.truth(number), number)
+        judged, is_written = run.carry_out(RunFolder(self._place(number)), self.at(number))
+        self.nights.append(
+            Night(
+                number,
+                mode,
+                before,
+                self.true_error_mm(number),
+                verdict=judged.verdict,
+                is_written=is_written,
+                said=judged.line,
+            )
+        )
+
+    def _place(self, number: int) -> Path:
+        return runs_folder(self.cell) / self.at(number).strftime("%Y-%m-%dT%H%M%SZ")
+
+    def _night_of_the_program(self, number: int, mode: Mode) -> None:
+        """Everything, with simulated devices; after a power cut half of the night's journal is left."""
+        before, words = self.true_error_mm(number), StringIO()
+        path = self.folder / "tonight.toml"
+        path.write_text(dump(changed(self.cell.settings, self._tonight(number))))
+        with clock_at(self.at(number)), redirect_stdout(words), redirect_stderr(words):
+            code = main(["run", str(path), "--unattended", "--mode", mode.value])
+        if number in self.power_cuts:
+            cut_off(RunFolder(self._place(number)))
+            for later in runs_folder(self.cell).glob(f"{self.at(number):%Y-%m-%d}T*"):
+                if later != self._place(number):
+                    shutil.rmtree(later)  # what would have been done after it
+        self.nights.append(
+            Night(number, mode, before, self.true_error_mm(number), code, said=words.getvalue())
+        )
+
+    def _tonight(self, number: int) -> dict[str, Any]:
+        values = self.cell.settings.mechanism.parameters.document(self.truth(number).vector)
+        assert self.cell.settings.simulation is not None
+        geometry = type(self.cell.settings.simulation.geometry).model_validate(values)
+        return {"simulation.geometry": geometry} | self.faults.get(number, {})
+
+
+@dataclass(frozen=True, eq=False)
+class VirtualNight:
+    """A run on a virtual robot, kept as a run is."""
+
+    cell: Cell
+    calibration: Calibration
+    truth: Geometry
+    number: int
+
+    def carry_out(self, folder: RunFolder, at: datetime) -> tuple[events.ResultValidated, bool]:
+        """Measure, judge, and write where every gate is passed; what was judged, and whether it stays."""
+        plan = replace(self.calibration.plan, with_forecast=False)
+        random = np.random.default_rng([365, self.number])
+        campaign = VirtualCampaign(plan, VirtualRobot(plan.robot, self.truth, random))
+        campaign.carry_out()
+        folder.create(self.cell)
+        measured = campaign.measurements
+        history: list[events.Event] = [self._started(), *map(taken, measured.records)]
+        if self.calibration.mode is Mode.CHECK:
+            history.append(self._checked(measured))
+        else:
+            history += self._calibrated(folder, fold(history), random)
+        state = fold(history)
+        assert state.judged is not None
+        code = 0 if state.judged.verdict is Verdict.PASS else 1
+        history.append(events.Ended(exit_code=code, line=state.judged.line))
+        lines = [encode(Entry(n, at, 0.0, event)) for n, event in enumerate(history, start=1)]
+        folder.journal.write_bytes(b"".join(lines))
+        return state.judged, state.committed is not None and not state.rolled_back
+
+    def _started(self) -> events.RunStarted:
+        robot = self.calibration.robot
+        assert robot.taught is not None
+        return events.RunStarted(
+            software="hexacell 0",
+            cell=self.cell.settings.name,
+            cell_text=self.cell.text_without_secrets,
+            mode=self.calibration.mode.value,
+            config=str(self.cell.config_path),
+            config_sha256=fingerprint(self.cell.config_path),
+            controller=robot.controller.document(),
+            branch=robot.branch,
+            devices=(),
+            taught=robot.taught.document(),
+            accepted=self.calibration.accepted,
+        )
+
+    def _checked(self, measured: MeasurementSet) -> events.ResultValidated:
+        calibration = self.calibration
+        effects = calibration.robot.effects
+        found = check_result(calibration.check, measured, calibration.accepted, effects)
+        return events.ResultValidated(verdict=found.verdict, line=check_line(found), check=found)
+
+    def _calibrated(
+        self, folder: RunFolder, state: RunState, random: np.random.Generator
+    ) -> Iterator[events.Event]:
+        """As the computations and the config transactions of a run do it."""
+        calibration, settings = self.calibration, self.cell.settings
+        robot = calibration.robot_of(state)
+        found = identify(robot.problem(state.measurements()))
+        result = IdentificationResult.of(found)
+        identified = events.Identified(result=result, held_out=())
+        yield identified
+        written = calibration.as_written(found.geometry)
+        conditions = gates(
+            found.estimate,
+            robot.tolerance_violations(found.estimate),
+            residuals=result.residuals,
+            largest_change_mm=settings.acceptance.largest_change_mm,
+            before=calibration.robot.commanding,
+        )
+        proposed = events.Proposed(gates=conditions, written=written.geometry.document())
+        yield proposed
+        assert all(gate.passed for gate in conditions), conditions
+        change = propose(
+            self.cell.config_path,
+            config_format(settings),
+            settings.controller.config_format,
+            written.geometry,
+            fingerprint_at_start=fingerprint(self.cell.config_path),
+        )
+        change.save(folder.proposal)
+        receipt = commit(change, folder.path)
+        committed = events.Committed(approved_by="the cell file: within its limits")
+        yield committed
+        state = fold_on(state, identified, proposed, committed)
+        after = calibration.written_robot(state)
+        held_out = measured_held_out(settings, found, after, VirtualRobot(after, self.truth, random))
+        verified = verify(settings, after, found, held_out)
+        line = outcome_line(result, len(found.free), verified)
+        yield events.ResultValidated(verdict=verified.verdict, line=line, verification=verified)
+        if verified.verdict is not Verdict.PASS:
+            rollback(receipt)
+            yield events.RolledBack()
+
+
+def fold_on(state: RunState, *further: events.Event) -> RunState:
+    for event in further:
+        state = apply(state, event)
+    return state
+
+
+def taken(record: Record) -> events.RecordTaken:
+    reading = events.Reading(
+        gauges_mm=record.deviation,
+        spread_mm=(0.0, 0.0, 0.0),
+        joints_mm=record.joints,
+        answers=(),
+        counts=((0,) * 6,),
+        temperatures=(),
+    )
+    return events.RecordTaken(
+        at=SetKey(phase=Phase.IDENTIFY, point=record.point),
+        orientation=record.orientation,
+        pose=record.pose.as_tuple(),
+        reading=reading,
+        deviation_mm=record.deviation,
+    )
+
+
+def cut_off(folder: RunFolder) -> None:
+    """What a power cut leaves: the journal up to some record, and part of the next line."""
+    lines = folder.journal.read_bytes().splitlines(keepends=True)
+    records = [n for n, line in enumerate(lines) if b'"kind":"sampled"' in line]
+    middle = records[len(records) // 2]
+    folder.journal.write_bytes(b"".join(lines[:middle]) + lines[middle][:40])
+    for path in folder.path.iterdir():
+        if path.name not in {folder.journal.name, "cell.toml"}:
+            path.unlink() if path.is_file() else shutil.rmtree(path)
+
+
+@contextmanager
+def few_poses() -> Iterator[None]:
+    """Choose among few poses: what is chosen is not under test here."""
+    with pytest.MonkeyPatch.context() as patch:
+        choose_among_few(patch)
+        patch.setattr(feasibility, "CANDIDATES", 8)
+        patch.setattr(feasibility, "ROBOTS", 4)
+        yield
+
+
+@contextmanager
+def clock_at(begin: datetime) -> Iterator[None]:
+    """The computer's clock as the program's folders, journals and notes have it."""
+    real = datetime.now(UTC)
+
+    class Clock:
+        fromisoformat = datetime.fromisoformat
+
+        @staticmethod
+        def now(tz: Any = None) -> datetime:
+            return (begin + (datetime.now(UTC) - real)).astimezone(tz)
+
+    with pytest.MonkeyPatch.context() as patch:
+        for module in (line_format, run_folder, unattended_runs):
+            patch.setattr(module, "datetime", Clock)
+        yield

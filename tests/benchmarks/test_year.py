@@ -1,0 +1,131 @@
+"""365 nights of a cell with a slow drift, a crash, a dead gauge for a week, a full disk and a power cut.
+
+``NIGHTS`` in the environment says how many nights; the events are at the same shares of them.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+from hexacell.application.cell_status import CellStatus, cell_status
+from hexacell.application.drift_history import DriftHistory, drift_history
+from hexacell.decision import Verdict
+from hexacell.errors import ExitCode
+from procedures.calibration.workflow import Mode
+from tests.benchmarks.simulated_year import DEAD_GAUGE, FULL_DISK, LIMIT_MM, Year
+
+Say = Callable[[str, str, str], None]
+
+pytestmark = pytest.mark.benchmark
+
+NIGHTS = int(os.environ.get("NIGHTS", "365"))
+DRIFT_MM, CRASH_MM = 0.0005, 0.31
+DEAD = range(int(0.3 * NIGHTS), int(0.3 * NIGHTS) + 7)
+FULL, CRASH, CUT = int(0.45 * NIGHTS), int(0.6 * NIGHTS), int(0.75 * NIGHTS)
+
+
+@dataclass(frozen=True)
+class Told:
+    """The year, and what the program says of it in the end."""
+
+    year: Year
+    drift: DriftHistory
+    status: CellStatus
+    explanations: dict[int, list[str]]
+
+
+@pytest.fixture(scope="module")
+def told(tmp_path_factory) -> Told:
+    faults = dict.fromkeys(DEAD, DEAD_GAUGE) | {FULL: FULL_DISK}
+    year = Year(tmp_path_factory.mktemp("year"), DRIFT_MM, CRASH, CRASH_MM, faults, frozenset({CUT}))
+    year.carry_out(NIGHTS)
+    return Told(year, drift_history(year.cell), cell_status(year.cell), year.explanations())
+
+
+def test_no_night_is_missing_or_unexplained(told, say) -> None:
+    silent = [number for number, lines in told.explanations.items() if not any(lines)]
+    judged = sum(night.verdict is not None or night.exit_code == 0 for night in told.year.nights)
+    say("nights; with a verdict", f"{NIGHTS}; {judged}", "")
+    say("nights that the history does not explain", f"{len(silent)}", "none")
+    assert not silent
+    assert len(told.year.nights) == NIGHTS
+    for number in DEAD:
+        assert any("not begun" in line and "gauge y" in line for line in told.explanations[number])
+    assert any("not begun" in line and "MB are free" in line for line in told.explanations[FULL])
+    [cut] = told.explanations[CUT]
+    assert cut == "not over: it is going on, or was killed"
+
+
+def test_the_program_says_hardware_on_nights_with_a_fault(told) -> None:
+    codes = {night.number: night.exit_code for night in told.year.nights}
+    assert {codes[number] for number in (*DEAD, FULL)} == {ExitCode.HARDWARE}
+
+
+def test_nothing_is_applied_falsely(told, say) -> None:
+    """A result is written only after a check that failed; the robot is better then, and within limits."""
+    written = [night for night in told.year.nights if night.is_written]
+    say("results written, the first calibration included", f"{len(written)}", "")
+    shown = ", ".join(
+        f"{one.number}: {one.error_before_mm:.3f} -> {one.error_after_mm:.3f}" for one in written
+    )
+    say(f"  {shown}", "", "night: true error before -> after, mm")
+    before = {night.number: told.year.nights[: night.number] for night in written}
+    for night in written:
+        assert night.mode in {Mode.OPTIMISE, Mode.QUICK}
+        assert night.verdict is Verdict.PASS
+        assert night.error_after_mm < min(night.error_before_mm, LIMIT_MM)
+        if night.number:
+            assert [one.verdict for one in before[night.number] if one.verdict is not None][
+                -1
+            ] is Verdict.FAIL
+    for night in told.year.nights:
+        if not night.is_written:
+            assert night.error_after_mm == night.error_before_mm
+
+
+def test_verdicts_are_right(told, say) -> None:
+    checks = [night for night in told.year.nights if night.mode is Mode.CHECK and night.verdict]
+    false_passes = [one for one in checks if one.verdict is Verdict.PASS and one.error_before_mm > LIMIT_MM]
+    false_fails = [one for one in checks if one.verdict is Verdict.FAIL and one.error_before_mm < LIMIT_MM]
+    undecided = [one for one in checks if one.verdict is Verdict.NOT_EVALUATED]
+    counts = f"{len(checks)}: {len(false_passes)}, {len(false_fails)}, {len(undecided)}"
+    say("checks: false passes, false fails, undecided", counts, "none, none")
+    worst = max(one.error_before_mm for one in checks if one.number != CRASH)
+    say("  largest true error of a night but the crash's", f"{worst:.3f} mm", f"limit {LIMIT_MM}")
+    assert not false_passes
+    assert not false_fails
+
+
+def test_alarms_are_right(told, say) -> None:
+    """The crash with its leg and night; else only the leg that drifts."""
+    crashes = [one for one in told.drift.changes if one.leg == 4]
+    others = [one for one in told.drift.changes if one.leg != 4]
+    say("alarms of the watch: crash, drift", f"{len(crashes)}, {len(others)}", "1, of leg 2 alone")
+    [crash] = crashes
+    at = told.year.at(CRASH)
+    late = (crash.noticed.date() - at.date()).days
+    size = (
+        f"{crash.parameter.name} {crash.change:+.3f} +- {crash.sigma:.3f} {crash.parameter.kind.unit.value}"
+    )
+    say(f"  the crash of {CRASH_MM} mm, nights until noticed", f"{late}; {size}", "at most 3")
+    assert crash.after < at <= crash.before
+    assert 0 <= late <= 3
+    assert {one.leg for one in others} <= {2}
+    steady = [rate.name for rate in told.drift.rates if rate.is_steady]
+    found = [one.leg for one in others]
+    say("  the drift of leg 2: alarms; steady rates", f"{len(found)}; {', '.join(steady) or 'none'}", "one")
+    assert found or "l2" in steady
+
+
+def test_the_archive_is_consistent(told, say) -> None:
+    say("runs in the history", f"{sum(map(len, told.explanations.values()))}", "")
+    assert told.year.archive_is_consistent()
+    assert told.status.in_force is not None
+    last = max((night for night in told.year.nights if night.is_written), key=lambda one: one.number)
+    assert told.status.in_force.summary.began == told.year.at(last.number)
+    assert np.isfinite(told.year.true_error_mm(NIGHTS - 1))

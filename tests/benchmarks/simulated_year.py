@@ -56,7 +56,7 @@ from tests.benchmarks.virtual_calibration import measured_held_out
 from tests.small_cell import SMALL, changed, choose_among_few
 
 FIRST_NIGHT = datetime(2026, 3, 1, 2, 30, tzinfo=UTC)
-LIMIT_MM, LIMIT_DEG = 0.15, 0.1
+LIMIT_MM, LIMIT_DEG = 0.25, 0.1
 SERVED: dict[str, Any] = {
     "timing.clock_factor": 500.0,
     "encoders.timeout_s": 10.0,
@@ -66,7 +66,7 @@ SERVED: dict[str, Any] = {
 }
 """Real drivers are patient with simulated devices on a fast clock."""
 
-MEASURED_AS_BUNDLED = {"identification", "verification"}
+AS_BUNDLED = ("identification", "verification", "noise.encoder", "noise.gauge", "simulation")
 
 DEAD_GAUGE = {"simulation.faults": (SimulatedFault(kind="silent", device="y"),)}
 FULL_DISK = {"guards.free_disk_mb": 1e12}
@@ -110,7 +110,7 @@ class Year:
         source = load_cell(bundled_config("simulated-hexaglide"))
         limits = {"acceptance.position_mm": LIMIT_MM, "acceptance.orientation_deg": LIMIT_DEG}
         patient = tuple(gauge.model_copy(update={"timeout_s": 2.0}) for gauge in source.settings.gauges)
-        small = {key: value for key, value in SMALL.items() if key.split(".")[0] not in MEASURED_AS_BUNDLED}
+        small = {key: value for key, value in SMALL.items() if not key.startswith(AS_BUNDLED)}
         settings = changed(source.settings, small | SERVED | limits | {"gauges": patient})
         path = self.folder / "cell.toml"
         path.write_text(dump(settings))

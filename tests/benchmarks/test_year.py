@@ -24,7 +24,7 @@ Say = Callable[[str, str, str], None]
 pytestmark = pytest.mark.benchmark
 
 NIGHTS = int(os.environ.get("NIGHTS", "365"))
-DRIFT_MM, CRASH_MM = 0.0005, 0.31
+DRIFT_MM, CRASH_MM = 0.001, 0.31
 DEAD = range(int(0.3 * NIGHTS), int(0.3 * NIGHTS) + 7)
 FULL, CRASH, CUT = int(0.45 * NIGHTS), int(0.6 * NIGHTS), int(0.75 * NIGHTS)
 
@@ -54,7 +54,7 @@ def test_no_night_is_missing_or_unexplained(told, say) -> None:
     say("nights that the history does not explain", f"{len(silent)}", "none")
     assert not silent
     assert len(told.year.nights) == NIGHTS
-    for number in DEAD:
+    for number in set(DEAD) - {FULL}:
         assert any("not begun" in line and "gauge y" in line for line in told.explanations[number])
     assert any("not begun" in line and "MB are free" in line for line in told.explanations[FULL])
     [cut] = told.explanations[CUT]

@@ -56,7 +56,7 @@ def test_the_crash_is_found_and_corrected(year) -> None:
     assert crash.error_before_mm > 0.5
     assert not crash.is_written
     assert corrected.is_written
-    assert corrected.error_after_mm < 0.05
+    assert corrected.error_after_mm < 0.15
     status = cell_status(year.cell)
     assert status.in_force is not None
     assert status.in_force.summary.mode == "quick"

@@ -3,9 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from urllib.parse import urlsplit
 
 from drivers.listening_ports import accepts_from_network, is_loopback
 from hexacell.cell.loader import Cell
+from hexacell.cell.notifications import scheme_of
+
+IN_CLEAR = ("http", "mqtt")
+
+
+def telling_warnings(cell: Cell) -> Iterator[str]:
+    """Notifications whose password crosses a network in clear."""
+    for one in cell.settings.notifications:
+        host = None if one.url is None else urlsplit(one.url).hostname
+        if host is None or one.url is None or scheme_of(one.url) not in IN_CLEAR or is_loopback(host):
+            continue
+        if one.password_file is not None:
+            scheme = scheme_of(one.url)
+            yield (
+                f"notification {one.name}: its password goes over the network in clear. Write {scheme}s:// "
+                f"instead of {scheme}://"
+            )
 
 
 def exposure_warnings(cell: Cell) -> Iterator[str]:

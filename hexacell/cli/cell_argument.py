@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from hexacell.application.security_warnings import exposure_warnings
+from hexacell.application.security_warnings import exposure_warnings, telling_warnings
 from hexacell.cell.loader import Cell, load_cell
 from hexacell.cell.passwords import password_warnings
 from hexacell.cli.console import Console
@@ -13,7 +13,7 @@ from hexacell.cli.console import Console
 def cell_at(path: Path, console: Console) -> Cell:
     """The cell; raises ``FileError`` or ``SeveralErrors`` as ``load_cell`` does."""
     cell = load_cell(path)
-    for warning in password_warnings(cell):
+    for warning in (*password_warnings(cell), *telling_warnings(cell)):
         console.warn(warning)
     return cell
 

@@ -96,6 +96,26 @@ def test_who_is_told_can_be_tried_and_sent_to_later(typed_here, quick_cell, tmp_
         assert typed_here("notify", quick_cell.cell, "--send").out == "nothing waits\n"
 
 
+def test_a_failure_that_is_tried_again_has_the_same_id(typed_here, quick_cell) -> None:
+    with webhook() as server:
+        tell(quick_cell, "hall", server.url)
+        with cell_lock(quick_cell.controller):
+            for _ in range(2):
+                typed_here("run", quick_cell.cell, *CHECK)
+    first, second = (json.loads(body) for body in server.bodies)
+    assert (first["id"], first["line"]) == (second["id"], second["line"])
+
+
+@pytest.mark.parametrize(
+    ("url", "is_warned"),
+    [("http://host/", True), ("mqtt://host", True), ("https://host/", False), ("mqtt://127.0.0.1", False)],
+)
+def test_a_password_in_clear_is_warned_of(typed_here, quick_cell, url, is_warned) -> None:
+    tell(quick_cell, "hall", url, 'password_file = "notify.toml"')
+    err = typed_here("notify", quick_cell.cell).err
+    assert ("goes over the network in clear" in err) is is_warned
+
+
 def test_nobody_to_tell(typed_here, quick_cell) -> None:
     assert "nobody is told" in typed_here("notify", quick_cell.cell).out
     outcome = typed_here("notify", quick_cell.cell, "--test")

@@ -12,13 +12,12 @@ from asyncua import ua
 from asyncua.crypto.permission_rules import User, UserRole
 from asyncua.server.server import Server
 
-from hexacell.application.history import PastRun, past_runs
 from hexacell.cell.loader import Cell
 from hexacell.cell.opcua import OpcUaSettings
-from hexacell.errors import DeviceError, FileError
+from hexacell.errors import DeviceError
 from hexacell.result_server.address_space import MOST_RESULTS, ResultNodes
 from hexacell.result_server.credentials import Reader, allowed_reader, ensure_certificate
-from hexacell.result_server.published_result import PublishedResult, published_result
+from hexacell.result_server.new_results import NewResults
 
 URI = "urn:hexacell:result-server"
 
@@ -97,28 +96,14 @@ async def _follow(
     warn: Callable[[str], None],
 ) -> None:
     """Show what there is, then show and tell what is new."""
-    known: set[str] = set()
-    for result in (await _ended(cell, known, warn))[-MOST_RESULTS:]:
+    results = NewResults(cell, warn)
+    for result in (await asyncio.to_thread(results.fetch))[-MOST_RESULTS:]:
         await nodes.show(result)
     ready()
     while not await _is_set_within(stop, settings.poll_s):
-        for result in await _ended(cell, known, warn):
+        for result in await asyncio.to_thread(results.fetch):
             await nodes.show(result)
             await nodes.tell(result)
-
-
-async def _ended(cell: Cell, known: set[str], warn: Callable[[str], None]) -> list[PublishedResult]:
-    """The runs that have ended and are not known yet, the oldest first; they are known then."""
-    try:
-        runs: tuple[PastRun, ...] = await asyncio.to_thread(past_runs, cell)
-    except FileError as error:
-        warn(str(error))
-        return []
-    is_simulated = cell.settings.simulation is not None
-    found = (published_result(cell.settings.name, run, is_simulated=is_simulated) for run in reversed(runs))
-    fresh = [one for one in found if one is not None and one.result_id not in known]
-    known.update(one.result_id for one in fresh)
-    return fresh
 
 
 async def _is_set_within(stop: asyncio.Event, seconds: float) -> bool:

@@ -49,7 +49,7 @@ class NotificationSettings(Section):
         "or a chat service's address as apprise has it. One with a token in it belongs in password_file",
     )
     on: tuple[OccasionWord, ...] = Field(
-        USUAL_OCCASIONS, min_length=1, description="pass, no-pass, alarm, answer-needed, failure"
+        USUAL_OCCASIONS, description="pass, no-pass, alarm, answer-needed, failure"
     )
     topic: Text | None = Field(
         None, min_length=1, description="MQTT: below which state is kept; by default hexacell/NAME-OF-CELL"
@@ -75,6 +75,13 @@ class NotificationSettings(Section):
         if mistake is not None:
             raise broken_rule(*mistake)
         return url
+
+    @field_validator("on")
+    @classmethod
+    def _tells_something(cls, on: tuple[OccasionWord, ...]) -> tuple[OccasionWord, ...]:
+        if not on:
+            raise broken_rule("nothing is told", "Name an occasion, or remove the section")
+        return on
 
     @field_validator("topic")
     @classmethod

@@ -120,12 +120,14 @@ def _basis_or_verdict(event: events.RunStarted | events.ResultValidated) -> str 
 
 
 def _finding_text(event: events.Event) -> str | None:
-    """What a start, the measured noise, the quick level or a verdict reports."""
+    """What a start, the measured noise, the quick level, a recall or a verdict reports."""
     match event:
         case events.RunStarted() | events.ResultValidated():
             return _basis_or_verdict(event)
         case events.Identified(quick=quick):
             return None if quick is None else quick_accuracy_text(quick)
+        case events.RunRecalled():
+            return f"the run is to end: {event.reason}; back to the reference"
         case events.NoiseMeasured():
             return noise_and_averaging_text(event.noise)
         case _:

@@ -178,7 +178,10 @@ class Calibration:
         Raises:
             HexacellError: no step is possible.
         """
-        return self.informed(state)._next_step(state)
+        informed = self.informed(state)
+        if state.recalled is None or state.ended is not None or state.config_write_pending:
+            return informed._next_step(state)
+        return informed._way_back(state)
 
     def _next_step(self, state: RunState) -> Step | None:
         if state.ended is not None:
@@ -195,19 +198,19 @@ class Calibration:
             return step or Compute(kind="take back" if state.provisional_active else "identify")
         return measuring.held_out.next_step(state, Phase.BEFORE) or self._write_back(state)
 
-    def way_back(self, state: RunState) -> Step | None:
+    def _way_back(self, state: RunState) -> Step | None:
         """The next move back to the reference of the set in which the robot is; none where it is there.
 
         Nor is there one where the robot is in no set, is lost, or finds no safe path.
         """
-        informed = self.informed(state)
-        if state.at_pose is None or state.position_unknown or not state.set(state.at_pose[0]).samples:
+        keys = [key for key in state.open_sets if state.set(key).samples]
+        at_reference = state.at_pose is not None and state.at_pose[1] == 1
+        if not keys or at_reference or state.position_unknown or state.target is None:
             return None
-        key, orientation = state.at_pose
-        measuring = informed._measuring(state)
+        key, measuring = keys[-1] if state.at_pose is None else state.at_pose[0], self._measuring(state)
         steps = measuring.points if key.phase is Phase.IDENTIFY else measuring.held_out
         try:
-            return None if orientation == 1 else steps.way_back(state, key)
+            return steps.way_back(state, key) if key in keys else None
         except HexacellError:
             return None
 

@@ -122,7 +122,8 @@ class Engine:
         A run that was killed has no ``Interrupted`` in its journal; it is added, since the position of
         the robot is unknown.
         """
-        if self.state.target is not None and not self.state.position_unknown:
+        is_moving = self.state.target is not None and not self.state.position_unknown
+        if is_moving or self.state.recalled is not None:
             self.record(events.Interrupted(reason="the program ended unexpectedly", exit_code=_KILLED))
         for key in self.state.open_sets:
             measured = self.state.set(key)
@@ -173,12 +174,9 @@ class Engine:
             self._is_prepared = True
 
     async def _decide(self) -> Step | None:
-        """The next step; raises ``OutOfTime`` where the run is to end and the robot is back."""
-        calibration, reason = self._executor.calibration, self._commands.flags.returning
-        if reason is None:
-            return await asyncio.to_thread(calibration.next_step, self.state)
-        step = await asyncio.to_thread(calibration.way_back, self.state)
-        if step is None:
+        """The next step; raises ``OutOfTime`` where the run was recalled and the robot is back."""
+        step = await asyncio.to_thread(self._executor.calibration.next_step, self.state)
+        if step is None and (reason := self.state.recalled) is not None:
             raise OutOfTime(f"the run was ended: {reason}", action="Resume it; what was measured is kept")
         return step
 
@@ -264,8 +262,11 @@ class Engine:
         for event in self._commands.take_invalidations():
             if self.state.set(event.at).samples:
                 self.record(event)
-        if reason := self._commands.flags.stopping:
-            raise Interruption(reason)
+        flags = self._commands.flags
+        if flags.stopping:
+            raise Interruption(flags.stopping)
+        if flags.returning and self.state.recalled is None:
+            self.record(events.RunRecalled(reason=flags.returning))
 
     def _reject(self, command: Command, reason: str) -> None:
         self.record(events.CommandRejected(command=type(command).__name__, reason=reason))

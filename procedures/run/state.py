@@ -69,6 +69,7 @@ class RunState:
     excluded: tuple[events.PoseExcluded, ...] = ()
     failures: dict[tuple[FailureKind, str], int] = field(default_factory=dict)
     is_in_estop: bool = False
+    recalled: str | None = None
     ended: events.Ended | None = None
 
     @property
@@ -233,7 +234,9 @@ def apply(state: RunState, event: events.Event) -> RunState:  # noqa: C901, PLR0
         case events.Failed():
             return _failed(_without_position(state), event)
         case events.Interrupted():
-            return _unverified(replace(_without_position(state), failures={}))
+            return _unverified(replace(_without_position(state), failures={}, recalled=None))
+        case events.RunRecalled():
+            return replace(state, recalled=event.reason)
         case events.Ended():
             return replace(state, ended=event)
         case _:

@@ -109,7 +109,7 @@ class Year:
     def cell(self) -> Cell:
         source = load_cell(bundled_config("simulated-hexaglide"))
         limits = {"acceptance.position_mm": LIMIT_MM, "acceptance.orientation_deg": LIMIT_DEG}
-        patient = tuple(gauge.model_copy(update={"timeout_s": 2.0}) for gauge in source.settings.gauges)
+        patient = tuple(gauge.model_copy(update={"timeout_s": 6.0}) for gauge in source.settings.gauges)
         small = {key: value for key, value in SMALL.items() if not key.startswith(AS_BUNDLED)}
         settings = changed(source.settings, small | SERVED | limits | {"gauges": patient})
         path = self.folder / "cell.toml"
@@ -199,6 +199,7 @@ class Year:
         with clock_at(self.at(number)), redirect_stdout(words), redirect_stderr(words):
             code = main(["run", str(path), "--unattended", "--mode", mode.value])
         if number in self.power_cuts:
+            assert self._place(number).joinpath("journal.jsonl").is_file(), words.getvalue()
             cut_off(RunFolder(self._place(number)))
             for later in runs_folder(self.cell).glob(f"{self.at(number):%Y-%m-%d}T*"):
                 if later != self._place(number):

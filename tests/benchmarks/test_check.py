@@ -92,7 +92,9 @@ def calibrated() -> Calibrated:
     campaign.carry_out()
     found = identify(robot.problem(campaign.measurements))
     frames = robot.mechanism.normalize_frames(found.geometry)[1]
-    return Calibrated(replace(robot, controller=found.geometry, frames=frames), found.covariance)
+    # The cell is ideal, and effects cannot be sent to another process.
+    known = replace(robot, controller=found.geometry, frames=frames, effects=())
+    return Calibrated(known, found.covariance)
 
 
 def campaign_of(check: Check, change: Array, number: int) -> VirtualCampaign:

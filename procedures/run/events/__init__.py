@@ -13,6 +13,7 @@ from procedures.run.events.course import (
     Interrupted,
     Paused,
     Resumed,
+    RunRecalled,
     RunStarted,
     StepBegun,
     Tripped,
@@ -76,6 +77,7 @@ __all__ = [
     "ResultValidated",
     "Resumed",
     "RolledBack",
+    "RunRecalled",
     "RunStarted",
     "SetClosed",
     "SetInvalidated",
@@ -113,6 +115,7 @@ Event = Annotated[
     | RolledBack
     | Paused
     | Resumed
+    | RunRecalled
     | Failed
     | CommandRejected
     | Tripped

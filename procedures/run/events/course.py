@@ -86,6 +86,13 @@ class Resumed(Frozen):
     kind: Literal["resumed"] = "resumed"
 
 
+class RunRecalled(Frozen):
+    """The run is to end at the reference of the set in which the robot is, and why."""
+
+    kind: Literal["recalled"] = "recalled"
+    reason: str
+
+
 class Failed(Frozen):
     """A step, or deciding on one, failed; motion was stopped.
 

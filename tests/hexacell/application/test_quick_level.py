@@ -3,20 +3,25 @@
 from __future__ import annotations
 
 import shutil
+from dataclasses import replace
 
 import pytest
 
 from hexacell.application.accepted_results import last_accepted_result
 from hexacell.application.calibration_run import calibrate
 from hexacell.application.replay_run import replay
+from hexacell.campaign.task_accuracy import Task
 from hexacell.cell.loader import Cell
 from hexacell.controller_config.change import fingerprint
 from hexacell.decision import Verdict
-from hexacell.errors import ExitCode, UsageError
+from hexacell.errors import ExitCode, OutOfTime, UsageError
+from hexacell.identification.estimator import identify
+from hexacell.robot_model import robot_of
 from hexacell.runs.run_folder import RunFolder, runs_folder
-from procedures.calibration.workflow import Mode
+from procedures.calibration.workflow import Calibration, Mode
 from procedures.journal.journal import read_journal
 from procedures.run import events
+from procedures.run.commands import CommandQueue, EndAtReference
 from procedures.run.state import RunState, fold
 from tests.hexacell.application.conftest import order_of
 
@@ -97,6 +102,49 @@ async def test_without_an_accepted_result_it_says_what_to_do(make_cell, tmp_path
         await calibrate(order_of(cell, RunFolder(tmp_path / "run"), mode=Mode.QUICK))
     assert "--mode optimise" in str(refusal.value)
     assert not (tmp_path / "run").exists()
+
+
+async def test_one_that_was_ended_in_its_midst_is_resumed(drifted) -> None:
+    """With the same prior and budget: what it started from is in its journal."""
+    folder, queue, counted = RunFolder(runs_folder(drifted) / "quick"), CommandQueue(), 0
+
+    def end(event: events.Event, _: object) -> None:
+        nonlocal counted
+        counted += isinstance(event, events.RecordTaken)
+        if counted == 7:
+            queue.put(EndAtReference("quiet hours begin at 05:30"))
+
+    request = order_of(drifted, folder, mode=Mode.QUICK)
+    with pytest.raises(OutOfTime):
+        await calibrate(request, [end], queue)
+    ended = await calibrate(replace(request, resume=True))
+    assert ended.exit_code == ExitCode.DONE
+    state = fold(read_journal(folder.journal))
+    assert len(state.measurements()) <= BUDGET
+    assert (await replay(folder.path)).differences == []
+
+
+async def test_what_effects_did_to_the_result_before_counts(drifted) -> None:
+    """An encoder that reads long did so in the calibration as well: its records do not average that."""
+    _, state, _ = await a_quick_run(drifted)
+    uncertain = drifted.settings.uncertainty.model_copy(update={"encoder_scale_um_m": 100.0})
+    settings = drifted.settings.model_copy(update={"uncertainty": uncertain})
+    assert state.started is not None
+    before = state.started.accepted
+    effects = last_accepted_result(replace(drifted, settings=settings))
+    assert before is not None
+    assert effects is not None
+    known = before.model_copy(update={"effects": effects.effects})
+    calibration = Calibration(settings, robot_of(drifted), Mode.QUICK, accepted=known)
+    robot = calibration.robot_of(state)
+    assert robot.known_effects.keys() == {"scale of each encoder"}
+    found = identify(robot.problem(state.measurements()))
+    belief = robot.belief(found)
+    task = Task.of(settings, robot, belief)
+    whole, forgetful = (task.budget(found, belief, robot.effects, one) for one in (robot.known_effects, {}))
+    assert whole is not None
+    assert forgetful is not None
+    assert whole.systematic_mm != pytest.approx(forgetful.systematic_mm, rel=1e-3)
 
 
 async def test_it_is_resumed_in_its_mode(drifted) -> None:

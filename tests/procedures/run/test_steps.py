@@ -264,6 +264,7 @@ some_event: st.SearchStrategy[Any] = st.one_of(
     st.builds(events.RolledBack),
     st.builds(events.Paused, at_once=st.booleans()),
     st.builds(events.Resumed),
+    st.builds(events.RunRecalled, reason=text),
     st.builds(
         events.Failed,
         step=st.none() | some_step,
@@ -314,6 +315,6 @@ KINDS = (
     *("started", "begun", "arrived", "placed", "sampled", "refused", "closed", "voided", "identified"),
     *("lent", "taken back", "proposed", "committed", "judged", "rolled back", "interrupted", "ended"),
     *("located", "undone", "confirmed", "paused", "resumed", "failed", "declined", "tripped"),
-    *("accepted", "stood", "repeated", "probed", "tried", "noise measured", "excluded"),
+    *("accepted", "stood", "repeated", "probed", "tried", "noise measured", "excluded", "recalled"),
 )
 """Journals on disk say these words: they must never change."""

@@ -36,7 +36,8 @@ MOST_TRIED = 6
 class VirtualCampaign:
     """One campaign, from the first reference to the end of the plan.
 
-    The robot is placed at each pose; what is between is left to subclasses.
+    The robot is placed at each pose; what is between is left to subclasses. Where the cell says so, the
+    controller commands with the estimate once the robot is known well enough.
 
     Attributes:
         state: what the next decision depends on.
@@ -102,7 +103,15 @@ class VirtualCampaign:
         """Go back to the reference of the present point."""
 
     def _leave_point(self) -> None:
-        """A point was finished."""
+        """Let the controller command with the estimate, if that is wanted and safe."""
+        plan = self.plan
+        if not plan.settings.identification.provisional or plan.robot.uses_provisional:
+            return
+        if plan.allows_provisional(self.state):
+            geometry = plan.estimate(self.state).belief.estimate
+            robot = replace(plan.robot, provisional=(geometry,), uses_provisional=True)
+            self.virtual_robot.load(robot)
+            self.plan = replace(plan, robot=robot)
 
     def _measure(self, decision: StartPoint | MeasurePose) -> None:
         state = self.state
@@ -184,6 +193,7 @@ def _carry_out(plan: Plan, truth: Geometry, number: int) -> _Outcome | None:
     campaign = VirtualCampaign(plan, VirtualRobot(plan.robot, truth, random))
     try:
         campaign.carry_out()
+        plan = campaign.plan
         estimate, forecast = plan.estimate(campaign.state), plan.forecast(campaign.state)
     except HexacellError:
         return None

@@ -7,7 +7,7 @@ or nothing is left that is worth measuring.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -36,7 +36,7 @@ from hexacell.errors import IdentifiabilityError, LimitError
 from hexacell.identification.belief import RobotBelief
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.rotations import Array
-from hexacell.measurements.records import deviation_of, joints_of
+from hexacell.measurements.records import Record, deviation_of, joints_of
 from hexacell.motion.path_check import is_clear
 from hexacell.motion.paths import find_route
 from hexacell.robot_model import Robot
@@ -92,13 +92,25 @@ class Plan:
         return self._estimator.estimate(state.measurements)
 
     def allows_provisional(self, state: CampaignState) -> bool:
-        """Whether the robot is known well enough for the controller to command with the estimate."""
+        """Whether the robot is known well enough for the controller to command with the estimate.
+
+        A controller whose own geometry is as good, as after a calibration, keeps it.
+        """
         estimate = self.estimate(state)
-        found = estimate.identification
+        found, belief = estimate.identification, estimate.belief
         if found is None:
             return False
         at_last = found.poses[[-1]], found.problem.joints[[-1]]
-        return estimate.belief.orientation_sigma(*at_last) <= PROVISIONAL_SIGMA
+        is_known = belief.orientation_sigma(*at_last) <= PROVISIONAL_SIGMA
+        return is_known and self._is_better_than_commanding(belief)
+
+    def _is_better_than_commanding(self, belief: RobotBelief) -> bool:
+        """Whether the geometry that commands errs by more at the task poses than the estimate may."""
+        error = self.task.error(belief)
+        if error is None:
+            return True
+        change = belief.free - self.robot.free_parameters
+        return error.largest(change) > error.worst(belief.covariance)
 
     def forecast(self, state: CampaignState) -> Forecast | None:
         """The gain of further records; None without task poses."""
@@ -189,6 +201,13 @@ class Plan:
         return planned_systematic_mm(self.robot, self.task, sets, self.earlier)
 
     @cached_property
+    def _last_out_of_reach(
+        self,
+    ) -> dict[tuple[Sequence[Record], frozenset[int], int | None], frozenset[int]]:
+        """Points that are not to be begun, by what that depends on."""
+        return {}
+
+    @cached_property
     def _estimator(self) -> RecordEstimator:
         return self.estimator or OnlineEstimator(self.robot)
 
@@ -250,6 +269,13 @@ class Plan:
 
         A point that is only too uncertain may be measured later, if there is another one to learn from.
         """
+        key = (state.measurements.records, state.done, state.point)
+        if key not in self._last_out_of_reach:
+            self._last_out_of_reach.clear()  # only the last one is asked for again
+            self._last_out_of_reach[key] = self._find_out_of_reach(state)
+        return self._last_out_of_reach[key]
+
+    def _find_out_of_reach(self, state: CampaignState) -> frozenset[int]:
         others = {point for point in self.points if point not in state.done and point != state.point}
         unsafe = {point for point in others if not self._is_safe(state, point)}
         if unsafe == others:

@@ -44,6 +44,10 @@ class TaskError:
         """One standard deviation at the worst pose, mm."""
         return float(np.sqrt(self.variances(covariance).max()))
 
+    def largest(self, change: Array) -> float:
+        """The largest error, mm, by a change (p,) of the parameters, mm."""
+        return float(np.linalg.norm(self.jacobian @ change, axis=-1).max())
+
     def mean_square(self, covariance: Array) -> float:
         """Over all poses, mm^2."""
         return float(self.variances(covariance).mean())

@@ -6,8 +6,6 @@ travel and singularity margin are put to the test and not assumed.
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from hexacell.campaign.decisions import MeasurePose, StartPoint
@@ -31,7 +29,6 @@ class SimulatedCampaign(VirtualCampaign):
         robot: what is known of the robot before.
         truth: its geometry, in the mechanism's frame convention.
         random: of the noise.
-        provisional: whether the controller commands with the estimate once the robot is known well enough.
     """
 
     def __init__(
@@ -40,11 +37,9 @@ class SimulatedCampaign(VirtualCampaign):
         robot: Robot,
         truth: Geometry,
         random: np.random.Generator,
-        provisional: bool = False,
     ) -> None:
         plan = Plan(settings, robot, with_forecast=False)
         super().__init__(plan, VirtualRobot(robot, truth, random))
-        self._provisional = provisional
         self._trail: list[tuple[Pose, bool]] = []
 
     @property
@@ -77,16 +72,6 @@ class SimulatedCampaign(VirtualCampaign):
             departure = max(row for row, (_, measured) in enumerate(self._trail) if measured)
             move = next_return_move(self._belief, zero.reference, trail, departure)
             self._move(self._trail[move][0] if isinstance(move, int) else self.robot.to_command(move))
-
-    def _leave_point(self) -> None:
-        """Let the controller command with the estimate, if that is wanted and safe."""
-        if not self._provisional or self.robot.uses_provisional:
-            return
-        if self.plan.allows_provisional(self.state):
-            geometry = self._belief.estimate
-            robot = replace(self.robot, provisional=(geometry,), uses_provisional=True)
-            self.virtual_robot.load(robot)
-            self.plan = replace(self.plan, robot=robot)
 
     @property
     def _belief(self) -> RobotBelief:

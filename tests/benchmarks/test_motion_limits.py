@@ -32,7 +32,7 @@ from hexacell.kinematics.rotations import Array
 from hexacell.robot_model import Robot, make_robot, robot_of
 from hexacell.study import data_sets
 from hexacell.study.simulated_campaign import SimulatedCampaign
-from tests.benchmarks.virtual_calibration import robot_that_reaches
+from tests.benchmarks.virtual_calibration import robot_that_reaches, stands_at
 from tests.benchmarks.watched_robot import Seen, WatchedRobot, watch
 
 pytestmark = pytest.mark.benchmark
@@ -69,13 +69,11 @@ def bundled() -> tuple[Cell, Robot]:
     return cell, robot_of(cell)
 
 
-def robot_that_stands(cell: Cell, robot: Robot, random: np.random.Generator) -> Geometry:
+def robot_at_first(cell: Cell, robot: Robot, random: np.random.Generator) -> Geometry:
     """A robot that keeps its limits at the first reference: it goes there before anything is known."""
-    first = robot.from_commands([Pose(*cell.settings.identification.points[0])])
     while True:
         truth = robot_that_reaches(cell, robot, random)
-        actual = robot.commanded(truth).actual_poses(first)
-        if robot.limits.allow_legs(robot.mechanism, truth, actual.poses, actual.joints)[0]:
+        if stands_at(robot, truth, cell.settings.identification.points[:1]):
             return truth
 
 
@@ -111,12 +109,12 @@ def visit_held_out(
 def outcome(number: int) -> Outcome:
     cell, robot = bundled()
     random = np.random.default_rng([11, number])
-    truth = robot_that_stands(cell, robot, random)
+    truth = robot_at_first(cell, robot, random)
     campaign = SimulatedCampaign(cell.settings, robot, truth, random)
     watched = watch(campaign, random)
     try:
         campaign.carry_out()
-        found = identify(robot.problem(campaign.measurements))
+        found = identify(campaign.robot.problem(campaign.measurements))
         sigma = task_sigma(cell, robot, found)
         held_out = visit_held_out(cell, robot, found, truth, watched.seen, number)
         written = as_written(cell.settings, robot, found.geometry).geometry
@@ -200,7 +198,7 @@ def compared(number: int) -> tuple[float, float]:
     """The predicted error of a campaign, and of the best fixed design, on one robot."""
     cell, robot = bundled()
     random = np.random.default_rng([12, number])
-    truth = robot_that_stands(cell, robot, np.random.default_rng([11, number]))
+    truth = robot_at_first(cell, robot, np.random.default_rng([11, number]))
     return outcome(number).sigma_mm, best_fixed(cell, robot, truth, random)
 
 

@@ -68,9 +68,11 @@ class Outcome:
     failed: bool = False
 
 
-def cell_and_robot(tilt_deg: float) -> tuple[Cell, Robot]:
+def cell_and_robot(tilt_deg: float, lend: bool = False) -> tuple[Cell, Robot]:
     cell = load_cell(bundled_config("simulated-hexaglide"))
-    robot = robot_of(cell)
+    identification = cell.settings.identification.model_copy(update={"provisional": lend})
+    settings = cell.settings.model_copy(update={"identification": identification})
+    cell, robot = replace(cell, settings=settings), robot_of(cell)
     return cell, replace(robot, limits=replace(robot.limits, tilt=float(np.radians(tilt_deg))))
 
 
@@ -102,13 +104,11 @@ def can_stand_everywhere(cell: Cell, robot: Robot, truth: Geometry) -> bool:
 
 def measured(job: tuple[int, Manner]) -> Outcome:
     number, manner = job
-    cell, robot = cell_and_robot(manner.tilt_deg)
+    cell, robot = cell_and_robot(manner.tilt_deg, manner.lend)
     truth = truth_of(cell, robot, number)
     if not can_stand_everywhere(cell, robot, truth):
         return Outcome(reason="cannot stand at all points")
-    campaign = SimulatedCampaign(
-        cell.settings, robot, truth, np.random.default_rng([5, number]), provisional=manner.lend
-    )
+    campaign = SimulatedCampaign(cell.settings, robot, truth, np.random.default_rng([5, number]))
     try:
         campaign.carry_out()
         found = error(campaign, truth, len(campaign.measurements))

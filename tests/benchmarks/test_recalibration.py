@@ -24,7 +24,7 @@ from hexacell.errors import HexacellError
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.robot_model import Robot, robot_of
-from tests.benchmarks.virtual_calibration import calibrate, robot_that_reaches
+from tests.benchmarks.virtual_calibration import calibrate, robot_that_stands
 from tests.benchmarks.worlds.closure import Bodies, CannotCloseError, follow, slider_places
 from tests.benchmarks.worlds.effects import Effect
 from tests.benchmarks.worlds.table import least_by_chance
@@ -58,10 +58,10 @@ class Calibration:
 
 
 def calibrations(number: int) -> list[Calibration]:
-    """Of a machine that can stand at all points as its controller sends it there."""
+    """Of a machine that can stand at all points, within its limits, as its controller sends it there."""
     cell = load_cell(bundled_config("simulated-hexaglide"))
     robot = robot_of(cell)
-    truth = robot_that_reaches(cell, robot, np.random.default_rng([7, number]))
+    truth = robot_that_stands(cell, robot, np.random.default_rng([7, number]))
     done = []
     for time in range(TIMES):
         calibration, robot = _calibrated(cell, robot, truth, Calibration(number, time))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,6 +10,7 @@ import numpy as np
 from hexacell.campaign.dry_run import VirtualCampaign
 from hexacell.campaign.planner import Plan
 from hexacell.campaign.teaching import as_written
+from hexacell.cell.fields import SixNumbers
 from hexacell.cell.loader import Cell
 from hexacell.cell.model import CellSettings
 from hexacell.controller_config.interface import ControllerGeometry
@@ -50,6 +52,27 @@ def robot_that_reaches(cell: Cell, robot: Robot, random: np.random.Generator) ->
             return truth
 
 
+def robot_that_stands(cell: Cell, robot: Robot, random: np.random.Generator) -> Geometry:
+    """A robot whose passive joints and legs keep their limits too, at all points as it is sent there.
+
+    Another one would stand at a stop of a joint before it was calibrated.
+    """
+    while True:
+        truth = robot_that_reaches(cell, robot, random)
+        if stands_at(robot, truth, cell.settings.identification.points):
+            return truth
+
+
+def stands_at(robot: Robot, truth: Geometry, points: Sequence[SixNumbers]) -> bool:
+    """Whether passive joints and legs keep their limits at some commands in the controller's frames."""
+    commands = robot.from_commands(Pose(*point) for point in points)
+    actual = robot.commanded(truth).actual_poses(commands)
+    if not actual.found.all():
+        return False
+    kept = robot.limits.allow_legs(robot.mechanism, truth, actual.poses, actual.joints)
+    return bool(kept.all())
+
+
 def calibrate(cell: Cell, robot: Robot, truth: Geometry, random: np.random.Generator) -> VirtualCalibration:
     """Measure, identify, write and verify.
 
@@ -59,7 +82,8 @@ def calibrate(cell: Cell, robot: Robot, truth: Geometry, random: np.random.Gener
     virtual = VirtualRobot(robot, truth, random)
     campaign = VirtualCampaign(Plan(cell.settings, robot, with_forecast=False), virtual)
     campaign.carry_out()
-    found = identify(robot.problem(campaign.measurements))
+    measured = campaign.plan.robot  # with the geometries that commanded the records
+    found = identify(measured.problem(campaign.measurements))
     written = as_written(cell.settings, robot, found.geometry).geometry
     after = make_robot(cell.settings, ControllerGeometry(written, robot.branch), taught=written)
     held_out = measured_held_out(cell.settings, found, after, VirtualRobot(after, truth, random))

@@ -17,13 +17,14 @@ from tests.benchmarks.watched_robot import watch
 @pytest.fixture
 def make_campaign(paper):
     cell = load_cell(bundled_config("simulated-hexaglide"))
-    identification = cell.settings.identification.model_copy(update={"orientations": 6})
-    settings = cell.settings.model_copy(update={"identification": identification})
     robot = robot_of(cell)
     truth, _ = robot.mechanism.normalize_frames(paper.actual)
 
-    def make(**options):
-        return SimulatedCampaign(settings, robot, truth, np.random.default_rng(5), **options)
+    def make(provisional=False):
+        changes = {"orientations": 6, "provisional": provisional}
+        identification = cell.settings.identification.model_copy(update=changes)
+        settings = cell.settings.model_copy(update={"identification": identification})
+        return SimulatedCampaign(settings, robot, truth, np.random.default_rng(5))
 
     return make
 

@@ -22,6 +22,7 @@ FREE: dict[str, Any] = {
 SMALL: dict[str, Any] = FREE | {
     "identification.points": ((100.0, -100.0, 500.0), (-100.0, 100.0, 500.0)),
     "identification.orientations": 9,
+    "identification.provisional": False,
     "verification.points": ((-100.0, -50.0, 450.0), (100.0, 100.0, 550.0)),
     "verification.orientations": 3,
     "noise.encoder_mm": 0.0012,

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from hexacell.cell.fields import LARGEST_NUMBER, GeometryDocument
+from hexacell.cell.fields import LARGEST_NUMBER, GeometryDocument, SixNumbers
 from hexacell.cell.measuring import MOST_POINTS, MOST_POSES
 from hexacell.cell.model import CellSettings
 from hexacell.controller_config.interface import JointRanges
@@ -29,6 +29,7 @@ from procedures.run.steps import Move, Phase, Place, Sample, SetKey, StepOfSet
 
 LARGEST_COUNT = 2**63 - 1
 LARGEST_VARIANCE = 1e12
+NOT_THEIR_POINTS = "the held-out poses are not those of the cell file's points"
 ANY_NUMBERS = (
     events.Arrived,
     events.Located,
@@ -99,6 +100,7 @@ class _Event:
         before = {
             events.Proposed: state.identified,
             events.Committed: state.proposed,
+            events.FurtherRecordsPlanned: state.committed,
             events.ResultAccepted: state.judged and state.judged.verification,
             events.RolledBack: state.proposed,
         }
@@ -160,19 +162,26 @@ class _Event:
                 yield from self._identified(identified)
             case events.Proposed() as proposed:
                 yield from self._geometries(proposed.written)
+            case events.FurtherRecordsPlanned() as planned:
+                yield from self._held_out(planned.poses)
 
     def _identified(self, identified: events.Identified) -> Iterator[str]:
         result, points = identified.result, len(self.settings.verification.points)
         yield from self._geometries(result.geometry)
         yield from self._geometries(result.sigma, is_physical=False)
         yield from self._covariance(result.covariance)
-        held_out, after = identified.held_out, identified.held_out_after
-        yield from _out_of_range((held_out, after), LARGEST_NUMBER)
-        fits = len(held_out) == points and any(held_out) and len(after) in {0, points}
-        if self.follows_plan and not fits:
-            yield "the held-out poses are not those of the cell file's points"
+        yield from self._held_out(identified.held_out)
+        after = identified.held_out_after
+        yield from _out_of_range(after, LARGEST_NUMBER)
+        if self.follows_plan and len(after) not in {0, points}:
+            yield NOT_THEIR_POINTS
         if any(not math.isfinite(one) for one in (result.chi2, result.residual_rms_mm)):
             yield "its residuals are no numbers"
+
+    def _held_out(self, poses: tuple[tuple[SixNumbers, ...], ...]) -> Iterator[str]:
+        yield from _out_of_range(poses, LARGEST_NUMBER)
+        if self.follows_plan and not (len(poses) == len(self.settings.verification.points) and any(poses)):
+            yield NOT_THEIR_POINTS
 
     def _geometries(self, *documents: GeometryDocument | None, is_physical: bool = True) -> Iterator[str]:
         parameters = self.settings.mechanism.parameters

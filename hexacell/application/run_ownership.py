@@ -136,6 +136,9 @@ def _poses_to_come(state: RunState) -> Iterator[SixNumbers]:
     if state.identified is not None:
         for at_point in (*state.identified.held_out, *state.identified.held_out_after):
             yield from at_point
+    if state.further is not None:
+        for at_point in state.further.poses:
+            yield from at_point
 
 
 def _commanding(robot: Robot, state: RunState) -> Iterator[Geometry]:

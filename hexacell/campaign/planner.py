@@ -46,6 +46,9 @@ PROVISIONAL_SIGMA = float(np.radians(2.0))
 """Standard deviation of the platform's orientation, rad, beyond which the controller does not command
 with the estimate: after a whole point it is below one degree, after two records seven."""
 
+_Progress = tuple[Sequence[Record], frozenset[int], int | None]
+"""Records, points that are done, and the present one."""
+
 
 @dataclass(frozen=True, eq=False)
 class Plan:

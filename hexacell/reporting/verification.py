@@ -18,25 +18,17 @@ from hexacell.campaign.task_accuracy import Task
 from hexacell.cell.fields import Frozen, SixNumbers
 from hexacell.cell.model import CellSettings
 from hexacell.decision import Verdict, decide, worst_verdict
-from hexacell.identification.diagnostics.model_tests import leave_one_point_out, prediction_test, update
-from hexacell.identification.solver.chi_square import SMALLEST_PROBABILITY, ChiSquareTest
+from hexacell.identification.diagnostics.model_tests import update
 from hexacell.identification.solver.result import Identification
 from hexacell.measurements.records import MeasurementSet
 from hexacell.reporting.length_result import LengthMeasurements, LengthResult, length_check
+from hexacell.reporting.model_evidence import ModelTest, confirmed, fails_narrowly, model_tests
 from hexacell.reporting.result import IdentificationResult
 from hexacell.robot_model import Robot
 from hexacell.uncertainty.budget import UncertaintyBudget
 from hexacell.uncertainty.length_check import LengthCheck
 from hexacell.uncertainty.length_errors import JudgedGeometry
 from hexacell.uncertainty.statement import LargestError
-
-
-class ModelTest(Frozen):
-    """One test of the model, whether it holds, and that as a sentence for people."""
-
-    name: str
-    passed: bool
-    sentence: str
 
 
 class JudgedError(Frozen):
@@ -108,6 +100,11 @@ class Verification(Frozen):
         """Whether a person may keep the result: it did not pass, but it is not worse than before."""
         return self.verdict is not Verdict.PASS and self.after_mm is not None and not self.is_worse
 
+    @property
+    def needs_further_records(self) -> bool:
+        """Whether only further records can tell if the model is wrong, or chance made a test fail."""
+        return fails_narrowly(self.tests) and self.accuracy is not None and not self.is_worse
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class HeldOut:
@@ -119,6 +116,8 @@ class HeldOut:
         after: with the new one, at the same poses.
         left_travel: whether the ball left the gauges' travel with the new geometry.
         length: what was measured with the new geometry in two seats; none without a length check.
+        further: records at points of their own, that were measured because a test failed narrowly; none
+            otherwise.
     """
 
     records: MeasurementSet
@@ -126,6 +125,7 @@ class HeldOut:
     after: Sequence[tuple[float, float, float]]
     left_travel: bool = False
     length: LengthMeasurements | None = None
+    further: MeasurementSet | None = None
 
 
 def verify(settings: CellSettings, robot: Robot, found: Identification, held_out: HeldOut) -> Verification:
@@ -141,8 +141,12 @@ def verify(settings: CellSettings, robot: Robot, found: Identification, held_out
     if before is None or after is None:
         return Verification(verdict=Verdict.NOT_EVALUATED)
     updated = update(found, robot.problem(held_out.records))
+    tests = model_tests(found, updated)
+    if held_out.further is not None:
+        updated = update(updated, robot.problem(held_out.further))
+        tests = confirmed(tests, updated, np.isin(updated.problem.labels[:, 0], held_out.further.points))
     accuracy = verified_accuracy(settings, robot, found, updated, held_out.length)
-    tests = (*model_tests(found, updated), *_length_test(accuracy))
+    tests = (*tests, *_length_test(accuracy))
     worse = is_worse(before, after, robot.noise)
     return Verification(
         verdict=_verdict(tests, accuracy, worse=worse),
@@ -160,7 +164,7 @@ def outcome_line(result: IdentificationResult, parameters: int, verified: Verifi
     if verified.before_mm is not None and verified.after_mm is not None:
         means = f"{verified.before_mm:.2f} -> {verified.after_mm:.3f} mm"
         parts.append(f"mean deviation at held-out poses {means}")
-    return outcome_of(parts, verified.accuracy, verified.verdict, _reason(verified))
+    return outcome_of(parts, verified.accuracy, verified.verdict, reason_of(verified))
 
 
 def outcome_of(
@@ -182,7 +186,7 @@ def _stated(accuracy: VerifiedAccuracy) -> str:
     return f"{name} error at the task poses {error.value:.3f} +- {error.expanded:.3f} {unit} ({error.rule})"
 
 
-def _reason(verified: Verification) -> str:
+def reason_of(verified: Verification) -> str:
     """Why a verdict is not that of the stated error."""
     failed = [test.sentence for test in verified.tests if not test.passed]
     if verified.is_worse:
@@ -192,26 +196,6 @@ def _reason(verified: Verification) -> str:
     if verified.verdict is Verdict.NOT_EVALUATED and verified.accuracy is not None:
         return "U is above the limit"
     return ""
-
-
-def model_tests(found: Identification, updated: Identification) -> tuple[ModelTest, ...]:
-    """The tests of an identification; ``updated`` contains the held-out records as well."""
-    points = leave_one_point_out(found)
-    held_out = ~np.isin(updated.problem.labels[:, 0], found.problem.labels[:, 0])
-    predicted = prediction_test(updated, held_out)
-    return (
-        _residual_test(found.goodness),
-        _prediction_test("held-out records", predicted, "The held-out records", SMALLEST_PROBABILITY),
-        *(
-            _prediction_test(
-                f"point {one.point} from the others",
-                one.test,
-                f"The records of point {one.point}, predicted from the other points,",
-                SMALLEST_PROBABILITY / len(points),
-            )
-            for one in points
-        ),
-    )
 
 
 def verified_accuracy(
@@ -276,22 +260,3 @@ def _verdict(tests: Sequence[ModelTest], accuracy: VerifiedAccuracy | None, *, w
         return Verdict.NOT_EVALUATED
     evidence = Verdict.PASS if all(test.passed for test in tests) else Verdict.NOT_EVALUATED
     return worst_verdict([evidence, accuracy.position.verdict, accuracy.orientation.verdict])
-
-
-def _residual_test(test: ChiSquareTest) -> ModelTest:
-    sentence = _sentence("The residuals", test, test.is_explained)
-    return ModelTest(name="residuals", passed=test.is_explained, sentence=sentence)
-
-
-def _prediction_test(name: str, test: ChiSquareTest, what: str, smallest: float) -> ModelTest:
-    """Records that are too close to their prediction are no evidence against the model."""
-    passed = test.probability >= smallest
-    return ModelTest(name=name, passed=passed, sentence=_sentence(what, test, passed))
-
-
-def _sentence(what: str, test: ChiSquareTest, passed: bool) -> str:
-    if passed:
-        return f"{what} agree with the stated noise."
-    if test.expected < 0.5:
-        return f"{what} prove nothing: there are no more records than unknowns."
-    return f"{what} are {test.ratio:.1f} times as far off as the stated noise explains."

@@ -7,7 +7,10 @@ a geometry may be right at small tilts alone.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
+
+import numpy as np
 
 from hexacell.cell.model import CellSettings
 from hexacell.errors import LimitError
@@ -27,6 +30,9 @@ from procedures.calibration.set_steps import (
 from procedures.calibration.trial_steps import TrialSteps
 from procedures.run.state import RunState
 from procedures.run.steps import Compute, Locate, Move, Phase, SetKey, SixNumbers, Step
+
+FURTHER_SEED = 1_000_003
+"""Added to the seed of the held-out orientations where further ones are needed."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,11 +99,29 @@ class HeldOutSteps:
                 chosen.append(())
         return tuple(chosen)
 
-    def _choose_at(self, point: int, belief: RobotBelief, used: Array | None) -> tuple[SixNumbers, ...]:
+    def choose_further_poses(
+        self, identified: Identification, taken: Iterable[SixNumbers]
+    ) -> tuple[tuple[SixNumbers, ...], ...]:
+        """The same once more, unlike those that are ``taken``, each point's reference among them."""
+        belief, robot = self.sets.robot.belief(identified), self.sets.robot
+        at_taken = robot.from_commands(Pose(*pose) for pose in taken).rotations
+        used = np.concatenate([identified.poses.rotations, at_taken])
+        chosen: list[tuple[SixNumbers, ...]] = []
+        for point in range(len(self.settings.verification.points)):
+            try:
+                chosen.append(self._choose_at(point, belief, used, FURTHER_SEED))
+            except LimitError:
+                chosen.append(())
+        return tuple(chosen)
+
+    def _choose_at(
+        self, point: int, belief: RobotBelief, used: Array | None, further_seed: int = 0
+    ) -> tuple[SixNumbers, ...]:
         """The poses at a point, counted from 0; the first is its reference."""
         verification, robot = self.settings.verification, self.sets.robot
+        seed = verification.seed + further_seed
         turns = candidates.orientations(
-            self.candidate_count, belief.limits.tilt, verification.seed, most_twist=belief.limits.turn
+            self.candidate_count, belief.limits.tilt, seed, most_twist=belief.limits.turn
         )
         position = robot.from_commands([Pose(*verification.points[point])]).positions[0]
         poses = select_validation_poses(belief, position, verification.orientations, turns, used)
@@ -105,7 +129,10 @@ class HeldOutSteps:
         return tuple(command.as_tuple() for command in commands)
 
     def _poses(self, state: RunState, key: SetKey) -> tuple[tuple[SixNumbers, ...], int]:
-        """The poses of a set, and how many of them are measured before and after."""
+        """The poses of a set, and how many of them were chosen as one list, in this order."""
+        if key.phase is Phase.FURTHER and state.further is not None:
+            poses = state.further.poses[key.point - 1]
+            return poses, len(poses)
         assert state.identified is not None  # noqa: S101 - its poses are held out of an identification
         common = state.identified.held_out[key.point - 1]
         if key.phase is Phase.BEFORE or not state.identified.held_out_after:
@@ -120,7 +147,7 @@ class HeldOutSteps:
     def _in_set(self, state: RunState, key: SetKey) -> Step:
         measured = state.set(key)
         require_zero(state, key)
-        if measured.rejections and key.phase is Phase.AFTER:
+        if measured.rejections and key.phase.has_new_geometry:
             if step := self._after_rejection(state, key):
                 return step
         elif measured.rejections:

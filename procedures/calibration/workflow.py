@@ -264,6 +264,14 @@ class Calibration:
         written = self._commanded_by(self.as_written(identified.geometry).geometry)
         return written.held_out.choose_poses_after(identified)
 
+    def further_poses(
+        self, identified: Identification, state: RunState
+    ) -> tuple[tuple[SixNumbers, ...], ...]:
+        """See :meth:`HeldOutSteps.choose_further_poses`."""
+        assert state.identified is not None  # noqa: S101 - callers have a result
+        taken = [pose for poses in state.identified.held_out_after for pose in poses]
+        return self._measuring(state).held_out.choose_further_poses(identified, taken)
+
     def held_out_replacements(
         self, identified: Identification, state: RunState
     ) -> Iterator[tuple[SixNumbers, SixNumbers]]:
@@ -290,10 +298,17 @@ class Calibration:
                 return Compute(kind="roll back")
             if state.committed is None:
                 return Compute(kind="commit")
-            after = self._measuring(state).held_out.next_step(state, Phase.AFTER)
-            length = None if after or not self.length_check else self._length_step(state)
-            return after or length or Compute(kind="judge")
+            return self._verifying(state) or Compute(kind="judge")
         return _after_verdict(state, state.judged)
+
+    def _verifying(self, state: RunState) -> Step | None:
+        """The next step of what the verdict on the written geometry needs; none if all is measured."""
+        held_out = self._measuring(state).held_out
+        after = held_out.next_step(state, Phase.AFTER)
+        length = None if after or not self.length_check else self._length_step(state)
+        if after or length or state.further is None:
+            return after or length
+        return held_out.next_step(state, Phase.FURTHER)
 
     def _length_step(self, state: RunState) -> Step | None:
         """The next step of the length check; none when it is done."""

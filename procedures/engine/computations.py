@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from statistics import fmean
 
@@ -12,14 +13,14 @@ from hexacell.cell.model import CellSettings
 from hexacell.errors import HexacellError
 from hexacell.identification.estimator import identify
 from hexacell.measurements.csv_file import write_measurements
-from hexacell.measurements.records import MeasurementSet
+from hexacell.measurements.records import MeasurementSet, Record
 from hexacell.reporting.assessment import assess
 from hexacell.reporting.check_result import check_line, check_result
 from hexacell.reporting.documents import fit_document
 from hexacell.reporting.length_result import LengthMeasurements
 from hexacell.reporting.length_statement import length_line, length_statement
 from hexacell.reporting.result import IdentificationResult
-from hexacell.reporting.verification import HeldOut, outcome_line, verify
+from hexacell.reporting.verification import HeldOut, outcome_line, reason_of, verify
 from hexacell.runs.run_folder import RunFolder
 from procedures.calibration.noise_steps import noise_readings
 from procedures.calibration.workflow import Calibration, Mode
@@ -99,8 +100,11 @@ class Computations:
             gates=conditions, written=written.geometry.document(), displacement=written.displacement
         )
 
-    def judge(self, state: RunState) -> events.ResultValidated:
-        """Verify the written geometry, or state what a check found; raises ``HexacellError``."""
+    def judge(self, state: RunState) -> events.ResultValidated | events.FurtherRecordsPlanned:
+        """Verify the written geometry, or state what a check found; raises ``HexacellError``.
+
+        A test of the model that failed narrowly asks for further records once, where any can be taken.
+        """
         if self.calibration.mode is Mode.CHECK:
             return self._judge_check(state)
         if self.calibration.mode is Mode.LENGTH:
@@ -109,6 +113,10 @@ class Computations:
         found = identify(calibration.robot_of(state).problem(state.measurements()))
         written = calibration.written_robot(state)
         verification = verify(calibration.settings, written, found, _held_out(calibration.settings, state))
+        if verification.needs_further_records and state.further is None:
+            poses = calibration.further_poses(found, state)
+            if any(poses):
+                return events.FurtherRecordsPlanned(reason=reason_of(verification), poses=poses)
         line = outcome_line(_identified(state), len(found.free), verification)
         return events.ResultValidated(verdict=verification.verdict, line=line, verification=verification)
 
@@ -157,18 +165,25 @@ def _length_measurements(settings: CellSettings, state: RunState) -> LengthMeasu
 def _held_out(settings: CellSettings, state: RunState) -> HeldOut:
     """What was measured at the held-out points, each phase at points of its own, and in the two seats."""
     count = max(sample.at.point for sample in state.samples(Phase.IDENTIFY))
-    records = []
+    records: list[Record] = []
     for phase in (Phase.BEFORE, Phase.AFTER):
         samples = state.samples(phase)
-        records += [replace(record(sample), point=sample.at.point + count) for sample in samples]
+        records += _at_points_from(count, samples)
         count += max((sample.at.point for sample in samples), default=0)
+    further = state.samples(Phase.FURTHER)
     return HeldOut(
         records=MeasurementSet(tuple(records)),
         before=state.held_out(Phase.BEFORE),
         after=state.held_out(Phase.AFTER),
-        left_travel=state.left_travel(Phase.AFTER),
+        left_travel=state.left_travel,
         length=_length_measurements(settings, state) if state.samples(Phase.LENGTH) else None,
+        further=MeasurementSet(tuple(_at_points_from(count, further))) if further else None,
     )
+
+
+def _at_points_from(count: int, samples: Iterable[events.RecordTaken]) -> Iterator[Record]:
+    """The records at points of their own, numbered after ``count`` others."""
+    return (replace(record(sample), point=sample.at.point + count) for sample in samples)
 
 
 def _identified(state: RunState) -> IdentificationResult:

@@ -177,7 +177,7 @@ class StepExecutor:
         except GuardTripped as tripped:
             measured = state.set(step.at)
             is_there = not measured.reference_unverified or measured.rejections > 0
-            if step.at.phase is not Phase.AFTER or not tripped.trip.is_about_the_ball or not is_there:
+            if not step.at.phase.has_new_geometry or not tripped.trip.is_about_the_ball or not is_there:
                 raise
             # The new geometry takes the ball off its plate: the second time that is a verdict.
             self.guards.supervisor.clear()

@@ -31,7 +31,7 @@ was located, its guard tripped on an emergency stop, gauges were not tried, the 
 did not count, the minutes of a forecast knew no durations of moves, and commands kept fewer limits. So a
 run of them was decided by other rules. Up to 9 there was no quick level."""
 
-RULES_SINCE = 9
+RULES_SINCE = 10
 """The version since which runs are decided by the present rules; older ones are not resumed."""
 
 RESTORE = "Restore the run folder from a copy; it cannot be continued"

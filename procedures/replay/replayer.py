@@ -219,7 +219,7 @@ OUTCOME_KINDS: dict[str, frozenset[str]] = {
     "identify": frozenset({"identified"}),
     "propose": frozenset({"proposed"}),
     "commit": frozenset({"committed"}),
-    "judge": frozenset({"judged"}),
+    "judge": frozenset({"judged", "further records planned"}),
     "accept": frozenset({"accepted"}),
     "roll back": frozenset({"rolled back"}),
 }

@@ -40,6 +40,7 @@ class RunState:
         position_unknown: the controller must be asked for the pose before the robot moves.
         excluded: poses that the controller refused, in the order of the refusals.
         failures: how many, by kind and place, since the run was begun or resumed.
+        further: the records that are to tell whether a test of the model failed by chance.
         rolling_back: the old geometry is being put back.
         provisional: the provisional geometry that the controller was given last.
         provisional_active: the controller has it now.
@@ -59,6 +60,7 @@ class RunState:
     identified: events.Identified | None = None
     proposed: events.Proposed | None = None
     committed: events.Committed | None = None
+    further: events.FurtherRecordsPlanned | None = None
     judged: events.ResultValidated | None = None
     accepted: events.ResultAccepted | None = None
     rolled_back: bool = False
@@ -147,10 +149,11 @@ class RunState:
                     shown.setdefault(temperature.name, []).append(temperature.celsius)
         return max((max(values) - min(values) for values in shown.values()), default=None)
 
-    def left_travel(self, phase: Phase) -> bool:
-        """Whether the ball left the gauges' travel in a set of a phase that could not be completed."""
-        of_phase = [value for key, value in self.sets.items() if key.phase is phase]
-        return any(value.rejections and not value.closed for value in of_phase)
+    @property
+    def left_travel(self) -> bool:
+        """Whether the ball left the travel with the new geometry, in a set that was not completed."""
+        verifying = [value for key, value in self.sets.items() if key.phase.has_new_geometry]
+        return any(value.rejections and not value.closed for value in verifying)
 
     def held_out(self, phase: Phase) -> list[tuple[float, float, float]]:
         """Deviations, mm, at the held-out poses that are measured before and after; no references."""
@@ -221,6 +224,8 @@ def apply(state: RunState, event: events.Event) -> RunState:  # noqa: C901, PLR0
         case events.Committed():
             # The same sliders are another pose under another geometry.
             return _without_position(replace(state, committed=event))
+        case events.FurtherRecordsPlanned():
+            return replace(state, further=event)
         case events.ResultValidated():
             return replace(state, judged=event)
         case events.ResultAccepted():
@@ -291,10 +296,10 @@ def _noise_measured(state: RunState, event: events.NoiseMeasured) -> RunState:
 def _rejected(state: RunState, event: events.RecordRejected) -> RunState:
     """At the pose the ball was outside the travel; before it, a guard stopped the robot on the way."""
     rejected = state.set(event.at).with_rejection(event.orientation)
-    is_on_the_way = event.at.phase is Phase.AFTER and state.at_pose != (event.at, event.orientation)
+    is_on_the_way = event.at.phase.has_new_geometry and state.at_pose != (event.at, event.orientation)
     left = _without_position(state) if is_on_the_way else replace(state, at_pose=None)
     # With the new geometry it may be a verdict, so it is verified first that the gauges are as they were.
-    is_verified = event.at.phase is not Phase.AFTER or rejected.rejections > 1
+    is_verified = not event.at.phase.has_new_geometry or rejected.rejections > 1
     return _with_set(left, event.at, rejected if is_verified else rejected.unverified())
 
 
@@ -341,8 +346,8 @@ def _rolled_back(state: RunState) -> RunState:
     """Without a verdict the proposal is open again, and the sets measured after it do not count."""
     if state.judged is not None:
         return replace(state, rolled_back=True)
-    kept = {key: value for key, value in state.sets.items() if key.phase is not Phase.AFTER}
-    return replace(state, committed=None, sets=kept)
+    kept = {key: value for key, value in state.sets.items() if not key.phase.has_new_geometry}
+    return replace(state, committed=None, further=None, sets=kept)
 
 
 def _place_of(step: Step | None) -> str:

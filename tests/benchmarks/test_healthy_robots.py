@@ -2,8 +2,9 @@
 
 A robot is healthy if it can stand at all points as its controller sends it there: clear of singularities,
 and with its passive joints and legs within their limits. Of those that cannot, before they are calibrated,
-the figures are printed beside them. Each is measured as a run measures it, identified, written and verified;
-its true error at the task poses is known. ``ROBOTS`` in the environment says how many there are; the targets are for 1,000. All cores are used.
+the figures are printed beside them. Each is measured as a run measures it, identified, written and
+verified; its true error at the task poses is known. ``ROBOTS`` in the environment says how many there are;
+the targets are for 1,000. All cores are used.
 """
 
 from __future__ import annotations

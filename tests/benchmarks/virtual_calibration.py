@@ -10,7 +10,6 @@ import numpy as np
 from hexacell.campaign.dry_run import VirtualCampaign
 from hexacell.campaign.planner import Plan
 from hexacell.campaign.teaching import as_written
-from hexacell.cell.fields import SixNumbers
 from hexacell.cell.loader import Cell
 from hexacell.cell.model import CellSettings
 from hexacell.controller_config.interface import ControllerGeometry
@@ -63,7 +62,7 @@ def robot_that_stands(cell: Cell, robot: Robot, random: np.random.Generator) -> 
             return truth
 
 
-def stands_at(robot: Robot, truth: Geometry, points: Sequence[SixNumbers]) -> bool:
+def stands_at(robot: Robot, truth: Geometry, points: Sequence[Sequence[float]]) -> bool:
     """Whether passive joints and legs keep their limits at some commands in the controller's frames."""
     commands = robot.from_commands(Pose(*point) for point in points)
     actual = robot.commanded(truth).actual_poses(commands)

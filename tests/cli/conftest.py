@@ -43,6 +43,7 @@ QUICK = (
     ("base_cone_deg = 45.0", "base_cone_deg = 180.0"),
     ("platform_cone_deg = 45.0", "platform_cone_deg = 180.0"),
     ("[stations]\n", "[stations]\ntrial_mm = 0.0\n"),
+    ("provisional = true", "provisional = false"),
     # Each test of the model fails one healthy run in a thousand, and the suite has hundreds of runs.
     ("encoder_mm = 0.01\ngauge_mm = 0.01", "encoder_mm = 0.014\ngauge_mm = 0.014"),
 )

@@ -12,7 +12,8 @@ from hexacell.decision import Verdict
 from hexacell.presentation.calibration_report.blocks import Block, Chapter, Facts, Paragraph, Table, Tone
 from hexacell.presentation.length import NOT_CHECKED, scale_lines
 from hexacell.presentation.teaching import teaching_sentence
-from hexacell.reporting.verification import JudgedError, ModelTest, VerifiedAccuracy
+from hexacell.reporting.model_evidence import ModelTest
+from hexacell.reporting.verification import JudgedError, VerifiedAccuracy
 from hexacell.uncertainty.statement import COVERAGE_FACTOR
 from procedures.run.steps import Phase
 

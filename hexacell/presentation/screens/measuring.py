@@ -216,6 +216,7 @@ def _short_name(at: SetKey) -> str:
         Phase.IDENTIFY: "{}",
         Phase.BEFORE: "before {}",
         Phase.AFTER: "after {}",
+        Phase.FURTHER: "further {}",
         Phase.LENGTH: "length {}",
     }
     return words[at.phase].format(at.point)

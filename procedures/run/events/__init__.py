@@ -39,6 +39,7 @@ from procedures.run.events.measuring import (
 )
 from procedures.run.events.results import (
     Committed,
+    FurtherRecordsPlanned,
     Identified,
     Proposed,
     ProvisionalApplied,
@@ -55,6 +56,7 @@ __all__ = [
     "Ended",
     "Event",
     "Failed",
+    "FurtherRecordsPlanned",
     "GaugesPlaced",
     "GaugesProbed",
     "GaugesTried",
@@ -110,6 +112,7 @@ Event = Annotated[
     | Identified
     | Proposed
     | Committed
+    | FurtherRecordsPlanned
     | ResultValidated
     | ResultAccepted
     | RolledBack

@@ -71,6 +71,17 @@ class Committed(Frozen):
     approved_by: str
 
 
+class FurtherRecordsPlanned(Frozen):
+    """A test of the model failed, perhaps by chance: further held-out poses were chosen, which tell.
+
+    ``poses`` are those at each held-out point, its reference first; none at a point that is left.
+    """
+
+    kind: Literal["further records planned"] = "further records planned"
+    reason: str
+    poses: tuple[tuple[SixNumbers, ...], ...]
+
+
 def _present_name(verdict: object) -> object:
     """The verdict for a word of versions 1 and 2."""
     return Verdict.FAIL if verdict in {"out of limits", "worse than before"} else verdict

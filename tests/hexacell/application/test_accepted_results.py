@@ -14,7 +14,8 @@ from hexacell.cell.loader import Cell, load_cell
 from hexacell.controller_config.change import fingerprint
 from hexacell.controller_config.write_back import RECEIPT, Receipt
 from hexacell.decision import Verdict
-from hexacell.reporting.verification import ModelTest, Verification
+from hexacell.reporting.model_evidence import ModelTest
+from hexacell.reporting.verification import Verification
 from hexacell.runs.run_folder import RunFolder, runs_folder
 from procedures.journal.journal import Journal
 from procedures.run import events

@@ -28,6 +28,7 @@ def make(**changes: Any) -> Plan:
     cell = load_cell(bundled_config("simulated-hexaglide"))
     settings = cell.settings
     listed = changes.pop("listed", None)
+    changes = {"identification__provisional": False} | changes
     for name, value in changes.items():
         section, _, key = name.partition("__")
         inner = getattr(settings, section).model_copy(update={key: value})

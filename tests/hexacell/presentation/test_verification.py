@@ -10,8 +10,9 @@ from hexacell.decision import Verdict
 from hexacell.presentation.length import NOT_CHECKED
 from hexacell.presentation.verification import check_start_text, check_text, verification_text
 from hexacell.reporting.check_result import CheckResult, ParameterChange, check_line
+from hexacell.reporting.model_evidence import ModelTest
 from hexacell.reporting.result import AcceptedResult
-from hexacell.reporting.verification import JudgedError, ModelTest, Verification, VerifiedAccuracy
+from hexacell.reporting.verification import JudgedError, Verification, VerifiedAccuracy
 
 WHEN = datetime(2026, 11, 20, 2, 30, tzinfo=UTC)
 

@@ -23,8 +23,9 @@ from hexacell.cell.recovery import Action, FailureKind
 from hexacell.decision import Verdict
 from hexacell.identification.diagnostics.approach_scatter import ScatterSource
 from hexacell.identification.solver.result import DataFaultKind
+from hexacell.reporting.model_evidence import ModelTest
 from hexacell.reporting.result import OutlierRecord
-from hexacell.reporting.verification import JudgedError, ModelTest, Verification, VerifiedAccuracy
+from hexacell.reporting.verification import JudgedError, Verification, VerifiedAccuracy
 from procedures.journal.journal import Journal, read_journal
 from procedures.run import events
 from procedures.run.events import course, measuring, results
@@ -136,9 +137,16 @@ judged_error = st.builds(
 verification = st.builds(
     Verification,
     verdict=st.sampled_from(Verdict),
-    tests=st.lists(st.builds(ModelTest, name=text, passed=st.booleans(), sentence=text), max_size=2).map(
-        tuple
-    ),
+    tests=st.lists(
+        st.builds(
+            ModelTest,
+            name=text,
+            passed=st.booleans(),
+            sentence=text,
+            probability=st.none() | st.floats(0.0, 1.0),
+        ),
+        max_size=2,
+    ).map(tuple),
     accuracy=st.none()
     | st.builds(
         VerifiedAccuracy,
@@ -255,6 +263,11 @@ some_event: st.SearchStrategy[Any] = st.one_of(
     st.builds(events.Proposed, gates=st.lists(gate, max_size=3).map(tuple)),
     st.builds(events.Committed, approved_by=text),
     st.builds(
+        events.FurtherRecordsPlanned,
+        reason=text,
+        poses=st.lists(st.lists(six, max_size=2).map(tuple), max_size=2).map(tuple),
+    ),
+    st.builds(
         events.ResultValidated,
         verdict=st.sampled_from(Verdict),
         line=text,
@@ -316,5 +329,6 @@ KINDS = (
     *("lent", "taken back", "proposed", "committed", "judged", "rolled back", "interrupted", "ended"),
     *("located", "undone", "confirmed", "paused", "resumed", "failed", "declined", "tripped"),
     *("accepted", "stood", "repeated", "probed", "tried", "noise measured", "excluded", "recalled"),
+    "further records planned",
 )
 """Journals on disk say these words: they must never change."""

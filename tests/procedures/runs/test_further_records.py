@@ -1,0 +1,142 @@
+"""A test of the model that fails narrowly asks for further records, which alone tell whether by chance."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from hexacell.decision import Verdict
+from hexacell.errors import ExitCode
+from hexacell.kinematics.pose import Pose
+from hexacell.presentation.events import event_text
+from hexacell.reporting import model_evidence
+from procedures.calibration.held_out_steps import HeldOutSteps
+from procedures.journal.journal import read_journal
+from procedures.run import events
+from procedures.run.state import RunState, fold
+from procedures.run.steps import Move, Phase, SetKey
+from tests.procedures.fakes import refused
+from tests.procedures.runs.listening import happened
+
+FIRST = SetKey(phase=Phase.FURTHER, point=1)
+
+
+class PowerCut(BaseException):
+    """Nothing after it is written down."""
+
+
+@pytest.fixture(autouse=True)
+def test_that_fails_narrowly(monkeypatch: pytest.MonkeyPatch) -> None:
+    """No healthy run passes the test of its held-out records."""
+    monkeypatch.setattr(model_evidence, "SMALLEST_PROBABILITY", 1.0)
+
+
+def nobody_keeps(rig: Any) -> Any:
+    rig.operator.name = None
+    return rig
+
+
+async def test_further_records_that_agree_end_the_run_with_a_pass(recording, replayed) -> None:
+    rig = replayed(recording.until(events.Proposed))
+    ended = await rig.run()
+    assert ended.exit_code == ExitCode.DONE
+    (planned,) = happened(rig, events.FurtherRecordsPlanned)
+    assert planned.reason.startswith("The held-out records are ")
+    state = fold(read_journal(rig.folder.journal))
+    assert [len(poses) for poses in planned.poses] == [3, 3]
+    assert [sample.pose for sample in state.samples(Phase.FURTHER)] == [
+        pose for poses in planned.poses for pose in poses
+    ]
+    assert not set(planned.poses[0][1:]) & set(recording_poses(state)), "they are new ones"
+    assert state.judged is not None
+    assert state.judged.verdict is Verdict.PASS
+    verification = state.judged.verification
+    assert verification is not None
+    assert verification.tests[-1].name == "further records"
+    assert all(test.passed for test in verification.tests)
+    assert any(
+        test.sentence.endswith("further records do not confirm that.") for test in verification.tests
+    )
+    assert rig.config == recording.config_after
+
+
+def recording_poses(state: RunState) -> list[Any]:
+    phases = (Phase.IDENTIFY, Phase.BEFORE, Phase.AFTER)
+    return [sample.pose for phase in phases for sample in state.samples(phase)]
+
+
+async def test_further_records_that_do_not_agree_leave_the_result_not_evaluated(
+    recording, replayed, monkeypatch
+) -> None:
+    monkeypatch.setattr(model_evidence, "CONFIRMING_PROBABILITY", 1.0)
+    rig = nobody_keeps(replayed(recording.until(events.Proposed)))
+    ended = await rig.run()
+    assert len(happened(rig, events.FurtherRecordsPlanned)) == 1, "once is enough"
+    assert happened(rig, events.ResultValidated)[0].verdict is Verdict.NOT_EVALUATED
+    assert ended.exit_code == ExitCode.OUT_OF_LIMITS
+    assert rig.config == recording.config_before
+
+
+async def test_a_failure_beyond_chance_asks_for_no_further_records(
+    recording, replayed, monkeypatch
+) -> None:
+    monkeypatch.setattr(model_evidence, "BEYOND_CHANCE", 1.0)
+    rig = nobody_keeps(replayed(recording.until(events.Proposed)))
+    await rig.run()
+    assert not happened(rig, events.FurtherRecordsPlanned)
+    assert happened(rig, events.ResultValidated)[0].verdict is Verdict.NOT_EVALUATED
+
+
+async def test_where_no_further_pose_can_be_taken_the_verdict_stays(
+    recording, replayed, monkeypatch
+) -> None:
+    monkeypatch.setattr(HeldOutSteps, "choose_further_poses", lambda *_: ((), ()))
+    rig = nobody_keeps(replayed(recording.until(events.Proposed)))
+    await rig.run()
+    assert not happened(rig, events.FurtherRecordsPlanned)
+    assert happened(rig, events.ResultValidated)[0].verdict is Verdict.NOT_EVALUATED
+
+
+async def test_a_run_killed_among_further_records_goes_on_there(recording, replayed) -> None:
+    rig = replayed(recording.until(events.Proposed))
+
+    def cut(event: events.Event, _: RunState) -> None:
+        if isinstance(event, events.RecordTaken) and event.at == FIRST and event.orientation == 2:
+            raise PowerCut
+
+    with pytest.raises(PowerCut):
+        await rig.run(cut)
+    assert fold(read_journal(rig.folder.journal)).is_unverified
+    ended = await rig.run()
+    assert ended.exit_code == ExitCode.DONE
+    assert len(happened(rig, events.FurtherRecordsPlanned)) == 1
+    assert orientations_taken(rig) == [1, 2, 3]
+
+
+async def test_a_refused_further_pose_is_left_out(recording, replayed) -> None:
+    rig = replayed(recording.until(events.Proposed))
+
+    def refuse(event: events.Event, _: RunState) -> None:
+        step = event.step if isinstance(event, events.StepBegun) else None
+        if isinstance(step, Move) and (step.at, step.orientation) == (FIRST, 2):
+            why = "would exceed joint 3's positive limit"
+            rig.controller.failures["move"] = refused(Pose(*step.pose), why)
+
+    ended = await rig.run(refuse)
+    assert ended.exit_code == ExitCode.DONE
+    (excluded,) = happened(rig, events.PoseExcluded)
+    assert (excluded.at, excluded.orientation) == (FIRST, 2)
+    assert orientations_taken(rig) == [1, 3]
+
+
+def orientations_taken(rig: Any) -> list[int]:
+    state = fold(read_journal(rig.folder.journal))
+    return [sample.orientation for sample in state.set(FIRST).samples]
+
+
+def test_why_more_is_measured_is_said() -> None:
+    pose = (0.0,) * 6
+    planned = events.FurtherRecordsPlanned(reason="The residuals are odd", poses=((pose, pose), ()))
+    said = "The residuals are odd: 2 further records tell whether by chance"
+    assert event_text(planned, RunState()) == said

@@ -10,7 +10,7 @@ from hexacell.campaign.verdict_forecast import VerdictForecast, forecast_verdict
 from hexacell.decision import ErrorLimits
 from hexacell.errors import HexacellError, LimitError
 from hexacell.experiment_design import candidates
-from hexacell.experiment_design.validation_poses import select_validation_poses
+from hexacell.experiment_design.validation_poses import select_near
 from hexacell.identification.diagnostics.model_tests import update
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.pose import Pose
@@ -62,13 +62,13 @@ def _records(plan: Plan, robot: Robot, found: Identification) -> Iterator[Record
     turns = candidates.orientations(
         CANDIDATES, belief.limits.tilt, settings.seed, most_twist=belief.limits.turn
     )
-    first = 1 + max(plan.points)
-    for point, position in enumerate(settings.points, start=first):
-        ball = robot.from_commands([Pose(*position)]).positions[0]
+    first, used = 1 + max(plan.points), found.poses.rotations
+    own, held_out = plan.settings.identification.points, settings.points
+    middle = robot.from_commands(Pose(*point) for point in own).positions.mean(axis=0)
+    balls = robot.from_commands(Pose(*point) for point in held_out).positions
+    for point, ball in enumerate(balls, start=first):
         try:
-            poses = select_validation_poses(
-                belief, ball, settings.orientations, turns, found.poses.rotations
-            )
+            poses = select_near(belief, ball, middle, settings.orientations, turns, used)
         except LimitError:
             continue
         yield from exact_records(robot, point, poses)

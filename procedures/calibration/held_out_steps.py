@@ -1,24 +1,14 @@
 """The steps that measure the held-out points, before and after the new geometry is written.
 
-Before, only poses can be taken at which the ball stays inside the travel although the geometry is wrong.
-Afterwards these are taken again, for the comparison, and then poses as wide as the robot's limits, since
-a geometry may be right at small tilts alone.
+The poses are chosen in :mod:`~procedures.calibration.held_out_poses`. Those that are measured before are
+measured again afterwards, for the comparison.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 
-import numpy as np
-
-from hexacell.cell.model import CellSettings
 from hexacell.errors import LimitError
-from hexacell.experiment_design import candidates
-from hexacell.experiment_design.validation_poses import select_validation_poses
-from hexacell.identification.belief import RobotBelief
-from hexacell.identification.solver.result import Identification
-from hexacell.kinematics.pose import Pose
 from hexacell.kinematics.rotations import Array
 from procedures.calibration.set_steps import (
     SetSteps,
@@ -31,22 +21,18 @@ from procedures.calibration.trial_steps import TrialSteps
 from procedures.run.state import RunState
 from procedures.run.steps import Compute, Locate, Move, Phase, SetKey, SixNumbers, Step
 
-FURTHER_SEED = 1_000_003
-"""Added to the seed of the held-out orientations where further ones are needed."""
-
 
 @dataclass(frozen=True, eq=False)
 class HeldOutSteps:
-    """Decides on the steps; poses are chosen among ``candidate_count`` orientations."""
+    """Decides on the steps that measure the chosen poses of ``point_count`` points."""
 
-    settings: CellSettings
+    point_count: int
     sets: SetSteps
     trials: TrialSteps
-    candidate_count: int
 
     def next_step(self, state: RunState, phase: Phase) -> Step | None:
         """The next step of the first set that is not closed; None if all are."""
-        for point in range(1, len(self.settings.verification.points) + 1):
+        for point in range(1, self.point_count + 1):
             key = SetKey(phase=phase, point=point)
             if not state.set(key).closed and not self._is_left(state, key):
                 return Locate() if state.position_unknown else self._in_set(state, key)
@@ -60,73 +46,6 @@ class HeldOutSteps:
         """
         is_in_order = self.sets.paths.is_in_order(state, key)
         return reference_move(state, key) if is_in_order else self._to_reference(state, key)
-
-    def choose_poses(self, identified: Identification) -> tuple[tuple[SixNumbers, ...], ...]:
-        """Poses at each held-out point, in the controller's frames.
-
-        A point at which it has too few, because the ball would leave the travel or the robot its limits,
-        gets none and is left.
-
-        Raises:
-            LimitError: every point has too few.
-        """
-        belief = self.sets.robot.belief(identified)
-        used = identified.poses.rotations
-        chosen: list[tuple[SixNumbers, ...]] = []
-        failures: list[LimitError] = []
-        for point in range(len(self.settings.verification.points)):
-            try:
-                chosen.append(self._choose_at(point, belief, used))
-            except LimitError as error:
-                chosen.append(())
-                failures.append(error)
-        if not any(chosen):
-            raise failures[0]
-        return tuple(chosen)
-
-    def choose_poses_after(self, identified: Identification) -> tuple[tuple[SixNumbers, ...], ...]:
-        """Further poses at each held-out point, for a robot whose controller has the identified geometry.
-
-        A point at which it has too few gets none.
-        """
-        belief = self.sets.robot.belief(identified)
-        used = identified.poses.rotations
-        chosen: list[tuple[SixNumbers, ...]] = []
-        for point in range(len(self.settings.verification.points)):
-            try:
-                chosen.append(self._choose_at(point, belief, used)[1:])
-            except LimitError:
-                chosen.append(())
-        return tuple(chosen)
-
-    def choose_further_poses(
-        self, identified: Identification, taken: Iterable[SixNumbers]
-    ) -> tuple[tuple[SixNumbers, ...], ...]:
-        """The same once more, unlike those that are ``taken``, each point's reference among them."""
-        belief, robot = self.sets.robot.belief(identified), self.sets.robot
-        at_taken = robot.from_commands(Pose(*pose) for pose in taken).rotations
-        used = np.concatenate([identified.poses.rotations, at_taken])
-        chosen: list[tuple[SixNumbers, ...]] = []
-        for point in range(len(self.settings.verification.points)):
-            try:
-                chosen.append(self._choose_at(point, belief, used, FURTHER_SEED))
-            except LimitError:
-                chosen.append(())
-        return tuple(chosen)
-
-    def _choose_at(
-        self, point: int, belief: RobotBelief, used: Array | None, further_seed: int = 0
-    ) -> tuple[SixNumbers, ...]:
-        """The poses at a point, counted from 0; the first is its reference."""
-        verification, robot = self.settings.verification, self.sets.robot
-        seed = verification.seed + further_seed
-        turns = candidates.orientations(
-            self.candidate_count, belief.limits.tilt, seed, most_twist=belief.limits.turn
-        )
-        position = robot.from_commands([Pose(*verification.points[point])]).positions[0]
-        poses = select_validation_poses(belief, position, verification.orientations, turns, used)
-        commands = (robot.to_command(poses.pose(row)) for row in range(len(poses)))
-        return tuple(command.as_tuple() for command in commands)
 
     def _poses(self, state: RunState, key: SetKey) -> tuple[tuple[SixNumbers, ...], int]:
         """The poses of a set, and how many of them were chosen as one list, in this order."""

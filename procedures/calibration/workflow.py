@@ -36,6 +36,7 @@ from hexacell.reporting.length_result import with_measured_scale
 from hexacell.reporting.result import AcceptedResult
 from hexacell.robot_model import Robot
 from hexacell.stated_effects import stated_effects
+from procedures.calibration.held_out_poses import HeldOutPoses, PosesByPoint
 from procedures.calibration.held_out_steps import HeldOutSteps
 from procedures.calibration.identification_steps import IdentificationSteps
 from procedures.calibration.length_steps import LengthSteps
@@ -71,7 +72,8 @@ class _Measuring:
         self.points = IdentificationSteps(
             plan, sets, plan.settings.identification.provisional, noise, trials
         )
-        self.held_out = HeldOutSteps(plan.settings, sets, trials, HELD_OUT_CANDIDATES)
+        self.held_out_poses = HeldOutPoses(plan.settings, plan.robot, HELD_OUT_CANDIDATES)
+        self.held_out = HeldOutSteps(len(plan.settings.verification.points), sets, trials)
         fixture = plan.settings.length_check
         self.length = None if fixture is None else LengthSteps(fixture, sets, trials)
 
@@ -255,22 +257,22 @@ class Calibration:
             return geometry_of(state.provisional, self.robot)
         return self.informed(state)._at_start.points.estimate(state)
 
-    def held_out_poses(self, identified: Identification) -> tuple[tuple[SixNumbers, ...], ...]:
-        """See :meth:`HeldOutSteps.choose_poses`."""
-        return self._at_start.held_out.choose_poses(identified)
+    def held_out_poses(self, identified: Identification) -> PosesByPoint:
+        """See :meth:`HeldOutPoses.before`."""
+        return self._at_start.held_out_poses.before(identified)
 
-    def held_out_poses_after(self, identified: Identification) -> tuple[tuple[SixNumbers, ...], ...]:
-        """See :meth:`HeldOutSteps.choose_poses_after`."""
+    def held_out_poses_after(self, identified: Identification, before: PosesByPoint) -> PosesByPoint:
+        """See :meth:`HeldOutPoses.after`."""
         written = self._commanded_by(self.as_written(identified.geometry).geometry)
-        return written.held_out.choose_poses_after(identified)
+        return written.held_out_poses.after(identified, before)
 
-    def further_poses(
-        self, identified: Identification, state: RunState
-    ) -> tuple[tuple[SixNumbers, ...], ...]:
-        """See :meth:`HeldOutSteps.choose_further_poses`."""
-        assert state.identified is not None  # noqa: S101 - callers have a result
-        taken = [pose for poses in state.identified.held_out_after for pose in poses]
-        return self._measuring(state).held_out.choose_further_poses(identified, taken)
+    def further_poses(self, identified: Identification, state: RunState) -> PosesByPoint:
+        """See :meth:`HeldOutPoses.further`."""
+        found = state.identified
+        assert found is not None  # noqa: S101 - callers have a result
+        return self._measuring(state).held_out_poses.further(
+            identified, found.held_out, found.held_out_after
+        )
 
     def held_out_replacements(
         self, identified: Identification, state: RunState
@@ -284,10 +286,10 @@ class Calibration:
         assert found is not None  # noqa: S101 - its poses are held out of an identification
         references = [poses[0] if poses else None for poses in found.held_out]
         if state.committed is None:
-            others = self._at_start.held_out.choose_poses_after(identified)
+            others = self._at_start.held_out_poses.after(identified, found.held_out)
             yield from _replacements(state, references, found.held_out, others)
         if found.held_out_after:
-            others = self.held_out_poses_after(identified)
+            others = self.held_out_poses_after(identified, found.held_out)
             yield from _replacements(state, references, found.held_out_after, others)
 
     def _write_back(self, state: RunState) -> Step | None:

@@ -57,10 +57,11 @@ class Computations:
         settings, noise = calibration.settings, calibration.measured_noise
         assessed = assess(settings, robot, measurements, identified, noise)
         self.folder.write_result(fit_document(assessed))
+        result, held_out = IdentificationResult.of(identified), calibration.held_out_poses(identified)
         return events.Identified(
-            result=IdentificationResult.of(identified),
-            held_out=calibration.held_out_poses(identified),
-            held_out_after=calibration.held_out_poses_after(identified),
+            result=result,
+            held_out=held_out,
+            held_out_after=calibration.held_out_poses_after(identified, held_out),
             improvement=assessed.improvement,
             quick=calibration.quick.accuracy(measurements) if calibration.mode is Mode.QUICK else None,
         )

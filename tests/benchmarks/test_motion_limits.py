@@ -22,8 +22,6 @@ from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import Cell, load_cell
 from hexacell.controller_config.interface import ControllerGeometry
 from hexacell.errors import HexacellError, LimitError
-from hexacell.experiment_design import candidates
-from hexacell.experiment_design.validation_poses import select_validation_poses
 from hexacell.identification.estimator import identify
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.geometry import Geometry
@@ -32,6 +30,7 @@ from hexacell.kinematics.rotations import Array
 from hexacell.robot_model import Robot, make_robot, robot_of
 from hexacell.study import data_sets
 from hexacell.study.simulated_campaign import SimulatedCampaign
+from procedures.calibration.held_out_poses import HeldOutPoses
 from tests.benchmarks.virtual_calibration import robot_that_reaches, stands_at
 from tests.benchmarks.watched_robot import Seen, WatchedRobot, watch
 
@@ -90,19 +89,15 @@ def visit_held_out(
 ) -> int:
     """Move through the held-out poses of a robot with some geometry in its controller; how many points."""
     watched = WatchedRobot(robot, truth, np.random.default_rng(seed), seen)
-    belief, wanted, visited = robot.belief(found), cell.settings.verification, 0
-    turns = candidates.orientations(
-        CANDIDATES, belief.limits.tilt, wanted.seed, most_twist=belief.limits.turn
-    )
-    for point in wanted.points:
-        ball = robot.from_commands([Pose(*point)]).positions[0]
-        with suppress(LimitError):
-            poses = select_validation_poses(belief, ball, wanted.orientations, turns, found.poses.rotations)
-            commands = [robot.to_command(poses.pose(row)) for row in range(len(poses))]
-            watched.place(commands[0])
-            for command in (*commands[1:], commands[0]):
+    visited = 0
+    with suppress(LimitError):
+        for poses in HeldOutPoses(cell.settings, robot, CANDIDATES).before(found):
+            commands = [Pose(*pose) for pose in poses]
+            if commands:
+                watched.place(commands[0])
+            for command in (*commands[1:], *commands[:1]):
                 watched.move(command)
-            visited += 1
+            visited += bool(commands)
     return visited
 
 

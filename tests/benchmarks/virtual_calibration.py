@@ -13,18 +13,15 @@ from hexacell.campaign.teaching import as_written
 from hexacell.cell.loader import Cell
 from hexacell.cell.model import CellSettings
 from hexacell.controller_config.interface import ControllerGeometry
-from hexacell.errors import LimitError
-from hexacell.experiment_design import candidates
-from hexacell.experiment_design.validation_poses import select_validation_poses
 from hexacell.identification.estimator import identify
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.pose import Pose
-from hexacell.kinematics.rotations import Array
 from hexacell.measurements.records import MeasurementSet, Record
 from hexacell.reporting.verification import HeldOut, Verification, verify
 from hexacell.robot_model import Robot, make_robot
 from hexacell.virtual_robot import VirtualRobot, random_robot
+from procedures.calibration.held_out_poses import HeldOutPoses
 
 HELD_OUT_FROM = 100
 """Points of the held-out records, which are of no other records."""
@@ -95,30 +92,17 @@ def measured_held_out(
 ) -> HeldOut:
     """What the held-out poses give, chosen as a run does after the identification.
 
-    A point at which the robot would leave its limits is left.
+    A point at which the robot would leave its limits is left, if there is none near it.
 
     Raises:
         LimitError: all of them are.
     """
-    belief, wanted = robot.belief(found), settings.verification
-    turns: Array = candidates.orientations(
-        CANDIDATES, belief.limits.tilt, wanted.seed, most_twist=belief.limits.turn
-    )
     records: list[Record] = []
-    failures: list[LimitError] = []
-    for number, point in enumerate(wanted.points, start=HELD_OUT_FROM):
-        position = robot.from_commands([Pose(*point)]).positions[0]
-        used = found.poses.rotations
-        try:
-            poses = select_validation_poses(belief, position, wanted.orientations, turns, used)
-        except LimitError as error:
-            failures.append(error)
-            continue
+    chosen = HeldOutPoses(settings, robot, CANDIDATES).before(found)
+    for number, poses in enumerate(chosen, start=HELD_OUT_FROM):
         virtual.zero_gauges()
-        for row in range(len(poses)):
-            virtual.place(robot.to_command(poses.pose(row)))
-            records.append(virtual.measure(number, row + 1))
-    if not records:
-        raise failures[0]
+        for orientation, pose in enumerate(poses, start=1):
+            virtual.place(Pose(*pose))
+            records.append(virtual.measure(number, orientation))
     deviations = [record.deviation for record in records if record.orientation > 1]
     return HeldOut(MeasurementSet(tuple(records)), deviations, deviations)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from hexacell.campaign.averaging import AveragingForecaster, worthwhile_windows
-from hexacell.campaign.budget import COMMANDED, usual_move_seconds
+from hexacell.campaign.budget import COMMANDED_PROVISIONALLY, usual_move_seconds
 from hexacell.campaign.measured_noise import AveragingForecast, with_measured_noise
 from hexacell.campaign.noise_assessment import NoiseReadings, assess_noise
 from hexacell.campaign.planner import Plan
@@ -220,5 +220,5 @@ def test_a_record_of_more_windows_takes_longer(plan) -> None:
         ).identification.seconds_per_record
         for windows in (1, 4)
     ]
-    moving_s = COMMANDED.moves * usual_move_seconds(plan.settings)
+    moving_s = COMMANDED_PROVISIONALLY.moves * usual_move_seconds(plan.settings)
     assert seconds == pytest.approx([moving_s + 0.6, moving_s + 4 * 0.6])

@@ -11,7 +11,7 @@ from hexacell.errors import ExitCode
 from hexacell.kinematics.pose import Pose
 from hexacell.presentation.events import event_text
 from hexacell.reporting import model_evidence
-from procedures.calibration.held_out_steps import HeldOutSteps
+from procedures.calibration.held_out_poses import HeldOutPoses
 from procedures.journal.journal import read_journal
 from procedures.run import events
 from procedures.run.state import RunState, fold
@@ -91,7 +91,7 @@ async def test_a_failure_beyond_chance_asks_for_no_further_records(
 async def test_where_no_further_pose_can_be_taken_the_verdict_stays(
     recording, replayed, monkeypatch
 ) -> None:
-    monkeypatch.setattr(HeldOutSteps, "choose_further_poses", lambda *_: ((), ()))
+    monkeypatch.setattr(HeldOutPoses, "further", lambda *_: ((), ()))
     rig = nobody_keeps(replayed(recording.until(events.Proposed)))
     await rig.run()
     assert not happened(rig, events.FurtherRecordsPlanned)

@@ -1,0 +1,112 @@
+"""The held-out poses of a calibration, in the controller's frames.
+
+Before the write-back only poses can be taken at which the ball stays inside the travel although the
+geometry is wrong. Afterwards these are taken again, for the comparison, and then poses as wide as the
+robot's limits, since a geometry may be right at small tilts alone. Where a test of the model fails narrowly,
+further ones follow, at the same points.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from hexacell.cell.model import CellSettings
+from hexacell.errors import LimitError
+from hexacell.experiment_design import candidates
+from hexacell.experiment_design.validation_poses import select_near, select_validation_poses
+from hexacell.identification.belief import RobotBelief
+from hexacell.identification.solver.result import Identification
+from hexacell.kinematics.pose import Pose, PoseBatch
+from hexacell.kinematics.rotations import Array
+from hexacell.robot_model import Robot
+from procedures.run.steps import SixNumbers
+
+FURTHER_SEED = 1_000_003
+"""Added to the seed of the held-out orientations where further ones are needed."""
+
+PosesByPoint = tuple[tuple[SixNumbers, ...], ...]
+"""Poses at each held-out point, its reference first; none at a point that is left."""
+
+
+@dataclass(frozen=True, eq=False)
+class HeldOutPoses:
+    """Chooses the poses for a robot with some geometry in its controller, of so many candidates."""
+
+    settings: CellSettings
+    robot: Robot
+    candidate_count: int
+
+    def before(self, identified: Identification) -> PosesByPoint:
+        """Those that are measured before the write-back as well.
+
+        Where a point has too few, because the ball would leave the travel or the robot its limits, they are
+        at one nearer to the middle of the points that the geometry is identified at. Where these are too
+        few, too, the point is left.
+
+        Raises:
+            LimitError: all points are.
+        """
+        belief, turns = self.robot.belief(identified), self._turns()
+        middle = self._positions(self.settings.identification.points).mean(axis=0)
+        chosen: list[tuple[SixNumbers, ...]] = []
+        failures: list[LimitError] = []
+        for position in self._positions(self.settings.verification.points):
+            try:
+                poses = select_near(
+                    belief, position, middle, self._count, turns, identified.poses.rotations
+                )
+                chosen.append(self._commands(poses))
+            except LimitError as error:
+                chosen.append(())
+                failures.append(error)
+        if not any(chosen):
+            raise failures[0]
+        return tuple(chosen)
+
+    def after(self, identified: Identification, before: PosesByPoint) -> PosesByPoint:
+        """Others at the points of those that are measured ``before``, without their references."""
+        belief, turns, used = self.robot.belief(identified), self._turns(), identified.poses.rotations
+        return tuple(self._at(poses, belief, turns, used)[1:] for poses in before)
+
+    def further(
+        self, identified: Identification, before: PosesByPoint, after: PosesByPoint
+    ) -> PosesByPoint:
+        """Once more others, which are unlike those ``after``; each point has its reference among them."""
+        belief, turns = self.robot.belief(identified), self._turns(FURTHER_SEED)
+        taken = self.robot.from_commands(Pose(*pose) for poses in after for pose in poses)
+        used = np.concatenate([identified.poses.rotations, taken.rotations])
+        return tuple(self._at(poses, belief, turns, used) for poses in before)
+
+    def _at(
+        self, chosen: Sequence[SixNumbers], belief: RobotBelief, turns: Array, used: Array
+    ) -> tuple[SixNumbers, ...]:
+        """Poses at the point of some; none where these are none, or the robot has too few others."""
+        if not chosen:
+            return ()
+        position = self._positions(chosen[:1])[0]
+        try:
+            return self._commands(select_validation_poses(belief, position, self._count, turns, used))
+        except LimitError:
+            return ()
+
+    @property
+    def _count(self) -> int:
+        return self.settings.verification.orientations
+
+    def _turns(self, further_seed: int = 0) -> Array:
+        limits, seed = self.robot.limits, self.settings.verification.seed + further_seed
+        turns: Array = candidates.orientations(
+            self.candidate_count, limits.tilt, seed, most_twist=limits.turn
+        )
+        return turns
+
+    def _positions(self, commands: Sequence[Sequence[float]]) -> Array:
+        """Of the ball (n, 3), mm, in the convention's frames."""
+        return self.robot.from_commands(Pose(*command) for command in commands).positions
+
+    def _commands(self, poses: PoseBatch) -> tuple[SixNumbers, ...]:
+        commands = (self.robot.to_command(poses.pose(row)) for row in range(len(poses)))
+        return tuple(command.as_tuple() for command in commands)

@@ -12,6 +12,7 @@ from procedures.calibration import workflow
 from procedures.run import events
 
 FREE: dict[str, Any] = {
+    "identification.provisional": False,
     "limits.turn_deg": 180.0,
     "limits.leg_distance_mm": 0.0,
     "limits.passive_joints.base_cone_deg": 180.0,
@@ -22,7 +23,6 @@ FREE: dict[str, Any] = {
 SMALL: dict[str, Any] = FREE | {
     "identification.points": ((100.0, -100.0, 500.0), (-100.0, 100.0, 500.0)),
     "identification.orientations": 9,
-    "identification.provisional": False,
     "verification.points": ((-100.0, -50.0, 450.0), (100.0, 100.0, 550.0)),
     "verification.orientations": 3,
     "noise.encoder_mm": 0.0012,

@@ -2,8 +2,8 @@
 
 Before the write-back only poses can be taken at which the ball stays inside the travel although the
 geometry is wrong. Afterwards these are taken again, for the comparison, and then poses as wide as the
-robot's limits, since a geometry may be right at small tilts alone. Where a test of the model fails narrowly,
-further ones follow, at the same points.
+robot's limits, since a geometry may be right at small tilts alone. Where a test of the model fails
+narrowly, further ones follow, at the same points.
 """
 
 from __future__ import annotations

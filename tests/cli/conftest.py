@@ -6,6 +6,7 @@ import fcntl
 import json
 import os
 import secrets
+import shutil
 import signal
 import subprocess
 import sys
@@ -151,6 +152,9 @@ class CellFolder:
         lines = (run / "journal.jsonl").read_bytes().splitlines(keepends=True)
         with journal.open("ab") as stream:
             stream.writelines(lines[1 : steps.index(before)])
+        for event in history[: steps.index(before)]:
+            if isinstance(event, events.ProvisionalApplied):
+                shutil.copytree(run / event.folder, journal.parent / event.folder)
         return journal.parent
 
 

@@ -154,8 +154,15 @@ class CellFolder:
             stream.writelines(lines[1 : steps.index(before)])
         for event in history[: steps.index(before)]:
             if isinstance(event, events.ProvisionalApplied):
-                shutil.copytree(run / event.folder, journal.parent / event.folder)
+                self._copy_write_back(run / event.folder, journal.parent / event.folder)
         return journal.parent
+
+    def _copy_write_back(self, folder: Path, copy: Path) -> None:
+        """A write to another cell's config as one to this cell's."""
+        shutil.copytree(folder, copy)
+        note = copy / "write-back.json"
+        noted = {"path": str(self.controller), "backup_folder": str(copy)}
+        note.write_text(json.dumps(json.loads(note.read_bytes()) | noted))
 
 
 def copy_cell(folder: Path) -> CellFolder:

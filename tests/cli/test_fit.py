@@ -177,7 +177,10 @@ def test_further_columns_another_order_and_windows_line_ends_are_accepted(
     (tmp_path / "m.csv").write_bytes(b"\xef\xbb\xbf" + text.encode() + b"\r\n\r\n")
     outcome = typed_here("fit", demo.cell, "--measurements", "m.csv", "--json")
     assert outcome.code == 0
-    assert outcome.document["geometry"] == json.loads((demo.run / "result.json").read_text())["geometry"]
+    # Beside its journal `fit` would know of the provisional geometry, and begin there.
+    of_run = json.loads((demo.run / "result.json").read_text())["geometry"]
+    for symbol, values in outcome.document["geometry"].items():
+        assert np.abs(np.subtract(values, of_run[symbol])).max() < 1e-6
 
 
 def small_tilts(cell_folder, degrees: float) -> list[str]:

@@ -29,8 +29,8 @@ versions 1 and 2 no verification; checks of version 3 measured held-out points; 
 measured. Versions up to 6 had no length check. Up to 8 only the controller's pose was read where the robot
 was located, its guard tripped on an emergency stop, gauges were not tried, the place of their plungers
 did not count, the minutes of a forecast knew no durations of moves, and commands kept fewer limits. Up to
-9 there was no quick level, a narrow failure of a test of the model ended the run, and a calibrated controller
-got a provisional geometry too. So a run of them was decided by other rules."""
+9 there was no quick level, a narrow failure of a test of the model ended the run, and a calibrated
+controller got a provisional geometry too. So a run of them was decided by other rules."""
 
 RULES_SINCE = 10
 """The version since which runs are decided by the present rules; older ones are not resumed."""

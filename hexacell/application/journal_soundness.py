@@ -100,7 +100,7 @@ class _Event:
         before = {
             events.Proposed: state.identified,
             events.Committed: state.proposed,
-            events.FurtherRecordsPlanned: state.committed,
+            events.ConfirmationPlanned: state.committed,
             events.ResultAccepted: state.judged and state.judged.verification,
             events.RolledBack: state.proposed,
         }
@@ -162,7 +162,7 @@ class _Event:
                 yield from self._identified(identified)
             case events.Proposed() as proposed:
                 yield from self._geometries(proposed.written)
-            case events.FurtherRecordsPlanned() as planned:
+            case events.ConfirmationPlanned() as planned:
                 yield from self._held_out(planned.poses)
 
     def _identified(self, identified: events.Identified) -> Iterator[str]:

@@ -136,8 +136,8 @@ def _poses_to_come(state: RunState) -> Iterator[SixNumbers]:
     if state.identified is not None:
         for at_point in (*state.identified.held_out, *state.identified.held_out_after):
             yield from at_point
-    if state.further is not None:
-        for at_point in state.further.poses:
+    if state.confirmation is not None:
+        for at_point in state.confirmation.poses:
             yield from at_point
 
 

@@ -20,7 +20,7 @@ SET_NAMES = {
     Phase.IDENTIFY: "point {}",
     Phase.BEFORE: "held-out point {}, before",
     Phase.AFTER: "held-out point {}, after",
-    Phase.FURTHER: "held-out point {}, further",
+    Phase.CONFIRM: "held-out point {}, confirming",
     Phase.LENGTH: "length check, mounting {}",
 }
 COMPUTATIONS = {
@@ -131,16 +131,16 @@ def _finding_text(event: events.Event) -> str | None:
             return f"the run is to end: {event.reason}; back to the reference"
         case events.NoiseMeasured():
             return noise_and_averaging_text(event.noise)
-        case events.FurtherRecordsPlanned():
-            return further_records_text(event)
+        case events.ConfirmationPlanned():
+            return confirmation_text(event)
         case _:
             return None
 
 
-def further_records_text(planned: events.FurtherRecordsPlanned) -> str:
+def confirmation_text(planned: events.ConfirmationPlanned) -> str:
     """Why more is measured, and how much."""
     records = sum(map(len, planned.poses))
-    return wrapped(f"{planned.reason}: {records} further records tell whether by chance", indent=2)
+    return wrapped(f"{planned.reason}: {records} new records tell whether by chance", indent=2)
 
 
 def _further_text(event: events.Event) -> str | None:

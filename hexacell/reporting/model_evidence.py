@@ -1,4 +1,4 @@
-"""The evidence for the model: tests of it, and how further records confirm a narrow failure or not.
+"""The evidence for the model: tests of it, and how new records confirm a narrow failure or not.
 
 Each test fails with a probability of 0.1 % although the model is right: of a cell that is calibrated
 every night one run a year would fail. A failure that is not beyond chance is therefore to be
@@ -19,10 +19,10 @@ from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.rotations import Mask
 
 BEYOND_CHANCE = 1e-6
-"""Probability below which a failure is none that further records are asked about."""
+"""Probability below which a failure is none that confirming records are asked about."""
 
 CONFIRMING_PROBABILITY = 1e-2
-"""Of further records that are so far off by chance: together with the first test at most one in 100,000."""
+"""Of confirming records that are so far off by chance: with the first test at most one in 100,000."""
 
 
 class ModelTest(Frozen):
@@ -63,19 +63,19 @@ def model_tests(found: Identification, updated: Identification) -> tuple[ModelTe
 
 
 def fails_narrowly(tests: Sequence[ModelTest]) -> bool:
-    """Whether tests failed, each of them in a way that further records can tell from chance."""
+    """Whether tests failed, each of them in a way that confirming records can tell from chance."""
     failed = [test for test in tests if not test.passed]
     return bool(failed) and all(test.failed_narrowly for test in failed)
 
 
-def confirmed(tests: Sequence[ModelTest], updated: Identification, further: Mask) -> tuple[ModelTest, ...]:
-    """The tests once there are ``further`` records (n,) in an ``updated`` identification.
+def confirmed(tests: Sequence[ModelTest], updated: Identification, rows: Mask) -> tuple[ModelTest, ...]:
+    """The tests once there are confirming records, the ``rows`` (n,) of an ``updated`` identification.
 
-    Those that failed narrowly hold if the further records agree with the model.
+    Those that failed narrowly hold if the confirming records agree with the model.
     """
-    what = "The further records, predicted from all others,"
-    test = prediction_test(updated, further)
-    confirming = _prediction_test("further records", test, what, CONFIRMING_PROBABILITY)
+    what = "The confirming records, predicted from all others,"
+    test = prediction_test(updated, rows)
+    confirming = _prediction_test("confirming records", test, what, CONFIRMING_PROBABILITY)
     if not confirming.passed:
         return (*tests, confirming)
     return (*(_taken_for_chance(one) for one in tests), confirming)
@@ -84,7 +84,7 @@ def confirmed(tests: Sequence[ModelTest], updated: Identification, further: Mask
 def _taken_for_chance(test: ModelTest) -> ModelTest:
     if not test.failed_narrowly:
         return test
-    sentence = f"{test.sentence.rstrip('.')}; further records do not confirm that."
+    sentence = f"{test.sentence.rstrip('.')}; new records do not confirm that."
     return test.model_copy(update={"passed": True, "sentence": sentence})
 
 

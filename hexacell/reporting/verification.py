@@ -101,8 +101,8 @@ class Verification(Frozen):
         return self.verdict is not Verdict.PASS and self.after_mm is not None and not self.is_worse
 
     @property
-    def needs_further_records(self) -> bool:
-        """Whether only further records can tell if the model is wrong, or chance made a test fail."""
+    def needs_confirmation(self) -> bool:
+        """Whether only confirming records can tell if the model is wrong, or chance made a test fail."""
         return fails_narrowly(self.tests) and self.accuracy is not None and not self.is_worse
 
 
@@ -116,7 +116,7 @@ class HeldOut:
         after: with the new one, at the same poses.
         left_travel: whether the ball left the gauges' travel with the new geometry.
         length: what was measured with the new geometry in two seats; none without a length check.
-        further: records at points of their own, that were measured because a test failed narrowly; none
+        confirming: records at points of their own, that were measured because a test failed narrowly; none
             otherwise.
     """
 
@@ -125,7 +125,7 @@ class HeldOut:
     after: Sequence[tuple[float, float, float]]
     left_travel: bool = False
     length: LengthMeasurements | None = None
-    further: MeasurementSet | None = None
+    confirming: MeasurementSet | None = None
 
 
 def verify(settings: CellSettings, robot: Robot, found: Identification, held_out: HeldOut) -> Verification:
@@ -142,9 +142,9 @@ def verify(settings: CellSettings, robot: Robot, found: Identification, held_out
         return Verification(verdict=Verdict.NOT_EVALUATED)
     updated = update(found, robot.problem(held_out.records))
     tests = model_tests(found, updated)
-    if held_out.further is not None:
-        updated = update(updated, robot.problem(held_out.further))
-        tests = confirmed(tests, updated, np.isin(updated.problem.labels[:, 0], held_out.further.points))
+    if held_out.confirming is not None:
+        updated = update(updated, robot.problem(held_out.confirming))
+        tests = confirmed(tests, updated, np.isin(updated.problem.labels[:, 0], held_out.confirming.points))
     accuracy = verified_accuracy(settings, robot, found, updated, held_out.length)
     tests = (*tests, *_length_test(accuracy))
     worse = is_worse(before, after, robot.noise)

@@ -3,7 +3,7 @@
 Before the write-back only poses can be taken at which the ball stays inside the travel although the
 geometry is wrong. Afterwards these are taken again, for the comparison, and then poses as wide as the
 robot's limits, since a geometry may be right at small tilts alone. Where a test of the model fails
-narrowly, further ones follow, at the same points.
+narrowly, confirming ones follow, at the same points.
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ from hexacell.kinematics.rotations import Array
 from hexacell.robot_model import Robot
 from procedures.run.steps import SixNumbers
 
-FURTHER_SEED = 1_000_003
-"""Added to the seed of the held-out orientations where further ones are needed."""
+CONFIRMING_SEED = 1_000_003
+"""Added to the seed of the held-out orientations for those that confirm a failure."""
 
 PosesByPoint = tuple[tuple[SixNumbers, ...], ...]
 """Poses at each held-out point, its reference first; none at a point that is left."""
@@ -71,11 +71,11 @@ class HeldOutPoses:
         belief, turns, used = self.robot.belief(identified), self._turns(), identified.poses.rotations
         return tuple(self._at(poses, belief, turns, used)[1:] for poses in before)
 
-    def further(
+    def confirming(
         self, identified: Identification, before: PosesByPoint, after: PosesByPoint
     ) -> PosesByPoint:
         """Once more others, which are unlike those ``after``; each point has its reference among them."""
-        belief, turns = self.robot.belief(identified), self._turns(FURTHER_SEED)
+        belief, turns = self.robot.belief(identified), self._turns(CONFIRMING_SEED)
         taken = self.robot.from_commands(Pose(*pose) for poses in after for pose in poses)
         used = np.concatenate([identified.poses.rotations, taken.rotations])
         return tuple(self._at(poses, belief, turns, used) for poses in before)
@@ -96,8 +96,8 @@ class HeldOutPoses:
     def _count(self) -> int:
         return self.settings.verification.orientations
 
-    def _turns(self, further_seed: int = 0) -> Array:
-        limits, seed = self.robot.limits, self.settings.verification.seed + further_seed
+    def _turns(self, added_seed: int = 0) -> Array:
+        limits, seed = self.robot.limits, self.settings.verification.seed + added_seed
         turns: Array = candidates.orientations(
             self.candidate_count, limits.tilt, seed, most_twist=limits.turn
         )

@@ -49,8 +49,8 @@ class HeldOutSteps:
 
     def _poses(self, state: RunState, key: SetKey) -> tuple[tuple[SixNumbers, ...], int]:
         """The poses of a set, and how many of them were chosen as one list, in this order."""
-        if key.phase is Phase.FURTHER and state.further is not None:
-            poses = state.further.poses[key.point - 1]
+        if key.phase is Phase.CONFIRM and state.confirmation is not None:
+            poses = state.confirmation.poses[key.point - 1]
             return poses, len(poses)
         assert state.identified is not None  # noqa: S101 - its poses are held out of an identification
         common = state.identified.held_out[key.point - 1]

@@ -266,11 +266,11 @@ class Calibration:
         written = self._commanded_by(self.as_written(identified.geometry).geometry)
         return written.held_out_poses.after(identified, before)
 
-    def further_poses(self, identified: Identification, state: RunState) -> PosesByPoint:
-        """See :meth:`HeldOutPoses.further`."""
+    def confirming_poses(self, identified: Identification, state: RunState) -> PosesByPoint:
+        """See :meth:`HeldOutPoses.confirming`."""
         found = state.identified
         assert found is not None  # noqa: S101 - callers have a result
-        return self._measuring(state).held_out_poses.further(
+        return self._measuring(state).held_out_poses.confirming(
             identified, found.held_out, found.held_out_after
         )
 
@@ -308,9 +308,9 @@ class Calibration:
         held_out = self._measuring(state).held_out
         after = held_out.next_step(state, Phase.AFTER)
         length = None if after or not self.length_check else self._length_step(state)
-        if after or length or state.further is None:
+        if after or length or state.confirmation is None:
             return after or length
-        return held_out.next_step(state, Phase.FURTHER)
+        return held_out.next_step(state, Phase.CONFIRM)
 
     def _length_step(self, state: RunState) -> Step | None:
         """The next step of the length check; none when it is done."""

@@ -101,10 +101,10 @@ class Computations:
             gates=conditions, written=written.geometry.document(), displacement=written.displacement
         )
 
-    def judge(self, state: RunState) -> events.ResultValidated | events.FurtherRecordsPlanned:
+    def judge(self, state: RunState) -> events.ResultValidated | events.ConfirmationPlanned:
         """Verify the written geometry, or state what a check found; raises ``HexacellError``.
 
-        A test of the model that failed narrowly asks for further records once, where any can be taken.
+        A test of the model that failed narrowly asks for confirming records once, where any can be taken.
         """
         if self.calibration.mode is Mode.CHECK:
             return self._judge_check(state)
@@ -114,10 +114,10 @@ class Computations:
         found = identify(calibration.robot_of(state).problem(state.measurements()))
         written = calibration.written_robot(state)
         verification = verify(calibration.settings, written, found, _held_out(calibration.settings, state))
-        if verification.needs_further_records and state.further is None:
-            poses = calibration.further_poses(found, state)
+        if verification.needs_confirmation and state.confirmation is None:
+            poses = calibration.confirming_poses(found, state)
             if any(poses):
-                return events.FurtherRecordsPlanned(reason=reason_of(verification), poses=poses)
+                return events.ConfirmationPlanned(reason=reason_of(verification), poses=poses)
         line = outcome_line(_identified(state), len(found.free), verification)
         return events.ResultValidated(verdict=verification.verdict, line=line, verification=verification)
 
@@ -171,14 +171,14 @@ def _held_out(settings: CellSettings, state: RunState) -> HeldOut:
         samples = state.samples(phase)
         records += _at_points_from(count, samples)
         count += max((sample.at.point for sample in samples), default=0)
-    further = state.samples(Phase.FURTHER)
+    confirming = state.samples(Phase.CONFIRM)
     return HeldOut(
         records=MeasurementSet(tuple(records)),
         before=state.held_out(Phase.BEFORE),
         after=state.held_out(Phase.AFTER),
         left_travel=state.left_travel,
         length=_length_measurements(settings, state) if state.samples(Phase.LENGTH) else None,
-        further=MeasurementSet(tuple(_at_points_from(count, further))) if further else None,
+        confirming=MeasurementSet(tuple(_at_points_from(count, confirming))) if confirming else None,
     )
 
 

@@ -219,7 +219,7 @@ OUTCOME_KINDS: dict[str, frozenset[str]] = {
     "identify": frozenset({"identified"}),
     "propose": frozenset({"proposed"}),
     "commit": frozenset({"committed"}),
-    "judge": frozenset({"judged", "further records planned"}),
+    "judge": frozenset({"judged", "confirmation planned"}),
     "accept": frozenset({"accepted"}),
     "roll back": frozenset({"rolled back"}),
 }

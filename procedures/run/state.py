@@ -40,7 +40,7 @@ class RunState:
         position_unknown: the controller must be asked for the pose before the robot moves.
         excluded: poses that the controller refused, in the order of the refusals.
         failures: how many, by kind and place, since the run was begun or resumed.
-        further: the records that are to tell whether a test of the model failed by chance.
+        confirmation: the records that are to tell whether a test of the model failed by chance.
         rolling_back: the old geometry is being put back.
         provisional: the provisional geometry that the controller was given last.
         provisional_active: the controller has it now.
@@ -60,7 +60,7 @@ class RunState:
     identified: events.Identified | None = None
     proposed: events.Proposed | None = None
     committed: events.Committed | None = None
-    further: events.FurtherRecordsPlanned | None = None
+    confirmation: events.ConfirmationPlanned | None = None
     judged: events.ResultValidated | None = None
     accepted: events.ResultAccepted | None = None
     rolled_back: bool = False
@@ -224,8 +224,8 @@ def apply(state: RunState, event: events.Event) -> RunState:  # noqa: C901, PLR0
         case events.Committed():
             # The same sliders are another pose under another geometry.
             return _without_position(replace(state, committed=event))
-        case events.FurtherRecordsPlanned():
-            return replace(state, further=event)
+        case events.ConfirmationPlanned():
+            return replace(state, confirmation=event)
         case events.ResultValidated():
             return replace(state, judged=event)
         case events.ResultAccepted():
@@ -347,7 +347,7 @@ def _rolled_back(state: RunState) -> RunState:
     if state.judged is not None:
         return replace(state, rolled_back=True)
     kept = {key: value for key, value in state.sets.items() if not key.phase.has_new_geometry}
-    return replace(state, committed=None, further=None, sets=kept)
+    return replace(state, committed=None, confirmation=None, sets=kept)
 
 
 def _place_of(step: Step | None) -> str:

@@ -21,13 +21,13 @@ class Phase(StrEnum):
     IDENTIFY = "P"
     BEFORE = "before-V"
     AFTER = "after-V"
-    FURTHER = "further-V"
+    CONFIRM = "confirm-V"
     LENGTH = "L"
 
     @property
     def has_new_geometry(self) -> bool:
         """Whether the held-out poses are commanded with the geometry that is to be verified."""
-        return self in {Phase.AFTER, Phase.FURTHER}
+        return self in {Phase.AFTER, Phase.CONFIRM}
 
 
 class SetKey(Frozen):
@@ -50,8 +50,8 @@ class SetKey(Frozen):
                 return f"held-out point {self.point}"
             case Phase.AFTER:
                 return f"held-out point {self.point} with the new geometry"
-            case Phase.FURTHER:
-                return f"held-out point {self.point} with the new geometry, further records"
+            case Phase.CONFIRM:
+                return f"held-out point {self.point} with the new geometry, confirming records"
         return f"point {self.point}"
 
 

@@ -216,7 +216,7 @@ def _short_name(at: SetKey) -> str:
         Phase.IDENTIFY: "{}",
         Phase.BEFORE: "before {}",
         Phase.AFTER: "after {}",
-        Phase.FURTHER: "further {}",
+        Phase.CONFIRM: "confirm {}",
         Phase.LENGTH: "length {}",
     }
     return words[at.phase].format(at.point)

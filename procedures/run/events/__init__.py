@@ -39,7 +39,7 @@ from procedures.run.events.measuring import (
 )
 from procedures.run.events.results import (
     Committed,
-    FurtherRecordsPlanned,
+    ConfirmationPlanned,
     Identified,
     Proposed,
     ProvisionalApplied,
@@ -53,10 +53,10 @@ __all__ = [
     "Arrived",
     "CommandRejected",
     "Committed",
+    "ConfirmationPlanned",
     "Ended",
     "Event",
     "Failed",
-    "FurtherRecordsPlanned",
     "GaugesPlaced",
     "GaugesProbed",
     "GaugesTried",
@@ -112,7 +112,7 @@ Event = Annotated[
     | Identified
     | Proposed
     | Committed
-    | FurtherRecordsPlanned
+    | ConfirmationPlanned
     | ResultValidated
     | ResultAccepted
     | RolledBack

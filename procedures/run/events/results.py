@@ -71,13 +71,13 @@ class Committed(Frozen):
     approved_by: str
 
 
-class FurtherRecordsPlanned(Frozen):
-    """A test of the model failed, perhaps by chance: further held-out poses were chosen, which tell.
+class ConfirmationPlanned(Frozen):
+    """A test of the model failed, perhaps by chance: confirming held-out poses were chosen, which tell.
 
     ``poses`` are those at each held-out point, its reference first; none at a point that is left.
     """
 
-    kind: Literal["further records planned"] = "further records planned"
+    kind: Literal["confirmation planned"] = "confirmation planned"
     reason: str
     poses: tuple[tuple[SixNumbers, ...], ...]
 

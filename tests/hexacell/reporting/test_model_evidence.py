@@ -1,4 +1,4 @@
-"""A narrow failure of a test of the model, confirmed by further records or not."""
+"""A narrow failure of a test of the model, confirmed by new records or not."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ def test_records_of_the_stated_noise_do_not_confirm_a_failure(robot, found, meas
     assert all(test.passed for test in after)
     (failed,) = [test for test in tests if not test.passed]
     (taken,) = [test for test in after if test.name == failed.name]
-    assert taken.sentence == f"{failed.sentence[:-1]}; further records do not confirm that."
+    assert taken.sentence == f"{failed.sentence[:-1]}; new records do not confirm that."
     assert taken.probability == failed.probability
 
 

@@ -263,7 +263,7 @@ some_event: st.SearchStrategy[Any] = st.one_of(
     st.builds(events.Proposed, gates=st.lists(gate, max_size=3).map(tuple)),
     st.builds(events.Committed, approved_by=text),
     st.builds(
-        events.FurtherRecordsPlanned,
+        events.ConfirmationPlanned,
         reason=text,
         poses=st.lists(st.lists(six, max_size=2).map(tuple), max_size=2).map(tuple),
     ),
@@ -329,6 +329,6 @@ KINDS = (
     *("lent", "taken back", "proposed", "committed", "judged", "rolled back", "interrupted", "ended"),
     *("located", "undone", "confirmed", "paused", "resumed", "failed", "declined", "tripped"),
     *("accepted", "stood", "repeated", "probed", "tried", "noise measured", "excluded", "recalled"),
-    "further records planned",
+    "confirmation planned",
 )
 """Journals on disk say these words: they must never change."""

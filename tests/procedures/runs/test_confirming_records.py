@@ -1,4 +1,4 @@
-"""A test of the model that fails narrowly asks for further records, which alone tell whether by chance."""
+"""A test of the model that fails narrowly asks for new records, which alone tell whether by chance."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from procedures.run.steps import Move, Phase, SetKey
 from tests.procedures.fakes import refused
 from tests.procedures.runs.listening import happened
 
-FIRST = SetKey(phase=Phase.FURTHER, point=1)
+FIRST = SetKey(phase=Phase.CONFIRM, point=1)
 
 
 class PowerCut(BaseException):
@@ -37,15 +37,15 @@ def nobody_keeps(rig: Any) -> Any:
     return rig
 
 
-async def test_further_records_that_agree_end_the_run_with_a_pass(recording, replayed) -> None:
+async def test_confirming_records_that_agree_end_the_run_with_a_pass(recording, replayed) -> None:
     rig = replayed(recording.until(events.Proposed))
     ended = await rig.run()
     assert ended.exit_code == ExitCode.DONE
-    (planned,) = happened(rig, events.FurtherRecordsPlanned)
+    (planned,) = happened(rig, events.ConfirmationPlanned)
     assert planned.reason.startswith("The held-out records are ")
     state = fold(read_journal(rig.folder.journal))
     assert [len(poses) for poses in planned.poses] == [3, 3]
-    assert [sample.pose for sample in state.samples(Phase.FURTHER)] == [
+    assert [sample.pose for sample in state.samples(Phase.CONFIRM)] == [
         pose for poses in planned.poses for pose in poses
     ]
     assert not set(planned.poses[0][1:]) & set(recording_poses(state)), "they are new ones"
@@ -53,11 +53,9 @@ async def test_further_records_that_agree_end_the_run_with_a_pass(recording, rep
     assert state.judged.verdict is Verdict.PASS
     verification = state.judged.verification
     assert verification is not None
-    assert verification.tests[-1].name == "further records"
+    assert verification.tests[-1].name == "confirming records"
     assert all(test.passed for test in verification.tests)
-    assert any(
-        test.sentence.endswith("further records do not confirm that.") for test in verification.tests
-    )
+    assert any(test.sentence.endswith("new records do not confirm that.") for test in verification.tests)
     assert rig.config == recording.config_after
 
 
@@ -66,39 +64,39 @@ def recording_poses(state: RunState) -> list[Any]:
     return [sample.pose for phase in phases for sample in state.samples(phase)]
 
 
-async def test_further_records_that_do_not_agree_leave_the_result_not_evaluated(
+async def test_confirming_records_that_do_not_agree_leave_the_result_not_evaluated(
     recording, replayed, monkeypatch
 ) -> None:
     monkeypatch.setattr(model_evidence, "CONFIRMING_PROBABILITY", 1.0)
     rig = nobody_keeps(replayed(recording.until(events.Proposed)))
     ended = await rig.run()
-    assert len(happened(rig, events.FurtherRecordsPlanned)) == 1, "once is enough"
+    assert len(happened(rig, events.ConfirmationPlanned)) == 1, "once is enough"
     assert happened(rig, events.ResultValidated)[0].verdict is Verdict.NOT_EVALUATED
     assert ended.exit_code == ExitCode.OUT_OF_LIMITS
     assert rig.config == recording.config_before
 
 
-async def test_a_failure_beyond_chance_asks_for_no_further_records(
+async def test_a_failure_beyond_chance_asks_for_no_confirming_records(
     recording, replayed, monkeypatch
 ) -> None:
     monkeypatch.setattr(model_evidence, "BEYOND_CHANCE", 1.0)
     rig = nobody_keeps(replayed(recording.until(events.Proposed)))
     await rig.run()
-    assert not happened(rig, events.FurtherRecordsPlanned)
+    assert not happened(rig, events.ConfirmationPlanned)
     assert happened(rig, events.ResultValidated)[0].verdict is Verdict.NOT_EVALUATED
 
 
-async def test_where_no_further_pose_can_be_taken_the_verdict_stays(
+async def test_where_no_confirming_pose_can_be_taken_the_verdict_stays(
     recording, replayed, monkeypatch
 ) -> None:
-    monkeypatch.setattr(HeldOutPoses, "further", lambda *_: ((), ()))
+    monkeypatch.setattr(HeldOutPoses, "confirming", lambda *_: ((), ()))
     rig = nobody_keeps(replayed(recording.until(events.Proposed)))
     await rig.run()
-    assert not happened(rig, events.FurtherRecordsPlanned)
+    assert not happened(rig, events.ConfirmationPlanned)
     assert happened(rig, events.ResultValidated)[0].verdict is Verdict.NOT_EVALUATED
 
 
-async def test_a_run_killed_among_further_records_goes_on_there(recording, replayed) -> None:
+async def test_a_run_killed_among_confirming_records_goes_on_there(recording, replayed) -> None:
     rig = replayed(recording.until(events.Proposed))
 
     def cut(event: events.Event, _: RunState) -> None:
@@ -110,11 +108,11 @@ async def test_a_run_killed_among_further_records_goes_on_there(recording, repla
     assert fold(read_journal(rig.folder.journal)).is_unverified
     ended = await rig.run()
     assert ended.exit_code == ExitCode.DONE
-    assert len(happened(rig, events.FurtherRecordsPlanned)) == 1
+    assert len(happened(rig, events.ConfirmationPlanned)) == 1
     assert orientations_taken(rig) == [1, 2, 3]
 
 
-async def test_a_refused_further_pose_is_left_out(recording, replayed) -> None:
+async def test_a_refused_confirming_pose_is_left_out(recording, replayed) -> None:
     rig = replayed(recording.until(events.Proposed))
 
     def refuse(event: events.Event, _: RunState) -> None:
@@ -137,6 +135,6 @@ def orientations_taken(rig: Any) -> list[int]:
 
 def test_why_more_is_measured_is_said() -> None:
     pose = (0.0,) * 6
-    planned = events.FurtherRecordsPlanned(reason="The residuals are odd", poses=((pose, pose), ()))
-    said = "The residuals are odd: 2 further records tell whether by chance"
+    planned = events.ConfirmationPlanned(reason="The residuals are odd", poses=((pose, pose), ()))
+    said = "The residuals are odd: 2 new records tell whether by chance"
     assert event_text(planned, RunState()) == said

@@ -85,6 +85,8 @@ class Night:
     verdict: Verdict | None = None
     is_written: bool = False
     said: str = ""
+    expanded_mm: float = np.nan
+    """Of the error that was stated."""
 
 
 @dataclass
@@ -185,6 +187,7 @@ class Year:
                 verdict=judged.verdict,
                 is_written=is_written,
                 said=judged.line,
+                expanded_mm=_expanded_mm(judged),
             )
         )
 
@@ -213,6 +216,11 @@ class Year:
         assert self.cell.settings.simulation is not None
         geometry = type(self.cell.settings.simulation.geometry).model_validate(values)
         return {"simulation.geometry": geometry} | self.faults.get(number, {})
+
+
+def _expanded_mm(judged: events.ResultValidated) -> float:
+    check = judged.check
+    return np.nan if check is None or check.accuracy is None else check.accuracy.position.expanded
 
 
 @dataclass(frozen=True, eq=False)

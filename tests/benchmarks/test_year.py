@@ -18,6 +18,7 @@ from hexacell.decision import Verdict
 from hexacell.errors import ExitCode
 from procedures.calibration.workflow import Mode
 from tests.benchmarks.simulated_year import DEAD_GAUGE, FULL_DISK, LIMIT_MM, Year
+from tests.benchmarks.worlds.table import most_by_chance
 
 Say = Callable[[str, str, str], None]
 
@@ -94,14 +95,16 @@ def test_verdicts_are_right(told, say) -> None:
     false_fails = [one for one in checks if one.verdict is Verdict.FAIL and one.error_before_mm < LIMIT_MM]
     undecided = [one for one in checks if one.verdict is Verdict.NOT_EVALUATED]
     counts = f"{len(checks)}: {len(false_passes)}, {len(false_fails)}, {len(undecided)}"
-    say("checks: false passes, false fails, undecided", counts, "none, none")
+    say("checks: false passes, false fails, undecided", counts, "")
     worst = max(one.error_before_mm for one in checks if one.number != CRASH)
     say("  largest true error of a night but the crash's", f"{worst:.3f} mm", f"limit {LIMIT_MM}")
     most = max((one.error_before_mm for one in false_passes), default=0.0)
-    say("  largest true error of a false pass", f"{most:.3f} mm", "none: missed, as the drift is hidden")
-    assert len(false_passes) <= 0.03 * len(checks)
-    assert most <= 1.3 * LIMIT_MM  # what a drift of one parameter hides from a short check
+    say("  largest true error of a false pass", f"{most:.3f} mm", "")
+    beyond = [one for one in checks if one.error_before_mm >= LIMIT_MM + one.expanded_mm]
+    wrong = sum(one.verdict is Verdict.PASS for one in beyond)
+    say("  of checks of a robot beyond limit + U, passes", f"{wrong} of {len(beyond)}", "at most 1 in 100")
     assert not false_fails
+    assert wrong <= most_by_chance(0.01, len(beyond))
 
 
 def test_alarms_are_right(told, say) -> None:
@@ -119,12 +122,12 @@ def test_alarms_are_right(told, say) -> None:
     assert crash.after < at <= crash.before
     assert 0 <= late <= 3
     of_leg_2 = sum(one.leg == 2 for one in others)
-    say("  of the alarms of the drift name leg 2", f"{of_leg_2} of {len(others)}", "all: missed")
-    assert of_leg_2 >= 0.75 * len(others)
+    say("  of the alarms of the drift name leg 2", f"{of_leg_2} of {len(others)}", "all")
     steady = [rate.name for rate in told.drift.rates if rate.is_steady]
     found = [one.leg for one in others]
     say("  the drift of leg 2: alarms; steady rates", f"{len(found)}; {', '.join(steady) or 'none'}", "one")
     assert found or "l2" in steady
+    assert of_leg_2 == len(others)
 
 
 def test_the_archive_is_consistent(told, say) -> None:

@@ -32,17 +32,23 @@ class FoundChange:
         noticed: when the run ended that alarmed.
         after, before: when the runs ended between which it happened.
         parameter: the likeliest one of its leg, with its ``change`` and one standard deviation of that.
+        possible_legs: of which one changed, the likeliest first; only one where that is certain.
         other_legs: that changed as well.
     """
 
     noticed: datetime
     after: datetime
     before: datetime
-    leg: int
+    possible_legs: tuple[int, ...]
     parameter: GeometricParameter
     change: float
     sigma: float
     other_legs: tuple[int, ...]
+
+    @property
+    def leg(self) -> int:
+        """The likeliest one."""
+        return self.possible_legs[0]
 
 
 @dataclass(frozen=True, slots=True)
@@ -138,7 +144,7 @@ def _change(
         noticed=ended[alarm.run],
         after=ended[max(alarm.first - 1, 0)],
         before=ended[alarm.last],
-        leg=alarm.leg,
+        possible_legs=alarm.possible_legs,
         parameter=parameters[alarm.cause],
         change=alarm.change,
         sigma=alarm.sigma,

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from hexacell.change_detection.carried_posterior import CarriedPosterior
 from hexacell.change_detection.cumulative_sums import REFERENCE, CumulativeSums
-from hexacell.change_detection.leg_evidence import likeliest_leg
+from hexacell.change_detection.leg_evidence import possible_legs
 from hexacell.change_detection.run_evidence import RunEvidence
 from hexacell.change_detection.run_length import limit_for_run_length
 from hexacell.change_detection.step_location import StepGains, step_gains
@@ -50,7 +50,7 @@ class StepAlarm:
     Attributes:
         run: index of the run that alarmed.
         first, last: indices of the runs before the first and the last of which the step may have been.
-        leg: that changed.
+        possible_legs: of which one changed, the likeliest first; only one where that is certain.
         cause: index of its likeliest cause.
         change, sigma: of that, in its unit.
         other_legs: that changed as well, within the runs since.
@@ -59,11 +59,16 @@ class StepAlarm:
     run: int
     first: int
     last: int
-    leg: int
+    possible_legs: tuple[int, ...]
     cause: int
     change: float
     sigma: float
     other_legs: tuple[int, ...]
+
+    @property
+    def leg(self) -> int:
+        """The likeliest one."""
+        return self.possible_legs[0]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -124,7 +129,7 @@ class DriftWatch:
     def _located(self) -> StepAlarm:
         """Where the step was; the watch goes on from there."""
         gains = step_gains(self.before, self._since, self._causes.by_state)
-        place, leg, cause = self._likeliest(gains)
+        place, legs, cause = self._likeliest(gains)
         first, last = gains.likely_runs(cause)
         offset = self.unchanged_from
         self._begin_anew(place, cause)
@@ -132,20 +137,20 @@ class DriftWatch:
             run=self._runs - 1,
             first=offset + first,
             last=offset + last,
-            leg=leg,
+            possible_legs=legs,
             cause=cause,
             change=float(gains.changes[place, cause]),
             sigma=float(gains.sigmas[place, cause]),
-            other_legs=self._other_legs(leg),
+            other_legs=self._other_legs(legs),
         )
 
-    def _likeliest(self, gains: StepGains) -> tuple[int, int, int]:
-        """The run, the leg, and the cause of that leg."""
+    def _likeliest(self, gains: StepGains) -> tuple[int, tuple[int, ...], int]:
+        """The run, the possible legs, and the cause of the likeliest of them."""
         legs, place = self._causes.legs, gains.likeliest[0]
-        leg = likeliest_leg(np.sqrt(gains.gains[place]), gains.sigmas[place], legs)
-        of_leg = np.where(legs == leg, gains.gains, -1.0)
+        possible = possible_legs(np.sqrt(gains.gains[place]), gains.sigmas[place], legs)
+        of_leg = np.where(legs == possible[0], gains.gains, -1.0)
         at, cause = np.unravel_index(of_leg.argmax(), of_leg.shape)
-        return int(at), leg, int(cause)
+        return int(at), possible, int(cause)
 
     def _begin_anew(self, place: int, cause: int) -> None:
         before = self.before
@@ -158,11 +163,11 @@ class DriftWatch:
             self._posterior = self._posterior.after(run)
         self._sums = CumulativeSums.at_rest(len(self._causes.legs))
 
-    def _other_legs(self, leg: int) -> tuple[int, ...]:
+    def _other_legs(self, possible: tuple[int, ...]) -> tuple[int, ...]:
         """Those for which there is evidence of a step beside the one that was found."""
         gains = step_gains(self.before, self._since, self._causes.by_state).gains.max(axis=0)
         others = self._causes.legs[gains > OTHER_LEG_GAIN]
-        return tuple(sorted({int(one) for one in others} - {leg}))
+        return tuple(sorted({int(one) for one in others} - set(possible)))
 
 
 def watch_runs(runs: Iterable[RunEvidence], causes: Causes) -> WatchResult:

@@ -17,11 +17,27 @@ from hexacell.kinematics.rotations import Array
 USUAL_CHANGE = 0.1
 """mm; 0.05 and 0.5 name the same legs in nearly all cases."""
 
+CERTAIN = 0.99
+"""Probability that the leg which changed is among those that are named."""
+
 
 def likeliest_leg(scores: Array, sigmas: Array, legs: NDArray[np.int_]) -> int:
     """The leg that changed, by the scores (m,) of single causes, their sigmas and their legs (m,)."""
+    return possible_legs(scores, sigmas, legs)[0]
+
+
+def possible_legs(scores: Array, sigmas: Array, legs: NDArray[np.int_]) -> tuple[int, ...]:
+    """The legs of which one changed, the likeliest first: as few as have ``CERTAIN`` together."""
+    evidence = _evidence(scores, sigmas, legs)
+    ordered = sorted(evidence, key=evidence.__getitem__, reverse=True)
+    total = logsumexp(list(evidence.values()))
+    together = np.cumsum([np.exp(evidence[leg] - total) for leg in ordered])
+    return tuple(ordered[: 1 + int(np.searchsorted(together, CERTAIN))])
+
+
+def _evidence(scores: Array, sigmas: Array, legs: NDArray[np.int_]) -> dict[int, float]:
+    """Logarithm of the evidence for each leg."""
     with np.errstate(divide="ignore"):
         ratio = (USUAL_CHANGE / sigmas) ** 2
     evidence = 0.5 * (scores**2 * ratio / (1.0 + ratio) - np.log1p(ratio))
-    of_leg = {int(leg): float(logsumexp(evidence[legs == leg])) for leg in np.unique(legs)}
-    return max(of_leg, key=of_leg.__getitem__)
+    return {int(leg): float(logsumexp(evidence[legs == leg])) for leg in np.unique(legs)}

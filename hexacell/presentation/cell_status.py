@@ -12,6 +12,7 @@ from typing import Any
 from hexacell.application.cell_status import CellStatus
 from hexacell.application.history import PastRun
 from hexacell.decision import Verdict
+from hexacell.presentation.changes import legs_text
 from hexacell.presentation.history import error_text
 
 LONGEST_NAME = 22
@@ -78,7 +79,7 @@ def _lines(one: CellStatus) -> Iterator[str]:
     if one.drift.changes:
         last = one.drift.changes[-1]
         noticed = f"noticed on {last.noticed:%Y-%m-%d}"
-        yield f"  leg {last.leg} changed, {noticed}; hexacell history --drift tells more"
+        yield f"  leg {legs_text(last)} changed, {noticed}; hexacell history --drift tells more"
 
 
 def _document(one: CellStatus) -> dict[str, Any]:

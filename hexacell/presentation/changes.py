@@ -55,6 +55,11 @@ def _rate_words(rate: ParameterRate) -> str:
     return f"{rate.name} by {change:+.3f} +- {sigma:.3f} {rate.unit} in {TREND_DAYS:.0f} days"
 
 
+def legs_text(found: FoundChange) -> str:
+    """The leg that changed, or those of which one did."""
+    return " or ".join(map(str, found.possible_legs))
+
+
 def change_sentence(found: FoundChange) -> str:
     """A change that was found: which leg, by how much, when, and whether others changed as well."""
     unit = found.parameter.kind.unit.value
@@ -62,7 +67,7 @@ def change_sentence(found: FoundChange) -> str:
     size = f"{abs(found.change):.3f} +- {found.sigma:.3f} {unit}"
     rest = f"legs {others} moved as well" if len(found.other_legs) > 1 else f"leg {others} moved as well"
     return (
-        f"leg {found.leg} moved {size} (as {found.parameter.name} by {found.change:+.3f}) "
+        f"leg {legs_text(found)} moved {size} (as {found.parameter.name} by {found.change:+.3f}) "
         f"between {found.after:%Y-%m-%d %H:%M} and {found.before:%Y-%m-%d %H:%M}; "
         f"{rest if others else 'the others did not'}. Noticed {found.noticed:%Y-%m-%d}."
     )

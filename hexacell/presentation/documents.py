@@ -254,6 +254,7 @@ def drift_document(found: Sequence[ParameterTrend], watched: DriftHistory) -> di
 def _change_document(found: FoundChange) -> dict[str, Any]:
     return {
         "leg": found.leg,
+        "possible_legs": list(found.possible_legs),
         "after": found.after.isoformat(),
         "before": found.before.isoformat(),
         "noticed": found.noticed.isoformat(),

@@ -121,8 +121,10 @@ def test_alarms_are_right(told, say) -> None:
     say(f"  the crash of {CRASH_MM} mm, nights until noticed", f"{late}; {size}", "at most 3")
     assert crash.after < at <= crash.before
     assert 0 <= late <= 3
-    of_leg_2 = sum(one.leg == 2 for one in others)
+    of_leg_2 = sum(2 in one.possible_legs for one in others)
+    certain = sum(one.possible_legs == (2,) for one in others)
     say("  of the alarms of the drift name leg 2", f"{of_leg_2} of {len(others)}", "all")
+    say("    and no other one", f"{certain}", "")
     steady = [rate.name for rate in told.drift.rates if rate.is_steady]
     found = [one.leg for one in others]
     say("  the drift of leg 2: alarms; steady rates", f"{len(found)}; {', '.join(steady) or 'none'}", "one")

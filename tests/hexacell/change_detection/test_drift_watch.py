@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from hexacell.change_detection.drift_watch import DriftWatch, StepAlarm, alarm_limit, watch_runs
-from hexacell.change_detection.leg_evidence import likeliest_leg
+from hexacell.change_detection.leg_evidence import likeliest_leg, possible_legs
 from tests.hexacell.change_detection.synthetic_runs import CAUSES, LEGS, LinearRobot
 
 
@@ -78,3 +78,10 @@ def test_the_evidence_of_a_leg_is_that_of_all_its_parameters() -> None:
     assert likeliest_leg(np.array([5.0, 0, 0, 0, 0, 0]), sigmas, LEGS) == 1
     assert likeliest_leg(np.array([5.0, 0, 4.9, 4.9, 0, 0]), sigmas, LEGS) == 2
     assert likeliest_leg(np.array([5.0, 0, 0, 0, 0, 9.0]), np.where(LEGS == 3, np.inf, 0.01), LEGS) == 1
+
+
+def test_as_many_legs_are_named_as_it_may_be() -> None:
+    sigmas = np.full(6, 0.01)
+    assert possible_legs(np.array([9.0, 0, 0, 0, 0, 0]), sigmas, LEGS) == (1,)
+    assert possible_legs(np.array([5.0, 0, 4.9, 0, 0, 0]), sigmas, LEGS) == (1, 2)
+    assert possible_legs(np.zeros(6), sigmas, LEGS) == (1, 2, 3)

@@ -100,7 +100,8 @@ def test_a_leg_that_moved_is_told_with_the_night(cell, typed_here) -> None:
     assert set(document) == {"parameters", "runs", "temperatures_c", "changes", "shares_of_limit", "rates"}
     (change,) = document["changes"]
     assert set(change) == {
-        "leg", "after", "before", "noticed", "parameter", "unit", "change", "sigma", "other_legs",
+        "leg", "possible_legs", "after", "before", "noticed",
+        "parameter", "unit", "change", "sigma", "other_legs",
     }  # fmt: skip
     assert (change["leg"], change["before"]) == (4, "2026-03-06T02:30:00+00:00")
     json.dumps(document, allow_nan=False)

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from drivers.simulated import robot
-from procedures.calibration import workflow
+from procedures.calibration import measuring, workflow
 from procedures.run import events
 
 FREE: dict[str, Any] = {
@@ -52,7 +52,7 @@ def changed(section: Any, changes: dict[str, Any]) -> Any:
 def choose_among_few(patch: pytest.MonkeyPatch) -> None:
     """Choose among few poses, and move there in few pieces: what is chosen is not under test."""
     patch.setattr(workflow, "CANDIDATES", 64)
-    patch.setattr(workflow, "HELD_OUT_CANDIDATES", 128)
+    patch.setattr(measuring, "HELD_OUT_CANDIDATES", 128)
     patch.setattr(robot, "LINE_STEPS", 8)
 
 

@@ -8,7 +8,7 @@ narrowly, confirming ones follow, at the same points.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,6 +20,7 @@ from hexacell.experiment_design.validation_poses import select_near, select_vali
 from hexacell.identification.belief import RobotBelief
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.pose import Pose, PoseBatch
+from hexacell.kinematics.refused_commands import RefusedCommands
 from hexacell.kinematics.rotations import Array
 from hexacell.robot_model import Robot
 from procedures.run.steps import SixNumbers
@@ -110,3 +111,17 @@ class HeldOutPoses:
     def _commands(self, poses: PoseBatch) -> tuple[SixNumbers, ...]:
         commands = (self.robot.to_command(poses.pose(row)) for row in range(len(poses)))
         return tuple(command.as_tuple() for command in commands)
+
+
+def replacements(
+    refused: RefusedCommands,
+    references: Sequence[SixNumbers | None],
+    present: Sequence[Sequence[SixNumbers]],
+    others: Sequence[Sequence[SixNumbers]],
+) -> Iterator[tuple[SixNumbers, SixNumbers]]:
+    """The refused poses of each point with others of the same point that it does not have yet."""
+    for reference, poses, chosen in zip(references, present, others, strict=True):
+        if reference is not None and refused.allows(reference):
+            left_out = (pose for pose in poses if not refused.allows(pose))
+            new = (pose for pose in chosen if pose not in poses)
+            yield from zip(left_out, new, strict=False)

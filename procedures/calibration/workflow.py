@@ -11,7 +11,7 @@ uses hardware or files, so a run, its resumption and its replay decide alike.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from functools import cached_property
@@ -36,19 +36,13 @@ from hexacell.reporting.length_result import with_measured_scale
 from hexacell.reporting.result import AcceptedResult
 from hexacell.robot_model import Robot
 from hexacell.stated_effects import stated_effects
-from procedures.calibration.held_out_poses import HeldOutPoses, PosesByPoint
-from procedures.calibration.held_out_steps import HeldOutSteps
-from procedures.calibration.identification_steps import IdentificationSteps
-from procedures.calibration.length_steps import LengthSteps
-from procedures.calibration.noise_steps import NoiseSteps
-from procedures.calibration.set_steps import SetSteps
-from procedures.calibration.trial_steps import TrialSteps
+from procedures.calibration.held_out_poses import PosesByPoint, replacements
+from procedures.calibration.measuring import Measuring
 from procedures.run import events
 from procedures.run.state import RunState
 from procedures.run.steps import Compute, Phase, SixNumbers, Step
 
 CANDIDATES = 1024
-HELD_OUT_CANDIDATES = 2048
 
 
 class Mode(StrEnum):
@@ -58,24 +52,6 @@ class Mode(StrEnum):
     CHECK = "check"
     QUICK = "quick"
     LENGTH = "length"
-
-
-class _Measuring:
-    """What is measured, for the geometries that command one robot."""
-
-    def __init__(self, plan: Plan) -> None:
-        self.robot = plan.robot
-        self.plan = plan
-        sets = SetSteps(plan.robot)
-        trials = TrialSteps(plan.settings.stations.trial_mm, sets)
-        noise = NoiseSteps(plan.settings.noise, sets)
-        self.points = IdentificationSteps(
-            plan, sets, plan.settings.identification.provisional, noise, trials
-        )
-        self.held_out_poses = HeldOutPoses(plan.settings, plan.robot, HELD_OUT_CANDIDATES)
-        self.held_out = HeldOutSteps(len(plan.settings.verification.points), sets, trials)
-        fixture = plan.settings.length_check
-        self.length = None if fixture is None else LengthSteps(fixture, sets, trials)
 
 
 @dataclass(frozen=True, eq=False)
@@ -287,10 +263,10 @@ class Calibration:
         references = [poses[0] if poses else None for poses in found.held_out]
         if state.committed is None:
             others = self._at_start.held_out_poses.after(identified, found.held_out)
-            yield from _replacements(state, references, found.held_out, others)
+            yield from replacements(state.refused, references, found.held_out, others)
         if found.held_out_after:
             others = self.held_out_poses_after(identified, found.held_out)
-            yield from _replacements(state, references, found.held_out_after, others)
+            yield from replacements(state.refused, references, found.held_out_after, others)
 
     def _write_back(self, state: RunState) -> Step | None:
         if state.proposed is None:
@@ -317,7 +293,7 @@ class Calibration:
         steps = self._measuring(state).length
         return None if steps is None else steps.next_step(state)
 
-    def _measuring(self, state: RunState) -> _Measuring:
+    def _measuring(self, state: RunState) -> Measuring:
         """The steps for the geometry that the controller has now, and for those that it had."""
         if state.committed is None:
             return self._identifying(state)
@@ -331,15 +307,15 @@ class Calibration:
             return self.as_written(state.identified.result.identified(parameters)).geometry
         return Geometry.of(parameters, state.proposed.written)
 
-    def _commanded_by(self, written: Geometry) -> _Measuring:
+    def _commanded_by(self, written: Geometry) -> Measuring:
         """The steps once the controller has a geometry."""
         key = written.vector.tobytes()
         if key not in self._with_result:
             robot = self.robot.with_controller(written)
-            self._with_result[key] = _Measuring(self._calibrating(robot))
+            self._with_result[key] = Measuring(self._calibrating(robot))
         return self._with_result[key]
 
-    def _identifying(self, state: RunState) -> _Measuring:
+    def _identifying(self, state: RunState) -> Measuring:
         """The steps for the geometries that the controller has while the points are measured."""
         if state.provisional is None:
             return self._at_start
@@ -350,14 +326,14 @@ class Calibration:
                 uses_provisional=state.provisional_active,
             )
             plan = self._calibrating(robot)
-            self._with_provisional[state.provisional_active] = _Measuring(plan)
+            self._with_provisional[state.provisional_active] = Measuring(plan)
         return self._with_provisional[state.provisional_active]
 
     @cached_property
-    def _at_start(self) -> _Measuring:
+    def _at_start(self) -> Measuring:
         if self.mode in {Mode.CHECK, Mode.QUICK}:
-            return _Measuring((self.check if self.mode is Mode.CHECK else self.quick).plan)
-        return _Measuring(self._calibrating(self.robot_checked if self.mode is Mode.LENGTH else self.robot))
+            return Measuring((self.check if self.mode is Mode.CHECK else self.quick).plan)
+        return Measuring(self._calibrating(self.robot_checked if self.mode is Mode.LENGTH else self.robot))
 
     def _calibrating(self, robot: Robot) -> Plan:
         left_points = frozenset(self.removed.points)
@@ -374,12 +350,12 @@ class Calibration:
         return {}
 
     @cached_property
-    def _with_provisional(self) -> dict[bool, _Measuring]:
+    def _with_provisional(self) -> dict[bool, Measuring]:
         """By whether the provisional geometry, one in a run, commands now."""
         return {}
 
     @cached_property
-    def _with_result(self) -> dict[bytes, _Measuring]:
+    def _with_result(self) -> dict[bytes, Measuring]:
         """By the geometry that is written."""
         return {}
 
@@ -393,20 +369,6 @@ def _after_verdict(state: RunState, judged: events.ResultValidated) -> Step | No
         return Compute(kind="accept")
     is_kept = state.accepted is not None and state.accepted.by is not None
     return None if is_kept else Compute(kind="roll back")
-
-
-def _replacements(
-    state: RunState,
-    references: Sequence[SixNumbers | None],
-    present: Sequence[Sequence[SixNumbers]],
-    others: Sequence[Sequence[SixNumbers]],
-) -> Iterator[tuple[SixNumbers, SixNumbers]]:
-    """The refused poses of each point with others of the same point that it does not have yet."""
-    for reference, poses, chosen in zip(references, present, others, strict=True):
-        if reference is not None and state.refused.allows(reference):
-            refused = (pose for pose in poses if not state.refused.allows(pose))
-            new = (pose for pose in chosen if pose not in poses)
-            yield from zip(refused, new, strict=False)
 
 
 def geometry_of(applied: events.ProvisionalApplied, robot: Robot) -> Geometry:

@@ -257,7 +257,7 @@ def few_candidates(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("hexacell.campaign.feasibility.CANDIDATES", 8)
     monkeypatch.setattr("hexacell.campaign.feasibility.ROBOTS", 4)
     monkeypatch.setattr("procedures.calibration.workflow.CANDIDATES", 64)
-    monkeypatch.setattr("procedures.calibration.workflow.HELD_OUT_CANDIDATES", 128)
+    monkeypatch.setattr("procedures.calibration.measuring.HELD_OUT_CANDIDATES", 128)
 
 
 @dataclass

@@ -30,7 +30,7 @@ from drivers.simulated import cell as simulated_cell
 from drivers.simulated import robot
 from hexacell.cli.app import main
 from hexacell.plugins import Group, load
-from procedures.calibration import workflow
+from procedures.calibration import measuring, workflow
 from procedures.journal import journal
 from tests.faults.interception import Failing, intercepted
 from tests.faults.pulling import pull_out
@@ -89,7 +89,7 @@ def serve() -> None:
         (Group.CONFIG_FORMATS, "toml"),
     ):
         load(group, name)
-    workflow.CANDIDATES, workflow.HELD_OUT_CANDIDATES, robot.LINE_STEPS = 64, 64, 8
+    workflow.CANDIDATES, measuring.HELD_OUT_CANDIDATES, robot.LINE_STEPS = 64, 64, 8
     scipy.stats.qmc.Sobol(3).random(2)  # which reads a file that not everybody may read
     print("ready", flush=True)
     for line in sys.stdin:

@@ -1,0 +1,69 @@
+"""What the arguments of all commands are made of."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any, NoReturn
+
+from hexacell.errors import UsageError
+
+
+class Parser(argparse.ArgumentParser):
+    """A parser that raises instead of exiting, so that every error is reported in the same form.
+
+    Options cannot be abbreviated: an abbreviation that works today may be ambiguous tomorrow.
+    """
+
+    def __init__(self, **settings: Any) -> None:  # noqa: ANN401 - argparse's own settings
+        super().__init__(allow_abbrev=False, **settings)
+
+    def error(self, message: str) -> NoReturn:
+        """Raise ``UsageError`` with argparse's message."""
+        raise UsageError(message, action=f"Try `{self.prog} --help`")
+
+
+def add_parser(commands: Any, name: str, summary: str) -> Parser:  # noqa: ANN401 - argparse's own type is private
+    """Add a command, or one of a command, with a summary that is its description, too."""
+    parser: Parser = commands.add_parser(
+        name, help=summary, description=summary[0].upper() + summary[1:] + "."
+    )
+    return parser
+
+
+def add_command(commands: Any, name: str, summary: str, target: str = "") -> Parser:  # noqa: ANN401
+    """Add a command; ``target`` is its module and function in ``hexacell.cli.commands``."""
+    parser = add_parser(commands, name, summary)
+    parser.set_defaults(target=target or f"{name}.main")
+    return parser
+
+
+def add_cell(parser: Parser) -> None:
+    """Add the cell file."""
+    parser.add_argument("cell", type=Path, metavar="CELL", help="the cell file (TOML)")
+
+
+def add_json(parser: Parser) -> None:
+    """Add the choice of a JSON document."""
+    parser.add_argument(
+        "--json", action="store_true", help="one JSON document on stdout; text goes to stderr"
+    )
+
+
+def add_resume(parser: argparse.ArgumentParser, what: str) -> None:
+    """Add the run to resume, the latest one by default."""
+    parser.add_argument(
+        "--resume",
+        metavar="RUN",
+        nargs="?",
+        const="latest",
+        help=f"resume an interrupted {what}: its folder or name (default: the latest one)",
+    )
+
+
+def not_negative(text: str) -> int:
+    """A number that is not negative; raises ``ValueError``, of which argparse makes a message."""
+    number = int(text)
+    if number < 0:
+        raise ValueError
+    return number

@@ -1,0 +1,99 @@
+"""Arguments of the commands around unattended runs, and for cell files."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from hexacell.cli.arguments.commands import add_cell, add_command, add_json, add_parser, not_negative
+
+
+def add_operation_commands(commands: Any) -> None:  # noqa: ANN401 - argparse's own type is private
+    """Add those to the commands of a parser."""
+    _schedule(commands)
+    _status(commands)
+    _notify(commands)
+    _serve(commands)
+    _cell(commands)
+
+
+def _schedule(commands: Any) -> None:  # noqa: ANN401
+    parser = add_command(
+        commands, "schedule", "have a cell checked each day: systemd units or a crontab line"
+    )
+    add_cell(parser)
+    what = parser.add_mutually_exclusive_group()
+    what.add_argument("--daily", metavar="HH:MM", help="write the units: a run each day at this time")
+    what.add_argument("--show", action="store_true", help="show the units of this cell")
+    what.add_argument("--remove", action="store_true", help="remove them")
+    parser.add_argument(
+        "--mode",
+        choices=("check", "quick", "optimise"),
+        default="check",
+        help="check: change nothing (default); quick: correct what has drifted, optimise: recalibrate, "
+        "and apply only within the limits",
+    )
+    for option, default, meaning in (
+        ("--longest", 120, "stop a run in place after so long"),
+        ("--retry", 15, "wait before another try"),
+    ):
+        parser.add_argument(
+            option, type=int, default=default, metavar="MINUTES", help=f"{meaning} (default: %(default)s)"
+        )
+    parser.add_argument(
+        "--retries",
+        type=not_negative,
+        default=3,
+        metavar="N",
+        help="how often, where a device or the lock is not there (default: %(default)s)",
+    )
+    parser.add_argument("--on-failure", metavar="UNIT", help="unit that systemd starts after a failure")
+    parser.add_argument(
+        "--metrics", type=Path, metavar="FILE", help="write metrics of the cell there after each run"
+    )
+    parser.add_argument("--cron", action="store_true", help="print a crontab line instead")
+    parser.add_argument("--folder", type=Path, metavar="FOLDER", help="where the units are, if elsewhere")
+    add_json(parser)
+
+
+def _status(commands: Any) -> None:  # noqa: ANN401
+    parser = add_command(
+        commands, "status", "all cells at a glance: latest verdicts, what waits for a person"
+    )
+    parser.add_argument("cells", type=Path, nargs="*", metavar="CELL", help="cell files (TOML)")
+    parser.add_argument(
+        "--archive", metavar="URL", help="instead of cell files: all cells that share this archive"
+    )
+    parser.add_argument(
+        "--metrics", type=Path, metavar="FILE", help="write it as metrics for Prometheus' node exporter too"
+    )
+    add_json(parser)
+
+
+def _notify(commands: Any) -> None:  # noqa: ANN401
+    parser = add_command(commands, "notify", "who is told of unattended runs: list, try, send what waits")
+    add_cell(parser)
+    what = parser.add_mutually_exclusive_group()
+    what.add_argument("--test", action="store_true", help="tell everybody something now")
+    what.add_argument("--send", action="store_true", help="send what earlier runs could not")
+    add_json(parser)
+
+
+def _serve(commands: Any) -> None:  # noqa: ANN401
+    parser = add_command(commands, "serve", "serve the results of a cell by OPC UA until interrupted")
+    add_cell(parser)
+
+
+def _cell(commands: Any) -> None:  # noqa: ANN401
+    parser = add_command(commands, "cell", "validate or show a cell file, or print its schema")
+    actions = parser.add_subparsers(title="actions", metavar="ACTION", required=True, dest="action")
+    validate = add_parser(actions, "validate", "check it; every mistake with its line")
+    add_cell(validate)
+    add_json(validate)
+    schema = add_parser(
+        actions, "schema", "print the JSON Schema of cell files, for editors and other programs"
+    )
+    add_json(schema)
+    show = add_parser(actions, "show", "print it with defaults filled in, and the origin of each value")
+    add_cell(show)
+    add_json(show)

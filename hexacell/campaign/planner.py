@@ -204,9 +204,7 @@ class Plan:
         return planned_systematic_mm(self.robot, self.task, sets, self.earlier)
 
     @cached_property
-    def _last_out_of_reach(
-        self,
-    ) -> dict[tuple[Sequence[Record], frozenset[int], int | None], frozenset[int]]:
+    def _last_out_of_reach(self) -> dict[_Progress, frozenset[int]]:
         """Points that are not to be begun, by what that depends on."""
         return {}
 

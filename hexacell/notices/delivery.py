@@ -1,8 +1,9 @@
-"""Telling one notice to one address: by what its scheme says, tried again, within a bounded time."""
+"""Telling one notice to one address: by what its scheme says, tried again after a pause, in bounded time."""
 
 from __future__ import annotations
 
 import threading
+import time
 from collections.abc import Callable
 from queue import SimpleQueue
 
@@ -14,29 +15,35 @@ from hexacell.notices.notice import Notice
 from hexacell.notices.undelivered import NoticeUndelivered
 from hexacell.notices.webhook import post_to_webhook
 
-ATTEMPTS = 2
+PAUSES_S = (1.0, 4.0)
+"""Before another attempt: a service that is just being restarted is back after them."""
+
 TIMEOUT_S = 10.0
 """Of each wait within an attempt."""
 
-LONGEST_ATTEMPT_S = 25.0
-"""Of one attempt, also where a server answers a byte at a time."""
+LONGEST_ATTEMPT_S = 18.0
+"""Of one attempt, also where a server answers a byte at a time; all of them fit into a minute."""
 
 Sender = Callable[[NoticeAddress, Notice, float], None]
 
 
-def deliver(address: NoticeAddress, notice: Notice, longest_s: float = LONGEST_ATTEMPT_S) -> None:
-    """Tell it, at once or at the second attempt.
+def deliver(
+    address: NoticeAddress,
+    notice: Notice,
+    longest_s: float = LONGEST_ATTEMPT_S,
+    pause: Callable[[float], object] = time.sleep,
+) -> None:
+    """Tell it, at once or at another attempt after a ``pause``, s.
 
     Raises:
         NoticeUndelivered: with the reason of the last attempt.
     """
-    for left in reversed(range(ATTEMPTS)):
+    for pause_s in PAUSES_S:
         try:
             return _attempt(address, notice, longest_s)
         except NoticeUndelivered:
-            if not left:
-                raise
-    return None
+            pause(pause_s)
+    return _attempt(address, notice, longest_s)
 
 
 def _attempt(address: NoticeAddress, notice: Notice, longest_s: float) -> None:

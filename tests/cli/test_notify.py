@@ -16,8 +16,10 @@ TOKEN = "hidden-token-7"
 
 
 @pytest.fixture(autouse=True)
-def no_proxy(monkeypatch):
+def reached_at_once(monkeypatch):
+    """Servers on loopback, and again at once where they refuse."""
     monkeypatch.setenv("no_proxy", "127.0.0.1")
+    monkeypatch.setattr("hexacell.notices.delivery.PAUSES_S", (0.0, 0.0))
 
 
 def tell(folder, name: str, url: str, *lines: str) -> None:

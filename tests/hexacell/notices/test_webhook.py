@@ -6,7 +6,9 @@ import json
 
 import pytest
 
-from hexacell.notices.delivery import deliver
+from hexacell.application.telling_people import LONGEST_TELLING_S
+from hexacell.notices import delivery
+from hexacell.notices.delivery import LONGEST_ATTEMPT_S, PAUSES_S, deliver
 from hexacell.notices.notice import Notice
 from hexacell.notices.undelivered import NoticeUndelivered
 from tests.hexacell.notices.local_servers import (
@@ -18,11 +20,6 @@ from tests.hexacell.notices.local_servers import (
 from tests.hexacell.notices.notices import a_notice, an_address
 
 NOTICE = a_notice()
-
-
-@pytest.fixture(autouse=True)
-def no_proxy(monkeypatch):
-    monkeypatch.setenv("no_proxy", "127.0.0.1")
 
 
 def test_it_gets_the_whole_notice_and_its_id() -> None:
@@ -41,12 +38,26 @@ def test_a_token_is_sent_as_bearer() -> None:
     assert server.headers[0]["Authorization"] == "Bearer t0ken"
 
 
-def test_one_refusal_is_tried_again() -> None:
+def test_a_refusal_is_tried_again_after_pauses_that_grow(monkeypatch) -> None:
+    monkeypatch.setattr(delivery, "PAUSES_S", PAUSES_S)
     with webhook() as server:
-        server.statuses = [503, 204]
-        deliver(an_address(server.url), NOTICE)
-    assert len(server.bodies) == 2
-    assert server.headers[0]["Idempotency-Key"] == server.headers[1]["Idempotency-Key"]
+        answered: list[tuple[int, float]] = []
+        server.statuses = [503, 503, 204]
+        deliver(
+            an_address(server.url), NOTICE, pause=lambda seconds: answered.append((len(server.bodies), seconds))
+        )
+    assert answered == [(1, 1.0), (2, 4.0)]
+    assert len({headers["Idempotency-Key"] for headers in server.headers}) == 1
+    assert len(server.bodies) == 3
+
+
+def test_all_attempts_fit_into_what_a_run_waits_for_them() -> None:
+    assert (len(PAUSES_S) + 1) * LONGEST_ATTEMPT_S + sum(PAUSES_S) < LONGEST_TELLING_S
+
+
+def test_what_is_taken_at_once_pauses_for_nothing() -> None:
+    with webhook() as server:
+        deliver(an_address(server.url), NOTICE, pause=lambda _: pytest.fail("paused"))
 
 
 @pytest.mark.parametrize("status", [401, 404, 500])

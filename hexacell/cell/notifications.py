@@ -49,7 +49,9 @@ class NotificationSettings(Section):
         "or a chat service's address as apprise has it. One with a token in it belongs in password_file",
     )
     on: tuple[OccasionWord, ...] = Field(
-        USUAL_OCCASIONS, description="pass, no-pass, alarm, answer-needed, failure"
+        USUAL_OCCASIONS,
+        description="the runs that are told; no-pass are those with another verdict than a pass, failure "
+        "those without one",
     )
     topic: Text | None = Field(
         None, min_length=1, description="MQTT: below which state is kept; by default hexacell/NAME-OF-CELL"

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from typing import get_args
+
 import pytest
 from pydantic import ValidationError
 
 from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import load_cell
-from hexacell.cell.notifications import USUAL_OCCASIONS, NotificationSettings, Occasion
+from hexacell.cell.notifications import USUAL_OCCASIONS, NotificationSettings, Occasion, OccasionWord
 from hexacell.errors import FileError
 
 
@@ -55,6 +57,17 @@ def test_secrets_are_refused_and_not_shown(tmp_path, url, reason) -> None:
 def test_what_makes_no_sense_is_refused(settings) -> None:
     with pytest.raises(ValidationError):
         NotificationSettings.model_validate({"name": "one", "url": "mqtt://x"} | settings)
+
+
+def test_a_word_that_is_no_occasion_is_answered_with_each_that_is_once(tmp_path) -> None:
+    source = load_cell(bundled_config("simulated-hexaglide"))
+    path = tmp_path / source.path.name
+    path.write_text(f'{source.text}\n[[notifications]]\nname = "one"\nurl = "mqtt://x"\non = ["fail"]\n')
+    with pytest.raises(FileError) as raised:
+        load_cell(path)
+    for word in get_args(OccasionWord):
+        assert str(raised.value).count(f"'{word}'") == 1
+    assert str(raised.value).count("alarm") == 1
 
 
 def test_names_differ(tmp_path) -> None:

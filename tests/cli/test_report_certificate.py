@@ -82,6 +82,20 @@ def certificate(typed_here, run, tmp_path):
     return target
 
 
+def test_it_is_called_what_it_is(typed_here, run, tmp_path) -> None:
+    target = tmp_path / "certificate.xml"
+    outcome = typed_here("report", run, "--output", target)
+    assert outcome.out == f"{target}: Digital Calibration Certificate, PASS\n"
+
+
+def test_what_it_cannot_say_is_not_left_out_silently(typed_here, run, tmp_path) -> None:
+    target = tmp_path / "certificate.xml"
+    outcome = typed_here("report", run, "--output", target, "--compare", run)
+    assert outcome.code == 2
+    assert "a certificate compares nothing" in outcome.err
+    assert not target.exists()
+
+
 def local(element) -> str:
     return str(element.tag).rpartition("}")[2]
 

@@ -6,25 +6,33 @@ import argparse
 
 from hexacell.application.reported_run import ReportedRun, reported_run
 from hexacell.cli.console import Console
-from hexacell.errors import ExitCode
-from hexacell.presentation.calibration_certificate.certificate import certificate_of_run
+from hexacell.errors import ExitCode, UsageError
+from hexacell.presentation.calibration_certificate import certificate
 from hexacell.presentation.calibration_report.blocks import Report
 from hexacell.presentation.calibration_report.html import html_of
 from hexacell.presentation.calibration_report.pdf import pdf_of
 from hexacell.presentation.calibration_report.report import report_of
 from hexacell.storage.atomic_files import write_atomically
 
+CERTIFICATE = ".xml"
+"""How the name of a file ends that is to be one."""
+
 
 def main(options: argparse.Namespace) -> ExitCode:
     """Write the report; the run folder is only read, unless the report goes into it."""
     console = Console(options.json)
+    if options.compare is not None and options.output is not None and options.output.suffix == CERTIFICATE:
+        raise UsageError(
+            "a certificate compares nothing", action="Leave --compare away, or name a file that ends in .pdf"
+        )
     earlier = None if options.compare is None else reported_run(options.compare)
     run = reported_run(options.run)
     report = report_of(run, earlier)
     target = options.output or options.run / "report.html"
     write_atomically(target, _written(target.suffix, run, report))
     console.document({"report": str(target), "identifier": report.identifier, "verdict": report.verdict})
-    console.print(f"{target}: {report.title.lower()}, {report.verdict}")
+    title = certificate.TITLE if target.suffix == CERTIFICATE else report.title.lower()
+    console.print(f"{target}: {title}, {report.verdict}")
     return ExitCode.DONE
 
 
@@ -34,6 +42,6 @@ def _written(suffix: str, run: ReportedRun, report: Report) -> bytes:
         case ".pdf":
             return pdf_of(report)
         case ".xml":
-            return certificate_of_run(run)
+            return certificate.certificate_of_run(run)
         case _:
             return html_of(report).encode()

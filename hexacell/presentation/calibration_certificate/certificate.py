@@ -14,6 +14,7 @@ from hexacell.presentation.calibration_certificate.administration import (
 from hexacell.presentation.calibration_certificate.elements import DCC
 from hexacell.presentation.calibration_certificate.measurement import add_measurement_results
 
+TITLE = "Digital Calibration Certificate"
 SCHEMA_VERSION = "3.3.0"
 
 

@@ -4,7 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from hexacell.application.offline import PlanTrial
+from hexacell.application.calibration_run import new_calibration
+from hexacell.application.offline import PlanTrial, try_plan
+from hexacell.campaign.check_trial import CheckTrial, try_check
+from hexacell.campaign.dry_run import VisitedPose
+from hexacell.campaign.quick_trial import QuickTrial, try_quick_level
 from hexacell.campaign.removed_poses import (
     NOTHING_REMOVED,
     RemovedPose,
@@ -13,9 +17,13 @@ from hexacell.campaign.removed_poses import (
     require_enough,
 )
 from hexacell.cell.fields import Frozen, SixNumbers
+from hexacell.cell.loader import Cell
 from hexacell.cell.model import CellSettings
 from hexacell.errors import UsageError
 from hexacell.kinematics.pose import Pose
+from procedures.calibration.workflow import Mode
+
+ModeTrial = PlanTrial | CheckTrial | QuickTrial
 
 
 class PlannedPose(Frozen):
@@ -40,19 +48,44 @@ class PlanPreview(Frozen):
     expanded_mm: float | None = None
 
 
-def preview_of(trial: PlanTrial) -> PlanPreview:
+def try_mode(cell: Cell, mode: Mode, removed: RemovedPoses = NOTHING_REMOVED) -> ModeTrial:
+    """Carry out what a run of that mode would measure, on simulated robots; takes some seconds.
+
+    Raises:
+        UsageError: without what is removed too little is left, or the mode needs an accepted result.
+        FileError: the config, or the list of poses, cannot be read.
+    """
+    if mode not in {Mode.CHECK, Mode.QUICK}:
+        return try_plan(cell, removed)
+    require_enough(removed, len(cell.settings.identification.points))
+    calibration = new_calibration(cell, mode).without(removed)
+    return try_check(calibration.check) if mode is Mode.CHECK else try_quick_level(calibration.quick)
+
+
+def preview_of(trial: ModeTrial) -> PlanPreview:
     """The preview that a trial gives."""
-    result = trial.result
-    poses = (
-        PlannedPose(point=point, orientation=orientation, pose=pose.as_tuple())
-        for point, orientation, pose in result.visited
-    )
+    match trial:
+        case PlanTrial(result=result):
+            return PlanPreview(
+                poses=_planned(result.visited),
+                records=result.records,
+                minutes=result.minutes,
+                error_mm=result.worst_sigma_mm,
+                expanded_mm=result.expanded_mm,
+            )
+        case CheckTrial(error_mm=error):
+            pass
+        case QuickTrial(accuracy=accuracy):
+            error = None if accuracy is None else accuracy.error_mm
     return PlanPreview(
-        poses=tuple(poses),
-        records=result.records,
-        minutes=result.minutes,
-        error_mm=result.worst_sigma_mm,
-        expanded_mm=result.expanded_mm,
+        poses=_planned(trial.visited), records=len(trial.visited), minutes=trial.minutes, error_mm=error
+    )
+
+
+def _planned(visited: tuple[VisitedPose, ...]) -> tuple[PlannedPose, ...]:
+    return tuple(
+        PlannedPose(point=point, orientation=orientation, pose=pose.as_tuple())
+        for point, orientation, pose in visited
     )
 
 

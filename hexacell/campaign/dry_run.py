@@ -31,6 +31,9 @@ from hexacell.virtual_robot import VirtualRobot, robots_within_tolerances
 ROBOTS = 2
 MOST_TRIED = 6
 
+VisitedPose = tuple[int, int, Pose]
+"""Point, orientation at it, and where that is."""
+
 
 @dataclass(eq=False)
 class VirtualCampaign:
@@ -57,6 +60,11 @@ class VirtualCampaign:
     def measurements(self) -> MeasurementSet:
         """The records taken so far."""
         return self.state.measurements
+
+    @property
+    def visited(self) -> tuple[VisitedPose, ...]:
+        """The poses of these records, in their order."""
+        return tuple((one.point, one.orientation, one.pose) for one in self.measurements.records)
 
     def carry_out(self) -> None:
         """Carry out all that the plan decides.
@@ -161,7 +169,7 @@ class DryRunResult:
     minutes: float
     expanded_mm: float | None = None
     verdicts: VerdictForecast | None = None
-    visited: tuple[tuple[int, int, Pose], ...] = ()
+    visited: tuple[VisitedPose, ...] = ()
 
 
 def dry_run(plan: Plan, robots: int = ROBOTS) -> DryRunResult:
@@ -230,7 +238,5 @@ def _summary(plan: Plan, tried: int, identified: list[_Outcome]) -> DryRunResult
         + after,
         expanded_mm=median(expanded) if expanded else None,
         verdicts=VerdictForecast.mean(verdicts) if verdicts else None,
-        visited=tuple(
-            (one.point, one.orientation, one.pose) for one in identified[0].campaign.measurements.records
-        ),
+        visited=identified[0].campaign.visited,
     )

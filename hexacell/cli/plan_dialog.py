@@ -4,22 +4,22 @@ from __future__ import annotations
 
 import sys
 
-from hexacell.application.offline import try_plan
-from hexacell.application.plan_draft import PlanDraft, preview_of
+from hexacell.application.plan_draft import PlanDraft, preview_of, try_mode
 from hexacell.campaign.removed_poses import RemovedPoses
 from hexacell.cell.loader import Cell
 from hexacell.cli.console import Console
 from hexacell.errors import AnswerNeeded, UsageError
 from hexacell.presentation.layout import wrapped
-from hexacell.presentation.plan_draft import REQUEST, plan_rows, removed_text
-from hexacell.presentation.planning import TRYING_PLAN, plan_trial_lines
+from hexacell.presentation.plan_draft import REQUEST, mode_trial_lines, plan_rows, removed_text
+from hexacell.presentation.planning import TRYING_PLAN
+from procedures.calibration.workflow import Mode
 
 
 class PlanDialog:
-    """Asks until the person is content with the plan of a cell."""
+    """Asks until the person is content with what a run of some mode would measure on a cell."""
 
-    def __init__(self, cell: Cell, console: Console) -> None:
-        self._cell, self._console = cell, console
+    def __init__(self, cell: Cell, mode: Mode, console: Console) -> None:
+        self._cell, self._mode, self._console = cell, mode, console
 
     def choose(self) -> RemovedPoses:
         """What is taken out.
@@ -59,7 +59,7 @@ class PlanDialog:
         """The draft once its plan was tried; without one, that of the whole plan."""
         self._console.print(TRYING_PLAN)
         removed = RemovedPoses() if draft is None else draft.removed
-        trial = try_plan(self._cell, removed)
+        trial = try_mode(self._cell, self._mode, removed)
         preview = preview_of(trial)
         if draft is None and not preview.poses:
             raise UsageError(
@@ -67,7 +67,7 @@ class PlanDialog:
             )
         whole = draft or PlanDraft(self._cell.settings, preview, preview)
         after = whole.after(preview, removed) if preview.poses else whole
-        for line in filter(None, (*plan_trial_lines(trial), removed_text(after))):
+        for line in filter(None, (*mode_trial_lines(trial), removed_text(after))):
             self._console.print(wrapped(line))
         return after
 

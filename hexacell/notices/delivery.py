@@ -1,4 +1,4 @@
-"""Telling one notice to one address: by what its scheme says, tried again after a pause, in bounded time."""
+"""Telling one notice to one address: by what its scheme says, tried again after pauses, in bounded time."""
 
 from __future__ import annotations
 

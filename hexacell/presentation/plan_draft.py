@@ -2,9 +2,16 @@
 
 from __future__ import annotations
 
-from hexacell.application.plan_draft import PlanDraft, PlanPreview
+from collections.abc import Iterator
+
+from hexacell.application.offline import PlanTrial
+from hexacell.application.plan_draft import ModeTrial, PlanDraft, PlanPreview
+from hexacell.campaign.check_trial import CheckTrial
+from hexacell.campaign.quick_trial import QuickTrial
 from hexacell.campaign.removed_poses import NOTHING_REMOVED, RemovedPoses
 from hexacell.presentation.layout import duration
+from hexacell.presentation.planning import plan_trial_lines
+from hexacell.presentation.quick_level import check_trial_text, quick_trial_text
 
 REQUEST = (
     "Type what to take out, or to put back: a point (3), a pose (3.2), one that is out (r1).\n"
@@ -12,6 +19,17 @@ REQUEST = (
 )
 OUT = "OUT"
 """Before what is left out."""
+
+
+def mode_trial_lines(trial: ModeTrial) -> Iterator[str]:
+    """What a run is expected to give."""
+    match trial:
+        case PlanTrial():
+            yield from plan_trial_lines(trial)
+        case CheckTrial():
+            yield check_trial_text(trial)
+        case QuickTrial():
+            yield quick_trial_text(trial)
 
 
 def plan_rows(draft: PlanDraft) -> tuple[tuple[str, str], ...]:

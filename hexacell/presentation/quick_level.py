@@ -1,9 +1,10 @@
-"""Text for the quick level: what it starts from, how well it knows the robot, and what more would give."""
+"""Text for the quick level and for checks: what they start from, what they give, and what more would."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
+from hexacell.campaign.check_trial import CheckTrial
 from hexacell.campaign.quick_level import QuickAccuracy
 from hexacell.campaign.quick_trial import QuickTrial
 from hexacell.presentation.layout import duration, wrapped
@@ -50,4 +51,19 @@ def quick_trial_text(trial: QuickTrial) -> str:
         f"{trial.accuracy.records} records at {trial.points} points, in about {duration(trial.minutes)}, "
         "and then the held-out poses as after a calibration. Expected of a robot that drifted as "
         f"drift_per_parameter_mm in [check] states: {quick_accuracy_sentences(trial.accuracy)}"
+    )
+
+
+def check_trial_text(trial: CheckTrial) -> str:
+    """What a check is expected to take and to give."""
+    if not trial.records:
+        return "No simulated robot that drifted as stated could be measured: a check may fail."
+    error = (
+        "" if trial.error_mm is None else f"; {trial.error_mm:.3f} mm at the worst task pose (one sigma)"
+    )
+    measured = f"{trial.records} records at {trial.points} points"
+    return (
+        f"A check: {measured}, in about {duration(trial.minutes)}{error}. That is of a robot "
+        "that drifted as drift_per_parameter_mm in [check] states; it takes more where the error is "
+        "near the limit."
     )

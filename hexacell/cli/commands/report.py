@@ -23,7 +23,8 @@ def main(options: argparse.Namespace) -> ExitCode:
     console = Console(options.json)
     if options.compare is not None and options.output is not None and options.output.suffix == CERTIFICATE:
         raise UsageError(
-            "a certificate compares nothing", action="Leave --compare away, or name a file that ends in .pdf"
+            "a certificate compares nothing",
+            action="Leave --compare away, or name a file that ends in .pdf",
         )
     earlier = None if options.compare is None else reported_run(options.compare)
     run = reported_run(options.run)

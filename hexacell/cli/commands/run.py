@@ -86,7 +86,7 @@ def _removed(request: RunRequest, console: Console) -> RemovedPoses:
         raise UsageError("the plan of a run that is resumed stays as it was", action="Leave --plan away")
     if request.unattended:
         raise UsageError("--plan needs somebody at a terminal", action="Leave it away")
-    return PlanDialog(request.cell, console).choose()
+    return PlanDialog(request.cell, request.mode, console).choose()
 
 
 def length(options: argparse.Namespace) -> ExitCode:

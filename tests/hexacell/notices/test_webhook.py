@@ -44,7 +44,9 @@ def test_a_refusal_is_tried_again_after_pauses_that_grow(monkeypatch) -> None:
         answered: list[tuple[int, float]] = []
         server.statuses = [503, 503, 204]
         deliver(
-            an_address(server.url), NOTICE, pause=lambda seconds: answered.append((len(server.bodies), seconds))
+            an_address(server.url),
+            NOTICE,
+            pause=lambda seconds: answered.append((len(server.bodies), seconds)),
         )
     assert answered == [(1, 1.0), (2, 4.0)]
     assert len({headers["Idempotency-Key"] for headers in server.headers}) == 1

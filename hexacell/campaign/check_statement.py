@@ -119,9 +119,12 @@ def is_final(verdict: Verdict) -> bool:
 
 
 def guarded_verdict(likeliest: TaskErrors, guarded: TaskErrors, limits: ErrorLimits) -> Verdict:
-    """The verdict by the likeliest errors; a pass holds for the guarded ones as well."""
-    verdict = limits.decide(likeliest)
-    if verdict is Verdict.PASS and limits.decide(guarded) is not Verdict.PASS:
+    """The verdict by the likeliest errors; a pass holds for the guarded ones as well.
+
+    These are already those of a robot that drifted more than it is likely to: of them a pass keeps U alone.
+    """
+    verdict, with_u_alone = limits.decide(likeliest), replace(limits, guard_band_factor=1.0)
+    if verdict is Verdict.PASS and with_u_alone.decide(guarded) is not Verdict.PASS:
         return Verdict.CONDITIONAL_PASS
     return verdict
 

@@ -105,7 +105,7 @@ class AcceptanceSettings(Section):
     position_mm: Positive = Field(0.15, description="largest position error at the task poses")
     orientation_deg: Positive = Field(0.05, description="largest orientation error at the task poses")
     guard_band_factor: float = Field(
-        1.0, ge=1.0, le=3.0, description="a pass keeps this times U from the limits; 1.5 is three sigma"
+        1.5, ge=1.0, le=3.0, description="a pass keeps this times U from the limits; 1.5 is three sigma"
     )
     largest_change_mm: Positive = Field(15.0, description="of a parameter, if no person approves")
     drift_mm: Positive = Field(0.1, description="of a point's reference, from its zeroing to its end")

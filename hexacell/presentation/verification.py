@@ -76,13 +76,20 @@ def _errors(accuracy: VerifiedAccuracy | None) -> list[str]:
     return [
         _error(f"largest position error at {accuracy.poses} {what}", accuracy.position, "mm"),
         _error("largest orientation error there", accuracy.orientation, "deg"),
+        *_guard_band(accuracy),
     ]
 
 
 def _error(what: str, error: JudgedError, unit: str) -> str:
     """U is the expanded uncertainty."""
-    stated = f"{error.value:.3f} {unit}, U {error.expanded:.3f} ({error.rule})"
+    stated = f"{error.value:.3f} {unit}, U {error.expanded:.3f} (limit {error.limit:g})"
     return f"  {what}: {stated}"
+
+
+def _guard_band(accuracy: VerifiedAccuracy) -> list[str]:
+    """What a verdict keeps from the limits, where value and U do not tell why it is no pass."""
+    told = [error for error in (accuracy.position, accuracy.orientation) if error.guard_band]
+    return [f"  a pass and a fail keep {told[0].guard_band} from the limit"] if told else []
 
 
 def _comparison(verified: Verification) -> list[str]:

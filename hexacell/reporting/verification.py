@@ -55,10 +55,15 @@ class JudgedError(Frozen):
         )
 
     @property
-    def rule(self) -> str:
-        """The limit, and the guard band where it is not U, for people."""
+    def guard_band(self) -> str:
+        """As a multiple of U, for people; empty where it is U, or the limit is passed."""
         factor = self.guard_band_factor
-        guard_band = "" if factor == 1.0 else f", guard band {factor:g} U"
+        return "" if factor == 1.0 or self.verdict is Verdict.PASS else f"{factor:g} U"
+
+    @property
+    def rule(self) -> str:
+        """The limit, and the guard band where it is told."""
+        guard_band = f", guard band {self.guard_band}" if self.guard_band else ""
         return f"limit {self.limit:g}{guard_band}"
 
 

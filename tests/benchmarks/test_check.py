@@ -36,8 +36,8 @@ Say = Callable[[str, str, str], None]
 pytestmark = pytest.mark.benchmark
 
 RUNS = int(os.environ.get("RUNS", "8"))
-LIMIT_MM = 0.15
-LIMITS = ErrorLimits(LIMIT_MM, 0.05)
+LIMITS = ErrorLimits.of(load_cell(bundled_config("simulated-hexaglide")).settings.acceptance)
+LIMIT_MM = LIMITS.position_mm
 DRIFT_MM = 0.02
 BUDGET = 40
 SIGMAS = 3.0

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from hexacell.campaign.teaching import as_written
 from hexacell.cell.loader import Cell
 from hexacell.cell.model import CellSettings
 from hexacell.controller_config.interface import ControllerGeometry
+from hexacell.errors import LimitError
 from hexacell.identification.estimator import identify
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.geometry import Geometry
@@ -22,9 +23,10 @@ from hexacell.reporting.verification import HeldOut, Verification, verify
 from hexacell.robot_model import Robot, make_robot
 from hexacell.virtual_robot import VirtualRobot, random_robot
 from procedures.calibration.held_out_poses import HeldOutPoses
+from procedures.run.steps import SixNumbers
 
-HELD_OUT_FROM = 100
-"""Points of the held-out records, which are of no other records."""
+HELD_OUT_FROM, AFTER_FROM, CONFIRMING_FROM = 100, 200, 300
+"""Points of the held-out records before and after, and of the confirming ones: of no other records."""
 
 CANDIDATES = 512
 
@@ -82,9 +84,73 @@ def calibrate(cell: Cell, robot: Robot, truth: Geometry, random: np.random.Gener
     found = identify(measured.problem(campaign.measurements))
     written = as_written(cell.settings, robot, found.geometry).geometry
     after = make_robot(cell.settings, ControllerGeometry(written, robot.branch), taught=written)
-    held_out = measured_held_out(cell.settings, found, after, VirtualRobot(after, truth, random))
-    verification = verify(cell.settings, after, found, held_out)
+    verification = verification_of(cell.settings, found, (robot, after), (truth, random))
     return VirtualCalibration(found, after, verification, len(campaign.measurements))
+
+
+def verification_of(
+    settings: CellSettings,
+    found: Identification,
+    robots: tuple[Robot, Robot],
+    actual: tuple[Geometry, np.random.Generator],
+) -> Verification:
+    """What a run states of a result: held-out poses before and after, and new ones after a narrow failure.
+
+    Args:
+        robots: with the controller's geometry of before, and with the result in it.
+        actual: the robot's geometry, and the source of all noise.
+
+    Raises:
+        HexacellError: a run would end with this message.
+    """
+    before, after = robots
+    common = HeldOutPoses(settings, before, CANDIDATES).before(found)
+    chosen = HeldOutPoses(settings, after, CANDIDATES)
+    wide = chosen.after(found, common)
+    old = _visited(VirtualRobot(before, *actual), common, HELD_OUT_FROM)
+    both = [first + more for first, more in zip(common, wide, strict=True)]
+    new = _visited(VirtualRobot(after, *actual), both, AFTER_FROM)
+    if not _keeps_travel(before, old):
+        raise LimitError("the ball left the gauges' travel at a held-out pose")
+    compared = [one for one in new if one.orientation <= len(common[one.point - AFTER_FROM])]
+    held_out = HeldOut(
+        MeasurementSet((*old, *new)),
+        _deviations(old),
+        _deviations(compared),
+        left_travel=not _keeps_travel(after, new),
+    )
+    verified = verify(settings, after, found, held_out)
+    if not verified.needs_confirmation:
+        return verified
+    poses = chosen.confirming(found, common, wide)
+    confirming = MeasurementSet(tuple(_visited(VirtualRobot(after, *actual), poses, CONFIRMING_FROM)))
+    return (
+        verify(settings, after, found, replace(held_out, confirming=confirming)) if confirming else verified
+    )
+
+
+def _visited(virtual: VirtualRobot, points: Sequence[Sequence[SixNumbers]], first: int) -> list[Record]:
+    """The records of some poses at each point, numbered from the ``first``; none of a point that is left.
+
+    Raises:
+        ReachError: it cannot take one of them.
+    """
+    records: list[Record] = []
+    for number, poses in enumerate(points, start=first):
+        virtual.zero_gauges()
+        for orientation, pose in enumerate(poses, start=1):
+            virtual.place(Pose(*pose))
+            records.append(virtual.measure(number, orientation))
+    return records
+
+
+def _deviations(records: Sequence[Record]) -> list[tuple[float, float, float]]:
+    """At all poses but the references."""
+    return [record.deviation for record in records if record.orientation > 1]
+
+
+def _keeps_travel(robot: Robot, records: Sequence[Record]) -> bool:
+    return bool(robot.limits.room.holds(np.array([record.deviation for record in records])).all())
 
 
 def measured_held_out(
@@ -104,5 +170,5 @@ def measured_held_out(
         for orientation, pose in enumerate(poses, start=1):
             virtual.place(Pose(*pose))
             records.append(virtual.measure(number, orientation))
-    deviations = [record.deviation for record in records if record.orientation > 1]
+    deviations = _deviations(records)
     return HeldOut(MeasurementSet(tuple(records)), deviations, deviations)

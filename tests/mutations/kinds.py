@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import random
 
-from tests.mutations import trials
+from tests.mutations import trials, unattended
 from tests.mutations.prompts import answers_to_prompts
 from tests.mutations.trials import Trial
 
 SHARES: dict[Trial, int] = {
-    trials.cell_file: 700,
+    trials.cell_file: 600,
     trials.config: 140,
     trials.odd_cell_file: 10,
     trials.records: 60,
@@ -20,6 +20,9 @@ SHARES: dict[Trial, int] = {
     trials.run_resumed: 10,
     trials.run_checked: 5,
     answers_to_prompts: 5,
+    unattended.cell_file_scheduled: 60,
+    unattended.earlier_runs_listed: 30,
+    unattended.run_reported: 10,
 }
 """How many of a thousand trials are of which kind; those that compute much are rarer."""
 

@@ -12,7 +12,13 @@ import pytest
 
 from hexacell.campaign import feasibility
 from hexacell.cell.bundled import bundled_config
+from hexacell.cell.certificates import CertificateSettings, ReportSettings
+from hexacell.cell.devices import ThermometerSettings
 from hexacell.cell.loader import dump, load_cell
+from hexacell.cell.model import CellSettings
+from hexacell.cell.notifications import NotificationSettings
+from hexacell.cell.opcua import OpcUaSettings
+from hexacell.cell.unattended import UnattendedSettings
 from hexacell.cli.app import main
 from procedures.journal.journal import read_entries
 from procedures.journal.line_format import encode
@@ -27,6 +33,13 @@ QUICK: dict[str, Any] = {
     "encoders.heartbeat_ms": 10_000,
     "simulation.motion.ringing_mm": 0.05,
 }
+CERTIFICATE = {"number": "D-K 4711", "due": "2027-03-31", "expanded_um": 1.2}
+REPORT = {"machine": "HX 3", "serial_number": "0017", "laboratory": "Hall 4", "country": "DE"}
+TOLD = (
+    {"name": "night shift", "url": "https://127.0.0.1:9/path", "on": ("no-pass", "alarm")},
+    {"name": "broker", "url": "mqtts://127.0.0.1:9", "topic": "cells/one", "ca_file": "ca.pem"},
+    {"name": "office", "url": "mailto://127.0.0.1:9?from=a@b.example&to=c@d.example"},
+)
 LATE = ("propose", "commit", "judge")
 
 
@@ -54,7 +67,28 @@ def make_templates(folder: Path) -> Templates:
     shutil.copy(source, plain / CELL)
     shutil.copy(source.with_name(CONFIG), plain / CONFIG)
     shutil.copy(small / RECORDS, plain / RECORDS)
-    return Templates(plain, small, tuple(_interrupted(small, folder / step, step) for step in LATE))
+    furnished = folder / "furnished"
+    shutil.copytree(plain, furnished)
+    settings = load_cell(furnished / CELL).settings
+    (furnished / CELL).write_text(dump(changed(settings, _every_section(settings))))
+    return Templates(
+        plain, small, furnished, tuple(_interrupted(small, folder / step, step) for step in LATE)
+    )
+
+
+def _every_section(settings: CellSettings) -> dict[str, Any]:
+    """What a cell file may have beside the bundled one's sections, by dotted keys."""
+    certificate = CertificateSettings.model_validate(CERTIFICATE)
+    gauges = tuple(gauge.model_copy(update={"certificate": certificate}) for gauge in settings.gauges)
+    return {
+        "gauges": gauges,
+        "thermometers": (ThermometerSettings(name="room", path="/sys/class/hwmon/none", legs=(4,)),),
+        "unattended": UnattendedSettings(quiet_hours=("05:30-22:00",), longest_minutes=90.0),
+        "notifications": tuple(NotificationSettings.model_validate(one) for one in TOLD),
+        "opcua": OpcUaSettings(anonymous=True),
+        "report": ReportSettings.model_validate(REPORT),
+        "acceptance.valid_days": 90.0,
+    }
 
 
 def _small(folder: Path) -> Path:

@@ -24,11 +24,13 @@ class Templates:
     Attributes:
         plain: the bundled cell, with a measurement file.
         small: a cell that is calibrated quickly, with a complete run.
-        interrupted: the same cell with runs that were interrupted late.
+        furnished: the bundled cell with every section that a cell file may have.
+        interrupted: the small cell with runs that were interrupted late.
     """
 
     plain: Path
     small: Path
+    furnished: Path
     interrupted: tuple[Path, ...]
 
 
@@ -41,7 +43,8 @@ def _rewrite(path: Path, data: bytes) -> None:
 
 def cell_file(templates: Templates, place: Place, draw: random.Random) -> Attempt:
     """A cell file that is validated or shown."""
-    place.refill(draw.choice((templates.plain, templates.small)), templates.small)
+    sound = (templates.plain, templates.small, templates.furnished)
+    place.refill(draw.choice(sound), templates.small)
     path = place.cell / CELL
     _rewrite(path, mutated(path.read_bytes(), TOML, draw))
     action = draw.choice((["validate"], ["validate", "--json"], ["show"], ["show", "--json"]))

@@ -38,6 +38,15 @@ def test_a_pass_holds_for_both_estimates() -> None:
     assert verdict(sure, unsure) is Verdict.CONDITIONAL_PASS
 
 
+def test_of_the_guarded_errors_a_pass_keeps_u_alone() -> None:
+    """They are those of a larger drift already; the likeliest ones keep the whole guard band."""
+    wide = replace(LIMITS, guard_band_factor=1.5)
+    sure, unsure = at_one_pose(sigma=0.03), at_one_pose(sigma=0.05)
+    assert wide.decide(unsure.errors) is not Verdict.PASS
+    assert guarded_verdict(sure.errors, unsure.errors, wide) is Verdict.PASS
+    assert guarded_verdict(unsure.errors, unsure.errors, wide) is not Verdict.PASS
+
+
 def test_a_fail_needs_the_likeliest_only() -> None:
     bad, unsure = at_one_pose((0.3, 0.0, 0.0), 0.03), at_one_pose((0.2, 0.0, 0.0), 0.1)
     assert verdict(bad, unsure) is Verdict.FAIL

@@ -136,7 +136,7 @@ def test_the_probabilities_are_of_all_verdicts(forecast) -> None:
 def test_95_percent_pass_the_limits_that_are_proposed(cell, forecast) -> None:
     stated = stated_errors(cell.found, cell.updated, cell.first, cell.second)
     far = 100.0 * forecast.passing.orientation_deg
-    told = forecast_verdicts(stated, cell.second, ErrorLimits(forecast.passing.position_mm, far))
+    told = forecast_verdicts(stated, cell.second, replace(forecast.passing, orientation_deg=far))
     assert told.probabilities[Verdict.PASS] == pytest.approx(0.95 * 0.997, abs=0.003)
     assert not told.is_wanted  # by the tests of the model
     wide = forecast_verdicts(stated, cell.second, ErrorLimits(far, far))

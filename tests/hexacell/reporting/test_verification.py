@@ -165,9 +165,8 @@ def test_the_outcome_says_what_was_used_the_error_and_the_verdict(cell, result, 
 def test_a_stricter_limit_gives_a_conditional_verdict(cell, result, held_out):
     stated = verified_by(cell, result, held_out()).accuracy
     assert stated is not None
-    limit = stated.position.value + 0.5 * stated.position.expanded
-    strict = cell.settings.acceptance.model_copy(
-        update={"position_mm": max(limit, stated.position.expanded)}
-    )
+    guard_band = stated.position.guard_band_factor * stated.position.expanded
+    limit = max(stated.position.value + 0.5 * guard_band, guard_band)
+    strict = cell.settings.acceptance.model_copy(update={"position_mm": limit})
     settings = cell.settings.model_copy(update={"acceptance": strict})
     assert verified_by(replace(cell, settings=settings), result, held_out()).verdict.is_conditional

@@ -33,6 +33,7 @@ AIM_MM = 2.5
 
 HELD_OUT = 6
 HELD_OUT_CANDIDATES = 64
+HELD_OUT_SEED, CONFIRMING_SEED = 100, 1_000_100
 
 
 class UnreachableError(Exception):
@@ -48,6 +49,7 @@ class Setting:
         commands: of the campaign, through the controller's geometry.
         task: poses of the task, and across the workspace.
         held_out: poses that are commanded through whatever geometry is written.
+        confirming: others at the same points, where a test of the model fails narrowly.
     """
 
     cell: Cell
@@ -56,6 +58,7 @@ class Setting:
     commands: Commands
     task: Task
     held_out: Commands
+    confirming: Commands
 
 
 @lru_cache
@@ -95,7 +98,8 @@ def setting(number: int) -> Setting:
         truth,
         Commands(PoseBatch.concatenate(parts), np.array(labels)),
         task,
-        _held_out(cell, belief, robot, number),
+        _held_out(cell, belief, robot, HELD_OUT_SEED + number),
+        _held_out(cell, belief, robot, CONFIRMING_SEED + number),
     )
 
 
@@ -110,16 +114,16 @@ def _truth(cell: Cell, robot: Robot, number: int) -> Geometry:
     return robot.mechanism.normalize_frames(geometry)[0]
 
 
-def _held_out(cell: Cell, belief, robot: Robot, number: int) -> Commands:
+def _held_out(cell: Cell, belief, robot: Robot, seed: int) -> Commands:
     """Random orientations at the points of the verification."""
     own = replace(belief, controller=belief.estimate)
-    turns: Array = orientations(HELD_OUT_CANDIDATES, belief.limits.tilt, 100 + number)
+    turns: Array = orientations(HELD_OUT_CANDIDATES, belief.limits.tilt, seed)
     parts, labels = [], []
     for place, point in enumerate(cell.settings.verification.points, start=1):
         position = robot.from_commands([Pose(*point)]).positions[0]
         _, commands = reachable(own, PoseBatch.at(position, np.concatenate([np.eye(3)[None], turns])))
         if len(commands) < HELD_OUT:
-            raise UnreachableError(f"robot {number} cannot take the held-out poses")
+            raise UnreachableError("the robot cannot take the held-out poses")
         parts.append(commands[:HELD_OUT])
         labels += [(place, turn) for turn in range(1, HELD_OUT + 1)]
     return Commands(PoseBatch.concatenate(parts), np.array(labels))

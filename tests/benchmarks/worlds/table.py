@@ -56,9 +56,9 @@ class Totals:
         return sum(one.is_false_pass for one in self.outcomes)
 
     @property
-    def false_passes_of_three_sigma(self) -> int:
-        """How many of these would pass with a guard band of 1.5 U."""
-        return sum(one.is_false_pass_of_three_sigma for one in self.outcomes)
+    def false_passes_with_u(self) -> int:
+        """How many would pass falsely with a guard band of U alone."""
+        return sum(one.is_false_pass_with_u for one in self.outcomes)
 
     @property
     def wrongly_named(self) -> int:

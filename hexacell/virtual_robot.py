@@ -66,6 +66,13 @@ class VirtualRobot:
         can_take: Mask = self.margins(commands) >= self._least_margin
         return can_take
 
+    def can_stand(self, commands: PoseBatch) -> Mask:
+        """Which of n commands it can take with its passive joints and legs within their limits."""
+        actual, stands = self.actual_poses(commands), self.can_take(commands)
+        poses, joints = actual.poses[stands], actual.joints[stands]
+        stands[stands] = self.model.limits.allow_legs(self.model.mechanism, self.truth, poses, joints)
+        return stands
+
     def place(self, command: Pose) -> None:
         """Set the robot to a command at once, without a check of the line.
 

@@ -122,11 +122,14 @@ def measuring_failures(plan: Plan) -> Iterator[list[HexacellError]]:
 
 
 def unreachable_share(plan: Plan) -> dict[int, float]:
-    """At each point the share of robots within the tolerances that cannot reach its reference."""
+    """At each point the share of robots within the tolerances that cannot reach its reference.
+
+    Nor do those that would have a passive joint or a leg beyond its limits there.
+    """
     references = plan.robot.from_commands([plan.reference_pose(point) for point in plan.points])
     robots = robots_within_tolerances(plan.robot, ROBOTS, plan.settings.identification.seed)
-    can_take = np.array([VirtualRobot(plan.robot, truth).can_take(references) for truth in robots])
-    unreachable = 1.0 - can_take.mean(axis=0)
+    can_stand = np.array([VirtualRobot(plan.robot, truth).can_stand(references) for truth in robots])
+    unreachable = 1.0 - can_stand.mean(axis=0)
     return dict(zip(plan.points, unreachable.tolist(), strict=True))
 
 

@@ -106,8 +106,8 @@ def plan_trial_lines(trial: PlanTrial) -> Iterator[str]:
     for point, share in trial.unreachable.items():
         if share > 0.0:
             yield (
-                f"Point {point}: {share:.0%} of the robots within the tolerances cannot reach it; "
-                "if yours is one of them, the run leaves it out or stops."
+                f"Point {point}: {share:.0%} of the robots within the tolerances cannot reach it "
+                "within their limits; if yours is one of them, the run leaves it out or stops."
             )
 
 

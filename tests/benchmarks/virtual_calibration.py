@@ -64,11 +64,7 @@ def robot_that_stands(cell: Cell, robot: Robot, random: np.random.Generator) -> 
 def stands_at(robot: Robot, truth: Geometry, points: Sequence[Sequence[float]]) -> bool:
     """Whether passive joints and legs keep their limits at some commands in the controller's frames."""
     commands = robot.from_commands(Pose(*point) for point in points)
-    actual = robot.commanded(truth).actual_poses(commands)
-    if not actual.found.all():
-        return False
-    kept = robot.limits.allow_legs(robot.mechanism, truth, actual.poses, actual.joints)
-    return bool(kept.all())
+    return bool(VirtualRobot(robot, truth).can_stand(commands).all())
 
 
 def calibrate(cell: Cell, robot: Robot, truth: Geometry, random: np.random.Generator) -> VirtualCalibration:

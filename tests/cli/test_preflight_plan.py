@@ -119,7 +119,7 @@ def test_the_predicted_accuracy_is_printed_before_any_motion(typed_here: Any, ce
     assert all(0.0 <= share < 0.3 for share in expected["lost"].values())
     verdicts = expected["verdicts"]
     assert sum(verdicts["probabilities"].values()) == pytest.approx(1.0)
-    limits = {"position_mm": 20.0, "orientation_deg": 5.0, "guard_band_factor": 1.0}
+    limits = {"position_mm": 20.0, "orientation_deg": 5.0, "guard_band_factor": 1.5}
     assert verdicts["limits"] == limits
     assert verdicts["probabilities"]["pass"] == pytest.approx(0.997, abs=0.001)
     assert 0.02 < verdicts["passing"]["position_mm"] < 4.0

@@ -132,7 +132,7 @@ class Robot:
             self.branch,
             free,
             covariance,
-            self.noise,
+            self.noise.along(self.frames.base),
             self.limits,
             self.frames.base[:, ["xyz".index(axis) for axis in self.work_frame]].T,
             self.refused,

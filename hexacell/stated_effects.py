@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from hexacell.cell.model import CellSettings
-from hexacell.cell.uncertainty import UncertaintySettings
+from hexacell.cell.uncertainty import CommonUncertaintySettings, UncertaintySettings
 from hexacell.kinematics.parameters import MachinePart
 from hexacell.uncertainty.effects import Effect
-from hexacell.uncertainty.encoder_effects import common_encoder_scale, encoder_scales, slider_repeatability
+from hexacell.uncertainty.encoder_effects import common_encoder_scale, encoder_scales, stop_repeatability
 from hexacell.uncertainty.environment_effects import (
     load_at_work,
     temperature_at_work,
@@ -19,13 +19,15 @@ from hexacell.uncertainty.guide_effects import common_sag, rail_directions, rail
 def stated_effects(settings: CellSettings, measured_range_k: float | None = None) -> tuple[Effect, ...]:
     """All effects that the budget of a cell has lines for, also those of size zero.
 
+    Only a mechanism with rails has those of rails.
+
     Args:
         settings: of the cell.
         measured_range_k: range of the temperatures read while measuring; none without thermometers.
     """
     stated = settings.uncertainty
     return (
-        *_of_encoders(stated),
+        *_of_encoders(stated, settings.mechanism.words.joint),
         *_of_guides(stated, settings.limits.joint_max_mm - settings.limits.joint_min_mm),
         gauge_scales(1e3 * settings.noise.gauge_scale, is_estimated=True, source="noise.gauge_scale"),
         ball_roundness(stated.ball_roundness_um, stated.source("ball_roundness_um")),
@@ -34,19 +36,22 @@ def stated_effects(settings: CellSettings, measured_range_k: float | None = None
     )
 
 
-def _of_encoders(stated: UncertaintySettings) -> tuple[Effect, ...]:
+def _of_encoders(stated: CommonUncertaintySettings, joint: str) -> tuple[Effect, ...]:
     return (
         common_encoder_scale(stated.common_encoder_scale_um_m, stated.source("common_encoder_scale_um_m")),
         encoder_scales(stated.encoder_scale_um_m, stated.source("encoder_scale_um_m")),
-        slider_repeatability(
-            stated.slider_repeatability_um,
-            stated.source("slider_repeatability_um"),
-            is_in_noise=stated.slider_repeatability_acts == "at work",
+        stop_repeatability(
+            stated.stop_repeatability_um,
+            stated.source("stop_repeatability_um"),
+            is_in_noise=stated.stop_repeatability_acts == "at work",
+            joint=joint,
         ),
     )
 
 
-def _of_guides(stated: UncertaintySettings, range_mm: float) -> tuple[Effect, ...]:
+def _of_guides(stated: CommonUncertaintySettings, range_mm: float) -> tuple[Effect, ...]:
+    if not isinstance(stated, UncertaintySettings):
+        return ()
     short, long = "rail_wave_short_um", "rail_wave_long_um"
     return (
         rail_directions(stated.rail_direction_mrad, stated.source("rail_direction_mrad")),
@@ -56,7 +61,9 @@ def _of_guides(stated: UncertaintySettings, range_mm: float) -> tuple[Effect, ..
     )
 
 
-def _of_environment(stated: UncertaintySettings, measured_range_k: float | None) -> tuple[Effect, ...]:
+def _of_environment(
+    stated: CommonUncertaintySettings, measured_range_k: float | None
+) -> tuple[Effect, ...]:
     expansion = {
         MachinePart.BASE: stated.expansion_base_um_m_k,
         MachinePart.PLATFORM: stated.expansion_platform_um_m_k,

@@ -130,7 +130,7 @@ class SimulatedMachine:
             )
             if not found.found[0]:
                 raise FileError(
-                    "this geometry has no pose at the present slider positions", subject=self._config
+                    "this geometry has no pose at the present joint variables", subject=self._config
                 )
             self._geometry = new
             self._line = found.poses[[0, 0]]

@@ -143,4 +143,5 @@ def _native_config(settings: CellSettings, started: RunStarted) -> bytes:
     """A config in the native format with the geometry that commanded the run."""
     parameters = settings.mechanism.parameters
     geometry = dump(geometry_settings(parameters).model_validate(started.controller))
-    return f"[geometry]\n{geometry}branch = {list(started.branch)}\n".encode()
+    branch = f"branch = {list(started.branch)}\n" if started.branch else ""
+    return f"[geometry]\n{geometry}{branch}".encode()

@@ -7,7 +7,7 @@ from hexacell.cell.fields import Frozen, Point, SixNumbers
 from hexacell.cell.model import CellSettings
 from hexacell.identification.diagnostics.approach_scatter import ScatterSource
 
-REPEATABILITY = "slider_repeatability_um"
+REPEATABILITY = "stop_repeatability_um"
 
 
 class InstrumentNoise(Frozen):
@@ -119,7 +119,7 @@ def _with_repeatability(settings: CellSettings, measured: MeasuredNoise) -> obje
     return stated.model_copy(
         update={
             REPEATABILITY: 1e3 * approaches.excess_mm,
-            "slider_repeatability_acts": "at work",
+            "stop_repeatability_acts": "at work",
             "sources": sources,
         }
     )

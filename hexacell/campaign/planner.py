@@ -252,14 +252,13 @@ class Plan:
         belief = estimate.belief.zeroed_at(state.zero_mm)
         selected, via = self.chooser.choose(belief, estimate.gauge_zero(point), state)
         base, record = self.robot.frames.base.T, selected.record
-        covariance = base @ np.diag(record.sigma[0] ** 2) @ base.T
         return MeasurePose(
             point=point,
             orientation=state.records_at(point) + 1,
             pose=self.robot.to_command(selected.command),
             joints=joints_of(record.targets.joints[0]),
             deviation=deviation_of(base @ record.deviation[0]),
-            sigma=deviation_of(np.sqrt(np.diag(covariance))),
+            sigma=deviation_of(record.sigma[0]),
             gain=selected.gain,
             forecast=self.forecaster.forecast(state, belief, selected) if self.with_forecast else None,
             via=via,

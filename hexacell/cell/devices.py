@@ -86,7 +86,7 @@ class EncoderSettings(Section):
     measuring_step_nm: Positive = Field(1000, description="one count, nm; must be what the device reports")
     signed: bool = Field(True, description="positions are I32 (linear devices) rather than U32")
     direction: tuple[Direction, Direction, Direction, Direction, Direction, Direction] = Field(
-        (1, 1, 1, 1, 1, 1), description="1: counts grow along the rail's +x, -1: against it"
+        (1, 1, 1, 1, 1, 1), description="1: counts grow with the joint variable, -1: against it"
     )
     offset_mm: SixInRange = Field(
         (0.0, 0.0, 0.0, 0.0, 0.0, 0.0), description="joint variable at count 0, mm"
@@ -152,7 +152,7 @@ class ControllerSettings(Section):
 class ThermometerSettings(Section):
     """A thermometer at the machine or in the room; its readings are kept with every record."""
 
-    name: Name = Field(description="where it is: room, rails, platform")
+    name: Name = Field(description="where it is: room, base, platform")
     protocol: Text = Field("sysfs", description="sysfs, or one that a plug-in adds")
     path: Text = Field(
         min_length=1,

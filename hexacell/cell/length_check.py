@@ -22,7 +22,8 @@ class LengthCheckSettings(Section):
         description="where the ball is measured in the first seat, mm, in the base"
     )
     direction: PointInRange = Field(
-        (1.0, 0.0, 0.0), description="from the first seat to the second; along the rails is best"
+        (1.0, 0.0, 0.0),
+        description="from the first seat to the second; a way on which all joints move alike is best",
     )
     distance_mm: float = Field(ge=20, le=5000, description="of the two places of the ball, as certified")
     uncertainty_mm: Positive = Field(description="of that distance, expanded (k = 2), as certified")

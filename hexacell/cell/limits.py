@@ -1,4 +1,4 @@
-"""Section of the cell file on the limits of motion: of commands, sliders, passive joints and legs."""
+"""Section of the cell file on the limits of motion: of commands, joint variables, joints and legs."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class AxisLimitSettings(Section):
 class PassiveJointSettings(Section):
     """How far each leg may turn in its two passive joints, from the joint's axis."""
 
-    base_cone_deg: Cone = Field(180.0, description="at the base's end, on the slider; 180: any")
+    base_cone_deg: Cone = Field(180.0, description="at the base's end; 180: any")
     platform_cone_deg: Cone = Field(180.0, description="at the platform; 180: any")
     base_cones_deg: SixCones | None = Field(
         None, description="of each leg, where they differ; takes the place of base_cone_deg"

@@ -42,7 +42,7 @@ from hexacell.cell.recovery import RecoverySettings
 from hexacell.cell.simulation import SimulationSettings
 from hexacell.cell.speed import SpeedSettings
 from hexacell.cell.unattended import UnattendedSettings
-from hexacell.cell.uncertainty import UncertaintySettings
+from hexacell.cell.uncertainty import CommonUncertaintySettings, UncertaintySettings
 from hexacell.kinematics.mechanism import Mechanism
 from hexacell.kinematics.parameters import ParameterKind, ParameterSet
 from hexacell.plugins import Group, load
@@ -60,7 +60,9 @@ class ToleranceSettings(Section):
 class RobotSettings(Section):
     """The mechanism and its drawing."""
 
-    mechanism: Text = Field(DEFAULT_MECHANISM, description="hexaglide, or one that a plug-in adds")
+    mechanism: Text = Field(
+        DEFAULT_MECHANISM, description="hexaglide, gough-stewart, or one that a plug-in adds"
+    )
     nominal: GeometrySettings = Field(description="the drawing; identification starts from it")
 
 
@@ -77,7 +79,7 @@ class CellSettings(Section):
     stations: StationSettings = StationSettings()
     tolerances: ToleranceSettings = ToleranceSettings()
     noise: NoiseSettings = NoiseSettings()
-    uncertainty: UncertaintySettings = UncertaintySettings()
+    uncertainty: CommonUncertaintySettings = CommonUncertaintySettings()
     limits: LimitSettings = LimitSettings()
     speed: SpeedSettings = SpeedSettings()
     timing: TimingSettings = TimingSettings()
@@ -218,14 +220,17 @@ def mechanism_named(name: str) -> Mechanism:
 @cache
 def cell_model(mechanism: str) -> type[CellSettings]:
     """The model of the cell files of one mechanism; raises ``UsageError`` if it is not installed."""
-    parameters = mechanism_named(mechanism).parameters
+    found = mechanism_named(mechanism)
+    parameters = found.parameters
     geometry, tolerances = geometry_settings(parameters), tolerance_settings(parameters)
     has_defaults = not any(field.is_required() for field in tolerances.model_fields.values())
     robot = _derived(RobotSettings, nominal=(geometry, RobotSettings.model_fields["nominal"]))
     truth = SimulationSettings.model_fields["geometry"]
     simulation = _derived(SimulationSettings, geometry=(geometry, truth))
+    uncertainty = CommonUncertaintySettings if found.words.guide is None else UncertaintySettings
     return _derived(
         CellSettings,
+        uncertainty=(uncertainty, uncertainty()),
         robot=(robot, ...),
         tolerances=(tolerances, tolerances() if has_defaults else ...),
         simulation=(simulation | None, None),
@@ -263,7 +268,7 @@ def _array_type(kind: ParameterKind) -> Any:  # noqa: ANN401 - a type made here
     return made
 
 
-def _derived(base: type[SectionType], **fields: Any) -> type[SectionType]:  # noqa: ANN401
+def _derived(base: type[SectionType], /, **fields: Any) -> type[SectionType]:  # noqa: ANN401
     """A section with the fields that the mechanism decides; each is a type and a default or description."""
     made: type[SectionType] = create_model(base.__name__, __base__=base, __doc__=base.__doc__, **fields)
     return made

@@ -139,7 +139,7 @@ class RecoverySettings(Section):
     """How failures and interruptions are handled."""
 
     agreement_mm: Positive = Field(
-        0.05, description="largest change of a reference, gauges and sliders, with which a set continues"
+        0.05, description="largest change of a reference, gauges and encoders, with which a set continues"
     )
     wait_s: NotNegative = Field(2.0, description="wait before a failed device is tried again")
     away_minutes: Positive = Field(

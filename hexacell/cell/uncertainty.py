@@ -28,7 +28,7 @@ SIZES_OF_GRADES: Mapping[Grade, Mapping[str, float]] = {
         "rail_wave_short_um": 0.0,
         "rail_wave_long_um": 0.0,
         "rail_sag_um": 0.0,
-        "slider_repeatability_um": 0.0,
+        "stop_repeatability_um": 0.0,
         "ball_roundness_um": 0.0,
         "temperature_at_work_k": 0.0,
         "temperature_measuring_k": 0.0,
@@ -38,7 +38,14 @@ SIZES_OF_GRADES: Mapping[Grade, Mapping[str, float]] = {
 """Where the sizes of a grade differ from the defaults of the keys, which are those of ``precision``."""
 
 
-class UncertaintySettings(Section):
+OLD_KEYS = {
+    "slider_repeatability_um": "stop_repeatability_um",
+    "slider_repeatability_acts": "stop_repeatability_acts",
+}
+"""What keys were called before there were mechanisms without sliders; cells of old runs have them."""
+
+
+class CommonUncertaintySettings(Section):
     """Sizes of systematic effects, one standard deviation; certificates and own measurements say better."""
 
     grade: Grade = Field(
@@ -48,20 +55,10 @@ class UncertaintySettings(Section):
     )
     common_encoder_scale_um_m: NotNegative = Field(15.0, description="scale error of all encoders alike")
     encoder_scale_um_m: NotNegative = Field(10.0, description="scale error of each encoder")
-    rail_direction_mrad: NotNegative = Field(
-        0.02, description="of each rail, horizontally and vertically, from parallel"
+    stop_repeatability_um: NotNegative = Field(
+        2.0, description="where a joint stops beside what its encoder shows"
     )
-    rail_wave_short_um: NotNegative = Field(3.0, description="amplitude of a short wave of each rail")
-    rail_wave_short_mm: Positive = Field(600.0, description="its length")
-    rail_wave_long_um: NotNegative = Field(5.0, description="amplitude of a long wave of each rail")
-    rail_wave_long_mm: Positive = Field(1500.0, description="its length")
-    rail_sag_um: NotNegative = Field(
-        10.0, description="depth to which all rails hang through alike, over the range of the joints"
-    )
-    slider_repeatability_um: NotNegative = Field(
-        2.0, description="where a slider's joint stops beside what its encoder shows"
-    )
-    slider_repeatability_acts: Literal["everywhere", "at work"] = Field(
+    stop_repeatability_acts: Literal["everywhere", "at work"] = Field(
         "everywhere", description="at work: the noise of the records contains it already"
     )
     ball_roundness_um: NotNegative = Field(2.0, description="largest departure from the mean radius")
@@ -73,7 +70,7 @@ class UncertaintySettings(Section):
         1.0, description="change while measuring; a run with thermometers takes their range instead"
     )
     expansion_base_um_m_k: NotNegative = Field(
-        23.0, description="of the base with its rails and scales: aluminium 23, steel 11.5, granite 6"
+        23.0, description="of the base with its scales: aluminium 23, steel 11.5, granite 6"
     )
     expansion_platform_um_m_k: NotNegative = Field(23.0, description="of the platform")
     expansion_legs_um_m_k: NotNegative = Field(23.0, description="of the legs")
@@ -88,12 +85,13 @@ class UncertaintySettings(Section):
         if not isinstance(given, dict):
             return given
         grade = given.get("grade", "precision")
-        sizes = SIZES_OF_GRADES[grade] if grade in get_args(Grade) else {}
-        return {**sizes, **given}
+        of_grade = SIZES_OF_GRADES[grade] if grade in get_args(Grade) else {}
+        sizes = {key: size for key, size in of_grade.items() if key in cls.model_fields}
+        return {**sizes, **{OLD_KEYS.get(key, key): value for key, value in given.items()}}
 
     @model_validator(mode="after")
     def _sources_belong_to_sizes(self) -> Self:
-        known = set(type(self).model_fields) - {"grade", "sources", "slider_repeatability_acts"}
+        known = set(type(self).model_fields) - {"grade", "sources", "stop_repeatability_acts"}
         if unknown := sorted(set(self.sources) - known):
             raise broken_rule(
                 f"sources has {unknown[0]}, which is no size of this section", "Correct the key"
@@ -106,3 +104,18 @@ class UncertaintySettings(Section):
         assumed = grade.get(key, type(self).model_fields[key].default)
         stated = "cell file" if getattr(self, key) != assumed else f"assumed: {self.grade}"
         return self.sources.get(key, stated)
+
+
+class UncertaintySettings(CommonUncertaintySettings):
+    """The same of a machine whose joints move along rails."""
+
+    rail_direction_mrad: NotNegative = Field(
+        0.02, description="of each rail, horizontally and vertically, from parallel"
+    )
+    rail_wave_short_um: NotNegative = Field(3.0, description="amplitude of a short wave of each rail")
+    rail_wave_short_mm: Positive = Field(600.0, description="its length")
+    rail_wave_long_um: NotNegative = Field(5.0, description="amplitude of a long wave of each rail")
+    rail_wave_long_mm: Positive = Field(1500.0, description="its length")
+    rail_sag_um: NotNegative = Field(
+        10.0, description="depth to which all rails hang through alike, over the range of the joints"
+    )

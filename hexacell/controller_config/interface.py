@@ -14,7 +14,7 @@ JointRanges = tuple[tuple[float, float], ...]
 
 @dataclass(frozen=True, slots=True)
 class ControllerGeometry:
-    """The geometry that a controller uses, as its config states it, and the branch of the robot.
+    """The geometry that a controller uses, as its config states it, and the branch of the robot if any.
 
     ``joint_ranges`` are the smallest and largest joint variable of each leg, mm, where the config has them.
     """

@@ -4,7 +4,7 @@
     S = [[x, y, z], ...]    # six joints on the sliders, base frame, mm
     B = [[x, y, z], ...]    # six joints on the platform, platform frame, mm
     l = [...]               # six leg lengths, mm
-    branch = [1, ...]       # six signs
+    branch = [1, ...]       # six signs; of a mechanism whose legs have two inverse solutions
 
     [[axes]]                # six sliders or none; the joint variable's range, which may be absent
     min = -800.0
@@ -109,7 +109,9 @@ class _Content:
         return Geometry.of(self.parameters, values)
 
     def branch(self) -> Branch:
-        """The signs, in ``[geometry]`` or at the top of the file."""
+        """The signs, in ``[geometry]`` or at the top of the file; none of a mechanism without."""
+        if not self.parameters.has_branch:
+            return ()
         path = ("branch",) if "branch" in self.document.data else self._path_to("branch")
         signs = self._numbers(path, (LEGS,))
         for leg, sign in enumerate(signs):
@@ -172,8 +174,11 @@ class _Content:
         return self._error(path, self.document.mismatch(path, expected))
 
     def _error(self, path: KeyPath, problem: str) -> FileError:
-        kinds = ", ".join(_needed(kind) for kind in self.parameters.kinds)
-        return self.document.error(path, problem, f"[geometry] needs {kinds} and branch (six signs)")
+        needed = [_needed(kind) for kind in self.parameters.kinds]
+        if self.parameters.has_branch:
+            needed.append("branch (six signs)")
+        *most, last = needed
+        return self.document.error(path, problem, f"[geometry] needs {', '.join(most)} and {last}")
 
 
 def _needed(kind: ParameterKind) -> str:

@@ -110,7 +110,8 @@ class PredictedRecords:
         jacobian: of the deviations (n, 3, p) by the free parameters.
         covariance: of the deviations (n, 3, 3), mm^2, the parameters being known.
         deviation: expected deviations (n, 3), mm.
-        sigma: their standard deviations (n, 3), mm, as the parameters are known now.
+        sigma: standard deviations (n, 3), mm, of what the gauges x, y, z will show, as the parameters are
+            known now.
     """
 
     targets: ReachableTargets
@@ -142,6 +143,6 @@ def predict_records(belief: RobotBelief, zero: GaugeZero, targets: ReachableTarg
     covariance = record_covariance(by_joints, belief.noise) + zero.covariance
     jacobian = by_parameters - zero.jacobian
     total = innovation_covariance(belief.covariance, jacobian, covariance)
-    sigma = np.sqrt(np.diagonal(total, axis1=-2, axis2=-1))
+    sigma = belief.limits.sigma_along_gauges(total)
     deviation = targets.poses.positions - zero.reference
     return PredictedRecords(targets, jacobian, covariance, deviation, sigma)

@@ -184,7 +184,8 @@ def _nearly_all_within(sampled: _SampledRobots, limits: Limits, share: float) ->
 def _all_within(sampled: _SampledRobots, limits: Limits, share: float) -> Mask:
     """At which targets all sampled robots, and those that ``SIGMAS`` predict, stay within a share of it."""
     deviations, margins = sampled.deviations, sampled.leg_margins
-    predicted = limits.within_travel(deviations.mean(axis=0), SIGMAS * deviations.std(axis=0), share)
+    spread = (deviations @ limits.frames.base).std(axis=0)
+    predicted = limits.within_travel(deviations.mean(axis=0), SIGMAS * spread, share)
     stay = sampled.found & limits.within_travel(deviations, share=share)
     are_free = (margins.mean(axis=0) >= SPARE_SIGMAS * margins.std(axis=0)).all(axis=-1)
     within: Mask = np.all(stay, axis=0) & predicted & are_free

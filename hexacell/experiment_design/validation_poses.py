@@ -95,7 +95,7 @@ def _stays_inside(belief: RobotBelief, actual: ActualPoses) -> Mask:
     jacobian, _ = position_derivatives(belief, ReachableTargets(actual.poses, actual.joints))
     noise = 2.0 * belief.noise.gauge_covariance
     covariance = innovation_covariance(belief.covariance, jacobian - jacobian[0], noise)
-    sigma = np.sqrt(np.diagonal(covariance, axis1=-2, axis2=-1))
+    sigma = belief.limits.sigma_along_gauges(covariance)
     deviation = actual.poses.positions - actual.poses.positions[0]
     # They are chosen long before the gauges are placed there.
     inside = belief.limits.within_travel(deviation, SAFETY_SIGMAS * sigma, TRAVEL_SHARE, surely=True)

@@ -17,7 +17,8 @@ from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array
 
 Sign = Literal[1, -1]
-Branch = tuple[Sign, Sign, Sign, Sign, Sign, Sign]
+Branch = tuple[Sign, Sign, Sign, Sign, Sign, Sign] | tuple[()]
+"""Which of its two inverse solutions each leg is on; empty where a leg has only one."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -167,10 +168,26 @@ class Guides:
     across: Array
 
 
+@dataclass(frozen=True, slots=True)
+class MechanismWords:
+    """What a mechanism and its parts are called in text.
+
+    Attributes:
+        machine: the kind of machine.
+        joint: what each joint variable is the position of; text adds the leg, as in "slider 3".
+        guide: what the joints move along, with errors of its own; none where there is no such thing.
+    """
+
+    machine: str
+    joint: str
+    guide: str | None = None
+
+
 class Mechanism(Protocol):
     """A six-legged parallel mechanism; all methods are batched over n poses, and none raises."""
 
     name: str
+    words: MechanismWords
     parameters: ParameterSet
     convention: FrameConvention
     frame_freedom: FrameFreedom
@@ -190,11 +207,15 @@ class Mechanism(Protocol):
         ...
 
     def inverse(self, geometry: Geometry, branch: Branch, poses: PoseBatch) -> Array:
-        """Joint variables (n, 6), mm, in closed form; NaN where a pose is out of a leg's reach."""
+        """Joint variables (n, 6), mm, in closed form; NaN where a pose is out of a leg's reach.
+
+        ``branch`` is empty for a mechanism without (:attr:`ParameterSet.has_branch
+        <hexacell.kinematics.parameters.ParameterSet.has_branch>`).
+        """
         ...
 
     def branch(self, geometry: Geometry, poses: PoseBatch, joints: Array) -> Array:
-        """Which of the two inverse solutions each leg is on (n, 6): -1 or 1."""
+        """Which of the two inverse solutions each leg is on (n, 6): -1 or 1; 1 where it has only one."""
         ...
 
     def normalize_frames(self, geometry: Geometry) -> tuple[Geometry, FrameTransform]:
@@ -206,7 +227,7 @@ class Mechanism(Protocol):
         ...
 
     def guides(self, geometry: Geometry, poses: PoseBatch, joints: Array) -> Guides | None:
-        """The guides on which sliders move; none for a mechanism without."""
+        """The guides on which sliders move; none for a mechanism whose words have no guide."""
         ...
 
     def legs(self, geometry: Geometry | GeometryBatch, poses: PoseBatch, joints: Array) -> Legs:

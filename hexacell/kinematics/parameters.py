@@ -112,9 +112,13 @@ class GeometricParameter:
 
 @dataclass(frozen=True)
 class ParameterSet:
-    """All parameters of a mechanism, in the order of its vectors: by kind, then leg, then component."""
+    """All parameters of a mechanism, in the order of its vectors: by kind, then leg, then component.
+
+    ``has_branch``: a leg has two inverse solutions, and a config states beside the parameters which one.
+    """
 
     kinds: tuple[ParameterKind, ...]
+    has_branch: bool = True
 
     @cached_property
     def parameters(self) -> tuple[GeometricParameter, ...]:

@@ -82,10 +82,17 @@ class Limits:
     ) -> Mask:
         """Which deviations (..., 3), mm, in the convention's frames stay within a share of the room.
 
-        With ``surely`` it is that of any station.
+        The ``spread`` (..., 3) is along the gauges. With ``surely`` the room is that of any station.
         """
         room = self.sure_room if surely else self.room
         return room.holds(deviations @ self.frames.base, spread, share)
+
+    def sigma_along_gauges(self, covariance: Array) -> Array:
+        """Standard deviations (..., 3) of what gauges show, by a covariance in the convention."""
+        base = self.frames.base
+        variances = np.einsum("ag,...ab,bg->...g", base, covariance, base)
+        sigma: Array = np.sqrt(np.maximum(variances, 0.0))
+        return sigma
 
     def zeroed_at(self, shown_mm: tuple[float, float, float] | None) -> Limits:
         """The same once the gauges were zeroed where they show ``shown_mm`` along base x, y, z."""

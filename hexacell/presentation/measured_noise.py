@@ -96,10 +96,10 @@ def _of_instrument(one: InstrumentNoise) -> Iterator[str]:
 def _of_approaches(found: RepeatedApproaches, source: ScatterSource) -> str:
     size = f"{_um(found.excess_mm)} um"
     if source is ScatterSource.SLIDERS:
-        what = f"the sliders stop {size} beside what their encoders show"
+        what = f"the joints stop {size} beside what their encoders show"
         look = "Look for play in guides and joints, and for friction"
     elif source is ScatterSource.ENCODERS or source.startswith("encoder"):
-        what = f"{source}: {size} beside where the sliders are, though the ball is at its place"
+        what = f"{source}: {size} beside where the joints are, though the ball is at its place"
         look = "Look at reading heads, scales and cables"
     else:
         what = f"{source} shows {size} more or less at the same place"

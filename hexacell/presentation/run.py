@@ -38,10 +38,10 @@ LISTED_DIFFERENCES = 10
 """How many differences of a replay are printed."""
 
 
-def demo_opening(config: Path) -> str:
-    """What the demo is about to calibrate."""
+def demo_opening(machine: str, config: Path) -> str:
+    """What the demo is about to calibrate: the kind of machine, and its controller's config."""
     return (
-        "A simulated Hexaglide: gauges on serial lines, encoders on CAN, TCP controller.\n"
+        f"A simulated {machine}: gauges on serial lines, encoders on CAN, TCP controller.\n"
         "The geometry in its controller's config is wrong by millimetres:\n"
         f"  {config}"
     )

@@ -34,9 +34,9 @@ class DataSet:
 
     Attributes:
         labels: point and orientation (n, 2).
-        commands: poses in the controller's geometry.
+        commands: poses in the controller's frames.
         joints: (n, 6), mm, exact.
-        positions: actual positions of the ball (n, 3), mm.
+        positions: actual positions of the ball (n, 3), mm, along the axes of the gauges.
     """
 
     labels: Array
@@ -81,9 +81,9 @@ def unlimited_travel(
     margin = robot.limits.singularity_margin if margin is None else margin
     sets = []
     for point in points:
-        drawn = (PoseBatch.at(point, turns) for turns in _random_orientations(random, amplitude))
+        drawn = (_commands(robot, point, turns) for turns in _random_orientations(random, amplitude))
         sets.append(_first_reached(robot, truth, point, drawn, orientations, margin))
-    return _data_set(sets, orientations)
+    return _data_set(robot, sets, orientations)
 
 
 def within_travel(
@@ -105,12 +105,17 @@ def within_travel(
     margin = robot.limits.singularity_margin
     sets = []
     for point in points:
-        level = [PoseBatch.at(point, np.eye(3)[None])]
+        level = [_commands(robot, point, np.eye(3)[None])]
         reference = _first_reached(robot, truth, point, level, 1, margin)
         drawn = _aimed(robot, truth, reference.actual, amplitude, random)
         others = _first_reached(robot, truth, point, drawn, orientations - 1, margin)
         sets.append(_Reached.concatenate([reference, others]))
-    return _data_set(sets, orientations)
+    return _data_set(robot, sets, orientations)
+
+
+def _commands(robot: Robot, point: Array, turns: Array) -> PoseBatch:
+    """Commands of turns (n, 3, 3) of the level platform at a point, in the convention's frames."""
+    return robot.frames.poses(PoseBatch.at(point, turns))
 
 
 def _random_orientations(random: np.random.Generator, amplitude: float) -> Iterator[Array]:
@@ -183,7 +188,8 @@ def _reached(robot: Robot, truth: Geometry, commands: PoseBatch, margin: float) 
     return found[np.logical_and(*clear)]
 
 
-def _data_set(sets: list[_Reached], orientations: int) -> DataSet:
+def _data_set(robot: Robot, sets: list[_Reached], orientations: int) -> DataSet:
     labels = [(point, turn) for point in range(1, len(sets) + 1) for turn in range(1, orientations + 1)]
     found = _Reached.concatenate(sets)
-    return DataSet(np.array(labels), found.commands, found.joints, found.actual.positions)
+    commands = robot.frames.inverse().poses(found.commands)
+    return DataSet(np.array(labels), commands, found.joints, found.actual.positions @ robot.frames.base)

@@ -27,13 +27,15 @@ def encoder_scales(um_per_m: float, source: str = "") -> Effect:
     )
 
 
-def slider_repeatability(um: float, source: str = "", *, is_in_noise: bool = False) -> Effect:
-    """A slider's joint stops beside what its encoder shows, each time elsewhere: play, friction.
+def stop_repeatability(
+    um: float, source: str = "", *, is_in_noise: bool = False, joint: str = "joint"
+) -> Effect:
+    """A joint stops beside what its encoder shows, each time elsewhere: play, friction.
 
-    ``is_in_noise``: the noise of the records contains it.
+    ``is_in_noise``: the noise of the records contains it. ``joint`` is the mechanism's word for it.
     """
     occurrence = Occurrence.STOPS_AT_WORK if is_in_noise else Occurrence.EVERY_STOP
-    return Effect("repeatability of a slider", um, "um", occurrence, _each_joint, source=source)
+    return Effect(f"repeatability of a {joint}", um, "um", occurrence, _each_joint, source=source)
 
 
 def _common_scale(placement: Placement) -> Array:

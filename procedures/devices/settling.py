@@ -126,7 +126,7 @@ def _moving(devices: Devices, timing: TimingSettings, settled: Settled) -> list[
     ]
     legs = enumerate(np.ptp(settled.joints, axis=0), start=1)
     return moving + [
-        f"slider {leg} by {spread:.3f} mm" for leg, spread in legs if spread > timing.spread_encoder_mm
+        f"encoder {leg} by {spread:.3f} mm" for leg, spread in legs if spread > timing.spread_encoder_mm
     ]
 
 

@@ -123,9 +123,10 @@ class Guards:
         return None if trip is None else trip.as_error()
 
     async def _arrival_trip(self, commanded: Array, reached: EncoderSample) -> Trip | None:
-        """A slider is not where it was commanded (6,), mm, or the controller is wrong about where it is."""
+        """A joint is not where it was commanded (6,), mm, or the controller is wrong about where it is."""
         limit = self._settings.guards.following_mm
-        following = rules.following_error(commanded, np.array(reached.positions_mm), limit)
+        joint = self._settings.mechanism.words.joint
+        following = rules.following_error(commanded, np.array(reached.positions_mm), limit, joint)
         found = await self.position.read(reached)
         return following if following and found.odd is PositionSource.ENCODERS else found.trip or following
 
@@ -136,7 +137,7 @@ class Guards:
     def _limits(self, rest_mm: float | None = None, zero_mm: ThreeNumbers | None = None) -> GuardLimits:
         guards = self._settings.guards
         plate = gauge_travel_of(self._settings).room(zero_mm).widened(guards.plate_margin_mm)
-        return GuardLimits(guards.stale_s, plate, rest_mm)
+        return GuardLimits(guards.stale_s, plate, rest_mm, self._settings.mechanism.words.joint)
 
     def _pollers(
         self,

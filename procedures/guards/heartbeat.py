@@ -69,8 +69,8 @@ class WatchedController:
         self._moving_since_s = now if self._moving_since_s is None else self._moving_since_s
         if self._clock.real_seconds(now - self._moving_since_s) > self._patience_s:
             raise ControllerFrozen(
-                f"is frozen: its server answers, but reports one position although slider "
-                f"{int(moved.argmax()) + 1} moved by {moved.max():.1f} mm",
+                f"is frozen: its server answers, but reports one position although encoder "
+                f"{int(moved.argmax()) + 1} shows a move by {moved.max():.1f} mm",
                 subject="controller",
                 action="Restart it, and find out why; then resume",
             )

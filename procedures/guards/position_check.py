@@ -93,19 +93,19 @@ class PositionCheck:
         )
 
     def _trip(self, found: PositionMismatch, reports: PositionReports) -> Trip:
-        slider = f"slider {found.leg}"
+        joint = f"{self._joint} {found.leg}"
         match found.odd:
             case PositionSource.POSE:
                 return self._odd_pose(found, reports)
             case PositionSource.JOINTS:
                 problem = (
-                    f"reports {slider} at {_mm(found.joint_mm)} where its pose has it at "
+                    f"reports {joint} at {_mm(found.joint_mm)} where its pose has it at "
                     f"{_mm(found.by_pose_mm)} and the encoder at {_mm(found.encoder_mm)}"
                 )
                 return _position_trip("controller", problem, "Home it again, then retry")
             case PositionSource.ENCODERS:
                 problem = (
-                    f"shows {slider} at {_mm(found.encoder_mm)} where the controller's pose and joints "
+                    f"shows {joint} at {_mm(found.encoder_mm)} where the controller's pose and joints "
                     f"have it at {_mm(found.joint_mm)} (limit {self.settings.guards.following_mm:g} mm)"
                 )
                 action = "See whether it slipped or lost its zero, or the controller was homed wrongly"
@@ -140,11 +140,15 @@ class PositionCheck:
         )
         return _position_trip("controller", problem, action)
 
+    @property
+    def _joint(self) -> str:
+        return self.settings.mechanism.words.joint
+
     def _at_pose(self, found: PositionMismatch) -> str:
         name = self.config.path.name
         if found.by_pose_mm is None:
             return f"which leg {found.leg} cannot reach by {name}"
-        return f"where {name} has slider {found.leg} at {_mm(found.by_pose_mm)}"
+        return f"where {name} has {self._joint} {found.leg} at {_mm(found.by_pose_mm)}"
 
 
 def _position_trip(device: str, problem: str, action: str) -> Trip:

@@ -37,12 +37,14 @@ class GuardLimits:
     Attributes:
         stale_s: longest silence of a device, s of real time.
         plate: how far the ball may go from the set's reference.
-        rest_mm: largest slider displacement at standstill; none while the robot moves.
+        rest_mm: largest displacement of a joint at standstill; none while the robot moves.
+        joint: the mechanism's word for one.
     """
 
     stale_s: float
     plate: GaugeRoom
     rest_mm: float | None = None
+    joint: str = "joint"
 
 
 Rule = Callable[[PolledDevices, GuardLimits], Trip | None]
@@ -142,13 +144,13 @@ def ball_off_gauge(devices: PolledDevices, limits: GuardLimits) -> Trip | None:
 
 
 def unexpected_motion(devices: PolledDevices, limits: GuardLimits) -> Trip | None:
-    """A slider moved during standstill."""
+    """A joint moved during standstill."""
     report = devices.encoders
     if limits.rest_mm is None or report is None or report.value is None or report.first is None:
         return None
     moved = np.subtract(report.value.positions_mm, report.first.positions_mm)
     words = f"moved by {{:+.2f}} mm during standstill (limit {limits.rest_mm:g} mm)"
-    return _slider_trip(moved, limits.rest_mm, words)
+    return _joint_trip(limits.joint, moved, limits.rest_mm, words)
 
 
 RULES: tuple[Rule, ...] = (
@@ -174,10 +176,12 @@ def motion_forbidden(reason: str) -> Trip:
     )
 
 
-def following_error(commanded: Array, measured: Array, limit_mm: float) -> Trip | None:
-    """After a move: a slider (6,), mm, is too far from its commanded position."""
+def following_error(
+    commanded: Array, measured: Array, limit_mm: float, joint: str = "joint"
+) -> Trip | None:
+    """After a move: a joint (6,), mm, is too far from its commanded position; ``joint`` is its word."""
     words = f"is {{:+.3f}} mm from its commanded position (limit {limit_mm:g} mm)"
-    return _slider_trip(np.subtract(measured, commanded), limit_mm, words)
+    return _joint_trip(joint, np.subtract(measured, commanded), limit_mm, words)
 
 
 def stuck_gauge(gauge: str, displayed: tuple[str, ...], expected_mm: float) -> Trip | None:
@@ -239,13 +243,13 @@ def _fault_trip(guard: Guard, report: DevicePoller[object]) -> Trip:
     return Trip(guard, error.subject or report.device, error.problem, action, (error,))
 
 
-def _slider_trip(difference: Array, limit_mm: float, words: str) -> Trip | None:
+def _joint_trip(joint: str, difference: Array, limit_mm: float, words: str) -> Trip | None:
     leg = int(np.argmax(np.abs(difference)))
     if abs(difference[leg]) <= limit_mm:
         return None
     return Trip(
         Guard.FOLLOWING,
-        f"slider {leg + 1}",
+        f"{joint} {leg + 1}",
         words.format(difference[leg]),
         "Look for what holds or moves that leg, and whether encoders and controller count alike",
     )

@@ -105,7 +105,7 @@ class ImperfectMachine:
         return self._poses(joints, poses, np.full(len(poses), self.warmer_k[0]), self.force_n, missed)
 
     def _missed(self, stops: int, random: np.random.Generator) -> Array:
-        return UM * self.sizes.slider_repeatability_um * random.standard_normal((stops, 6))
+        return UM * self.sizes.stop_repeatability_um * random.standard_normal((stops, 6))
 
     def _poses(
         self, shown: Array, near: PoseBatch, warmer: Array, force: Array, missed: Array

@@ -29,7 +29,7 @@ from hexacell.robot_model import Robot
 from hexacell.stated_effects import stated_effects
 from hexacell.uncertainty.budget import UncertaintyBudget
 from hexacell.uncertainty.effects import Effect
-from hexacell.uncertainty.encoder_effects import common_encoder_scale, encoder_scales, slider_repeatability
+from hexacell.uncertainty.encoder_effects import common_encoder_scale, encoder_scales, stop_repeatability
 from hexacell.uncertainty.environment_effects import load_at_work, temperature_at_work
 from hexacell.uncertainty.gauge_effects import ball_roundness, gauge_scales
 from hexacell.uncertainty.guide_effects import common_sag, rail_directions, rail_waves
@@ -93,7 +93,7 @@ def test_each_effect_is_as_large_as_an_independent_simulation_says(bench: Bench)
         figures = (line.through_mm, line.direct_mm, line.combined_mm, beside)
         print(f"  {name:42}" + "".join(f"{figure:9.4f}" for figure in figures))
         assert 0.5 * beside - 5e-4 < line.combined_mm < 1.5 * beside + 5e-4
-    stops = bench.budget(bench.found, (slider_repeatability(5.0),)).lines[0]
+    stops = bench.budget(bench.found, (stop_repeatability(5.0),)).lines[0]
     print(f"  {'repeatability 5 um a slider':42}{stops.through_mm:9.4f}{stops.direct_mm:9.4f}", end="")
     print(f"{stops.combined_mm:9.4f}   (0.018 through the fit, 0.038 at the pose)")
     assert stops.through_mm == pytest.approx(0.018, rel=0.25)

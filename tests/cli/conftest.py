@@ -367,18 +367,19 @@ class Demo:
 
     outcome: Outcome
     folder: Path
+    name: str = "simulated-hexaglide"
 
     @property
     def run(self) -> Path:
-        return self.folder / "runs" / "simulated-hexaglide" / "demo"
+        return self.folder / "runs" / self.name / "demo"
 
     @property
     def cell(self) -> Path:
-        return self.folder / CELL
+        return self.folder / f"{self.name}.toml"
 
     @property
     def controller(self) -> Path:
-        return self.folder / CONTROLLER
+        return self.folder / f"{self.name}.controller.toml"
 
     def events(self) -> tuple[events.Event, ...]:
         return read_journal(self.run / "journal.jsonl")

@@ -113,7 +113,7 @@ def demo(options: argparse.Namespace) -> ExitCode:
     """Copy a simulated cell into a folder of its own and calibrate it there."""
     console = Console(options.json)
     request = prepare_demo(options.folder, options.config)
-    console.print(demo_opening(request.cell.config_path))
+    console.print(demo_opening(request.cell.settings.mechanism.words.machine, request.cell.config_path))
     return _run_to_end(request, console)
 
 

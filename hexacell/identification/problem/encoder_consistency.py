@@ -94,7 +94,8 @@ class EncoderConsistency:
         names, sources = (
             ", ".join(f"q{leg + 1}" for leg in legs) for legs in (moved, [columns[leg] for leg in moved])
         )
-        return f"The columns {names} look like those of {sources}: check which encoder is on which slider"
+        joint = self.commands.mechanism.words.joint
+        return f"The columns {names} look like those of {sources}: check which encoder is on which {joint}"
 
     def _columns(self) -> list[int]:
         """The column (6,) that fits each leg's commands best: a linear assignment."""

@@ -33,8 +33,9 @@ class Noise:
         alignment: of each component of a station's small rotation against the base, rad; zero if exact.
         gauge_scale: of each gauge's relative scale error; zero if exact.
         encoder_shares: of each encoder, in units of ``encoder_mm``; empty where all are alike.
-        gauge_shares: of each gauge, x, y, z, in units of ``gauge_mm``. Their axes count as those of the
-            frame convention, from which they differ by few degrees.
+        gauge_shares: of each gauge, x, y, z, in units of ``gauge_mm``.
+        gauge_axes: rows of the matrix whose columns are the gauges' directions in the frame convention;
+            empty where all gauges are alike, or along its axes.
     """
 
     encoder_mm: float
@@ -43,6 +44,7 @@ class Noise:
     gauge_scale: float = 0.0
     encoder_shares: tuple[float, ...] = ()
     gauge_shares: tuple[float, ...] = ()
+    gauge_axes: tuple[tuple[float, ...], ...] = ()
 
     def with_devices(self, encoders_mm: Sequence[float], gauges_mm: Sequence[float]) -> Noise:
         """The same with the noise of each encoder, and of the gauges x, y and z."""
@@ -54,6 +56,12 @@ class Noise:
             encoder_shares=tuple(mm / encoder for mm in encoders_mm),
             gauge_shares=tuple(mm / gauge for mm in gauges_mm),
         )
+
+    def along(self, gauges: Array) -> Noise:
+        """The same of gauges whose directions in the frame convention are the columns (3, 3)."""
+        if not self.gauge_shares:
+            return self
+        return replace(self, gauge_axes=tuple(tuple(row) for row in gauges.tolist()))
 
     @property
     def encoders_mm(self) -> Array:
@@ -73,8 +81,12 @@ class Noise:
 
     @property
     def gauge_covariance(self) -> Array:
-        """Covariance (3, 3), mm^2, of what the gauges show."""
-        return np.diag(self.gauges_mm**2)
+        """Covariance (3, 3), mm^2, of what the gauges show, in the frame convention."""
+        if not self.gauge_axes:
+            return np.diag(self.gauges_mm**2)
+        scaled = np.array(self.gauge_axes) * self.gauges_mm
+        covariance: Array = scaled @ scaled.T
+        return covariance
 
 
 @dataclass(frozen=True, slots=True)
@@ -316,7 +328,7 @@ def build_problem(
     return Problem(
         mechanism=mechanism,
         prior=prior,
-        noise=noise,
+        noise=noise.along(change.base),
         joints=joints,
         deviations=change.deviations(measurements.deviations[order]),
         first_rows=_first_rows(labels[:, 0]),

@@ -2,11 +2,12 @@
 
 A record satisfies ``P - d = c + w x d - k * d + noise``, with the position c of the ball when the
 point's gauges were zeroed, the small rotation w of the gauges against the base, and the scale errors
-k of the gauges. All of them are linear, so for given weights their best values are computed and
-subtracted, and they never become parameters (variable projection; Golub and Pereyra 1973): c and w
-for each point, with a prior on w, and k once for all points, with a prior as well. With equal weights
-and without w and k this subtracts the mean of each point, which has the same minimum as all the pairs
-of eq. 5-8 of Abtahi et al. 2010, with 2/(k-1) of the rows. The cost is linear in the number of records.
+k of the gauges, which are along their axes. All of them are linear, so for given weights their best
+values are computed and subtracted, and they never become parameters (variable projection; Golub and
+Pereyra 1973): c and w for each point, with a prior on w, and k once for all points, with a prior as
+well. With equal weights and without w and k this subtracts the mean of each point, which has the same
+minimum as all the pairs of eq. 5-8 of Abtahi et al. 2010, with 2/(k-1) of the rows. The cost is linear
+in the number of records.
 """
 
 from __future__ import annotations
@@ -57,7 +58,8 @@ class NuisanceElimination:
         self._scale_design: Array = np.zeros((problem.records, 3, 0))
         self._has_scale = problem.noise.gauge_scale > 0.0
         if self._has_scale:
-            design = -np.eye(3) * problem.deviations[:, None, :]
+            shown = problem.deviations @ problem.gauges
+            design = -problem.gauges * shown[:, None, :]
             self._scale_design, self._scale_rows = self._without_stations(design)
             normal = self._gram(self._scale_design, self._scale_rows)
             self._scale_normal = np.linalg.inv(normal + np.eye(3) / problem.noise.gauge_scale**2)

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from hexacell.errors import UsageError
 from hexacell.kinematics.geometry import Geometry, GeometryBatch
+from hexacell.kinematics.leg_vectors import CLOSEST_JOINTS_MM, axes_through, by_pose
 from hexacell.kinematics.legs import Legs
 from hexacell.kinematics.mechanism import (
     Branch,
@@ -20,6 +21,7 @@ from hexacell.kinematics.mechanism import (
     FrameFreedom,
     FrameTransform,
     Guides,
+    MechanismWords,
 )
 from hexacell.kinematics.parameters import MachinePart, ParameterKind, ParameterSet
 from hexacell.kinematics.pose import PoseBatch
@@ -68,14 +70,12 @@ PAPER_FRAME = FrameConvention(
 RAILS = ((0, 5), (1, 4), (2, 3))
 """Legs, counted from 0, whose sliders share a rail: their joints are at the same height and side."""
 
-CLOSEST_JOINTS_MM = 1e-6
-"""Joints that are closer than that are at one place."""
-
 
 class Hexaglide:
     """The Hexaglide as a :class:`~hexacell.kinematics.mechanism.Mechanism`; stateless."""
 
     name = "hexaglide"
+    words = MechanismWords("Hexaglide", joint="slider", guide="rail")
     parameters = HEXAGLIDE_PARAMETERS
     convention = PAPER_FRAME
     frame_freedom = FrameFreedom(base="x")  # the rails run along base x
@@ -85,7 +85,7 @@ class Hexaglide:
     ) -> tuple[Array, Array]:
         """See :class:`~hexacell.kinematics.mechanism.Mechanism`."""
         b, v = _leg_vectors(geometry, poses, joints)
-        return _leg_errors(geometry, v), _pose_jacobian(b, v / geometry["l"][..., None])
+        return _leg_errors(geometry, v), by_pose(b, -v / geometry["l"][..., None])
 
     def derivatives(self, geometry: Geometry, poses: PoseBatch, joints: Array) -> ConstraintDerivatives:
         """See :class:`~hexacell.kinematics.mechanism.Mechanism`."""
@@ -93,7 +93,7 @@ class Hexaglide:
         n = v / geometry["l"][:, None]
         by_length = -0.5 * (np.sum(n * n, axis=-1, keepdims=True) + 1.0)
         return ConstraintDerivatives(
-            pose=_pose_jacobian(b, n),
+            pose=by_pose(b, -n),
             joints=n[..., 0],
             parameters=np.concatenate([n, -n @ poses.rotations, by_length], axis=-1),
         )
@@ -115,7 +115,7 @@ class Hexaglide:
         """Origin at S2, S3 at the same height, platform axes through B2, B5 and B3."""
         S, B = geometry["S"], geometry["B"]
         base = _leveling_roll(S[2] - S[1])
-        platform = _axes_through(B[1], B[4], B[2])
+        platform = axes_through(B[1], B[4], B[2], "platform")
         change = FrameTransform(base, S[1].copy(), platform)
         S = (S - S[1]) @ base.T
         B = B @ platform.T
@@ -169,19 +169,6 @@ def _leg_errors(geometry: Geometry | GeometryBatch, v: Array) -> Array:
     return error
 
 
-def _pose_jacobian(b: Array, n: Array) -> Array:
-    """Derivatives (n, 6, 6) of the constraints by the pose: ``[-n, -b x n]``."""
-    jacobian = np.empty((*n.shape[:-1], 6))
-    jacobian[..., :3] = -n
-    # np.cross would cost as much as the rest of a Newton step.
-    bx, by, bz = b[..., 0], b[..., 1], b[..., 2]
-    nx, ny, nz = n[..., 0], n[..., 1], n[..., 2]
-    jacobian[..., 3] = bz * ny - by * nz
-    jacobian[..., 4] = bx * nz - bz * nx
-    jacobian[..., 5] = by * nx - bx * ny
-    return jacobian
-
-
 def _leveling_roll(vector: Array) -> Array:
     """The rotation about x that turns ``vector`` into z = 0, y > 0."""
     across = np.hypot(vector[1], vector[2])
@@ -189,15 +176,3 @@ def _leveling_roll(vector: Array) -> Array:
         raise UsageError("two slider joints that fix the frame are on one rail")
     y, z = vector[1:] / across
     return np.array([[1.0, 0.0, 0.0], [0.0, y, z], [0.0, -z, y]])
-
-
-def _axes_through(second: Array, fifth: Array, third: Array) -> Array:
-    """Rows: x from B2 to B5, z normal to the plane of B2, B5, B3, y toward B3."""
-    if (width := np.linalg.norm(fifth - second)) < CLOSEST_JOINTS_MM:
-        raise UsageError("two platform joints that fix the frame are at one place")
-    x = (fifth - second) / width
-    z = np.cross(x, third - second)
-    if (height := np.linalg.norm(z)) < CLOSEST_JOINTS_MM:
-        raise UsageError("the platform joints that fix the frame are in one line")
-    z /= height
-    return np.stack([x, np.cross(z, x), z])

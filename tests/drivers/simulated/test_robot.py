@@ -204,7 +204,7 @@ def test_a_geometry_that_cannot_hold_the_sliders_is_refused(twin) -> None:
     shrunk = hexaglide_geometry(twin.truth["S"], twin.truth["B"], twin.truth["l"] / 3.0)
     kept = twin.config.read_text()
     rewrite(twin, shrunk)
-    with pytest.raises(FileError, match="no pose at the present slider positions"):
+    with pytest.raises(FileError, match="no pose at the present joint variables"):
         twin.machine.switch_on()
     twin.config.write_text(kept)
     twin.machine.move(TILTED)

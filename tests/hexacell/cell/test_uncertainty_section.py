@@ -11,7 +11,7 @@ from hexacell.cell.uncertainty import SIZES_OF_GRADES, Grade, UncertaintySetting
 from hexacell.errors import FileError
 
 SECTION = '[uncertainty]\ngrade = "ideal"\n'
-SIZES = set(UncertaintySettings.model_fields) - {"grade", "sources", "slider_repeatability_acts"}
+SIZES = set(UncertaintySettings.model_fields) - {"grade", "sources", "stop_repeatability_acts"}
 
 
 @pytest.fixture

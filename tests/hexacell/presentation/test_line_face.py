@@ -65,7 +65,7 @@ def test_what_the_devices_show() -> None:
         "gauge y: -0.500 mm, 12.0 s ago",
         "gauge z: not read yet",
         "gauge w: is silent",
-        "sliders: 1.000 -2.000 3.500 4.000 5.000 6.000 mm",
+        "encoders: 1.000 -2.000 3.500 4.000 5.000 6.000 mm",
         "motion is forbidden: the stop file is there",
     ]
     assert max(map(len, text.splitlines())) <= 80

@@ -10,7 +10,7 @@ import pytest
 from hexacell.identification.estimator import identify
 from hexacell.identification.problem.problem import Noise
 from hexacell.uncertainty.budget import UncertaintyBudget
-from hexacell.uncertainty.encoder_effects import common_encoder_scale, encoder_scales, slider_repeatability
+from hexacell.uncertainty.encoder_effects import common_encoder_scale, encoder_scales, stop_repeatability
 from hexacell.uncertainty.gauge_effects import ball_beside_tool, ball_roundness, gauge_scales
 from hexacell.uncertainty.guide_effects import common_sag, rail_directions, rail_waves
 from hexacell.uncertainty.statement import TaskErrors
@@ -40,7 +40,7 @@ def near(visit, make_problem, paper):
 EFFECTS = (
     encoder_scales(10.0),
     rail_waves(5.0, 600.0),
-    slider_repeatability(2.0),
+    stop_repeatability(2.0),
     ball_roundness(2.0),
 )
 

@@ -9,7 +9,7 @@ from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.parameters import MachinePart
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.uncertainty.effects import Effect, Placement
-from hexacell.uncertainty.encoder_effects import encoder_scales, slider_repeatability
+from hexacell.uncertainty.encoder_effects import encoder_scales, stop_repeatability
 from hexacell.uncertainty.environment_effects import load_at_work, temperature_at_work
 from hexacell.uncertainty.guide_effects import common_sag, rail_directions, rail_waves
 from tests.hexacell.kinematics.mechanisms.gough_stewart import PARAMETERS, GoughStewart
@@ -44,7 +44,7 @@ def test_a_mechanism_without_rails_has_no_effects_of_rails(hexapod, effect) -> N
 
 def test_it_has_the_effects_of_encoders_and_loads(hexapod) -> None:
     assert columns(encoder_scales(1.0), hexapod).shape == (2, 6, 6)
-    assert columns(slider_repeatability(1.0), hexapod).shape == (2, 6, 6)
+    assert columns(stop_repeatability(1.0), hexapod).shape == (2, 6, 6)
     assert columns(load_at_work(1.0, 0.05), hexapod).shape == (2, 6, 3)
 
 

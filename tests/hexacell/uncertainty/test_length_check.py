@@ -14,7 +14,7 @@ from hexacell.errors import IdentifiabilityError
 from hexacell.identification.estimator import identify
 from hexacell.identification.problem.problem import Noise
 from hexacell.uncertainty.budget import UncertaintyBudget
-from hexacell.uncertainty.encoder_effects import common_encoder_scale, encoder_scales, slider_repeatability
+from hexacell.uncertainty.encoder_effects import common_encoder_scale, encoder_scales, stop_repeatability
 from hexacell.uncertainty.gauge_effects import ball_roundness
 from hexacell.uncertainty.guide_effects import common_sag, rail_directions, rail_waves
 from hexacell.uncertainty.length_check import LengthCheck
@@ -249,7 +249,7 @@ EFFECTS = (
     rail_directions(0.02),
     rail_waves(3.0, 600.0),
     common_sag(10.0, 800.0),
-    slider_repeatability(2.0),
+    stop_repeatability(2.0),
     ball_roundness(2.0),
 )
 

@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from hexacell.kinematics.parameters import MachinePart
 from hexacell.uncertainty.effects import Effect, Occurrence
-from hexacell.uncertainty.encoder_effects import common_encoder_scale, encoder_scales, slider_repeatability
+from hexacell.uncertainty.encoder_effects import common_encoder_scale, encoder_scales, stop_repeatability
 from hexacell.uncertainty.environment_effects import load_at_work, temperature_at_work
 from hexacell.uncertainty.gauge_effects import ball_beside_tool, ball_roundness, gauge_scales
 from hexacell.uncertainty.guide_effects import common_sag, rail_directions, rail_waves
@@ -163,7 +163,7 @@ def test_a_stop_that_the_encoders_miss_is_one_cause_at_one_record(laboratory, ex
 
     records = len(laboratory.visits.joints)
     each = np.array([alone(row, leg) for row in range(records) for leg in range(6)])
-    columns = propagation.parameter_columns(slider_repeatability(1.0))
+    columns = propagation.parameter_columns(stop_repeatability(1.0))
     assert columns.shape[1] <= len(exact.free)
     assert columns @ columns.T == pytest.approx(each.T @ each, rel=1e-9, abs=1e-15)
 
@@ -179,7 +179,7 @@ def test_a_stop_that_the_encoders_miss_is_one_cause_at_one_record(laboratory, ex
 
 
 def test_a_missed_stop_at_a_task_pose_is_not_taught_away(laboratory, propagation) -> None:
-    direct = propagation.columns(slider_repeatability(1.0)).direct
+    direct = propagation.columns(stop_repeatability(1.0)).direct
     machine = lambda shown: (laboratory.paper.actual, shown + 0.01 * np.eye(6)[3])  # noqa: E731
     moved = laboratory.errors(machine, laboratory.paper.actual, laboratory.task)
     rows = range(len(laboratory.task))
@@ -190,12 +190,12 @@ def test_a_missed_stop_at_a_task_pose_is_not_taught_away(laboratory, propagation
 
 def test_missed_stops_in_the_noise_of_the_records_act_at_work_alone(propagation) -> None:
     everywhere, at_work = (
-        propagation.columns(slider_repeatability(1.0, is_in_noise=in_noise)) for in_noise in (False, True)
+        propagation.columns(stop_repeatability(1.0, is_in_noise=in_noise)) for in_noise in (False, True)
     )
     assert np.count_nonzero(everywhere.through)
     assert at_work.through.shape[-1] == 0
     np.testing.assert_array_equal(at_work.combined, everywhere.direct)
-    assert propagation.chi_square(slider_repeatability(1.0, is_in_noise=True)) == 0.0
+    assert propagation.chi_square(stop_repeatability(1.0, is_in_noise=True)) == 0.0
 
 
 def test_a_machine_that_is_warmer_at_work_errs_as_its_lengths_say(laboratory, propagation) -> None:
@@ -263,7 +263,7 @@ def test_an_estimate_shares_constant_effects_with_the_earlier_one_that_is_its_pr
 
 
 def test_missed_stops_of_an_earlier_estimate_are_other_ones(laboratory, exact, propagation, visit) -> None:
-    effect = slider_repeatability(1.0)
+    effect = stop_repeatability(1.0)
     further = visit(points=2, orientations=6, seed=5)
     updated = laboratory.updated(exact, further.measured())
     before = propagation.parameter_columns(effect)

@@ -88,14 +88,14 @@ async def test_a_gauge_that_never_settles_is_named(bench, name: str) -> None:
 
 async def test_a_slider_that_never_settles_is_named(bench) -> None:
     bench.encoders.shown = lambda: (0.0, 0.0, 0.0, bench.clock.now(), 0.0, 0.0)
-    with pytest.raises(DeviceError, match=r"slider 4 by 0\.600 mm"):
+    with pytest.raises(DeviceError, match=r"encoder 4 by 0\.600 mm"):
         await settle(bench.devices, TIMING, bench.clock)
 
 
 async def test_all_moving_gauges_and_sliders_are_named(bench) -> None:
     bench.gauges[0].shown = bench.gauges[2].shown = lambda: math.sin(3.0 * bench.clock.now())
     bench.encoders.shown = lambda: (0.0, -bench.clock.now(), 0.0, 0.0, 0.0, 0.0)
-    with pytest.raises(DeviceError, match=r"gauge x by .*, gauge z by .*, slider 2 by"):
+    with pytest.raises(DeviceError, match=r"gauge x by .*, gauge z by .*, encoder 2 by"):
         await settle(bench.devices, TIMING, bench.clock)
 
 

@@ -98,6 +98,8 @@ def words(annotation: Any) -> str:  # noqa: PLR0911 - a case a kind of type
         return " or ".join([*options, *(["null"] if NoneType in arguments else [])])
     if origin is Literal:
         return " or ".join(f"`{one}`" for one in arguments)
+    if origin is tuple and not arguments:
+        return "an empty list"
     if origin is tuple and arguments[-1] is Ellipsis:
         return f"list of {words(arguments[0])}"
     if origin is tuple:

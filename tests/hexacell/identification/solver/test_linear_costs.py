@@ -16,12 +16,12 @@ from hexacell.identification.problem.systematic_errors import no_systematic_erro
 from hexacell.identification.solver.linear_costs import LinearCosts, systematic_errors
 from hexacell.kinematics.rotations import skew
 from hexacell.measurements.records import MeasurementSet
-from hexacell.uncertainty.encoder_effects import encoder_scales, slider_repeatability
+from hexacell.uncertainty.encoder_effects import encoder_scales, stop_repeatability
 from hexacell.uncertainty.gauge_effects import ball_roundness
 from hexacell.uncertainty.record_effects import RecordEffects
 
 NOISE = Noise(0.01, 0.01, alignment=0.005, gauge_scale=1e-3)
-EFFECTS = RecordEffects((encoder_scales(30.0), slider_repeatability(8.0), ball_roundness(6.0)))
+EFFECTS = RecordEffects((encoder_scales(30.0), stop_repeatability(8.0), ball_roundness(6.0)))
 MACHINES = 60
 
 

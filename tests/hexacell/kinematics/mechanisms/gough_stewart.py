@@ -17,6 +17,7 @@ from hexacell.kinematics.mechanism import (
     FrameFreedom,
     FrameTransform,
     Guides,
+    MechanismWords,
 )
 from hexacell.kinematics.parameters import MachinePart, ParameterKind, ParameterSet
 from hexacell.kinematics.pose import PoseBatch
@@ -65,6 +66,7 @@ class GoughStewart:
     """Six legs of variable length between two plates."""
 
     name = "gough-stewart"
+    words = MechanismWords("hexapod", joint="leg")
     parameters = PARAMETERS
     convention = CONVENTION
     frame_freedom = FrameFreedom()

@@ -1,0 +1,105 @@
+"""Whether the frame convention of a mechanism removes exactly what the choice of frames explains."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hexacell.conformance.example import MechanismExample
+from hexacell.identification.diagnostics.frame_alignment import frame_derivatives
+from hexacell.kinematics.geometry import Geometry
+from hexacell.kinematics.mechanism import FrameTransform
+from hexacell.kinematics.rotations import Array
+from hexacell.kinematics.sensitivity import pose_sensitivity
+
+ROUNDING = 1e-8
+LEAST_DETERMINED = 1e-7
+"""Of the largest singular value: what is smaller is not determined at all."""
+
+
+def check_rules(example: MechanismExample) -> None:
+    """The rules name parameters of the mechanism, each once, and leave what the frames do not take."""
+    convention, parameters = example.mechanism.convention, example.mechanism.parameters
+    ruled = [*convention.zero, *(name for group in convention.equal for name in group)]
+    if not set(ruled) <= set(parameters.names) or len(set(ruled)) != len(ruled):
+        raise AssertionError("a rule names no parameter, or one that another rule names")
+    fixed = len(parameters) - len(convention.free_names())
+    if fixed != len(example.mechanism.frame_freedom.columns):
+        raise AssertionError(
+            f"the rules fix {fixed} numbers, the frames may be changed in "
+            f"{len(example.mechanism.frame_freedom.columns)} ways"
+        )
+
+
+def check_normal_form(example: MechanismExample) -> None:
+    """The convention's frames satisfy its rules exactly, and are found again from any others."""
+    mechanism = example.mechanism
+    for geometry in example.robots():
+        normal, _ = mechanism.normalize_frames(geometry)
+        _check_rules_of(example, normal)
+        again, change = mechanism.normalize_frames(normal)
+        np.testing.assert_allclose(again.vector, normal.vector, atol=ROUNDING, err_msg="normalized twice")
+        _check_no_change(change)
+        for other in example.changes_of_frames():
+            changed = mechanism.change_frames(geometry, other)
+            found, _ = mechanism.normalize_frames(changed)
+            np.testing.assert_allclose(found.vector, normal.vector, atol=ROUNDING, err_msg=str(other))
+
+
+def _check_rules_of(example: MechanismExample, normal: Geometry) -> None:
+    convention = example.mechanism.convention
+    exact = convention.geometry(convention.free_parameters(normal))
+    np.testing.assert_array_equal(normal.vector, exact.vector, "the rules hold only nearly")
+
+
+def _check_no_change(change: FrameTransform) -> None:
+    for turn in (change.base, change.platform):
+        np.testing.assert_allclose(turn, np.eye(3), atol=ROUNDING)
+    np.testing.assert_allclose(change.origin, 0.0, atol=ROUNDING)
+
+
+def check_changes_of_frames(example: MechanismExample) -> None:
+    """The same machine in other frames has the same joint variables at the same poses."""
+    mechanism = example.mechanism
+    for geometry in example.robots():
+        expected = example.joints(geometry)
+        normal, to_normal = mechanism.normalize_frames(geometry)
+        found = example.joints(normal, to_normal.poses(example.poses))
+        np.testing.assert_allclose(found, expected, atol=ROUNDING, err_msg="in the convention's frames")
+        for change in example.changes_of_frames():
+            changed = mechanism.change_frames(geometry, change)
+            found = example.joints(changed, change.poses(example.poses))
+            np.testing.assert_allclose(found, expected, atol=ROUNDING, err_msg=str(change))
+            back = mechanism.change_frames(changed, change.inverse())
+            np.testing.assert_allclose(back.vector, geometry.vector, atol=ROUNDING)
+
+
+def check_identifiable(example: MechanismExample) -> None:
+    """The poses determine every free parameter, and no more than those, whatever frames are chosen."""
+    convention = example.mechanism.convention
+    all_together = _by_parameters(example, np.eye(len(example.mechanism.parameters)))
+    free = _by_parameters(example, convention.basis())
+    rank = int(np.sum(all_together > LEAST_DETERMINED * all_together[0]))
+    if rank != len(free):
+        raise AssertionError(
+            f"the poses determine {rank} parameters, the convention leaves {len(free)} free"
+        )
+    if free[-1] < LEAST_DETERMINED * free[0]:
+        raise AssertionError(f"a free parameter is not determined: {free[-1] / free[0]:.1e}")
+
+
+def _by_parameters(example: MechanismExample, basis: Array) -> Array:
+    """Singular values of the poses by parameters, less what changes of the frames explain.
+
+    Parameters are in units of their tolerances, rotations times the platform's radius.
+    """
+    mechanism, geometry = example.mechanism, example.mechanism.normalize_frames(example.drawing)[0]
+    poses = mechanism.normalize_frames(example.drawing)[1].poses(example.poses)
+    joints = example.joints(geometry, poses)
+    weights = np.repeat([1.0, float(mechanism.platform_radius(geometry))], 3)[:, None]
+    widths = example.widths.widths(mechanism.parameters)
+    columns = pose_sensitivity(mechanism, geometry, poses, joints).parameters @ (widths[:, None] * basis)
+    columns = (weights * columns).reshape(-1, basis.shape[1])
+    frames, _ = np.linalg.qr((weights * frame_derivatives(poses)).reshape(-1, 9))
+    left = columns - frames @ (frames.T @ columns)
+    sizes: Array = np.linalg.svd(left, compute_uv=False)
+    return sizes

@@ -1,0 +1,62 @@
+"""Whether the geometry of a mechanism is found from records without noise."""
+
+from __future__ import annotations
+
+from hexacell.conformance.example import MechanismExample
+from hexacell.identification.estimator import identify
+from hexacell.identification.problem.problem import Noise, Prior, build_problem
+from hexacell.kinematics.forward import continue_solution
+from hexacell.kinematics.geometry import Geometry
+from hexacell.kinematics.rotations import Array
+from hexacell.measurements.records import MeasurementSet, Record, deviation_of, joints_of
+
+NOISE = Noise(1e-5, 1e-5)
+"""Stated, mm; the records have none."""
+
+LARGEST_ERROR = 1e-6
+"""Of any parameter, mm or rad."""
+
+
+def check_identification(example: MechanismExample) -> None:
+    """A robot within the tolerances is identified from its records, commanded with the drawing."""
+    _, truth, *_ = example.robots()
+    normal, _ = example.mechanism.normalize_frames(truth)
+    problem = build_problem(
+        example.mechanism,
+        records_without_noise(example, truth),
+        controller=example.drawing,
+        branch=example.branch,
+        prior=Prior.of(example.mechanism, example.drawing, example.widths),
+        noise=NOISE,
+    )
+    found = identify(problem)
+    if found.undetermined:
+        raise AssertionError(f"not determined: {', '.join(found.undetermined)}")
+    error = found.geometry.largest_difference(normal)
+    if not error < LARGEST_ERROR:
+        raise AssertionError(f"the identified geometry is {error:.1e} off")
+
+
+def records_without_noise(example: MechanismExample, truth: Geometry) -> MeasurementSet:
+    """The records of a robot that is commanded with the drawing, at those poses that it can take.
+
+    The gauges have the travel that they need. Their axes are those of the drawing, once both robots are in
+    the convention's frames.
+    """
+    mechanism = example.mechanism
+    normal, _ = mechanism.normalize_frames(truth)
+    drawn, frames = mechanism.normalize_frames(example.drawing)
+    commands = frames.poses(example.poses)
+    joints = example.joints(drawn, commands)
+    actual = continue_solution(
+        mechanism, normal, joints, start=commands, start_geometry=drawn, start_joints=joints
+    )
+    balls, zeros, records = actual.poses.positions @ frames.base, dict[int, Array](), []
+    for row, (point, orientation) in enumerate(example.labels()):
+        if actual.found[row]:
+            deviation = deviation_of(balls[row] - zeros.setdefault(point, balls[row]))
+            pose = example.poses.pose(row)
+            records.append(Record(point, orientation, pose, joints_of(joints[row]), deviation))
+    if 2 * len(records) < len(balls):
+        raise AssertionError("the robot cannot take most of the drawing's poses")
+    return MeasurementSet(tuple(records))

@@ -1,0 +1,155 @@
+"""Whether constraints, derivatives, inverse and forward kinematics of a mechanism agree."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from hexacell.conformance.example import MechanismExample
+from hexacell.kinematics.forward import apply_twist, continue_solution
+from hexacell.kinematics.geometry import Geometry, GeometryBatch
+from hexacell.kinematics.mechanism import ConstraintDerivatives
+from hexacell.kinematics.parameters import ParameterUnit
+from hexacell.kinematics.pose import PoseBatch
+from hexacell.kinematics.rotations import Array
+
+ROUNDING = 1e-9
+DIFFERENCES = 1e-6
+"""Accuracy of central differences, relative to the largest derivative of the same kind."""
+
+STEPS = {ParameterUnit.MM: 1e-3, ParameterUnit.RAD: 1e-6, ParameterUnit.NONE: 1e-6}
+TWIST_STEPS = np.repeat([STEPS[ParameterUnit.MM], STEPS[ParameterUnit.RAD]], 3)
+OFF = np.repeat([3.0, 0.01], 3)
+"""A twist, mm and rad, after which the legs do not close: derivatives must hold there too."""
+
+FAR_MM = 1e5
+
+
+def check_inverse(example: MechanismExample) -> None:
+    """The inverse closes every leg, is on its branch, and gives NaN or a number anywhere."""
+    mechanism = example.mechanism
+    for geometry in example.robots():
+        reached = example.reached(geometry)
+        poses, joints = example.poses[reached], example.joints(geometry)[reached]
+        residual = mechanism.residual_and_jacobian(geometry, poses, joints)[0]
+        np.testing.assert_allclose(residual, 0.0, atol=ROUNDING, err_msg="the inverse leaves legs open")
+        sides = np.array(example.branch or (1,) * 6)
+        found = mechanism.branch(geometry, poses, joints)
+        np.testing.assert_array_equal(found, np.broadcast_to(sides, found.shape), "branch of the inverse")
+    far = PoseBatch.at(np.full(3, FAR_MM), example.poses.rotations)
+    with np.errstate(all="raise"):
+        mechanism.inverse(example.drawing, example.branch, far)
+
+
+def check_lengths(example: MechanismExample) -> None:
+    """A constraint is a leg's error in mm: where it closes, a motion along the leg counts fully."""
+    joints = example.joints(example.drawing)
+    pose = example.mechanism.derivatives(example.drawing, example.poses, joints).pose
+    size = np.linalg.norm(pose[..., :3], axis=-1)
+    np.testing.assert_allclose(size, 1.0, atol=ROUNDING, err_msg="derivatives by the ball's position")
+
+
+def check_derivatives(example: MechanismExample) -> None:
+    """All derivatives are those of the constraints (central differences), off closed poses too."""
+    for geometry in example.robots():
+        random = np.random.default_rng(3)
+        reached = example.reached(geometry)
+        off = OFF * random.uniform(-1.0, 1.0, (len(reached), 6))
+        poses = apply_twist(example.poses[reached], off)
+        _check_derivatives_at(example, geometry, poses, example.joints(geometry)[reached])
+
+
+def _check_derivatives_at(
+    example: MechanismExample, geometry: Geometry, poses: PoseBatch, joints: Array
+) -> None:
+    mechanism, parameters = example.mechanism, example.mechanism.parameters
+    found = mechanism.derivatives(geometry, poses, joints)
+    jacobian = mechanism.residual_and_jacobian(geometry, poses, joints)[1]
+    np.testing.assert_allclose(found.pose, jacobian, atol=ROUNDING, err_msg="the two pose Jacobians")
+
+    def by_twist(step: Array) -> Array:
+        twisted = apply_twist(poses, np.tile(step, (len(poses), 1)))
+        return mechanism.residual_and_jacobian(geometry, twisted, joints)[0]
+
+    def by_joints(step: Array) -> Array:
+        return mechanism.residual_and_jacobian(geometry, poses, joints + step)[0]
+
+    def by_parameters(step: Array) -> Array:
+        changed = Geometry(parameters, geometry.vector + step)
+        return mechanism.residual_and_jacobian(changed, poses, joints)[0]
+
+    sizes = np.array([STEPS[parameter.kind.unit] for parameter in parameters.parameters])
+    names = [f"pose {column}" for column in range(1, 7)]
+    _compare(found.pose, by_twist, TWIST_STEPS, names)
+    of_each_joint = found.joints[..., None] * np.eye(6)
+    _compare(of_each_joint, by_joints, np.full(6, STEPS[ParameterUnit.MM]), ["joints"] * 6)
+    _compare(_by_all_parameters(example, found), by_parameters, sizes, parameters.names)
+
+
+def _by_all_parameters(example: MechanismExample, found: ConstraintDerivatives) -> Array:
+    """Derivatives (n, 6, P): leg i depends on its own numbers alone."""
+    per_leg = example.mechanism.parameters.numbers_per_leg
+    of_legs = found.parameters[:, :, None, :] * np.eye(6)[..., None]
+    by_leg: Array = of_legs.reshape(*found.joints.shape, 6 * per_leg)
+    return by_leg[..., example.mechanism.parameters.leg_order]
+
+
+def _compare(told: Array, residual: Callable[[Array], Array], steps: Array, names: Sequence[str]) -> None:
+    """Derivatives (n, 6, k) with central differences by each of k numbers."""
+    for column, (step, name) in enumerate(zip(np.diag(steps), names, strict=True)):
+        differences = (residual(step) - residual(-step)) / (2.0 * steps[column])
+        limit = DIFFERENCES * max(1.0, float(np.abs(differences).max()))
+        words = f"derivatives by {name}"
+        np.testing.assert_allclose(told[..., column], differences, rtol=0.0, atol=limit, err_msg=words)
+
+
+def check_forward(example: MechanismExample) -> None:
+    """The robot goes where the inverse sends it: forward kinematics from the drawing's pose leads back."""
+    for geometry in example.robots():
+        reached = example.reached(geometry)
+        found = continue_solution(
+            example.mechanism,
+            geometry,
+            example.joints(geometry)[reached],
+            start=example.poses[reached],
+            start_geometry=example.drawing,
+            start_joints=example.joints(example.drawing)[reached],
+        )
+        if not found.found.all():
+            raise AssertionError("forward kinematics finds no pose within the tolerances of the drawing")
+        poses = example.poses[reached]
+        np.testing.assert_allclose(found.poses.positions, poses.positions, atol=1e-6)
+        np.testing.assert_allclose(found.poses.rotations, poses.rotations, atol=1e-8)
+
+
+def check_batches(example: MechanismExample) -> None:
+    """One geometry for each pose gives what each gives alone."""
+    mechanism, robots = example.mechanism, list(example.robots())
+    rows = np.arange(len(robots))
+    poses, joints = example.poses[rows], example.joints(example.drawing)[rows]
+    batch = GeometryBatch(mechanism.parameters, np.stack([one.vector for one in robots]))
+    together = mechanism.residual_and_jacobian(batch, poses, joints)
+    legs, radii = mechanism.legs(batch, poses, joints), mechanism.platform_radius(batch)
+    for row, geometry in enumerate(robots):
+        at = [row]
+        alone = mechanism.residual_and_jacobian(geometry, poses[at], joints[at])
+        for told, expected in zip(together, alone, strict=True):
+            np.testing.assert_allclose(told[row], expected[0], atol=ROUNDING)
+        own = mechanism.legs(geometry, poses[at], joints[at])
+        np.testing.assert_allclose(legs.base_joints[row], own.base_joints[0], atol=ROUNDING)
+        np.testing.assert_allclose(legs.platform_joints[row], own.platform_joints[0], atol=ROUNDING)
+        np.testing.assert_allclose(radii[row], mechanism.platform_radius(geometry), atol=ROUNDING)
+
+
+def check_legs(example: MechanismExample) -> None:
+    """Platform joints are fixed to the platform, their mean distance from the ball is its radius."""
+    mechanism, poses = example.mechanism, example.poses
+    legs = mechanism.legs(example.drawing, poses, example.joints(example.drawing))
+    own = np.einsum("nij,nki->nkj", poses.rotations, legs.platform_joints - poses.positions[:, None])
+    np.testing.assert_allclose(own, np.broadcast_to(own[0], own.shape), atol=ROUNDING)
+    radius = np.linalg.norm(own[0], axis=-1).mean()
+    np.testing.assert_allclose(mechanism.platform_radius(example.drawing), radius, atol=ROUNDING)
+    has_guides = mechanism.guides(example.drawing, poses, example.joints(example.drawing)) is not None
+    if has_guides != (mechanism.words.guide is not None):
+        raise AssertionError("a mechanism has a word for its guides exactly if it has guides")

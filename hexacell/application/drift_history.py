@@ -11,8 +11,9 @@ from hexacell.application.run_evidence_document import EvidenceDocument, evidenc
 from hexacell.application.run_index import RunIndex
 from hexacell.campaign.change_alarm import machine_causes
 from hexacell.cell.loader import Cell
-from hexacell.change_detection.drift_watch import Causes, StepAlarm, WatchResult, watch_runs
-from hexacell.change_detection.steady_drift import steady_drift
+from hexacell.change_detection.change_attribution import AttributedChange
+from hexacell.change_detection.drift_watch import StepAlarm, WatchResult, watch_runs
+from hexacell.change_detection.steady_drift import steady_drift_of_each
 from hexacell.kinematics.parameters import GeometricParameter
 from hexacell.reporting.run_comparison import DAY_S
 from hexacell.robot_model import robot_of
@@ -32,7 +33,10 @@ class FoundChange:
         noticed: when the run ended that alarmed.
         after, before: when the runs ended between which it happened.
         parameter: the likeliest one of its leg, with its ``change`` and one standard deviation of that.
-        possible_legs: of which one changed, the likeliest first; only one where that is certain.
+        per_day, sigma_per_day: by how much it has moved on since, until the next change; ``moves_on``:
+            surely.
+        possible_legs: of which one changed by all runs until the next change, the likeliest first; only
+            one where that is certain.
         other_legs: that changed as well.
     """
 
@@ -43,6 +47,9 @@ class FoundChange:
     parameter: GeometricParameter
     change: float
     sigma: float
+    per_day: float
+    sigma_per_day: float
+    moves_on: bool
     other_legs: tuple[int, ...]
 
     @property
@@ -91,34 +98,41 @@ def drift_history(cell: Cell, index: RunIndex | None = None) -> DriftHistory:
     if not runs:
         return DriftHistory((), (), (), ())
     causes = machine_causes(robot_of(cell), len(runs[-1].evidence.weighted))
-    watched = watch_runs([run.evidence for run in runs], causes)
+    days = [(run.at - runs[0].at).total_seconds() / DAY_S for run in runs]
+    watched = watch_runs([run.evidence for run in runs], causes, days)
     parameters = cell.settings.mechanism.parameters
     ended = tuple(run.at for run in runs)
-    changes = tuple(_change(alarm, ended, parameters.parameters) for alarm in watched.alarms)
+    changes = (
+        _change(alarm, found, ended, parameters.parameters)
+        for alarm, found in zip(watched.alarms, watched.attributed, strict=True)
+    )
     shares = zip(parameters.names, watched.share_of_limit.tolist(), strict=True)
     return DriftHistory(
         ended,
         tuple(run.celsius for run in runs),
-        changes,
+        tuple(changes),
         tuple(shares),
-        _rates(cell, runs, causes, watched),
+        _rates(parameters.parameters, runs, days, watched),
     )
 
 
 def _rates(
-    cell: Cell, runs: list[EvidenceDocument], causes: Causes, watched: WatchResult
+    parameters: tuple[GeometricParameter, ...],
+    runs: list[EvidenceDocument],
+    days: list[float],
+    watched: WatchResult,
 ) -> tuple[ParameterRate, ...]:
     """The rates that the runs since the last change see, if these span some days."""
-    unchanged = runs[watched.unchanged_from :]
-    days = np.array([(run.at - unchanged[0].at).total_seconds() / DAY_S for run in unchanged])
-    if np.ptp(days) < LEAST_DAYS:
+    first = watched.since.first
+    if days[-1] - days[first] < LEAST_DAYS:
         return ()
-    found = steady_drift(watched.before, [run.evidence for run in unchanged], days, causes.by_state)
+    found = steady_drift_of_each(watched.since.before, [run.evidence for run in runs[first:]], days[first:])
     is_steady = np.abs(found.scores) > found.limit
     numbers = zip(found.rates.tolist(), found.sigmas.tolist(), is_steady.tolist(), strict=True)
-    named = zip(cell.settings.mechanism.parameters.parameters, numbers, strict=True)
     return tuple(
-        ParameterRate(one.name, one.kind.unit.value, *each) for one, each in named if np.isfinite(each[1])
+        ParameterRate(one.name, one.kind.unit.value, *each)
+        for one, each in zip(parameters, numbers, strict=True)
+        if np.isfinite(each[1])
     )
 
 
@@ -138,15 +152,21 @@ def _counted_runs(cell: Cell, index: RunIndex) -> list[EvidenceDocument]:
 
 
 def _change(
-    alarm: StepAlarm, ended: tuple[datetime, ...], parameters: tuple[GeometricParameter, ...]
+    alarm: StepAlarm,
+    found: AttributedChange,
+    ended: tuple[datetime, ...],
+    parameters: tuple[GeometricParameter, ...],
 ) -> FoundChange:
     return FoundChange(
         noticed=ended[alarm.run],
         after=ended[max(alarm.first - 1, 0)],
         before=ended[alarm.last],
-        possible_legs=alarm.possible_legs,
-        parameter=parameters[alarm.cause],
-        change=alarm.change,
-        sigma=alarm.sigma,
-        other_legs=alarm.other_legs,
+        possible_legs=found.possible_legs,
+        parameter=parameters[found.cause],
+        change=found.change,
+        sigma=found.sigma,
+        per_day=found.rate,
+        sigma_per_day=found.rate_sigma,
+        moves_on=found.moves_on,
+        other_legs=tuple(leg for leg in alarm.other_legs if leg not in found.possible_legs),
     )

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hexacell.change_detection.drift_watch import Causes
+from hexacell.change_detection.causes import Causes
 from hexacell.change_detection.leg_evidence import likeliest_leg
 from hexacell.change_detection.run_evidence import WhitenedRecords, whiten_records
 from hexacell.change_detection.single_cause import SingleCauseTest, single_cause_test

@@ -84,3 +84,25 @@ class CarriedPosterior:
         return CarriedPosterior(
             RunEvidence(information - np.outer(taken, along), weighted - taken * float(cause @ weighted))
         )
+
+    def marginal(self, rows: list[int]) -> CarriedPosterior:
+        """What is known of some numbers of the state, whatever the others are."""
+        information, weighted = self.evidence.information, self.evidence.weighted
+        others = [row for row in range(len(weighted)) if row not in rows]
+        crossed = information[np.ix_(rows, others)]
+        taken = crossed @ np.linalg.inv(information[np.ix_(others, others)])
+        return CarriedPosterior(
+            RunEvidence(
+                information[np.ix_(rows, rows)] - taken @ crossed.T,
+                weighted[rows] - taken @ weighted[others],
+            )
+        )
+
+    def with_unknowns(self, sigma: Array) -> CarriedPosterior:
+        """The same with further numbers (k,) of mean 0, of which nothing but their ``sigma`` is known."""
+        evidence, states = self.evidence, len(self.evidence.weighted)
+        information = np.diag(np.concatenate([np.zeros(states), sigma**-2.0]))
+        information[:states, :states] = evidence.information
+        return CarriedPosterior(
+            RunEvidence(information, np.concatenate([evidence.weighted, np.zeros(len(sigma))]))
+        )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.special import ndtri
 
 from hexacell.kinematics.rotations import Array
 
@@ -22,3 +23,8 @@ def largest_by_chance(unit: Array) -> float:
     factor = np.linalg.qr(unit)[1] if len(unit) > unit.shape[1] else unit
     largest = np.concatenate([np.abs(part @ factor).max(axis=1) for part in np.array_split(draws, 10)])
     return float(np.quantile(largest, 1.0 - FALSE_ALARMS))
+
+
+def largest_of_independent(scores: int) -> float:
+    """The same of so many scores whose correlations nobody looks at: it is exceeded no more often."""
+    return float(-ndtri(0.5 * FALSE_ALARMS / scores))

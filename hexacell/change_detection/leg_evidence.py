@@ -28,16 +28,15 @@ def likeliest_leg(scores: Array, sigmas: Array, legs: NDArray[np.int_]) -> int:
 
 def possible_legs(scores: Array, sigmas: Array, legs: NDArray[np.int_]) -> tuple[int, ...]:
     """The legs of which one changed, the likeliest first: as few as have ``CERTAIN`` together."""
-    evidence = _evidence(scores, sigmas, legs)
-    ordered = sorted(evidence, key=evidence.__getitem__, reverse=True)
-    total = logsumexp(list(evidence.values()))
-    together = np.cumsum([np.exp(evidence[leg] - total) for leg in ordered])
-    return tuple(ordered[: 1 + int(np.searchsorted(together, CERTAIN))])
-
-
-def _evidence(scores: Array, sigmas: Array, legs: NDArray[np.int_]) -> dict[int, float]:
-    """Logarithm of the evidence for each leg."""
     with np.errstate(divide="ignore"):
         ratio = (USUAL_CHANGE / sigmas) ** 2
-    evidence = 0.5 * (scores**2 * ratio / (1.0 + ratio) - np.log1p(ratio))
-    return {int(leg): float(logsumexp(evidence[legs == leg])) for leg in np.unique(legs)}
+    return legs_by_evidence(0.5 * (scores**2 * ratio / (1.0 + ratio) - np.log1p(ratio)), legs)
+
+
+def legs_by_evidence(evidence: Array, legs: NDArray[np.int_]) -> tuple[int, ...]:
+    """The same by the logarithm of the evidence (m,) for each cause."""
+    of_leg = {int(leg): float(logsumexp(evidence[legs == leg])) for leg in np.unique(legs)}
+    ordered = sorted(of_leg, key=of_leg.__getitem__, reverse=True)
+    total = logsumexp(list(of_leg.values()))
+    together = np.cumsum([np.exp(of_leg[leg] - total) for leg in ordered])
+    return tuple(ordered[: 1 + int(np.searchsorted(together, CERTAIN))])

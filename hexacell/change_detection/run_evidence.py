@@ -43,6 +43,10 @@ class RunEvidence:
         """Both together."""
         return RunEvidence(self.information + other.information, self.weighted + other.weighted)
 
+    def in_terms_of(self, matrix: Array) -> RunEvidence:
+        """The same evidence on numbers (u,) from which the state is made by a ``matrix`` (s, u)."""
+        return RunEvidence(matrix.T @ self.information @ matrix, matrix.T @ self.weighted)
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class WhitenedRecords:

@@ -15,10 +15,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import ndtri
 
 from hexacell.change_detection.carried_posterior import LEAST_SHARE, CarriedPosterior
-from hexacell.change_detection.largest_score import FALSE_ALARMS
+from hexacell.change_detection.largest_score import largest_of_independent
+from hexacell.change_detection.moving_posterior import MovingPosterior
 from hexacell.change_detection.run_evidence import RunEvidence
 from hexacell.kinematics.rotations import Array
 
@@ -42,7 +42,24 @@ class SteadyDrift:
     @property
     def limit(self) -> float:
         """What the largest score exceeds by chance in one case of a hundred, at most."""
-        return float(-ndtri(0.5 * FALSE_ALARMS / len(self.rates)))
+        return largest_of_independent(len(self.rates))
+
+
+def steady_drift_of_each(
+    before: MovingPosterior, runs: Sequence[RunEvidence], days: Sequence[float]
+) -> SteadyDrift:
+    """The rates of all causes on the ``days`` (n) of runs, by what is known before them.
+
+    Nothing that was said before of the rates of a leg counts for it; other legs may move on meanwhile.
+    """
+    causes, since = before.causes, np.array(days) - before.day
+    rates, sigmas = np.zeros(len(causes.legs)), np.zeros(len(causes.legs))
+    for leg in np.unique(causes.legs).tolist():
+        known, rows = before.without_rates((leg,)), causes.legs == leg
+        seen = [known.seen(run, day) for run, day in zip(runs, days, strict=True)]
+        found = steady_drift(known.posterior, seen, since, known.by_state[rows])
+        rates[rows], sigmas[rows] = found.rates, found.sigmas
+    return SteadyDrift(rates, sigmas)
 
 
 def steady_drift(

@@ -7,6 +7,9 @@ from hexacell.application.evidence_comparison import EvidenceComparison
 from hexacell.presentation.history import TREND_DAYS
 from hexacell.presentation.layout import wrapped
 
+SMALLEST_SHOWN = 0.001
+"""A standard deviation that is smaller has a further digit."""
+
 
 def evidence_comparison_text(found: EvidenceComparison) -> str:
     """Whether the records of two runs contradict an unchanged machine, and each parameter taken alone."""
@@ -51,8 +54,14 @@ def _rate_lines(found: DriftHistory) -> list[str]:
 
 
 def _rate_words(rate: ParameterRate) -> str:
-    change, sigma = TREND_DAYS * rate.per_day, TREND_DAYS * rate.sigma_per_day
-    return f"{rate.name} by {change:+.3f} +- {sigma:.3f} {rate.unit} in {TREND_DAYS:.0f} days"
+    change = _in_thirty_days(rate.per_day, rate.sigma_per_day)
+    return f"{rate.name} by {change} {rate.unit} in {TREND_DAYS:.0f} days"
+
+
+def _in_thirty_days(per_day: float, sigma_per_day: float) -> str:
+    change, sigma = TREND_DAYS * per_day, TREND_DAYS * sigma_per_day
+    digits = 3 if sigma >= SMALLEST_SHOWN else 4
+    return f"{change:+.{digits}f} +- {sigma:.{digits}f}"
 
 
 def legs_text(found: FoundChange) -> str:
@@ -68,6 +77,14 @@ def change_sentence(found: FoundChange) -> str:
     rest = f"legs {others} moved as well" if len(found.other_legs) > 1 else f"leg {others} moved as well"
     return (
         f"leg {legs_text(found)} moved {size} (as {found.parameter.name} by {found.change:+.3f}) "
-        f"between {found.after:%Y-%m-%d %H:%M} and {found.before:%Y-%m-%d %H:%M}; "
-        f"{rest if others else 'the others did not'}. Noticed {found.noticed:%Y-%m-%d}."
+        f"between {found.after:%Y-%m-%d %H:%M} and {found.before:%Y-%m-%d %H:%M}"
+        f"{_motion_since(found)}; {rest if others else 'the others did not'}. "
+        f"Noticed {found.noticed:%Y-%m-%d}."
     )
+
+
+def _motion_since(found: FoundChange) -> str:
+    if not found.moves_on:
+        return ""
+    rate, unit = _in_thirty_days(found.per_day, found.sigma_per_day), found.parameter.kind.unit.value
+    return f" and has moved on since by {rate} {unit} in {TREND_DAYS:.0f} days"

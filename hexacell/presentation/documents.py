@@ -262,6 +262,9 @@ def _change_document(found: FoundChange) -> dict[str, Any]:
         "unit": found.parameter.kind.unit.value,
         "change": found.change,
         "sigma": found.sigma,
+        "per_day": found.per_day,
+        "sigma_per_day": found.sigma_per_day,
+        "moves_on": found.moves_on,
         "other_legs": list(found.other_legs),
     }
 

@@ -22,7 +22,8 @@ import pytest
 from hexacell.campaign.change_alarm import machine_causes, machine_records
 from hexacell.campaign.dry_run import VirtualCampaign
 from hexacell.change_detection.carried_posterior import CarriedPosterior
-from hexacell.change_detection.drift_watch import Causes, DriftWatch, StepAlarm, watch_runs
+from hexacell.change_detection.causes import Causes
+from hexacell.change_detection.drift_watch import DriftWatch, StepAlarm, watch_runs
 from hexacell.change_detection.run_evidence import RunEvidence
 from hexacell.kinematics.rotations import Array
 from hexacell.virtual_robot import VirtualRobot

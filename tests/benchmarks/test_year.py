@@ -17,7 +17,7 @@ from hexacell.application.drift_history import DriftHistory, drift_history
 from hexacell.decision import Verdict
 from hexacell.errors import ExitCode
 from procedures.calibration.workflow import Mode
-from tests.benchmarks.simulated_year import DEAD_GAUGE, FULL_DISK, LIMIT_MM, Year
+from tests.benchmarks.simulated_year import DEAD_GAUGE, FIRST_NIGHT, FULL_DISK, LIMIT_MM, Year
 from tests.benchmarks.worlds.table import most_by_chance
 
 Say = Callable[[str, str, str], None]
@@ -108,7 +108,7 @@ def test_verdicts_are_right(told, say) -> None:
 
 
 def test_alarms_are_right(told, say) -> None:
-    """The crash with its leg and night; else only the leg that drifts."""
+    """The crash with its leg and night; else only the leg that drifts, once, with its rate."""
     crashes = [one for one in told.drift.changes if one.leg == 4]
     others = [one for one in told.drift.changes if one.leg != 4]
     say("alarms of the watch: crash, drift", f"{len(crashes)}, {len(others)}", "1, of leg 2 alone")
@@ -121,15 +121,23 @@ def test_alarms_are_right(told, say) -> None:
     say(f"  the crash of {CRASH_MM} mm, nights until noticed", f"{late}; {size}", "at most 3")
     assert crash.after < at <= crash.before
     assert 0 <= late <= 3
+    assert abs(crash.change - CRASH_MM) < 4 * crash.sigma
     of_leg_2 = sum(2 in one.possible_legs for one in others)
     certain = sum(one.possible_legs == (2,) for one in others)
     say("  of the alarms of the drift name leg 2", f"{of_leg_2} of {len(others)}", "all")
     say("    and no other one", f"{certain}", "")
+    for one in others:
+        rate = f"{one.parameter.name} {one.per_day:+.5f} +- {one.sigma_per_day:.5f} mm a night"
+        say(
+            f"  noticed in night {(one.noticed.date() - FIRST_NIGHT.date()).days}",
+            rate,
+            f"l2 {DRIFT_MM:+.5f}",
+        )
     steady = [rate.name for rate in told.drift.rates if rate.is_steady]
-    found = [one.leg for one in others]
-    say("  the drift of leg 2: alarms; steady rates", f"{len(found)}; {', '.join(steady) or 'none'}", "one")
-    assert found or "l2" in steady
+    say("  steady rates in the end", ", ".join(steady) or "none", "l2 among them")
+    assert others or "l2" in steady
     assert of_leg_2 == len(others)
+    assert len(others) <= 1
 
 
 def test_the_archive_is_consistent(told, say) -> None:

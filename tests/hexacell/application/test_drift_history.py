@@ -196,6 +196,18 @@ def test_a_steady_drift_is_told_by_calibrations_and_checks_together(nights) -> N
     assert "Moving steadily" in watch_text(found)
 
 
+def test_what_moves_on_steadily_is_told_once_with_its_rate(nights) -> None:
+    nights.calibrate()
+    for number in range(20):
+        nights.changes = {"l4": 10 * DRIFT_MM * number}
+        nights.check()
+    (change,) = drift_history(nights.cell).changes
+    assert (change.possible_legs, change.parameter.name, change.moves_on) == ((4,), "l4", True)
+    assert change.per_day == pytest.approx(10 * DRIFT_MM, abs=4 * change.sigma_per_day)
+    assert change.noticed.day < 10
+    assert " and has moved on since by +0.3" in " ".join(change_sentence(change).split())
+
+
 def test_rates_are_of_the_time_since_the_last_change(nights) -> None:
     found = after(nights, 6, 6, crash=CRASH)
     assert len(found.changes) == 1

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hexacell.change_detection.drift_watch import Causes
+from hexacell.change_detection.causes import Causes
 from hexacell.change_detection.run_evidence import RunEvidence, WhitenedRecords
 from hexacell.kinematics.rotations import Array
 
@@ -17,9 +17,10 @@ CAUSES = Causes(np.eye(6), LEGS, 6)
 
 @dataclass
 class LinearRobot:
-    """A robot of six parameters, of which each run shows a part of all, with noise of 1 unit."""
+    """A robot of six parameters, of which each run shows a part of all, with ``noise``."""
 
     seed: int = 0
+    noise: float = 1.0
 
     def __post_init__(self) -> None:
         self.random = np.random.default_rng(self.seed)
@@ -29,6 +30,7 @@ class LinearRobot:
 
     def records(self, rows: Array, state: Array) -> WhitenedRecords:
         """Records at the true ``state``, linearized at 0."""
+        rows = rows / self.noise
         residuals = -rows @ state + self.random.standard_normal(len(rows))
         return WhitenedRecords(np.zeros(6), rows, residuals)
 

@@ -5,7 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hexacell.change_detection.drift_watch import DriftWatch, StepAlarm, alarm_limit, watch_runs
+from hexacell.change_detection.drift_watch import (
+    DriftWatch,
+    StepAlarm,
+    WatchResult,
+    alarm_limit,
+    watch_runs,
+)
 from hexacell.change_detection.leg_evidence import likeliest_leg, possible_legs
 from tests.hexacell.change_detection.synthetic_runs import CAUSES, LEGS, LinearRobot
 
@@ -58,6 +64,57 @@ def test_a_slow_drift_is_found_too() -> None:
     assert alarms
     assert alarms[0].leg == 1
     assert alarms[0].change > 0.0
+
+
+NOISE, RATE, CRASH = 0.004, 0.0008, 0.12
+"""mm: as those of a real robot."""
+
+
+def moved(seed: int, nights: int, *motions: tuple[int, float, int], noise: float = NOISE) -> WatchResult:
+    """A calibration, 60 quiet nights, and some before which parameters move by so much from a night on."""
+    robot = LinearRobot(seed, noise)
+    runs = list(robot.runs(60))
+    for night in range(nights):
+        for parameter, size, first in motions:
+            robot.state[parameter] += size * (night >= first)
+        runs += robot.nights(1)
+    return watch_runs(runs, CAUSES)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_what_moves_on_steadily_is_one_change_of_its_leg(seed) -> None:
+    found = moved(seed, 300, (1, RATE, 0))
+    (change,) = found.attributed
+    assert (change.possible_legs, change.cause, change.moves_on) == ((1,), 1, True)
+    assert change.rate == pytest.approx(RATE, abs=4 * change.rate_sigma)
+    assert found.share_of_limit.max() < 1.0
+
+
+def test_a_crash_while_another_leg_moves_on_is_a_change_of_its_own() -> None:
+    found = moved(1, 200, (1, RATE, 0), (5, CRASH, 120), (5, -CRASH, 121))
+    assert [one.possible_legs for one in found.attributed] == [(1,), (3,)]
+    assert [one.moves_on for one in found.attributed] == [True, False]
+    assert found.alarms[1].run == 60 + 121
+    assert found.attributed[1].change == pytest.approx(CRASH, abs=4 * found.attributed[1].sigma)
+
+
+def test_a_drift_that_becomes_faster_is_a_further_change() -> None:
+    first, *later = moved(2, 400, (1, RATE, 0), (1, 4 * RATE, 200)).alarms
+    assert first.run < 60 + 200
+    assert [one.leg for one in later] == [1]
+    assert 60 + 200 < later[0].run < 60 + 230
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_a_leg_that_stood_still_after_a_crash_is_watched_as_before(seed) -> None:
+    """Its next step, a small one, is found about as soon as that of a robot which never had one."""
+    step = 0.5 * NOISE
+
+    def noticed(*crash: tuple[int, float, int]) -> int:
+        found = moved(seed, 240, *crash, (3, step, 100), (3, -step, 101))
+        return next(one.run for one in found.alarms if one.run > 60 + 100)
+
+    assert noticed((3, CRASH, 0), (3, -CRASH, 1)) <= noticed() + 2
 
 
 def test_alarms_come_as_the_runs_do() -> None:

@@ -9,6 +9,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any
 
+from hexacell.application.journal_soundness import require_sound
 from hexacell.cell.loader import load_cell
 from hexacell.cell.model import CellSettings
 from hexacell.controller_config.write_back import AFTER, BEFORE
@@ -18,7 +19,7 @@ from hexacell.runs.run_folder import JOURNAL, RunFolder
 from hexacell.storage import atomic_files
 from procedures.journal.journal import read_entries
 from procedures.run import events
-from procedures.run.state import RunState, fold
+from procedures.run.state import RunState
 
 CELL = "cell.toml"
 FINGERPRINTED = (JOURNAL, CELL, "measurements.csv", "result.json", BEFORE, AFTER)
@@ -77,12 +78,14 @@ def reported_run(run: Path) -> ReportedRun:
     if not folder.journal.is_file():
         raise UsageError("this is no run folder", subject=run, action="`hexacell history CELL` lists them")
     entries = read_entries(folder.journal)
-    state = fold(entry.event for entry in entries)
+    settings = load_cell(run / CELL).settings
+    history = (entry.event for entry in entries)
+    state = require_sound(history, settings, folder.journal, follows_plan=False)
     if state.started is None:
         raise UsageError("nothing happened in this run", subject=run, action="Name another")
     return ReportedRun(
         name=run.resolve().name,
-        settings=load_cell(run / CELL).settings,
+        settings=settings,
         state=state,
         began=entries[0].at,
         ended=entries[-1].at,

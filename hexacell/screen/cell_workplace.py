@@ -9,6 +9,7 @@ from pathlib import Path
 from hexacell.application.config_rollback import roll_back_config
 from hexacell.application.history import PastRun, compare_runs, parameter_trends, past_runs
 from hexacell.application.interrupted_runs import LATEST, run_to_resume
+from hexacell.application.journal_soundness import require_sound
 from hexacell.application.plan_draft import PlanPreview
 from hexacell.application.proposals import apply_proposal, approval_question, read_proposal
 from hexacell.application.security_warnings import exposure_warnings
@@ -34,6 +35,13 @@ from procedures.calibration.workflow import Mode
 from procedures.journal.journal import read_journal
 from procedures.run.events import RunStarted
 from procedures.run.questions import Question
+
+
+def _recorded_run(cell: Cell, run: str) -> RecordedRun:
+    folder = find_run(cell, run)
+    history = read_journal(folder.journal)
+    require_sound(history, cell.settings, folder.journal, follows_plan=False)
+    return RecordedRun(folder)
 
 
 def mode_of(what: str) -> Mode:
@@ -142,4 +150,4 @@ class CellWorkplace:
 
     async def open_run(self, run: str) -> RunConnection:
         """See :class:`Workplace`."""
-        return await asyncio.to_thread(RecordedRun, find_run(self.cell, run))
+        return await asyncio.to_thread(_recorded_run, self.cell, run)

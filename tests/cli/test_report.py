@@ -13,6 +13,7 @@ import pytest
 from procedures.journal.journal import read_entries
 from procedures.journal.line_format import encode
 from procedures.run import events
+from tests.mutations.journals import with_checksum
 
 CHAPTERS = [
     "Statement of conformity",
@@ -120,3 +121,17 @@ def test_a_damaged_result_is_told(typed_here, run) -> None:
     outcome = typed_here("report", run)
     assert outcome.code == 2
     assert "result.json: is damaged" in outcome.err
+
+
+def test_a_forged_journal_is_told(typed_here, run) -> None:
+    """Its checksums are right, and its geometry is that of no robot."""
+    first, *others = (run / "journal.jsonl").read_bytes().splitlines(keepends=True)
+    record = json.loads(first)
+    record["event"]["controller"]["B"] = [[1.0], [2.0, 3.0]]
+    del record["crc"]
+    (run / "journal.jsonl").write_bytes(with_checksum(record) + b"".join(others))
+    outcome = typed_here("report", run)
+    assert outcome.code == 2
+    said = " ".join(outcome.err.split())
+    assert "journal.jsonl:1: this line of the journal cannot be of this run: a geometry has other" in said
+    assert not (run / "report.html").exists()

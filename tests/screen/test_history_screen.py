@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import json
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from pathlib import Path
@@ -14,6 +15,7 @@ from hexacell.acceptance import AcceptanceGate
 from hexacell.attach.snapshots import LiveSnapshot
 from hexacell.cell.loader import Cell
 from hexacell.controller_config.write_back import commit
+from hexacell.errors import FileError
 from hexacell.presentation.config_changes import RELOAD
 from hexacell.screen.app import TechnicianApp
 from hexacell.screen.cell_workplace import CellWorkplace
@@ -21,6 +23,7 @@ from hexacell.screen.overlays.confirm_overlay import ConfirmOverlay
 from hexacell.screen.overlays.fault_overlay import FaultOverlay
 from hexacell.screen.session import ScreenSession
 from tests.hexacell.application.proposed_runs import ProposedRun, a_cell, propose_run
+from tests.mutations.journals import with_checksum
 from tests.screen.conftest import settled
 from tests.screen.test_job import press, shown, until_shown
 from tests.waiting import until
@@ -243,3 +246,16 @@ async def test_a_proposal_for_an_edited_config_is_not_written(cell: Cell, left: 
         await press(pilot, "enter")
         await until_shown(pilot, "+# by hand")
     assert cell.config_path.read_bytes() == edited
+
+
+async def test_a_forged_run_is_not_opened(cell: Cell, runs: list[ProposedRun]) -> None:
+    """Its checksums are right, and its geometry is that of no robot."""
+    journal = runs[1].folder.journal
+    first, *others = journal.read_bytes().splitlines(keepends=True)
+    record = json.loads(first)
+    record["event"]["controller"]["B"] = [[1.0], [2.0, 3.0]]
+    del record["crc"]
+    journal.write_bytes(with_checksum(record) + b"".join(others))
+    with pytest.raises(FileError, match="a geometry has other parameters"):
+        await CellWorkplace(cell.path).open_run(runs[1].folder.path.name)
+    await CellWorkplace(cell.path).open_run(runs[0].folder.path.name)

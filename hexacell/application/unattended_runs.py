@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime, timedelta
+from pathlib import Path
 
 from hexacell.application.calibration_run import RunRequest
 from hexacell.cell.model import CellSettings
 from hexacell.errors import ExitCode, HexacellError, OutOfTime
+from hexacell.runs.run_folder import new_run_in, runs_folder_of_unreadable
 from hexacell.runs.start_attempts import StartAttempt, StartAttempts, note_attempt
 from hexacell.scheduling.quiet_hours import next_quiet, quiet_until
 from procedures.run.commands import CommandQueue, EndAtReference
@@ -62,6 +64,18 @@ def refused_start(request: RunRequest, error: HexacellError, began: datetime, at
     except HexacellError:
         attempts = None
     return RefusedStart(attempts, _wait_s(request.cell.settings, error, began, at))
+
+
+def note_unreadable_cell(path: Path, mode: str, error: HexacellError) -> None:
+    """Note that a run could not begin, as the cell file at ``path`` has mistakes.
+
+    That is left where nothing tells whose file it is, or the disk takes no note.
+    """
+    folder = runs_folder_of_unreadable(path)
+    if folder is not None:
+        attempt = StartAttempt(at=datetime.now(UTC), reason=str(error), exit_code=int(error.exit_code))
+        with suppress(HexacellError):
+            note_attempt(new_run_in(folder), mode, attempt)
 
 
 def _wait_s(settings: CellSettings, error: HexacellError, began: datetime, at: datetime) -> float | None:

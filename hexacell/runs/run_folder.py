@@ -4,16 +4,23 @@ from __future__ import annotations
 
 import itertools
 import json
+import re
+from contextlib import suppress
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
+from pydantic import TypeAdapter, ValidationError
+
+from hexacell.cell.fields import Name
 from hexacell.cell.loader import Cell
 from hexacell.errors import UsageError
 from hexacell.storage.atomic_files import create_folder_durably, write_atomically
 
 JOURNAL = "journal.jsonl"
+
+_NAME = re.compile(r"""\s*name\s*=\s*(["'])(?P<name>[^"']*)\1""")
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,9 +87,30 @@ def runs_folder(cell: Cell) -> Path:
     return cell.path.parent / "runs" / cell.settings.name
 
 
+def runs_folder_of_unreadable(path: Path) -> Path | None:
+    """The same where the file at ``path`` has mistakes; none where neither it nor a run tells its name."""
+    every = path.parent / "runs"
+    with suppress(OSError, ValidationError):
+        return every / TypeAdapter(Name).validate_python(_stated_name(path.read_text(errors="replace")))
+    present = [one for one in every.glob("*") if one.is_dir()]
+    return present[0] if len(present) == 1 else None
+
+
+def _stated_name(text: str) -> str | None:
+    """The name that a cell file states above its first section."""
+    above = itertools.takewhile(lambda line: not line.lstrip().startswith("["), text.splitlines())
+    found = map(_NAME.match, above)
+    return next((one["name"] for one in found if one is not None), None)
+
+
 def new_run(cell: Cell) -> RunFolder:
     """A folder for a run that begins now; nothing is made yet."""
-    return RunFolder(_unused(runs_folder(cell) / datetime.now(UTC).strftime("%Y-%m-%dT%H%M%SZ")))
+    return new_run_in(runs_folder(cell))
+
+
+def new_run_in(folder: Path) -> RunFolder:
+    """The same below the folder of a cell's runs."""
+    return RunFolder(_unused(folder / datetime.now(UTC).strftime("%Y-%m-%dT%H%M%SZ")))
 
 
 def find_run(cell: Cell, named: str) -> RunFolder:

@@ -97,6 +97,7 @@ class Year:
         drift_mm: of the length of leg 2, a night.
         crash_night: in the day before which leg 4 becomes ``crash_mm`` longer.
         faults: of nights, as changes of the cell file.
+        is_corrected: whether a quick level follows a check that failed.
     """
 
     folder: Path
@@ -105,6 +106,7 @@ class Year:
     crash_mm: float
     faults: dict[int, dict[str, Any]]
     power_cuts: frozenset[int] = frozenset()
+    is_corrected: bool = True
     nights: list[Night] = field(default_factory=list)
 
     @cached_property
@@ -124,7 +126,7 @@ class Year:
         with few_poses():
             self._virtual_night(0, Mode.OPTIMISE)
             for number in range(1, nights):
-                mode = Mode.QUICK if self._has_failed() else Mode.CHECK
+                mode = Mode.QUICK if self.is_corrected and self._has_failed() else Mode.CHECK
                 if number in self.faults or number in self.power_cuts:
                     self._night_of_the_program(number, mode)
                 else:

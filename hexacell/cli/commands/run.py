@@ -14,10 +14,11 @@ from hexacell.application.demo import prepare_demo
 from hexacell.application.event_stream import EventStream
 from hexacell.application.interrupted_runs import run_to_resume
 from hexacell.application.run_notices import RunEnd
-from hexacell.application.unattended_runs import ended_in_time
+from hexacell.application.unattended_runs import ended_in_time, note_unreadable_cell
 from hexacell.attach.run_device_watch import RunDeviceWatch
 from hexacell.campaign.pose_list import pose_list_of
 from hexacell.campaign.removed_poses import RemovedPoses
+from hexacell.cell.loader import Cell
 from hexacell.cli.cell_argument import cell_with_devices_at
 from hexacell.cli.commands.attach import run_detachable
 from hexacell.cli.console import Console
@@ -96,7 +97,7 @@ def length(options: argparse.Namespace) -> ExitCode:
 
 
 def _request(options: argparse.Namespace, console: Console, mode: Mode) -> RunRequest:
-    cell = cell_with_devices_at(options.cell, console)
+    cell = _cell(options, console, mode)
     attended = is_interactive() and not options.unattended
     return RunRequest(
         cell=cell,
@@ -107,6 +108,16 @@ def _request(options: argparse.Namespace, console: Console, mode: Mode) -> RunRe
         resume=options.resume is not None,
         keeps_hours=options.unattended,
     )
+
+
+def _cell(options: argparse.Namespace, console: Console, mode: Mode) -> Cell:
+    """The cell; if its file has mistakes, the history of its runs says why there was none tonight."""
+    try:
+        return cell_with_devices_at(options.cell, console)
+    except HexacellError as error:
+        if options.unattended:
+            note_unreadable_cell(options.cell, mode.value, error)
+        raise
 
 
 def demo(options: argparse.Namespace) -> ExitCode:

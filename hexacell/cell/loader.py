@@ -10,7 +10,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from datetime import date
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, get_args
 
 import tomlkit
 from pydantic import SecretStr, ValidationError
@@ -148,11 +148,18 @@ def _section(section: Section, path: KeyPath, remark: Remark) -> Iterator[str]:
     """The section's own values first: after a header every key belongs to the section it opens."""
     for name, value in section:
         if not subsections((*path, name), value):
-            yield from _setting(name, value, remark((*path, name)))
+            shown = None if value == () and _has_sections(section, name) else value
+            yield from _setting(name, shown, remark((*path, name)))
     for name, value in section:
         for inner, subsection in subsections((*path, name), value):
             yield from ("", table_header(inner))
             yield from _section(subsection, inner, remark)
+
+
+def _has_sections(section: Section, name: str) -> bool:
+    """Whether a key is a list of sections: an empty one leaves room for its first ``[[section]]``."""
+    items = get_args(section.__class__.model_fields[name].annotation)
+    return bool(items) and isinstance(items[0], type) and issubclass(items[0], Section)
 
 
 def _setting(name: str, value: object, comment: str | None) -> list[str]:

@@ -8,7 +8,7 @@ import pytest
 from pydantic import ValidationError
 
 from hexacell.cell.bundled import bundled_config
-from hexacell.cell.loader import load_cell
+from hexacell.cell.loader import dump, load_cell
 from hexacell.cell.notifications import USUAL_OCCASIONS, NotificationSettings, Occasion, OccasionWord
 from hexacell.errors import FileError
 
@@ -68,6 +68,13 @@ def test_a_word_that_is_no_occasion_is_answered_with_each_that_is_once(tmp_path)
     for word in get_args(OccasionWord):
         assert str(raised.value).count(f"'{word}'") == 1
     assert str(raised.value).count("alarm") == 1
+
+
+def test_a_first_one_can_be_added_to_a_cell_file_that_was_written_with_defaults(tmp_path) -> None:
+    source = load_cell(bundled_config("simulated-hexaglide"))
+    path = tmp_path / source.path.name
+    path.write_text(f'{dump(source.settings)}\n[[notifications]]\nname = "one"\nurl = "mqtt://x"\n')
+    assert [one.name for one in load_cell(path).settings.notifications] == ["one"]
 
 
 def test_names_differ(tmp_path) -> None:

@@ -86,7 +86,7 @@ class Course(Enum):
 
     STEADY = "always the same"
     RISING = "by its size every hour"
-    CENTRED = "by its size in the course of a campaign, zero in its middle"
+    CENTRED = "by its size from the first record to the last, evenly, zero in the middle"
     WARMING_UP = "quickly at first, then hardly any more"
 
     def shares(self, hours: Array) -> Array:
@@ -98,7 +98,7 @@ class Course(Enum):
             case Course.RISING:
                 shares = hours
             case Course.CENTRED:
-                shares = (hours - hours.mean()) / max(np.ptp(hours), 1e-9)
+                shares = np.linspace(-0.5, 0.5, len(hours))
             case Course.WARMING_UP:
                 shares = 1.0 - np.exp(-hours / WARM_UP_HOURS)
         return shares

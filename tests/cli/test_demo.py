@@ -278,7 +278,7 @@ def test_an_unknown_cell_does_not_remove_an_earlier_demo(typed_here, earlier, na
 
 def test_the_bundled_cells_can_be_loaded(typed_here):
     outcome = typed_here("demo", "--config", "12")
-    assert "There are: paper-experiment, simulated-hexaglide" in outcome.err.replace(
+    assert "There are: gough-stewart, paper-experiment, simulated-hexaglide" in outcome.err.replace(
         "linuxcnc-hexaglide, ", ""
     )
 

@@ -161,7 +161,7 @@ class TestUnattendedRun:
         document = outcome.document
         assert re.fullmatch(
             r"check: \d+ records at 2 points; position error at the task poses "
-            r"\d+\.\d{3} \+- \d+\.\d{3} mm \(limit 0\.25\): fail",
+            r"\d+\.\d{3} \+- \d+\.\d{3} mm \(limit 0\.25, guard band 1\.5 U\): fail",
             document["line"],
         )
         assert document["verdict"] == document["check"]["verdict"] == "fail"

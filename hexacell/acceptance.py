@@ -101,7 +101,9 @@ def _agrees(residuals: ChiSquareTest) -> AcceptanceGate:
 
 def _within_tolerance(violations: Sequence[ToleranceViolation]) -> AcceptanceGate:
     """The drawing may be of another machine; who knows better takes the responsibility by its name."""
-    names = ", ".join(f"{violation.name} ({violation.change_mm:+.2f} mm)" for violation in violations)
+    names = ", ".join(
+        f"{violation.name} ({violation.change:+.2f} {violation.unit})" for violation in violations
+    )
     sentence = (
         f"Beyond the drawing's tolerance: {names}."
         if violations

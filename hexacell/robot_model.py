@@ -220,15 +220,17 @@ def _require_same_robot(cell: Cell, drawing: Geometry, controller: Geometry) -> 
         FileError: names the parameter that differs most.
     """
     mechanism = cell.settings.mechanism
-    drawn = mechanism.normalize_frames(drawing)[0].vector
-    commanding = mechanism.normalize_frames(controller)[0].vector
+    units = mechanism.parameters.like_a_mm
+    drawn = mechanism.normalize_frames(drawing)[0].vector / units
+    commanding = mechanism.normalize_frames(controller)[0].vector / units
     difference = np.abs(drawn - commanding)
     worst = int(difference.argmax())
     if difference[worst] > FARTHEST_DRAWING * np.abs(commanding).max():
-        name = mechanism.convention.display_name(mechanism.parameters.names[worst])
+        parameter = mechanism.parameters.parameters[worst]
+        name, unit = mechanism.convention.display_name(parameter.name), parameter.kind.unit.shown
         raise FileError(
             f"the drawing is not of the robot in {cell.config_path}: {name} differs by "
-            f"{difference[worst]:.4g} once both are in the same frames",
+            f"{difference[worst]:.4g} {unit} once both are in the same frames",
             subject=cell.path,
             line=cell.document.line_of(("robot", "nominal")),
             action="Correct [robot.nominal], or the config",

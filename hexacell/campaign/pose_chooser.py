@@ -108,7 +108,8 @@ class PoseChooser:
     def _criterion(self, belief: RobotBelief) -> Criterion:
         name = self.settings.identification.criterion
         if name == "parameters":
-            return Criterion(belief.basis.T @ belief.basis)
+            scaled = belief.basis / belief.mechanism.parameters.like_a_mm[:, None]
+            return Criterion(scaled.T @ scaled)
         error = self.task.error(belief) if name == "task" else None
         return D_OPTIMAL if error is None else Criterion(error.weight())
 

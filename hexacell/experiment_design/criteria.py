@@ -7,7 +7,7 @@ those taken (Fedorov, Theory of Optimal Experiments, 1972; Atkinson & Donev, Opt
 1992), for one of the criteria
 
 - D: the volume of the confidence ellipsoid, ``log det C``;
-- A: the sum of the variances of all parameters, ``tr C``;
+- A: the sum of the variances of all parameters, ``tr C``, in mm and mrad;
 - I: the mean variance of the position at the task poses, ``tr(J C J^T)``.
 """
 

@@ -57,8 +57,8 @@ class Geometry:
         return self.parameters.document(self.vector)
 
     def largest_difference(self, other: Geometry) -> float:
-        """Largest absolute difference of a parameter, mm or rad."""
-        return float(np.max(np.abs(self.vector - other.vector)))
+        """Largest absolute difference of a parameter, mm; mrad of an angle."""
+        return float(np.max(np.abs(self.vector - other.vector) / self.parameters.like_a_mm))
 
     def interpolate(self, other: Geometry, fraction: float) -> Geometry:
         """Linear interpolation: 0 gives this geometry, 1 gives ``other``."""

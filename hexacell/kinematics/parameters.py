@@ -32,6 +32,16 @@ class ParameterUnit(StrEnum):
         """Decimals in a config: 1 nm; 1 nrad, which is 1 nm at 1 m."""
         return 6 if self is ParameterUnit.MM else 9
 
+    @property
+    def like_a_mm(self) -> float:
+        """What counts as much as a millimetre: a milliradian moves by that at 1 m."""
+        return 1.0 if self is ParameterUnit.MM else 1e-3
+
+    @property
+    def shown(self) -> str:
+        """The name of that in text."""
+        return {ParameterUnit.MM: "mm", ParameterUnit.RAD: "mrad", ParameterUnit.NONE: "1e-3"}[self]
+
 
 class MachinePart(StrEnum):
     """The part of the machine that a length is measured on."""
@@ -162,6 +172,11 @@ class ParameterSet:
     def numbers_per_leg(self) -> int:
         """How many parameters a leg has."""
         return sum(kind.numbers_per_leg for kind in self.kinds)
+
+    @cached_property
+    def like_a_mm(self) -> Array:
+        """What counts as much as a millimetre of each parameter (P,)."""
+        return np.array([parameter.kind.unit.like_a_mm for parameter in self.parameters])
 
     @cached_property
     def leg_order(self) -> NDArray[np.intp]:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from hexacell.decision import Verdict
 from hexacell.identification.diagnostics.model_tests import contradicted_points
 from hexacell.identification.diagnostics.pose_accuracy import PoseErrors
@@ -11,13 +13,12 @@ from hexacell.identification.diagnostics.repeatability import Repeatability
 from hexacell.identification.diagnostics.variance_components import NoiseLevel, NoiseLevels
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.geometry import Geometry
+from hexacell.kinematics.parameters import GeometricParameter, ParameterUnit
 from hexacell.presentation.layout import wrapped
 from hexacell.presentation.measured_noise import measured_noise_text
 from hexacell.presentation.uncertainty import budget_table
 from hexacell.reporting.assessment import Assessment
 from hexacell.reporting.findings import findings, noise_sentence, pair_sentences, residual_sentence
-
-PARAMETER_HEADER = f"{'mm':4}{'drawing':>10}{'identified':>12}{'change':>9}{'sigma':>8}"
 
 
 def identification_report(assessed: Assessment) -> str:
@@ -91,17 +92,29 @@ def _data_and_termination(found: Identification) -> str:
 
 
 def parameter_table(found: Identification, drawing: Geometry) -> str:
-    """One line a parameter, mm; those that the frame convention fixes are left out."""
-    undetermined = set(found.undetermined)
-    names = found.geometry.parameters.names
-    rows = zip(names, drawing.vector, found.geometry.vector, found.sigma, strict=True)
+    """One line a parameter, mm or mrad; those that the frame convention fixes are left out."""
+    undetermined, parameters = set(found.undetermined), found.geometry.parameters
+    values = np.array([drawing.vector, found.geometry.vector, found.sigma]) / parameters.like_a_mm
+    names = [_with_unit(parameter) for parameter in parameters.parameters]
+    width = max(4, *map(len, names))
     lines = [
-        f"{name:4}{old:10.3f}{new:12.3f}{new - old:+9.3f}{sigma:8.3f}  "
-        + ("not determined by these data" if name in undetermined else _significance(new - old, sigma))
-        for name, old, new, sigma in rows
+        f"{name:{width}}{old:10.3f}{new:12.3f}{new - old:+9.3f}{sigma:8.3f}  "
+        + (
+            "not determined by these data"
+            if name.split(",")[0] in undetermined
+            else _significance(new - old, sigma)
+        )
+        for name, (old, new, sigma) in zip(names, values.T, strict=True)
         if sigma > 0.0
     ]
-    return "\n".join([PARAMETER_HEADER, *lines])
+    header = f"{'mm':{width}}{'drawing':>10}{'identified':>12}{'change':>9}{'sigma':>8}"
+    return "\n".join([header, *lines])
+
+
+def _with_unit(parameter: GeometricParameter) -> str:
+    """``S3x``; ``rail2a, mrad``."""
+    unit = parameter.kind.unit
+    return parameter.name if unit is ParameterUnit.MM else f"{parameter.name}, {unit.shown}"
 
 
 def _significance(change: float, sigma: float) -> str:

@@ -40,8 +40,9 @@ LISTED_DIFFERENCES = 10
 
 def demo_opening(machine: str, config: Path) -> str:
     """What the demo is about to calibrate: the kind of machine, and its controller's config."""
+    devices = "gauges on serial lines, encoders on CAN, TCP controller."
     return (
-        f"A simulated {machine}: gauges on serial lines, encoders on CAN, TCP controller.\n"
+        f"{wrapped(f'A simulated {machine}: {devices}')}\n"
         "The geometry in its controller's config is wrong by millimetres:\n"
         f"  {config}"
     )

@@ -126,8 +126,8 @@ def _contradicted_by_others(points: Sequence[PointPrediction]) -> str:
 
 def _beyond_tolerance(violations: Sequence[ToleranceViolation], convention: FrameConvention) -> str:
     names = ", ".join(
-        f"{convention.display_name(one.name)} is {one.change_mm:+.2f} mm from the drawing "
-        f"(tolerance {one.tolerance_mm:g}, sigma {one.sigma_mm:.2g})"
+        f"{convention.display_name(one.name)} is {one.change:+.2f} {one.unit} from the drawing "
+        f"(tolerance {one.tolerance:g}, sigma {one.sigma:.2g})"
         for one in violations
     )
     return (

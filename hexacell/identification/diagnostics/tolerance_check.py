@@ -32,7 +32,7 @@ from hexacell.kinematics.rotations import Array
 SIGNIFICANT_SIGMAS = 3.0
 
 STEP = 1e-4
-"""Of the derivatives by turns, rad."""
+"""Of the derivatives by turns, rad, and by parameters, mm or mrad."""
 
 LARGEST_TURN = 0.2
 """Between the drawing's frames and the machine's, rad; tolerances that allow more are no tolerances."""
@@ -50,16 +50,18 @@ EXCESS_SHARE = 1e-5
 
 @dataclass(frozen=True, slots=True)
 class ToleranceViolation:
-    """A parameter that is significantly outside its tolerance; mm.
+    """A parameter that is significantly outside its tolerance, in mm, or mrad of an angle.
 
     Attributes:
-        change_mm: from the drawing, in the frames and with the ball's offset that suit the robot best.
+        change: from the drawing, in the frames and with the ball's offset that suit the robot best.
+        unit: ``mm`` or ``mrad``.
     """
 
     name: str
-    change_mm: float
-    tolerance_mm: float
-    sigma_mm: float
+    change: float
+    tolerance: float
+    sigma: float
+    unit: str = "mm"
 
 
 def tolerance_violations(
@@ -115,10 +117,18 @@ class _Check:
     ) -> tuple[ToleranceViolation, ...]:
         """Of the parameters with an excess."""
         change = self._difference(frames) + ball @ self._ball_offset
-        sigma, names = self._sigma(frames), self.drawing.parameters.names
+        parameters = self.drawing.parameters
+        sizes = np.array([change, self._widths, self._sigma(frames)]) / parameters.like_a_mm
         return tuple(
-            ToleranceViolation(names[row], float(change[row]), float(self._widths[row]), float(sigma[row]))
-            for row in np.flatnonzero(excess)
+            ToleranceViolation(
+                parameter.name,
+                float(sizes[0, row]),
+                float(sizes[1, row]),
+                float(sizes[2, row]),
+                parameter.kind.unit.shown,
+            )
+            for row, parameter in enumerate(parameters.parameters)
+            if excess[row]
         )
 
     def _excess(self, frames: FrameTransform, ball: Array) -> Array:
@@ -134,18 +144,20 @@ class _Check:
     def _programme(self, frames: FrameTransform, reach: float) -> tuple[Array, Array]:
         """The best small change of frames (9,), and the best offset of the ball (3,), mm.
 
-        First the least excess; then, with that allowed, the largest margin to all other tolerances.
+        First the least excess; then, with that allowed, the largest margin to all other tolerances. All
+        parameters are in units of their tolerances.
         ``reach`` is the largest turn, rad; shifts are limited in proportion.
         """
         free = self.mechanism.frame_freedom.columns
         columns = np.hstack([self._frame_columns(frames)[:, free], self._ball_offset.T])
+        columns /= self._widths[:, None]
         largest = np.concatenate([self._scales[free] * reach, np.full(3, self.tolerances.ball_mm)])
-        difference, allowed = self._difference(frames), self._allowed(frames)
-        by_excess = np.diag(-np.ones_like(allowed)), 1.0 / self._widths
+        difference, allowed = self._difference(frames) / self._widths, self._allowed(frames) / self._widths
+        by_excess = np.diag(-np.ones_like(allowed)), np.ones_like(allowed)
         excess = _best(columns, difference, allowed, largest, *by_excess)[len(largest) :]
-        is_inside = excess < EXCESS_SHARE * self._widths
-        by_margin = np.where(is_inside, self._widths, 0.0)[:, None], -np.ones(1)
-        widened = allowed + excess + 0.1 * EXCESS_SHARE * self._widths
+        is_inside = excess < EXCESS_SHARE
+        by_margin = np.where(is_inside, 1.0, 0.0)[:, None], -np.ones(1)
+        widened = allowed + excess + 0.1 * EXCESS_SHARE
         found = _best(columns, difference, widened, largest, *by_margin)
         change = np.zeros(9)
         change[free], ball = np.split(found[: len(largest)], [len(free)])
@@ -158,8 +170,9 @@ class _Check:
 
     def _sigma(self, frames: FrameTransform) -> Array:
         """Standard deviations (P,) of the parameters in some frames."""
-        origin = self._in(frames, np.zeros_like(self.geometry.vector))
-        turned = np.array([self._in(frames, unit) - origin for unit in np.eye(len(origin))])
+        here, steps = self.geometry.vector, STEP * np.diag(self.drawing.parameters.like_a_mm)
+        ends = np.array([[self._in(frames, here + side * step) for step in steps] for side in (1.0, -1.0)])
+        turned = (ends[0] - ends[1]) / (2.0 * np.diag(steps)[:, None])
         sigma: Array = np.sqrt(np.einsum("ij,ik,kj->j", turned, self.covariance, turned))
         return sigma
 

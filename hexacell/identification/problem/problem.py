@@ -226,6 +226,11 @@ class Problem:
         return self.mechanism.convention.basis()
 
     @property
+    def like_a_mm(self) -> Array:
+        """What counts as much as a millimetre of each free parameter (p,)."""
+        return self.mechanism.parameters.like_a_mm[self.mechanism.convention.free_rows()]
+
+    @property
     def points(self) -> int:
         """The number of points with records."""
         return len(self.first_rows)

@@ -77,7 +77,7 @@ class SolverOptions:
 
     Attributes:
         damping: initial damping.
-        step_mm: the iteration ends when the largest step is below this.
+        step_mm: the iteration ends when the largest step is below this; mrad of an angle.
         iterations: the largest number of iterations in one search.
         searches: the largest number of searches around singularities (:mod:`.singular_records`).
     """
@@ -150,7 +150,8 @@ class _Search:
         if self.singular.any():
             return Termination.SINGULAR
         step = _Step.of(self.linear(), self.precision, self.now.free - self.centre, self.damping)
-        if np.abs(step.free).max() < self.options.step_mm and self.damping <= self.options.damping:
+        largest = float(np.abs(step.free / self.problem.like_a_mm).max())
+        if largest < self.options.step_mm and self.damping <= self.options.damping:
             return Termination.STEP
         trial = measurement_model.evaluate_step(self.problem, self.now, step.free)
         if not trial.found.all():

@@ -70,10 +70,10 @@ def _changes(run: ReportedRun) -> Picture | None:
         return None
     mechanism = run.settings.mechanism
     parameters = mechanism.parameters
-    old = run.geometry_before.vector
-    sigma = parameters.vector(identified.result.sigma)
+    old, units = run.geometry_before.vector, parameters.like_a_mm
+    sigma = parameters.vector(identified.result.sigma) / units
     rows = np.flatnonzero(sigma > 0.0)
-    change = (parameters.vector(identified.result.geometry) - old)[rows]
+    change = ((parameters.vector(identified.result.geometry) - old) / units)[rows]
     figure, axes = _axes()
     axes.errorbar(
         np.arange(len(rows)),
@@ -86,7 +86,7 @@ def _changes(run: ReportedRun) -> Picture | None:
     )
     axes.axhline(0.0, color=INK, linewidth=0.6)
     axes.set_xticks(np.arange(len(rows)), [parameters.parameters[row].name for row in rows], rotation=90)
-    axes.set_ylabel("change, mm")
+    axes.set_ylabel(f"change, {' or '.join(dict.fromkeys(kind.unit.shown for kind in parameters.kinds))}")
     return Picture(_svg(figure), "Change of each parameter, with its expanded uncertainty (k = 2).")
 
 

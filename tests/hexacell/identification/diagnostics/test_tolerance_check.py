@@ -78,8 +78,8 @@ def test_a_leg_beyond_its_tolerance_is_named_and_no_other_parameter(paper, seed,
     built = with_errors(paper.nominal, {f"l{leg}": sign * 3.5}, seed)
     [violation] = tolerance_violations(estimate(built), MECHANISM, paper.nominal, THREE_MM)
     assert violation.name == f"l{leg}"
-    assert violation.change_mm == pytest.approx(sign * 3.5)
-    assert violation.tolerance_mm == 3.0
+    assert violation.change == pytest.approx(sign * 3.5)
+    assert violation.tolerance == 3.0
 
 
 @settings(max_examples=20)

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from hexacell.cell.loader import load_cell
 from hexacell.conformance import MechanismConformance, MechanismExample
+from hexacell.kinematics.mechanisms.six_rails import SixRails, rail_turns, six_rails_geometry
 from hexacell.robot_model import robot_of
 
 CONFIGS = Path(__file__).parents[4] / "configs"
@@ -27,3 +29,41 @@ class TestHexaglide(MechanismConformance):
 
 class TestGoughStewart(MechanismConformance):
     example = example_of("gough-stewart")
+
+
+class TestVerticalRails(MechanismConformance):
+    example = example_of("linapod")
+
+
+def with_rails(directions: np.ndarray) -> MechanismExample:
+    """The Linapod with rails along other vectors (6, 3)."""
+    vertical = example_of("linapod")
+    turns = rail_turns(directions / np.linalg.norm(directions, axis=1, keepdims=True))
+    drawn = vertical.drawing
+    drawing = six_rails_geometry(drawn["S"], turns, drawn["B"], drawn["l"])
+    return replace(vertical, drawing=drawing, points=vertical.points * (1.0, 1.0, 0.3) + (0.0, 0.0, 150.0))
+
+
+class TestSlantedRails(MechanismConformance):
+    """Columns that lean toward the middle."""
+
+    example = with_rails(np.array([0.0, 0.0, 1.0]) - example_of("linapod").drawing["S"] / 2000.0)
+
+
+class TestCrossedRails(MechanismConformance):
+    """The two rails of a column lean against each other."""
+
+    example = with_rails(np.array([(0.1 * (-1) ** leg, 0.05 * (leg % 3 - 1), 1.0) for leg in range(6)]))
+
+
+def parallel_rails() -> MechanismExample:
+    """The Hexaglide's, whose directions are not taken for granted."""
+    paper = example_of("simulated-hexaglide")
+    S, B, l = (paper.drawing[symbol] for symbol in ("S", "B", "l"))  # noqa: E741 - the paper's symbol
+    drawing = six_rails_geometry(S, np.tile([0.0, np.pi / 2], (6, 1)), B, l)
+    tolerances = {"S": 2.0, "rail": 0.002, "B": 2.0, "l": 2.0}
+    return replace(paper, mechanism=SixRails(), drawing=drawing, tolerances=tolerances)
+
+
+class TestParallelRails(MechanismConformance):
+    example = parallel_rails()

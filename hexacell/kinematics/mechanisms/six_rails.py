@@ -120,7 +120,7 @@ class SixRails:
         """See :class:`~hexacell.kinematics.mechanism.Mechanism`."""
         b, v = _leg_vectors(geometry, poses, joints)
         n = v / np.linalg.norm(v, axis=-1, keepdims=True)
-        directions, by_turns = rail_directions(geometry["rail"])
+        directions, by_turns = directions_of_rails(geometry["rail"])
         by_rail = joints[..., None] * np.einsum("nij,ijk->nik", n, by_turns)
         by_length = -np.ones((*joints.shape, 1))
         return ConstraintDerivatives(
@@ -168,7 +168,7 @@ class SixRails:
         """See :class:`~hexacell.kinematics.mechanism.Mechanism`; across as the rail leans by a and b."""
         _, v = _leg_vectors(geometry, poses, joints)
         n = v / np.linalg.norm(v, axis=-1, keepdims=True)
-        directions, by_turns = rail_directions(geometry["rail"])
+        directions, by_turns = directions_of_rails(geometry["rail"])
         along = np.einsum("ij,ij->i", geometry["S"], directions) + joints
         across = np.einsum("nij,ijk->nik", n, by_turns / np.linalg.norm(by_turns, axis=1, keepdims=True))
         return Guides(OWN_RAILS, along, across)
@@ -190,7 +190,7 @@ def six_rails_geometry(S: ArrayLike, rail: ArrayLike, B: ArrayLike, l: ArrayLike
     return Geometry.of(SIX_RAILS_PARAMETERS, {"S": S, "rail": rail, "B": B, "l": l})
 
 
-def rail_directions(turns: Array) -> tuple[Array, Array]:
+def directions_of_rails(turns: Array) -> tuple[Array, Array]:
     """Unit vectors (..., 3) along rails by their turns (..., 2), rad, and their derivatives (..., 3, 2)."""
     a, b = turns[..., 0], turns[..., 1]
     squared = a * a + b * b
@@ -214,7 +214,7 @@ def rail_turns(directions: Array) -> Array:
 
 
 def _directions(turns: Array) -> Array:
-    return rail_directions(turns)[0]
+    return directions_of_rails(turns)[0]
 
 
 def _leg_vectors(

@@ -15,7 +15,7 @@ from hexacell.kinematics.mechanisms.six_rails import (
     FIRST_RAIL_FRAME,
     SIX_RAILS_PARAMETERS,
     SixRails,
-    rail_directions,
+    directions_of_rails,
     rail_turns,
     six_rails_geometry,
 )
@@ -92,17 +92,17 @@ def test_derivatives_are_those_of_the_leg_equation(pose: Pose, off_mm: float) ->
 
 @given(turns, turns)
 def test_a_direction_is_where_the_turn_puts_the_z_axis(a: float, b: float) -> None:
-    direction, by_turns = rail_directions(np.array([a, b]))
+    direction, by_turns = directions_of_rails(np.array([a, b]))
     turned = Rotation.from_rotvec([a, b, 0.0]).as_matrix()[:, 2]
     np.testing.assert_allclose(direction, turned, atol=1e-12)
     for column, step in enumerate(1e-6 * np.eye(2)):
-        ends = [rail_directions(np.array([a, b]) + side * step)[0] for side in (1.0, -1.0)]
+        ends = [directions_of_rails(np.array([a, b]) + side * step)[0] for side in (1.0, -1.0)]
         np.testing.assert_allclose(by_turns[:, column], (ends[0] - ends[1]) / 2e-6, atol=1e-8)
 
 
 @given(turns, turns)
 def test_turns_are_found_from_directions(a: float, b: float) -> None:
-    direction, _ = rail_directions(np.array([a, b]))
+    direction, _ = directions_of_rails(np.array([a, b]))
     np.testing.assert_allclose(rail_turns(direction), [a, b], atol=1e-9)
 
 
@@ -112,7 +112,7 @@ def test_turns_are_found_from_directions(a: float, b: float) -> None:
     ids=["vertical", "along x", "along y"],
 )
 def test_directions_along_the_axes(turn, axis) -> None:
-    np.testing.assert_allclose(rail_directions(np.array(turn, dtype=float))[0], axis, atol=1e-15)
+    np.testing.assert_allclose(directions_of_rails(np.array(turn, dtype=float))[0], axis, atol=1e-15)
 
 
 @given(
@@ -153,14 +153,14 @@ def test_rail_1_and_slider_3_are_the_base_frame() -> None:
 
 def test_rails_that_count_the_opposite_way_are_refused() -> None:
     numbers = machine()
-    numbers["rail"][4] = rail_turns(-rail_directions(numbers["rail"][0])[0])
+    numbers["rail"][4] = rail_turns(-directions_of_rails(numbers["rail"][0])[0])
     with pytest.raises(UsageError, match="a slider counts the opposite way of slider 1"):
         MECHANISM.normalize_frames(six_rails_geometry(**numbers))
 
 
 def test_sliders_on_one_rail_fix_no_frame() -> None:
     numbers = machine()
-    numbers["S"][2] = numbers["S"][0] + 100.0 * rail_directions(numbers["rail"][0])[0]
+    numbers["S"][2] = numbers["S"][0] + 100.0 * directions_of_rails(numbers["rail"][0])[0]
     with pytest.raises(UsageError, match="two slider joints that fix the frame are on one rail"):
         MECHANISM.normalize_frames(six_rails_geometry(**numbers))
 
@@ -175,7 +175,7 @@ def test_a_displacement_across_a_rail_is_that_of_its_joint() -> None:
     guides = MECHANISM.guides(geometry, batch, joints)
     assert guides is not None
     assert guides.rails == ((0,), (1,), (2,), (3,), (4,), (5,))
-    direction, by_turns = rail_directions(geometry["rail"])
+    direction, by_turns = directions_of_rails(geometry["rail"])
     sideways = by_turns / np.linalg.norm(by_turns, axis=1, keepdims=True)
     np.testing.assert_allclose(np.einsum("ij,ijk->ik", direction, sideways), 0.0, atol=1e-12)
     for side in range(2):

@@ -9,6 +9,7 @@ from typing import Literal
 from pydantic import Field, field_validator, model_validator
 
 from hexacell.cell.fields import Name, Section, Text, broken_rule
+from hexacell.storage.secrets import MASK
 
 MOST_NOTIFICATIONS = 10
 
@@ -109,7 +110,8 @@ def mistake_in_address(url: str) -> tuple[str, str] | None:
     found = _ADDRESS.fullmatch(url)
     if found is None:
         return "this is no address", "Write https://host/path, mqtts://host or mailto://host?to=..."
-    if ":" in (found["login"] or "") or _SECRET_QUERY.search(url):
+    login = found["login"] or ""
+    if (":" in login and not login.endswith(f":{MASK}@")) or _SECRET_QUERY.search(url):
         return "a password does not belong here", "Move it to a file of mode 600, and name it password_file"
     if found["scheme"] not in WITHOUT_TOKENS:
         return (

@@ -16,7 +16,8 @@ MASK = "***"
 _IN_A_COMMENT = re.compile(
     rf"(#[^\r\n]*?(?:{SECRET_WORDS})[\"']?[ \t]*[=: \t][ \t]*)[^\r\n]+", re.IGNORECASE
 )
-_IN_AN_ADDRESS = re.compile(r"(://[^\s/:@\"']*:)[^\s/@\"']+(?=@)")
+# What follows a host's port and a question mark is no password: mailto://host:25?from=a@b.
+_IN_AN_ADDRESS = re.compile(r"(://[^\s/:@\"']*:)(?!\d{1,5}[?#])[^\s/@\"']+(?=@)")
 _LIKE_A_SECRET = re.compile(
     rf"((?:{SECRET_WORDS}|connectpw|enablepw)[\"']?[ \t]*[=: \t][ \t]*)[^\r\n]+", re.IGNORECASE
 )

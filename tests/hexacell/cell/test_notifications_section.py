@@ -11,16 +11,31 @@ from hexacell.cell.bundled import bundled_config
 from hexacell.cell.loader import dump, load_cell
 from hexacell.cell.notifications import USUAL_OCCASIONS, NotificationSettings, Occasion, OccasionWord
 from hexacell.errors import FileError
+from hexacell.storage.secrets import without_secrets
+
+OPEN_ADDRESSES = [
+    "https://host:8443/a/b",
+    "mqtts://broker",
+    "mailto://host:587?from=a@b&to=c@d",
+    "http://user@h/x",
+]
 
 
-@pytest.mark.parametrize(
-    "url",
-    ["https://host:8443/a/b", "mqtts://broker", "mailto://host:587?from=a@b&to=c@d", "http://user@h/x"],
-)
+@pytest.mark.parametrize("url", OPEN_ADDRESSES)
 def test_addresses_without_secrets_may_stand_there(url) -> None:
     settings = NotificationSettings(name="one", url=url)
     assert (settings.url, settings.on) == (url, USUAL_OCCASIONS)
     assert Occasion.PASS not in USUAL_OCCASIONS
+
+
+@pytest.mark.parametrize("url", OPEN_ADDRESSES)
+def test_the_copy_with_a_run_keeps_them(url) -> None:
+    assert without_secrets(f'url = "{url}"') == f'url = "{url}"'
+
+
+def test_runs_whose_copy_has_a_masked_address_can_still_be_read() -> None:
+    url = "mailto://127.0.0.1:***@example.org&to=night@example.org"
+    assert NotificationSettings(name="mail", url=url).url == url
 
 
 @pytest.mark.parametrize(

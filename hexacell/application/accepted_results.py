@@ -8,6 +8,7 @@ from pathlib import Path
 
 from hexacell.application.journal_soundness import require_sound
 from hexacell.application.proposals import later_approval
+from hexacell.application.started_robot import started_robot
 from hexacell.campaign.task_accuracy import Task
 from hexacell.cell.loader import Cell
 from hexacell.controller_config.change import fingerprint
@@ -17,7 +18,6 @@ from hexacell.errors import HexacellError
 from hexacell.identification.estimator import identify
 from hexacell.reporting.length_result import LengthResult, with_measured_scale
 from hexacell.reporting.result import AcceptedResult
-from hexacell.robot_model import robot_of_start
 from hexacell.runs.run_folder import RunFolder, runs_folder
 from procedures.calibration.workflow import Calibration, Mode
 from procedures.journal.journal import read_entries
@@ -120,9 +120,7 @@ def _effects(cell: Cell, state: RunState) -> dict[str, tuple[tuple[float, ...], 
     if state.started is None:
         return {}
     settings, started = cell.settings, state.started
-    start = robot_of_start(
-        settings, started.controller, started.branch, started.taught, started.joint_ranges
-    )
+    start = started_robot(settings, started)
     robot = Calibration(settings, start, Mode(started.mode), accepted=started.accepted).robot_of(state)
     effects = [one for one in with_measured_scale(robot.effects, _length(state)) if one.size]
     if not effects:

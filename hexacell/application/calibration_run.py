@@ -14,13 +14,14 @@ from hexacell.application.accepted_results import last_accepted_result
 from hexacell.application.device_setup import Connected, device_addresses, open_devices
 from hexacell.application.journal_soundness import require_sound
 from hexacell.application.run_ownership import require_own_run
+from hexacell.application.started_robot import started_robot
 from hexacell.campaign.pose_list import pose_list_of
 from hexacell.campaign.removed_poses import NOTHING_REMOVED, RemovedPoses, require_enough
 from hexacell.cell.loader import Cell
 from hexacell.controller_config.change import fingerprint
 from hexacell.controller_config.current import CurrentConfig
 from hexacell.errors import FileError, HexacellError, UsageError, flatten_errors
-from hexacell.robot_model import config_format, robot_of, robot_of_start
+from hexacell.robot_model import config_format, robot_of
 from hexacell.runs.run_folder import RunFolder, runs_folder
 from hexacell.storage.atomic_files import read_text, remove_stale_temporaries, write_atomically
 from hexacell.storage.cell_lock import cell_lock
@@ -285,9 +286,7 @@ def _resumed_start(request: RunRequest) -> events.RunStarted:
 
 def calibration_of_run(cell: Cell, started: events.RunStarted) -> Calibration:
     """The calibration or check that a run was begun for."""
-    robot = robot_of_start(
-        cell.settings, started.controller, started.branch, started.taught, started.joint_ranges
-    )
+    robot = started_robot(cell.settings, started)
     return Calibration(
         cell.settings,
         robot,

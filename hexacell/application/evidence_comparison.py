@@ -9,12 +9,13 @@ import numpy as np
 from hexacell.application.run_evidence_document import evidence_document
 from hexacell.campaign.change_alarm import machine_causes
 from hexacell.cell.loader import Cell
+from hexacell.cell.model import CellSettings
 from hexacell.change_detection.carried_posterior import CarriedPosterior
 from hexacell.change_detection.leg_evidence import likeliest_leg
 from hexacell.change_detection.run_evidence import RunEvidence
 from hexacell.change_detection.step_location import step_gains
 from hexacell.errors import UsageError
-from hexacell.robot_model import robot_of
+from hexacell.robot_model import Robot, robot_of
 from hexacell.runs.run_folder import RunFolder, find_run
 
 
@@ -61,18 +62,29 @@ class EvidenceComparison:
 
 
 def compare_evidence(cell: Cell, before: str, after: str) -> EvidenceComparison:
-    """Compare two runs, by folder or name.
+    """Compare two runs of a cell, by folder or name.
 
     Raises:
-        UsageError: there is no such run, it says nothing of the geometry, or both see nothing in common.
+        UsageError: there is no such run, or as :func:`compare_run_folders`.
         FileError: the controller's config cannot be read.
     """
     folders = find_run(cell, before), find_run(cell, after)
-    first, second = (_evidence(cell, folder) for folder in folders)
+    return compare_run_folders(cell.settings, robot_of(cell), *folders)
+
+
+def compare_run_folders(
+    settings: CellSettings, robot: Robot, before: RunFolder, after: RunFolder
+) -> EvidenceComparison:
+    """Compare two runs by what their folders have.
+
+    Raises:
+        UsageError: one of them says nothing of the geometry, or both see nothing in common.
+    """
+    first, second = (_evidence(settings, folder) for folder in (before, after))
     states = len(first.weighted)
     if len(second.weighted) != states:
         raise UsageError("these runs are of different mechanisms", action="Compare runs of one")
-    causes = machine_causes(robot_of(cell), states)
+    causes = machine_causes(robot, states)
     known = CarriedPosterior.diffuse(causes.free, states - causes.free)
     scores = known.after(first).scores(second, causes.by_state)
     steps = step_gains(known, [first, second], causes.by_state)
@@ -80,18 +92,17 @@ def compare_evidence(cell: Cell, before: str, after: str) -> EvidenceComparison:
     seen = np.flatnonzero(~np.isnan(scores) & np.isfinite(sigmas))
     if not len(seen):
         raise UsageError("these runs see nothing in common", action="Compare each with a calibration")
-    parameters = cell.settings.mechanism.parameters.parameters
+    parameters = settings.mechanism.parameters.parameters
     numbers = np.column_stack([changes, sigmas, scores])[seen].tolist()
     named = zip([parameters[row] for row in seen.tolist()], numbers, strict=True)
     found = tuple(CauseOfDifference(one.name, one.kind.unit.value, one.leg, *each) for one, each in named)
     limit = known.after(first).largest_score_by_chance(second, causes.by_state[seen])
-    return EvidenceComparison(
-        *folders, found, limit, likeliest_leg(scores[seen], sigmas[seen], causes.legs[seen])
-    )
+    leg = likeliest_leg(scores[seen], sigmas[seen], causes.legs[seen])
+    return EvidenceComparison(before, after, found, limit, leg)
 
 
-def _evidence(cell: Cell, folder: RunFolder) -> RunEvidence:
-    found = evidence_document(cell.settings, folder)
+def _evidence(settings: CellSettings, folder: RunFolder) -> RunEvidence:
+    found = evidence_document(settings, folder)
     if found is None:
         raise UsageError(
             f"the run {folder.path.name} says nothing of the geometry",

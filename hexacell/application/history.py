@@ -114,7 +114,7 @@ def _summary(folder: RunFolder) -> RunSummary:
         verdict=None if state.judged is None else state.judged.verdict,
         accuracy=judged_accuracy(state.judged),
         line=_last_line(entries, state),
-        has_result=_has_own_result(state),
+        has_result=result_of_its_own(state) is not None,
         is_over=state.ended is not None,
         written_sha256=_written_sha256(folder),
         has_written=(folder.path / RECEIPT).is_file(),
@@ -194,18 +194,21 @@ def _result(folder: RunFolder) -> IdentificationResult | None:
         state = fold(read_journal(folder.journal))
     except HexacellError:
         return None
-    return state.identified.result if _has_own_result(state) and state.identified else None
-
-
-def _has_own_result(state: RunState) -> bool:
-    """The quick level's has the errors of the result that it started from: the two are no two witnesses."""
-    is_quick = state.started is not None and state.started.mode == "quick"
-    return state.identified is not None and not is_quick
+    return result_of_its_own(state)
 
 
 def _age_rank(run: PastRun) -> tuple[bool, float, str]:
     ended = run.summary.ended
     return ended is not None, 0.0 if ended is None else ended.timestamp(), run.name
+
+
+def result_of_its_own(state: RunState) -> IdentificationResult | None:
+    """What its records alone identified; none where nothing was identified, and none of the quick level.
+
+    That of the quick level has the errors of the result that it started from: the two are no two witnesses.
+    """
+    is_quick = state.started is not None and state.started.mode == "quick"
+    return None if state.identified is None or is_quick else state.identified.result
 
 
 def judged_accuracy(judged: events.ResultValidated | None) -> VerifiedAccuracy | None:

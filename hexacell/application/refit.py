@@ -5,12 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from hexacell.application.journal_soundness import require_sound
+from hexacell.application.started_robot import started_robot
 from hexacell.cell.loader import Cell
 from hexacell.errors import UsageError
 from hexacell.identification.estimator import identify
 from hexacell.reporting.result import IdentificationResult
 from hexacell.reporting.run_comparison import ParameterDifference, result_differences
-from hexacell.robot_model import robot_of_start
 from hexacell.runs.run_folder import RunFolder, find_run
 from procedures.calibration.workflow import Calibration, Mode
 from procedures.journal.journal import read_journal
@@ -63,8 +63,6 @@ def refit_run(cell: Cell, named: str) -> RefittedRun:
 def _identified(cell: Cell, state: RunState) -> IdentificationResult:
     started = state.started
     assert started is not None  # noqa: S101 - seen by the caller
-    robot = robot_of_start(
-        cell.settings, started.controller, started.branch, started.taught, started.joint_ranges
-    )
+    robot = started_robot(cell.settings, started)
     known = Calibration(cell.settings, robot, Mode(started.mode), accepted=started.accepted).robot_of(state)
     return IdentificationResult.of(identify(known.problem(state.measurements())))

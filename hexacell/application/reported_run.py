@@ -39,13 +39,18 @@ class ReportedRun:
         fingerprints: SHA-256 of the files of the folder, by their names.
     """
 
-    name: str
+    folder: RunFolder
     settings: CellSettings
     state: RunState
     began: datetime
     ended: datetime
     document: Mapping[str, Any]
     fingerprints: Mapping[str, str]
+
+    @property
+    def name(self) -> str:
+        """That of its folder."""
+        return self.folder.path.resolve().name
 
     @property
     def started(self) -> events.RunStarted:
@@ -84,7 +89,7 @@ def reported_run(run: Path) -> ReportedRun:
     if state.started is None:
         raise UsageError("nothing happened in this run", subject=run, action="Name another")
     return ReportedRun(
-        name=run.resolve().name,
+        folder=folder,
         settings=settings,
         state=state,
         began=entries[0].at,

@@ -10,6 +10,7 @@ from typing import Self
 import numpy as np
 
 from hexacell.application.journal_soundness import require_sound
+from hexacell.application.started_robot import started_robot
 from hexacell.campaign.change_alarm import machine_records
 from hexacell.campaign.leg_expansion import leg_expansion
 from hexacell.cell.fields import Frozen
@@ -19,7 +20,6 @@ from hexacell.errors import HexacellError
 from hexacell.kinematics.parameters import LEGS
 from hexacell.kinematics.rotations import Array
 from hexacell.measurements.records import MeasurementSet, RecordId
-from hexacell.robot_model import robot_of_start
 from hexacell.runs.run_folder import RunFolder
 from procedures.calibration.workflow import Calibration, Mode
 from procedures.journal.journal import read_entries
@@ -131,9 +131,7 @@ def _calibration(settings: CellSettings, state: RunState, mode: Mode) -> Calibra
     started = state.started
     if started is None:
         return None
-    robot = robot_of_start(
-        settings, started.controller, started.branch, started.taught, started.joint_ranges
-    )
+    robot = started_robot(settings, started)
     return Calibration(settings, robot, mode, accepted=started.accepted)
 
 

@@ -13,6 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
+from hexacell.application.started_robot import started_robot
 from hexacell.cell.loader import Cell
 from hexacell.controller_config.change import ConfigChange
 from hexacell.controller_config.interface import ControllerGeometry
@@ -21,7 +22,7 @@ from hexacell.errors import FileError
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.limits.limits import SAME_FRAMES
-from hexacell.robot_model import Robot, config_format, robot_of_start
+from hexacell.robot_model import Robot, config_format
 from hexacell.runs.run_folder import RunFolder
 from hexacell.stated_limits import stated_limits
 from hexacell.storage import atomic_files
@@ -111,9 +112,7 @@ def _require_own_poses(cell: Cell, folder: RunFolder, state: RunState, started: 
     poses = list(dict.fromkeys(_poses_to_come(state)))
     if not poses:
         return
-    robot = robot_of_start(
-        cell.settings, started.controller, started.branch, started.taught, started.joint_ranges
-    )
+    robot = started_robot(cell.settings, started)
     batch = PoseBatch.of(Pose(*pose) for pose in poses)
     reached = np.zeros(len(poses), dtype=bool)
     for geometry in _commanding(robot, state):

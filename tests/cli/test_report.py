@@ -86,6 +86,27 @@ def test_two_runs_are_compared(typed_here, demo, run, tmp_path) -> None:
     assert "The noise of both runs explains all changes together." in said
 
 
+def test_a_run_of_the_quick_level_is_compared_by_its_records(typed_here, demo, run) -> None:
+    """Its geometry has the errors of the result that it started from."""
+    first, *others = (run / "journal.jsonl").read_bytes().splitlines(keepends=True)
+    record = json.loads(first)
+    record["event"]["mode"] = "quick"
+    del record["crc"]
+    (run / "journal.jsonl").write_bytes(with_checksum(record) + b"".join(others))
+    outcome = typed_here("report", run, "--compare", demo.run)
+    assert outcome.code == 0, outcome.err
+    said = text_of((run / "report.html").read_text())
+    assert "The noise of the records of both explains all differences." in said
+    assert re.search(r"\bl4 mm [+-]0\.000 \d\.\d{3} [+-]0\.0\b", said)
+
+
+@pytest.mark.parametrize("name", ["report.doc", "report", "report.PDF.txt"])
+def test_what_no_report_can_be_written_as_is_told(typed_here, run, tmp_path, name) -> None:
+    outcome = typed_here("report", run, "--output", tmp_path / name)
+    assert (outcome.code, "of this kind no report is made" in outcome.err) == (2, True)
+    assert not (tmp_path / name).exists()
+
+
 def test_an_interrupted_run_has_no_verdict(typed_here, run) -> None:
     entries = list(read_entries(run / "journal.jsonl"))
     first = next(n for n, one in enumerate(entries) if isinstance(one.event, events.SetClosed))

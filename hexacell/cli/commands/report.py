@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from pathlib import Path
 
 from hexacell.application.reported_run import ReportedRun, reported_run
 from hexacell.cli.console import Console
@@ -17,24 +18,33 @@ from hexacell.storage.atomic_files import write_atomically
 CERTIFICATE = ".xml"
 """How the name of a file ends that is to be one."""
 
+KINDS = (".html", ".htm", ".pdf", CERTIFICATE)
+
 
 def main(options: argparse.Namespace) -> ExitCode:
     """Write the report; the run folder is only read, unless the report goes into it."""
     console = Console(options.json)
-    if options.compare is not None and options.output is not None and options.output.suffix == CERTIFICATE:
-        raise UsageError(
-            "a certificate compares nothing",
-            action="Leave --compare away, or name a file that ends in .pdf",
-        )
+    target = options.output or options.run / "report.html"
+    _require_possible(target, is_comparison=options.compare is not None)
     earlier = None if options.compare is None else reported_run(options.compare)
     run = reported_run(options.run)
     report = report_of(run, earlier)
-    target = options.output or options.run / "report.html"
     write_atomically(target, _written(target.suffix, run, report))
     console.document({"report": str(target), "identifier": report.identifier, "verdict": report.verdict})
     title = certificate.TITLE if target.suffix == CERTIFICATE else report.title.lower()
     console.print(f"{target}: {title}, {report.verdict}")
     return ExitCode.DONE
+
+
+def _require_possible(target: Path, *, is_comparison: bool) -> None:
+    if target.suffix not in KINDS:
+        action = "Name one that ends in .html, .pdf or .xml"
+        raise UsageError("of this kind no report is made", subject=target, action=action)
+    if is_comparison and target.suffix == CERTIFICATE:
+        raise UsageError(
+            "a certificate compares nothing",
+            action="Leave --compare away, or name a file that ends in .pdf",
+        )
 
 
 def _written(suffix: str, run: ReportedRun, report: Report) -> bytes:

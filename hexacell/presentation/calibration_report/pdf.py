@@ -33,6 +33,7 @@ PREAMBLE = """
 )
 #show heading: set block(above: 14pt, below: 6pt)
 #show table.cell: set text(8.5pt)
+#show table.cell: set block(breakable: false)
 #text(20pt, weight: "bold", {title})
 
 #text(9pt, fill: luma(90), {identifier})
@@ -105,8 +106,15 @@ def _block(block: Block) -> str:
 def _table(table: Table) -> str:
     count = len(table.columns)
     first = table.numbers_from
-    widths = ", ".join(["auto"] * count if first is not None else ["auto", *["1fr"] * (count - 1)])
+    widths = ", ".join(["auto"] * count if first is not None else _text_widths(table))
     align = ", ".join("left" if first is None or column < first else "right" for column in range(count))
     head = ", ".join(f"strong({_text(name)})" for name in table.columns)
     cells = ", ".join(_text(text) for row in table.rows for text in row)
     return f"#table(columns: ({widths}), align: ({align}), table.header({head}), {cells})"
+
+
+def _text_widths(table: Table) -> list[str]:
+    """The column with the longest text takes what the others leave."""
+    longest = [max(map(len, column)) for column in zip(table.columns, *table.rows, strict=True)]
+    widest = longest.index(max(longest))
+    return ["1fr" if column == widest else "auto" for column in range(len(longest))]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from hexacell.application.reported_run import ReportedRun
 from hexacell.presentation.calibration_report.blocks import Report, Tone
+from hexacell.presentation.calibration_report.comparison import comparison_chapter
 from hexacell.presentation.calibration_report.figures import figure_chapter
 from hexacell.presentation.calibration_report.provenance import (
     authorisation_chapter,
@@ -12,7 +13,6 @@ from hexacell.presentation.calibration_report.provenance import (
     traceability_chapter,
 )
 from hexacell.presentation.calibration_report.results import (
-    comparison_chapter,
     observability_chapter,
     parameter_chapter,
     uncertainty_chapter,

@@ -8,12 +8,10 @@ from typing import Any
 import numpy as np
 
 from hexacell.application.reported_run import ReportedRun
-from hexacell.errors import UsageError
 from hexacell.kinematics.parameters import ParameterUnit
 from hexacell.presentation.calibration_report.blocks import Block, Chapter, Paragraph, Table
 from hexacell.presentation.quick_level import quick_accuracy_sentences
 from hexacell.reporting.check_result import ParameterChange
-from hexacell.reporting.run_comparison import ParameterDifference, compare_results
 from hexacell.uncertainty.statement import COVERAGE_FACTOR
 
 SMALLEST_MM = 0.0005
@@ -49,29 +47,6 @@ def parameter_chapter(run: ReportedRun) -> Chapter | None:
         "change; the controller's config has the new one in the frames in which the task poses move least."
     )
     return Chapter("Identified geometry", (table, Paragraph(text)))
-
-
-def comparison_chapter(earlier: ReportedRun, run: ReportedRun) -> Chapter:
-    """What has changed since an earlier run.
-
-    Raises:
-        UsageError: one of them identified nothing, or their frames differ.
-    """
-    then, now = earlier.state.identified, run.state.identified
-    is_own = "quick" not in {earlier.started.mode, run.started.mode}
-    if then is None or now is None or not is_own:
-        action = "Name calibrations, which do"
-        raise UsageError("one of the runs identified no geometry of its own", action=action)
-    compared = compare_results(run.settings.mechanism.parameters, then.result, now.result)
-    rows = tuple(map(_difference_row, compared.parameters))
-    columns = ("Parameter", "unit", "then", "now", "change", "U (k = 2)", "")
-    text = (
-        "All changes together are more than the noise of both runs explains."
-        if compared.is_changed
-        else "The noise of both runs explains all changes together."
-    )
-    title = f"Compared with {earlier.name} of {earlier.ended:%Y-%m-%d}"
-    return Chapter(title, (Paragraph(text, is_strong=True), Table(columns, rows, 2)))
 
 
 def observability_chapter(run: ReportedRun) -> Chapter | None:
@@ -130,12 +105,6 @@ def _parameter_rows(run: ReportedRun) -> Iterator[tuple[str, ...]]:
             f"{new[row] - old[row]:+.{decimals}f}",
             f"{COVERAGE_FACTOR * sigma[row]:.{decimals}f}",
         )
-
-
-def _difference_row(one: ParameterDifference) -> tuple[str, ...]:
-    values = f"{one.before:.3f}", f"{one.after:.3f}", f"{one.change:+.3f}"
-    expanded = f"{COVERAGE_FACTOR * one.sigma:.3f}"
-    return one.name, one.unit, *values, expanded, "changed" if one.is_significant else ""
 
 
 def _left_out(run: ReportedRun) -> str:

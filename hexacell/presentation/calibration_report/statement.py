@@ -20,10 +20,10 @@ from procedures.run.steps import Phase
 NO_VERDICT = "NOT EVALUATED"
 
 MEANINGS = {
-    Verdict.PASS: "The error and its uncertainty together are within the limit.",
-    Verdict.CONDITIONAL_PASS: "The error is within the limit; its uncertainty reaches above it.",
-    Verdict.CONDITIONAL_FAIL: "The error is above the limit; its uncertainty reaches below it.",
-    Verdict.FAIL: "The error is above the limit, also with its uncertainty taken off.",
+    Verdict.PASS: "The error and the guard band together are within the limit.",
+    Verdict.CONDITIONAL_PASS: "The error is within the limit, but not by the guard band.",
+    Verdict.CONDITIONAL_FAIL: "The error is above the limit, but not by the guard band.",
+    Verdict.FAIL: "The error is above the limit, also with the guard band taken off.",
     Verdict.NOT_EVALUATED: "The records do not decide it.",
 }
 

@@ -20,9 +20,9 @@ from procedures.run.steps import Phase
 
 VERDICT_WORDS = {
     Verdict.PASS: "PASS: error and uncertainty together are within the limit.",
-    Verdict.CONDITIONAL_PASS: "CONDITIONAL PASS: the error is within the limit, U reaches above it.",
+    Verdict.CONDITIONAL_PASS: "CONDITIONAL PASS: the error is within the limit, but not by the guard band.",
     Verdict.NOT_EVALUATED: "NOT EVALUATED: the records do not decide it.",
-    Verdict.CONDITIONAL_FAIL: "CONDITIONAL FAIL: the error is above the limit, U reaches below it.",
+    Verdict.CONDITIONAL_FAIL: "CONDITIONAL FAIL: the error is above the limit, but not by the guard band.",
     Verdict.FAIL: "FAIL: the error is above the limit.",
 }
 

@@ -1,0 +1,14 @@
+"""The robot of a run, as the run knew it when it began."""
+
+from __future__ import annotations
+
+from hexacell.cell.model import CellSettings
+from hexacell.robot_model import Robot, robot_of_start
+from procedures.run.events import RunStarted
+
+
+def started_robot(settings: CellSettings, started: RunStarted) -> Robot:
+    """From a cell's settings, which may be newer, and what its controller had then."""
+    return robot_of_start(
+        settings, started.controller, started.branch, started.taught, started.joint_ranges
+    )

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from datetime import datetime, timedelta
+from pathlib import Path
 
 from hexacell.application.drift_history import DriftHistory, drift_history
 from hexacell.application.history import PastRun, past_runs
 from hexacell.application.run_index import RunIndex
 from hexacell.cell.loader import Cell
 from hexacell.decision import Verdict
+from hexacell.errors import HexacellError
 from hexacell.storage.cell_lock import lock_holder
 
 
@@ -41,6 +43,14 @@ class CellStatus:
     def worst_share(self) -> tuple[str, float] | None:
         """The parameter whose cumulative sum is nearest to its limit, and how near; none without runs."""
         return max(self.drift.shares, key=lambda one: one[1], default=None)
+
+
+@dataclass(frozen=True, slots=True)
+class UnreadableCell:
+    """A cell of which nothing can be said, as its file, or that of its controller, cannot be used."""
+
+    path: Path
+    error: HexacellError
 
 
 def cell_status(cell: Cell) -> CellStatus:

@@ -94,6 +94,8 @@ def scheduled_run(cell: Cell, request: ScheduleRequest) -> ScheduledRun:
 def write_schedule(cell: Cell, request: ScheduleRequest, folder: Path | None) -> Schedule:
     """Write the units, into a folder or where this user's units are.
 
+    Those that the cell had under an earlier name are removed: a cell has one schedule.
+
     Raises:
         UsageError: as :func:`scheduled_run`, or another cell's units have this name.
         FileError: they cannot be written.
@@ -106,6 +108,7 @@ def write_schedule(cell: Cell, request: ScheduleRequest, folder: Path | None) ->
     user = _owner_of(run.cell) if is_of_system else None
     groups = [group for group in DEVICE_GROUPS if _exists(group)]
     atomic_files.create_folder_durably(place)
+    _remove_units([path for path in _units_of(run.cell, place) if path not in {service, timer}])
     atomic_files.write_atomically(service, service_text(run, user, groups, request.on_failure).encode())
     atomic_files.write_atomically(timer, timer_text(run).encode())
     return Schedule(run.unit, (service, timer), is_of_system, _verified((service, timer)))
@@ -114,8 +117,7 @@ def write_schedule(cell: Cell, request: ScheduleRequest, folder: Path | None) ->
 def present_schedule(cell: Cell, folder: Path | None) -> Schedule | None:
     """The units of a cell; none if it has none."""
     place, is_of_system = _place(folder)
-    mine = cell.path.resolve()
-    found = tuple(path for path in sorted(place.glob("hexacell-*.*")) if _cell_of(path) == mine)
+    found = _units_of(cell.path.resolve(), place)
     return Schedule(found[0].stem, found, is_of_system) if found else None
 
 
@@ -128,13 +130,21 @@ def remove_schedule(cell: Cell, folder: Path | None) -> Schedule | None:
     present = present_schedule(cell, folder)
     if present is None:
         return None
-    enabled = [path.parent / "timers.target.wants" / path.name for path in present.files]
-    try:
-        for path in (*enabled, *present.files):
-            path.unlink(missing_ok=True)
-    except OSError as error:
-        raise atomic_files.os_error_to_file_error("cannot be removed", path, error) from error
+    _remove_units(present.files)
     return present
+
+
+def _units_of(cell: Path, place: Path) -> tuple[Path, ...]:
+    return tuple(path for path in sorted(place.glob("hexacell-*.*")) if _cell_of(path) == cell)
+
+
+def _remove_units(files: Sequence[Path]) -> None:
+    enabled = [path.parent / "timers.target.wants" / path.name for path in files]
+    for path in (*enabled, *files):
+        try:
+            path.unlink(missing_ok=True)
+        except OSError as error:
+            raise atomic_files.os_error_to_file_error("cannot be removed", path, error) from error
 
 
 def _require_possible(cell: Cell, request: ScheduleRequest) -> None:
@@ -151,6 +161,10 @@ def _require_possible(cell: Cell, request: ScheduleRequest) -> None:
         if not 1 <= minutes <= MOST_MINUTES:
             action = f"Give 1 to {MOST_MINUTES} minutes"
             raise UsageError(f"--{what} {minutes} is no duration", action=action)
+    if request.metrics is not None and not request.metrics.resolve().parent.is_dir():
+        raise UsageError(
+            "the folder of the metrics does not exist", subject=request.metrics, action="Make it"
+        )
     if request.on_failure is not None and not _UNIT_NAME.fullmatch(request.on_failure):
         raise UsageError(
             f"'{request.on_failure}' is no name of a unit", action="Write it as mail-me@%n.service"

@@ -18,7 +18,7 @@ from pydantic import SecretStr, ValidationError
 from hexacell.cell.diagnostics import Diagnosis, ModelLookup
 from hexacell.cell.fields import Section
 from hexacell.cell.model import DEFAULT_MECHANISM, CellSettings, cell_model
-from hexacell.errors import joined
+from hexacell.errors import FileError, joined
 from hexacell.plugins import Group, names
 from hexacell.storage.atomic_files import read_text
 from hexacell.storage.secrets import MASK, without_secrets
@@ -75,6 +75,18 @@ def load_cell(path: Path) -> Cell:
     """
     document = TomlDocument.parse(read_text(path, LARGEST_FILE_BYTES), path)
     return Cell(path, _checked(document, path), document)
+
+
+def is_cell_file(path: Path) -> bool:
+    """Whether a file seems to be one, with or without mistakes: not a config or a password file beside it.
+
+    What cannot be read as TOML counts as one, so that nobody overlooks a broken cell file.
+    """
+    try:
+        data = TomlDocument.parse(read_text(path, LARGEST_FILE_BYTES), path).data
+    except FileError:
+        return True
+    return any(section in data for section in ("robot", "gauges", "encoders", "identification"))
 
 
 def describe(cell: Cell) -> str:

@@ -7,9 +7,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from datetime import datetime
+from textwrap import indent
 from typing import Any
 
-from hexacell.application.cell_status import CellStatus
+from hexacell.application.cell_status import CellStatus, UnreadableCell
 from hexacell.application.history import PastRun
 from hexacell.decision import Verdict
 from hexacell.presentation.changes import legs_text
@@ -35,15 +36,24 @@ HELP = {
 }
 
 
-def status_text(found: Sequence[CellStatus]) -> str:
-    """A line a cell, and below it what needs somebody."""
+def status_text(found: Sequence[CellStatus], unreadable: Sequence[UnreadableCell] = ()) -> str:
+    """A line a cell, and below it what needs somebody; the broken ones at the end."""
     head = f"{'cell':{LONGEST_NAME}} {'latest verdict':17} {'error, mm':16} {'when':17} in use"
-    return "\n".join([head, *(line for one in found for line in _lines(one))])
+    lines = [head, *(line for one in found for line in _lines(one))]
+    for one in unreadable:
+        lines += [
+            f"{one.path.name[:LONGEST_NAME]:{LONGEST_NAME}} cannot be read",
+            indent(str(one.error), "  "),
+        ]
+    return "\n".join(lines)
 
 
-def status_document(found: Sequence[CellStatus]) -> dict[str, Any]:
+def status_document(
+    found: Sequence[CellStatus], unreadable: Sequence[UnreadableCell] = ()
+) -> dict[str, Any]:
     """What ``status --json`` prints."""
-    return {"cells": [_document(one) for one in found]}
+    broken = [{"cell": str(one.path), "error": str(one.error)} for one in unreadable]
+    return {"cells": [_document(one) for one in found], "unreadable": broken}
 
 
 def metrics_text(found: Sequence[CellStatus]) -> str:

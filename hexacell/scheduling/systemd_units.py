@@ -24,7 +24,6 @@ HARDENING = (
     "CapabilityBoundingSet=",
     "ProtectSystem=strict",
     "ProtectHome=read-only",
-    "PrivateTmp=yes",
     "ProtectClock=no",
     "ProtectKernelTunables=yes",
     "ProtectKernelModules=yes",
@@ -40,6 +39,9 @@ HARDENING = (
 )
 """Of a system's service. ProtectClock would take the serial lines away; the families are those of
 controllers and CAN."""
+
+
+TEMPORARY = (Path("/tmp"), Path("/var/tmp"))  # noqa: S108 - what PrivateTmp hides
 
 
 def service_text(run: ScheduledRun, user: str | None, groups: Sequence[str], on_failure: str | None) -> str:
@@ -107,7 +109,10 @@ def _retries(run: ScheduledRun) -> list[str]:
 
 
 def _hardening(run: ScheduledRun) -> list[str]:
-    return [*HARDENING, *(f"ReadWritePaths={_quoted(str(one))}" for one in run.writable)]
+    """A cell below a temporary folder is seen only in the folder that all share."""
+    is_temporary = any(one.is_relative_to(folder) for one in run.writable for folder in TEMPORARY)
+    private = "PrivateTmp=no" if is_temporary else "PrivateTmp=yes"
+    return [*HARDENING, private, *(f"ReadWritePaths={_quoted(str(one))}" for one in run.writable)]
 
 
 def _identity(user: str | None, groups: Sequence[str]) -> list[str]:

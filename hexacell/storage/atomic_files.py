@@ -25,6 +25,9 @@ from hexacell.errors import FileError
 NOT_FOR_OTHERS = 0o002
 """What no file or folder that the program makes is: writable by everybody, whatever the umask."""
 
+FOR_EVERYBODY = 0o444
+"""To be read by everybody."""
+
 BYTE_ORDER_MARK = "\ufeff"
 
 _REASONS: dict[int, tuple[str, str]] = {
@@ -94,14 +97,20 @@ def decode_utf8(data: bytes, path: Path) -> str:
 
 
 def write_atomically(
-    path: Path, data: bytes, *, expected: bytes | None = None, like: Path | None = None
+    path: Path,
+    data: bytes,
+    *,
+    expected: bytes | None = None,
+    like: Path | None = None,
+    for_everybody: bool = False,
 ) -> None:
     """Replace the content of ``path``, or create it, in one step that survives a power cut.
 
     A symbolic link is kept; the file it points to is replaced. Mode, owner and extended attributes (with
     access control lists) are kept; where the owner cannot be kept, nothing is written. If ``expected`` is
     given, the file must hold exactly that just before it is replaced. A new file has the permissions of
-    ``like``, if that is given, but is never writable by everybody.
+    ``like``, if that is given, but is never writable by everybody; with ``for_everybody`` all may read it,
+    whatever the umask.
 
     Raises:
         FileError: the file is unchanged, and no temporary file is left. Only if the message says that the
@@ -110,7 +119,7 @@ def write_atomically(
     try:
         target = _resolved(path)
         with _temporary_beside(target) as temporary:
-            _write_like(target, temporary, data, _new_mode(like))
+            _write_like(target, temporary, data, _new_mode(like), for_everybody=for_everybody)
             _require_content(target, expected)
             os.replace(temporary, target)  # noqa: PTH105 - named as the system call it is
     except OSError as error:
@@ -194,7 +203,7 @@ def _new_mode(like: Path | None) -> int:
     return mode & 0o666 & ~NOT_FOR_OTHERS
 
 
-def _write_like(target: Path, temporary: Path, data: bytes, new_mode: int) -> None:
+def _write_like(target: Path, temporary: Path, data: bytes, new_mode: int, *, for_everybody: bool) -> None:
     status = _status(target)
     # Who may not read the old file must not read the new one, not even while it is written.
     mode = new_mode if status is None else 0o600
@@ -203,6 +212,8 @@ def _write_like(target: Path, temporary: Path, data: bytes, new_mode: int) -> No
         stream.flush()
         if status is not None:
             _keep_attributes(stream.fileno(), target, status)
+        elif for_everybody:
+            os.fchmod(stream.fileno(), stat.S_IMODE(os.fstat(stream.fileno()).st_mode) | FOR_EVERYBODY)
         os.fsync(stream.fileno())
 
 

@@ -46,7 +46,30 @@ def test_as_a_document(schedule, units) -> None:
     }
 
 
+def test_a_cell_with_another_name_still_has_one_schedule(schedule, cell_folder, units) -> None:
+    assert schedule("--daily", "02:30").code == 0
+    cell_folder.edit(('name = "simulated-hexaglide"', 'name = "hall 4"'))
+    assert schedule("--daily", "03:30").code == 0
+    assert sorted(path.name for path in units.iterdir()) == [
+        "hexacell-hall-4.service",
+        "hexacell-hall-4.timer",
+    ]
+
+
+def test_a_service_that_could_not_begin_is_not_written(schedule, units, tmp_path) -> None:
+    """systemd refuses one with a writable path that does not exist."""
+    refused = schedule("--daily", "02:30", "--metrics", tmp_path / "nowhere" / "cell.prom")
+    assert (refused.code, "the folder of the metrics does not exist" in refused.err) == (2, True)
+    assert not units.exists()
+
+
+def test_what_cron_cannot_do_is_refused(schedule) -> None:
+    refused = schedule("--daily", "02:30", "--cron", "--on-failure", "mail.service")
+    assert (refused.code, "only systemd" in refused.err) == (2, True)
+
+
 def test_metrics_may_be_written_into_their_folder(schedule, units, tmp_path) -> None:
+    (tmp_path / "metrics").mkdir()
     assert schedule("--daily", "02:30", "--metrics", tmp_path / "metrics" / "cell.prom").code == 0
     service = (units / UNITS[0]).read_text()
     assert f'--metrics" "{tmp_path}/metrics/cell.prom"' in service
@@ -86,7 +109,7 @@ def test_a_cell_that_needs_a_person_is_not_scheduled(schedule, cell_folder, unit
     ("words", "problem"),
     [
         (["--daily", "25:00"], "'25:00' is no time of day"),
-        ([], "when?"),
+        ([], "the time of day is missing"),
         (["--daily", "02:30", "--longest", "0"], "--longest 0 is no duration"),
         (["--daily", "02:30", "--retry", "100000"], "--retry 100000 is no duration"),
         (["--daily", "02:30", "--longest", "600"], "all tries together last longer than a day"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 
 import pytest
@@ -92,7 +93,47 @@ def test_names_with_quotes_stay_names(typed_here, cell_folder, tmp_path) -> None
     assert labels == {"Zelle (3) #+"}
 
 
-def test_a_cell_file_with_a_mistake_is_named(typed_here, cell_folder, tmp_path) -> None:
-    outcome = typed_here("status", cell_folder.cell, tmp_path / "nowhere.toml")
+def test_a_cell_file_that_is_not_there_is_named(typed_here, tmp_path) -> None:
+    outcome = typed_here("status", tmp_path / "nowhere.toml")
+    assert (outcome.code, "nowhere.toml" in outcome.err) == (2, True)
+
+
+@pytest.mark.parametrize("mistake", ["nowhere", "no TOML", "a value", "no config"])
+def test_a_broken_cell_hides_no_other(typed_here, cell_folder, tmp_path, mistake) -> None:
+    broken, target = tmp_path / "broken.toml", tmp_path / "hexacell.prom"
+    if mistake != "nowhere":
+        text = cell_folder.cell.read_text()
+        broken.write_text(text.replace("[robot]", "[robot", 1) if mistake == "no TOML" else text)
+    if mistake == "a value":
+        broken.write_text(broken.read_text().replace("position_mm = 0.25", 'position_mm = "wide"', 1))
+    outcome = typed_here("status", broken, cell_folder.cell, "--json", "--metrics", target)
     assert outcome.code == 2
-    assert "nowhere.toml" in outcome.err
+    assert [one["name"] for one in outcome.document["cells"]] == ["simulated-hexaglide"]
+    (told,) = outcome.document["unreadable"]
+    assert told["cell"] == str(broken)
+    reason = "simulated-hexaglide.controller.toml" if mistake == "no config" else "broken.toml"
+    assert reason in told["error"]
+    assert "broken.toml            cannot be read" in outcome.err
+    assert ("in_use",) in samples(target)
+
+
+def test_what_a_pattern_names_beside_the_cells_is_passed_over(typed_here, cell_folder) -> None:
+    passwords = cell_folder.path / "notify.toml"
+    passwords.write_text('token = "hidden"\n')
+    outcome = typed_here("status", *sorted(cell_folder.path.glob("*.toml")), "--json")
+    assert outcome.code == 0, outcome.err
+    assert (len(outcome.document["cells"]), outcome.document["unreadable"]) == (1, [])
+    assert typed_here("status", passwords).code == 2
+
+
+def test_the_metrics_can_be_read_by_who_collects_them(typed_here, cell_folder, tmp_path) -> None:
+    """The service that writes them lets nobody read what it makes."""
+    target, before = tmp_path / "hexacell.prom", os.umask(0o077)
+    try:
+        assert typed_here("status", cell_folder.cell, "--metrics", target).code == 0
+    finally:
+        os.umask(before)
+    assert target.stat().st_mode & 0o777 == 0o644
+    target.chmod(0o640)
+    assert typed_here("status", cell_folder.cell, "--metrics", target).code == 0
+    assert target.stat().st_mode & 0o777 == 0o640

@@ -38,7 +38,7 @@ def main(options: argparse.Namespace) -> ExitCode:
         console.document(schedule_document(removed))
         console.print(removed_schedule_text(removed))
     elif options.daily is None:
-        raise UsageError("when?", action="Give --daily 02:30, --show or --remove")
+        raise UsageError("the time of day is missing", action="Give --daily 02:30, --show or --remove")
     else:
         _write(cell, options, console)
     return ExitCode.DONE
@@ -55,6 +55,8 @@ def _write(cell: Cell, options: argparse.Namespace, console: Console) -> None:
         options.metrics,
     )
     if options.cron:
+        if options.on_failure is not None:
+            raise UsageError("only systemd starts a unit on a failure", action="Leave --on-failure away")
         line = crontab_line(scheduled_run(cell, request))
         console.document({"crontab": line})
         console.print(crontab_text(line, cell.settings.unattended))

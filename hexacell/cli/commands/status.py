@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
+from pathlib import Path
 
-from hexacell.application.cell_status import cell_status
+from hexacell.application.cell_status import CellStatus, UnreadableCell, cell_status
 from hexacell.application.fleet import fleet_cells
+from hexacell.cell.loader import is_cell_file
 from hexacell.cli.archive_argument import archive_url, publish_or_warn
 from hexacell.cli.cell_argument import cell_at
 from hexacell.cli.console import Console
-from hexacell.errors import ExitCode, UsageError
+from hexacell.errors import ExitCode, HexacellError, UsageError
 from hexacell.presentation.cell_status import metrics_text, status_document, status_text
 from hexacell.presentation.fleet import fleet_document, fleet_text
 from hexacell.storage.atomic_files import write_atomically
@@ -22,14 +25,30 @@ def main(options: argparse.Namespace) -> ExitCode:
         return _fleet(options, console)
     if options.archive is not None:
         raise UsageError("--archive is for all of its cells", action="Name no cell, or leave it away")
-    found = [cell_status(cell_at(path, console)) for path in options.cells]
+    found, unreadable = _all(options.cells, console)
     for one in found:
         publish_or_warn(one, console)
     if options.metrics is not None:
-        write_atomically(options.metrics, metrics_text(found).encode())
-    console.document(status_document(found))
-    console.print(status_text(found))
-    return ExitCode.DONE
+        write_atomically(options.metrics, metrics_text(found).encode(), for_everybody=True)
+    console.document(status_document(found, unreadable))
+    console.print(status_text(found, unreadable))
+    return ExitCode.USAGE if unreadable else ExitCode.DONE
+
+
+def _all(paths: Sequence[Path], console: Console) -> tuple[list[CellStatus], list[UnreadableCell]]:
+    """Every cell; one that is broken hides no other. What a pattern names beside them is left out."""
+    found: list[CellStatus] = []
+    unreadable: list[UnreadableCell] = []
+    for path in paths:
+        if len(paths) > 1 and not is_cell_file(path):
+            continue
+        try:
+            found.append(cell_status(cell_at(path, console)))
+        except HexacellError as error:
+            if len(paths) == 1:
+                raise
+            unreadable.append(UnreadableCell(path, error))
+    return found, unreadable
 
 
 def _fleet(options: argparse.Namespace, console: Console) -> ExitCode:

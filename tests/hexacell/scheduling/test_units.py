@@ -65,6 +65,14 @@ def test_metrics_are_written_after_each_run_whatever_came_of_it() -> None:
     assert "ExecStopPost" not in service_text(scheduled(), "robot", [], None)
 
 
+@pytest.mark.parametrize(
+    ("cell", "private"),
+    [("/cells/a/cell.toml", "yes"), ("/tmp/a/cell.toml", "no"), ("/tmpa/cell.toml", "yes")],
+)
+def test_a_cell_below_a_temporary_folder_is_not_hidden_from_its_run(cell, private) -> None:
+    assert settings_of(service_text(scheduled(cell), "robot", [], None))["PrivateTmp"] == private
+
+
 def test_the_service_of_a_user_asks_for_nothing_that_only_root_may() -> None:
     found = settings_of(service_text(scheduled(retries=0), None, ["dialout"], None))
     assert not {"User", "ProtectSystem", "CapabilityBoundingSet", "OnFailure", "Restart"} & set(found)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from datetime import datetime, timedelta
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 
 from hexacell.application.drift_history import DriftHistory, drift_history
@@ -13,6 +13,9 @@ from hexacell.cell.loader import Cell
 from hexacell.decision import Verdict
 from hexacell.errors import HexacellError
 from hexacell.storage.cell_lock import lock_holder
+
+CLOCKS_DIFFER = timedelta(minutes=5)
+"""By so much the clocks of computers that share a folder may."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,6 +41,12 @@ class CellStatus:
     due_at: datetime | None
     proposal: PastRun | None
     drift: DriftHistory
+
+    @property
+    def ends_in_future(self) -> PastRun | None:
+        """The latest run, if by the clock of today it has not ended yet: it hides those that follow."""
+        ended = None if self.latest is None else self.latest.summary.ended
+        return self.latest if ended is not None and ended > datetime.now(UTC) + CLOCKS_DIFFER else None
 
     @property
     def worst_share(self) -> tuple[str, float] | None:

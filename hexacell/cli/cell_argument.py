@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from hexacell.application.certificate_warnings import certificate_warnings
 from hexacell.application.security_warnings import exposure_warnings, telling_warnings
 from hexacell.cell.loader import Cell, load_cell
 from hexacell.cell.passwords import password_warnings
@@ -21,6 +22,6 @@ def cell_at(path: Path, console: Console) -> Cell:
 def cell_with_devices_at(path: Path, console: Console) -> Cell:
     """The same for a command that is about the cell's devices."""
     cell = cell_at(path, console)
-    for warning in exposure_warnings(cell):
+    for warning in (*exposure_warnings(cell), *certificate_warnings(cell)):
         console.warn(warning)
     return cell

@@ -83,7 +83,9 @@ def _lines(one: CellStatus) -> Iterator[str]:
     if one.latest is not None and not one.latest.summary.has_begun:
         yield f"  {one.latest.name}: {one.latest.summary.line}"
     if one.latest is not None and not one.latest.summary.is_over:
-        yield f"  {one.latest.name} is not over: {one.latest.summary.line}"
+        yield f"  {one.latest.name}: {one.latest.summary.line}"
+    if one.ends_in_future is not None:
+        yield f"  {one.ends_in_future.name} ended in the future: this computer's clock is wrong, or was"
     if one.due_at is not None:
         yield f"  calibration due on {one.due_at:%Y-%m-%d}"
     if one.drift.changes:

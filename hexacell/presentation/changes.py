@@ -35,7 +35,8 @@ def watch_text(found: DriftHistory) -> str:
     lines = [wrapped(change_sentence(one), indent=2) for one in found.changes]
     name, share = max(found.shares, key=lambda one: one[1])
     since = "since then " if found.changes else ""
-    runs = f"{len(found.runs)} runs from {found.runs[0]:%Y-%m-%d} to {found.runs[-1]:%Y-%m-%d}"
+    first, last = (f"{at:%Y-%m-%d}" for at in (found.runs[0], found.runs[-1]))
+    runs = f"{len(found.runs)} runs from {first} to {last}" if len(found.runs) > 1 else f"1 run of {first}"
     quiet = "" if found.changes else "no leg has moved: "
     rest = f"{runs}: {quiet}{since}the largest sum of innovations is {share:.0%} of its limit ({name})."
     shown = [one for one in found.celsius if one is not None]

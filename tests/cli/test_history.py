@@ -67,6 +67,13 @@ def test_a_run_is_told_in_lines(cell, typed_here) -> None:
     assert typed_here("history", cell.path, "--show", "never").code == 2
 
 
+def test_a_run_of_which_nothing_is_left_is_told(cell, typed_here) -> None:
+    run = propose_run(cell)
+    run.folder.journal.write_bytes(b"")
+    refused = typed_here("history", cell.path, "--show", run.folder.path.name)
+    assert (refused.code, "nothing happened in this run" in refused.err) == (2, True)
+
+
 def test_one_question_at_a_time(cell, typed_here) -> None:
     refused = typed_here("history", cell.path, "--drift", "--compare", "a", "b")
     assert (refused.code, "not allowed with" in refused.err) == (2, True)

@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import os
 import shutil
+from dataclasses import replace
+from datetime import timedelta
 
 import pytest
 from prometheus_client.parser import text_string_to_metric_families
 
 from hexacell.storage.cell_lock import cell_lock
+from procedures.journal.journal import read_entries
+from procedures.journal.line_format import encode
 
 
 @pytest.fixture
@@ -81,6 +85,16 @@ def test_who_holds_a_cell_is_told_and_nobody_is_kept_out(typed_here, cell_folder
     assert typed_here("status", cell_folder.cell).out.splitlines()[1].endswith(" no")
     with cell_lock(cell_folder.controller):
         pass
+
+
+def test_a_run_that_ended_in_the_future_is_told(typed_here, demo, calibrated) -> None:
+    """It would hide each night that follows until the clock has reached it."""
+    journal = calibrated.parent / "runs" / "simulated-hexaglide" / "demo" / "journal.jsonl"
+    entries = read_entries(journal)
+    assert "in the future" not in typed_here("status", calibrated).out
+    late = [replace(entry, at=entry.at + timedelta(days=400)) for entry in entries]
+    journal.write_bytes(b"".join(map(encode, late)))
+    assert "demo ended in the future: this computer's clock" in typed_here("status", calibrated).out
 
 
 def test_names_with_quotes_stay_names(typed_here, cell_folder, tmp_path) -> None:

@@ -31,7 +31,7 @@ from hexacell.presentation.fleet import fleet_history_document, fleet_history_te
 from hexacell.presentation.history import comparison_text, drift_text, history_text
 from hexacell.presentation.old_runs import refit_text, retention_text
 from hexacell.presentation.run_story import story_text
-from hexacell.runs.run_folder import find_run
+from hexacell.runs.run_folder import RunFolder, find_run
 from procedures.journal.journal import read_entries
 
 MOST_DAYS = 36525.0
@@ -48,9 +48,7 @@ def main(options: argparse.Namespace) -> ExitCode:
     if options.compare is not None:
         _compare(cell, options.compare, console)
     elif options.show is not None:
-        entries = read_entries(find_run(cell, options.show).journal)
-        console.document(story_document(entries))
-        console.print(story_text(entries))
+        _show(find_run(cell, options.show), console)
     elif options.refit is not None:
         refitted = refit_run(cell, options.refit)
         console.document(refit_document(refitted))
@@ -95,6 +93,14 @@ def _keep(cell: Cell, options: argparse.Namespace, console: Console) -> None:
         delete_runs(cell, found.leaving)
     console.document(retention_document(found, is_deleted=options.delete))
     console.print(retention_text(found, is_deleted=options.delete))
+
+
+def _show(run: RunFolder, console: Console) -> None:
+    entries = read_entries(run.journal)
+    if not entries:
+        raise UsageError("nothing happened in this run", subject=run.path, action="Name another")
+    console.document(story_document(entries))
+    console.print(story_text(entries))
 
 
 def _compare(cell: Cell, named: Sequence[str], console: Console) -> None:

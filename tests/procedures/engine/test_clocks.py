@@ -28,9 +28,11 @@ WALL_CLOCKS = {
 }
 MAY_LOOK = {
     "hexacell/runs/run_folder.py": "names a run folder",
+    "hexacell/application/certificate_warnings.py": "warns; the run itself decides",
     "hexacell/application/calibration_run.py": "says which certificates have expired; a person decides",
     "hexacell/application/unattended_runs.py": "keeps quiet hours, and notes when a run was refused",
     "hexacell/application/retention.py": "says which runs are old; a person deletes them",
+    "hexacell/application/cell_status.py": "says that a run ended in the future",
     "hexacell/application/fleet.py": "dates what a cell puts into a shared archive; says what is overdue",
     "hexacell/application/run_notices.py": "dates a notice",
     "hexacell/application/telling_people.py": "gives up notices that were tried and are days old",

@@ -6,7 +6,7 @@ Nothing here fails a run. What went wrong is in the :class:`Telling` of each who
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from threading import Thread
@@ -89,7 +89,7 @@ def waiting_notices(cell: Cell) -> tuple[PendingNotice, ...]:
 
 
 def _send_all(
-    cell: Cell, outbox: NoticeOutbox, send: Deliver, unkept: Iterable[PendingNotice]
+    cell: Cell, outbox: NoticeOutbox, send: Deliver, unkept: Sequence[PendingNotice]
 ) -> TellingOutcome:
     """Send what waits, and what could not be kept."""
     try:
@@ -97,7 +97,7 @@ def _send_all(
             if not is_ours:
                 return TellingOutcome((ToldPerson("the outbox", 0, 0, OTHER_PROCESS),))
             queues = _queues(cell, (*outbox.pending(), *unkept))
-            told = _in_parallel(cell, queues, _removing(outbox, send))
+            told = _in_parallel(cell, queues, _removing(outbox, send, unkept))
             dropped = outbox.drop_old(datetime.now(UTC))
     except HexacellError as error:
         return TellingOutcome((ToldPerson("the outbox", 0, 0, str(error)),))
@@ -117,10 +117,13 @@ def _queues(cell: Cell, waiting: Iterable[PendingNotice]) -> dict[str, tuple[Pen
     return queues
 
 
-def _removing(outbox: NoticeOutbox, send: Deliver) -> Callable[[NoticeAddress, PendingNotice], None]:
+def _removing(
+    outbox: NoticeOutbox, send: Deliver, unkept: Sequence[PendingNotice]
+) -> Callable[[NoticeAddress, PendingNotice], None]:
     def act(address: NoticeAddress, pending: PendingNotice) -> None:
         send(address, pending.notice)
-        outbox.forget(pending)
+        if pending not in unkept:
+            outbox.forget(pending)
 
     return act
 

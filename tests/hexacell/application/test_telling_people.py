@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import os
 import threading
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
@@ -135,8 +137,12 @@ def test_on_a_full_disk_it_is_told_all_the_same(tmp_path, post, monkeypatch) -> 
     def full(path: Path, *_: Any, **__: Any) -> None:
         raise FileError("the disk is full", subject=path)
 
+    def read_only(path: Path, *_: Any, **__: Any) -> None:
+        raise OSError(errno.EROFS, os.strerror(errno.EROFS), path)
+
     with monkeypatch.context() as patch:
         patch.setattr("hexacell.storage.atomic_files.write_atomically", full)
+        patch.setattr(Path, "unlink", read_only)
         assert tell_people(cell, now_notice(1), post).are_all_told
         post.absent = {"one"}
         (told, untold) = sorted(tell_people(cell, now_notice(2), post).people, key=lambda one: -one.told)

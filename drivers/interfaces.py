@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 from typing import Protocol, TypeVar
 
+from hexacell.kinematics.parameters import JointUnit
 from hexacell.kinematics.pose import Pose
 
 Identity_co = TypeVar("Identity_co", covariant=True)
@@ -37,10 +38,11 @@ class GaugeReading:
 
 @dataclass(frozen=True, slots=True)
 class EncoderSample:
-    """Six slider positions sampled at one SYNC: raw counts, and mm along the rails."""
+    """Six joint variables sampled at one SYNC: raw counts, and in the unit of the joint variables."""
 
     counts: tuple[int, ...]
-    positions_mm: tuple[float, ...]
+    positions: tuple[float, ...]
+    unit: JointUnit = JointUnit.MM
 
 
 class StartupAction(StrEnum):
@@ -83,11 +85,11 @@ class ReportedPosition:
 
     Attributes:
         pose: by its own forward kinematics.
-        joints_mm: its six joint variables; none where its protocol does not tell them.
+        joints: its six joint variables; none where its protocol does not tell them.
     """
 
     pose: Pose
-    joints_mm: tuple[float, ...] | None = None
+    joints: tuple[float, ...] | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -165,6 +165,6 @@ def is_worse(before: DeviationStatistics, after: DeviationStatistics, noise: Noi
     A mean of n distances to one noisy reference has at most the variance of a record, once for the
     reference and 1/n for the poses.
     """
-    record_mm = float(np.hypot(noise.gauge_mm, noise.encoder_mm))
+    record_mm = float(np.hypot(noise.gauge_mm, noise.encoder))
     standard_error = record_mm * float(np.sqrt(2.0 + 1.0 / before.poses + 1.0 / after.poses))
     return after.mean_mm - before.mean_mm > SIGNIFICANT_SIGMAS * standard_error

@@ -49,9 +49,10 @@ def _of_command(robot: Robot, pose: Pose) -> Iterator[str]:
 
 
 def _of_joints(robot: Robot, joints: Array) -> Iterator[str]:
+    unit = robot.mechanism.words.joint_unit
     for leg, (lowest, highest) in enumerate(robot.limits.joint_ranges):
         if not lowest <= joints[leg] <= highest:
-            yield f"q{leg + 1} would be {joints[leg]:.1f} mm, outside {lowest:g} to {highest:g}"
+            yield f"q{leg + 1} would be {joints[leg]:.1f} {unit}, outside {lowest:g} to {highest:g}"
 
 
 def _of_legs(robot: Robot, poses: PoseBatch, joints: Array) -> Iterator[str]:

@@ -256,11 +256,11 @@ def noise_of(settings: CellSettings) -> Noise:
     """The noise of a record that a cell's settings state."""
     stated = settings.noise
     alignment = float(np.radians(settings.stations.alignment_deg))
-    noise = Noise(stated.encoder_mm, stated.gauge_mm, alignment, stated.gauge_scale)
-    if stated.encoders_mm is None and stated.gauges_mm is None:
+    noise = Noise(stated.encoder, stated.gauge_mm, alignment, stated.gauge_scale)
+    if stated.encoders is None and stated.gauges_mm is None:
         return noise
-    encoders, gauges = noise.encoders_mm.tolist(), noise.gauges_mm.tolist()
-    return noise.with_devices(stated.encoders_mm or encoders, stated.gauges_mm or gauges)
+    encoders, gauges = noise.encoders.tolist(), noise.gauges_mm.tolist()
+    return noise.with_devices(stated.encoders or encoders, stated.gauges_mm or gauges)
 
 
 def make_robot(

@@ -3,10 +3,22 @@
 from __future__ import annotations
 
 from hexacell.cell.model import CellSettings
-from hexacell.cell.uncertainty import CommonUncertaintySettings, UncertaintySettings
+from hexacell.cell.uncertainty import (
+    CommonUncertaintySettings,
+    LinearUncertaintySettings,
+    RotaryUncertaintySettings,
+    UncertaintySettings,
+    repeatability_key,
+)
+from hexacell.kinematics.mechanism import MechanismWords
 from hexacell.kinematics.parameters import MachinePart
 from hexacell.uncertainty.effects import Effect
-from hexacell.uncertainty.encoder_effects import common_encoder_scale, encoder_scales, stop_repeatability
+from hexacell.uncertainty.encoder_effects import (
+    common_encoder_scale,
+    encoder_eccentricities,
+    encoder_scales,
+    stop_repeatability,
+)
 from hexacell.uncertainty.environment_effects import (
     load_at_work,
     temperature_at_work,
@@ -27,8 +39,9 @@ def stated_effects(settings: CellSettings, measured_range_k: float | None = None
     """
     stated = settings.uncertainty
     return (
-        *_of_encoders(stated, settings.mechanism.words.joint),
-        *_of_guides(stated, settings.limits.joint_max_mm - settings.limits.joint_min_mm),
+        *_of_encoders(stated),
+        _of_stops(stated, settings.mechanism.words),
+        *_of_guides(stated, settings.limits.joint_max - settings.limits.joint_min),
         gauge_scales(1e3 * settings.noise.gauge_scale, is_estimated=True, source="noise.gauge_scale"),
         ball_roundness(stated.ball_roundness_um, stated.source("ball_roundness_um")),
         ball_beside_tool(stated.ball_beside_tool_mm, stated.source("ball_beside_tool_mm")),
@@ -36,16 +49,27 @@ def stated_effects(settings: CellSettings, measured_range_k: float | None = None
     )
 
 
-def _of_encoders(stated: CommonUncertaintySettings, joint: str) -> tuple[Effect, ...]:
-    return (
-        common_encoder_scale(stated.common_encoder_scale_um_m, stated.source("common_encoder_scale_um_m")),
-        encoder_scales(stated.encoder_scale_um_m, stated.source("encoder_scale_um_m")),
-        stop_repeatability(
-            stated.stop_repeatability_um,
-            stated.source("stop_repeatability_um"),
-            is_in_noise=stated.stop_repeatability_acts == "at work",
-            joint=joint,
-        ),
+def _of_encoders(stated: CommonUncertaintySettings) -> tuple[Effect, ...]:
+    if isinstance(stated, LinearUncertaintySettings):
+        common, each = "common_encoder_scale_um_m", "encoder_scale_um_m"
+        return (
+            common_encoder_scale(stated.common_encoder_scale_um_m, stated.source(common)),
+            encoder_scales(stated.encoder_scale_um_m, stated.source(each)),
+        )
+    if isinstance(stated, RotaryUncertaintySettings):
+        key = "encoder_eccentricity_mdeg"
+        return (encoder_eccentricities(stated.encoder_eccentricity_mdeg, stated.source(key)),)
+    return ()
+
+
+def _of_stops(stated: CommonUncertaintySettings, words: MechanismWords) -> Effect:
+    key = repeatability_key(words.joint_unit)
+    return stop_repeatability(
+        getattr(stated, key),
+        stated.source(key),
+        is_in_noise=stated.stop_repeatability_acts == "at work",
+        joint=words.joint,
+        unit=words.joint_unit,
     )
 
 

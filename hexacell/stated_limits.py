@@ -54,9 +54,9 @@ def gauge_travel_of(settings: CellSettings) -> GaugeTravel:
 
 
 def _joint_ranges(limits: LimitSettings, of_controller: JointRanges | None) -> tuple[Array, Array]:
-    """The narrowest of the stated ranges: (6,) lowest and (6,) highest, mm."""
-    lowest, highest = np.full(6, limits.joint_min_mm), np.full(6, limits.joint_max_mm)
-    for ranges in (limits.joints_mm, of_controller):
+    """The narrowest of the stated ranges: (6,) lowest and (6,) highest, in their unit."""
+    lowest, highest = np.full(6, limits.joint_min), np.full(6, limits.joint_max)
+    for ranges in (limits.joints, of_controller):
         if ranges is not None:
             low, high = np.transpose(ranges)
             lowest, highest = np.maximum(lowest, low), np.minimum(highest, high)
@@ -78,10 +78,10 @@ def _leg_limits(settings: CellSettings, controller: ControllerGeometry) -> LegLi
     drawing = Geometry.of(mechanism.parameters, settings.robot.nominal.model_dump())
     legs = _legs_in_the_middle(settings, mechanism, drawing, controller.branch)
     frames = mechanism.normalize_frames(drawing)[1]
-    base = legs.directions[0] if stated.base_axes is None else stated.base_axes
+    base = _unit(legs.directions_in_carriers[0] if stated.base_axes is None else stated.base_axes)
     platform = legs.directions_in_platform[0] if stated.platform_axes is None else stated.platform_axes
     return LegLimits(
-        _unit(base) @ frames.base.T,
+        base @ frames.base.T if legs.carriers is None else base,
         _unit(platform) @ frames.platform.T,
         np.radians(stated.base_cones),
         np.radians(stated.platform_cones),

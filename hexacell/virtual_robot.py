@@ -135,7 +135,7 @@ class VirtualRobot:
         shown = model.frames.base.T @ self._actual_pose.positions[0]
         shown = shown + model.noise.gauges_mm * self._random.standard_normal(3)
         joints = self._joints(self._commanded)[0]
-        joints = joints + model.noise.encoders_mm * self._random.standard_normal(6)
+        joints = joints + model.noise.encoders * self._random.standard_normal(6)
         self._zero = shown if self._zero is None else self._zero
         deviation = deviation_of(shown - self._zero)
         return Record(point, orientation, self.command, joints_of(joints), deviation)

@@ -25,7 +25,7 @@ SMALL: dict[str, Any] = FREE | {
     "identification.orientations": 9,
     "verification.points": ((-100.0, -50.0, 450.0), (100.0, 100.0, 550.0)),
     "verification.orientations": 3,
-    "noise.encoder_mm": 0.0012,
+    "noise.encoder": 0.0012,
     "noise.gauge_mm": 0.0012,
     "stations.trial_mm": 0.0,
     "noise.standstill_readings": 0,
@@ -34,8 +34,8 @@ SMALL: dict[str, Any] = FREE | {
     "acceptance.orientation_deg": 2.0,
     "simulation.gauges.noise_mm": 0.001,
     "simulation.gauges.flicker_mm": 0.0002,
-    "simulation.encoders.noise_mm": 0.001,
-    "simulation.encoders.flicker_mm": 0.0002,
+    "simulation.encoders.noise": 0.001,
+    "simulation.encoders.flicker": 0.0002,
 }
 """As few poses as identify it, by dotted keys of the cell file."""
 

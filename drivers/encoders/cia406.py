@@ -8,8 +8,8 @@ from functools import partial
 from drivers.encoders.can_bus import EncoderBus
 from drivers.encoders.canopen_node import EncoderNode, Leg, NmtCommand
 from drivers.encoders.node_identity import (
-    check_measuring_step,
     check_serial_number,
+    check_step,
     detect_nodes,
     read_device_type,
     read_identity,
@@ -24,8 +24,6 @@ from drivers.wire_trace import TraceRecorder
 from drivers.worker_thread import WorkerThread
 from hexacell.cell.devices import EncoderSettings
 from hexacell.errors import DeviceError
-
-NM_TO_MM = 1e-6
 
 
 class Cia406Bank:
@@ -108,7 +106,7 @@ class EncoderSession:
         counts = self._sampler.sample(signed=self._settings.signed)
         self._alarms.check()
         self.bus.check()
-        return EncoderSample(counts, positions_mm(counts, self._settings))
+        return EncoderSample(counts, joint_variables(counts, self._settings), self._settings.unit)
 
     def _start(self) -> None:
         settings = self._settings
@@ -118,7 +116,7 @@ class EncoderSession:
             node.command(NmtCommand.ENTER_PRE_OPERATIONAL)
         detect_nodes(nodes, self.bus, settings.timeout_s)
         monitors = tuple(NodeMonitor(leg, self.bus, settings.heartbeat_ms) for leg in legs)
-        device_types = tuple(read_device_type(node) for node in nodes)
+        device_types = tuple(read_device_type(node, settings.unit) for node in nodes)
         self.identities = tuple(map(self._identify, nodes, device_types))
         channels = tuple(
             configure_position_tpdo(node, device_type, settings.heartbeat_ms)
@@ -134,17 +132,16 @@ class EncoderSession:
         self._sampler.self_test(signed=settings.signed)
 
     def _identify(self, node: EncoderNode, device_type: DeviceType) -> DeviceIdentity:
-        check_measuring_step(node, self._settings.measuring_step_nm)
+        check_step(node, self._settings)
         identity = read_identity(node, device_type)
         check_serial_number(node, identity, self._settings)
         return identity
 
 
-def positions_mm(counts: tuple[int, ...], settings: EncoderSettings) -> tuple[float, ...]:
-    """Joint variables q along the rails, mm: direction x counts x step + offset."""
-    step_mm = settings.measuring_step_nm * NM_TO_MM
-    terms = zip(settings.direction, counts, settings.offset_mm, strict=True)
-    return tuple(direction * count * step_mm + offset for direction, count, offset in terms)
+def joint_variables(counts: tuple[int, ...], settings: EncoderSettings) -> tuple[float, ...]:
+    """Joint variables q, in their unit: direction x counts x step + offset."""
+    terms = zip(settings.direction, counts, settings.offset, strict=True)
+    return tuple(direction * count * settings.step + offset for direction, count, offset in terms)
 
 
 def _check_all(

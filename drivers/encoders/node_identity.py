@@ -16,15 +16,18 @@ from drivers.encoders.object_dictionary import (
     MEASURING_STEP,
     MEASURING_STEP_SETTING,
     PRODUCT,
+    RESOLUTION,
     REVISION,
     SERIAL_NUMBER,
+    UNITS_PER_TURN,
     VENDOR,
     DeviceType,
 )
 from drivers.errors import BusError
 from drivers.interfaces import DeviceIdentity
-from hexacell.cell.devices import EncoderSettings
+from hexacell.cell.devices import EncoderSettings, LinearEncoderSettings, RotaryEncoderSettings
 from hexacell.errors import DeviceError
+from hexacell.kinematics.parameters import JointUnit
 
 SECOND_RESPONSE_S = 0.03
 """How long a second device may take to respond to the same request."""
@@ -43,21 +46,40 @@ def detect_nodes(nodes: Sequence[EncoderNode], bus: EncoderBus, timeout_s: float
         raise _missing(missing, _unexpected_nodes(nodes, bus))
 
 
-def read_device_type(node: EncoderNode) -> DeviceType:
-    """The device type of a node, which must be an absolute linear encoder."""
+def read_device_type(node: EncoderNode, unit: JointUnit = JointUnit.MM) -> DeviceType:
+    """The device type of a node, which must be an absolute encoder of joint variables in a unit."""
     value = node.read(DEVICE_TYPE)
-    try:
-        return DeviceType(value)
-    except ValueError as error:
+    if value not in {kind.value for kind in DeviceType if kind.unit is unit}:
+        wanted = "linear" if unit is JointUnit.MM else "rotary"
         raise DeviceError(
-            f"is no absolute linear encoder: its device type is {_device_type_text(value)}",
+            f"is no absolute {wanted} encoder: its device type is {_device_type_text(value)}",
             subject=node.leg.subject,
             action="Check `nodes` under [encoders] in the cell file against the devices' node ids",
-        ) from error
+        )
+    return DeviceType(value)
 
 
-def check_measuring_step(node: EncoderNode, step_nm: float) -> None:
-    """Compare the measuring step with the cell file."""
+def check_step(node: EncoderNode, settings: EncoderSettings) -> None:
+    """Compare what a count is with the cell file."""
+    if isinstance(settings, LinearEncoderSettings):
+        _check_measuring_step(node, settings.measuring_step_nm)
+    elif isinstance(settings, RotaryEncoderSettings):
+        _check_counts_per_turn(node, settings.counts_per_turn)
+
+
+def _check_counts_per_turn(node: EncoderNode, counts: int) -> None:
+    found = node.read_optional(UNITS_PER_TURN)
+    if found is None:
+        found = node.read(RESOLUTION)
+    if found != counts:
+        raise DeviceError(
+            f"has {found} counts a turn, the cell file says {counts}",
+            subject=node.leg.subject,
+            action="Correct `counts_per_turn` under [encoders], or set the device with its vendor's tool",
+        )
+
+
+def _check_measuring_step(node: EncoderNode, step_nm: float) -> None:
     found = node.read_optional(MEASURING_STEP_SETTING)
     if found is None:
         found = node.read(MEASURING_STEP)

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import IntEnum
 
+from hexacell.kinematics.parameters import JointUnit
+
 
 @dataclass(frozen=True, slots=True)
 class ObjectEntry:
@@ -21,19 +23,31 @@ class ObjectEntry:
 class DeviceType(IntEnum):
     """The supported values of 1000h: profile 406 and the encoder class."""
 
+    SINGLE_TURN = 0x0001_0196
+    MULTI_TURN = 0x0002_0196
     ABSOLUTE_LINEAR = 0x0008_0196
     SEVERAL_MAGNETS = 0x000A_0196
 
     @property
+    def unit(self) -> JointUnit:
+        """Of the joint variables that it measures."""
+        is_rotary = self in {DeviceType.SINGLE_TURN, DeviceType.MULTI_TURN}
+        return JointUnit.DEG if is_rotary else JointUnit.MM
+
+    @property
     def description(self) -> str:
         """The name of this type."""
-        one = "absolute linear encoder"
-        return one if self is DeviceType.ABSOLUTE_LINEAR else f"{one} for several magnets"
+        return {
+            DeviceType.SINGLE_TURN: "absolute rotary encoder",
+            DeviceType.MULTI_TURN: "absolute rotary encoder of several turns",
+            DeviceType.ABSOLUTE_LINEAR: "absolute linear encoder",
+            DeviceType.SEVERAL_MAGNETS: "absolute linear encoder for several magnets",
+        }[self]
 
     @property
     def position(self) -> ObjectEntry:
-        """The entry with the position of the (first) magnet."""
-        return POSITION if self is DeviceType.ABSOLUTE_LINEAR else POSITION_OF_MAGNET_1
+        """The entry with the position, of the first magnet if there are several."""
+        return POSITION_OF_MAGNET_1 if self is DeviceType.SEVERAL_MAGNETS else POSITION
 
 
 ENCODER_PROFILE = 406
@@ -48,8 +62,11 @@ SERIAL_NUMBER = ObjectEntry(0x1018, 4, 4)
 
 POSITION = ObjectEntry(0x6004, 0, 4)
 POSITION_OF_MAGNET_1 = ObjectEntry(0x6020, 1, 4)
+UNITS_PER_TURN = ObjectEntry(0x6001, 0, 4)
 MEASURING_STEP_SETTING = ObjectEntry(0x6005, 1, 4)
 MEASURING_STEP = ObjectEntry(0x6501, 0, 4)
+RESOLUTION = ObjectEntry(0x6501, 0, 4)
+"""Of a rotary encoder, whose counts a turn object 6001h may divide."""
 ALARMS = ObjectEntry(0x6503, 0, 2)
 
 TPDO_COUNT = 4

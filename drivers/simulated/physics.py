@@ -142,11 +142,11 @@ class RobotPhysics:
         motion = self._settings.motion
         with self._lock:
             distance = float(np.abs(np.diff(path, axis=0)).sum(axis=0).max())
-            scatter = motion.repeatability_mm * self._random.standard_normal(6)
+            scatter = motion.repeatability * self._random.standard_normal(6)
             actual = path / self._shown_per_mm + np.linspace(0.0, 1.0, len(path))[:, None] * scatter
             actual[0] = self._motion.joints(self._update())
             told_s = 0.0 if duration_s is None else duration_s + RAMP_S
-            duration = max(motion.minimum_s, distance / motion.speed_mm_s, told_s)
+            duration = max(motion.minimum_s, distance / motion.speed, told_s)
             self._motion, self._rows_passed = Motion(actual, self._clock.now(), duration), 0
             self._draw_noise()
             self.on_motion_start()
@@ -173,7 +173,7 @@ class RobotPhysics:
     def encoder_positions(self) -> Array:
         """The slider positions measured by the encoders (6,), mm."""
         with self._lock:
-            flicker = self._settings.encoders.flicker_mm * self._random.standard_normal(6)
+            flicker = self._settings.encoders.flicker * self._random.standard_normal(6)
             shown = self._shown_per_mm * self._motion.joints(self._clock.now())
             measured: Array = shown + self._encoder_noise + flicker
             return measured
@@ -202,7 +202,7 @@ class RobotPhysics:
     def _draw_noise(self) -> None:
         self._ringing_direction = self._random.standard_normal(3)
         self._gauge_noise = self._settings.gauges.noise_mm * self._random.standard_normal(3)
-        self._encoder_noise = self._settings.encoders.noise_mm * self._random.standard_normal(6)
+        self._encoder_noise = self._settings.encoders.noise * self._random.standard_normal(6)
 
     def _update(self) -> float:
         """Move the platform along the path of the sliders since the last update."""

@@ -236,7 +236,7 @@ def _noise_problems(measured: events.NoiseMeasured) -> Iterator[str]:
     noise = measured.noise
     if len(noise.encoders) != LEGS:
         yield "there are six encoders"
-    if not all(one.record_mm > 0.0 for one in (*noise.gauges, *noise.encoders)):
+    if not all(one.record > 0.0 for one in (*noise.gauges, *noise.encoders)):
         yield "an instrument has no noise"
     if not 1 <= noise.windows <= 16:
         yield f"a record is no mean of {noise.windows} windows"

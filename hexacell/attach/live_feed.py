@@ -11,6 +11,7 @@ from typing import Any
 from drivers.interfaces import GaugeReading
 from hexacell.attach.snapshots import ControllerSnapshot, EncoderSnapshot, GaugeSnapshot, LiveSnapshot
 from hexacell.cell.devices import GaugeSettings
+from hexacell.kinematics.parameters import JointUnit
 from procedures.devices.live_values import LiveValue, LiveValues
 
 NOISE_READINGS = 10
@@ -39,11 +40,12 @@ class LiveFeed:
 
     def snapshot(self) -> LiveSnapshot:
         """The latest values of all devices."""
-        live = self._live
+        live, sample = self._live, self._live.encoders.value
         return LiveSnapshot(
             gauges=tuple(map(self._gauge, self._gauges)),
             encoders=EncoderSnapshot(
-                positions_mm=None if live.encoders.value is None else live.encoders.value.positions_mm,
+                positions=None if sample is None else sample.positions,
+                unit=JointUnit.MM if sample is None else sample.unit,
                 age_s=_age(live.encoders),
                 problem=live.encoders.problem,
             ),

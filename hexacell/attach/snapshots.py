@@ -7,6 +7,7 @@ from typing import Literal
 from pydantic import Field
 
 from hexacell.cell.fields import Frozen
+from hexacell.kinematics.parameters import JointUnit
 
 SnapshotAge = float | None
 """How long ago a device answered, s; none before its first answer."""
@@ -39,9 +40,10 @@ class GaugeSnapshot(Frozen):
 
 
 class EncoderSnapshot(Frozen):
-    """The six slider positions, mm; none before the first answer."""
+    """The six joint variables in their unit; none before the first answer."""
 
-    positions_mm: tuple[float, ...] | None = None
+    positions: tuple[float, ...] | None = None
+    unit: JointUnit = JointUnit.MM
     age_s: SnapshotAge = None
     problem: str = ""
 

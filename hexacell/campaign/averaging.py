@@ -54,14 +54,12 @@ class AveragingForecaster:
 
 def perfect_encoders(noise: Noise) -> Noise:
     """The same gauges with encoders that are hardly noisy."""
-    return replace(noise, encoder_mm=PERFECT * noise.encoder_mm)
+    return replace(noise, encoder=PERFECT * noise.encoder)
 
 
 def mean_of_independent(noise: Noise, windows: int) -> Noise:
     """The noise of means of some windows, if all of it differs from reading to reading."""
-    return replace(
-        noise, encoder_mm=noise.encoder_mm / windows**0.5, gauge_mm=noise.gauge_mm / windows**0.5
-    )
+    return replace(noise, encoder=noise.encoder / windows**0.5, gauge_mm=noise.gauge_mm / windows**0.5)
 
 
 def worthwhile_windows(forecasts: tuple[AveragingForecast, ...], most: int) -> int:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 from hexacell.campaign.speed_limits import speed_limits
 from hexacell.cell.model import CellSettings
+from hexacell.kinematics.parameters import JointUnit
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,7 +60,10 @@ def usual_move_seconds(settings: CellSettings) -> float:
     if settings.timing.move_s is not None:
         return settings.timing.move_s
     limits, usual = speed_limits(settings.speed, at_gauges=True), _usual(settings)
-    return MOVE_OVERHEAD_S + max(usual.joint_mm / limits.joint_mm_s, usual.edge_mm / limits.edge_mm_s)
+    by_edge = usual.edge_mm / limits.edge_mm_s
+    if settings.mechanism.words.joint_unit is not JointUnit.MM:
+        return MOVE_OVERHEAD_S + by_edge  # how far such joints turn depends on their size
+    return MOVE_OVERHEAD_S + max(usual.joint_mm / limits.joint, by_edge)
 
 
 def noise_minutes(settings: CellSettings) -> float:

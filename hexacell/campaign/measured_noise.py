@@ -2,36 +2,44 @@
 
 from __future__ import annotations
 
+from pydantic import AliasChoices, Field
+
 from hexacell.campaign.budget import TimeModel
 from hexacell.cell.fields import Frozen, Point, SixNumbers
 from hexacell.cell.model import CellSettings
+from hexacell.cell.uncertainty import repeatability_key
 from hexacell.identification.diagnostics.approach_scatter import ScatterSource
+from hexacell.kinematics.parameters import JointUnit
 
-REPEATABILITY = "stop_repeatability_um"
+
+def _once(name: str) -> AliasChoices:
+    """The name of a number, and what it was called in journals up to version 11, when all were in mm."""
+    return AliasChoices(name, f"{name}_mm")
 
 
 class InstrumentNoise(Frozen):
-    """The noise of one gauge or encoder, one standard deviation, mm.
+    """The noise of one gauge or encoder, one standard deviation, in its unit.
 
     Attributes:
-        reading_mm: of a single reading at standstill, with its degrees of freedom; none without a series.
-        drift_mm: change over the series, zero unless significant.
+        reading: of a single reading at standstill, with its degrees of freedom; none without a series.
+        drift: change over the series, zero unless significant.
         outliers: false readings in the series, which were left out.
         correlation: of successive readings, zero unless significant.
-        stated_mm: of a record, by the cell file.
+        stated: of a record, by the cell file.
         is_noisier: whether a record is noisier by its readings alone than stated.
-        record_mm: of a record, as the run uses it from now on.
+        record: of a record, as the run uses it from now on.
     """
 
     name: str
-    reading_mm: float | None = None
+    unit: JointUnit = JointUnit.MM
+    reading: float | None = Field(None, validation_alias=_once("reading"))
     degrees_of_freedom: int = 0
-    drift_mm: float = 0.0
+    drift: float = Field(0.0, validation_alias=_once("drift"))
     outliers: int = 0
     correlation: float = 0.0
-    stated_mm: float
+    stated: float = Field(validation_alias=_once("stated"))
     is_noisier: bool = False
-    record_mm: float
+    record: float = Field(validation_alias=_once("record"))
 
 
 class RepeatedApproaches(Frozen):
@@ -41,8 +49,8 @@ class RepeatedApproaches(Frozen):
         visits: of the reference, the first one included.
         ball_mm: how far the ball was from its mean (root mean square distance).
         ratio: of what the encoders do not explain to what the noise explains.
-        source: what does not repeat beyond that, none unless significant; ``excess_mm`` is one standard
-            deviation of it.
+        source: what does not repeat beyond that, none unless significant; ``excess`` is one standard
+            deviation of it, in ``unit``.
     """
 
     visits: int
@@ -50,7 +58,8 @@ class RepeatedApproaches(Frozen):
     ball_mm: float
     ratio: float
     source: ScatterSource | None = None
-    excess_mm: float = 0.0
+    unit: JointUnit = JointUnit.MM
+    excess: float = Field(0.0, validation_alias=_once("excess"))
 
 
 class AveragingForecast(Frozen):
@@ -92,9 +101,9 @@ class MeasuredNoise(Frozen):
 
 def with_measured_noise(settings: CellSettings, measured: MeasuredNoise) -> CellSettings:
     """The settings of a cell with what was measured in the place of what they state."""
-    gauges: Point = tuple(one.record_mm for one in measured.gauges)  # type: ignore[assignment]
-    encoders: SixNumbers = tuple(one.record_mm for one in measured.encoders)  # type: ignore[assignment]
-    noise = settings.noise.model_copy(update={"gauges_mm": gauges, "encoders_mm": encoders})
+    gauges: Point = tuple(one.record for one in measured.gauges)  # type: ignore[assignment]
+    encoders: SixNumbers = tuple(one.record for one in measured.encoders)  # type: ignore[assignment]
+    noise = settings.noise.model_copy(update={"gauges_mm": gauges, "encoders": encoders})
     seconds = TimeModel.of(settings).record_seconds + averaging_seconds(settings, measured.windows)
     return settings.model_copy(
         update={
@@ -115,10 +124,11 @@ def _with_repeatability(settings: CellSettings, measured: MeasuredNoise) -> obje
     stated, approaches = settings.uncertainty, measured.approaches
     if approaches is None or approaches.source is not ScatterSource.SLIDERS:
         return stated
-    sources = stated.sources | {REPEATABILITY: f"{approaches.visits} visits of the first reference"}
+    key = repeatability_key(approaches.unit)
+    sources = stated.sources | {key: f"{approaches.visits} visits of the first reference"}
     return stated.model_copy(
         update={
-            REPEATABILITY: 1e3 * approaches.excess_mm,
+            key: 1e3 * approaches.excess,
             "stop_repeatability_acts": "at work",
             "sources": sources,
         }

@@ -23,6 +23,7 @@ from hexacell.campaign.planner import Plan
 from hexacell.identification.diagnostics.approach_scatter import ApproachScatter, approach_scatter
 from hexacell.identification.diagnostics.standstill import SIGNIFICANCE, ReadingNoise, reading_noise
 from hexacell.identification.problem.problem import Noise
+from hexacell.kinematics.parameters import JointUnit
 from hexacell.kinematics.pose import Pose
 from hexacell.kinematics.rotations import Array
 from hexacell.kinematics.sensitivity import position_sensitivity
@@ -66,7 +67,7 @@ class _NoiseAssessment:
     def stated(self) -> Array:
         """The stated noise of a record (9,), mm."""
         noise = self.plan.robot.noise
-        return np.concatenate([noise.gauges_mm, noise.encoders_mm])
+        return np.concatenate([noise.gauges_mm, noise.encoders])
 
     @cached_property
     def reading_noise(self) -> tuple[ReadingNoise, ...]:
@@ -89,7 +90,7 @@ class _NoiseAssessment:
         return MeasuredNoise(
             gauges=(x, y, z),
             encoders=tuple(instruments[3:]),
-            approaches=scatter and _approaches(scatter),
+            approaches=scatter and _approaches(scatter, self._unit_of(scatter)),
             windows=windows,
             forecasts=forecasts,
             encoders_part_mm=forecaster.encoders_part(self._noise(by_windows[1])),
@@ -140,47 +141,67 @@ class _NoiseAssessment:
         """Noise (9,) with what does not repeat."""
         if scatter is None or scatter.source is None:
             return sigma
-        return np.asarray(np.hypot(sigma, scatter.excess_mm * scatter.source.instruments))
+        return np.asarray(np.hypot(sigma, scatter.excess * scatter.source.instruments))
 
     def _noise(self, sigma: Array) -> Noise:
         return self.plan.robot.noise.with_devices(sigma[3:].tolist(), sigma[:3].tolist())
+
+    @property
+    def joint_unit(self) -> JointUnit:
+        return self.plan.robot.mechanism.words.joint_unit
+
+    def _unit_of(self, scatter: ApproachScatter) -> JointUnit:
+        """That of its excess: gauges show mm."""
+        of_gauge = scatter.source is None or scatter.source.instruments[:3].any()
+        return JointUnit.MM if of_gauge else self.joint_unit
 
     def _instruments(self, records: Array) -> Sequence[InstrumentNoise]:
         gauges = sorted(self.plan.settings.gauges, key=lambda gauge: gauge.axis)
         names = [*(f"gauge {one.name}" for one in gauges), *(f"encoder {leg}" for leg in range(1, 7))]
         larger = self._at_least(self.stated) > self.stated
         found = self.reading_noise or (None,) * len(names)
-        rows = zip(names, found, self.stated.tolist(), larger.tolist(), records.tolist(), strict=True)
+        units = [JointUnit.MM] * 3 + [self.joint_unit] * 6
+        rows = zip(
+            names, units, found, self.stated.tolist(), larger.tolist(), records.tolist(), strict=True
+        )
         return [
-            _instrument(name, noise, stated, is_noisier=noisier, record_mm=record)
-            for name, noise, stated, noisier, record in rows
+            _instrument(name, unit, noise, stated, is_noisier=noisier, record=record)
+            for name, unit, noise, stated, noisier, record in rows
         ]
 
 
 def _instrument(
-    name: str, found: ReadingNoise | None, stated_mm: float, *, is_noisier: bool, record_mm: float
+    name: str,
+    unit: JointUnit,
+    found: ReadingNoise | None,
+    stated: float,
+    *,
+    is_noisier: bool,
+    record: float,
 ) -> InstrumentNoise:
     if found is None:
-        return InstrumentNoise(name=name, stated_mm=stated_mm, record_mm=record_mm)
+        return InstrumentNoise(name=name, unit=unit, stated=stated, record=record)
     return InstrumentNoise(
         name=name,
-        reading_mm=found.sigma_mm,
+        unit=unit,
+        reading=found.sigma,
         degrees_of_freedom=found.degrees_of_freedom,
-        drift_mm=found.drift_mm,
+        drift=found.drift,
         outliers=found.outliers,
         correlation=found.correlation,
-        stated_mm=stated_mm,
+        stated=stated,
         is_noisier=is_noisier,
-        record_mm=record_mm,
+        record=record,
     )
 
 
-def _approaches(scatter: ApproachScatter) -> RepeatedApproaches:
+def _approaches(scatter: ApproachScatter, unit: JointUnit) -> RepeatedApproaches:
     return RepeatedApproaches(
         visits=scatter.visits,
         degrees_of_freedom=scatter.degrees_of_freedom,
         ball_mm=scatter.ball_mm,
         ratio=scatter.ratio,
         source=scatter.source,
-        excess_mm=scatter.excess_mm,
+        unit=unit,
+        excess=scatter.excess,
     )

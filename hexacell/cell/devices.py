@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal
 
@@ -9,12 +10,16 @@ from pydantic import Field, SecretStr, field_validator
 
 from hexacell.cell.certificates import CertificateSettings
 from hexacell.cell.fields import InRange, Name, Password, Positive, Section, SixInRange, Text, broken_rule
+from hexacell.kinematics.parameters import JointUnit
 
 NodeId = Annotated[int, Field(ge=1, le=127)]
 Unsigned = Annotated[int, Field(ge=0, le=2**32 - 1)]
 Direction = Literal[1, -1]
 StartupWord = Literal["reset-estop", "switch-on", "home"]
 LegNumber = Annotated[int, Field(ge=1, le=6)]
+NM = 1e-6
+"""A nanometre in mm."""
+
 STARTUP_WORDS: tuple[StartupWord, ...] = ("reset-estop", "switch-on", "home")
 
 
@@ -75,21 +80,20 @@ class GaugeSettings(Section):
         return None if self.middle_mm is None else self.mounting.coordinate(self.middle_mm)
 
 
-class EncoderSettings(Section):
-    """The bank of six slider encoders."""
+class EncoderSettings(Section, ABC):
+    """The bank of six joint encoders, but for what a count is."""
 
     protocol: Text = Field("cia406", description="cia406, or one that a plug-in adds")
     bus: dict[str, Any] | None = Field(None, description="passed to python-can's Bus")
     nodes: tuple[NodeId, NodeId, NodeId, NodeId, NodeId, NodeId] = Field(
         (1, 2, 3, 4, 5, 6), description="CANopen node ids of legs 1 to 6, each from 1 to 127"
     )
-    measuring_step_nm: Positive = Field(1000, description="one count, nm; must be what the device reports")
     signed: bool = Field(True, description="positions are I32 (linear devices) rather than U32")
     direction: tuple[Direction, Direction, Direction, Direction, Direction, Direction] = Field(
         (1, 1, 1, 1, 1, 1), description="1: counts grow with the joint variable, -1: against it"
     )
-    offset_mm: SixInRange = Field(
-        (0.0, 0.0, 0.0, 0.0, 0.0, 0.0), description="joint variable at count 0, mm"
+    offset: SixInRange = Field(
+        (0.0, 0.0, 0.0, 0.0, 0.0, 0.0), alias="offset_mm", description="joint variable at count 0"
     )
     serial_numbers: tuple[Unsigned, Unsigned, Unsigned, Unsigned, Unsigned, Unsigned] | None = Field(
         None, description="object 1018h:4 of each node; another device is refused"
@@ -104,6 +108,50 @@ class EncoderSettings(Section):
         if len(set(nodes)) != len(nodes):
             raise broken_rule("two encoders have the same node id", "Give each leg its own node id")
         return nodes
+
+    @property
+    @abstractmethod
+    def unit(self) -> JointUnit:
+        """That of the joint variables."""
+
+    @property
+    @abstractmethod
+    def step(self) -> float:
+        """What one count is of the joint variable, in its unit."""
+
+
+class LinearEncoderSettings(EncoderSettings):
+    """The bank of six encoders of joints that slide, or of legs."""
+
+    measuring_step_nm: Positive = Field(1000, description="one count, nm; must be what the device reports")
+
+    @property
+    def unit(self) -> JointUnit:
+        """Millimetres."""
+        return JointUnit.MM
+
+    @property
+    def step(self) -> float:
+        """One count, mm."""
+        return self.measuring_step_nm * NM
+
+
+class RotaryEncoderSettings(EncoderSettings):
+    """The bank of six encoders of joints that turn."""
+
+    counts_per_turn: int = Field(
+        1 << 20, ge=1, le=0xFFFF_FFFF, description="of the joint; must be what the device reports"
+    )
+
+    @property
+    def unit(self) -> JointUnit:
+        """Degrees."""
+        return JointUnit.DEG
+
+    @property
+    def step(self) -> float:
+        """One count, deg."""
+        return 360.0 / self.counts_per_turn
 
 
 class ControllerSettings(Section):

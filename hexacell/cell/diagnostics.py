@@ -42,7 +42,7 @@ class ModelLookup:
         while path and not isinstance(path[-1], str):
             path = path[:-1]
         section = self.section_at(path[:-1]) if path else None
-        field = section.model_fields.get(str(path[-1])) if section else None
+        field = section.field_of(str(path[-1])) if section else None
         return field.description if field else None
 
     def header(self, path: KeyPath) -> str:
@@ -52,7 +52,7 @@ class ModelLookup:
     def sections_with(self, key: str) -> list[str]:
         """The headers of the sections that have ``key``."""
         found = self._sections(self.model, ())
-        return [self.header(path) for path, section in found if key in section.model_fields]
+        return [self.header(path) for path, section in found if section.field_of(key)]
 
     def _annotation_at(self, path: KeyPath) -> object:
         annotation: object = self.model
@@ -61,7 +61,7 @@ class ModelLookup:
         return annotation
 
     def _sections(self, section: type[Section], path: KeyPath) -> Iterator[tuple[KeyPath, type[Section]]]:
-        for name in section.model_fields:
+        for name in map(section.key, section.model_fields):
             for inner in ((*path, name), (*path, name, 0)):
                 if found := self.section_at(inner):
                     yield inner, found
@@ -70,7 +70,7 @@ class ModelLookup:
 
 def _inside(annotation: object, key: str | int) -> object:
     if isinstance(annotation, type) and issubclass(annotation, Section):
-        field = annotation.model_fields.get(str(key))
+        field = annotation.field_of(str(key))
         return field.annotation if field else None
     return get_args(annotation)[0] if get_origin(annotation) is tuple else None
 
@@ -159,7 +159,7 @@ class Diagnosis:
 
     def _missing(self, path: KeyPath) -> FileError:
         if section := self.model.section_at(path) or self.model.section_at((*path, 0)):
-            keys = [name for name, field in section.model_fields.items() if field.is_required()]
+            keys = [section.key(name) for name, one in section.model_fields.items() if one.is_required()]
             action = f"Add it, with {', '.join(keys)}" if keys else "Add it"
             return self.document.error(path, f"the section {self.model.header(path)} is missing", action)
         meaning = self.model.description_at(path)
@@ -168,7 +168,7 @@ class Diagnosis:
 
     def _unknown(self, path: KeyPath) -> FileError:
         parent = self.model.section_at(path[:-1])
-        known = list(parent.model_fields) if parent else []
+        known = list(map(parent.key, parent.model_fields)) if parent else []
         kind = "section" if isinstance(self.document.value(path), dict) else "key"
         action = f"Known here: {', '.join(known)}"
         if homes := self.model.sections_with(str(path[-1])):

@@ -15,6 +15,7 @@ from pydantic import (
     SecretStr,
     ValidationError,
 )
+from pydantic.fields import FieldInfo
 from pydantic_core import PydanticCustomError
 
 from hexacell.storage.secrets import MASK
@@ -130,7 +131,23 @@ class Frozen(BaseModel):
 
 
 class Section(Frozen):
-    """A section of the cell file."""
+    """A section of the cell file.
+
+    A key whose value is in the unit of the joint variables has that unit in its name, and the field has
+    not: ``encoder`` is ``encoder_mm`` in a file, or ``encoder_deg`` (:mod:`hexacell.cell.joint_units`).
+    """
+
+    model_config = ConfigDict(serialize_by_alias=True)
+
+    @classmethod
+    def key(cls, field: str) -> str:
+        """What a field is called in the file."""
+        return cls.model_fields[field].alias or field
+
+    @classmethod
+    def field_of(cls, key: str) -> FieldInfo | None:
+        """The field of a key in the file; none if the section has no such key."""
+        return next((one for name, one in cls.model_fields.items() if cls.key(name) == key), None)
 
 
 class GeometrySettings(Section):

@@ -59,7 +59,8 @@ class PassiveJointSettings(Section):
     base_axes: SixJointAxes | None = Field(
         None,
         description="axes of the cones in the base frame of the drawing, from the platform to the base; by "
-        "default each leg's direction at the middle of all points, untilted",
+        "default each leg's direction at the middle of all points, untilted. On a crank: in its own frame, "
+        "x along the crank and z along its axis",
     )
     platform_axes: SixJointAxes | None = Field(
         None, description="those at the platform, in the platform frame of the drawing, likewise"
@@ -82,12 +83,17 @@ class LimitSettings(Section):
     gauge_travel_mm: Positive = Field(5.0, description="largest deviation from the zeroed reference")
     tilt_deg: Positive = Field(45.0, le=80, description="largest tilt of the platform")
     turn_deg: Positive = Field(180.0, le=180, description="largest turn of the platform about its normal")
-    joint_min_mm: InRange = Field(-1000.0, description="smallest joint variable of any leg")
-    joint_max_mm: InRange = Field(1000.0, description="largest joint variable of any leg")
-    joints_mm: SixRanges | None = Field(
+    joint_min: InRange = Field(
+        -1000.0, alias="joint_min_mm", description="smallest joint variable of any leg"
+    )
+    joint_max: InRange = Field(
+        1000.0, alias="joint_max_mm", description="largest joint variable of any leg"
+    )
+    joints: SixRanges | None = Field(
         None,
-        description="smallest and largest joint variable of each leg, where they differ; joint_min_mm and "
-        "joint_max_mm hold as well",
+        alias="joints_mm",
+        description="smallest and largest joint variable of each leg, where they differ; those of all legs "
+        "hold as well",
     )
     axes: AxisLimitSettings = AxisLimitSettings()
     passive_joints: PassiveJointSettings = PassiveJointSettings()
@@ -100,6 +106,7 @@ class LimitSettings(Section):
 
     @model_validator(mode="after")
     def _joint_limits_are_ordered(self) -> Self:
-        if self.joint_min_mm >= self.joint_max_mm:
-            raise broken_rule("joint_min_mm must be below joint_max_mm", "Exchange or correct them")
+        if self.joint_min >= self.joint_max:
+            low, high = self.key("joint_min"), self.key("joint_max")
+            raise broken_rule(f"{low} must be below {high}", "Exchange or correct them")
         return self

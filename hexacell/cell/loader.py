@@ -18,7 +18,7 @@ from pydantic import SecretStr, ValidationError
 from hexacell.cell.diagnostics import Diagnosis, ModelLookup
 from hexacell.cell.fields import Section
 from hexacell.cell.model import DEFAULT_MECHANISM, CellSettings, cell_model
-from hexacell.errors import FileError, joined
+from hexacell.errors import FileError, did_you_mean, joined
 from hexacell.plugins import Group, names
 from hexacell.storage.atomic_files import read_text
 from hexacell.storage.secrets import MASK, without_secrets
@@ -137,10 +137,21 @@ def validated(document: TomlDocument, model: type[SectionType], path: Path) -> S
 
 
 def _mechanism(document: TomlDocument) -> str:
-    """The mechanism that the file names. One that is not installed is refused when the robot is made."""
+    """The mechanism that the file names, which decides about its other keys.
+
+    Raises:
+        FileError: it is not installed.
+    """
     robot = document.data.get("robot")
     name = robot.get("mechanism") if isinstance(robot, dict) else None
-    return name if isinstance(name, str) and name in names(Group.MECHANISMS) else DEFAULT_MECHANISM
+    if not isinstance(name, str):
+        return DEFAULT_MECHANISM
+    if name not in (known := names(Group.MECHANISMS)):
+        action = (
+            did_you_mean(name, known) or f"Known are: {', '.join(known)}; or install the package with it"
+        )
+        raise document.error(("robot", "mechanism"), f"there is no mechanism '{name}'", action)
+    return name
 
 
 def dump(settings: Section, remark: Remark = lambda _: None) -> str:
@@ -160,8 +171,8 @@ def _section(section: Section, path: KeyPath, remark: Remark) -> Iterator[str]:
     """The section's own values first: after a header every key belongs to the section it opens."""
     for name, value in section:
         if not subsections((*path, name), value):
-            shown = None if value == () and _has_sections(section, name) else value
-            yield from _setting(name, shown, remark((*path, name)))
+            shown, key = None if value == () and _has_sections(section, name) else value, section.key(name)
+            yield from _setting(key, shown, remark((*path, key)))
     for name, value in section:
         for inner, subsection in subsections((*path, name), value):
             yield from ("", table_header(inner))

@@ -167,7 +167,9 @@ class TimingSettings(Section):
     interval_s: Positive = Field(0.1, description="time between readings")
     readings: int = Field(5, ge=2, le=1000, description="smallest number of readings in the window")
     spread_gauge_mm: Positive = Field(0.06, description="largest range of one gauge in the window")
-    spread_encoder_mm: Positive = Field(0.06, description="largest range of one encoder in the window")
+    spread_encoder: Positive = Field(
+        0.06, alias="spread_encoder_mm", description="largest range of one encoder in the window"
+    )
     give_up_s: Positive = Field(20.0, description="longest wait for settled readings")
     move_s: Positive | None = Field(
         None, description="duration of an ordinary move, for time estimates only; by default from [speed]"
@@ -180,13 +182,15 @@ class TimingSettings(Section):
 class NoiseSettings(Section):
     """Standard deviations of the numbers of one record, and how a run measures them at its start."""
 
-    encoder_mm: Positive = Field(0.01, description="of an encoder")
+    encoder: Positive = Field(0.01, alias="encoder_mm", description="of an encoder")
     gauge_scale: NotNegative = Field(
         0.001, description="relative error of each gauge's scale, one standard deviation"
     )
     gauge_mm: Positive = Field(0.01, description="of a gauge's reading")
-    encoders_mm: tuple[Positive, Positive, Positive, Positive, Positive, Positive] | None = Field(
-        None, description="of each encoder, where they differ; takes the place of encoder_mm"
+    encoders: tuple[Positive, Positive, Positive, Positive, Positive, Positive] | None = Field(
+        None,
+        alias="encoders_mm",
+        description="of each encoder, where they differ; takes the place of that of all",
     )
     gauges_mm: tuple[Positive, Positive, Positive] | None = Field(
         None, description="of the gauges x, y and z, where they differ; takes the place of gauge_mm"
@@ -237,8 +241,8 @@ class GuardSettings(Section):
     plate_margin_mm: NotNegative = Field(
         0.5, description="added to limits.gauge_travel_mm during a move, when the ball swings"
     )
-    following_mm: Positive = Field(
-        1.0, description="largest difference of a joint from its commanded position"
+    following: Positive = Field(
+        1.0, alias="following_mm", description="largest difference of a joint from its commanded position"
     )
     free_disk_mb: float = Field(
         50.0, ge=0, le=1e12, allow_inf_nan=False, description="least free space for the run folder, MB"

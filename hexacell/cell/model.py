@@ -11,7 +11,14 @@ from pydantic_core import InitErrorDetails
 
 from hexacell.cell.archive import ArchiveSettings
 from hexacell.cell.certificates import CertificateSettings, ReportSettings
-from hexacell.cell.devices import ControllerSettings, EncoderSettings, GaugeSettings, ThermometerSettings
+from hexacell.cell.devices import (
+    ControllerSettings,
+    EncoderSettings,
+    GaugeSettings,
+    LinearEncoderSettings,
+    RotaryEncoderSettings,
+    ThermometerSettings,
+)
 from hexacell.cell.fields import (
     GeometrySettings,
     InRange,
@@ -22,6 +29,7 @@ from hexacell.cell.fields import (
     Text,
     broken_rule,
 )
+from hexacell.cell.joint_units import in_joint_unit
 from hexacell.cell.length_check import LengthCheckSettings
 from hexacell.cell.limits import LimitSettings
 from hexacell.cell.measuring import (
@@ -39,12 +47,17 @@ from hexacell.cell.measuring import (
 from hexacell.cell.notifications import MOST_NOTIFICATIONS, NotificationSettings
 from hexacell.cell.opcua import OpcUaSettings
 from hexacell.cell.recovery import RecoverySettings
-from hexacell.cell.simulation import SimulationSettings
+from hexacell.cell.simulation import SimulatedEncoders, SimulatedMotion, SimulationSettings
 from hexacell.cell.speed import SpeedSettings
 from hexacell.cell.unattended import UnattendedSettings
-from hexacell.cell.uncertainty import CommonUncertaintySettings, UncertaintySettings
+from hexacell.cell.uncertainty import (
+    CommonUncertaintySettings,
+    LinearUncertaintySettings,
+    RotaryUncertaintySettings,
+    UncertaintySettings,
+)
 from hexacell.kinematics.mechanism import Mechanism
-from hexacell.kinematics.parameters import ParameterKind, ParameterSet
+from hexacell.kinematics.parameters import JointUnit, ParameterKind, ParameterSet
 from hexacell.plugins import Group, load
 
 DEFAULT_MECHANISM = "hexaglide"
@@ -61,7 +74,8 @@ class RobotSettings(Section):
     """The mechanism and its drawing."""
 
     mechanism: Text = Field(
-        DEFAULT_MECHANISM, description="hexaglide, gough-stewart, or one that a plug-in adds"
+        DEFAULT_MECHANISM,
+        description="hexaglide, gough-stewart, six-rails, rotary-cranks, or one that a plug-in adds",
     )
     nominal: GeometrySettings = Field(description="the drawing; identification starts from it")
 
@@ -103,6 +117,13 @@ class CellSettings(Section):
     def mechanism(self) -> Mechanism:
         """The mechanism that the file names; raises ``UsageError`` if it is not installed."""
         return mechanism_named(self.robot.mechanism)
+
+    @property
+    def reference_agreement(self) -> tuple[float, float]:
+        """What gauges, mm, and encoders, in their unit, may show at a reference beside what they did."""
+        agreement_mm = self.recovery.agreement_mm
+        is_rotary = self.mechanism.words.joint_unit is JointUnit.DEG
+        return agreement_mm, self.timing.spread_encoder if is_rotary else agreement_mm
 
     @property
     def certificates(self) -> dict[str, CertificateSettings]:
@@ -187,6 +208,18 @@ class CellSettings(Section):
         return self
 
     @model_validator(mode="after")
+    def _a_length_check_is_of_encoders_of_lengths(self) -> Self:
+        if self.length_check is not None and self.mechanism.words.joint_unit is JointUnit.DEG:
+            refusal = broken_rule(
+                "a length check finds what is wrong with the scale of encoders of lengths; those of this "
+                "mechanism are of angles",
+                "Remove [length_check]",
+            )
+            detail = InitErrorDetails(type=refusal, loc=("length_check",), input=None)
+            raise ValidationError.from_exception_data(self.name, [detail])
+        return self
+
+    @model_validator(mode="after")
     def _real_devices_can_be_reached(self) -> Self:
         """Each missing connection is refused at its own place, which gives the error its line."""
         if self.simulation is not None:
@@ -226,15 +259,42 @@ def cell_model(mechanism: str) -> type[CellSettings]:
     has_defaults = not any(field.is_required() for field in tolerances.model_fields.values())
     robot = _derived(RobotSettings, nominal=(geometry, RobotSettings.model_fields["nominal"]))
     truth = SimulationSettings.model_fields["geometry"]
-    simulation = _derived(SimulationSettings, geometry=(geometry, truth))
-    uncertainty = CommonUncertaintySettings if found.words.guide is None else UncertaintySettings
+    simulated = _in_unit(found, encoders=SimulatedEncoders, motion=SimulatedMotion)
+    simulation = _derived(SimulationSettings, geometry=(geometry, truth), **simulated)
+    uncertainty = uncertainty_settings(found)
+    is_rotary = found.words.joint_unit is JointUnit.DEG
+    encoders = in_joint_unit(
+        RotaryEncoderSettings if is_rotary else LinearEncoderSettings, found.words.joint_unit
+    )
     return _derived(
         CellSettings,
         uncertainty=(uncertainty, uncertainty()),
         robot=(robot, ...),
+        encoders=(encoders, ...),
         tolerances=(tolerances, tolerances() if has_defaults else ...),
         simulation=(simulation | None, None),
+        **_in_unit(
+            found,
+            noise=NoiseSettings,
+            limits=LimitSettings,
+            speed=SpeedSettings,
+            timing=TimingSettings,
+            guards=GuardSettings,
+        ),
     )
+
+
+def uncertainty_settings(mechanism: Mechanism) -> type[CommonUncertaintySettings]:
+    """The section of the effects that a mechanism has."""
+    if mechanism.words.joint_unit is JointUnit.DEG:
+        return RotaryUncertaintySettings
+    return LinearUncertaintySettings if mechanism.words.guide is None else UncertaintySettings
+
+
+def _in_unit(mechanism: Mechanism, **sections: type[Section]) -> dict[str, Any]:
+    """Fields of sections with a default, in the unit of the mechanism's joint variables."""
+    made = {name: in_joint_unit(one, mechanism.words.joint_unit) for name, one in sections.items()}
+    return {name: (one, one()) for name, one in made.items()}
 
 
 def geometry_settings(parameters: ParameterSet) -> type[GeometrySettings]:

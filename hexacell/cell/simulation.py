@@ -57,8 +57,10 @@ class SimulatedGauges(Section):
 class SimulatedEncoders(Section):
     """How the simulated CANopen encoders behave."""
 
-    noise_mm: NotNegative = Field(0.01, description="drawn at every stop of the robot, 1 sigma")
-    flicker_mm: NotNegative = Field(0.001, description="drawn at every sample, 1 sigma")
+    noise: NotNegative = Field(
+        0.01, alias="noise_mm", description="drawn at every stop of the robot, 1 sigma"
+    )
+    flicker: NotNegative = Field(0.001, alias="flicker_mm", description="drawn at every sample, 1 sigma")
     latency_s: NotNegative = Field(0.001, description="between SYNC and the last answer")
     common_scale_um_m: InRange = Field(
         0.0, ge=-1e5, le=1e5, description="by how much all of them show more than the joints move"
@@ -68,11 +70,15 @@ class SimulatedEncoders(Section):
 class SimulatedMotion(Section):
     """How the simulated robot moves."""
 
-    speed_mm_s: Positive = Field(100.0, description="of the fastest joint, however short a move is to be")
+    speed: Positive = Field(
+        100.0, alias="speed_mm_s", description="of the fastest joint, however short a move is to be"
+    )
     minimum_s: NotNegative = Field(0.3, description="shortest duration of a move")
     ringing_mm: NotNegative = Field(0.2, description="amplitude of the ball's oscillation on arrival")
     ringing_s: Positive = Field(0.15, description="time constant of its decay")
-    repeatability_mm: NotNegative = Field(0.0, description="scatter of each joint's stop, 1 sigma")
+    repeatability: NotNegative = Field(
+        0.0, alias="repeatability_mm", description="scatter of each joint's stop, 1 sigma"
+    )
 
 
 class SoftLimits(Section):

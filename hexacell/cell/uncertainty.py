@@ -8,6 +8,7 @@ from typing import Any, Literal, Self, get_args
 from pydantic import Field, model_validator
 
 from hexacell.cell.fields import NotNegative, Positive, Section, Text, broken_rule
+from hexacell.kinematics.parameters import JointUnit
 
 Grade = Literal["precision", "ordinary", "ideal"]
 
@@ -20,10 +21,13 @@ SIZES_OF_GRADES: Mapping[Grade, Mapping[str, float]] = {
         "rail_wave_short_um": 5.0,
         "rail_wave_long_um": 10.0,
         "rail_sag_um": 20.0,
+        "encoder_eccentricity_mdeg": 10.0,
     },
     "ideal": {
         "common_encoder_scale_um_m": 0.0,
         "encoder_scale_um_m": 0.0,
+        "encoder_eccentricity_mdeg": 0.0,
+        "stop_repeatability_mdeg": 0.0,
         "rail_direction_mrad": 0.0,
         "rail_wave_short_um": 0.0,
         "rail_wave_long_um": 0.0,
@@ -45,18 +49,18 @@ OLD_KEYS = {
 """What keys were called before there were mechanisms without sliders; cells of old runs have them."""
 
 
+def repeatability_key(unit: JointUnit) -> str:
+    """The key of where a joint stops beside what its encoder shows."""
+    return f"stop_repeatability_{unit.thousandth}"
+
+
 class CommonUncertaintySettings(Section):
     """Sizes of systematic effects, one standard deviation; certificates and own measurements say better."""
 
     grade: Grade = Field(
         "precision",
         description="what sizes that are not given are for; precision: glass scales and precision guides; "
-        "ordinary: magnetic tape and ordinary guides; ideal: none of the effects, as in a simulation",
-    )
-    common_encoder_scale_um_m: NotNegative = Field(15.0, description="scale error of all encoders alike")
-    encoder_scale_um_m: NotNegative = Field(10.0, description="scale error of each encoder")
-    stop_repeatability_um: NotNegative = Field(
-        2.0, description="where a joint stops beside what its encoder shows"
+        "ordinary: magnetic scales and ordinary guides; ideal: none of the effects, as in a simulation",
     )
     stop_repeatability_acts: Literal["everywhere", "at work"] = Field(
         "everywhere", description="at work: the noise of the records contains it already"
@@ -98,6 +102,11 @@ class CommonUncertaintySettings(Section):
             )
         return self
 
+    @property
+    def common_scale_um_m(self) -> float:
+        """Size of a scale error common to all encoders; encoders of angles have none."""
+        return 0.0
+
     def source(self, key: str) -> str:
         """Where a size comes from."""
         grade = SIZES_OF_GRADES[self.grade]
@@ -106,7 +115,33 @@ class CommonUncertaintySettings(Section):
         return self.sources.get(key, stated)
 
 
-class UncertaintySettings(CommonUncertaintySettings):
+class LinearUncertaintySettings(CommonUncertaintySettings):
+    """The same of a machine whose joint variables are lengths."""
+
+    common_encoder_scale_um_m: NotNegative = Field(15.0, description="scale error of all encoders alike")
+    encoder_scale_um_m: NotNegative = Field(10.0, description="scale error of each encoder")
+    stop_repeatability_um: NotNegative = Field(
+        2.0, description="where a joint stops beside what its encoder shows"
+    )
+
+    @property
+    def common_scale_um_m(self) -> float:
+        """As stated."""
+        return self.common_encoder_scale_um_m
+
+
+class RotaryUncertaintySettings(CommonUncertaintySettings):
+    """The same of a machine whose joints turn: a full circle has no error of scale."""
+
+    encoder_eccentricity_mdeg: NotNegative = Field(
+        2.0, description="amplitude of each encoder's error over a turn, as its disc is off centre"
+    )
+    stop_repeatability_mdeg: NotNegative = Field(
+        1.0, description="where a joint stops beside what its encoder shows"
+    )
+
+
+class UncertaintySettings(LinearUncertaintySettings):
     """The same of a machine whose joints move along rails."""
 
     rail_direction_mrad: NotNegative = Field(

@@ -79,16 +79,18 @@ def check_identifiable(example: MechanismExample) -> None:
     all_together = _by_parameters(example, np.eye(len(example.mechanism.parameters)))
     free = _by_parameters(example, convention.basis())
     rank = int(np.sum(all_together > LEAST_DETERMINED * all_together[0]))
-    if rank != len(free):
+    determined = len(free) - example.mechanism.frame_freedom.size
+    if rank != determined:
         raise AssertionError(
             f"the poses determine {rank} parameters, the convention leaves {len(free)} free"
+            + (", one of them the size" if example.mechanism.frame_freedom.size else "")
         )
-    if free[-1] < LEAST_DETERMINED * free[0]:
-        raise AssertionError(f"a free parameter is not determined: {free[-1] / free[0]:.1e}")
+    if free[determined - 1] < LEAST_DETERMINED * free[0]:
+        raise AssertionError(f"a free parameter is not determined: {free[determined - 1] / free[0]:.1e}")
 
 
 def _by_parameters(example: MechanismExample, basis: Array) -> Array:
-    """Singular values of the poses by parameters, less what changes of the frames explain.
+    """Singular values of the poses by parameters, less what changes of the frames and of the size explain.
 
     Parameters are in units of their tolerances, rotations times the platform's radius.
     """
@@ -99,7 +101,11 @@ def _by_parameters(example: MechanismExample, basis: Array) -> Array:
     widths = example.widths.widths(mechanism.parameters)
     columns = pose_sensitivity(mechanism, geometry, poses, joints).parameters @ (widths[:, None] * basis)
     columns = (weights * columns).reshape(-1, basis.shape[1])
-    frames, _ = np.linalg.qr((weights * frame_derivatives(poses)).reshape(-1, 9))
+    unseen = frame_derivatives(poses)
+    if mechanism.frame_freedom.size:
+        larger = np.concatenate([poses.positions, np.zeros((len(poses), 3))], axis=-1)
+        unseen = np.concatenate([unseen, larger[..., None]], axis=-1)
+    frames, _ = np.linalg.qr((weights * unseen).reshape(-1, unseen.shape[-1]))
     left = columns - frames @ (frames.T @ columns)
     sizes: Array = np.linalg.svd(left, compute_uv=False)
     return sizes

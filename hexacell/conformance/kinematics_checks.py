@@ -10,7 +10,7 @@ from hexacell.conformance.example import MechanismExample
 from hexacell.kinematics.forward import apply_twist, continue_solution
 from hexacell.kinematics.geometry import Geometry, GeometryBatch
 from hexacell.kinematics.mechanism import ConstraintDerivatives
-from hexacell.kinematics.parameters import ParameterUnit
+from hexacell.kinematics.parameters import JointUnit, ParameterUnit
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array
 
@@ -18,7 +18,13 @@ ROUNDING = 1e-9
 DIFFERENCES = 1e-6
 """Accuracy of central differences, relative to the largest derivative of the same kind."""
 
-STEPS = {ParameterUnit.MM: 1e-3, ParameterUnit.RAD: 1e-6, ParameterUnit.NONE: 1e-6}
+STEPS = {
+    ParameterUnit.MM: 1e-3,
+    ParameterUnit.RAD: 1e-6,
+    ParameterUnit.DEG: 1e-4,
+    ParameterUnit.NONE: 1e-6,
+}
+JOINT_STEPS = {JointUnit.MM: 1e-3, JointUnit.DEG: 1e-4}
 TWIST_STEPS = np.repeat([STEPS[ParameterUnit.MM], STEPS[ParameterUnit.RAD]], 3)
 OFF = np.repeat([3.0, 0.01], 3)
 """A twist, mm and rad, after which the legs do not close: derivatives must hold there too."""
@@ -83,7 +89,7 @@ def _check_derivatives_at(
     names = [f"pose {column}" for column in range(1, 7)]
     _compare(found.pose, by_twist, TWIST_STEPS, names)
     of_each_joint = found.joints[..., None] * np.eye(6)
-    _compare(of_each_joint, by_joints, np.full(6, STEPS[ParameterUnit.MM]), ["joints"] * 6)
+    _compare(of_each_joint, by_joints, np.full(6, JOINT_STEPS[mechanism.words.joint_unit]), ["joints"] * 6)
     _compare(_by_all_parameters(example, found), by_parameters, sizes, parameters.names)
 
 

@@ -25,14 +25,17 @@ class Legs:
     """The legs at n poses, in the base frame.
 
     Attributes:
-        base_joints: (n, 6, 3) passive joints at the base's end: those on the sliders, mm.
+        base_joints: (n, 6, 3) passive joints at the base's end: those on the sliders or cranks, mm.
         platform_joints: (n, 6, 3), mm.
         rotations: (n, 3, 3) platform frame to base frame.
+        carriers: (n, 6, 3, 3) to the base frame from what carries each leg's joint at the base's end; none
+            where that does not turn.
     """
 
     base_joints: Array
     platform_joints: Array
     rotations: Array
+    carriers: Array | None = None
 
     @property
     def directions(self) -> Array:
@@ -40,6 +43,14 @@ class Legs:
         vectors = self.base_joints - self.platform_joints
         directions: Array = vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
         return directions
+
+    @property
+    def directions_in_carriers(self) -> Array:
+        """The same unit vectors in the frames of what carries the joints at the base's end."""
+        if self.carriers is None:
+            return self.directions
+        seen: Array = np.einsum("nlij,nli->nlj", self.carriers, self.directions)
+        return seen
 
     @property
     def directions_in_platform(self) -> Array:

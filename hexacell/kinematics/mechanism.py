@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from hexacell.errors import ReachError
 from hexacell.kinematics.geometry import Geometry, GeometryBatch
 from hexacell.kinematics.legs import Legs
-from hexacell.kinematics.parameters import GeometricParameter, ParameterSet
+from hexacell.kinematics.parameters import GeometricParameter, JointUnit, ParameterSet
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array
 
@@ -23,12 +23,12 @@ Branch = tuple[Sign, Sign, Sign, Sign, Sign, Sign] | tuple[()]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ConstraintDerivatives:
-    """First derivatives of the six constraints at n poses, all per mm of leg length.
+    """First derivatives of the six constraints, which are in mm, at n poses.
 
     Attributes:
         pose: (n, 6, 6) by the ball's position, mm, then by a rotation vector in the base frame,
             rad, applied from the left.
-        joints: (n, 6): leg i depends on joint variable i alone.
+        joints: (n, 6): leg i depends on joint variable i alone, in its unit.
         parameters: (n, 6, c): leg i depends on its own c numbers alone, in the order of the kinds.
     """
 
@@ -107,11 +107,15 @@ class FrameFreedom:
         shift: along which axes of the base frame its origin may be shifted.
         base: about which of them it may be turned.
         platform: about which axes of the platform frame that frame may be turned; its origin is the ball.
+        size: whether a machine whose lengths are all larger by a share does the same, and its ball goes
+            farther by that share. No joint variable is a length then. It is no choice of frames, and no
+            rule takes it: the parameters keep it, and the tolerances alone determine it.
     """
 
     shift: str = "xyz"
     base: str = "xyz"
     platform: str = "xyz"
+    size: bool = False
 
     @property
     def columns(self) -> list[int]:
@@ -176,11 +180,13 @@ class MechanismWords:
         machine: the kind of machine.
         joint: what each joint variable is the position of; text adds the leg, as in "slider 3".
         guide: what the joints move along, with errors of its own; none where there is no such thing.
+        joint_unit: of the joint variables, which are places of what slides or angles of what turns.
     """
 
     machine: str
     joint: str
     guide: str | None = None
+    joint_unit: JointUnit = JointUnit.MM
 
 
 class Mechanism(Protocol):
@@ -207,7 +213,7 @@ class Mechanism(Protocol):
         ...
 
     def inverse(self, geometry: Geometry, branch: Branch, poses: PoseBatch) -> Array:
-        """Joint variables (n, 6), mm, in closed form; NaN where a pose is out of a leg's reach.
+        """Joint variables (n, 6), in their unit, in closed form; NaN where a pose is out of a leg's reach.
 
         ``branch`` is empty for a mechanism without (:attr:`ParameterSet.has_branch
         <hexacell.kinematics.parameters.ParameterSet.has_branch>`).
@@ -240,7 +246,7 @@ class Mechanism(Protocol):
 
 
 def inverse_kinematics(mechanism: Mechanism, geometry: Geometry, branch: Branch, poses: PoseBatch) -> Array:
-    """Joint variables (n, 6), mm, of n poses.
+    """Joint variables (n, 6), in their unit, of n poses.
 
     Raises:
         ReachError: a pose is out of a leg's reach; the message names both.

@@ -25,22 +25,38 @@ class ParameterUnit(StrEnum):
 
     MM = "mm"
     RAD = "rad"
+    DEG = "deg"
     NONE = ""
 
     @property
     def decimals(self) -> int:
-        """Decimals in a config: 1 nm; 1 nrad, which is 1 nm at 1 m."""
-        return 6 if self is ParameterUnit.MM else 9
+        """Decimals in a config: 1 nm; 1 nrad, which is 1 nm at 1 m, or less."""
+        return {ParameterUnit.MM: 6, ParameterUnit.DEG: 7}.get(self, 9)
 
     @property
     def like_a_mm(self) -> float:
         """What counts as much as a millimetre: a milliradian moves by that at 1 m."""
-        return 1.0 if self is ParameterUnit.MM else 1e-3
+        return {ParameterUnit.MM: 1.0, ParameterUnit.DEG: float(np.degrees(1e-3))}.get(self, 1e-3)
 
     @property
     def shown(self) -> str:
         """The name of that in text."""
-        return {ParameterUnit.MM: "mm", ParameterUnit.RAD: "mrad", ParameterUnit.NONE: "1e-3"}[self]
+        return {ParameterUnit.MM: "mm", ParameterUnit.NONE: "1e-3"}.get(self, "mrad")
+
+
+class JointUnit(StrEnum):
+    """The unit of a mechanism's joint variables, from the encoders to the constraints and in every file.
+
+    Nothing converts them on the way: of joints that turn, the mechanism's own file alone knows radians.
+    """
+
+    MM = "mm"
+    DEG = "deg"
+
+    @property
+    def thousandth(self) -> str:
+        """The name of its thousandth part, in which noise and repeatability are told."""
+        return "um" if self is JointUnit.MM else "mdeg"
 
 
 class MachinePart(StrEnum):

@@ -57,11 +57,11 @@ class AgreementTolerances:
 
     Attributes:
         position_mm: of a position that the controller reports.
-        encoders_mm: of an encoder from the controller's joint variable.
+        encoders: of an encoder from the controller's joint variable.
     """
 
     position_mm: float
-    encoders_mm: float
+    encoders: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,16 +71,16 @@ class PositionMismatch:
     Attributes:
         odd: the one that the two others contradict; none where no two agree.
         leg: the leg, counted from 1, with the largest difference.
-        by_pose_mm: its joint variable by the reported pose; none where a leg cannot reach that.
-        joint_mm: its joint variable by the controller, and ``encoder_mm`` by its encoder.
+        by_pose: its joint variable by the reported pose; none where a leg cannot reach that.
+        joint: its joint variable by the controller, and ``encoder`` by its encoder.
         is_pose_near: whether the encoders agree with the reported pose.
     """
 
     odd: PositionSource | None
     leg: int
-    by_pose_mm: float | None
-    joint_mm: float | None
-    encoder_mm: float
+    by_pose: float | None
+    joint: float | None
+    encoder: float
     is_pose_near: bool
 
 
@@ -93,11 +93,11 @@ def position_mismatch(
 ) -> PositionMismatch | None:
     """How the reports disagree under the controller's geometry; none where they agree."""
     by_pose, rounding = _joints_of(mechanism, geometry, branch, reports.pose, tolerances.position_mm)
-    from_encoders = _excess(by_pose - reports.encoders, rounding + tolerances.encoders_mm)
+    from_encoders = _excess(by_pose - reports.encoders, rounding + tolerances.encoders)
     if reports.joints is None:
         return _mismatch(None, from_encoders, by_pose, reports, from_encoders)
     from_joints = _excess(by_pose - reports.joints, rounding)
-    between = _excess(reports.joints - reports.encoders, np.full(6, tolerances.encoders_mm))
+    between = _excess(reports.joints - reports.encoders, np.full(6, tolerances.encoders))
     if _agree(from_joints):
         return _mismatch(PositionSource.ENCODERS, between, by_pose, reports, from_encoders)
     if _agree(between):
@@ -137,8 +137,8 @@ def _mismatch(
     return PositionMismatch(
         odd=odd,
         leg=leg + 1,
-        by_pose_mm=float(by_pose[leg]) if np.isfinite(by_pose[leg]) else None,
-        joint_mm=None if reports.joints is None else float(reports.joints[leg]),
-        encoder_mm=float(reports.encoders[leg]),
+        by_pose=float(by_pose[leg]) if np.isfinite(by_pose[leg]) else None,
+        joint=None if reports.joints is None else float(reports.joints[leg]),
+        encoder=float(reports.encoders[leg]),
         is_pose_near=_agree(near),
     )

@@ -1,7 +1,7 @@
 """What passive joints and legs allow: cones about the joints' axes, and a smallest distance; batched.
 
 A passive joint (ball joint or universal joint) lets a leg turn within a cone about an axis that is fixed to
-what carries the joint: the slider, which does not turn, at one end, and the platform at the other.
+what carries the joint: at one end the slider, which does not turn, or the crank, at the other the platform.
 """
 
 from __future__ import annotations
@@ -22,7 +22,8 @@ class LegLimits:
     """What passive joints and legs allow.
 
     Attributes:
-        base_axes: (6, 3) unit vectors in the base frame about which the base's passive joints turn.
+        base_axes: (6, 3) unit vectors about which the base's passive joints turn: in the base frame, or
+            in that of the crank which carries the joint.
         platform_axes: (6, 3) those of the platform's joints, in the platform frame.
         base_cones: (6,) largest angles of the legs from these axes, rad.
         platform_cones: (6,) those at the platform, rad.
@@ -37,7 +38,7 @@ class LegLimits:
 
     def spare_angles(self, legs: Legs) -> Array:
         """Angles (n, 2, 6), rad, that passive joints have left, at the base and at the platform."""
-        at_base = self.base_cones - angles_between(legs.directions, self.base_axes)
+        at_base = self.base_cones - angles_between(legs.directions_in_carriers, self.base_axes)
         at_platform = self.platform_cones - angles_between(legs.directions_in_platform, self.platform_axes)
         return np.stack([at_base, at_platform], axis=-2)
 

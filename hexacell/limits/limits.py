@@ -43,8 +43,8 @@ class Limits:
     Attributes:
         gauge_travel_mm: largest deviation from the zeroed reference.
         tilt: largest angle of the platform's normal from the base's.
-        joint_min_mm: smallest joint variable, of every leg or of each (6,).
-        joint_max_mm: the largest.
+        joint_min: smallest joint variable, of every leg or of each (6,).
+        joint_max: the largest.
         frames: from the frames of the commands, in which a level platform is level, to the convention's.
         turn: largest turn of the platform about its normal.
         axes: what the controller's axes may be commanded to.
@@ -55,8 +55,8 @@ class Limits:
 
     gauge_travel_mm: float
     tilt: float
-    joint_min_mm: float | Array
-    joint_max_mm: float | Array
+    joint_min: float | Array
+    joint_max: float | Array
     singularity_margin: float
     frames: FrameTransform = field(default=SAME_FRAMES)
     turn: float = np.pi
@@ -103,7 +103,7 @@ class Limits:
     @property
     def joint_ranges(self) -> tuple[tuple[float, float], ...]:
         """Smallest and largest joint variable of each leg, mm."""
-        lowest, highest = (np.broadcast_to(limit, 6) for limit in (self.joint_min_mm, self.joint_max_mm))
+        lowest, highest = (np.broadcast_to(limit, 6) for limit in (self.joint_min, self.joint_max))
         return tuple(zip(lowest.tolist(), highest.tolist(), strict=True))
 
     def tilts(self, poses: PoseBatch) -> Array:
@@ -122,7 +122,7 @@ class Limits:
 
     def allow_joints(self, joints: Array) -> Mask:
         """Which joint variables (..., 6), mm, are in their ranges; NaN is not."""
-        in_range = (joints >= self.joint_min_mm) & (joints <= self.joint_max_mm)
+        in_range = (joints >= self.joint_min) & (joints <= self.joint_max)
         return np.asarray(in_range.all(axis=-1))
 
     def allow_poses(self, poses: PoseBatch, joints: Array) -> Mask:
@@ -176,8 +176,8 @@ class Limits:
             self,
             tilt=max(self.tilt, *(float(pose.tilts()[0]) for pose in given)),
             turn=max(self.turn, *(float(np.abs(pose.turns()[0])) for pose in given)),
-            joint_min_mm=np.minimum(self.joint_min_mm, joints[0]),
-            joint_max_mm=np.maximum(self.joint_max_mm, joints[0]),
+            joint_min=np.minimum(self.joint_min, joints[0]),
+            joint_max=np.maximum(self.joint_max, joints[0]),
             axes=self.axes.including(given[0]),
         )
         if self.legs is None:

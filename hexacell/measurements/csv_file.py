@@ -1,8 +1,8 @@
 """Measurements as a CSV file.
 
 One row per record, with the header ``point,orientation,x,y,z,a,b,c,q1,...,q6,dx,dy,dz``: the pose as
-commanded, mm and deg, the encoder positions, mm, and the deviation from the point's first row, mm.
-The order of the columns is free, and other columns are ignored.
+commanded, mm and deg, the joint variables by the encoders, mm or deg as the mechanism has them, and the
+deviation from the point's first row, mm. The order of the columns is free, and other columns are ignored.
 """
 
 from __future__ import annotations

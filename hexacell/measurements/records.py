@@ -42,7 +42,7 @@ class Record:
         point: at which of the cell's points the gauges are placed, from 1.
         orientation: the pose at this point, from 1.
         pose: as commanded, under the geometry in the controller at that time.
-        joints: slider positions q1 to q6 from the encoders, mm.
+        joints: joint variables q1 to q6 from the encoders, mm or deg.
         deviation: of the ball from its position when the gauges were zeroed, along base x, y, z, mm.
     """
 
@@ -108,7 +108,7 @@ class MeasurementSet:
 
     @cached_property
     def joints(self) -> Array:
-        """Slider positions (n, 6), mm."""
+        """Joint variables (n, 6), in their unit."""
         return _frozen(np.array([record.joints for record in self.records], dtype=float).reshape(-1, 6))
 
     @cached_property

@@ -28,7 +28,7 @@ SHORTEST_S = 0.1
 class SpeedLimits:
     """The largest speeds, mm/s: of any slider, and of the ball and any joint of the platform (its edge)."""
 
-    joint_mm_s: float
+    joint: float
     edge_mm_s: float
 
 
@@ -38,7 +38,7 @@ def shortest_duration(joints: Array, points: Array, limits: SpeedLimits) -> floa
     The way: ``joints`` (k, 6), mm, and ``points`` (k, m, 3) of the platform's edge in the base frame, mm,
     evenly in its parameter. Joints that are out of reach (NaN) do not count.
     """
-    by_joints = np.abs(np.diff(joints, axis=0)).max(axis=1) / limits.joint_mm_s
+    by_joints = np.abs(np.diff(joints, axis=0)).max(axis=1) / limits.joint
     by_edge = np.linalg.norm(np.diff(points, axis=0), axis=2).max(axis=1) / limits.edge_mm_s
     slowest = float(np.fmax(by_joints, by_edge).max())
     return max(SHORTEST_S, slowest * (len(joints) - 1))

@@ -13,7 +13,7 @@ from hexacell.identification.diagnostics.repeatability import Repeatability
 from hexacell.identification.diagnostics.variance_components import NoiseLevel, NoiseLevels
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.geometry import Geometry
-from hexacell.kinematics.parameters import GeometricParameter, ParameterUnit
+from hexacell.kinematics.parameters import GeometricParameter, JointUnit, ParameterUnit
 from hexacell.presentation.layout import wrapped
 from hexacell.presentation.measured_noise import measured_noise_text
 from hexacell.presentation.uncertainty import budget_table
@@ -141,7 +141,9 @@ def noise_table(noise: NoiseLevels | None) -> str:
         return wrapped(noise_sentence(noise))
     rows = (("encoders", noise.encoder), ("gauges", noise.gauge))
     lines = [f"  {name:10}{level.stated:9.4f}  {_noise_estimate(level)}" for name, level in rows]
-    return "\n".join([f"{'Noise, mm':12}{'stated':>9}  estimated from the residuals", *lines])
+    unit = noise.joint_unit
+    head = "Noise, mm" if unit is JointUnit.MM else f"Noise, {unit}, mm"
+    return "\n".join([f"{head:12}{'stated':>9}  estimated from the residuals", *lines])
 
 
 def _noise_estimate(level: NoiseLevel) -> str:

@@ -9,23 +9,28 @@ from hexacell.reporting.length_statement import LengthStatement
 NAMED_SOURCES = 4
 """So many of the sources of uncertainty are printed, the largest."""
 
-NOT_CHECKED = "The length scale is that of the encoders; it was not checked."
+
+def not_checked(scale_of: str = "encoders") -> str:
+    """Where the length scale comes from, if nobody checked it."""
+    if scale_of == "encoders":
+        return "The length scale is that of the encoders; it was not checked."
+    return "The length scale is that of the drawing, within its tolerances, which U contains."
 
 
-def scale_lines(length: LengthResult | None) -> list[str]:
+def scale_lines(length: LengthResult | None, scale_of: str = "encoders") -> list[str]:
     """What is known of the length scale; none where a check contradicts itself, which its test says."""
     if length is None:
-        return [NOT_CHECKED]
+        return [not_checked(scale_of)]
     if not length.is_consistent:
         return []
     checked = f"length scale: checked over {length.distance_mm:.3f} mm: {encoders_read(length)}"
     return [checked, remedy(length)] if length.is_significant else [checked]
 
 
-def earlier_scale_line(length: LengthResult | None) -> str:
+def earlier_scale_line(length: LengthResult | None, scale_of: str = "encoders") -> str:
     """What a check knows of the length scale, by the run of the result that it started from."""
     if length is None or not length.is_consistent:
-        return NOT_CHECKED
+        return not_checked(scale_of)
     return f"length scale: as checked in that run: {encoders_read(length)}"
 
 

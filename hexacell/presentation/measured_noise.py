@@ -12,11 +12,12 @@ from hexacell.campaign.measured_noise import (
     RepeatedApproaches,
 )
 from hexacell.identification.diagnostics.approach_scatter import ScatterSource
+from hexacell.kinematics.parameters import JointUnit
 from hexacell.presentation.layout import duration, wrapped
 
-UM = 1e3
-WHOLE_UM = 9.95
-"""From here on sizes are told in whole micrometres."""
+THOUSAND = 1e3
+WHOLE = 9.95
+"""From here on sizes are told in whole micrometres or millidegrees."""
 NOTEWORTHY_DRIFT = 1.0
 """In units of the noise of a record: a smaller drift within seconds is not mentioned."""
 
@@ -41,9 +42,9 @@ def _paragraphs(lines: Sequence[str]) -> str:
 
 
 def _summary(measured: MeasuredNoise) -> Iterator[str]:
-    yield f"noise                    {_of_each_kind(measured, 'record_mm')} a record"
-    if measured.gauges[0].reading_mm is not None:
-        yield f"  readings at rest: {_of_each_kind(measured, 'reading_mm')}"
+    yield f"noise                    {_of_each_kind(measured, 'record')} a record"
+    if measured.gauges[0].reading is not None:
+        yield f"  readings at rest: {_of_each_kind(measured, 'reading')}"
     approaches = measured.approaches
     if approaches is not None and approaches.source is None:
         yield (
@@ -54,19 +55,22 @@ def _summary(measured: MeasuredNoise) -> Iterator[str]:
 
 def _of_each_kind(measured: MeasuredNoise, figure: str) -> str:
     """A figure of gauges and encoders, um; of several alike the range."""
-    return f"gauges {_range(measured.gauges, figure)}, encoders {_range(measured.encoders, figure)} um"
+    gauges, encoders = _range(measured.gauges, figure), _range(measured.encoders, figure)
+    unit = measured.encoders[0].unit
+    of_gauges = "" if unit is JointUnit.MM else f" {JointUnit.MM.thousandth}"
+    return f"gauges {gauges}{of_gauges}, encoders {encoders} {unit.thousandth}"
 
 
 def _range(instruments: Sequence[InstrumentNoise], figure: str) -> str:
     values = sorted(getattr(one, figure) for one in instruments)
-    first, last = _um(values[0]), _um(values[-1])
+    first, last = _number(values[0]), _number(values[-1])
     return first if first == last else f"{first} to {last}"
 
 
-def _um(size_mm: float) -> str:
-    """A size in um, to two digits where it is below 10."""
-    size = UM * size_mm
-    return f"{size:.2g}" if size < WHOLE_UM else f"{size:.0f}"
+def _number(size: float) -> str:
+    """A size in thousandths of its unit, to two digits where it is below 10."""
+    shown = THOUSAND * size
+    return f"{shown:.2g}" if shown < WHOLE else f"{shown:.0f}"
 
 
 def _warnings(measured: MeasuredNoise) -> Iterator[str]:
@@ -77,24 +81,24 @@ def _warnings(measured: MeasuredNoise) -> Iterator[str]:
 
 
 def _of_instrument(one: InstrumentNoise) -> Iterator[str]:
-    is_gauge = one.name.startswith("gauge")
-    if one.is_noisier and one.reading_mm is not None:
+    is_gauge, unit = one.name.startswith("gauge"), one.unit.thousandth
+    if one.is_noisier and one.reading is not None:
         look = "a loose clamp, vibration or its cable" if is_gauge else "its cable, its head and vibration"
         yield (
-            f"  {one.name}: its readings scatter by {_um(one.reading_mm)} um without moving, more than "
-            f"the {_um(one.stated_mm)} um stated for a record. The run counts with "
-            f"{_um(one.record_mm)} um. Look at {look}; if that is how it is, state it in [noise]"
+            f"  {one.name}: its readings scatter by {_number(one.reading)} {unit} without moving, more "
+            f"than the {_number(one.stated)} {unit} stated for a record. The run counts with "
+            f"{_number(one.record)} {unit}. Look at {look}; if that is how it is, state it in [noise]"
         )
-    if abs(one.drift_mm) > NOTEWORTHY_DRIFT * one.stated_mm:
+    if abs(one.drift) > NOTEWORTHY_DRIFT * one.stated:
         look = "let it warm up, and look whether its stand creeps" if is_gauge else "see whether it slides"
-        yield f"  {one.name}: it drifted by {UM * one.drift_mm:+.0f} um within the series: {look}"
+        yield f"  {one.name}: it drifted by {THOUSAND * one.drift:+.0f} {unit} within the series: {look}"
     if one.outliers:
         what = "a reading was" if one.outliers == 1 else f"{one.outliers} readings were"
         yield f"  {one.name}: {what} false, and left out. Look at its cable and contacts"
 
 
 def _of_approaches(found: RepeatedApproaches, source: ScatterSource) -> str:
-    size = f"{_um(found.excess_mm)} um"
+    size = f"{_number(found.excess)} {found.unit.thousandth}"
     if source is ScatterSource.SLIDERS:
         what = f"the joints stop {size} beside what their encoders show"
         look = "Look for play in guides and joints, and for friction"

@@ -17,7 +17,7 @@ def verification_text(verified: Verification) -> str:
     lines = [_verdict(verified), *_errors(verified.accuracy), *_comparison(verified)]
     lines += [f"  {wrapped(test.sentence, indent=2)}" for test in verified.tests if not test.passed]
     if verified.accuracy is not None:
-        lines += [f"  {line}" for line in scale_lines(verified.accuracy.length)]
+        lines += [f"  {line}" for line in scale_lines(verified.accuracy.length, verified.accuracy.scale_of)]
     return "\n".join(lines)
 
 
@@ -36,7 +36,7 @@ def check_text(found: CheckResult) -> str:
     if not found.is_consistent:
         lines.append("  the residuals are larger than the stated noise explains: the model does not hold")
     if found.accuracy is not None:
-        lines.append(f"  {earlier_scale_line(found.accuracy.length)}")
+        lines.append(f"  {earlier_scale_line(found.accuracy.length, found.accuracy.scale_of)}")
     return "\n".join(lines)
 
 

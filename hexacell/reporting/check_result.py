@@ -210,6 +210,7 @@ def _accuracy(check: Check, stated: CheckStatement, length: LengthResult | None)
         task_named=bool(check.settings.task.poses),
         worst=check.robot.to_command(task.poses.pose(stated.errors.worst)).as_tuple(),
         length=length,
+        scale_of=VerifiedAccuracy.scale_with(check.robot.mechanism),
     )
 
 

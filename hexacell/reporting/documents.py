@@ -67,7 +67,7 @@ def _noise(noise: NoiseLevels | None) -> dict[str, Any] | None:
         return None
     levels = {
         name: asdict(level) | {"seen": level.is_resolved}
-        for name, level in (("encoder_mm", noise.encoder), ("gauge_mm", noise.gauge))
+        for name, level in ((f"encoder_{noise.joint_unit}", noise.encoder), ("gauge_mm", noise.gauge))
     }
     return levels | {"correlation": noise.correlation, "told_apart": noise.are_separable}
 

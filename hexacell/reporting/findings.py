@@ -10,6 +10,7 @@ from hexacell.identification.diagnostics.variance_components import NoiseLevel, 
 from hexacell.identification.solver.chi_square import ChiSquareTest, ChiSquareVerdict
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.mechanism import FrameConvention
+from hexacell.kinematics.parameters import JointUnit
 from hexacell.reporting.assessment import SEPARATED_PAIRS, Assessment
 
 POOR_REPEATABILITY = 2.0
@@ -76,14 +77,15 @@ def noise_sentence(levels: NoiseLevels) -> str:
     """The noise levels that the residuals show."""
     if not levels.are_separable:
         return "The noise of the encoders and of the gauges cannot be separated with these records."
-    encoders, gauges = _noise_level("encoders", levels.encoder), _noise_level("gauges", levels.gauge)
+    encoders = _noise_level("encoders", levels.encoder, levels.joint_unit)
+    gauges = _noise_level("gauges", levels.gauge, JointUnit.MM)
     return f"Noise by the residuals: {encoders}; {gauges}."
 
 
-def _noise_level(kind: str, level: NoiseLevel) -> str:
+def _noise_level(kind: str, level: NoiseLevel, unit: JointUnit) -> str:
     if not level.is_resolved:
-        return f"{kind} below {level.at_most:.4f} mm (stated {level.stated:g})"
-    return f"{kind} {level.estimated:.4f} +- {level.standard_error:.4f} mm (stated {level.stated:g})"
+        return f"{kind} below {level.at_most:.4f} {unit} (stated {level.stated:g})"
+    return f"{kind} {level.estimated:.4f} +- {level.standard_error:.4f} {unit} (stated {level.stated:g})"
 
 
 def _verdict(assessed: Assessment) -> str:

@@ -45,7 +45,7 @@ def length_statement(
     belief = robot.belief()
     judged = JudgedGeometry(belief.covariance, accepted.parameter_columns)
     check = length_check(settings, robot, belief.estimate, judged, measured, robot.effects)
-    result = LengthResult.of(check, settings.uncertainty.common_encoder_scale_um_m)
+    result = LengthResult.of(check, settings.uncertainty.common_scale_um_m)
     known = judged.with_scale(belief.mechanism, belief.estimate).parameter_columns
     error = _error(settings, robot, belief, known, result)
     return LengthStatement(verdict=_verdict(result, error), result=result, error=error)

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 
@@ -20,6 +21,8 @@ from hexacell.cell.model import CellSettings
 from hexacell.decision import Verdict, decide, worst_verdict
 from hexacell.identification.diagnostics.model_tests import update
 from hexacell.identification.solver.result import Identification
+from hexacell.kinematics.mechanism import Mechanism
+from hexacell.kinematics.parameters import JointUnit
 from hexacell.measurements.records import MeasurementSet
 from hexacell.reporting.length_result import LengthMeasurements, LengthResult, length_check
 from hexacell.reporting.model_evidence import ModelTest, confirmed, fails_narrowly, model_tests
@@ -74,6 +77,7 @@ class VerifiedAccuracy(Frozen):
         poses: their number, and whether the cell file names them; else they span the workspace.
         worst: the pose with the largest position error, in the controller's frames.
         length: what a length check found; none if there was none.
+        scale_of: what says how long a millimetre is: the encoders, or the drawing where these read angles.
     """
 
     position: JudgedError
@@ -82,6 +86,12 @@ class VerifiedAccuracy(Frozen):
     task_named: bool
     worst: SixNumbers
     length: LengthResult | None = None
+    scale_of: Literal["encoders", "drawing"] = "encoders"
+
+    @staticmethod
+    def scale_with(mechanism: Mechanism) -> Literal["encoders", "drawing"]:
+        """What says so of a mechanism."""
+        return "encoders" if mechanism.words.joint_unit is JointUnit.MM else "drawing"
 
 
 class Verification(Frozen):
@@ -217,7 +227,7 @@ def verified_accuracy(
     if budget is None:
         return None
     check = measured and _length_check(settings, robot, updated, budget, measured)
-    length = check and LengthResult.of(check, settings.uncertainty.common_encoder_scale_um_m)
+    length = check and LengthResult.of(check, settings.uncertainty.common_scale_um_m)
     if check and length and length.replaces_stated:
         budget = (
             task.budget(updated, belief, robot.effects, robot.known_effects, check.observation) or budget
@@ -232,6 +242,7 @@ def verified_accuracy(
         task_named=bool(settings.task.poses),
         worst=robot.to_command(task.poses.pose(errors.worst)).as_tuple(),
         length=length,
+        scale_of=VerifiedAccuracy.scale_with(robot.mechanism),
     )
 
 

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from hexacell.kinematics.parameters import LEGS
+from hexacell.kinematics.parameters import LEGS, JointUnit
 from hexacell.kinematics.rotations import Array
-from hexacell.uncertainty.effects import UM, Effect, Occurrence, Placement
+from hexacell.uncertainty.effects import Effect, Occurrence, Placement
 
 COMMON_SCALE = "scale common to all encoders"
 """The effect that a length check measures."""
+
+THOUSANDTH = 1e-3
+"""A micrometre in mm, a millidegree in deg."""
 
 
 def common_encoder_scale(um_per_m: float, source: str = "") -> Effect:
@@ -27,15 +30,28 @@ def encoder_scales(um_per_m: float, source: str = "") -> Effect:
     )
 
 
+def encoder_eccentricities(mdeg: float, source: str = "") -> Effect:
+    """The disc of each rotary encoder is off its axis in any direction: its error is a sine over a turn."""
+    name = "eccentricity of each encoder"
+    return Effect(name, mdeg, "mdeg", Occurrence.CONSTANT, _each_eccentricity, source=source)
+
+
 def stop_repeatability(
-    um: float, source: str = "", *, is_in_noise: bool = False, joint: str = "joint"
+    size: float,
+    source: str = "",
+    *,
+    is_in_noise: bool = False,
+    joint: str = "joint",
+    unit: JointUnit = JointUnit.MM,
 ) -> Effect:
     """A joint stops beside what its encoder shows, each time elsewhere: play, friction.
 
-    ``is_in_noise``: the noise of the records contains it. ``joint`` is the mechanism's word for it.
+    ``size`` is in um or mdeg. ``is_in_noise``: the noise of the records contains it. ``joint`` is the
+    mechanism's word for it.
     """
     occurrence = Occurrence.STOPS_AT_WORK if is_in_noise else Occurrence.EVERY_STOP
-    return Effect(f"repeatability of a {joint}", um, "um", occurrence, _each_joint, source=source)
+    name = f"repeatability of a {joint}"
+    return Effect(name, size, unit.thousandth, occurrence, _each_joint, source=source)
 
 
 def _common_scale(placement: Placement) -> Array:
@@ -46,5 +62,14 @@ def _each_scale(placement: Placement) -> Array:
     return placement.by_joints(1e-6 * placement.joints[..., None] * np.eye(LEGS))
 
 
+def _each_eccentricity(placement: Placement) -> Array:
+    """Two causes a joint; a wave whose phase is unknown has half the variance in each."""
+    angles = np.radians(placement.joints)[..., None]
+    waves = np.sqrt(0.5) * np.concatenate(
+        [np.cos(angles) * np.eye(LEGS), np.sin(angles) * np.eye(LEGS)], axis=-1
+    )
+    return placement.by_joints(THOUSANDTH * waves)
+
+
 def _each_joint(placement: Placement) -> Array:
-    return placement.by_joints(np.broadcast_to(UM * np.eye(LEGS), (len(placement), LEGS, LEGS)))
+    return placement.by_joints(np.broadcast_to(THOUSANDTH * np.eye(LEGS), (len(placement), LEGS, LEGS)))

@@ -18,7 +18,8 @@ from hexacell.identification.data_faults.hypotheses import (
 )
 from hexacell.identification.solver.linearized_model import LinearizedModel
 from hexacell.identification.solver.result import Identification
-from hexacell.uncertainty.encoder_effects import encoder_scales
+from hexacell.kinematics.parameters import JointUnit
+from hexacell.uncertainty.encoder_effects import encoder_eccentricities, encoder_scales
 from hexacell.uncertainty.environment_effects import load_at_work
 from hexacell.uncertainty.excess_test import ExcessTest
 from hexacell.uncertainty.gauge_effects import ball_roundness
@@ -48,9 +49,11 @@ def possible_causes(found: Identification) -> tuple[PossibleCause, ...]:
 
 
 def _of_the_machine(test: ExcessTest) -> Iterator[PossibleCause]:
+    unit = test.found.problem.mechanism.words.joint_unit
+    of_encoders = encoder_scales(1.0) if unit is JointUnit.MM else encoder_eccentricities(1.0)
     waves = (rail_waves(1.0, length) for length in WAVELENGTHS_MM)
     columns = {
-        "errors of the encoders": [*test.by_effects(encoder_scales(1.0)), *test.by_encoders()],
+        "errors of the encoders": [*test.by_effects(of_encoders), *test.by_encoders()],
         "guides that are not straight or parallel": test.by_effects(rail_directions(1.0), *waves),
         "legs that yield under the load": test.by_effects(load_at_work(1.0, 1.0)),
         "a temperature that changed while measuring": test.by_expansion(),

@@ -78,18 +78,18 @@ def noise_readings(measured: SetState, encoders: EncoderSettings) -> NoiseReadin
     """What was read at the reference of a set."""
     zero, series = measured.samples[0], measured.standstill
     gauges = [] if series is None else series.gauges_mm
-    joints = [] if series is None else series.joints_mm
+    joints = [] if series is None else series.joints
     answers = zero.reading.answers if series is None else series.answers
     steps = [display_step([one[gauge] for one in answers]) for gauge in range(3)]
     visits = [zero.reading, *(visit.reading for visit in measured.visits)]
     return NoiseReadings(
         reference=Pose(*zero.pose),
         series=np.concatenate([np.reshape(gauges, (-1, 3)), np.reshape(joints, (-1, 6))], axis=1),
-        steps=np.array([*steps, *(1e-6 * encoders.measuring_step_nm,) * 6]),
+        steps=np.array([*steps, *(encoders.step,) * 6]),
         visits=np.array([_row(reading) for reading in visits]),
         window_readings=len(zero.reading.counts),
     )
 
 
 def _row(reading: Reading) -> tuple[float, ...]:
-    return (*reading.gauges_mm, *reading.joints_mm)
+    return (*reading.gauges_mm, *reading.joints)

@@ -93,17 +93,20 @@ def require_zero(state: RunState, key: SetKey) -> None:
 
 
 def check_reference(
-    at: SetKey, before: events.Reading, now: events.Reading, limit_mm: float
+    at: SetKey, before: events.Reading, now: events.Reading, limit_mm: float, joint_limit: float
 ) -> events.ReferenceConfirmed | events.SetInvalidated:
-    """Whether gauges and sliders show at a set's reference what they showed before."""
+    """Whether gauges and encoders show at a set's reference what they showed before.
+
+    ``joint_limit`` is in the unit of the joint variables.
+    """
     gauges = np.subtract(now.gauges_mm, before.gauges_mm)
-    sliders = np.subtract(now.joints_mm, before.joints_mm)
+    joints = np.subtract(now.joints, before.joints)
     if np.abs(gauges).max() > limit_mm:
         reason = f"back at its reference the gauges show {in_words(gauges)}, more than {limit_mm:g} mm"
         return events.SetInvalidated(at=at, reason=reason, reading=now)
-    if np.abs(sliders).max() > limit_mm:
-        leg = int(np.abs(sliders).argmax())
-        reason = f"back at its reference q{leg + 1} shows {sliders[leg]:+.3f}, more than {limit_mm:g} mm"
+    if np.abs(joints).max() > joint_limit:
+        leg = int(np.abs(joints).argmax())
+        reason = f"back at its reference q{leg + 1} shows {joints[leg]:+.3f}, more than {joint_limit:g}"
         return events.SetInvalidated(at=at, reason=reason, reading=now)
     return events.ReferenceConfirmed(at=at, change_mm=deviation_of(gauges), reading=now)
 

@@ -45,8 +45,8 @@ class Settled:
 
     @property
     def joints(self) -> Array:
-        """Slider positions (n, 6), mm."""
-        return np.array([one.encoders.positions_mm for one in self.window])
+        """Joint variables (n, 6), in their unit."""
+        return np.array([one.encoders.positions for one in self.window])
 
 
 async def read_all(devices: Devices, clock: CellClock) -> DeviceSnapshot:
@@ -124,9 +124,9 @@ def _moving(devices: Devices, timing: TimingSettings, settled: Settled) -> list[
         for m, spread in gauges
         if spread > timing.spread_gauge_mm
     ]
-    legs = enumerate(np.ptp(settled.joints, axis=0), start=1)
+    legs, unit = enumerate(np.ptp(settled.joints, axis=0), start=1), settled.window[0].encoders.unit
     return moving + [
-        f"encoder {leg} by {spread:.3f} mm" for leg, spread in legs if spread > timing.spread_encoder_mm
+        f"encoder {leg} by {spread:.3f} {unit}" for leg, spread in legs if spread > timing.spread_encoder
     ]
 
 

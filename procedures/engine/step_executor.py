@@ -157,8 +157,8 @@ class StepExecutor:
         found = await self.guards.locate()
         return events.Located(
             pose=found.pose.as_tuple(),
-            joints_mm=None if found.joints is None else joints_of(found.joints),
-            encoders_mm=joints_of(found.encoders),
+            joints=None if found.joints is None else joints_of(found.joints),
+            encoders=joints_of(found.encoders),
         )
 
     async def require_departure(self, state: RunState) -> None:
@@ -264,8 +264,8 @@ class StepExecutor:
                 raise
             return events.SetInvalidated(at=step.at, reason=str(error))
         await self._check_gauges()
-        limit_mm = self.cell.settings.recovery.agreement_mm
-        return check_reference(step.at, state.set(step.at).samples[0].reading, reading, limit_mm)
+        before, limits = state.set(step.at).samples[0].reading, self.cell.settings.reference_agreement
+        return check_reference(step.at, before, reading, *limits)
 
     async def _check_gauges(self) -> None:
         checks = [mounted.gauge.check() for mounted in self.devices.gauges]
@@ -299,7 +299,7 @@ class StepExecutor:
         return events.StandstillRead(
             at=step.at,
             gauges_mm=tuple(deviation_of(_on_axes(self.devices, row)) for row in series.gauges),
-            joints_mm=tuple(joints_of(row) for row in series.joints),
+            joints=tuple(joints_of(row) for row in series.joints),
             **_raw(series.window),
         )
 
@@ -335,7 +335,7 @@ def _reading(
     return events.Reading(
         gauges_mm=deviation_of(_on_axes(devices, gauges)),
         spread_mm=deviation_of(np.abs(_on_axes(devices, spreads))),
-        joints_mm=joints_of(joints),
+        joints=joints_of(joints),
         temperatures=temperatures,
         **_raw([snapshot for one in settled for snapshot in one.window]),
     )

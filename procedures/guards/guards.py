@@ -75,7 +75,7 @@ class Guards:
     async def move(
         self, step: Move, state: RunState, duration_s: float, commanded: Callable[[], Array]
     ) -> None:
-        """Move to the target of a step; ``commanded`` gives the slider positions (6,), mm, at its pose."""
+        """Move to the target of a step; ``commanded`` gives the joint variables (6,) at its pose."""
         gauges = self._watched_gauges(step, state)
         pollers = self._pollers(controller=True, gauges=gauges)
         limits = self._limits(zero_mm=state.zero_shown(step.at))
@@ -101,7 +101,7 @@ class Guards:
 
     async def at_standstill(self, action: Supervised[Result]) -> Result:
         """Run an action during which the robot must stay at standstill."""
-        limits = self._limits(rest_mm=self._settings.guards.following_mm)
+        limits = self._limits(rest=self._settings.guards.following)
         return await self.supervisor.supervise(action, self._pollers(controller=True), limits)
 
     async def during_readings(self, action: Supervised[Result]) -> Result:
@@ -123,10 +123,10 @@ class Guards:
         return None if trip is None else trip.as_error()
 
     async def _arrival_trip(self, commanded: Array, reached: EncoderSample) -> Trip | None:
-        """A joint is not where it was commanded (6,), mm, or the controller is wrong about where it is."""
-        limit = self._settings.guards.following_mm
-        joint = self._settings.mechanism.words.joint
-        following = rules.following_error(commanded, np.array(reached.positions_mm), limit, joint)
+        """A joint is not where it was commanded (6,), or the controller is wrong about where it is."""
+        limit = self._settings.guards.following
+        words = self._settings.mechanism.words
+        following = rules.following_error(commanded, np.array(reached.positions), limit, words)
         found = await self.position.read(reached)
         return following if following and found.odd is PositionSource.ENCODERS else found.trip or following
 
@@ -134,10 +134,10 @@ class Guards:
         await self._devices.controller.move(step.target, duration_s)
         return await self._devices.read_encoders()
 
-    def _limits(self, rest_mm: float | None = None, zero_mm: ThreeNumbers | None = None) -> GuardLimits:
+    def _limits(self, rest: float | None = None, zero_mm: ThreeNumbers | None = None) -> GuardLimits:
         guards = self._settings.guards
         plate = gauge_travel_of(self._settings).room(zero_mm).widened(guards.plate_margin_mm)
-        return GuardLimits(guards.stale_s, plate, rest_mm, self._settings.mechanism.words.joint)
+        return GuardLimits(guards.stale_s, plate, rest, self._settings.mechanism.words)
 
     def _pollers(
         self,
@@ -158,7 +158,7 @@ class Guards:
 
     def _watched_controller(self) -> WatchedController:
         guards = self._settings.guards
-        return WatchedController(self._devices, self._clock, guards.following_mm, guards.stale_s)
+        return WatchedController(self._devices, self._clock, guards.following, guards.stale_s)
 
     def _gauge_pollers(self, gauges: tuple[WatchedGauge, ...]) -> tuple[DevicePoller[GaugeDeviation], ...]:
         """One poller a gauge; gauges behind one multiplexer share a port and so a line."""

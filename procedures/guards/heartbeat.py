@@ -1,6 +1,6 @@
 """Whether the controller works, or only its server still answers.
 
-A controller that works reports something else whenever the sliders move. One whose server answers from
+A controller that works reports something else whenever the joints move. One whose server answers from
 what it knew last is frozen: the encoders show another position, and its heartbeat stands.
 """
 
@@ -23,14 +23,14 @@ class WatchedController:
     Args:
         devices: the controller, and the encoders whose samples the guards have.
         clock: the cell's.
-        moved_mm: by so much a slider has moved.
-        patience_s: for so long the heartbeat may lag behind the sliders, s of real time.
+        moved: by so much a joint has moved, in its unit.
+        patience_s: for so long the heartbeat may lag behind the joints, s of real time.
     """
 
-    def __init__(self, devices: Devices, clock: CellClock, moved_mm: float, patience_s: float) -> None:
+    def __init__(self, devices: Devices, clock: CellClock, moved: float, patience_s: float) -> None:
         self._devices = devices
         self._clock = clock
-        self._moved_mm = moved_mm
+        self._moved = moved
         self._patience_s = patience_s
         self._heartbeat = ""
         self._restart()
@@ -39,7 +39,7 @@ class WatchedController:
         """Its status now.
 
         Raises:
-            ControllerFrozen: its heartbeat stands although a slider moves.
+            ControllerFrozen: its heartbeat stands although a joint moves.
         """
         sample = self._devices.live.encoders.value  # before the heartbeat, which may only be newer
         status = await self._devices.controller_status()
@@ -62,15 +62,15 @@ class WatchedController:
         if self._before is None:
             self._before = sample if self._new_samples > _FRESH_SAMPLES else None
             return
-        moved = np.abs(np.subtract(sample.positions_mm, self._before.positions_mm))
-        if moved.max() <= self._moved_mm:
+        moved = np.abs(np.subtract(sample.positions, self._before.positions))
+        if moved.max() <= self._moved:
             return
         now = self._clock.now()
         self._moving_since_s = now if self._moving_since_s is None else self._moving_since_s
         if self._clock.real_seconds(now - self._moving_since_s) > self._patience_s:
             raise ControllerFrozen(
                 f"is frozen: its server answers, but reports one position although encoder "
-                f"{int(moved.argmax()) + 1} shows a move by {moved.max():.1f} mm",
+                f"{int(moved.argmax()) + 1} shows a move by {moved.max():.1f} {sample.unit}",
                 subject="controller",
                 action="Restart it, and find out why; then resume",
             )

@@ -14,6 +14,7 @@ from drivers.interfaces import EncoderSample
 from hexacell.cell.model import CellSettings
 from hexacell.clock import CellClock
 from hexacell.controller_config.current import CurrentConfig
+from hexacell.kinematics.parameters import JointUnit
 from hexacell.kinematics.position_agreement import (
     AgreementTolerances,
     PositionMismatch,
@@ -80,13 +81,13 @@ class PositionCheck:
         reported = await self.devices.controller.position()
         if reported is None:
             return None
-        joints = None if reported.joints_mm is None else np.array(reported.joints_mm)
-        return PositionReports(reported.pose, joints, np.array(encoders.positions_mm))
+        joints = None if reported.joints is None else np.array(reported.joints)
+        return PositionReports(reported.pose, joints, np.array(encoders.positions))
 
     def _mismatch(self, reports: PositionReports) -> PositionMismatch | None:
         commanding = self.config.geometry()
         tolerances = AgreementTolerances(
-            self.settings.controller.position_tolerance_mm, self.settings.guards.following_mm
+            self.settings.controller.position_tolerance_mm, self.settings.guards.following
         )
         return position_mismatch(
             self.settings.mechanism, commanding.geometry, commanding.branch, reports, tolerances
@@ -99,14 +100,15 @@ class PositionCheck:
                 return self._odd_pose(found, reports)
             case PositionSource.JOINTS:
                 problem = (
-                    f"reports {joint} at {_mm(found.joint_mm)} where its pose has it at "
-                    f"{_mm(found.by_pose_mm)} and the encoder at {_mm(found.encoder_mm)}"
+                    f"reports {joint} at {self._place(found.joint)} where its pose has it at "
+                    f"{self._place(found.by_pose)} and the encoder at {self._place(found.encoder)}"
                 )
                 return _position_trip("controller", problem, "Home it again, then retry")
             case PositionSource.ENCODERS:
                 problem = (
-                    f"shows {joint} at {_mm(found.encoder_mm)} where the controller's pose and joints "
-                    f"have it at {_mm(found.joint_mm)} (limit {self.settings.guards.following_mm:g} mm)"
+                    f"shows {joint} at {self._place(found.encoder)} where the controller's pose and joints "
+                    f"have it at {self._place(found.joint)} "
+                    f"(limit {self.settings.guards.following:g} {self._unit})"
                 )
                 action = "See whether it slipped or lost its zero, or the controller was homed wrongly"
                 return _position_trip(f"encoder {found.leg}", problem, f"{action}; then retry")
@@ -116,7 +118,7 @@ class PositionCheck:
         path = self.config.path
         problem = (
             f"reports the pose {reports.pose}, {self._at_pose(found)}; its joints and the encoders have "
-            f"it at {_mm(found.joint_mm)}. "
+            f"it at {self._place(found.joint)}. "
         )
         other = "it runs another geometry than this file has"
         again = f"Make it read {path} again, or name the file that it runs in controller.config"
@@ -129,12 +131,11 @@ class PositionCheck:
     def _contradiction(self, found: PositionMismatch, reports: PositionReports) -> Trip:
         """No two reports agree, or there are only two."""
         problem = f"reports the pose {reports.pose}, {self._at_pose(found)}; "
-        if found.joint_mm is None:
-            problem += f"its encoder shows {_mm(found.encoder_mm)}, and the controller tells no joints"
+        if found.joint is None:
+            problem += f"its encoder shows {self._place(found.encoder)}, and the controller tells no joints"
         else:
-            problem += (
-                f"its joints have it at {_mm(found.joint_mm)}, its encoder at {_mm(found.encoder_mm)}"
-            )
+            joint, encoder = self._place(found.joint), self._place(found.encoder)
+            problem += f"its joints have it at {joint}, its encoder at {encoder}"
         action = (
             f"Find out where the robot is and home it; make it read {self.config.path} again; then retry"
         )
@@ -144,11 +145,18 @@ class PositionCheck:
     def _joint(self) -> str:
         return self.settings.mechanism.words.joint
 
+    @property
+    def _unit(self) -> JointUnit:
+        return self.settings.mechanism.words.joint_unit
+
+    def _place(self, value: float | None) -> str:
+        return "no place" if value is None else f"{value:.3f} {self._unit}"
+
     def _at_pose(self, found: PositionMismatch) -> str:
         name = self.config.path.name
-        if found.by_pose_mm is None:
+        if found.by_pose is None:
             return f"which leg {found.leg} cannot reach by {name}"
-        return f"where {name} has {self._joint} {found.leg} at {_mm(found.by_pose_mm)}"
+        return f"where {name} has {self._joint} {found.leg} at {self._place(found.by_pose)}"
 
 
 def _position_trip(device: str, problem: str, action: str) -> Trip:
@@ -159,7 +167,3 @@ def _not_homed() -> Trip:
     return _position_trip(
         "controller", "is not homed: where the robot is, is not known", "Home it, then retry"
     )
-
-
-def _mm(value: float | None) -> str:
-    return "no place" if value is None else f"{value:.3f} mm"

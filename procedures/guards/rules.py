@@ -17,6 +17,7 @@ import numpy as np
 from drivers.controllers.errors import ControllerFrozen
 from drivers.errors import GaugeAtEnd
 from drivers.stop_input import SUBJECT as STOP_LINE
+from hexacell.kinematics.mechanism import MechanismWords
 from hexacell.kinematics.rotations import Array
 from hexacell.limits.gauge_travel import GaugeRoom
 from hexacell.storage import atomic_files
@@ -30,6 +31,9 @@ STUCK_GAUGE_MM = 1.0
 """A gauge is stuck if its display did not change over an expected displacement larger than this."""
 
 
+SOME_MECHANISM = MechanismWords("robot", joint="joint")
+
+
 @dataclass(frozen=True, slots=True)
 class GuardLimits:
     """The limits of one action.
@@ -37,14 +41,14 @@ class GuardLimits:
     Attributes:
         stale_s: longest silence of a device, s of real time.
         plate: how far the ball may go from the set's reference.
-        rest_mm: largest displacement of a joint at standstill; none while the robot moves.
-        joint: the mechanism's word for one.
+        rest: largest displacement of a joint at standstill, in its unit; none while the robot moves.
+        words: the mechanism's, for a joint and its unit.
     """
 
     stale_s: float
     plate: GaugeRoom
-    rest_mm: float | None = None
-    joint: str = "joint"
+    rest: float | None = None
+    words: MechanismWords = SOME_MECHANISM
 
 
 Rule = Callable[[PolledDevices, GuardLimits], Trip | None]
@@ -80,7 +84,7 @@ def controller_not_ready(devices: PolledDevices, _limits: GuardLimits) -> Trip |
 
 
 def controller_frozen(devices: PolledDevices, _limits: GuardLimits) -> Trip | None:
-    """The controller answers, but always the same, although the sliders move."""
+    """The controller answers, but always the same, although the joints move."""
     report = devices.controller
     is_frozen = report is not None and isinstance(report.error, ControllerFrozen)
     return _fault_trip(Guard.STALE, report) if report is not None and is_frozen else None
@@ -146,11 +150,12 @@ def ball_off_gauge(devices: PolledDevices, limits: GuardLimits) -> Trip | None:
 def unexpected_motion(devices: PolledDevices, limits: GuardLimits) -> Trip | None:
     """A joint moved during standstill."""
     report = devices.encoders
-    if limits.rest_mm is None or report is None or report.value is None or report.first is None:
+    if limits.rest is None or report is None or report.value is None or report.first is None:
         return None
-    moved = np.subtract(report.value.positions_mm, report.first.positions_mm)
-    words = f"moved by {{:+.2f}} mm during standstill (limit {limits.rest_mm:g} mm)"
-    return _joint_trip(limits.joint, moved, limits.rest_mm, words)
+    moved = np.subtract(report.value.positions, report.first.positions)
+    unit = limits.words.joint_unit
+    words = f"moved by {{:+.2f}} {unit} during standstill (limit {limits.rest:g} {unit})"
+    return _joint_trip(limits.words.joint, moved, limits.rest, words)
 
 
 RULES: tuple[Rule, ...] = (
@@ -177,11 +182,12 @@ def motion_forbidden(reason: str) -> Trip:
 
 
 def following_error(
-    commanded: Array, measured: Array, limit_mm: float, joint: str = "joint"
+    commanded: Array, measured: Array, limit: float, of: MechanismWords = SOME_MECHANISM
 ) -> Trip | None:
-    """After a move: a joint (6,), mm, is too far from its commanded position; ``joint`` is its word."""
-    words = f"is {{:+.3f}} mm from its commanded position (limit {limit_mm:g} mm)"
-    return _joint_trip(joint, np.subtract(measured, commanded), limit_mm, words)
+    """After a move: a joint (6,) is too far from its commanded position; ``of`` has its word and unit."""
+    unit = of.joint_unit
+    words = f"is {{:+.3f}} {unit} from its commanded position (limit {limit:g} {unit})"
+    return _joint_trip(of.joint, np.subtract(measured, commanded), limit, words)
 
 
 def stuck_gauge(gauge: str, displayed: tuple[str, ...], expected_mm: float) -> Trip | None:
@@ -243,9 +249,9 @@ def _fault_trip(guard: Guard, report: DevicePoller[object]) -> Trip:
     return Trip(guard, error.subject or report.device, error.problem, action, (error,))
 
 
-def _joint_trip(joint: str, difference: Array, limit_mm: float, words: str) -> Trip | None:
+def _joint_trip(joint: str, difference: Array, limit: float, words: str) -> Trip | None:
     leg = int(np.argmax(np.abs(difference)))
-    if abs(difference[leg]) <= limit_mm:
+    if abs(difference[leg]) <= limit:
         return None
     return Trip(
         Guard.FOLLOWING,

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 from pydantic import BaseModel
 
-from drivers.encoders.cia406 import positions_mm
+from drivers.encoders.cia406 import joint_variables
 from hexacell import __version__
 from hexacell.cell.devices import EncoderSettings
 from procedures.run.events import Reading
@@ -111,12 +111,12 @@ def is_wording(change: Change) -> bool:
 
 
 def counts_mismatch(reading: Reading, encoders: EncoderSettings) -> Change | None:
-    """A difference of slider positions from their encoder counts by more than half a count."""
-    means = np.mean([positions_mm(counts, encoders) for counts in reading.counts], axis=0)
-    half_mm = encoders.measuring_step_nm * 0.5e-6
-    if np.abs(means - reading.joints_mm).max() <= half_mm + TOLERANCE:
+    """A difference of joint variables from their encoder counts by more than half a count."""
+    means = np.mean([joint_variables(counts, encoders) for counts in reading.counts], axis=0)
+    half = 0.5 * encoders.step
+    if np.abs(means - reading.joints).max() <= half + TOLERANCE:
         return None
-    return Change("reading.joints_mm", reading.joints_mm, tuple(means.tolist()))
+    return Change("reading.joints", reading.joints, tuple(means.tolist()))
 
 
 def _changes(field: str, recorded: object, replayed: object, tolerance: float) -> Iterator[Change]:

@@ -68,7 +68,7 @@ class RecordedEncoders:
     async def read(self) -> EncoderSample:
         """The last counts of the reading."""
         reading = self.recorded.reading
-        return EncoderSample(reading.counts[-1], reading.joints_mm)
+        return EncoderSample(reading.counts[-1], reading.joints)
 
     async def close(self) -> None:
         """Nothing to release."""

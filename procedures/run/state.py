@@ -367,6 +367,6 @@ def record(sample: events.RecordTaken) -> Record:
         sample.at.point,
         sample.orientation,
         Pose(*sample.pose),
-        sample.reading.joints_mm,
+        sample.reading.joints,
         sample.deviation_mm,
     )

@@ -83,7 +83,7 @@ class ImperfectMachine:
         poses = self._poses(joints, near, warmer, np.zeros(3), self._missed(len(joints), random))
         shown = poses.positions + self._oval(poses.rotations)
         shown = shown + noise.gauge_mm * random.standard_normal(shown.shape)
-        read = joints + noise.encoder_mm * random.standard_normal(joints.shape)
+        read = joints + noise.encoder * random.standard_normal(joints.shape)
         zeros: dict[int, Array] = {}
         records: list[Record] = []
         for record, ball, sliders in zip(planned.records, shown, read, strict=True):

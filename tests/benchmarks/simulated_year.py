@@ -62,7 +62,8 @@ SERVED: dict[str, Any] = {
     "encoders.timeout_s": 10.0,
     "encoders.heartbeat_ms": 10_000,
     "simulation.motion.ringing_mm": 0.05,
-    **{f"speed.{what}_mm_s": 1000.0 for what in ("joint", "edge", "joint_at_gauges", "edge_at_gauges")},
+    **dict.fromkeys(("speed.joint", "speed.joint_at_gauges"), 1000.0),
+    **dict.fromkeys(("speed.edge_mm_s", "speed.edge_at_gauges_mm_s"), 1000.0),
 }
 """Real drivers are patient with simulated devices on a fast clock."""
 
@@ -331,7 +332,7 @@ def taken(record: Record) -> events.RecordTaken:
     reading = events.Reading(
         gauges_mm=record.deviation,
         spread_mm=(0.0, 0.0, 0.0),
-        joints_mm=record.joints,
+        joints=record.joints,
         answers=(),
         counts=((0,) * 6,),
         temperatures=(),

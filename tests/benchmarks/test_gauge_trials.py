@@ -33,7 +33,7 @@ TRIALS = int(os.environ.get("TRIALS", "100"))
 def rigs(folder: Path, seed: int) -> Iterator[Any]:
     """Runs of drawn robots, with gauges and encoders as noisy as the bundled cell states."""
     noise: dict[str, Any] = {f"simulation__{one}__noise_mm": 0.01 for one in ("gauges", "encoders")}
-    noise |= {"noise__gauge_mm": 0.01, "noise__encoder_mm": 0.01, "stations__trial_mm": 1.0}
+    noise |= {"noise__gauge_mm": 0.01, "noise__encoder": 0.01, "stations__trial_mm": 1.0}
     first = new_rig(folder)
     for number, geometry in enumerate(drawn_robots(first.cell.settings, seed)):
         place = folder / str(number)

@@ -132,7 +132,7 @@ async def reference(devices: Devices) -> RunState:
     reading = events.Reading(
         gauges_mm=(on_axes[0], on_axes[1], on_axes[2]),
         spread_mm=(0.0, 0.0, 0.0),
-        joints_mm=(0.0,) * 6,
+        joints=(0.0,) * 6,
         answers=(),
         counts=(),
     )

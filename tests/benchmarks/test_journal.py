@@ -30,7 +30,7 @@ def sampled(number: int, per_set: int) -> events.RecordTaken:
     reading = events.Reading(
         gauges_mm=(0.123, 1.2345, value),
         spread_mm=(0.001, 0.002, 0.003),
-        joints_mm=(value, 2 * value, 3 * value, 4 * value, 5 * value, 6 * value),
+        joints=(value, 2 * value, 3 * value, 4 * value, 5 * value, 6 * value),
         answers=(("+1.234\r", "01A+00001.234\r", "1.234\r"),) * WINDOW,
         counts=((123456, 123457, 123458, -123459, 123460, 123461),) * WINDOW,
     )

@@ -88,7 +88,7 @@ def two_seats(
     true = DISTANCE_MM + CERTIFICATE_MM * random.standard_normal()
     seats = balls[0] + offsets * true / DISTANCE_MM + seated
     deviations: Array = balls - seats + noise.gauge_mm * random.standard_normal(balls.shape)
-    read = shown + noise.encoder_mm * random.standard_normal(shown.shape)
+    read = shown + noise.encoder * random.standard_normal(shown.shape)
     return LengthRecords.of(
         robot.mechanism, found.geometry, commands, read, deviations, mountings, np.eye(3)
     )

@@ -40,14 +40,14 @@ def whole_run(folder: Path, seed: int, how: dict[str, Any]) -> RunState:
         "identification__orientations": 11,
         "verification__points": bundled.verification.points,
         "verification__orientations": 6,
-        "noise__encoder_mm": 0.01,
+        "noise__encoder": 0.01,
         "noise__gauge_mm": 0.01,
         "acceptance__position_mm": 0.3,
         "acceptance__orientation_deg": 0.1,
         "simulation__gauges__noise_mm": 0.01,
         "simulation__gauges__flicker_mm": 0.001,
-        "simulation__encoders__noise_mm": 0.03,
-        "simulation__encoders__flicker_mm": 0.001,
+        "simulation__encoders__noise": 0.03,
+        "simulation__encoders__flicker": 0.001,
         "simulation__seed": seed,
     }
     rig = new_rig(folder, **(changes | how))
@@ -79,7 +79,7 @@ def test_noisier_encoders_than_stated(tmp_path: Path, say: Any) -> None:
         ratios = [ratio_of(state) for state in found]
         say(f"residuals over {name} noise, median of {RUNS} runs", f"{np.nanmedian(ratios):.2f}", "")
     told = [state.noise for state in states["measured"] if state.noise is not None]
-    sizes = [event.noise.encoders[0].record_mm for event in told]
+    sizes = [event.noise.encoders[0].record for event in told]
     say("noise of the encoders, 0.03 mm, as measured, median", f"{np.median(sizes):.3f} mm", "0.02 to 0.04")
     say("runs that pass with measured noise", f"{passes(states['measured'])} of {RUNS}", "more than half")
     say("runs that pass with stated noise", f"{passes(states['stated'])} of {RUNS}", "none")

@@ -75,8 +75,8 @@ def test_points_and_task_poses_can_be_reached(cell):
     for values in (settings.robot.nominal, settings.simulation.geometry):
         joints = inverse_kinematics(Hexaglide(), geometry(values), BRANCH, poses)
         margins = singularity_margin(Hexaglide(), geometry(values), poses, joints)
-        assert joints.min() > settings.limits.joint_min_mm
-        assert joints.max() < settings.limits.joint_max_mm
+        assert joints.min() > settings.limits.joint_min
+        assert joints.max() < settings.limits.joint_max
         assert margins.min() > settings.limits.singularity_margin
 
 
@@ -109,7 +109,7 @@ def test_simulated_hexaglide_is_table_1():
     assert settings.verification.points == (P6, (100, 100, 550), (0, -100, 600))
     assert settings.limits.gauge_travel_mm == 5
     assert settings.tolerances.model_dump() == {"S_mm": 7, "B_mm": 7, "l_mm": 7, "ball_mm": 0}
-    assert {settings.noise.encoder_mm, settings.noise.gauge_mm} == {0.01}
+    assert {settings.noise.encoder, settings.noise.gauge_mm} == {0.01}
     assert [(gauge.axis, gauge.protocol) for gauge in settings.gauges] == [
         ("x", "sylvac"),
         ("y", "mux10"),

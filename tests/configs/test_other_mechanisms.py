@@ -16,7 +16,7 @@ from hexacell.kinematics.sensitivity import singularity_margin
 from hexacell.robot_model import Robot, robot_of
 
 CONFIGS = Path(__file__).parents[2] / "configs"
-NAMES = ["gough-stewart", "linapod"]
+NAMES = ["gough-stewart", "linapod", "rotary-cranks"]
 NOT_THEIRS = re.compile(r"\b(slider|rail|hexaglide)", re.IGNORECASE)
 
 

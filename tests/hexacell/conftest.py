@@ -86,7 +86,7 @@ POINTS = np.array(  # Table 3, P1 to P6
     dtype=float,
 )
 
-PAPER_NOISE = Noise(encoder_mm=0.01, gauge_mm=0.01)
+PAPER_NOISE = Noise(encoder=0.01, gauge_mm=0.01)
 PAPER_TOLERANCES = Tolerances({"S": 7.0, "B": 7.0, "l": 7.0})
 
 STAGES = 8

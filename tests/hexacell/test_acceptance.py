@@ -173,7 +173,7 @@ def test_no_redundancy_needs_a_person(judged):
 
 LARGE = DeviationStatistics(3.41, 10)
 SMALL = DeviationStatistics(0.010, 10)
-NOISE = Noise(encoder_mm=0.01, gauge_mm=0.01)
+NOISE = Noise(encoder=0.01, gauge_mm=0.01)
 
 
 @pytest.mark.parametrize(

@@ -45,7 +45,7 @@ def test_every_kind_that_hexacell_itself_announces() -> None:
         Group.CONTROLLERS: ("linuxcncrsh",),
         Group.THERMOMETERS: ("sysfs",),
         Group.CONFIG_FORMATS: ("toml",),
-        Group.MECHANISMS: ("gough-stewart", "hexaglide", "six-rails"),
+        Group.MECHANISMS: ("gough-stewart", "hexaglide", "rotary-cranks", "six-rails"),
     }
 
 

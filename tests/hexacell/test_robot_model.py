@@ -58,7 +58,7 @@ def test_the_bundled_cell_is_the_papers_simulated_robot(robot, paper):
         np.testing.assert_array_equal(geometry.vector, paper.nominal.vector)
     assert robot.branch == paper.branch
     assert robot.tolerances == Tolerances({"S": 7.0, "B": 7.0, "l": 7.0})
-    assert (robot.noise.encoder_mm, robot.noise.gauge_mm) == (0.01, 0.01)
+    assert (robot.noise.encoder, robot.noise.gauge_mm) == (0.01, 0.01)
 
 
 @pytest.fixture

@@ -30,7 +30,7 @@ class Story:
         pose: SixNumbers | None = None,
     ) -> events.Event:
         reading = events.Reading(
-            gauges_mm=deviation, spread_mm=NOTHING_IS_ZERO, joints_mm=(0.0,) * 6, answers=(), counts=()
+            gauges_mm=deviation, spread_mm=NOTHING_IS_ZERO, joints=(0.0,) * 6, answers=(), counts=()
         )
         where = self.arrived(orientation, pose).model_dump(exclude={"kind"})
         return events.RecordTaken(**where, reading=reading, deviation_mm=deviation)

@@ -61,7 +61,7 @@ def snapshot(stop_reason: str = "", **changes: dict[str, object]) -> LiveSnapsho
     return LiveSnapshot(
         gauges=gauges(**changes),
         encoders=EncoderSnapshot(
-            positions_mm=(-120.4531, 14.2187, 88.0021, 301.7745, -45.1002, 210.6654), age_s=0.1
+            positions=(-120.4531, 14.2187, 88.0021, 301.7745, -45.1002, 210.6654), age_s=0.1
         ),
         controller=ControllerSnapshot(estop=False, enabled=True, age_s=0.2),
         stop_reason=stop_reason,

@@ -9,11 +9,12 @@ from typing import Any
 
 from drivers.simulated.encoders.can_bus import SimulatedCanBus
 from drivers.simulated.encoders.node import SimulatedEncoder
-from drivers.simulated.encoders.object_dictionary import EVENTS_AND_SYNC, DeviceData, Vendor
+from drivers.simulated.encoders.object_dictionary import EVENTS_AND_SYNC, ROTARY, DeviceData, Vendor
 from drivers.simulated.served_device import Closeable, Switch
-from hexacell.cell.devices import EncoderSettings
+from hexacell.cell.devices import NM, EncoderSettings, RotaryEncoderSettings
 from hexacell.cell.simulation import FaultKind
 from hexacell.clock import CellClock
+from hexacell.kinematics.parameters import JointUnit
 
 Positions = Callable[[], Sequence[float]]
 
@@ -36,7 +37,7 @@ class SimulatedEncoderBank(Closeable):
         positions: Positions,
         clock: CellClock,
         latency_s: float = 0.0,
-        vendors: Sequence[Vendor] = (EVENTS_AND_SYNC,) * 6,
+        vendors: Sequence[Vendor] | None = None,
     ) -> None:
         self.channel = f"hexacell-encoders-{uuid.uuid4().hex}"
         self.bus = SimulatedCanBus(self.channel)
@@ -44,7 +45,8 @@ class SimulatedEncoderBank(Closeable):
         self._positions = positions
         self._clock = clock
         self._latency_s = latency_s
-        self._vendors = tuple(vendors)
+        usual = ROTARY if settings.unit is JointUnit.DEG else EVENTS_AND_SYNC
+        self._vendors = tuple(vendors or (usual,) * 6)
         serial_numbers = settings.serial_numbers or range(FIRST_SERIAL_NUMBER, FIRST_SERIAL_NUMBER + 6)
         self._encoders = tuple(
             self._make(leg, serial_number) for leg, serial_number in enumerate(serial_numbers, 1)
@@ -83,9 +85,10 @@ class SimulatedEncoderBank(Closeable):
 
     def _make(self, leg: int, serial_number: int) -> SimulatedEncoder:
         settings = self._settings
-        data = DeviceData(
-            settings.nodes[leg - 1], serial_number, round(settings.measuring_step_nm), settings.signed
-        )
+        step = round(settings.step / NM)
+        if isinstance(settings, RotaryEncoderSettings):
+            step = settings.counts_per_turn
+        data = DeviceData(settings.nodes[leg - 1], serial_number, step, settings.signed)
         return SimulatedEncoder(self.bus, self._vendors[leg - 1], data, self._clock.real_seconds)
 
     def _on_sync(self, _can_id: int, _data: bytearray, _timestamp: float) -> None:
@@ -106,10 +109,9 @@ class SimulatedEncoderBank(Closeable):
         for leg, (encoder, position) in enumerate(zip(self._encoders, positions, strict=True), 1):
             encoder.counts = self._counts(leg, position)
 
-    def _counts(self, leg: int, position_mm: float) -> int:
+    def _counts(self, leg: int, position: float) -> int:
         """The counts at a position; they wrap around at 32 bits."""
         settings = self._settings
-        step_mm = settings.measuring_step_nm * 1e-6
-        from_zero = (position_mm - settings.offset_mm[leg - 1]) * settings.direction[leg - 1]
-        counts = round(from_zero / step_mm) % _ALL_BITS
+        from_zero = (position - settings.offset[leg - 1]) * settings.direction[leg - 1]
+        counts = round(from_zero / settings.step) % _ALL_BITS
         return counts - _ALL_BITS if settings.signed and counts >= _ALL_BITS // 2 else counts

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from canopen.objectdictionary import ObjectDictionary, ODRecord, ODVariable
 from canopen.objectdictionary.datatypes import (
@@ -35,14 +35,22 @@ class Vendor:
     mapping_writable: bool = True
     magnets: int = 1
 
+    @property
+    def is_rotary(self) -> bool:
+        """Whether it measures angles."""
+        return self.device_type == MULTI_TURN
+
+
+MULTI_TURN = 0x0002_0196
+
 
 @dataclass(frozen=True, slots=True)
 class DeviceData:
-    """Serial number and settings of one device."""
+    """Serial number and settings of one device; ``step`` is nm a count, or counts a turn."""
 
     node: int
     serial_number: int
-    step_nm: int
+    step: int
     signed: bool
 
 
@@ -57,6 +65,9 @@ EVENTS_AND_SYNC = Vendor(
     ),
 )
 """TPDO1 on its event timer, TPDO2 with every SYNC."""
+
+ROTARY = replace(EVENTS_AND_SYNC, device_type=MULTI_TURN)
+"""The same of angles."""
 
 POSITION = 0x6004
 POSITION_OF_MAGNET = 0x6020
@@ -80,7 +91,7 @@ def build(vendor: Vendor, data: DeviceData) -> ObjectDictionary:
     """The object dictionary of a device after power-on."""
     dictionary = ObjectDictionary()  # type: ignore[no-untyped-call]
     position = INTEGER32 if data.signed else UNSIGNED32
-    rows = [*_communication(vendor, data.serial_number), *_profile(vendor, data.step_nm, position)]
+    rows = [*_communication(vendor, data.serial_number), *_profile(vendor, data.step, position)]
     for number, tpdo in enumerate(vendor.tpdos, 1):
         rows += _tpdo(number, tpdo, data.node)
     for row in rows:
@@ -100,7 +111,7 @@ def _communication(vendor: Vendor, serial_number: int) -> Iterator[_Row]:
     yield _Row(0x650B, 0, "serial number", UNSIGNED32, serial_number)
 
 
-def _profile(vendor: Vendor, step_nm: int, position: int) -> Iterator[_Row]:
+def _profile(vendor: Vendor, step: int, position: int) -> Iterator[_Row]:
     yield _Row(0x6000, 0, "operating parameters", UNSIGNED16, 0, "rw")
     if vendor.magnets == 1:
         yield _Row(POSITION, 0, "position", position, 0)
@@ -108,13 +119,15 @@ def _profile(vendor: Vendor, step_nm: int, position: int) -> Iterator[_Row]:
         yield _Row(POSITION_OF_MAGNET, 0, "number of magnets", UNSIGNED8, vendor.magnets)
         for magnet in range(1, vendor.magnets + 1):
             yield _Row(POSITION_OF_MAGNET, magnet, f"position of magnet {magnet}", position, 0)
-    if vendor.step_in_6005:
+    if vendor.is_rotary:
+        yield _Row(0x6001, 0, "measuring units per revolution", UNSIGNED32, step)
+    elif vendor.step_in_6005:
         yield _Row(0x6005, 0, "number of step settings", UNSIGNED8, 2)
-        yield _Row(0x6005, 1, "position step", UNSIGNED32, step_nm)
+        yield _Row(0x6005, 1, "position step", UNSIGNED32, step)
         yield _Row(0x6005, 2, "speed step", UNSIGNED32, 100)
     yield _Row(0x6030, 0, "number of speeds", UNSIGNED8, 1)
     yield _Row(0x6030, 1, "speed", INTEGER16, 0)
-    yield _Row(0x6501, 0, "measuring step", UNSIGNED32, step_nm)
+    yield _Row(0x6501, 0, "measuring step", UNSIGNED32, step)
     yield _Row(ALARMS, 0, "alarms", UNSIGNED16, 0)
     yield _Row(0x6504, 0, "supported alarms", UNSIGNED16, 1)
     yield _Row(0x6505, 0, "warnings", UNSIGNED16, 0)

@@ -80,7 +80,7 @@ class ApproachScatter:
         ball_mm: how far the ball is from its mean, as the gauges see it (root mean square distance).
         chi_square: of what the encoders do not explain, under the stated noise.
         source: what does not repeat; none where the stated noise explains everything.
-        excess_mm: one standard deviation of it beside the stated noise, of each slider or encoder or of
+        excess: one standard deviation of it beside the stated noise, of each slider or encoder or of
             the instrument.
     """
 
@@ -89,7 +89,7 @@ class ApproachScatter:
     ball_mm: float
     chi_square: float
     source: ScatterSource | None = None
-    excess_mm: float = 0.0
+    excess: float = 0.0
 
     @property
     def ratio(self) -> float:
@@ -103,7 +103,7 @@ class ApproachScatter:
 
 
 def approach_scatter(
-    deviations: Array, joints: Array, by_joints: Array, encoders_mm: Array, gauges_mm: Array
+    deviations: Array, joints: Array, by_joints: Array, encoders: Array, gauges_mm: Array
 ) -> ApproachScatter | None:
     """The scatter of visits of one pose; none with fewer than ``FEWEST_VISITS``.
 
@@ -111,13 +111,13 @@ def approach_scatter(
         deviations: of the ball along base x, y, z (m, 3), mm.
         joints: what the encoders showed (m, 6), mm.
         by_joints: derivative G (3, 6) of the ball's position by the joint variables.
-        encoders_mm: stated noise of each encoder (6,) in a record.
+        encoders: stated noise of each encoder (6,) in a record.
         gauges_mm: likewise of the gauges (3,).
     """
     if len(deviations) < FEWEST_VISITS:
         return None
     shown = np.concatenate([deviations, joints], axis=1)
-    visits = _Visits.of(shown, by_joints, np.diag(np.concatenate([gauges_mm, encoders_mm]) ** 2))
+    visits = _Visits.of(shown, by_joints, np.diag(np.concatenate([gauges_mm, encoders]) ** 2))
     freedom, chi_square = 3 * visits.freedom, visits.unexplained()
     found = ApproachScatter(len(deviations), freedom, visits.ball_mm, chi_square)
     if float(chdtrc(freedom, chi_square)) >= SIGNIFICANCE:

@@ -46,16 +46,16 @@ class ReadingNoise:
     """Noise of single readings of one instrument.
 
     Attributes:
-        sigma_mm: standard deviation of a reading about the line through the series, outliers left out.
+        sigma: standard deviation of a reading about the line through the series, outliers left out.
         degrees_of_freedom: of it.
-        drift_mm: change over the series, if it is significant; zero otherwise.
+        drift: change over the series, if it is significant; zero otherwise.
         outliers: readings that were left out.
         correlation: of successive readings, if it is significantly positive; zero otherwise.
     """
 
-    sigma_mm: float
+    sigma: float
     degrees_of_freedom: int
-    drift_mm: float
+    drift: float
     outliers: int
     correlation: float
 
@@ -68,12 +68,12 @@ class ReadingNoise:
         """Standard deviation, mm, of the mean of successive readings."""
         lags = np.arange(1, readings)
         related = 2.0 * np.sum((1.0 - lags / readings) * self.correlation**lags)
-        return float(self.sigma_mm * np.sqrt((1.0 + related) / readings))
+        return float(self.sigma * np.sqrt((1.0 + related) / readings))
 
-    def exceeds(self, stated_mm: float, readings: int, significance: float = SIGNIFICANCE) -> bool:
+    def exceeds(self, stated: float, readings: int, significance: float = SIGNIFICANCE) -> bool:
         """Whether the mean of successive readings is significantly noisier than stated (chi-square)."""
         freedom = self.degrees_of_freedom * (1.0 - self.correlation) / (1.0 + self.correlation)
-        most = stated_mm**2 * float(chdtri(freedom, significance)) / freedom
+        most = stated**2 * float(chdtri(freedom, significance)) / freedom
         return self.of_mean(readings) ** 2 > most
 
 

@@ -27,6 +27,7 @@ import numpy as np
 from hexacell.identification.solver.linearized_model import LinearizedModel
 from hexacell.identification.solver.measurement_model import record_weights
 from hexacell.identification.solver.result import Identification
+from hexacell.kinematics.parameters import JointUnit
 from hexacell.kinematics.rotations import Array
 
 MAX_STEPS = 60
@@ -41,7 +42,7 @@ MIN_CORRELATION = -0.9
 
 @dataclass(frozen=True, slots=True)
 class NoiseLevel:
-    """One kind of noise: standard deviations, mm, stated in the cell file and estimated from the residuals.
+    """One kind of noise: standard deviations, as stated in the cell file and as the residuals show them.
 
     ``at_most`` is an upper limit, two standard errors of the variance above the estimate.
     """
@@ -59,11 +60,12 @@ class NoiseLevel:
 
 @dataclass(frozen=True, slots=True)
 class NoiseLevels:
-    """The noise of encoders and gauges, and the correlation of the two estimates."""
+    """The noise of encoders, in ``joint_unit``, and of gauges, mm, and how the two estimates correlate."""
 
     encoder: NoiseLevel
     gauge: NoiseLevel
     correlation: float
+    joint_unit: JointUnit = JointUnit.MM
 
     @property
     def are_separable(self) -> bool:
@@ -74,7 +76,7 @@ class NoiseLevels:
 def noise_levels(found: Identification) -> NoiseLevels | None:
     """The noise levels from the residuals; None without redundancy."""
     noise = found.problem.noise
-    stated = np.array([noise.encoder_mm, noise.gauge_mm]) ** 2
+    stated = np.array([noise.encoder, noise.gauge_mm]) ** 2
     if _Equations.at(found, stated).redundancy < 1.0:
         return None
     variances = _solve(found, stated)
@@ -118,7 +120,7 @@ class _Equations:
         """At some variances (2,), mm^2, with the parameters refitted under them."""
         model = _refitted(found, variances)
         by_joints = found.prediction.by_joints
-        unit = replace(found.problem.noise, encoder_mm=1.0, gauge_mm=1.0)
+        unit = replace(found.problem.noise, encoder=1.0, gauge_mm=1.0)
         encoder = unit.encoder_covariance(by_joints)
         cofactors = (encoder, np.broadcast_to(unit.gauge_covariance, encoder.shape))
         scores = model.scores
@@ -146,6 +148,6 @@ class _Equations:
 def _refitted(found: Identification, variances: Array) -> LinearizedModel:
     """The linear model with the parameters that are best under some variances (2,), mm^2."""
     encoder, gauge = np.sqrt(variances).tolist()
-    noise = replace(found.problem.noise, encoder_mm=encoder, gauge_mm=gauge)
+    noise = replace(found.problem.noise, encoder=encoder, gauge_mm=gauge)
     reweighted = replace(found.prediction, weights=record_weights(found.prediction.by_joints, noise))
     return LinearizedModel.around(found.problem, reweighted, found.active_prior)

@@ -28,17 +28,17 @@ class Noise:
     """Standard deviations of the readings of a record and of the gauges' alignment and scale.
 
     Attributes:
-        encoder_mm: of an encoder; where they differ, the root mean square of all.
+        encoder: of an encoder; where they differ, the root mean square of all.
         gauge_mm: likewise of a gauge.
         alignment: of each component of a station's small rotation against the base, rad; zero if exact.
         gauge_scale: of each gauge's relative scale error; zero if exact.
-        encoder_shares: of each encoder, in units of ``encoder_mm``; empty where all are alike.
+        encoder_shares: of each encoder, in units of ``encoder``; empty where all are alike.
         gauge_shares: of each gauge, x, y, z, in units of ``gauge_mm``.
         gauge_axes: rows of the matrix whose columns are the gauges' directions in the frame convention;
             empty where all gauges are alike, or along its axes.
     """
 
-    encoder_mm: float
+    encoder: float
     gauge_mm: float
     alignment: float = 0.0
     gauge_scale: float = 0.0
@@ -46,14 +46,14 @@ class Noise:
     gauge_shares: tuple[float, ...] = ()
     gauge_axes: tuple[tuple[float, ...], ...] = ()
 
-    def with_devices(self, encoders_mm: Sequence[float], gauges_mm: Sequence[float]) -> Noise:
+    def with_devices(self, encoders: Sequence[float], gauges_mm: Sequence[float]) -> Noise:
         """The same with the noise of each encoder, and of the gauges x, y and z."""
-        encoder, gauge = (float(np.sqrt(np.mean(np.square(one)))) for one in (encoders_mm, gauges_mm))
+        encoder, gauge = (float(np.sqrt(np.mean(np.square(one)))) for one in (encoders, gauges_mm))
         return replace(
             self,
-            encoder_mm=encoder,
+            encoder=encoder,
             gauge_mm=gauge,
-            encoder_shares=tuple(mm / encoder for mm in encoders_mm),
+            encoder_shares=tuple(mm / encoder for mm in encoders),
             gauge_shares=tuple(mm / gauge for mm in gauges_mm),
         )
 
@@ -64,9 +64,9 @@ class Noise:
         return replace(self, gauge_axes=tuple(tuple(row) for row in gauges.tolist()))
 
     @property
-    def encoders_mm(self) -> Array:
+    def encoders(self) -> Array:
         """Of each encoder (6,)."""
-        return self.encoder_mm * np.array(self.encoder_shares or (1.0,) * LEGS)
+        return self.encoder * np.array(self.encoder_shares or (1.0,) * LEGS)
 
     @property
     def gauges_mm(self) -> Array:
@@ -75,7 +75,7 @@ class Noise:
 
     def encoder_covariance(self, position_by_joints: Array) -> Array:
         """Covariance (n, 3, 3), mm^2, of the ball's position by ``dP/dq`` (n, 3, 6)."""
-        scaled = position_by_joints * self.encoders_mm
+        scaled = position_by_joints * self.encoders
         covariance: Array = scaled @ np.swapaxes(scaled, -1, -2)
         return covariance
 

@@ -41,6 +41,7 @@ from hexacell.kinematics.mechanism import (
 from hexacell.kinematics.parameters import MachinePart, ParameterKind, ParameterSet, ParameterUnit
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.rotations import Array
+from hexacell.kinematics.turned_axes import turns_of
 
 SIX_RAILS_PARAMETERS = ParameterSet(
     (
@@ -159,7 +160,7 @@ class SixRails:
         """See :class:`~hexacell.kinematics.mechanism.Mechanism`."""
         return six_rails_geometry(
             (geometry["S"] - change.origin) @ change.base.T,
-            rail_turns(_directions(geometry["rail"]) @ change.base.T),
+            turns_of(_directions(geometry["rail"]) @ change.base.T),
             geometry["B"] @ change.platform.T,
             geometry["l"],
         )
@@ -201,16 +202,6 @@ def directions_of_rails(turns: Array) -> tuple[Array, Array]:
     by_a = np.stack([a * b * change, -sine - a * a * change, -a * sine], axis=-1)
     by_b = np.stack([sine + b * b * change, -a * b * change, -b * sine], axis=-1)
     return directions, np.stack([by_a, by_b], axis=-1)
-
-
-def rail_turns(directions: Array) -> Array:
-    """The turns (..., 2), rad, of rails along unit vectors (..., 3); of -z that about x."""
-    x, y, z = np.moveaxis(directions, -1, 0)
-    across = np.hypot(x, y)
-    is_vertical = across < SMALL
-    factor = np.where(is_vertical, 1.0, np.arctan2(across, z) / np.where(is_vertical, 1.0, across))
-    a = np.where(is_vertical & (z < 0.0), np.pi, -y * factor)
-    return np.stack([a, x * factor], axis=-1)
 
 
 def _directions(turns: Array) -> Array:

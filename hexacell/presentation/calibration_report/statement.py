@@ -10,7 +10,7 @@ from hexacell.application.reported_run import ReportedRun
 from hexacell.campaign.teaching import TaskDisplacement
 from hexacell.decision import Verdict
 from hexacell.presentation.calibration_report.blocks import Block, Chapter, Facts, Paragraph, Table, Tone
-from hexacell.presentation.length import NOT_CHECKED, scale_lines
+from hexacell.presentation.length import not_checked, scale_lines
 from hexacell.presentation.teaching import teaching_sentence
 from hexacell.reporting.model_evidence import ModelTest
 from hexacell.reporting.verification import JudgedError, VerifiedAccuracy
@@ -150,7 +150,7 @@ def scope_sentences(accuracy: VerifiedAccuracy | None) -> str:
     if accuracy is None:
         return "Nothing is stated of errors at the task."
     where = "the task poses of the cell file" if accuracy.task_named else "poses across the workspace"
-    scale = " ".join(scale_lines(accuracy.length)) or NOT_CHECKED
+    scale = " ".join(scale_lines(accuracy.length, accuracy.scale_of)) or not_checked(accuracy.scale_of)
     return (
         f"This holds at {where}, at the time and under the conditions below, after the best choice of "
         f"frames that can be taught. {scale}"

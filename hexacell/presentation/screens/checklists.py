@@ -33,7 +33,7 @@ def live_items(live: LiveSnapshot | None) -> tuple[ChecklistItem, ...]:
         _device(f"gauge {one.name}", one.problem, "" if one.shown_mm is None else f"{one.shown_mm:+.3f} mm")
         for one in live.gauges
     ]
-    found = "" if live.encoders.positions_mm is None else "six positions"
+    found = "" if live.encoders.positions is None else "six positions"
     encoders = _device("encoders", live.encoders.problem, found)
     stop = ChecklistItem(Mark.DONE, "stop line", "motion is allowed")
     if live.stop_reason:

@@ -118,15 +118,15 @@ def _is_silent(age_s: float | None, later_s: float) -> bool:
 
 
 def encoder_line(encoders: EncoderSnapshot, later_s: float) -> DeviceLine:
-    """The six slider positions."""
+    """The six joint variables."""
     if encoders.problem:
         return DeviceLine("encoders", encoders.problem, Urgency.ALARM)
-    if encoders.positions_mm is None:
+    if encoders.positions is None:
         return DeviceLine("encoders", "no reading yet")
-    positions = " ".join(f"{one:+9.3f}" for one in encoders.positions_mm)
+    positions = " ".join(f"{one:+9.3f}" for one in encoders.positions)
     silent = _is_silent(encoders.age_s, later_s)
     age = f", {age_text(encoders.age_s, later_s)} ago" if silent else ""
-    return DeviceLine("encoders", f"{positions} mm{age}")
+    return DeviceLine("encoders", f"{positions} {encoders.unit}{age}")
 
 
 def controller_line(controller: ControllerSnapshot, later_s: float) -> DeviceLine:

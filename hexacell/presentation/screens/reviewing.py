@@ -8,7 +8,6 @@ from hexacell.acceptance import DeviationStatistics
 from hexacell.cell.model import CellSettings
 from hexacell.decision import Verdict
 from hexacell.presentation.events import event_text
-from hexacell.presentation.length import NOT_CHECKED
 from hexacell.presentation.screens.measuring import accuracy_plot
 from hexacell.presentation.screens.parameters import PARAMETER_COLUMNS, parameter_lines
 from hexacell.presentation.screens.questions import approval_refusal
@@ -58,7 +57,7 @@ def _verdict(state: RunState) -> tuple[str, Urgency]:
 def _scope(state: RunState) -> tuple[str, ...]:
     """What the verdict holds for; the verdict itself is said above."""
     if state.judged is None:
-        return (NOT_CHECKED,) if state.identified else ()
+        return ("The length scale was not checked.",) if state.identified else ()
     lines = (event_text(state.judged, state) or "").splitlines()
     kept = [line.removeprefix("  ") for line in lines if not line.startswith("verdict: ")]
     return tuple(kept or [state.judged.line])

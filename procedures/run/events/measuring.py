@@ -5,11 +5,16 @@ Readings are raw and depend on no geometry: encoder counts, gauge answers, and t
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Annotated, Literal
+
+from pydantic import AliasChoices, Field
 
 from hexacell.campaign.measured_noise import MeasuredNoise
 from hexacell.cell.fields import Frozen
 from procedures.run.steps import SetKey, SixNumbers, ThreeNumbers
+
+Joints = Annotated[SixNumbers, Field(validation_alias=AliasChoices("joints", "joints_mm"))]
+"""The six joint variables, mm or deg; up to version 11 a journal had another name for them."""
 
 
 class Arrived(Frozen):
@@ -47,8 +52,8 @@ class Located(Frozen):
 
     kind: Literal["located"] = "located"
     pose: SixNumbers
-    joints_mm: SixNumbers | None = None
-    encoders_mm: SixNumbers | None = None
+    joints: SixNumbers | None = Field(None, validation_alias=AliasChoices("joints", "joints_mm"))
+    encoders: SixNumbers | None = Field(None, validation_alias=AliasChoices("encoders", "encoders_mm"))
 
 
 class GaugesPlaced(Frozen):
@@ -70,14 +75,14 @@ class Temperature(Frozen):
 class Reading(Frozen):
     """A settled window of readings.
 
-    ``gauges_mm`` and ``spread_mm`` are mean and range along base x, y, z; ``joints_mm`` the mean
-    slider positions. ``answers`` and ``counts`` are the raw readings behind them, in the order taken.
+    ``gauges_mm`` and ``spread_mm`` are mean and range along base x, y, z; ``joints`` the mean
+    joint variables. ``answers`` and ``counts`` are the raw readings behind them, in the order taken.
     ``temperatures`` are those of the cell's thermometers just afterwards.
     """
 
     gauges_mm: ThreeNumbers
     spread_mm: ThreeNumbers
-    joints_mm: SixNumbers
+    joints: Joints
     answers: tuple[tuple[str, ...], ...]
     counts: tuple[tuple[int, ...], ...]
     temperatures: tuple[Temperature, ...] = ()
@@ -127,14 +132,14 @@ class ReferenceConfirmed(Frozen):
 class StandstillRead(Frozen):
     """The devices were read again and again at a reference while nothing moved.
 
-    ``gauges_mm`` along base x, y, z and ``joints_mm`` have an entry for each reading, ``answers`` and
+    ``gauges_mm`` along base x, y, z and ``joints`` have an entry for each reading, ``answers`` and
     ``counts`` are the raw readings behind them.
     """
 
     kind: Literal["stood"] = "stood"
     at: SetKey
     gauges_mm: tuple[ThreeNumbers, ...]
-    joints_mm: tuple[SixNumbers, ...]
+    joints: tuple[SixNumbers, ...] = Field(validation_alias=AliasChoices("joints", "joints_mm"))
     answers: tuple[tuple[str, ...], ...]
     counts: tuple[tuple[int, ...], ...]
 

@@ -61,7 +61,7 @@ def test_without_effects_the_machine_goes_where_the_product_says(own):
 
 
 def test_without_effects_and_noise_records_are_those_of_a_virtual_robot(own):
-    noise = replace(own.robot.noise, encoder_mm=0.0, gauge_mm=0.0)
+    noise = replace(own.robot.noise, encoder=0.0, gauge_mm=0.0)
     robot = VirtualRobot(replace(own.robot, noise=noise), own.truth)
     records = world(own, Effect()).records(own.commands, own.robot.commanding).records
     for record in records:

@@ -106,7 +106,7 @@ class World:
         joints = stopped + self.effect.encoder_noise(stops)
         if self.is_noisy:
             shown = shown + noise.gauge_mm * random.standard_normal(shown.shape)
-            joints = joints + noise.encoder_mm * random.standard_normal(joints.shape)
+            joints = joints + noise.encoder * random.standard_normal(joints.shape)
         deviations = shown - shown[_firsts(stops.points)]
         return MeasurementSet(
             tuple(

@@ -12,7 +12,7 @@ import can
 import pytest
 
 from drivers.encoders.cia406 import Cia406Bank
-from hexacell.cell.devices import EncoderSettings
+from hexacell.cell.devices import LinearEncoderSettings
 from tests.waiting import until
 
 SYNC, NMT, EMERGENCY, SDO_ANSWER, SDO_REQUEST, HEARTBEAT = 0x80, 0x00, 0x80, 0x580, 0x600, 0x700
@@ -169,22 +169,22 @@ def raw() -> Iterator[RawBus]:
 
 
 @pytest.fixture
-def settings(raw: RawBus) -> EncoderSettings:
+def settings(raw: RawBus) -> LinearEncoderSettings:
     """Raw nodes send no heartbeat unless a test does."""
-    return EncoderSettings(
+    return LinearEncoderSettings(
         bus={"interface": "virtual", "channel": raw.channel}, heartbeat_ms=0, timeout_s=10.0
     )
 
 
 @pytest.fixture
-async def bank(settings: EncoderSettings) -> AsyncIterator[Cia406Bank]:
+async def bank(settings: LinearEncoderSettings) -> AsyncIterator[Cia406Bank]:
     bank = Cia406Bank(settings)
     yield bank
     await bank.close()
 
 
 @pytest.fixture
-async def short_timeout_bank(settings: EncoderSettings) -> AsyncIterator[Cia406Bank]:
+async def short_timeout_bank(settings: LinearEncoderSettings) -> AsyncIterator[Cia406Bank]:
     """A bank for tests in which a node is silent."""
     bank = Cia406Bank(settings.model_copy(update={"timeout_s": 1.0}))
     yield bank

@@ -7,8 +7,9 @@ import pytest
 
 from drivers.encoders.cia406 import Cia406Bank
 from drivers.errors import BusError, InvalidSampleError, SilentNodeError
-from hexacell.cell.devices import EncoderSettings
+from hexacell.cell.devices import LinearEncoderSettings, RotaryEncoderSettings
 from hexacell.errors import DeviceError
+from hexacell.kinematics.parameters import JointUnit
 
 DIALOGUE_WITH_NODE_4 = """
     8004                enter PRE-OPERATIONAL
@@ -245,7 +246,7 @@ async def test_an_invalid_response_is_an_error_that_names_the_leg(raw, bank):
 )
 async def test_a_bus_that_cannot_be_opened_is_reported_with_an_action(bus, words):
     with pytest.raises(BusError, match=words) as caught:
-        await Cia406Bank(EncoderSettings(bus=bus)).open()
+        await Cia406Bank(LinearEncoderSettings(bus=bus)).open()
     assert caught.value.action
 
 
@@ -263,3 +264,51 @@ async def test_bus_settings_are_passed_unchanged(raw, settings, monkeypatch):
     await bank.open()
     await bank.close()
     assert seen == stated
+
+
+def turned_into_rotary(raw, counts: int) -> None:
+    for node in raw.nodes.values():
+        node.objects[0x1000, 0] = (0x0002_0196).to_bytes(4, "little")
+        node.objects[0x6001, 0] = counts.to_bytes(4, "little")
+        del node.objects[0x6005, 1]
+
+
+def rotary_bank(raw, settings) -> Cia406Bank:
+    kept = settings.model_dump(exclude={"measuring_step_nm", "offset", "signed"})
+    return Cia406Bank(RotaryEncoderSettings(**kept, counts_per_turn=3600))
+
+
+async def test_encoders_of_angles_show_degrees(raw, settings):
+    turned_into_rotary(raw, 3600)
+    bank = rotary_bank(raw, settings)
+    identities = await bank.open()
+    try:
+        assert identities[0].description.startswith("CiA 406 absolute rotary encoder")
+        found = await bank.read()
+        assert found.unit is JointUnit.DEG
+        assert found.positions == pytest.approx([100.0 * leg for leg in range(1, 7)])
+    finally:
+        await bank.close()
+
+
+async def test_another_number_of_counts_a_turn_is_refused(raw, settings):
+    turned_into_rotary(raw, 4096)
+    with pytest.raises(DeviceError, match=r"leg 1.*has 4096 counts a turn, the cell file says 3600"):
+        await rotary_bank(raw, settings).open()
+
+
+async def test_counts_a_turn_may_be_kept_in_6501(raw, settings):
+    turned_into_rotary(raw, 3600)
+    for node in raw.nodes.values():
+        node.objects[0x6501, 0] = node.objects.pop((0x6001, 0))
+    bank = rotary_bank(raw, settings)
+    await bank.open()
+    await bank.close()
+
+
+async def test_an_encoder_of_lengths_is_none_of_angles_nor_the_other_way_round(raw, bank, settings):
+    with pytest.raises(DeviceError, match="is no absolute rotary encoder"):
+        await rotary_bank(raw, settings).open()
+    turned_into_rotary(raw, 3600)
+    with pytest.raises(DeviceError, match="is no absolute linear encoder"):
+        await bank.open()

@@ -45,7 +45,7 @@ async def test_counts_become_millimetres_by_direction_step_and_offset(raw, setti
             update={
                 "measuring_step_nm": 250.0,
                 "direction": (1, -1, 1, -1, 1, -1),
-                "offset_mm": (7.5, 0.0, -1.0, 0.0, 0.0, 100.0),
+                "offset": (7.5, 0.0, -1.0, 0.0, 0.0, 100.0),
             }
         )
     )
@@ -54,7 +54,7 @@ async def test_counts_become_millimetres_by_direction_step_and_offset(raw, setti
     await bank.close()
     assert found.counts == (0, 1, -1, 2**31 - 1, -(2**31), 400)
     expected = (7.5, -0.00025, -1.00025, -536870.91175, -536870.912, 99.9)
-    assert found.positions_mm == pytest.approx(expected, abs=1e-9)
+    assert found.positions == pytest.approx(expected, abs=1e-9)
 
 
 async def test_unsigned_positions_do_not_turn_negative(raw, settings):

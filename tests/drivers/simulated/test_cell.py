@@ -84,9 +84,9 @@ async def test_every_device_answers_and_the_robot_moves(bundled_cell) -> None:
     with serve(bundled_cell) as cell:
         async with drivers(cell.settings) as (gauges, encoders, controller):
             await controller.prepare(ALL)
-            before = (await encoders.read()).positions_mm
+            before = (await encoders.read()).positions
             await controller.move(target, MOVE_S)
-            after = (await encoders.read()).positions_mm
+            after = (await encoders.read()).positions
             readings = [(await gauge.read()).value_mm for gauge in gauges]
             seen = [cell.physics.gauge_displacement(axis) for axis in "xyz"]
             assert (await controller.pose()).as_tuple() == pytest.approx(target.as_tuple(), abs=1e-3)
@@ -99,10 +99,10 @@ async def test_a_target_out_of_reach_is_refused(bundled_cell) -> None:
     with serve(bundled_cell) as cell:
         async with drivers(cell.settings) as (_, encoders, controller):
             await controller.prepare(ALL)
-            before = (await encoders.read()).positions_mm
+            before = (await encoders.read()).positions
             with pytest.raises(MoveRefused, match="kinematicsInverse"):
                 await controller.move(Pose(0.0, 0.0, 2000.0), MOVE_S)
-            assert (await encoders.read()).positions_mm == pytest.approx(before, abs=0.01)
+            assert (await encoders.read()).positions == pytest.approx(before, abs=0.01)
 
 
 async def test_a_cancelled_move_stops_the_robot_in_place(bundled_cell) -> None:

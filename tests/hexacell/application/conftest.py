@@ -30,9 +30,9 @@ from tests.small_cell import SMALL, changed, choose_among_few, history_until
 
 SERVED: dict[str, Any] = {
     "timing.clock_factor": 500.0,
-    "speed.joint_mm_s": 1000.0,
+    "speed.joint": 1000.0,
     "speed.edge_mm_s": 1000.0,
-    "speed.joint_at_gauges_mm_s": 1000.0,
+    "speed.joint_at_gauges": 1000.0,
     "speed.edge_at_gauges_mm_s": 1000.0,
     "encoders.timeout_s": 10.0,
     "encoders.heartbeat_ms": 10_000,

@@ -118,7 +118,7 @@ class Nights:
         reading = events.Reading(
             gauges_mm=record.deviation,
             spread_mm=(0.0, 0.0, 0.0),
-            joints_mm=record.joints,
+            joints=record.joints,
             answers=(),
             counts=((0,) * 6,),
             temperatures=tuple(events.Temperature(name=n, celsius=c) for n, c in self.celsius.items()),

@@ -82,7 +82,7 @@ def test_the_first_event_has_the_inputs_of_the_run(finished) -> None:
 def test_raw_readings_are_what_the_devices_sent(finished) -> None:
     samples = fold(finished.history).samples(Phase.IDENTIFY)
     for sample in samples:
-        assert np.mean(sample.reading.counts, axis=0) * 0.001 == pytest.approx(sample.reading.joints_mm)
+        assert np.mean(sample.reading.counts, axis=0) * 0.001 == pytest.approx(sample.reading.joints)
         assert all(len(answer) == 3 and all(answer) for answer in sample.reading.answers)
 
 

@@ -53,7 +53,7 @@ async def test_a_pose_of_home_after_a_failed_kinematics_is_not_believed(make_sit
     site.simulated.faults.clear("forward kinematics", "controller")
     assert (await site.calibrate(resume=True)).exit_code == ExitCode.DONE
     located = site.happened(events.Located)[-1]
-    assert located.joints_mm == pytest.approx(located.encoders_mm, abs=0.1)
+    assert located.joints == pytest.approx(located.encoders, abs=0.1)
 
 
 async def test_a_config_that_the_controller_does_not_run_is_found_before_the_first_move(make_site) -> None:
@@ -90,7 +90,7 @@ async def test_preflight_finds_it_once_the_controller_is_homed(make_site) -> Non
 async def test_preflight_names_an_encoder_that_the_controller_contradicts(make_site) -> None:
     site = make_site()
     cell = await homed(site)
-    wrong = changed(cell.settings, {"encoders.offset_mm": (0.0, 0.0, 0.0, -12.0, 0.0, 0.0)})
+    wrong = changed(cell.settings, {"encoders.offset": (0.0, 0.0, 0.0, -12.0, 0.0, 0.0)})
     cell = replace(cell, settings=wrong)
     with pytest.raises(GuardTripped, match=r"encoder 4: shows slider 4 at .* where the controller's pose"):
         await preflight(cell, Mode.OPTIMISE, unattended=True)

@@ -88,8 +88,8 @@ def test_a_folder_without_a_run_tells_nothing(tmp_path):
 
 
 def measured_noise(*gauges_mm: float) -> events.NoiseMeasured:
-    gauges = [InstrumentNoise(name="a gauge", stated_mm=0.01, record_mm=one) for one in gauges_mm]
-    encoder = InstrumentNoise(name="an encoder", stated_mm=0.01, record_mm=0.01)
+    gauges = [InstrumentNoise(name="a gauge", stated=0.01, record=one) for one in gauges_mm]
+    encoder = InstrumentNoise(name="an encoder", stated=0.01, record=0.01)
     noise = MeasuredNoise(gauges=tuple(gauges), encoders=(encoder,) * 6)
     return events.NoiseMeasured(at=SetKey(phase=Phase.IDENTIFY, point=1), noise=noise)
 

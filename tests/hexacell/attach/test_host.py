@@ -154,7 +154,7 @@ async def test_gauges_are_shown_while_they_are_placed(hosted) -> None:
             (axis, axis, "mm", "") for axis in "xyz"
         ]
         assert all(0.0 <= one.age_s < 60.0 and one.noise_mm < 0.01 for one in shown.gauges)
-        assert len(shown.encoders.positions_mm) == 6
+        assert len(shown.encoders.positions) == 6
         assert (shown.controller.estop, shown.controller.enabled) == (False, True)
         await client.connection.leave(keep_running=False)
         assert await run.serving is ExitCode.INTERRUPTED

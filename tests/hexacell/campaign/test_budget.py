@@ -52,7 +52,7 @@ def test_durations_of_a_cell(make_plan):
 def test_a_move_takes_as_long_as_its_largest_speeds_let_it(make_plan):
     slow, fast = (
         usual_move_seconds(
-            make_plan(speed__joint_at_gauges_mm_s=speed, speed__edge_at_gauges_mm_s=speed).settings
+            make_plan(speed__joint_at_gauges=speed, speed__edge_at_gauges_mm_s=speed).settings
         )
         for speed in (10.0, 40.0)
     )

@@ -41,7 +41,7 @@ def make_check(make_plan, paper) -> MakeCheck:
     def make(*, calibrated: bool = True, budget: int = 40, **changes: Any) -> Check:
         changes = {
             "identification__points": TWO_POINTS,
-            "noise__encoder_mm": 0.002,
+            "noise__encoder": 0.002,
             "noise__gauge_mm": 0.002,
         } | changes
         plan = make_plan(**changes)
@@ -126,7 +126,7 @@ def test_a_robot_that_was_hit_fails(make_check) -> None:
 
 
 def test_without_enough_records_it_is_not_evaluated_and_says_how_many_would_do(make_check) -> None:
-    check = make_check(noise__encoder_mm=0.01, noise__gauge_mm=0.01, budget=6)
+    check = make_check(noise__encoder=0.01, noise__gauge_mm=0.01, budget=6)
     state = carried_out(check, check.robot.commanding)
     stated = said(check, state.measurements)
     assert stated.records == 6

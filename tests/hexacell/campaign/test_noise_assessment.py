@@ -78,7 +78,7 @@ def readings(
 
 
 def records_of(measured: Any) -> np.ndarray:
-    return np.array([one.record_mm for one in (*measured.gauges, *measured.encoders)])
+    return np.array([one.record for one in (*measured.gauges, *measured.encoders)])
 
 
 def test_quiet_readings_do_not_replace_what_is_stated_for_records(plan) -> None:
@@ -88,7 +88,7 @@ def test_quiet_readings_do_not_replace_what_is_stated_for_records(plan) -> None:
     assert not measured.is_larger
     assert [one.name for one in measured.gauges] == ["gauge x", "gauge y", "gauge z"]
     assert [one.name for one in measured.encoders] == [f"encoder {leg}" for leg in range(1, 7)]
-    found = [one.reading_mm for one in (*measured.gauges, *measured.encoders)]
+    found = [one.reading for one in (*measured.gauges, *measured.encoders)]
     assert found == pytest.approx([QUIET] * 9, rel=0.4)
 
 
@@ -104,20 +104,20 @@ def test_one_noisy_instrument_is_named_and_counts_as_it_is(plan, row) -> None:
     assert records_of(measured) == pytest.approx(expected, rel=0.3)
     assert measured.is_larger
     noise = noise_of(with_measured_noise(plan.settings, measured))
-    assert np.concatenate([noise.gauges_mm, noise.encoders_mm]) == pytest.approx(records_of(measured))
+    assert np.concatenate([noise.gauges_mm, noise.encoders]) == pytest.approx(records_of(measured))
 
 
 def test_play_becomes_noise_of_the_encoders_and_the_repeatability_of_the_budget(plan) -> None:
     measured = assess_noise(plan, readings(plan, sliders=0.06))
     assert measured.approaches is not None
     assert measured.approaches.source is ScatterSource.SLIDERS
-    assert measured.approaches.excess_mm == pytest.approx(0.06, rel=0.4)
-    expected = np.hypot(STATED, measured.approaches.excess_mm)
+    assert measured.approaches.excess == pytest.approx(0.06, rel=0.4)
+    expected = np.hypot(STATED, measured.approaches.excess)
     assert records_of(measured)[3:] == pytest.approx(np.full(6, expected))
     assert records_of(measured)[:3] == pytest.approx(np.full(3, STATED))
     effects = stated_effects(with_measured_noise(plan.settings, measured))
     (line,) = (effect for effect in effects if effect.name == "repeatability of a slider")
-    assert line.size == pytest.approx(1e3 * measured.approaches.excess_mm)
+    assert line.size == pytest.approx(1e3 * measured.approaches.excess)
     assert line.source == "7 visits of the first reference"
     assert line.occurrence is Occurrence.STOPS_AT_WORK
 
@@ -127,7 +127,7 @@ def test_errors_of_the_encoders_are_noise_and_no_repeatability(plan) -> None:
     measured = assess_noise(plan, readings(plan, encoders=0.06))
     assert measured.approaches is not None
     assert measured.approaches.source is ScatterSource.ENCODERS
-    expected = np.hypot(STATED, measured.approaches.excess_mm)
+    expected = np.hypot(STATED, measured.approaches.excess)
     assert records_of(measured)[3:] == pytest.approx(np.full(6, expected))
     assert with_measured_noise(plan.settings, measured).uncertainty == plan.settings.uncertainty
 
@@ -177,7 +177,7 @@ def test_without_a_series_or_visits_what_is_stated_holds(plan) -> None:
     assert records_of(measured) == pytest.approx(np.full(9, STATED))
     assert measured.approaches is None
     assert measured.windows == 1
-    assert {one.reading_mm for one in measured.gauges} == {None}
+    assert {one.reading for one in measured.gauges} == {None}
 
 
 def test_the_part_of_the_encoders_and_the_rest_make_the_whole(plan) -> None:
@@ -187,7 +187,7 @@ def test_the_part_of_the_encoders_and_the_rest_make_the_whole(plan) -> None:
     assert whole is not None
     assert part is not None
     assert 0.5 * whole < part < whole
-    halved = forecaster.end_error(replace(noise, encoder_mm=0.5 * noise.encoder_mm))
+    halved = forecaster.end_error(replace(noise, encoder=0.5 * noise.encoder))
     assert halved is not None
     assert halved == pytest.approx(np.sqrt(whole**2 - 0.75 * part**2), rel=0.1)
 

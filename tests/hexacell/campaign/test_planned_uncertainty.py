@@ -29,7 +29,7 @@ def ordinary(make_plan):
 
 def test_exact_records_are_those_of_a_virtual_robot_without_errors_and_noise(make_plan) -> None:
     robot = make_plan().robot
-    silent = replace(robot, noise=replace(robot.noise, encoder_mm=0.0, gauge_mm=0.0))
+    silent = replace(robot, noise=replace(robot.noise, encoder=0.0, gauge_mm=0.0))
     commands = [Pose(100.0, -100.0, 500.0), Pose(101.0, -100.0, 499.0, 5.0, -8.0, 12.0)]
     virtual = VirtualRobot(silent, robot.commanding)
     measured = []

@@ -30,7 +30,7 @@ MakeQuick = Callable[..., QuickLevel]
 @pytest.fixture(scope="module")
 def make_quick(make_plan, paper) -> MakeQuick:
     def make(*, budget: int = 24, calibrated_mm: float = CALIBRATED_MM) -> QuickLevel:
-        plan = make_plan(noise__encoder_mm=0.002, noise__gauge_mm=0.002)
+        plan = make_plan(noise__encoder=0.002, noise__gauge_mm=0.002)
         normal, frames = plan.robot.mechanism.normalize_frames(paper.actual)
         robot = replace(plan.robot, controller=normal, frames=frames)
         covariance = calibrated_mm**2 * np.eye(len(robot.mechanism.parameters))

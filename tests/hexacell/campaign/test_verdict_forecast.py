@@ -70,7 +70,7 @@ class Cell:
         seen = actual.poses.positions
         seen = seen + noise.gauges_mm * random.standard_normal(seen.shape)
         deviations = seen - problem.per_record(seen[problem.first_rows])
-        joints = shown + noise.encoders_mm * random.standard_normal(shown.shape)
+        joints = shown + noise.encoders * random.standard_normal(shown.shape)
         return replace(problem, joints=joints, deviations=deviations)
 
 

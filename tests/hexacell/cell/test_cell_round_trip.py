@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from hexacell.cell import devices, limits, measuring, model, simulation
 from hexacell.cell.loader import describe, dump, schema
+from hexacell.cell.model import DEFAULT_MECHANISM
 
 finite = st.floats(allow_nan=False, allow_infinity=False)
 numbers = st.floats(-1e6, 1e6)
@@ -56,7 +57,7 @@ def _gauges(axes: tuple[str, ...]) -> st.SearchStrategy[tuple[Any, ...]]:
 cells = st.builds(
     MODEL,
     name=st.text(st.characters(categories=["L", "Nd"]), min_size=1, max_size=12),
-    robot=st.builds(ROBOT, mechanism=printable, nominal=geometries),
+    robot=st.builds(ROBOT, mechanism=st.just(DEFAULT_MECHANISM), nominal=geometries),
     controller=st.builds(
         devices.ControllerSettings,
         config=printable,
@@ -65,7 +66,7 @@ cells = st.builds(
     ),
     gauges=st.permutations("xyz").flatmap(lambda axes: _gauges(tuple(axes))),
     encoders=st.builds(
-        devices.EncoderSettings,
+        devices.LinearEncoderSettings,
         bus=st.none() | tables,
         nodes=st.permutations(range(1, 128)).map(lambda ids: tuple(ids[:6])),
         signed=st.booleans(),

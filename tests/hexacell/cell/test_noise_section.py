@@ -23,14 +23,14 @@ def test_a_cell_measures_its_noise_unless_it_says_otherwise(load_noise) -> None:
 
 def test_one_figure_is_that_of_all_instruments_of_a_kind(load_noise) -> None:
     noise = noise_of(load_noise("encoder_mm = 0.02\ngauge_mm = 0.005\n"))
-    assert noise.encoders_mm.tolist() == [0.02] * 6
+    assert noise.encoders.tolist() == [0.02] * 6
     assert noise.gauges_mm.tolist() == [0.005] * 3
 
 
 def test_each_instrument_may_have_its_own(load_noise) -> None:
     noise = noise_of(load_noise("gauges_mm = [0.01, 0.03, 0.01]\nencoder_mm = 0.02\n"))
     assert noise.gauges_mm.tolist() == pytest.approx([0.01, 0.03, 0.01])
-    assert noise.encoders_mm.tolist() == pytest.approx([0.02] * 6)
+    assert noise.encoders.tolist() == pytest.approx([0.02] * 6)
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ from typing import get_args
 import pytest
 
 from hexacell.cell.loader import describe
-from hexacell.cell.uncertainty import SIZES_OF_GRADES, Grade, UncertaintySettings
+from hexacell.cell.uncertainty import SIZES_OF_GRADES, Grade, RotaryUncertaintySettings, UncertaintySettings
 from hexacell.errors import FileError
 
 SECTION = '[uncertainty]\ngrade = "ideal"\n'
@@ -28,10 +28,19 @@ def test_a_cell_without_the_section_is_no_ideal_machine(load_section) -> None:
 
 @pytest.mark.parametrize("grade", get_args(Grade))
 def test_every_grade_is_told_and_only_states_sizes_that_exist(load_section, grade: Grade) -> None:
-    assert set(SIZES_OF_GRADES[grade]) <= SIZES
+    assert set(SIZES_OF_GRADES[grade]) <= SIZES | set(RotaryUncertaintySettings.model_fields)
     cell = load_section(f'[uncertainty]\ngrade = "{grade}"\n')
     stated = cell.settings.uncertainty
-    assert {key: getattr(stated, key) for key in SIZES_OF_GRADES[grade]} == SIZES_OF_GRADES[grade]
+    sizes = {key: size for key, size in SIZES_OF_GRADES[grade].items() if key in SIZES}
+    assert {key: getattr(stated, key) for key in sizes} == sizes
+
+
+def test_keys_of_before_there_were_mechanisms_without_sliders_are_read(load_section) -> None:
+    """Cells of old runs have them, in their journals too."""
+    lines = 'slider_repeatability_um = 4.5\nslider_repeatability_acts = "at work"\n'
+    stated = load_section(f"[uncertainty]\n{lines}").settings.uncertainty
+    assert (stated.stop_repeatability_um, stated.stop_repeatability_acts) == (4.5, "at work")
+    assert stated.source("stop_repeatability_um") == "cell file"
 
 
 def test_an_ideal_machine_has_no_effect_at_all(load_section) -> None:

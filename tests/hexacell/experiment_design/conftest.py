@@ -22,8 +22,8 @@ NOISE = Noise(0.01, 0.01)
 LIMITS = Limits(
     gauge_travel_mm=5.0,
     tilt=float(np.radians(45.0)),
-    joint_min_mm=-800.0,
-    joint_max_mm=800.0,
+    joint_min=-800.0,
+    joint_max=800.0,
     singularity_margin=0.05,
 )
 

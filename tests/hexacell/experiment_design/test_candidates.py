@@ -89,8 +89,8 @@ def test_some_poses_of_the_estimated_robot_have_no_command(know, much):
     "change",
     [
         {"tilt": 0.1},
-        {"joint_min_mm": -480.0},
-        {"joint_max_mm": 480.0},
+        {"joint_min": -480.0},
+        {"joint_max": 480.0},
         {"singularity_margin": 0.12},
     ],
 )

@@ -96,7 +96,7 @@ def test_with_almost_no_travel_there_is_no_record(found, belief):
 
 
 def test_where_no_pose_is_in_reach_there_is_no_record(found, belief):
-    stuck = replace(belief, limits=replace(LIMITS, joint_min_mm=0.0, joint_max_mm=1.0))
+    stuck = replace(belief, limits=replace(LIMITS, joint_min=0.0, joint_max=1.0))
     pairs = strongly_correlated(found)[:1]
     assert decorrelating_poses(stuck, found, pairs) == (None,)
 

@@ -243,7 +243,7 @@ def test_the_jacobian_of_the_record_is_that_of_the_forward_kinematics(stage, leg
     ("change", "message"),
     [
         ({"tilt": 1e-6}, "no orientation is within reach"),
-        ({"joint_max_mm": -100.0}, "no orientation is within reach"),
+        ({"joint_max": -100.0}, "no orientation is within reach"),
         ({"singularity_margin": 0.9}, "no orientation is within reach"),
         ({"gauge_travel_mm": 1e-3}, "no orientation surely keeps the ball inside"),
     ],

@@ -25,7 +25,7 @@ from hexacell.kinematics.rotations import Array
 from hexacell.robot_model import robot_of
 
 ROBOT = robot_of(load_cell(bundled_config("simulated-hexaglide")))
-TOLERANCES = AgreementTolerances(position_mm=0.01, encoders_mm=1.0)
+TOLERANCES = AgreementTolerances(position_mm=0.01, encoders=1.0)
 HOME = Pose(0.0, 0.0, 550.0)
 THERE = Pose(60.0, -80.0, 520.0, 20.0, -15.0, 30.0)
 
@@ -64,8 +64,8 @@ def test_the_pose_of_home_is_odd_where_joints_and_encoders_agree() -> None:
     assert found.odd is PositionSource.POSE
     assert not found.is_pose_near
     leg = found.leg - 1
-    assert found.by_pose_mm == pytest.approx(joints_at(HOME)[leg])
-    assert found.joint_mm == pytest.approx(joints_at(THERE)[leg], abs=1e-6)
+    assert found.by_pose == pytest.approx(joints_at(HOME)[leg])
+    assert found.joint == pytest.approx(joints_at(THERE)[leg], abs=1e-6)
 
 
 @pytest.mark.parametrize("name", ["S1x", "B4y", "l6"])
@@ -94,7 +94,7 @@ def test_an_encoder_that_contradicts_pose_and_joints_is_named(leg: int) -> None:
     assert found is not None
     assert found.odd is PositionSource.ENCODERS
     assert found.leg == leg
-    assert found.encoder_mm == encoders[leg - 1]
+    assert found.encoder == encoders[leg - 1]
 
 
 def test_joints_of_home_are_odd_where_pose_and_encoders_agree() -> None:
@@ -112,13 +112,13 @@ def test_where_no_two_agree_nothing_is_named() -> None:
 def test_without_joints_nothing_is_named() -> None:
     found = mismatch(reports(pose=HOME, joints=None))
     assert found is not None
-    assert (found.odd, found.joint_mm) == (None, None)
+    assert (found.odd, found.joint) == (None, None)
 
 
 def test_a_pose_out_of_reach_is_odd() -> None:
     found = mismatch(reports(pose=Pose(0.0, 0.0, 2000.0)))
     assert found is not None
-    assert (found.odd, found.by_pose_mm, found.is_pose_near) == (PositionSource.POSE, None, False)
+    assert (found.odd, found.by_pose, found.is_pose_near) == (PositionSource.POSE, None, False)
 
 
 def test_a_servo_that_trembles_by_its_tolerance_is_no_mismatch() -> None:

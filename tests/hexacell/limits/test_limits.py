@@ -58,7 +58,7 @@ def test_axes_are_limited_in_the_controllers_numbers():
 
 def test_joints_have_ranges_of_their_own():
     lowest = np.array([-800.0, -800.0, -800.0, -200.0, -200.0, -200.0])
-    limits = replace(LIMITS, joint_min_mm=lowest, joint_max_mm=-lowest[::-1])
+    limits = replace(LIMITS, joint_min=lowest, joint_max=-lowest[::-1])
     joints = np.array([[-300.0] * 3 + [300.0] * 3, [-300.0] * 3 + [-201.0] + [300.0] * 2, [np.nan] * 6])
     np.testing.assert_array_equal(limits.allow_joints(joints), [True, False, False])
     assert limits.joint_ranges[0] == (-800.0, 200.0)
@@ -79,4 +79,4 @@ def test_limits_stay_as_they_are_for_a_robot_within_them(paper, tilt):
     joints = Hexaglide().inverse(paper.nominal, paper.branch, here)
     widened = LIMITS.including(Hexaglide(), paper.nominal, here, here, joints)
     assert (widened.tilt, widened.turn) == (LIMITS.tilt, LIMITS.turn)
-    np.testing.assert_array_equal(widened.joint_min_mm, np.full(6, -800.0))
+    np.testing.assert_array_equal(widened.joint_min, np.full(6, -800.0))

@@ -19,7 +19,7 @@ from hexacell.robot_model import robot_of
 
 ROBOT = robot_of(load_cell(bundled_config("simulated-hexaglide")))
 LINES = LineDurations(Hexaglide(), ROBOT.controller, ROBOT.branch)
-LIMITS = SpeedLimits(joint_mm_s=20.0, edge_mm_s=30.0)
+LIMITS = SpeedLimits(joint=20.0, edge_mm_s=30.0)
 HOME = Pose(0.0, 0.0, 550.0)
 
 
@@ -41,7 +41,7 @@ def test_no_piece_of_a_line_is_passed_faster_than_allowed(end: Pose) -> None:
     duration_s = LINES.of(HOME, end, LIMITS)
     pieces = 24  # of the simulated controller; another number than the durations are found with
     joints, edge = passed(HOME, end, pieces)
-    assert joints.max() * pieces / duration_s <= LIMITS.joint_mm_s * (1.0 + 1e-6)
+    assert joints.max() * pieces / duration_s <= LIMITS.joint * (1.0 + 1e-6)
     assert edge.max() * pieces / duration_s <= LIMITS.edge_mm_s * (1.0 + 1e-6)
 
 
@@ -51,7 +51,7 @@ def test_the_fastest_piece_is_passed_as_fast_as_allowed(end: Pose) -> None:
     if duration_s == SHORTEST_S:
         return
     joints, edge = passed(HOME, end, 48)
-    share = np.maximum(joints / LIMITS.joint_mm_s, edge / LIMITS.edge_mm_s) * 48 / duration_s
+    share = np.maximum(joints / LIMITS.joint, edge / LIMITS.edge_mm_s) * 48 / duration_s
     assert share.max() == pytest.approx(1.0)
 
 
@@ -59,7 +59,7 @@ def test_a_tilt_about_the_ball_takes_time_although_the_ball_stays() -> None:
     """A feed rate would not see it: X, Y and Z do not change."""
     tilted = Pose(0.0, 0.0, 550.0, 30.0, 0.0, 0.0)
     radius_mm = np.linalg.norm(ROBOT.controller["B"], axis=1).max()
-    free = SpeedLimits(joint_mm_s=1e9, edge_mm_s=25.0)
+    free = SpeedLimits(joint=1e9, edge_mm_s=25.0)
     assert LINES.of(HOME, tilted, free) > 0.8 * radius_mm * np.radians(30.0) / 25.0
 
 

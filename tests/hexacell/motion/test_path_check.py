@@ -77,10 +77,10 @@ def test_a_singularity_between_two_samples_is_detected(exactly, start):
 
 def test_the_joint_range_is_checked_along_the_line(exactly):
     """Both ends are inside; in the middle, where the platform is highest, no slider is."""
-    tight = exactly(joint_min_mm=-480.0, joint_max_mm=480.0)
+    tight = exactly(joint_min=-480.0, joint_max=480.0)
     low, high = at(0, -50, 600), at(0, 60, 600)
     assert is_clear(exactly(), low, high)
-    ends_only = exactly(joint_min_mm=-520.0, joint_max_mm=520.0)
+    ends_only = exactly(joint_min=-520.0, joint_max=520.0)
     assert is_clear(ends_only, low, high)
     assert not is_clear(tight, at(0, 0, 600), at(0, 0, 480))
 
@@ -120,7 +120,7 @@ def test_the_travel_is_around_the_reference_given(exactly):
         ({"tilt": np.radians(20.0)}, (0, 0, 550, 19), (0, 0, 550, 21)),
         ({"turn": np.radians(20.0)}, (0, 0, 550, 0, 0, 19), (0, 0, 550, 0, 0, -21)),
         ({"axes": AxisLimits(highest=(50.0, *(np.inf,) * 5))}, (49, 0, 550), (51, 0, 550)),
-        ({"joint_max_mm": np.array([np.inf] * 5 + [530.0])}, (30, 0, 550), (60, 0, 550)),
+        ({"joint_max": np.array([np.inf] * 5 + [530.0])}, (30, 0, 550), (60, 0, 550)),
     ],
     ids=["tilt", "turn", "axis", "joint"],
 )

@@ -18,7 +18,7 @@ ZERO = (0.0, 0.0, 0.0)
 POINT = SetKey(phase=Phase.IDENTIFY, point=2)
 HELD_OUT = SetKey(phase=Phase.BEFORE, point=1)
 FORECAST = Forecast(now_mm=0.31, next_mm=0.29, end_mm=0.06, records=24, minutes=12.4)
-READING = events.Reading(gauges_mm=ZERO, spread_mm=ZERO, joints_mm=POSE, answers=(), counts=())
+READING = events.Reading(gauges_mm=ZERO, spread_mm=ZERO, joints=POSE, answers=(), counts=())
 
 
 def move(at: SetKey, orientation: int, forecast: Forecast | None = None) -> events.StepBegun:

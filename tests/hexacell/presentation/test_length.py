@@ -6,7 +6,7 @@ import pytest
 
 from hexacell.decision import Verdict
 from hexacell.kinematics.pose import Pose
-from hexacell.presentation.length import NOT_CHECKED, earlier_scale_line, length_text, scale_lines
+from hexacell.presentation.length import earlier_scale_line, length_text, not_checked, scale_lines
 from hexacell.presentation.run import question_text
 from hexacell.reporting.length_result import LengthResult, LengthSource
 from hexacell.reporting.length_statement import LengthStatement, length_line
@@ -61,9 +61,9 @@ def test_a_significant_scale_has_its_remedy(long_um_m: float, factor: str) -> No
 
 
 def test_what_was_not_checked_is_said_and_what_says_nothing_is_left_out() -> None:
-    assert scale_lines(None) == [NOT_CHECKED] == [earlier_scale_line(None)]
+    assert scale_lines(None) == [not_checked()] == [earlier_scale_line(None)]
     assert scale_lines(length_of(reason="the fixture moved")) == []
-    assert earlier_scale_line(length_of(reason="the fixture moved")) == NOT_CHECKED
+    assert earlier_scale_line(length_of(reason="the fixture moved")) == not_checked()
     assert earlier_scale_line(length_of()).endswith(
         "as checked in that run: encoders read 12 +- 20 um/m long"
     )

@@ -56,7 +56,7 @@ def test_what_the_devices_show() -> None:
                 name="w", axis="z", shown_mm=1.0, age_s=3.0, problem="gauge w: is silent", travel_mm=1
             ),
         ),
-        encoders=EncoderSnapshot(positions_mm=(1.0, -2.0, 3.5, 4.0, 5.0, 6.0), age_s=0.0),
+        encoders=EncoderSnapshot(positions=(1.0, -2.0, 3.5, 4.0, 5.0, 6.0), age_s=0.0),
         stop_reason="the stop file is there",
     )
     text = gauges_text(snapshot)

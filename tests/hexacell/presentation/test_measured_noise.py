@@ -17,7 +17,7 @@ from hexacell.presentation.measured_noise import measured_noise_text, noise_and_
 
 
 def instrument(name: str, **more: Any) -> InstrumentNoise:
-    usual = {"reading_mm": 0.001, "degrees_of_freedom": 38, "stated_mm": 0.01, "record_mm": 0.01}
+    usual = {"reading": 0.001, "degrees_of_freedom": 38, "stated": 0.01, "record": 0.01}
     return InstrumentNoise(name=name, **(usual | more))
 
 
@@ -32,9 +32,9 @@ def said(noise: MeasuredNoise) -> str:
     return " ".join(noise_and_averaging_text(noise).split())
 
 
-def visits(ratio: float, source: ScatterSource | None = None, excess_mm: float = 0.0) -> RepeatedApproaches:
+def visits(ratio: float, source: ScatterSource | None = None, excess: float = 0.0) -> RepeatedApproaches:
     return RepeatedApproaches(
-        visits=7, degrees_of_freedom=18, ball_mm=0.02, ratio=ratio, source=source, excess_mm=excess_mm
+        visits=7, degrees_of_freedom=18, ball_mm=0.02, ratio=ratio, source=source, excess=excess
     )
 
 
@@ -49,19 +49,19 @@ def test_a_quiet_cell_is_told_in_short() -> None:
 
 
 def test_the_ranges_of_unlike_instruments_are_told() -> None:
-    text = said(measured(instrument("gauge y", reading_mm=0.004, record_mm=0.02)))
+    text = said(measured(instrument("gauge y", reading=0.004, record=0.02)))
     assert "gauges 10 to 20, encoders 10 um a record" in text
     assert "readings at rest: gauges 1 to 4, encoders 1 um" in text
 
 
 def test_large_noise_is_told_in_whole_micrometres() -> None:
-    text = said(measured(instrument("gauge y", reading_mm=0.1234, record_mm=1.5)))
+    text = said(measured(instrument("gauge y", reading=0.1234, record=1.5)))
     assert "gauges 10 to 1500, encoders 10 um a record" in text
     assert "readings at rest: gauges 1 to 123, encoders 1 um" in text
 
 
 def test_without_a_series_no_readings_at_rest_are_told() -> None:
-    text = said(measured(instrument("gauge x", reading_mm=None)))
+    text = said(measured(instrument("gauge x", reading=None)))
     assert "at rest" not in text
 
 
@@ -69,23 +69,23 @@ def test_without_a_series_no_readings_at_rest_are_told() -> None:
     ("name", "action"), [("gauge y", "a loose clamp"), ("encoder 3", "its cable, its head and vibration")]
 )
 def test_a_noisy_instrument_is_named_with_what_to_do(name: str, action: str) -> None:
-    noisy = instrument(name, reading_mm=0.113, record_mm=0.045, is_noisier=True)
+    noisy = instrument(name, reading=0.113, record=0.045, is_noisier=True)
     text = said(measured(noisy))
     assert f"{name}: its readings scatter by 113 um without moving, more than the 10 um stated" in text
     assert "The run counts with 45 um." in text
     assert action in text
     assert "state it in [noise]" in text
-    assert "scatter by" not in said(measured(instrument(name, reading_mm=0.113)))
+    assert "scatter by" not in said(measured(instrument(name, reading=0.113)))
 
 
 def test_a_drift_is_told_where_it_matters() -> None:
     assert "gauge z: it drifted by -30 um within the series: let it warm up" in said(
-        measured(instrument("gauge z", drift_mm=-0.03))
+        measured(instrument("gauge z", drift=-0.03))
     )
     assert "encoder 2: it drifted by +30 um within the series: see whether it slides" in said(
-        measured(instrument("encoder 2", drift_mm=0.03))
+        measured(instrument("encoder 2", drift=0.03))
     )
-    assert "drifted" not in said(measured(instrument("gauge z", drift_mm=-0.002)))
+    assert "drifted" not in said(measured(instrument("gauge z", drift=-0.002)))
 
 
 def test_false_readings_are_told() -> None:

@@ -96,7 +96,7 @@ def test_a_plunger_is_shown_in_its_travel(place: float | None, bar: str) -> None
 
 
 def test_a_device_that_is_silent_gets_older_by_itself() -> None:
-    snapshot = LiveSnapshot(gauges=(gauge(),), encoders=EncoderSnapshot(positions_mm=(0.0,) * 6, age_s=0.1))
+    snapshot = LiveSnapshot(gauges=(gauge(),), encoders=EncoderSnapshot(positions=(0.0,) * 6, age_s=0.1))
     assert "0.1 s" in device_lines(live_view(snapshot))[0][0]
     lines = device_lines(live_view(snapshot, later_s=7.0))
     assert "7.1 s" in lines[0][0]

@@ -7,7 +7,7 @@ from datetime import UTC, datetime
 import pytest
 
 from hexacell.decision import Verdict
-from hexacell.presentation.length import NOT_CHECKED
+from hexacell.presentation.length import not_checked
 from hexacell.presentation.verification import check_start_text, check_text, verification_text
 from hexacell.reporting.check_result import CheckResult, ParameterChange, check_line
 from hexacell.reporting.model_evidence import ModelTest
@@ -58,7 +58,7 @@ def test_a_verdict_fits_six_lines_with_what_must_be_taught_anew() -> None:
         "  largest position error at 6 task poses: 0.036 mm, U 0.040 (limit 0.15)",
         "  largest orientation error there: 0.008 deg, U 0.007 (limit 0.05)",
         "  mean deviation at held-out poses 4.90 -> 0.030 mm",
-        f"  {NOT_CHECKED}",
+        f"  {not_checked()}",
     ]
 
 
@@ -94,7 +94,7 @@ def test_a_check_names_the_parameter_that_changed_most(
     lines = check_text(result(verdict, changes=changes)).splitlines()
     assert lines[0] == f"verdict: {verdict.value}"
     assert [line for line in lines if "changed" in line] == ([] if said is None else [said])
-    assert lines[-1] == f"  {NOT_CHECKED}"
+    assert lines[-1] == f"  {not_checked()}"
 
 
 @pytest.mark.parametrize(

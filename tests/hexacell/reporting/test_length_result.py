@@ -15,7 +15,7 @@ from hexacell.cell.uncertainty import UncertaintySettings
 from hexacell.decision import Verdict
 from hexacell.identification.estimator import identify
 from hexacell.measurements.records import MeasurementSet, joints_of
-from hexacell.presentation.length import NOT_CHECKED
+from hexacell.presentation.length import not_checked
 from hexacell.presentation.verification import verification_text
 from hexacell.reporting.length_result import LengthMeasurements, LengthResult, length_standard
 from hexacell.reporting.result import IdentificationResult
@@ -84,7 +84,7 @@ def test_encoders_that_are_long_pass_falsely_without_the_check_and_is_found_with
     """The error of 0.27 mm at the task is above the limit; no residual shows it."""
     blind, line = verified(LONG_UM_M, checked=False)
     assert blind.verdict is Verdict.PASS, line
-    assert NOT_CHECKED in verification_text(blind)
+    assert not_checked() in verification_text(blind)
     assert GUARD_BAND not in verification_text(blind)
     assert "guard band" not in line
     seen, line = verified(LONG_UM_M)
@@ -97,7 +97,7 @@ def test_encoders_that_are_long_pass_falsely_without_the_check_and_is_found_with
     assert ", guard band 1.5 U): conditional fail" in line
     said = verification_text(seen)
     assert GUARD_BAND in said
-    assert NOT_CHECKED not in said
+    assert not_checked() not in said
     assert f"length scale: checked over 300.000 mm: encoders read {length.long_um_m:.0f} +- " in said
     assert f"scale factor of all encoders by {length.factor:.6f}" in said.replace("\n  ", " ")
     assert max(map(len, said.splitlines())) <= 80

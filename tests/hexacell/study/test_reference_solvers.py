@@ -36,7 +36,7 @@ def test_pairs_are_of_one_point_and_each_once(visit, make_problem):
 
 def test_the_pairwise_minimum_is_the_unweighted_centred_one(noisy, make_problem, problem):
     """With no noise on the encoders all weights are equal, and centring is subtracting the mean."""
-    unweighted = make_problem(noisy, noise=Noise(encoder_mm=0.0, gauge_mm=0.01))
+    unweighted = make_problem(noisy, noise=Noise(encoder=0.0, gauge_mm=0.01))
     parameters = len(problem.prior.covariance)
     centred = levenberg_marquardt.solve(
         unweighted,

@@ -2,33 +2,42 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
+from hexacell.cell.loader import load_cell
+from hexacell.kinematics.forward import forward_kinematics
 from hexacell.kinematics.geometry import Geometry
+from hexacell.kinematics.mechanisms.gough_stewart import GoughStewart, gough_stewart_geometry
 from hexacell.kinematics.parameters import MachinePart
 from hexacell.kinematics.pose import Pose, PoseBatch
+from hexacell.robot_model import robot_of
 from hexacell.uncertainty.effects import Effect, Placement
-from hexacell.uncertainty.encoder_effects import encoder_scales, stop_repeatability
+from hexacell.uncertainty.encoder_effects import (
+    encoder_eccentricities,
+    encoder_scales,
+    stop_repeatability,
+)
 from hexacell.uncertainty.environment_effects import load_at_work, temperature_at_work
 from hexacell.uncertainty.guide_effects import common_sag, rail_directions, rail_waves
-from tests.hexacell.kinematics.mechanisms.gough_stewart import PARAMETERS, GoughStewart
 
 STEP_MM = 1e-4
+CONFIGS = Path(__file__).parents[3] / "configs"
 
 
 @pytest.fixture(scope="module")
 def hexapod() -> Placement:
     """A Gough-Stewart platform 420 mm above its base, tilted."""
     base, platform = np.radians([-50, 50, 70, 170, 190, 290]), np.radians([-10, 10, 110, 130, 230, 250])
-    values = {
-        "z": np.full(6, 500.0),
-        "A": np.stack([350 * np.cos(base), 350 * np.sin(base), np.zeros(6)], axis=1),
-        "B": np.stack([160 * np.cos(platform), 160 * np.sin(platform), np.full(6, -30.0)], axis=1),
-    }
-    geometry = Geometry.of(PARAMETERS, values)
+    geometry = gough_stewart_geometry(
+        base=np.stack([350 * np.cos(base), 350 * np.sin(base), np.zeros(6)], axis=1),
+        platform=np.stack([160 * np.cos(platform), 160 * np.sin(platform), np.full(6, -30.0)], axis=1),
+        offset=np.full(6, 500.0),
+    )
     poses = PoseBatch.of([Pose(0.0, 0.0, 420.0, 10.0, 5.0, 0.0), Pose(40.0, -30.0, 450.0, 0.0, -12.0, 8.0)])
-    joints = GoughStewart().inverse(geometry, (1, 1, 1, 1, 1, 1), poses)
+    joints = GoughStewart().inverse(geometry, (), poses)
     return Placement(GoughStewart(), geometry, poses, joints)
 
 
@@ -83,3 +92,23 @@ def test_legs_of_one_rail_are_beside_each_other_in_the_drawing(paper, hexaglide)
     for rail in hexaglide.guides(paper.nominal, poses, joints).rails:
         places = paper.nominal["S"][list(rail), 1:]
         assert places == pytest.approx(np.broadcast_to(places[0], places.shape))
+
+
+def test_a_disc_off_centre_errs_by_a_sine_over_the_turn() -> None:
+    """Of known phase it is a sum of its two causes; the pose follows the angle that is wrong by it."""
+    robot = robot_of(load_cell(CONFIGS / "rotary-cranks.toml"))
+    poses = PoseBatch.of([Pose(0.0, 0.0, 600.0, 10.0, 5.0, 0.0), Pose(40.0, -30.0, 560.0, 0.0, -12.0, 8.0)])
+    joints = robot.mechanism.inverse(robot.drawing, robot.branch, poses)
+    placement = Placement(robot.mechanism, robot.drawing, poses, joints)
+    found = columns(encoder_eccentricities(1.0), placement)
+    assert found.shape == (2, 6, 12)
+    amplitude, leg, phase = 0.01, 2, 0.7
+    share = np.sqrt(2.0) * amplitude / 1e-3 * np.array([np.cos(phase), np.sin(phase)])
+    predicted = found[..., [leg, 6 + leg]] @ share
+    wrong = joints.copy()
+    wrong[:, leg] += amplitude * np.cos(np.radians(joints[:, leg]) - phase)
+    moved = forward_kinematics(robot.mechanism, robot.drawing, wrong, poses)
+    assert moved.found.all()
+    np.testing.assert_allclose(
+        moved.poses.positions - poses.positions, predicted[:, :3], rtol=2e-3, atol=1e-5
+    )

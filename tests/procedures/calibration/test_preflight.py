@@ -33,7 +33,7 @@ async def test_every_point_out_of_reach_is_named_with_its_leg(make_rig) -> None:
 
 
 async def test_a_point_outside_the_joint_range_is_named_with_its_joint(make_rig) -> None:
-    found = await failures(make_rig(limits__joint_min_mm=-480.0, limits__joint_max_mm=480.0))
+    found = await failures(make_rig(limits__joint_min=-480.0, limits__joint_max=480.0))
     assert found
     own = (
         "mm, outside -480 to 200",

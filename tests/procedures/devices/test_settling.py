@@ -212,4 +212,4 @@ async def test_a_snapshot_contains_raw_answers_counts_and_positions(bench) -> No
     look = await read_all(bench.devices, bench.clock)
     assert [reading.raw for reading in look.gauges] == ["+0.000", "-1.250", "+0.000"]
     assert look.encoders.counts == (1, 0, 0, 0, 0, -2500)
-    assert look.encoders.positions_mm == (0.001, 0.0, 0.0, 0.0, 0.0, -2.5)
+    assert look.encoders.positions == (0.001, 0.0, 0.0, 0.0, 0.0, -2.5)

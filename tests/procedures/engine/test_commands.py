@@ -23,7 +23,7 @@ from tests.waiting import until
 
 P1 = SetKey(phase=Phase.IDENTIFY, point=1)
 READING = events.Reading(
-    gauges_mm=(0.0,) * 3, spread_mm=(0.0,) * 3, joints_mm=(0.0,) * 6, answers=(), counts=()
+    gauges_mm=(0.0,) * 3, spread_mm=(0.0,) * 3, joints=(0.0,) * 6, answers=(), counts=()
 )
 
 

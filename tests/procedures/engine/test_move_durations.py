@@ -62,7 +62,7 @@ def test_fixed_gauges_are_everywhere(make_rig: Any) -> None:
 
 
 async def test_a_move_with_gauges_at_the_ball_is_as_much_slower_as_stated(make_rig: Any) -> None:
-    rig = make_rig(stations__placement="by-hand", speed__joint_mm_s=40.0, speed__edge_mm_s=40.0)
+    rig = make_rig(stations__placement="by-hand", speed__joint=40.0, speed__edge_mm_s=40.0)
     back = Move(at=P1, orientation=1, pose=POSE)
     there = events.Arrived(at=P1, orientation=2, pose=NEXT)
     steps: list[tuple[Move, list[events.Event]]] = [
@@ -101,7 +101,7 @@ async def test_in_a_whole_run_no_slider_and_no_point_of_the_platform_is_faster_t
     rig.controller.machine = rig.machine
     await rig.run()
     speed = rig.cell.settings.speed
-    assert 0.9 * speed.joint_at_gauges_mm_s < fastest["joint"] < 1.01 * speed.joint_at_gauges_mm_s
+    assert 0.9 * speed.joint_at_gauges < fastest["joint"] < 1.01 * speed.joint_at_gauges
     assert fastest["edge"] < 1.1 * speed.edge_at_gauges_mm_s, "another geometry after the write-back"
     assert min(rig.controller.durations_s) >= SHORTEST_S
     assert isinstance(rig.machine._line, PoseBatch)

@@ -45,7 +45,7 @@ class Station:
 @pytest.fixture
 def station(make_rig) -> Station:
     """Its sliders show what they are told to, and its gauges may stand anywhere."""
-    return Station(make_rig(guards__following_mm=1e6, stations__mounting_mm=4.0))
+    return Station(make_rig(guards__following=1e6, stations__mounting_mm=4.0))
 
 
 @pytest.fixture
@@ -67,7 +67,7 @@ async def test_the_first_record_of_a_set_is_its_zero(station: Station) -> None:
     assert isinstance(event, events.RecordTaken)
     assert event.deviation_mm == (0.0, 0.0, 0.0)
     assert event.reading.gauges_mm == (-1.0, 2.0, 3.0)
-    assert event.reading.joints_mm == (1.0, 2.0, 3.0, 4.0, 5.0, 6.0)
+    assert event.reading.joints == (1.0, 2.0, 3.0, 4.0, 5.0, 6.0)
 
 
 async def test_later_records_are_differences_from_the_zero(station: Station, zeroed: RunState) -> None:

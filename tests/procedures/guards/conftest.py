@@ -190,7 +190,7 @@ class Scene:
 def scene(make_rig: Any) -> Callable[..., Scene]:
     def make(rig: Any = None, **changes: Any) -> Scene:
         slow = {"simulation__motion__minimum_s": 1.0, "guards__stale_s": GuardSettings().stale_s}
-        slow |= {"speed__joint_at_gauges_mm_s": 100.0, "speed__edge_at_gauges_mm_s": 100.0}
+        slow |= {"speed__joint_at_gauges": 100.0, "speed__edge_at_gauges_mm_s": 100.0}
         return Scene(rig or make_rig(**slow | changes))
 
     return make

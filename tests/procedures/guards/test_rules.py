@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from drivers.errors import GaugeAtEnd, GaugeSilent, WrongAnswer, ZeroVoid
 from drivers.interfaces import ControllerStatus, EncoderSample
 from hexacell.errors import DeviceError, ExitCode, LimitError
+from hexacell.kinematics.mechanisms.hexaglide import Hexaglide
 from hexacell.limits.gauge_travel import GaugeRoom
 from procedures.guards import rules
 from procedures.guards.polling import DevicePoller, GaugeDeviation, LineActivity, PolledDevices
@@ -156,7 +157,7 @@ def test_a_slider_that_moves_at_standstill_trips_the_following_guard(leg: int, w
     now[leg] += way
     snapshot = PolledDevices(encoders=sliders(tuple(now), (10.0,) * 6))
     assert rules.first_trip(snapshot, LIMITS) is None, "a robot that moves may"
-    trip = rules.first_trip(snapshot, GuardLimits(0.12, PLATE, rest_mm=1.0, joint="slider"))
+    trip = rules.first_trip(snapshot, GuardLimits(0.12, PLATE, 1.0, Hexaglide.words))
     if abs(now[leg] - 10.0) > 1.0:
         assert trip is not None
         assert (trip.guard, trip.device) == (Guard.FOLLOWING, f"slider {leg + 1}")
@@ -212,7 +213,7 @@ def test_a_slider_beyond_the_following_limit_is_named() -> None:
     sent = np.arange(6.0)
     assert rules.following_error(sent, sent + 1.0, 1.0) is None
     measured = sent + np.array([0.0, 0.5, 0.0, 0.0, -1.25, 1.0])
-    trip = rules.following_error(sent, measured, 1.0, "slider")
+    trip = rules.following_error(sent, measured, 1.0, Hexaglide.words)
     assert trip is not None
     assert (trip.guard, trip.device) == (Guard.FOLLOWING, "slider 5")
     assert "is -1.250 mm from its commanded position (limit 1 mm)" in trip.problem

@@ -77,7 +77,7 @@ def test_a_field_missing_in_the_recorded_event_is_no_difference() -> None:
     entry = decode(checked(line), Path("journal.jsonl"), 2)
     assert entry is not None
     reading = events.Reading(
-        gauges_mm=(0.0,) * 3, spread_mm=(0.0,) * 3, joints_mm=(0.0,) * 6, answers=(), counts=()
+        gauges_mm=(0.0,) * 3, spread_mm=(0.0,) * 3, joints=(0.0,) * 6, answers=(), counts=()
     )
     again = events.SetClosed(at=KEY, drift_mm=(0.0, 0.0, 0.0), reading=reading)
     assert changes(entry.event, again, 1e-9) == []

@@ -257,10 +257,10 @@ MANIPULATIONS: dict[str, tuple[type[Any], dict[str, Any], int, Scope, str]] = {
     "a gauge": (events.RecordTaken, {"reading.gauges_mm": (0.0,) * 3}, 3, Scope.RESULTS, "deviation_mm[0]"),
     "a slider": (
         events.RecordTaken,
-        {"reading.joints_mm": (0.0,) * 6},
+        {"reading.joints": (0.0,) * 6},
         3,
         Scope.RESULTS,
-        "reading.joints_mm",
+        "reading.joints",
     ),
     "an arrival": (events.Arrived, {"pose": (1.0,) * 6}, 2, Scope.RESULTS, "pose[0]"),
     "a drift": (events.SetClosed, {"drift_mm": (1.0,) * 3}, 2, Scope.RESULTS, "drift_mm[0]"),

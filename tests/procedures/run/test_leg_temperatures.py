@@ -20,7 +20,7 @@ def sample(**celsius: float | None) -> events.RecordTaken:
     reading = events.Reading(
         gauges_mm=(0.0,) * 3,
         spread_mm=(0.0,) * 3,
-        joints_mm=(0.0,) * 6,
+        joints=(0.0,) * 6,
         answers=(),
         counts=(),
         temperatures=tuple(events.Temperature(name=name, celsius=one) for name, one in celsius.items()),

@@ -91,7 +91,7 @@ def test_a_record_has_what_was_commanded_and_measured(story) -> None:
     sampled = story().sampled(2, (0.5, -0.5, 0.125))
     record = fold([story().sampled(), sampled]).measurements().records[1]
     assert record.pose.as_tuple() == sampled.pose
-    assert record.joints == sampled.reading.joints_mm
+    assert record.joints == sampled.reading.joints
     assert record.deviation == (0.5, -0.5, 0.125)
 
 

@@ -23,6 +23,7 @@ from hexacell.cell.recovery import Action, FailureKind
 from hexacell.decision import Verdict
 from hexacell.identification.diagnostics.approach_scatter import ScatterSource
 from hexacell.identification.solver.result import DataFaultKind
+from hexacell.kinematics.parameters import JointUnit
 from hexacell.reporting.model_evidence import ModelTest
 from hexacell.reporting.result import OutlierRecord
 from hexacell.reporting.verification import JudgedError, Verification, VerifiedAccuracy
@@ -119,7 +120,7 @@ reading = st.builds(
     events.Reading,
     gauges_mm=three,
     spread_mm=three,
-    joints_mm=six,
+    joints=six,
     answers=st.lists(st.tuples(text, text, text), max_size=2).map(tuple),
     counts=st.lists(st.tuples(*[st.integers()] * 6), max_size=2).map(tuple),
 )
@@ -171,12 +172,13 @@ outlier = st.builds(
 instrument = st.builds(
     InstrumentNoise,
     name=text,
-    reading_mm=st.none() | number,
+    unit=st.sampled_from(JointUnit),
+    reading=st.none() | number,
     degrees_of_freedom=count,
-    drift_mm=number,
-    stated_mm=number,
+    drift=number,
+    stated=number,
     is_noisier=st.booleans(),
-    record_mm=number,
+    record=number,
 )
 measured_noise = st.builds(
     MeasuredNoise,
@@ -190,7 +192,8 @@ measured_noise = st.builds(
         ball_mm=number,
         ratio=number,
         source=st.none() | st.sampled_from(ScatterSource),
-        excess_mm=number,
+        unit=st.sampled_from(JointUnit),
+        excess=number,
     ),
     windows=count,
     forecasts=st.lists(
@@ -215,7 +218,7 @@ some_event: st.SearchStrategy[Any] = st.one_of(
     ),
     st.builds(events.StepBegun, step=some_step),
     st.builds(events.Arrived, at=set_key, orientation=count, pose=six),
-    st.builds(events.Located, pose=six, joints_mm=st.none() | six, encoders_mm=st.none() | six),
+    st.builds(events.Located, pose=six, joints=st.none() | six, encoders=st.none() | six),
     st.builds(
         events.PoseExcluded,
         at=set_key,
@@ -236,7 +239,7 @@ some_event: st.SearchStrategy[Any] = st.one_of(
         events.StandstillRead,
         at=set_key,
         gauges_mm=st.lists(three, max_size=2).map(tuple),
-        joints_mm=st.lists(six, max_size=2).map(tuple),
+        joints=st.lists(six, max_size=2).map(tuple),
         answers=st.lists(st.tuples(text, text, text), max_size=2).map(tuple),
         counts=st.lists(st.tuples(*[st.integers()] * 6), max_size=2).map(tuple),
     ),

@@ -87,8 +87,8 @@ async def test_it_is_read_at_rest_left_in_all_directions_and_evaluated(asked: Ri
 async def test_the_quiet_simulation_is_as_noisy_as_stated(asked: Rig) -> None:
     found = (await measure_noise(asked)).noise
     assert not found.is_larger
-    assert {one.record_mm for one in (*found.gauges, *found.encoders)} == {0.0012}
-    readings = [one.reading_mm or 1.0 for one in (*found.gauges, *found.encoders)]
+    assert {one.record for one in (*found.gauges, *found.encoders)} == {0.0012}
+    readings = [one.reading or 1.0 for one in (*found.gauges, *found.encoders)]
     assert max(readings) < 0.0012
     assert found.approaches is not None
     assert found.approaches.visits == 7
@@ -114,10 +114,10 @@ async def test_a_drifting_gauge_is_named_and_is_no_noise(asked: Rig) -> None:
     shown = asked.gauges[2].shown
     asked.gauges[2].shown = lambda: shown() + 0.003 * asked.clock.now()
     found = await measure_noise(asked)
-    (drifting,) = (one for one in found.noise.gauges if one.drift_mm)
+    (drifting,) = (one for one in found.noise.gauges if one.drift)
     assert drifting.name == "gauge z"
     (series,) = happened(asked, events.StandstillRead)
-    assert drifting.drift_mm == pytest.approx(series.gauges_mm[-1][2] - series.gauges_mm[0][2], rel=0.2)
+    assert drifting.drift == pytest.approx(series.gauges_mm[-1][2] - series.gauges_mm[0][2], rel=0.2)
     assert not drifting.is_noisier
     text = event_text(found, RunState())
     assert text is not None
@@ -138,13 +138,13 @@ async def test_encoders_that_show_other_places_each_time_are_told(make_rig: Make
         await rig.run(moved, on(events.NoiseMeasured, lambda: rig.engine.command(Stop())))
     (found,) = happened(rig, events.NoiseMeasured)
     assert found.noise.approaches.source == "encoders"
-    assert found.noise.approaches.excess_mm == pytest.approx(0.03, rel=0.6)
+    assert found.noise.approaches.excess == pytest.approx(0.03, rel=0.6)
     text = event_text(found, RunState())
     assert text is not None
     assert "Look at reading heads" in " ".join(text.split())
     informed = rig.calibration.informed(fold(read_journal(rig.folder.journal)))
     assert informed.settings.uncertainty == rig.cell.settings.uncertainty
-    assert informed.robot.noise.encoders_mm == pytest.approx(np.full(6, 0.03), rel=0.6)
+    assert informed.robot.noise.encoders == pytest.approx(np.full(6, 0.03), rel=0.6)
     assert informed.robot.noise.gauges_mm == pytest.approx(np.full(3, 0.0012))
 
 
@@ -159,8 +159,8 @@ def on_every(kind: type[Any], action: Any) -> Any:
 AVERAGED = ASKED | {
     "noise__averaged_windows": 4,
     "simulation__gauges__flicker_mm": 0.01,
-    "simulation__encoders__flicker_mm": 0.01,
-    "noise__encoder_mm": 0.0045,
+    "simulation__encoders__flicker": 0.01,
+    "noise__encoder": 0.0045,
     "noise__gauge_mm": 0.0045,
 }
 
@@ -178,7 +178,7 @@ async def test_records_are_means_of_several_windows_where_that_is_allowed_and_pa
     state = fold(read_journal(rig.folder.journal))
     assert state.set(P1).samples[:2] == (zero, second)
     noise = rig.calibration.robot_of(state).noise
-    assert noise.encoder_mm < 0.85 * 0.0045
+    assert noise.encoder < 0.85 * 0.0045
 
 
 async def test_a_check_measures_the_noise_too(make_rig: MakeRig) -> None:

@@ -170,7 +170,7 @@ async def test_the_position_is_pose_and_joints_of_a_homed_machine(play):
     found = await driver.position()
     assert found is not None
     assert found.pose == Pose(5.0, 10.0, 555.0, 2.5, -2.0, 1.5)
-    assert found.joints_mm == (1.0, 2.0, 3.0, 4.0, 5.0, 6.0)
+    assert found.joints == (1.0, 2.0, 3.0, 4.0, 5.0, 6.0)
 
 
 async def test_before_a_joint_is_homed_there_is_no_position(play):

@@ -14,7 +14,7 @@ from drivers.encoders.cia406 import Cia406Bank
 from drivers.simulated.encoders.bank import SimulatedEncoderBank
 from drivers.simulated.serial_line import PtyLine, SerialLine, SocketLine
 from drivers.simulated.slcan import SlcanServer
-from hexacell.cell.devices import EncoderSettings
+from hexacell.cell.devices import LinearEncoderSettings
 from hexacell.clock import CellClock
 
 
@@ -48,13 +48,13 @@ def samples() -> Samples:
 
 
 @pytest.fixture
-def settings() -> EncoderSettings:
+def settings() -> LinearEncoderSettings:
     """The driver's time-outs are for silent nodes; a busy machine is not one."""
-    return EncoderSettings(timeout_s=10.0)
+    return LinearEncoderSettings(timeout_s=10.0)
 
 
 @pytest.fixture
-def make_bank(settings: EncoderSettings, samples: Samples) -> Iterator[MakeBank]:
+def make_bank(settings: LinearEncoderSettings, samples: Samples) -> Iterator[MakeBank]:
     """Start a simulated bank; ends with the test."""
     with ExitStack() as stack:
 

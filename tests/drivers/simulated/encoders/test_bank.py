@@ -65,9 +65,9 @@ async def test_every_vendor_is_configured_to_one_sample_per_sync(make_bank, driv
     "changes",
     [
         {"nodes": (11, 25, 3, 127, 64, 1)},
-        {"direction": (1, -1, 1, -1, 1, -1), "offset_mm": (500.0, -500.0, 0.0, 1.5, -2.25, 1000.0)},
+        {"direction": (1, -1, 1, -1, 1, -1), "offset": (500.0, -500.0, 0.0, 1.5, -2.25, 1000.0)},
         {"measuring_step_nm": 5000.0},
-        {"signed": False, "offset_mm": (-1000.0,) * 6},
+        {"signed": False, "offset": (-1000.0,) * 6},
         {"serial_numbers": (9, 8, 7, 6, 5, 4)},
     ],
 )
@@ -77,7 +77,7 @@ async def test_positions_come_back_within_half_a_step(make_bank, driver, setting
     simulated = make_bank(settings=changed, positions=lambda: positions)
     bank = driver(simulated.bus_settings, **changes)
     await bank.open()
-    found = (await bank.read()).positions_mm
+    found = (await bank.read()).positions
     assert found == pytest.approx(positions, abs=changed.measuring_step_nm * 0.5e-6 + 1e-9)
 
 
@@ -85,7 +85,7 @@ async def test_two_cells_in_one_process_have_separate_buses(make_bank, driver):
     banks = [driver(make_bank(positions=lambda mm=mm: [mm] * 6).bus_settings) for mm in (1.0, 2.0)]
     await asyncio.gather(*(bank.open() for bank in banks))
     rounds = await asyncio.gather(*(bank.read() for bank in banks for _ in range(10)))
-    assert [found.positions_mm[0] for found in rounds] == pytest.approx([1.0] * 10 + [2.0] * 10)
+    assert [found.positions[0] for found in rounds] == pytest.approx([1.0] * 10 + [2.0] * 10)
 
 
 async def test_latency_is_in_the_cells_time(make_bank, driver):

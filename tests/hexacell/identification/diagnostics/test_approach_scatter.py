@@ -55,7 +55,7 @@ def test_play_of_the_sliders_is_found_with_its_size(visit) -> None:
     found = [visit(sliders=0.05) for _ in range(100)]
     named = Counter(one.source for one in found)
     assert named[ScatterSource.SLIDERS] >= 95
-    sizes = [one.excess_mm for one in found if one.source is ScatterSource.SLIDERS]
+    sizes = [one.excess for one in found if one.source is ScatterSource.SLIDERS]
     assert np.median(sizes) == pytest.approx(0.05, rel=0.15)
 
 
@@ -71,7 +71,7 @@ def test_a_gauge_that_does_not_repeat_is_named_with_its_size(visit, gauges, sour
     found = [visit(gauges=gauges) for _ in range(60)]
     named = [one for one in found if one.source is source]
     assert len(named) >= 54
-    assert np.median([one.excess_mm for one in named]) == pytest.approx(max(gauges), rel=0.2)
+    assert np.median([one.excess for one in named]) == pytest.approx(max(gauges), rel=0.2)
 
 
 @pytest.mark.parametrize("stops", [0.0, 0.02])
@@ -81,7 +81,7 @@ def test_play_moves_the_ball_and_errors_of_encoders_do_not(visit, stops) -> None
         found = [visit(stops=stops, **{kind: 0.04}) for _ in range(60)]
         named = [one for one in found if one.source is source]
         assert len(named) >= 56
-        assert np.median([one.excess_mm for one in named]) == pytest.approx(0.04, rel=0.15)
+        assert np.median([one.excess for one in named]) == pytest.approx(0.04, rel=0.15)
 
 
 def test_one_encoder_is_named(visit) -> None:

@@ -42,12 +42,12 @@ def found():
 def test_the_variance_has_the_distribution_of_its_degrees_of_freedom(found) -> None:
     clean = [one for one in found if not one.outliers]
     assert {one.degrees_of_freedom for one in clean} == {READINGS - 2}
-    scaled = np.array([one.degrees_of_freedom * (one.sigma_mm / SIGMA) ** 2 for one in clean])
+    scaled = np.array([one.degrees_of_freedom * (one.sigma / SIGMA) ** 2 for one in clean])
     assert kstest(scaled, chi2(READINGS - 2).cdf).pvalue > 0.01
 
 
 def test_white_noise_shows_no_drift_and_no_outlier_and_hardly_a_correlation(found) -> None:
-    assert np.mean([one.drift_mm != 0.0 for one in found]) < 0.004
+    assert np.mean([one.drift != 0.0 for one in found]) < 0.004
     assert np.mean([one.outliers > 0 for one in found]) < 0.004
     assert np.mean([not one.are_independent for one in found]) < 0.02
 
@@ -62,9 +62,9 @@ def test_stated_noise_is_rarely_exceeded_and_twice_as_much_nearly_always(found, 
 def test_a_drift_is_found_and_is_not_in_the_noise() -> None:
     drift = np.linspace(0.0, 6.0 * SIGMA, READINGS)
     found = [reading_noise(white(seed) + drift, STEP) for seed in range(400)]
-    assert np.mean([one.drift_mm > 0.0 for one in found]) > 0.99
-    assert np.mean([one.drift_mm for one in found]) == pytest.approx(6.0 * SIGMA, rel=0.02)
-    assert np.sqrt(np.mean([one.sigma_mm**2 for one in found])) == pytest.approx(SIGMA, rel=0.02)
+    assert np.mean([one.drift > 0.0 for one in found]) > 0.99
+    assert np.mean([one.drift for one in found]) == pytest.approx(6.0 * SIGMA, rel=0.02)
+    assert np.sqrt(np.mean([one.sigma**2 for one in found])) == pytest.approx(SIGMA, rel=0.02)
 
 
 @pytest.mark.parametrize("row", [0, 17, READINGS - 1])
@@ -75,8 +75,8 @@ def test_a_false_reading_is_left_out(row) -> None:
     found = reading_noise(values, STEP)
     assert found.outliers == 1
     assert found.degrees_of_freedom == READINGS - 3
-    assert found.sigma_mm == pytest.approx(clean.sigma_mm, rel=0.03)
-    assert found.drift_mm == 0.0
+    assert found.sigma == pytest.approx(clean.sigma, rel=0.03)
+    assert found.drift == 0.0
 
 
 def test_two_false_readings_do_not_hide_each_other() -> None:
@@ -87,8 +87,8 @@ def test_two_false_readings_do_not_hide_each_other() -> None:
 
 def test_a_dead_still_series_has_the_noise_of_its_display() -> None:
     found = reading_noise(np.full(READINGS, 12.345), 1e-3)
-    assert found.sigma_mm == pytest.approx(1e-3 / np.sqrt(12.0))
-    assert (found.drift_mm, found.outliers, found.are_independent) == (0.0, 0, True)
+    assert found.sigma == pytest.approx(1e-3 / np.sqrt(12.0))
+    assert (found.drift, found.outliers, found.are_independent) == (0.0, 0, True)
 
 
 def test_the_last_digit_that_flickers_once_is_no_false_reading() -> None:
@@ -110,7 +110,7 @@ def test_the_mean_of_correlated_readings_is_as_noisy_as_drawn(correlation) -> No
 
 def test_the_mean_of_independent_readings_is_better_by_the_root_of_their_number(found) -> None:
     independent = next(one for one in found if one.are_independent)
-    assert independent.of_mean(16) == pytest.approx(independent.sigma_mm / 4.0)
+    assert independent.of_mean(16) == pytest.approx(independent.sigma / 4.0)
 
 
 def test_a_random_walk_has_the_largest_correlation() -> None:

@@ -25,12 +25,12 @@ def levels_in(found: Identification) -> NoiseLevels:
     return levels
 
 
-def with_noise(exact, encoder_mm, gauge_mm, seed):
+def with_noise(exact, encoder, gauge_mm, seed):
     random = np.random.default_rng(seed)
     records = [
         replace(
             record,
-            joints=tuple((record.joints + encoder_mm * random.standard_normal(6)).tolist()),
+            joints=tuple((record.joints + encoder * random.standard_normal(6)).tolist()),
             deviation=tuple((record.deviation + gauge_mm * random.standard_normal(3)).tolist()),
         )
         for record in exact.measured().records
@@ -40,18 +40,18 @@ def with_noise(exact, encoder_mm, gauge_mm, seed):
 
 @pytest.fixture(scope="module")
 def levels_of(visit, make_problem):
-    def found(encoder_mm, gauge_mm, seed=0, **how):
-        measured = with_noise(visit(seed=2, **how), encoder_mm, gauge_mm, seed)
+    def found(encoder, gauge_mm, seed=0, **how):
+        measured = with_noise(visit(seed=2, **how), encoder, gauge_mm, seed)
         return levels_in(identify(make_problem(measured), find_outliers=False))
 
     return found
 
 
-@pytest.mark.parametrize(("encoder_mm", "gauge_mm"), [(0.02, 0.01), (0.005, 0.02), (0.01, 0.01)])
-def test_levels_are_found_without_bias_and_with_their_standard_errors(levels_of, encoder_mm, gauge_mm):
-    found = [levels_of(encoder_mm, gauge_mm, seed) for seed in range(REPETITIONS)]
+@pytest.mark.parametrize(("encoder", "gauge_mm"), [(0.02, 0.01), (0.005, 0.02), (0.01, 0.01)])
+def test_levels_are_found_without_bias_and_with_their_standard_errors(levels_of, encoder, gauge_mm):
+    found = [levels_of(encoder, gauge_mm, seed) for seed in range(REPETITIONS)]
     for true, levels in (
-        (encoder_mm, [one.encoder for one in found]),
+        (encoder, [one.encoder for one in found]),
         (gauge_mm, [one.gauge for one in found]),
     ):
         variances = np.array([one.estimated for one in levels]) ** 2

@@ -9,7 +9,8 @@ import numpy as np
 
 from hexacell.cell.loader import load_cell
 from hexacell.conformance import MechanismConformance, MechanismExample
-from hexacell.kinematics.mechanisms.six_rails import SixRails, rail_turns, six_rails_geometry
+from hexacell.kinematics.mechanisms.six_rails import SixRails, six_rails_geometry
+from hexacell.kinematics.turned_axes import turns_of
 from hexacell.robot_model import robot_of
 
 CONFIGS = Path(__file__).parents[4] / "configs"
@@ -35,10 +36,14 @@ class TestVerticalRails(MechanismConformance):
     example = example_of("linapod")
 
 
+class TestRotaryCranks(MechanismConformance):
+    example = example_of("rotary-cranks")
+
+
 def with_rails(directions: np.ndarray) -> MechanismExample:
     """The Linapod with rails along other vectors (6, 3)."""
     vertical = example_of("linapod")
-    turns = rail_turns(directions / np.linalg.norm(directions, axis=1, keepdims=True))
+    turns = turns_of(directions / np.linalg.norm(directions, axis=1, keepdims=True))
     drawn = vertical.drawing
     drawing = six_rails_geometry(drawn["S"], turns, drawn["B"], drawn["l"])
     return replace(vertical, drawing=drawing, points=vertical.points * (1.0, 1.0, 0.3) + (0.0, 0.0, 150.0))

@@ -16,10 +16,10 @@ from hexacell.kinematics.mechanisms.six_rails import (
     SIX_RAILS_PARAMETERS,
     SixRails,
     directions_of_rails,
-    rail_turns,
     six_rails_geometry,
 )
 from hexacell.kinematics.pose import Pose, PoseBatch
+from hexacell.kinematics.turned_axes import turns_of
 
 STEP = 1e-30  # complex steps need no compromise between rounding and truncation
 MECHANISM = SixRails()
@@ -103,7 +103,7 @@ def test_a_direction_is_where_the_turn_puts_the_z_axis(a: float, b: float) -> No
 @given(turns, turns)
 def test_turns_are_found_from_directions(a: float, b: float) -> None:
     direction, _ = directions_of_rails(np.array([a, b]))
-    np.testing.assert_allclose(rail_turns(direction), [a, b], atol=1e-9)
+    np.testing.assert_allclose(turns_of(direction), [a, b], atol=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -153,7 +153,7 @@ def test_rail_1_and_slider_3_are_the_base_frame() -> None:
 
 def test_rails_that_count_the_opposite_way_are_refused() -> None:
     numbers = machine()
-    numbers["rail"][4] = rail_turns(-directions_of_rails(numbers["rail"][0])[0])
+    numbers["rail"][4] = turns_of(-directions_of_rails(numbers["rail"][0])[0])
     with pytest.raises(UsageError, match="a slider counts the opposite way of slider 1"):
         MECHANISM.normalize_frames(six_rails_geometry(**numbers))
 

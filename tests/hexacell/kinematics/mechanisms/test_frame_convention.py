@@ -10,10 +10,10 @@ from scipy.spatial.transform import Rotation
 
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import FrameTransform, Mechanism
+from hexacell.kinematics.mechanisms.gough_stewart import GoughStewart
 from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS, Hexaglide
 from hexacell.kinematics.pose import PoseBatch
 from hexacell.kinematics.sensitivity import pose_sensitivity
-from tests.hexacell.kinematics.mechanisms.gough_stewart import GoughStewart
 
 CONVENTION_MM = 1e-9
 place = st.floats(-500.0, 500.0)

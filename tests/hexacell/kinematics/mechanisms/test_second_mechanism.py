@@ -19,17 +19,24 @@ from hexacell.identification.problem.problem import Noise, Prior, Tolerances, bu
 from hexacell.kinematics.forward import continue_solution
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import Branch, FrameTransform, Mechanism
+from hexacell.kinematics.mechanisms.gough_stewart import (
+    GOUGH_STEWART_PARAMETERS as PARAMETERS,
+)
+from hexacell.kinematics.mechanisms.gough_stewart import (
+    THREE_LEGS_FRAME as CONVENTION,
+)
+from hexacell.kinematics.mechanisms.gough_stewart import GoughStewart, gough_stewart_geometry
 from hexacell.kinematics.parameters import ParameterKind, ParameterSet, ParameterUnit
 from hexacell.kinematics.pose import Pose, PoseBatch
 from hexacell.kinematics.rotations import Array
-from hexacell.kinematics.sensitivity import pose_sensitivity, singularity_margin
+from hexacell.kinematics.sensitivity import singularity_margin
 from hexacell.measurements.records import MeasurementSet, Record
 from hexacell.reporting.result import IdentificationResult
-from tests.hexacell.kinematics.mechanisms.gough_stewart import CONVENTION, PARAMETERS, GoughStewart
 
 MECHANISM: Mechanism = GoughStewart()
-BRANCH: Branch = (1, 1, 1, 1, 1, 1)
-TOLERANCES = Tolerances({"z": 1.0, "A": 2.0, "B": 2.0}, ball_mm=0.0)
+BRANCH: Branch = ()
+SIGNS = [1, 1, 1, 1, 1, 1]
+TOLERANCES = Tolerances({"base": 2.0, "platform": 2.0, "offset": 1.0}, ball_mm=0.0)
 
 
 def ring(radius: float, degrees: tuple[float, ...], height: float) -> Array:
@@ -43,7 +50,7 @@ def ring(radius: float, degrees: tuple[float, ...], height: float) -> Array:
 def drawing() -> Geometry:
     base = ring(350.0, (-50.0, 50.0, 70.0, 170.0, 190.0, 290.0), 0.0)
     platform = ring(160.0, (-10.0, 10.0, 110.0, 130.0, 230.0, 250.0), -30.0)
-    drawn = Geometry.of(PARAMETERS, {"z": np.full(6, 500.0), "A": base, "B": platform})
+    drawn = gough_stewart_geometry(base, platform, np.full(6, 500.0))
     return MECHANISM.normalize_frames(drawn)[0]
 
 
@@ -55,7 +62,7 @@ def truth(drawing: Geometry) -> Geometry:
 
 def poses(drawing: Geometry, random: np.random.Generator) -> Iterator[tuple[int, int, Pose]]:
     """Orientations about the middle of the workspace, clear of singularities."""
-    middle = drawing["A"].mean(axis=0) + np.array([0.0, 0.0, 420.0])
+    middle = drawing["base"].mean(axis=0) + np.array([0.0, 0.0, 420.0])
     for point, orientation in product(range(1, 6), range(1, 12)):
         shift = 60.0 * np.array([point % 3 - 1, point % 2, point - 3])
         while True:
@@ -85,29 +92,6 @@ def measurements(drawing: Geometry, truth: Geometry) -> MeasurementSet:
     return MeasurementSet(tuple(records))
 
 
-def test_derivatives_by_every_parameter(truth: Geometry) -> None:
-    """Implicit derivatives against differences of forward kinematics."""
-    start = PoseBatch.of([Pose(150.0, 120.0, 430.0, 8.0, -5.0, 11.0)])
-    joints = MECHANISM.inverse(truth, BRANCH, start)
-    found = pose_sensitivity(MECHANISM, truth, start, joints).parameters[0, :3]
-    step = 1e-4
-    for row in range(len(PARAMETERS)):
-        change = np.where(np.arange(len(PARAMETERS)) == row, step, 0.0)
-        ends = [
-            continue_solution(
-                MECHANISM,
-                Geometry(PARAMETERS, truth.vector + sign * change),
-                joints,
-                start=start,
-                start_geometry=truth,
-                start_joints=joints,
-            ).poses.positions[0]
-            for sign in (-1.0, 1.0)
-        ]
-        difference = (ends[1] - ends[0]) / (2.0 * step)
-        np.testing.assert_allclose(found[:, row], difference, atol=1e-6, err_msg=PARAMETERS.names[row])
-
-
 def test_a_second_mechanism_is_identified_from_exact_records(
     drawing: Geometry, truth: Geometry, measurements: MeasurementSet
 ) -> None:
@@ -124,7 +108,7 @@ def test_a_second_mechanism_is_identified_from_exact_records(
     assert found.undetermined == ()
     assert found.geometry.largest_difference(truth) < 1e-5
     document = IdentificationResult.of(found).document(PARAMETERS)
-    assert list(document["geometry"]) == ["z", "A", "B"]
+    assert list(document["geometry"]) == ["base", "platform", "offset"]
     assert [entry["name"] for entry in document["parameters"]] == list(PARAMETERS.names)
     assert np.array(document["covariance"]).shape == (42, 42)
 
@@ -148,7 +132,7 @@ def test_the_config_of_a_second_mechanism_is_read_and_rewritten(
 ) -> None:
     config = tmp_path / "robot.toml"
     lines = [f"{symbol} = {values}" for symbol, values in drawing.document().items()]
-    config.write_text("\n".join(["[geometry]", *lines, f"branch = {list(BRANCH)}", ""]))
+    config.write_text("\n".join(["[geometry]", *lines, ""]))
     kept = NativeToml(PARAMETERS)
     assert kept.read(config).geometry.largest_difference(drawing) == 0.0
     config.write_text(kept.rewrite(config.read_text(), truth))
@@ -157,23 +141,27 @@ def test_the_config_of_a_second_mechanism_is_read_and_rewritten(
 
 def test_missing_keys_are_named_by_the_mechanisms_own_symbols(tmp_path: Path) -> None:
     config = tmp_path / "robot.toml"
-    config.write_text("[geometry]\nz = [1.0, 1.0, 1.0, 1.0, 1.0, 1.0]\n")
-    with pytest.raises(
-        FileError, match=r"has no A.*needs z \(six numbers, mm\), A \(six rows of 3 numbers, mm"
-    ):
+    config.write_text("[geometry]\noffset = [1.0, 1.0, 1.0, 1.0, 1.0, 1.0]\n")
+    needed = r"needs base \(six rows of 3 numbers, mm\), platform \(.*\) and offset \(six numbers, mm\)"
+    with pytest.raises(FileError, match=rf"has no base.*{needed}"):
         NativeToml(PARAMETERS).read(config)
 
 
 def test_the_cell_file_has_the_keys_of_the_mechanism(drawing: Geometry) -> None:
     section = geometry_settings(PARAMETERS)
-    assert list(section.model_fields) == ["z", "A", "B"]
-    assert section.model_validate(drawing.document()).model_dump()["z"] == tuple(drawing["z"])
-    assert list(tolerance_settings(PARAMETERS)().model_dump()) == ["z_mm", "A_mm", "B_mm", "ball_mm"]
+    assert list(section.model_fields) == ["base", "platform", "offset"]
+    assert section.model_validate(drawing.document()).model_dump()["offset"] == tuple(drawing["offset"])
+    assert list(tolerance_settings(PARAMETERS)().model_dump()) == [
+        "base_mm",
+        "platform_mm",
+        "offset_mm",
+        "ball_mm",
+    ]
 
 
 def test_display_names_of_its_parameters() -> None:
-    assert CONVENTION.display_name("z4") == "leg 4 zero"
-    assert CONVENTION.display_name("B1z") == "B1/B2/B3 z"
+    assert CONVENTION.display_name("offset4") == "leg 4 offset"
+    assert CONVENTION.display_name("platform1z") == "platform1/platform3/platform5 z"
 
 
 RAILS = ParameterSet(
@@ -190,7 +178,7 @@ def test_a_unit_has_its_own_decimals_and_no_tolerance_by_default(tmp_path: Path)
     built = Geometry.of(RAILS, {"r": np.full((6, 2), 1.23456e-6), "l": np.full(6, 600.1234561)})
     config = tmp_path / "robot.toml"
     lines = [f"{symbol} = {values}" for symbol, values in drawn.document().items()]
-    config.write_text("\n".join(["[geometry]", *lines, f"branch = {list(BRANCH)}", ""]))
+    config.write_text("\n".join(["[geometry]", *lines, f"branch = {SIGNS}", ""]))
     config.write_text(NativeToml(RAILS).rewrite(config.read_text(), built))
     read = NativeToml(RAILS).read(config).geometry
     assert read["r"][2, 1] == 1.235e-6

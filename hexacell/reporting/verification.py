@@ -9,7 +9,7 @@ verdict on that error under the limit, which needs the evidence. See ``docs/meth
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -20,6 +20,7 @@ from hexacell.cell.fields import Frozen, SixNumbers
 from hexacell.cell.model import CellSettings
 from hexacell.decision import Verdict, decide, worst_verdict
 from hexacell.identification.diagnostics.model_tests import update
+from hexacell.identification.problem.problem import Noise
 from hexacell.identification.solver.result import Identification
 from hexacell.kinematics.mechanism import Mechanism
 from hexacell.kinematics.parameters import JointUnit
@@ -162,7 +163,7 @@ def verify(settings: CellSettings, robot: Robot, found: Identification, held_out
         tests = confirmed(tests, updated, np.isin(updated.problem.labels[:, 0], held_out.confirming.points))
     accuracy = verified_accuracy(settings, robot, found, updated, held_out.length)
     tests = (*tests, *_length_test(accuracy))
-    worse = is_worse(before, after, robot.noise)
+    worse = is_worse(before, after, _noise_in_mm(robot, updated))
     return Verification(
         verdict=_verdict(tests, accuracy, worse=worse),
         tests=tests,
@@ -244,6 +245,15 @@ def verified_accuracy(
         length=length,
         scale_of=VerifiedAccuracy.scale_with(robot.mechanism),
     )
+
+
+def _noise_in_mm(robot: Robot, updated: Identification) -> Noise:
+    """The noise of a record, that of encoders of angles as what it does to the ball."""
+    if robot.mechanism.words.joint_unit is JointUnit.MM:
+        return robot.noise
+    covariances = robot.noise.encoder_covariance(updated.prediction.by_joints)
+    of_ball = float(np.sqrt(np.mean(np.trace(covariances, axis1=1, axis2=2)) / 3.0))
+    return replace(robot.noise, encoder=of_ball)
 
 
 def _length_check(

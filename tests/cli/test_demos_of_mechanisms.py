@@ -10,7 +10,8 @@ import pytest
 from hexacell.cell.loader import load_cell
 from hexacell.robot_model import robot_of
 from procedures.run import events
-from tests.cli.conftest import Demo, run_command
+from tests.cli.commands import run_command
+from tests.cli.conftest import Demo
 
 NOT_THEIRS = re.compile(r".*\b(?:slider|rail|hexaglide)\w*.*", re.IGNORECASE)
 FREE = {"gough-stewart": 33, "linapod": 45, "rotary-cranks": 57}

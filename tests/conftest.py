@@ -57,6 +57,18 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
         terminalreporter.write_line(table(Case(*json.loads(str(entry))) for entry in entries))
 
 
+@pytest.fixture(scope="module")
+def postgresql() -> Iterator[str]:
+    """The address of an empty database of a real server; the tests are skipped where none is installed."""
+    from tests.hexacell.runs.postgresql_server import HOW_TO, installed_programs, running_server
+
+    programs = installed_programs()
+    if programs is None:
+        pytest.skip(HOW_TO)
+    with running_server(programs) as url:
+        yield url
+
+
 @pytest.fixture(autouse=True)
 def nothing_left_open() -> Iterator[None]:
     """Fail a test that leaves a thread, a file, a socket, a terminal or a blocked signal behind."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import shutil
 import socket
-from collections.abc import Iterator
 from datetime import UTC, datetime, timedelta
 
 import pytest
@@ -13,16 +12,6 @@ from hexacell.application.fleet import FleetCell
 from hexacell.presentation.fleet import fleet_text
 from hexacell.runs.archive import INDEX
 from hexacell.storage.cell_lock import cell_lock
-from tests.hexacell.runs.postgresql_server import HOW_TO, installed_programs, running_server
-
-
-@pytest.fixture(scope="module")
-def server() -> Iterator[str]:
-    programs = installed_programs()
-    if programs is None:
-        pytest.skip(HOW_TO)
-    with running_server(programs) as url:
-        yield url
 
 
 @pytest.fixture
@@ -40,19 +29,21 @@ def share(cell, url: str, name: str, further: str = "") -> None:
     cell.write_text(f'{text}\n[archive]\nurl = "{url}"\n{further}')
 
 
-def test_two_cells_on_two_computers(typed_here, server, demo, calibrated, cell_folder, monkeypatch) -> None:
+def test_two_cells_on_two_computers(
+    typed_here, postgresql, demo, calibrated, cell_folder, monkeypatch
+) -> None:
     text = calibrated.read_text().replace("[acceptance]\n", "[acceptance]\nvalid_days = 30\n", 1)
     calibrated.write_text(text)
-    share(calibrated, server, "cell A")
+    share(calibrated, postgresql, "cell A")
     (calibrated.parent / "runs" / "simulated-hexaglide").rename(calibrated.parent / "runs" / "cell A")
-    share(cell_folder.cell, server, "cell B")
-    assert "No cell has put" in typed_here("status", "--archive", server).out
+    share(cell_folder.cell, postgresql, "cell B")
+    assert "No cell has put" in typed_here("status", "--archive", postgresql).out
     for host, cell in (("east", calibrated), ("west", cell_folder.cell)):
         monkeypatch.setattr(socket, "gethostname", lambda host=host: host)
         assert typed_here("status", cell).code == 0
     monkeypatch.setattr(socket, "gethostname", lambda: "office")
 
-    outcome = typed_here("status", "--archive", server, "--json")
+    outcome = typed_here("status", "--archive", postgresql, "--json")
     assert outcome.code == 0, outcome.err
     first, second = outcome.document["cells"]
     accuracy = demo.outcome.document["verification"]["accuracy"]["position"]
@@ -72,7 +63,7 @@ def test_two_cells_on_two_computers(typed_here, server, demo, calibrated, cell_f
     assert lines[2] == f"  calibration due on {ended + timedelta(days=30):%Y-%m-%d}"
     assert max(map(len, lines)) <= 80
 
-    history = typed_here("history", "--archive", server, "--json")
+    history = typed_here("history", "--archive", postgresql, "--json")
     (run,) = history.document["runs"]
     assert (run["cell"], run["host"], run["run"], run["verdict"]) == (
         "cell A",
@@ -83,12 +74,13 @@ def test_two_cells_on_two_computers(typed_here, server, demo, calibrated, cell_f
     assert "cell A" in history.err
 
 
-def test_a_run_puts_its_cell_there(typed_here, server, quick_cell) -> None:
-    share(quick_cell.cell, server, "cell C")
+def test_a_run_puts_its_cell_there(typed_here, postgresql, quick_cell) -> None:
+    share(quick_cell.cell, postgresql, "cell C")
     with cell_lock(quick_cell.controller):
         assert typed_here("run", quick_cell.cell, "--unattended").code == 5
     found = {
-        one["name"]: one for one in typed_here("status", "--archive", server, "--json").document["cells"]
+        one["name"]: one
+        for one in typed_here("status", "--archive", postgresql, "--json").document["cells"]
     }
     assert found["cell C"]["cell"] == str(quick_cell.cell)
 

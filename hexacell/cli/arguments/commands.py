@@ -43,6 +43,21 @@ def add_cell(parser: Parser) -> None:
     parser.add_argument("cell", type=Path, metavar="CELL", help="the cell file (TOML)")
 
 
+def add_run(parser: Parser, what: str = "a run folder") -> None:
+    """Add the run."""
+    parser.add_argument("run", type=Path, metavar="RUN", help=what)
+
+
+def add_file(parser: Parser, option: str, what: str, *, is_required: bool = False) -> None:
+    """Add an option that names a file."""
+    parser.add_argument(option, type=Path, required=is_required, metavar="FILE", help=what)
+
+
+def add_archive(parser: Parser, what: str) -> None:
+    """Add the address of an archive that cells share."""
+    parser.add_argument("--archive", metavar="URL", help=what)
+
+
 def add_json(parser: Parser) -> None:
     """Add the choice of a JSON document."""
     parser.add_argument(

@@ -5,7 +5,15 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from hexacell.cli.arguments.commands import add_cell, add_command, add_json, add_parser, not_negative
+from hexacell.cli.arguments.commands import (
+    add_archive,
+    add_cell,
+    add_command,
+    add_file,
+    add_json,
+    add_parser,
+    not_negative,
+)
 
 
 def add_operation_commands(commands: Any) -> None:  # noqa: ANN401 - argparse's own type is private
@@ -48,9 +56,7 @@ def _schedule(commands: Any) -> None:  # noqa: ANN401
         help="how often, where a device or the lock is not there (default: %(default)s)",
     )
     parser.add_argument("--on-failure", metavar="UNIT", help="unit that systemd starts after a failure")
-    parser.add_argument(
-        "--metrics", type=Path, metavar="FILE", help="write metrics of the cell there after each run"
-    )
+    add_file(parser, "--metrics", "write metrics of the cell there after each run")
     parser.add_argument("--cron", action="store_true", help="print a crontab line instead")
     parser.add_argument("--folder", type=Path, metavar="FOLDER", help="where the units are, if elsewhere")
     add_json(parser)
@@ -61,12 +67,8 @@ def _status(commands: Any) -> None:  # noqa: ANN401
         commands, "status", "all cells at a glance: latest verdicts, what waits for a person"
     )
     parser.add_argument("cells", type=Path, nargs="*", metavar="CELL", help="cell files (TOML)")
-    parser.add_argument(
-        "--archive", metavar="URL", help="instead of cell files: all cells that share this archive"
-    )
-    parser.add_argument(
-        "--metrics", type=Path, metavar="FILE", help="write it as metrics for Prometheus' node exporter too"
-    )
+    add_archive(parser, "instead of cell files: all cells that share this archive")
+    add_file(parser, "--metrics", "write it as metrics for Prometheus' node exporter too")
     add_json(parser)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from hexacell.cli.arguments.commands import add_cell, add_command, add_json, not_negative
+from hexacell.cli.arguments.commands import add_cell, add_command, add_file, add_json, add_run, not_negative
 
 
 def add_record_commands(commands: Any) -> None:  # noqa: ANN401 - argparse's own type is private
@@ -18,9 +18,7 @@ def add_record_commands(commands: Any) -> None:  # noqa: ANN401 - argparse's own
 def _next(commands: Any) -> None:  # noqa: ANN401
     parser = add_command(commands, "next", "print the pose worth measuring next", "records.propose_next")
     add_cell(parser)
-    parser.add_argument(
-        "--measurements", type=Path, required=True, metavar="FILE", help="the records so far (CSV)"
-    )
+    add_file(parser, "--measurements", "the records so far (CSV)", is_required=True)
     parser.add_argument(
         "--refused",
         type=not_negative,
@@ -34,15 +32,13 @@ def _next(commands: Any) -> None:  # noqa: ANN401
 def _fit(commands: Any) -> None:  # noqa: ANN401
     parser = add_command(commands, "fit", "identify the geometry from a measurement file", "records.fit")
     add_cell(parser)
-    parser.add_argument(
-        "--measurements", type=Path, required=True, metavar="FILE", help="the records (CSV)"
-    )
+    add_file(parser, "--measurements", "the records (CSV)", is_required=True)
     add_json(parser)
 
 
 def _replay(commands: Any) -> None:  # noqa: ANN401
     parser = add_command(commands, "replay", "repeat a recorded run's decisions and results, and compare")
-    parser.add_argument("run", type=Path, metavar="RUN", help="a run folder, or a journal")
+    add_run(parser, "a run folder, or a journal")
     parser.add_argument(
         "--only",
         choices=("decisions", "results", "identification"),

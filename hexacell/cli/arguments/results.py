@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from hexacell.cli.arguments.commands import add_cell, add_command, add_json
+from hexacell.cli.arguments.commands import add_archive, add_cell, add_command, add_file, add_json, add_run
 
 
 def add_result_commands(commands: Any) -> None:  # noqa: ANN401 - argparse's own type is private
@@ -20,7 +20,7 @@ def _apply(commands: Any) -> None:  # noqa: ANN401
     parser = add_command(
         commands, "apply", "write the proposal of a run into the controller's config", "config.apply_run"
     )
-    parser.add_argument("run", type=Path, metavar="RUN", help="a run folder")
+    add_run(parser)
     add_json(parser)
 
 
@@ -52,7 +52,7 @@ def _history(commands: Any) -> None:  # noqa: ANN401
         "--compare",
         nargs=2,
         metavar=("RUN", "RUN"),
-        help="what changed from one calibration to another, parameter by parameter",
+        help="what changed from one run to another, parameter by parameter",
     )
     what.add_argument("--show", metavar="RUN", help="what happened in a run, and when")
     what.add_argument(
@@ -66,23 +66,20 @@ def _history(commands: Any) -> None:  # noqa: ANN401
     )
     what.add_argument("--drift", action="store_true", help="the trend of every parameter over all runs")
     parser.add_argument("--delete", action="store_true", help="with --keep: delete those")
-    parser.add_argument(
-        "--archive",
-        metavar="URL",
-        help="the index over the runs: postgresql://user@host/database (default: as [archive] has it)",
+    add_archive(
+        parser, "the index over the runs: postgresql://user@host/database (default: as [archive] has it)"
     )
     add_json(parser)
 
 
 def _report(commands: Any) -> None:  # noqa: ANN401
     parser = add_command(commands, "report", "write the report of a run: one file to read, print and file")
-    parser.add_argument("run", type=Path, metavar="RUN", help="a run folder")
-    parser.add_argument(
+    add_run(parser)
+    add_file(
+        parser,
         "--output",
-        type=Path,
-        metavar="FILE",
-        help="where to (default: report.html in the run folder); .pdf gives PDF/A, .xml a "
-        "Digital Calibration Certificate",
+        "where to (default: report.html in the run folder); .pdf gives PDF/A, .xml a Digital Calibration "
+        "Certificate",
     )
     parser.add_argument(
         "--compare", type=Path, metavar="RUN", help="say also what has changed since this run, a folder"

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from hexacell.cli.arguments.commands import add_cell, add_command, add_json, add_resume
+from hexacell.cli.arguments.commands import add_cell, add_command, add_file, add_json, add_resume
 
 
 def add_run_commands(commands: Any) -> None:  # noqa: ANN401 - argparse's own type is private
@@ -63,12 +63,7 @@ def _run(commands: Any) -> None:  # noqa: ANN401
         help="check the length scale before the verdict, with the fixture of [length_check]; a resumed run "
         "has it if it was begun with it",
     )
-    parser.add_argument(
-        "--events",
-        type=Path,
-        metavar="FILE",
-        help="write each event there, as a line of JSON, as it happens",
-    )
+    add_file(parser, "--events", "write each event there, as a line of JSON, as it happens")
     parser.add_argument(
         "--detachable",
         action="store_true",
@@ -117,12 +112,7 @@ def _simulate(commands: Any) -> None:  # noqa: ANN401
         commands, "simulate", "serve a simulated cell to other processes until interrupted"
     )
     add_cell(parser)
-    parser.add_argument(
-        "--output",
-        type=Path,
-        metavar="FILE",
-        help="write the cell file for `run` there instead of to stdout",
-    )
+    add_file(parser, "--output", "write the cell file for `run` there instead of to stdout")
 
 
 def _host(commands: Any) -> None:  # noqa: ANN401

@@ -11,6 +11,7 @@ from hexacell.application.telling_people import (
     tell_test,
     waiting_notices,
 )
+from hexacell.cell.loader import Cell
 from hexacell.cli.cell_argument import cell_at
 from hexacell.cli.console import Console
 from hexacell.errors import ExitCode, UsageError
@@ -26,16 +27,19 @@ def main(options: argparse.Namespace) -> ExitCode:
     """List, send what waits, or try everybody."""
     console = Console(options.json)
     cell = cell_at(options.cell, console)
-    settings = cell.settings.notifications
     if options.test:
-        if not settings:
-            raise UsageError(
-                "nobody is told of its runs", subject=cell.path, action="Write [[notifications]]"
-            )
-        return _told(tell_test(cell, notice_of_test(cell)), console)
-    if options.send:
-        return _told(send_waiting(cell), console)
-    waiting = waiting_notices(cell)
+        return _told(_tested(cell), console)
+    return _told(send_waiting(cell), console) if options.send else _list(cell, console)
+
+
+def _tested(cell: Cell) -> TellingOutcome:
+    if not cell.settings.notifications:
+        raise UsageError("nobody is told of its runs", subject=cell.path, action="Write [[notifications]]")
+    return tell_test(cell, notice_of_test(cell))
+
+
+def _list(cell: Cell, console: Console) -> ExitCode:
+    settings, waiting = cell.settings.notifications, waiting_notices(cell)
     console.document(notifications_document(settings, waiting))
     console.print(notifications_text(settings, waiting))
     return ExitCode.DONE

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Callable
 
 from hexacell.application.schedules import (
+    Schedule,
     ScheduleRequest,
     present_schedule,
     remove_schedule,
@@ -30,18 +32,19 @@ def main(options: argparse.Namespace) -> ExitCode:
     console = Console(options.json)
     cell = cell_at(options.cell, console)
     if options.show:
-        present = present_schedule(cell, options.folder)
-        console.document(schedule_document(present))
-        console.print(present_schedule_text(present))
+        _print(present_schedule(cell, options.folder), present_schedule_text, console)
     elif options.remove:
-        removed = remove_schedule(cell, options.folder)
-        console.document(schedule_document(removed))
-        console.print(removed_schedule_text(removed))
+        _print(remove_schedule(cell, options.folder), removed_schedule_text, console)
     elif options.daily is None:
         raise UsageError("the time of day is missing", action="Give --daily 02:30, --show or --remove")
     else:
         _write(cell, options, console)
     return ExitCode.DONE
+
+
+def _print(found: Schedule | None, text: Callable[[Schedule | None], str], console: Console) -> None:
+    console.document(schedule_document(found))
+    console.print(text(found))
 
 
 def _write(cell: Cell, options: argparse.Namespace, console: Console) -> None:

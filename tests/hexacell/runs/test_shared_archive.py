@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
 from pathlib import Path
-
-import pytest
 
 from hexacell.application.history import past_runs
 from hexacell.application.run_index import RunIndex
@@ -15,57 +12,47 @@ from hexacell.runs.archive import INDEX, Archive
 from hexacell.runs.archived_documents import DocumentKind, StampedDocument
 from hexacell.runs.run_folder import runs_folder
 from tests.hexacell.application.proposed_runs import a_cell, propose_run
-from tests.hexacell.runs.postgresql_server import HOW_TO, installed_programs, running_server
 
 SUMMARY = DocumentKind.SUMMARY
 
 
-@pytest.fixture(scope="module")
-def server() -> Iterator[str]:
-    programs = installed_programs()
-    if programs is None:
-        pytest.skip(HOW_TO)
-    with running_server(programs) as url:
-        yield url
-
-
-def test_cells_share_it_and_keep_apart(server, tmp_path) -> None:
+def test_cells_share_it_and_keep_apart(postgresql, tmp_path) -> None:
     documents = {}
     for name in ("one", "other"):
         (tmp_path / name).mkdir()
         documents[name] = {"a": StampedDocument(name, bytes(range(256)))}
-        with closing(Archive(tmp_path / name, "cell", server)) as archive:
+        with closing(Archive(tmp_path / name, "cell", postgresql)) as archive:
             archive.store(SUMMARY, documents[name])
             archive.store(SUMMARY, documents[name])
     for name, kept in documents.items():
-        with closing(Archive(tmp_path / name, "cell", server)) as archive:
+        with closing(Archive(tmp_path / name, "cell", postgresql)) as archive:
             assert archive.documents(SUMMARY) == kept
             assert archive.documents(DocumentKind.RESULT) == {}
-    with closing(Archive(tmp_path / "one", "cell", server)) as archive:
+    with closing(Archive(tmp_path / "one", "cell", postgresql)) as archive:
         archive.forget(["a"])
         assert archive.documents(SUMMARY) == {}
-    with closing(Archive(tmp_path / "other", "cell", server)) as archive:
+    with closing(Archive(tmp_path / "other", "cell", postgresql)) as archive:
         assert archive.documents(SUMMARY) == documents["other"]
 
 
-def test_a_history_is_served_by_it(server, tmp_path: Path) -> None:
+def test_a_history_is_served_by_it(postgresql, tmp_path: Path) -> None:
     cell = a_cell(tmp_path)
     propose_run(cell, "a")
     warnings: list[str] = []
-    assert [run.name for run in past_runs(cell, RunIndex(cell, server, warnings.append))] == ["a"]
-    with closing(Archive(runs_folder(cell), cell.settings.name, server)) as archive:
+    assert [run.name for run in past_runs(cell, RunIndex(cell, postgresql, warnings.append))] == ["a"]
+    with closing(Archive(runs_folder(cell), cell.settings.name, postgresql)) as archive:
         assert list(archive.documents(SUMMARY)) == ["a"]
     assert not (runs_folder(cell) / INDEX).exists()
     assert warnings == []
 
 
-def test_several_machines_may_keep_the_same_at_once(server, tmp_path: Path) -> None:
+def test_several_machines_may_keep_the_same_at_once(postgresql, tmp_path: Path) -> None:
     def fill(number: int) -> None:
-        with closing(Archive(tmp_path, "cell", server)) as archive:
+        with closing(Archive(tmp_path, "cell", postgresql)) as archive:
             for count in range(5):
                 archive.store(SUMMARY, {name: StampedDocument(str(count), b"x") for name in "abcdef"})
 
     with ThreadPoolExecutor(4) as pool:
         list(pool.map(fill, range(4)))
-    with closing(Archive(tmp_path, "cell", server)) as archive:
+    with closing(Archive(tmp_path, "cell", postgresql)) as archive:
         assert set(archive.documents(SUMMARY)) == set("abcdef")

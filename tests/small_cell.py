@@ -2,12 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import shutil
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
 import pytest
 
 from drivers.simulated import robot
+from hexacell.campaign import feasibility
+from hexacell.cell.bundled import bundled_config
+from hexacell.cell.loader import Cell, dump, load_cell
+from hexacell.cell.model import CellSettings
 from procedures.calibration import measuring, workflow
 from procedures.run import events
 
@@ -54,6 +61,31 @@ def choose_among_few(patch: pytest.MonkeyPatch) -> None:
     patch.setattr(workflow, "CANDIDATES", 64)
     patch.setattr(measuring, "HELD_OUT_CANDIDATES", 128)
     patch.setattr(robot, "LINE_STEPS", 8)
+
+
+@contextmanager
+def few_candidates() -> Iterator[None]:
+    """The same for a while, with a plan that is checked on few robots and poses."""
+    with pytest.MonkeyPatch.context() as patch:
+        choose_among_few(patch)
+        patch.setattr(feasibility, "CANDIDATES", 8)
+        patch.setattr(feasibility, "ROBOTS", 4)
+        yield
+
+
+def write_small_cell(folder: Path, changes: dict[str, Any], timeout_s: float) -> Cell:
+    """The demo's cell with some changes in a folder, and its controller's config if there is none yet.
+
+    Its gauges wait ``timeout_s`` on a busy machine.
+    """
+    source = load_cell(bundled_config("simulated-hexaglide"))
+    patient = tuple(gauge.model_copy(update={"timeout_s": timeout_s}) for gauge in source.settings.gauges)
+    settings: CellSettings = changed(source.settings, {"gauges": patient} | changes)
+    path = folder / "cell.toml"
+    path.write_text(dump(settings))
+    if not (folder / settings.controller.config).exists():
+        shutil.copy(source.config_path, folder)
+    return load_cell(path)
 
 
 def history_until(

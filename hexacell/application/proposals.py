@@ -86,7 +86,7 @@ def read_proposal(folder: RunFolder) -> Proposal:
         )
     change = ConfigChange.load(folder.proposal)
     _require_together(folder, state.started, state.proposed, change)
-    settings = load_cell(folder.path / "cell.toml").settings
+    settings = load_cell(folder.cell_file).settings
     return Proposal(
         folder,
         state.started.cell,

@@ -15,7 +15,7 @@ from hexacell.cell.model import CellSettings, geometry_settings
 from hexacell.controller_config.change import ConfigChange
 from hexacell.controller_config.write_back import BEFORE
 from hexacell.errors import FileError, HexacellError, UsageError
-from hexacell.runs.run_folder import RunFolder
+from hexacell.runs.run_folder import CELL_FILE, RunFolder
 from hexacell.storage import atomic_files
 from procedures.journal.journal import read_entries, read_version
 from procedures.journal.line_format import RESTORE, RULES_SINCE, Entry
@@ -104,7 +104,7 @@ def _set_up(
 
 
 def _cell(scratch: Path, started: RunStarted, journal: Path) -> Cell:
-    path = scratch / "cell.toml"
+    path = scratch / CELL_FILE
     path.write_text(started.cell_text, encoding="utf-8")
     try:
         return load_cell(path)

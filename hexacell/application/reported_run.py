@@ -10,19 +10,19 @@ from pathlib import Path
 from typing import Any
 
 from hexacell.application.journal_soundness import require_sound
+from hexacell.application.started_robot import geometry_before
 from hexacell.cell.loader import load_cell
 from hexacell.cell.model import CellSettings
 from hexacell.controller_config.write_back import AFTER, BEFORE
 from hexacell.errors import FileError, UsageError
 from hexacell.kinematics.geometry import Geometry
-from hexacell.runs.run_folder import JOURNAL, RunFolder
+from hexacell.runs.run_folder import CELL_FILE, JOURNAL, MEASUREMENTS, RESULT, RunFolder
 from hexacell.storage import atomic_files
 from procedures.journal.journal import read_entries
 from procedures.run import events
 from procedures.run.state import RunState
 
-CELL = "cell.toml"
-FINGERPRINTED = (JOURNAL, CELL, "measurements.csv", "result.json", BEFORE, AFTER)
+FINGERPRINTED = (JOURNAL, CELL_FILE, MEASUREMENTS, RESULT, BEFORE, AFTER)
 """Files of a run folder that the report vouches for, where they are there."""
 
 IDENTIFIER_DIGITS = 12
@@ -61,9 +61,7 @@ class ReportedRun:
     @property
     def geometry_before(self) -> Geometry:
         """That of the controller when the run began, in the mechanism's frame convention."""
-        mechanism = self.settings.mechanism
-        before = Geometry.of(mechanism.parameters, self.started.controller)
-        return mechanism.normalize_frames(before)[0]
+        return geometry_before(self.settings, self.started)
 
     @property
     def identifier(self) -> str:
@@ -83,7 +81,7 @@ def reported_run(run: Path) -> ReportedRun:
     if not folder.journal.is_file():
         raise UsageError("this is no run folder", subject=run, action="`hexacell history CELL` lists them")
     entries = read_entries(folder.journal)
-    settings = load_cell(run / CELL).settings
+    settings = load_cell(folder.cell_file).settings
     history = (entry.event for entry in entries)
     state = require_sound(history, settings, folder.journal, follows_plan=False)
     if state.started is None:

@@ -13,7 +13,7 @@ from typing import Any
 from hexacell.controller_config.change import ConfigChange
 from hexacell.controller_config.write_back import AFTER, BEFORE, RECEIPT
 from hexacell.errors import FileError, UsageError
-from hexacell.runs.run_folder import RunFolder
+from hexacell.runs.run_folder import CELL_FILE, MEASUREMENTS, RESULT, RunFolder
 from hexacell.storage import atomic_files
 from hexacell.storage.secrets import MASK, clear_secrets, with_lines_masked, without_secrets
 from hexacell.storage.toml_document import TomlDocument
@@ -23,7 +23,7 @@ from procedures.journal.line_format import with_event
 from procedures.run.events import RunStarted
 
 _CONFIGS = (BEFORE, AFTER, f"{PROVISIONAL_FOLDER}/{BEFORE}", f"{PROVISIONAL_FOLDER}/{AFTER}")
-_AS_THEY_ARE = ("measurements.csv", "result.json", RECEIPT, f"{PROVISIONAL_FOLDER}/{RECEIPT}")
+_AS_THEY_ARE = (MEASUREMENTS, RESULT, RECEIPT, f"{PROVISIONAL_FOLDER}/{RECEIPT}")
 _WIRE_LINE = re.compile(r"(?P<head>\S+ .+ [<>] )(?P<bytes>[0-9a-f]{2}(?: [0-9a-f]{2})*)  .*")
 _HALF_MASKED = re.compile(rb"\*\*\*[^\s]+")
 
@@ -54,8 +54,8 @@ def export_run(run: Path, target: Path) -> tuple[str, ...]:
 def _files(folder: RunFolder, cell_text: str) -> Iterator[tuple[str, bytes]]:
     """The files of the copy: name and content."""
     yield folder.journal.name, _journal(folder.journal, cell_text)
-    if (text := _kept(folder, "cell.toml")) is not None:
-        yield "cell.toml", _text(text)
+    if (text := _kept(folder, CELL_FILE)) is not None:
+        yield CELL_FILE, _text(text)
     for name in _CONFIGS:
         if (text := _kept(folder, name)) is not None:
             yield name, _text(text)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from hexacell.cell.model import CellSettings
+from hexacell.kinematics.geometry import Geometry
 from hexacell.robot_model import Robot, robot_of_start
 from procedures.run.events import RunStarted
 
@@ -12,3 +13,9 @@ def started_robot(settings: CellSettings, started: RunStarted) -> Robot:
     return robot_of_start(
         settings, started.controller, started.branch, started.taught, started.joint_ranges
     )
+
+
+def geometry_before(settings: CellSettings, started: RunStarted) -> Geometry:
+    """That of the controller when the run began, in the mechanism's frame convention."""
+    mechanism = settings.mechanism
+    return mechanism.normalize_frames(Geometry.of(mechanism.parameters, started.controller))[0]

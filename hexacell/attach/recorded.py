@@ -132,7 +132,7 @@ class RecordedRun:
     def _description(self) -> RunDescribed:
         return RunDescribed(
             cell=self._started.cell,
-            cell_file=self._folder.path / "cell.toml",
+            cell_file=self._folder.cell_file,
             folder=self._folder.path,
             mode=self._started.mode,
             expected_records=fold(entry.event for entry in self._entries).completed,

@@ -19,6 +19,9 @@ from hexacell.errors import UsageError
 from hexacell.storage.atomic_files import create_folder_durably, write_atomically
 
 JOURNAL = "journal.jsonl"
+CELL_FILE = "cell.toml"
+MEASUREMENTS = "measurements.csv"
+RESULT = "result.json"
 
 _NAME = re.compile(r"""\s*name\s*=\s*(["'])(?P<name>[^"']*)\1""")
 
@@ -35,6 +38,11 @@ class RunFolder:
         return self.path / JOURNAL
 
     @property
+    def cell_file(self) -> Path:
+        """The cell file's text as the run began, without passwords."""
+        return self.path / CELL_FILE
+
+    @property
     def attempts(self) -> Path:
         """The tries to begin it, where it was refused."""
         return self.path / "not-begun.json"
@@ -42,12 +50,12 @@ class RunFolder:
     @property
     def measurements(self) -> Path:
         """The records as a measurement file, for ``hexacell fit``."""
-        return self.path / "measurements.csv"
+        return self.path / MEASUREMENTS
 
     @property
     def result(self) -> Path:
         """The identification, as ``hexacell fit --json`` prints it."""
-        return self.path / "result.json"
+        return self.path / RESULT
 
     @property
     def proposal(self) -> Path:
@@ -75,7 +83,7 @@ class RunFolder:
                 "this folder holds a run already", subject=self.path, action="Resume it, or name another"
             )
         create_folder_durably(self.path)
-        write_atomically(self.path / "cell.toml", cell.text_without_secrets.encode())
+        write_atomically(self.cell_file, cell.text_without_secrets.encode())
 
     def write_result(self, document: dict[str, Any]) -> None:
         """Keep an identification; raises ``FileError``."""

@@ -27,10 +27,8 @@ from hexacell.application import unattended_runs
 from hexacell.application.calibration_run import new_calibration
 from hexacell.application.drift_history import drift_history
 from hexacell.application.history import past_runs
-from hexacell.campaign import feasibility
 from hexacell.campaign.dry_run import VirtualCampaign
-from hexacell.cell.bundled import bundled_config
-from hexacell.cell.loader import Cell, dump, load_cell
+from hexacell.cell.loader import Cell, dump
 from hexacell.cell.simulation import SimulatedFault
 from hexacell.cli.app import main
 from hexacell.controller_config.change import fingerprint, propose
@@ -53,7 +51,7 @@ from procedures.run import events
 from procedures.run.state import RunState, apply, fold
 from procedures.run.steps import Phase, SetKey
 from tests.benchmarks.virtual_calibration import measured_held_out
-from tests.small_cell import SMALL, changed, choose_among_few
+from tests.small_cell import SMALL, changed, few_candidates, write_small_cell
 
 FIRST_NIGHT = datetime(2026, 3, 1, 2, 30, tzinfo=UTC)
 LIMIT_MM, LIMIT_DEG = 0.25, 0.1
@@ -112,19 +110,13 @@ class Year:
 
     @cached_property
     def cell(self) -> Cell:
-        source = load_cell(bundled_config("simulated-hexaglide"))
         limits = {"acceptance.position_mm": LIMIT_MM, "acceptance.orientation_deg": LIMIT_DEG}
-        patient = tuple(gauge.model_copy(update={"timeout_s": 6.0}) for gauge in source.settings.gauges)
         small = {key: value for key, value in SMALL.items() if not key.startswith(AS_BUNDLED)}
-        settings = changed(source.settings, small | SERVED | limits | {"gauges": patient})
-        path = self.folder / "cell.toml"
-        path.write_text(dump(settings))
-        shutil.copy(source.config_path, self.folder)
-        return load_cell(path)
+        return write_small_cell(self.folder, small | SERVED | limits, timeout_s=6.0)
 
     def carry_out(self, nights: int) -> None:
         """A calibration, and so many nights less one after it."""
-        with few_poses():
+        with few_candidates():
             self._virtual_night(0, Mode.OPTIMISE)
             for number in range(1, nights):
                 mode = Mode.QUICK if self.is_corrected and self._has_failed() else Mode.CHECK
@@ -355,16 +347,6 @@ def cut_off(folder: RunFolder) -> None:
     for path in folder.path.iterdir():
         if path.name not in {folder.journal.name, "cell.toml"}:
             path.unlink() if path.is_file() else shutil.rmtree(path)
-
-
-@contextmanager
-def few_poses() -> Iterator[None]:
-    """Choose among few poses: what is chosen is not under test here."""
-    with pytest.MonkeyPatch.context() as patch:
-        choose_among_few(patch)
-        patch.setattr(feasibility, "CANDIDATES", 8)
-        patch.setattr(feasibility, "ROBOTS", 4)
-        yield
 
 
 @contextmanager

@@ -6,8 +6,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from hexacell.application.started_robot import geometry_before
 from hexacell.cell.model import CellSettings
-from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.parameters import ParameterUnit
 from hexacell.reporting.check_result import ParameterChange
 from procedures.run import events
@@ -35,7 +35,7 @@ def _rows(
 ) -> Iterator[str]:
     mechanism, result = settings.mechanism, identified.result
     parameters, undetermined = mechanism.parameters, frozenset(result.undetermined)
-    old = mechanism.normalize_frames(Geometry.of(parameters, started.controller))[0].vector
+    old = geometry_before(settings, started).vector
     new, sigma = parameters.vector(result.geometry), parameters.vector(result.sigma)
     for row in np.flatnonzero(sigma > 0.0):
         parameter, change = parameters.parameters[row], new[row] - old[row]

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-import shutil
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -14,10 +12,7 @@ import pytest
 
 from drivers.simulated.cell import SimulatedCell
 from hexacell.application.calibration_run import RunRequest, calibrate
-from hexacell.campaign import feasibility
-from hexacell.cell.bundled import bundled_config
-from hexacell.cell.loader import Cell, dump, load_cell
-from hexacell.cell.model import CellSettings
+from hexacell.cell.loader import Cell
 from hexacell.controller_config.toml_format import NativeToml
 from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS, Hexaglide
 from hexacell.runs.run_folder import RunFolder, runs_folder
@@ -26,7 +21,7 @@ from procedures.engine.engine import Listener
 from procedures.journal.journal import Journal, read_journal
 from procedures.run import events
 from procedures.run.questions import Question, UnattendedOperator
-from tests.small_cell import SMALL, changed, choose_among_few, history_until
+from tests.small_cell import SMALL, few_candidates, history_until, write_small_cell
 
 SERVED: dict[str, Any] = {
     "timing.clock_factor": 500.0,
@@ -46,16 +41,8 @@ MakeCell = Callable[..., Cell]
 
 def maker(folder: Path) -> MakeCell:
     def make(**changes: Any) -> Cell:
-        source = bundled_config("simulated-hexaglide")
-        cell = load_cell(source)
-        changes = SMALL | SERVED | {key.replace("__", "."): value for key, value in changes.items()}
-        patient = tuple(gauge.model_copy(update={"timeout_s": 10.0}) for gauge in cell.settings.gauges)
-        settings: CellSettings = changed(cell.settings, {"gauges": patient} | changes)
-        path = folder / "cell.toml"
-        path.write_text(dump(settings))
-        if not (folder / settings.controller.config).exists():
-            shutil.copy(cell.config_path, folder)
-        return load_cell(path)
+        dotted = {key.replace("__", "."): value for key, value in changes.items()}
+        return write_small_cell(folder, SMALL | SERVED | dotted, timeout_s=10.0)
 
     return make
 
@@ -63,16 +50,6 @@ def maker(folder: Path) -> MakeCell:
 @pytest.fixture
 def make_cell(tmp_path: Path) -> MakeCell:
     return maker(tmp_path)
-
-
-@contextmanager
-def few_candidates() -> Iterator[None]:
-    """Choose among few poses: what is chosen is not under test here."""
-    with pytest.MonkeyPatch.context() as patch:
-        choose_among_few(patch)
-        patch.setattr(feasibility, "CANDIDATES", 8)
-        patch.setattr(feasibility, "ROBOTS", 4)
-        yield
 
 
 @pytest.fixture(autouse=True)

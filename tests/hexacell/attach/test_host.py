@@ -33,8 +33,9 @@ from procedures.journal.journal import read_entries, read_journal
 from procedures.run import events
 from procedures.run.commands import Answer, CommandQueue, Pause, Resume
 from procedures.run.questions import QuestionKind
-from tests.hexacell.application.conftest import few_candidates, maker
+from tests.hexacell.application.conftest import maker
 from tests.hexacell.attach.conftest import Client
+from tests.small_cell import few_candidates
 from tests.waiting import until
 
 

@@ -121,7 +121,7 @@ def bend(site: Any, millimetres: float) -> None:
 
 async def test_a_result_worse_than_before_is_rolled_back_bit_for_bit(proposed, finished) -> None:
     site = proposed()
-    ended = await site.calibrate(at(events.Committed, lambda: bend(site, 2.0)), resume=True)
+    ended = await site.calibrate(at(events.Committed, lambda: bend(site, 1.0)), resume=True)
     assert ended.exit_code == ExitCode.OUT_OF_LIMITS
     assert ended.line.endswith("rolled back, the controller has its old config")
     assert site.happened(events.ResultValidated)[0].verdict is Verdict.FAIL

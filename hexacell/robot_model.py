@@ -171,9 +171,14 @@ class Robot:
 
 
 def config_format(settings: CellSettings) -> ConfigFormat:
-    """The reader and writer of a cell's controller config."""
-    parameters = settings.mechanism.parameters
-    made: ConfigFormat = load(Group.CONFIG_FORMATS, settings.controller.config_format)(parameters)
+    """The reader and writer of a cell's controller config.
+
+    Raises:
+        UsageError: there is no such format, or its options are wrong.
+    """
+    controller, parameters = settings.controller, settings.mechanism.parameters
+    factory = load(Group.CONFIG_FORMATS, controller.config_format)
+    made: ConfigFormat = factory(parameters, controller.config_options)
     return made
 
 

@@ -174,7 +174,12 @@ class ControllerSettings(Section):
         "environment take precedence",
     )
     config: Text = Field(description="the file with its geometry, relative to the cell file")
-    config_format: Text = Field("toml", description="toml, or one that a plug-in adds")
+    config_format: Text = Field(
+        "toml", description="toml, linuxcnc-ini, linuxcnc-hal, template, or one that a plug-in adds"
+    )
+    config_options: dict[str, Any] = Field(
+        default_factory=dict, description="where that format finds the numbers, see docs/linuxcnc.md"
+    )
     taught: Text | None = Field(
         None,
         description="copy of config from when points and frames were taught last, relative to the cell "

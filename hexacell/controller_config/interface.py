@@ -9,6 +9,9 @@ from typing import Protocol
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import Branch
 
+LARGEST_CONFIG_BYTES = 1_000_000
+"""Of a file, which usually has a few thousand."""
+
 JointRanges = tuple[tuple[float, float], ...]
 
 
@@ -25,7 +28,11 @@ class ControllerGeometry:
 
 
 class ConfigFormat(Protocol):
-    """A kind of controller config; a plug-in's class takes the parameters of the mechanism."""
+    """A kind of controller config.
+
+    A plug-in's class takes the parameters of the mechanism and ``[controller.config_options]`` of the cell
+    file, a mapping that it checks by itself.
+    """
 
     def read(self, path: Path) -> ControllerGeometry:
         """The geometry in the file.

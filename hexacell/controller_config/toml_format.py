@@ -16,19 +16,21 @@ character.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, cast
 
 import numpy as np
 
 from hexacell.cell.fields import LARGEST_NUMBER
-from hexacell.controller_config.interface import ControllerGeometry, JointRanges
-from hexacell.errors import FileError
+from hexacell.controller_config.interface import LARGEST_CONFIG_BYTES, ControllerGeometry, JointRanges
+from hexacell.controller_config.number_tokens import require_physical, write_number
+from hexacell.errors import FileError, UsageError
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanism import Branch
-from hexacell.kinematics.parameters import LEGS, ParameterKind, ParameterSet, ParameterUnit
+from hexacell.kinematics.parameters import LEGS, ParameterKind, ParameterSet
 from hexacell.storage import atomic_files
 from hexacell.storage.toml_document import TomlDocument
 from hexacell.storage.toml_edit import replace_numbers
@@ -36,14 +38,23 @@ from hexacell.storage.toml_locations import KeyPath
 
 
 class NativeToml:
-    """The format ``toml``, a :class:`~hexacell.controller_config.interface.ConfigFormat`."""
+    """The format ``toml``, a :class:`~hexacell.controller_config.interface.ConfigFormat`.
 
-    def __init__(self, parameters: ParameterSet) -> None:
+    Raises:
+        UsageError: options are given; it has none.
+    """
+
+    def __init__(self, parameters: ParameterSet, given: Mapping[str, Any] = MappingProxyType({})) -> None:
+        if given:
+            raise UsageError(
+                f"the config format 'toml' has no options, but '{next(iter(given))}' is given",
+                action="Remove [controller.config_options], or name another config_format",
+            )
         self._parameters = parameters
 
     def read(self, path: Path) -> ControllerGeometry:
         """The geometry and the branch in the file; raises ``FileError`` with file and line."""
-        text = atomic_files.read_text(path, LARGEST_FILE_BYTES)
+        text = atomic_files.read_text(path, LARGEST_CONFIG_BYTES)
         content = _Content(TomlDocument.parse(text, path), self._parameters)
         return ControllerGeometry(content.geometry(), content.branch(), content.joint_ranges())
 
@@ -54,7 +65,7 @@ class NativeToml:
         value that is not finite, or a length that is not above zero, is refused; the new text is read
         again before it is returned.
         """
-        _require_physical(geometry)
+        require_physical(geometry)
         document = TomlDocument.parse(text)
         before = _Content(document, self._parameters).geometry()
         changed = replace_numbers(document, dict(_changed_tokens(before, geometry)))
@@ -68,28 +79,12 @@ class NativeToml:
         return changed
 
 
-def number_token(value: float, unit: ParameterUnit) -> str:
-    """``value`` as a TOML float: at most the decimals of its unit, at least one, never ``-0.0``."""
-    whole, _, decimals = f"{value:.{unit.decimals}f}".partition(".")
-    number = f"{whole}.{decimals.rstrip('0') or '0'}"
-    return "0.0" if number == "-0.0" else number
-
-
-def _require_physical(geometry: Geometry) -> None:
-    positive = [geometry[kind.symbol] for kind in geometry.parameters.kinds if kind.is_positive]
-    if not np.isfinite(geometry.vector).all() or not all((values > 0.0).all() for values in positive):
-        raise FileError(
-            "the new geometry has values that are not finite, or lengths that are not above zero",
-            action="Nothing was written; identify again",
-        )
-
-
 def _changed_tokens(before: Geometry, after: Geometry) -> Iterator[tuple[KeyPath, str]]:
     for kind in after.parameters.kinds:
         old, half_of_last = before[kind.symbol], 0.5 * 10.0**-kind.unit.decimals
         for index, new in np.ndenumerate(after[kind.symbol]):
             if abs(new - old[index]) > half_of_last:
-                yield ("geometry", kind.symbol, *index), number_token(float(new), kind.unit)
+                yield ("geometry", kind.symbol, *index), write_number(float(new), kind.unit.decimals)
 
 
 @dataclass(frozen=True, slots=True)
@@ -185,7 +180,3 @@ def _needed(kind: ParameterKind) -> str:
     """``S (six rows of 3 numbers, mm)``."""
     values = f"six rows of {len(kind.components)} numbers" if kind.components else "six numbers"
     return f"{kind.symbol} ({', '.join(filter(None, (values, kind.unit)))})"
-
-
-LARGEST_FILE_BYTES = 1_000_000
-"""Of a config, which usually has a few thousand."""

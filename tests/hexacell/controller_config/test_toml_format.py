@@ -11,7 +11,8 @@ from hypothesis import strategies as st
 
 from hexacell.controller_config import toml_format
 from hexacell.controller_config.interface import ConfigFormat
-from hexacell.controller_config.toml_format import NativeToml, number_token
+from hexacell.controller_config.number_tokens import write_number
+from hexacell.controller_config.toml_format import NativeToml
 from hexacell.errors import FileError
 from hexacell.kinematics.geometry import Geometry
 from hexacell.kinematics.mechanisms.hexaglide import HEXAGLIDE_PARAMETERS
@@ -157,7 +158,7 @@ def test_writing_the_same_geometry_again_changes_nothing(
 
 @given(st.floats(-1e15, 1e15))
 def test_number_tokens_are_floats_with_six_decimals(value: float) -> None:
-    token = number_token(value, ParameterUnit.MM)
+    token = write_number(value, ParameterUnit.MM.decimals)
     _, decimals = token.split(".")
     assert 1 <= len(decimals) <= 6
     assert not decimals[1:].endswith("0")
@@ -170,7 +171,7 @@ def test_number_tokens_are_floats_with_six_decimals(value: float) -> None:
     [(1000.0, "1000.0"), (-0.0, "0.0"), (-1e-9, "0.0"), (0.1 + 0.2, "0.3"), (1e22, "1" + "0" * 22 + ".0")],
 )
 def test_number_tokens(value: float, token: str) -> None:
-    assert number_token(value, ParameterUnit.MM) == token
+    assert write_number(value, ParameterUnit.MM.decimals) == token
 
 
 def test_read_gives_geometry_and_branch(config: Path, geometry: Geometry) -> None:

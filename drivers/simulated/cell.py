@@ -3,21 +3,15 @@
 from __future__ import annotations
 
 from contextlib import ExitStack
-from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
 
-from drivers.simulated.encoders.bank import SimulatedEncoderBank
 from drivers.simulated.fault_schedule import CellFaults, FaultSchedule
-from drivers.simulated.gauges.bank import SimulatedGaugeBank
 from drivers.simulated.linuxcnc.server import SimulatedController
 from drivers.simulated.physics import RobotPhysics
 from drivers.simulated.robot import SimulatedMachine
-from drivers.simulated.serial_line import PtyLine
+from drivers.simulated.sensors import SimulatedSensors
 from drivers.simulated.served_device import Closeable
-from drivers.simulated.slcan import SlcanServer
-from hexacell.cell.devices import GaugeSettings
 from hexacell.cell.model import CellSettings
 from hexacell.cell.simulation import SimulationSettings
 from hexacell.clock import CellClock
@@ -57,21 +51,17 @@ class SimulatedCell(Closeable):
         )
         with ExitStack() as served:
             stop_file = _stop_file(settings, served)
-            self.gauges = served.enter_context(_gauge_bank(settings, simulation, self.physics, clock))
-            self.encoders = served.enter_context(_encoder_bank(settings, simulation, self.physics, clock))
-            bus: dict[str, Any] = self.encoders.bus_settings
-            if other_processes:
-                adapter = served.enter_context(SlcanServer(self.encoders.channel, PtyLine("slcan")))
-                bus = adapter.bus_settings
+            sensors = served.enter_context(
+                SimulatedSensors(settings, simulation, self.physics, clock, other_processes=other_processes)
+            )
+            self.gauges, self.encoders = sensors.gauges, sensors.encoders
             self.controller = served.enter_context(SimulatedController(self.machine, settings.controller))
             self.faults = CellFaults(self.gauges, self.encoders, self.controller, self.machine, stop_file)
             self.schedule = served.enter_context(FaultSchedule(self.faults, clock, simulation.faults))
             self.physics.on_motion_start = self.schedule.on_motion_start
             self._served = served.pop_all()
-        self.settings = settings.model_copy(
+        self.settings = sensors.addressed(settings).model_copy(
             update={
-                "gauges": self.gauges.gauges,
-                "encoders": settings.encoders.model_copy(update={"bus": bus}),
                 "controller": settings.controller.model_copy(
                     update={
                         "host": "127.0.0.1",
@@ -80,7 +70,6 @@ class SimulatedCell(Closeable):
                     }
                 ),
                 "guards": settings.guards.model_copy(update={"stop_file": str(stop_file)}),
-                "simulation": None,
             }
         )
 
@@ -94,24 +83,3 @@ def _stop_file(settings: CellSettings, served: ExitStack) -> Path:
     if settings.guards.stop_file is not None:
         return Path(settings.guards.stop_file)
     return Path(served.enter_context(TemporaryDirectory(prefix="hexacell-"))) / "stop"
-
-
-def _gauge_bank(
-    settings: CellSettings, simulation: SimulationSettings, physics: RobotPhysics, clock: CellClock
-) -> SimulatedGaugeBank:
-    plungers = {gauge.name: partial(_plunger_position, physics, gauge) for gauge in settings.gauges}
-    return SimulatedGaugeBank(settings.gauges, plungers, simulation.gauges, clock)
-
-
-def _encoder_bank(
-    settings: CellSettings, simulation: SimulationSettings, physics: RobotPhysics, clock: CellClock
-) -> SimulatedEncoderBank:
-    latency = simulation.encoders.latency_s
-    return SimulatedEncoderBank(
-        settings.encoders, lambda: physics.encoder_positions().tolist(), clock, latency_s=latency
-    )
-
-
-def _plunger_position(physics: RobotPhysics, gauge: GaugeSettings) -> float:
-    """The position of one gauge's plunger, mm, in the instrument's own direction."""
-    return gauge.mounting.reading(physics.gauge_displacement(gauge.axis))

@@ -39,9 +39,11 @@ def device_addresses(cell: Cell, *, other_processes: bool = False) -> Iterator[C
         return
     # Imported here: a cell of real devices needs nothing of the simulation.
     from drivers.simulated.cell import SimulatedCell  # noqa: PLC0415
+    from drivers.simulated.followed_controller import FollowedController  # noqa: PLC0415
 
     mechanism: Mechanism = load(Group.MECHANISMS, settings.robot.mechanism)()
-    with SimulatedCell(
+    kind = FollowedController if settings.simulation.joints_command else SimulatedCell
+    with kind(
         settings,
         settings.simulation,
         mechanism,

@@ -129,6 +129,11 @@ class SimulationSettings(Section):
     station_reach_mm: Positive = Field(
         30.0, description="at rest farther than this from the gauges, the gauges are moved to the ball"
     )
+    joints_command: tuple[Text, ...] = Field(
+        (),
+        description="prints six joint variables a line, mm: gauges and encoders are then simulated at the "
+        "real controller of [controller]",
+    )
     gauges: SimulatedGauges = SimulatedGauges()
     encoders: SimulatedEncoders = SimulatedEncoders()
     motion: SimulatedMotion = SimulatedMotion()

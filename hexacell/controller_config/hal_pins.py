@@ -24,7 +24,8 @@ from hexacell.controller_config.number_tokens import NumberToken
 from hexacell.errors import FileError
 from hexacell.kinematics.parameters import GeometricParameter, ParameterSet
 
-_SETP = re.compile(r"[ \t]*setp[ \t]+(?P<pin>\S+)[ \t]+(?P<value>\S+)[ \t]*(?:#.*)?\r?")
+SETP = re.compile(r"[ \t]*setp[ \t]+(?P<pin>\S+)[ \t]+(?P<value>\S+)[ \t]*(?:#.*)?\r?")
+"""A line that sets a pin."""
 
 
 class HalPinsOptions(KeyedOptions):
@@ -85,7 +86,7 @@ class HalText:
         found: defaultdict[str, list[NumberToken]] = defaultdict(list)
         start = 0
         for line, content in enumerate(self.text.split("\n"), start=1):
-            if setp := _SETP.fullmatch(content):
+            if setp := SETP.fullmatch(content):
                 first, end = (start + place for place in setp.span("value"))
                 found[setp["pin"]].append(NumberToken(setp["value"], first, end, line))
             start += len(content) + 1

@@ -96,6 +96,11 @@ class IniText:
             )
         return seen[0]
 
+    def has(self, key: str) -> bool:
+        """Whether there is such a variable, wherever."""
+        section, _, name = key.rpartition(SEPARATOR)
+        return any((one.section, one.name) == (section or self.section, name) for one in self._variables)
+
     def _missing(self, section: str, name: str, found: list[_Variable]) -> FileError:
         if found:
             problem = (

@@ -108,7 +108,7 @@ def configs(draw) -> tuple[Kind, str, dict[str, str]]:
 
 @pytest.fixture(scope="module")
 def written(tmp_path_factory) -> Callable[[str], Path]:
-    path = tmp_path_factory.mktemp("configs") / "config"
+    path: Path = tmp_path_factory.mktemp("configs") / "config"
 
     def write(text: str) -> Path:
         path.write_bytes(text.encode())

@@ -1,7 +1,7 @@
 # All commands of a newcomer or of CI. Each target sets up .venv first, which takes milliseconds and no
 # network once it is done.
 #
-#   make demo | test | test-full | lint | bench | screenshots | clean
+#   make demo | test | test-full | test-linuxcnc | lint | bench | screenshots | clean
 #   make test ARGS="-k gauges"       more arguments for the program
 #   make PYTHON=python3.12 test      the Python for .venv, the first time
 
@@ -21,20 +21,24 @@ unexport PYTHONDONTWRITEBYTECODE
 # The matrices are small: threads of the linear algebra only slow them down.
 export OPENBLAS_NUM_THREADS = 1
 
-.PHONY: demo test test-full lint bench screenshots clean venv
+.PHONY: demo test test-full test-linuxcnc lint bench screenshots clean venv
 
 demo: venv
 	.venv/bin/hexacell demo $(ARGS)
 
 test: venv
-	$(RUN) pytest $(FOUR_AT_A_TIME) -m "not slow and not benchmark" $(ARGS)
+	$(RUN) pytest $(FOUR_AT_A_TIME) -m "not slow and not benchmark and not linuxcnc" $(ARGS)
 
 test-full: venv
-	$(RUN) pytest $(FOUR_AT_A_TIME) -m "not benchmark" $(ARGS)
+	$(RUN) pytest $(FOUR_AT_A_TIME) -m "not benchmark and not linuxcnc" $(ARGS)
 
 bench:
 	@.ci/venv "$(PYTHON)" bench
 	$(RUN) pytest tests/benchmarks -s --timeout=0 $(ARGS)
+
+# One LinuxCNC a machine, in real time. docs/linuxcnc.md says how it is installed.
+test-linuxcnc: venv
+	$(RUN) pytest tests/linuxcnc --timeout=1200 $(ARGS)
 
 lint: venv
 	$(RUN) ruff check

@@ -37,8 +37,6 @@ class FollowingPhysics(RobotPhysics):
             return super().encoder_positions()
 
     def _follow(self, joints: Array, now: float) -> None:
-        if not joints.any():  # a LinuxCNC that is not homed
-            return
         step = joints - self._joints
         largest = float(np.abs(step).max())
         if largest < MOVED_MM:

@@ -25,7 +25,10 @@ KEPT = 10_000
 
 
 class JointSource(Closeable):
-    """Runs ``command`` until it is closed; each line of six numbers is where the joints are, mm."""
+    """Runs ``command`` until it is closed; each line of six numbers is where the joints are, mm.
+
+    A seventh, if any, is 0 where they are not homed; what they are then said to be is no place.
+    """
 
     def __init__(self, command: Sequence[str]) -> None:
         self._command = tuple(command)
@@ -75,9 +78,11 @@ class JointSource(Closeable):
 
 
 def joints_in(line: str) -> Array | None:
-    """The six numbers of a line; none if there are not six."""
+    """The six numbers of a line; none if there are not six, or a seventh is 0."""
     try:
         numbers = np.array([float(word) for word in line.split()])
     except ValueError:
         return None
-    return numbers if numbers.shape == (LEGS,) and np.isfinite(numbers).all() else None
+    if len(numbers) not in {LEGS, LEGS + 1} or not np.isfinite(numbers).all():
+        return None
+    return numbers[:LEGS] if numbers[LEGS:].all() else None

@@ -1,0 +1,163 @@
+"""A real LinuxCNC without a screen, of the configuration in ``configs/linuxcnc-hexaglide``.
+
+Only one can run on a machine: a second one would end the first.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import suppress
+from pathlib import Path
+
+import pytest
+
+from tests.linuxcnc.server_client import ServerClient
+
+CONFIGURATION = Path(__file__).parents[2] / "configs" / "linuxcnc-hexaglide"
+STARTED_S, ENDED_S, ANSWER_S = 60.0, 20.0, 30.0
+NOBODY = "65534"
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    here = Path(__file__).parent
+    for item in items:
+        if here in item.path.parents:
+            item.add_marker(pytest.mark.linuxcnc)
+
+
+class LinuxCNC:
+    """One in a folder of its own, started and ended as often as a test likes."""
+
+    def __init__(self, folder: Path, port: int) -> None:
+        self.folder = folder
+        self.port = port
+        self._process: subprocess.Popen[bytes] | None = None
+
+    @property
+    def environment(self) -> dict[str, str]:
+        """For its programs, and those of hexacell; as root it wants another user to be."""
+        fifo = {"RTAPI_UID": NOBODY, "RTAPI_FIFO_PATH": str(self.folder / "rtapi_fifo")}
+        path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
+        return os.environ | (fifo if os.geteuid() == 0 else {}) | {"PATH": path}
+
+    def start(self) -> None:
+        """Start it and wait until its server answers."""
+        with (self.folder / "linuxcnc.log").open("ab") as log:
+            self._process = subprocess.Popen(
+                ["linuxcnc", "-r", "hexaglide.ini"],
+                cwd=self.folder,
+                env=self.environment,
+                stdin=subprocess.DEVNULL,
+                stdout=log,
+                stderr=log,
+                start_new_session=True,
+            )
+        deadline = time.monotonic() + STARTED_S
+        while not self._answers():
+            assert time.monotonic() < deadline, self.log
+
+    def shut_down(self) -> None:
+        """As its owner does."""
+        with suppress(OSError), self.connect() as client:
+            client.send("shutdown")
+        self._wait()
+
+    def kill(self) -> None:
+        """Its task and its server at once, as in a crash."""
+        for name in ("milltask", "linuxcncrsh"):
+            subprocess.run(["pkill", "-KILL", "-x", name], check=False)
+        self._wait()
+
+    @property
+    def log(self) -> str:
+        """All that it printed."""
+        return (self.folder / "linuxcnc.log").read_text(errors="replace")
+
+    def connect(self) -> ServerClient:
+        """A connection that may command."""
+        return ServerClient(socket.create_connection(("127.0.0.1", self.port), timeout=ANSWER_S))
+
+    def pin(self, name: str) -> str:
+        """What a pin has, with the seven digits that LinuxCNC tells."""
+        return self._run("halcmd", "getp", name).stdout.strip()
+
+    def hexacell(self, *arguments: str, timeout_s: float = 900.0) -> subprocess.CompletedProcess[str]:
+        """Run the program in the folder of the configuration."""
+        return self._run("hexacell", *arguments, timeout_s=timeout_s, check=False)
+
+    def _run(
+        self, *command: str, timeout_s: float = ANSWER_S, check: bool = True
+    ) -> subprocess.CompletedProcess[str]:
+        return subprocess.run(
+            command,
+            cwd=self.folder,
+            env=self.environment,
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            text=True,
+            timeout=timeout_s,
+            check=check,
+        )
+
+    def _answers(self) -> bool:
+        try:
+            self.connect().close()
+        except OSError:
+            time.sleep(0.1)
+            return False
+        return True
+
+    def _wait(self) -> None:
+        if self._process is None:
+            return
+        try:
+            self._process.wait(ENDED_S)
+        except subprocess.TimeoutExpired:
+            os.killpg(self._process.pid, signal.SIGKILL)
+            self._process.wait(ENDED_S)
+        self._process = None
+
+
+@pytest.fixture(scope="session")
+def installed(tmp_path_factory: pytest.TempPathFactory) -> None:
+    """The kinematics of the configuration, for the LinuxCNC of this machine."""
+    if shutil.which("linuxcnc") is None or shutil.which("halcompile") is None:
+        pytest.skip("there is no LinuxCNC here; docs/linuxcnc.md says how to install it")
+    source = shutil.copy(CONFIGURATION / "hexaglidekins.comp", tmp_path_factory.mktemp("kinematics"))
+    subprocess.run(["halcompile", "--install", Path(source).name], cwd=Path(source).parent, check=True)
+
+
+@pytest.fixture
+def linuxcnc(installed: None, tmp_path: Path) -> Iterator[LinuxCNC]:
+    """A copy of the configuration; it is running."""
+    folder = tmp_path / "linuxcnc-hexaglide"
+    shutil.copytree(CONFIGURATION, folder)
+    port = _free_port()
+    for name, pattern in (("hexaglide.ini", r"--port \d+"), ("cell.toml", r"port = \d+")):
+        text = (folder / name).read_text()
+        words = re.search(pattern, text)
+        assert words is not None
+        (folder / name).write_text(text.replace(words[0], f"{words[0].rsplit(maxsplit=1)[0]} {port}"))
+    for path in (tmp_path, folder, *folder.iterdir()):  # LinuxCNC of root runs as nobody
+        path.chmod(path.stat().st_mode | 0o777)
+    for parent in tmp_path.parents:
+        with suppress(PermissionError):
+            parent.chmod(parent.stat().st_mode | 0o011)
+    machine = LinuxCNC(folder, port)
+    machine.start()
+    yield machine
+    machine.shut_down()
+
+
+def _free_port() -> int:
+    with socket.socket() as found:
+        found.bind(("127.0.0.1", 0))
+        return int(found.getsockname()[1])

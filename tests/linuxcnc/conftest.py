@@ -12,7 +12,6 @@ import signal
 import socket
 import subprocess
 import sys
-import time
 from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
@@ -20,9 +19,10 @@ from pathlib import Path
 import pytest
 
 from tests.linuxcnc.server_client import ServerClient
+from tests.waiting import wait_until
 
 CONFIGURATION = Path(__file__).parents[2] / "configs" / "linuxcnc-hexaglide"
-STARTED_S, ENDED_S, ANSWER_S = 60.0, 20.0, 30.0
+ENDED_S, ANSWER_S = 20.0, 30.0
 NOBODY = "65534"
 
 
@@ -60,9 +60,7 @@ class LinuxCNC:
                 stderr=log,
                 start_new_session=True,
             )
-        deadline = time.monotonic() + STARTED_S
-        while not self._answers():
-            assert time.monotonic() < deadline, self.log
+        wait_until(self._answers)
 
     def shut_down(self) -> None:
         """As its owner does."""
@@ -111,7 +109,6 @@ class LinuxCNC:
         try:
             self.connect().close()
         except OSError:
-            time.sleep(0.1)
             return False
         return True
 

@@ -1,0 +1,113 @@
+"""``hexacell-set-pins`` against a ``halcmd`` that keeps pins in a file."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from drivers.controllers.linuxcnc import set_pins as command
+from drivers.controllers.linuxcnc.set_pins import set_pins
+from hexacell.errors import FileError, UsageError
+
+HALCMD = """#!{python}
+import json, sys
+from pathlib import Path
+
+kept = Path({pins!r})
+pins = json.loads(kept.read_text())
+if sys.argv[1:] == ["-f"]:
+    for line in sys.stdin:
+        word, pin, value = line.split()
+        if word != "setp" or pin not in pins:
+            sys.exit(f"<stdin>:1: pin '{{pin}}' not found")
+        pins[pin] = value
+    pins["kins.fwd-kins-fail"] = "TRUE" if float(pins["kins.l.0"]) > 900.0 else "FALSE"
+    kept.write_text(json.dumps(pins))
+else:
+    for pin, value in pins.items():
+        if sys.argv[-1] == "*" or pin.endswith(sys.argv[-1].lstrip("*")):
+            print("kins", "bit" if value in ("TRUE", "FALSE") else "float", "IN", value, pin)
+"""
+
+HAL = """
+loadrt kins
+setp kins.l.0 [KINS]L1   # of leg 1
+setp kins.l.1 582.5
+setp kins.gain [OTHER]GAIN
+net x kins.out => joint.0.in
+"""
+INI = "[KINS]\nL1 = 591.123456789\n"
+
+
+@pytest.fixture
+def pins(tmp_path, monkeypatch) -> Callable[[], dict[str, str]]:
+    """What the running LinuxCNC has."""
+    kept = tmp_path / "pins.json"
+    kept.write_text(json.dumps({"kins.l.0": "590", "kins.l.1": "580", "kins.fwd-kins-fail": "FALSE"}))
+    folder = tmp_path / "bin"
+    folder.mkdir()
+    program = folder / "halcmd"
+    program.write_text(HALCMD.format(python=sys.executable, pins=str(kept)))
+    program.chmod(0o755)
+    monkeypatch.setenv("PATH", str(folder))
+    monkeypatch.setattr(command, "KINEMATICS_CYCLES_S", 0.0)
+    return lambda: json.loads(kept.read_text())
+
+
+@pytest.fixture
+def files(tmp_path) -> Callable[..., list[Path]]:
+    def write(hal: str = HAL, ini: str = INI) -> list[Path]:
+        (tmp_path / "kins.hal").write_text(hal)
+        (tmp_path / "kins.ini").write_text(ini)
+        return [tmp_path / "kins.hal", tmp_path / "kins.ini"]
+
+    return write
+
+
+def test_pins_get_the_numbers_of_both_files(pins, files) -> None:
+    assert set_pins(files()) == 2
+    assert pins()["kins.l.0"] == "591.123456789", "not rounded"
+    assert pins()["kins.l.1"] == "582.5"
+
+
+def test_where_the_forward_kinematics_fails_the_old_numbers_are_set_again(pins, files) -> None:
+    with pytest.raises(UsageError, match=r"no pose with these numbers \(kins.fwd-kins-fail\)"):
+        set_pins(files(ini="[KINS]\nL1 = 950.0\n"))
+    assert (pins()["kins.l.0"], pins()["kins.l.1"]) == ("590", "580")
+    assert pins()["kins.fwd-kins-fail"] == "FALSE"
+
+
+def test_a_pin_that_is_not_there_sets_none(pins, files) -> None:
+    with pytest.raises(UsageError, match=r"no pin kins\.gain"):
+        set_pins(files(ini=INI + "[OTHER]\nGAIN = 2\n"))
+    assert pins()["kins.l.1"] == "580"
+
+
+def test_a_variable_that_is_no_single_number_is_refused(pins, files) -> None:
+    with pytest.raises(FileError, match="behind L1 stands"):
+        set_pins(files(ini="[KINS]\nL1 = 591.0 # mm\n"))
+    assert pins()["kins.l.1"] == "580"
+
+
+def test_without_a_hal_file_it_says_how_it_is_called(pins, files) -> None:
+    with pytest.raises(UsageError, match="no HAL file is named"):
+        set_pins(files()[1:])
+
+
+def test_without_linuxcnc_the_command_fails_in_one_line(files, monkeypatch, capsys) -> None:
+    monkeypatch.setenv("PATH", "")
+    monkeypatch.setattr(sys, "argv", ["hexacell-set-pins", *map(str, files())])
+    assert command.main() == 1
+    said = capsys.readouterr().err
+    assert said.startswith("hexacell-set-pins: halcmd cannot be run")
+    assert said.count("\n") == 1
+
+
+def test_the_command_tells_how_many(pins, files, monkeypatch, capsys) -> None:
+    monkeypatch.setattr(sys, "argv", ["hexacell-set-pins", *map(str, files())])
+    assert command.main() == 0
+    assert capsys.readouterr().out == "2 pins set\n"

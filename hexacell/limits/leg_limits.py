@@ -27,7 +27,8 @@ class LegLimits:
         platform_axes: (6, 3) those of the platform's joints, in the platform frame.
         base_cones: (6,) largest angles of the legs from these axes, rad.
         platform_cones: (6,) those at the platform, rad.
-        distance_mm: smallest distance of two legs.
+        distance_mm: smallest distance of two legs; 0 is no limit, and has no margin. Below it, where limits
+            were widened, everything is allowed, with a margin.
     """
 
     base_axes: Array
@@ -60,9 +61,10 @@ class LegLimits:
     def including(self, legs: Legs, wanted: Array | float = 0.0) -> LegLimits:
         """These limits, widened where the margins at one pose (1) are less than wanted (m,)."""
         missing = np.maximum(0.0, wanted - self.margins(legs)[0] + ROUNDING)
+        distance = self.distance_mm - float(missing[12:].sum())
         return replace(
             self,
             base_cones=self.base_cones + missing[:6],
             platform_cones=self.platform_cones + missing[6:12],
-            distance_mm=max(0.0, self.distance_mm - float(missing[12:].sum())),
+            distance_mm=distance if distance or not self.distance_mm else -ROUNDING,
         )

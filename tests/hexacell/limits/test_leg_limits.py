@@ -49,6 +49,19 @@ def test_legs_that_come_too_near_are_seen():
     ]
 
 
+@pytest.mark.parametrize("missing", [25.0, 30.0, 31.0, 500.0])
+def test_limits_that_include_legs_that_touch_still_have_a_margin_for_their_distance(missing):
+    # One robot in 1,700 stood so under its provisional geometry, and its run ended with a traceback.
+    here = turned([1, 0, 0], 10.0)
+    stated = limits(distance=30.0)
+    spare = stated.margins(here)[0, 12]
+    wanted = np.append(np.zeros(12), spare + missing)
+    widened = stated.including(here, wanted)
+    assert widened.margins(here).shape == (1, 13)
+    assert (widened.margins(here)[0] >= wanted).all()
+    assert len(widened.margins_for(0.1, 100.0)) == 13
+
+
 def test_limits_that_include_a_pose_allow_it_and_nothing_beyond():
     here = turned([1, 0, 0], 33.0)
     widened = limits(distance=60.0).including(here)

@@ -43,7 +43,7 @@ def test_a_run_keeps_no_password_can_be_resumed_and_its_files_are_its_users(
 
     if (run / "config-before").exists():
         quick_cell.controller.write_bytes((run / "config-before").read_bytes())
-    rewound = quick_cell.rewound(run, "P1/close")
+    rewound = quick_cell.rewound(run, "propose")
     first, *others = (rewound / "journal.jsonl").read_bytes().splitlines(keepends=True)
     assert b"hunter2" in first, "as an earlier version kept it"
     masked = (run / "journal.jsonl").read_bytes().splitlines(keepends=True)[0]

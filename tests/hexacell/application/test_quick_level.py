@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import asyncio
 import shutil
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from pathlib import Path
 
 import pytest
 
@@ -16,6 +18,7 @@ from hexacell.controller_config.change import fingerprint
 from hexacell.decision import Verdict
 from hexacell.errors import ExitCode, OutOfTime, UsageError
 from hexacell.identification.estimator import identify
+from hexacell.reporting.result import AcceptedResult
 from hexacell.robot_model import robot_of
 from hexacell.runs.run_folder import RunFolder, runs_folder
 from procedures.calibration.workflow import Calibration, Mode
@@ -23,23 +26,49 @@ from procedures.journal.journal import read_journal
 from procedures.run import events
 from procedures.run.commands import CommandQueue, EndAtReference
 from procedures.run.state import RunState, fold
-from tests.hexacell.application.conftest import order_of
+from tests.hexacell.application.conftest import Finished, maker, order_of
+from tests.small_cell import few_candidates
 
 BUDGET = 20
 DRIFT_MM = 0.1
 
 
-@pytest.fixture
-def drifted(make_cell, finished) -> Cell:
+def drifted_cell(folder: Path, finished: Finished) -> Cell:
     """The cell that was calibrated, of whose robot one leg has become longer since."""
-    truth = finished.cell.settings.simulation.geometry.model_dump()
+    simulation = finished.cell.settings.simulation
+    assert simulation is not None
+    truth = simulation.geometry.model_dump()
     lengths = list(truth["l"])
     lengths[3] += DRIFT_MM
-    geometry = finished.cell.settings.simulation.geometry.model_copy(update={"l": tuple(lengths)})
-    cell: Cell = make_cell(simulation__geometry=geometry, quick__budget_records=BUDGET)
+    geometry = simulation.geometry.model_copy(update={"l": tuple(lengths)})
+    cell = maker(folder)(simulation__geometry=geometry, quick__budget_records=BUDGET)
     cell.config_path.write_bytes(finished.cell.config_path.read_bytes())
     shutil.copytree(runs_folder(finished.cell), runs_folder(cell))
     return cell
+
+
+@pytest.fixture
+def drifted(tmp_path, finished) -> Cell:
+    return drifted_cell(tmp_path, finished)
+
+
+@dataclass(frozen=True)
+class Corrected:
+    """The same after a run of the quick level."""
+
+    cell: Cell
+    started_from: AcceptedResult | None
+    ended: events.Ended
+    state: RunState
+    folder: RunFolder
+
+
+@pytest.fixture(scope="module")
+def corrected(tmp_path_factory: pytest.TempPathFactory, finished: Finished) -> Corrected:
+    cell = drifted_cell(tmp_path_factory.mktemp("corrected"), finished)
+    before = last_accepted_result(cell)
+    with few_candidates():
+        return Corrected(cell, before, *asyncio.run(a_quick_run(cell)))
 
 
 async def a_quick_run(cell: Cell, name: str = "quick") -> tuple[events.Ended, RunState, RunFolder]:
@@ -48,11 +77,10 @@ async def a_quick_run(cell: Cell, name: str = "quick") -> tuple[events.Ended, Ru
     return ended, fold(read_journal(folder.journal)), folder
 
 
-async def test_a_robot_that_drifted_is_corrected_by_few_records(drifted, finished) -> None:
-    before = last_accepted_result(drifted)
-    assert before is not None
-    ended, state, folder = await a_quick_run(drifted)
-    assert ended.exit_code == ExitCode.DONE
+async def test_a_robot_that_drifted_is_corrected_by_few_records(corrected, finished) -> None:
+    assert corrected.started_from is not None
+    state, folder = corrected.state, corrected.folder
+    assert corrected.ended.exit_code == ExitCode.DONE
     assert state.judged is not None
     assert state.judged.verdict is Verdict.PASS
     assert state.judged.verification is not None
@@ -64,16 +92,16 @@ async def test_a_robot_that_drifted_is_corrected_by_few_records(drifted, finishe
     assert state.identified.quick is not None
     assert state.identified.quick.records == len(state.measurements()) <= BUDGET
     # What it wrote is what the next run starts from, with a covariance of its own.
-    after = last_accepted_result(drifted)
+    after = last_accepted_result(corrected.cell)
     assert after is not None
     assert after.run == str(folder.path)
-    assert fingerprint(drifted.config_path) != fingerprint(finished.cell.config_path)
+    assert fingerprint(corrected.cell.config_path) != fingerprint(finished.cell.config_path)
     assert (await replay(folder.path)).differences == []
 
 
-async def test_its_residuals_are_judged_by_what_was_known_before(drifted) -> None:
+def test_its_residuals_are_judged_by_what_was_known_before(corrected) -> None:
     """Where an earlier result holds some parameters, fewer are taken from the residuals than there are."""
-    _, state, _ = await a_quick_run(drifted)
+    state = corrected.state
     assert state.identified is not None
     result = state.identified.result
     assert result.expected_chi2 is not None
@@ -84,16 +112,16 @@ async def test_its_residuals_are_judged_by_what_was_known_before(drifted) -> Non
     assert all(gate.passed for gate in state.proposed.gates)
 
 
-async def test_the_next_check_starts_from_it(drifted) -> None:
-    await a_quick_run(drifted)
-    folder = RunFolder(runs_folder(drifted) / "check")
-    ended = await calibrate(order_of(drifted, folder, mode=Mode.CHECK))
+async def test_the_next_check_starts_from_it(corrected) -> None:
+    cell = corrected.cell
+    folder = RunFolder(runs_folder(cell) / "check")
+    ended = await calibrate(order_of(cell, folder, mode=Mode.CHECK))
     assert ended.exit_code == ExitCode.DONE
     state = fold(read_journal(folder.journal))
     assert state.judged is not None
     assert state.judged.check is not None
     assert state.judged.check.drift_scale == 1.0
-    assert state.judged.check.earlier_run == str(runs_folder(drifted) / "quick")
+    assert state.judged.check.earlier_run == str(corrected.folder.path)
 
 
 async def test_without_an_accepted_result_it_says_what_to_do(make_cell, tmp_path) -> None:
@@ -124,18 +152,18 @@ async def test_one_that_was_ended_in_its_midst_is_resumed(drifted) -> None:
     assert (await replay(folder.path)).differences == []
 
 
-async def test_what_effects_did_to_the_result_before_counts(drifted) -> None:
+def test_what_effects_did_to_the_result_before_counts(corrected) -> None:
     """An encoder that reads long did so in the calibration as well: its records do not average that."""
-    _, state, _ = await a_quick_run(drifted)
-    uncertain = drifted.settings.uncertainty.model_copy(update={"encoder_scale_um_m": 100.0})
-    settings = drifted.settings.model_copy(update={"uncertainty": uncertain})
+    cell, state = corrected.cell, corrected.state
+    uncertain = cell.settings.uncertainty.model_copy(update={"encoder_scale_um_m": 100.0})
+    settings = cell.settings.model_copy(update={"uncertainty": uncertain})
     assert state.started is not None
     before = state.started.accepted
-    effects = last_accepted_result(replace(drifted, settings=settings))
+    effects = last_accepted_result(replace(cell, settings=settings))
     assert before is not None
     assert effects is not None
     known = before.model_copy(update={"effects": effects.effects})
-    calibration = Calibration(settings, robot_of(drifted), Mode.QUICK, accepted=known)
+    calibration = Calibration(settings, robot_of(cell), Mode.QUICK, accepted=known)
     robot = calibration.robot_of(state)
     assert robot.known_effects.keys() == {"scale of each encoder"}
     found = identify(robot.problem(state.measurements()))
@@ -147,8 +175,8 @@ async def test_what_effects_did_to_the_result_before_counts(drifted) -> None:
     assert whole.systematic_mm != pytest.approx(forgetful.systematic_mm, rel=1e-3)
 
 
-async def test_it_is_resumed_in_its_mode(drifted) -> None:
-    _, _, folder = await a_quick_run(drifted)
+async def test_it_is_resumed_in_its_mode(drifted, corrected) -> None:
+    folder = corrected.folder
     lines = folder.journal.read_bytes().splitlines(keepends=True)
     history = read_journal(folder.journal)
     until = next(n for n, event in enumerate(history) if isinstance(event, events.Proposed))

@@ -20,6 +20,8 @@ from procedures.run.steps import Move, Phase, SixNumbers
 from tests.hexacell.application.conftest import Approver, Finished, Site
 
 THREE_POINTS = ((100.0, -100.0, 500.0), (0.0, 150.0, 520.0), (-100.0, 100.0, 500.0))
+AMONG_THREE = {1: 1, 2: 3}
+"""The points of the cell that was calibrated, and where they are among the three."""
 
 
 def some_measured(finished: Finished) -> tuple[RemovedPose, ...]:
@@ -27,7 +29,8 @@ def some_measured(finished: Finished) -> tuple[RemovedPose, ...]:
     samples = fold(finished.history).samples(Phase.IDENTIFY)
     references = [Pose(*one.pose) for one in samples if one.orientation == 1]
     poses = [one for one in samples if one.orientation in {3, 6}]
-    return tuple(removed_pose(one.at.point, Pose(*one.pose), references, is_listed=False) for one in poses)
+    placed = [(AMONG_THREE[one.at.point], Pose(*one.pose)) for one in poses]
+    return tuple(removed_pose(point, pose, references, is_listed=False) for point, pose in placed)
 
 
 def commanded(site: Site) -> list[SixNumbers]:
@@ -35,12 +38,12 @@ def commanded(site: Site) -> list[SixNumbers]:
     return [event.step.pose for event in begun if isinstance(event.step, Move)]
 
 
-async def test_others_are_measured_in_their_place(
+async def test_others_are_measured_in_their_place_and_points_are_left(
     make_site: Callable[..., Site], finished: Finished, approver: Approver
 ) -> None:
-    removed = RemovedPoses(poses=some_measured(finished))
+    removed = RemovedPoses(points=(2,), poses=some_measured(finished))
     assert len(removed.poses) == 4
-    site, queue = make_site(), CommandQueue()
+    site, queue = make_site(identification__points=THREE_POINTS), CommandQueue()
 
     def stop_early(event: events.Event, _: Any) -> None:
         if isinstance(event, events.SetClosed):
@@ -54,22 +57,11 @@ async def test_others_are_measured_in_their_place(
     assert ended.exit_code == ExitCode.DONE, ended.line
     assert commanded(site)
     assert all(removed.refused.allows(pose) for pose in commanded(site))
-    records = fold(finished.history).samples(Phase.IDENTIFY)
-    assert len(fold(read_journal(site.folder.journal)).samples(Phase.IDENTIFY)) == len(records)
+    records = fold(read_journal(site.folder.journal)).samples(Phase.IDENTIFY)
+    assert len(records) == len(fold(finished.history).samples(Phase.IDENTIFY))
+    assert {one.at.point for one in records} == {1, 3}
     report = await replay(site.folder.path)
     assert not report.differences, "a replay decides alike"
-
-
-async def test_points_that_were_taken_out_are_left(
-    make_site: Callable[..., Site], approver: Approver
-) -> None:
-    site = make_site(identification__points=THREE_POINTS)
-    ended = await site.calibrate(operator=approver, unattended=False, removed=RemovedPoses(points=(2,)))
-    assert ended.exit_code == ExitCode.DONE, ended.line
-    measured = {one.at.point for one in fold(read_journal(site.folder.journal)).samples(Phase.IDENTIFY)}
-    assert measured == {1, 3}
-    report = await replay(site.folder.path)
-    assert not report.differences
 
 
 async def test_a_run_with_too_little_left_is_refused_before_anything_moves(

@@ -225,12 +225,15 @@ def test_the_run_is_reproduced(whole: Rig, few_candidates: None, tmp_path: Path)
     assert report.results > 60
 
 
-@pytest.mark.parametrize("command", [Abort(), pytest.param(None, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(
+    ("command", "step"),
+    [(Abort(), 9), *(pytest.param(one, 3, marks=pytest.mark.slow) for one in (Abort(), None))],
+)
 async def test_interrupted_anywhere_it_is_measured_once(
-    make_rig: MakeRig, few_candidates: None, tmp_path: Path, command: Abort | None
+    make_rig: MakeRig, few_candidates: None, tmp_path: Path, command: Abort | None, step: int
 ) -> None:
-    """After a stop, and after a death that leaves no word, at each event until the noise is measured."""
-    for number in range(2, 56, 3):
+    """After a stop, and after a death that leaves no word, at some events until the noise is measured."""
+    for number in range(2, 56, step):
         folder = tmp_path / f"{number}"
         folder.mkdir()
         rig = new_rig(folder, **ASKED)

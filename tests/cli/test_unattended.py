@@ -99,15 +99,15 @@ def test_a_signal_ends_the_waiting(start, short_cell) -> None:
     assert process.stopped(signal.SIGTERM).code == ExitCode.INTERRUPTED
 
 
-def test_a_run_that_lasts_too_long_ends_at_its_reference_and_is_resumed(start, typed, quick_cell) -> None:
+def test_a_run_that_lasts_too_long_ends_at_its_reference_and_is_resumed(typed_here, quick_cell) -> None:
     stated(quick_cell, "longest_minutes = 4")
-    ended = start("run", quick_cell.cell, "--unattended", "--mode", "optimise").ended()
+    ended = typed_here("run", quick_cell.cell, "--unattended", "--mode", "optimise")
     assert ended.code == ExitCode.OUT_OF_TIME
     assert "it lasted longer than longest_minutes = 4" in " ".join(ended.err.split())
     assert "To continue:" in ended.out
     cell = load_cell(quick_cell.cell)
     assert cell.settings.unattended.longest_minutes == 4.0
-    resumed = typed("run", quick_cell.cell, "--resume", "--mode", "optimise")
+    resumed = typed_here("run", quick_cell.cell, "--resume", "--mode", "optimise")
     assert resumed.code == ExitCode.DONE, resumed.err
 
 

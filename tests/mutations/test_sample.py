@@ -8,12 +8,13 @@ import pytest
 
 from tests.mutations.kinds import SHARES
 
-EACH = 5
-"""Trials of each kind."""
+SAMPLE, EACH = 3, 20
+"""Trials of each kind in ``make test`` and in ``make test-full``."""
 
 
+@pytest.mark.parametrize("number", [SAMPLE, pytest.param(EACH, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("trial", SHARES, ids=lambda trial: trial.__name__)
-def test_mutated_input_is_refused_or_used_and_never_more(trial, templates, place):
-    found = [trial(templates, place, random.Random(seed)) for seed in range(EACH)]
+def test_mutated_input_is_refused_or_used_and_never_more(trial, number, templates, place):
+    found = [trial(templates, place, random.Random(seed)) for seed in range(number)]
     wrong = [f"seed {seed}: {one}" for seed, one in enumerate(found) if one.problems]
     assert not wrong, "\n".join(wrong)

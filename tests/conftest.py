@@ -6,6 +6,7 @@ import asyncio
 import contextlib
 import json
 import os
+import re
 import signal
 import threading
 import time
@@ -18,6 +19,7 @@ from hypothesis import settings
 GRACE_S = 20.0  # for what is on its way out when a test returns; only a test that fails waits so long
 TESTS = Path(__file__).parent
 BENCHMARKS = TESTS / "benchmarks"
+_KEPT_OPEN = re.compile(r"/mpl-data/|\.so(\.[0-9.]+)?$")
 FAULTS = "fault-matrix"  # what a test calls the cases that it tried
 
 # As in the program and the Makefile: threads only slow small matrices down. Numpy is imported later.
@@ -106,10 +108,10 @@ def _blocked_signals() -> set[str]:
 def _descriptors() -> set[str]:
     """Every open file descriptor and what it refers to; none where there is no /proc.
 
-    Without the fonts that matplotlib opens once and keeps.
+    Without what is opened once and kept: matplotlib's fonts, and libraries that a library loads.
     """
     found = {}
     for descriptor in Path("/proc/self/fd").glob("*"):
         with contextlib.suppress(FileNotFoundError):  # the one that lists the folder
             found[descriptor.name] = str(descriptor.readlink())
-    return {f"descriptor {name} -> {file}" for name, file in found.items() if "/mpl-data/" not in file}
+    return {f"descriptor {name} -> {file}" for name, file in found.items() if not _KEPT_OPEN.search(file)}

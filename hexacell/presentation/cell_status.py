@@ -32,6 +32,7 @@ HELP = {
     "hexacell_position_limit_mm": "Its limit.",
     "hexacell_open_proposal": "Whether a proposal waits for a person.",
     "hexacell_changes_found": "Changes of the robot that the watch over all runs found.",
+    "hexacell_largest_drift_sigmas": "Largest rate of a parameter since the last change, over its sigma.",
     "hexacell_largest_sum_ratio": "Largest cumulative sum of a parameter, over the limit of an alarm.",
 }
 
@@ -130,9 +131,13 @@ def _samples(one: CellStatus) -> Iterator[tuple[str, dict[str, str], str]]:
         "hexacell_calibration_due_timestamp_seconds": one.due_at,
     }
     yield from ((name, {}, repr(at.timestamp())) for name, at in times.items() if at is not None)
-    if one.worst_share is not None:
-        parameter, ratio = one.worst_share
-        yield "hexacell_largest_sum_ratio", {"parameter": parameter}, repr(ratio)
+    worst = {
+        "hexacell_largest_drift_sigmas": one.surest_drift,
+        "hexacell_largest_sum_ratio": one.worst_share,
+    }
+    for name, found in worst.items():
+        if found is not None:
+            yield name, {"parameter": found[0]}, repr(found[1])
     if one.judged is None:
         return
     verdict, accuracy = one.judged.summary.verdict, one.judged.summary.accuracy

@@ -10,9 +10,11 @@ from datetime import timedelta
 import pytest
 from prometheus_client.parser import text_string_to_metric_families
 
+from hexacell.cell.loader import load_cell
 from hexacell.storage.cell_lock import cell_lock
 from procedures.journal.journal import read_entries
 from procedures.journal.line_format import encode
+from tests.hexacell.application.recorded_nights import Nights
 
 
 @pytest.fixture
@@ -65,6 +67,19 @@ def test_metrics_are_those_of_the_latest_verdict(typed_here, demo, calibrated, t
     assert found[("last_pass_timestamp_seconds",)] == found[("last_run_timestamp_seconds",)] > 1.7e9
     assert (found[("in_use",)], found[("open_proposal",)], found[("changes_found",)]) == (0.0, 0.0, 0.0)
     assert ("calibration_due_timestamp_seconds",) not in found
+
+
+def test_the_parameter_that_drifts_most_surely_is_collected(typed_here, cell_folder, tmp_path) -> None:
+    nights = Nights(load_cell(cell_folder.cell))
+    nights.calibrate()
+    for _ in range(4):
+        nights.check()
+    target = tmp_path / "hexacell.prom"
+    assert typed_here("status", cell_folder.cell, "--metrics", target).code == 0
+    rates = typed_here("history", cell_folder.cell, "--drift", "--json").document["rates"]
+    scores = {one["name"]: abs(one["per_day"]) / one["sigma_per_day"] for one in rates}
+    name = max(scores, key=scores.__getitem__)
+    assert samples(target)[("largest_drift_sigmas", name)] == pytest.approx(scores[name])
 
 
 def test_when_the_next_calibration_is_due(typed_here, calibrated, tmp_path) -> None:

@@ -55,7 +55,7 @@ class CellStatus:
 
     @property
     def surest_drift(self) -> tuple[str, float] | None:
-        """The parameter that drifts most surely, and how surely, in standard deviations; none without runs."""
+        """The parameter that drifts most surely, and by how many standard deviations; none without runs."""
         scores = [(one.name, abs(one.per_day) / one.sigma_per_day) for one in self.drift.rates]
         return max(scores, key=lambda one: one[1], default=None)
 
